@@ -43,7 +43,8 @@ $(DOCS): $(READY)
 	$(PIP) --quiet --editable '.[docs]'
 	@touch $@
 
-# --strict: a broken link, anchor or reference ends the build. The theme's notice of its end of life is known: mkdocs.yml.
+# --strict: a broken link, anchor or reference ends the build.
+# The theme says when its maintenance ends: docs/explanation/design.md, "Dependencies".
 docs: $(DOCS)  ## the documentation site: out/site/index.html, readable without a network
 	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --strict
 

@@ -7,8 +7,10 @@ import statistics
 from measure import RUNS, say, spread
 from report import Row, Section
 
-from robochoc.flight.flight import FlightConditions, FlightLog, fly
+from robochoc.flight.flight import fly
+from robochoc.flight.log import FlightLog
 from robochoc.flight.mission import Mission, mission_of
+from robochoc.flight.quadrotor.conditions import FlightConditions
 from robochoc.flight.quadrotor.simulation import DT
 from robochoc.generators.queens3d import queens3d
 from robochoc.model.outcome import Outcome, Verdict

@@ -15,7 +15,7 @@ from robochoc.communication.simulator.schedule import Concurrent
 from robochoc.communication.simulator.simulator import Simulation
 from robochoc.formats import PREDEFINED
 from robochoc.model.problem import Child, Constraint, Domain, Parent, ProblemKind, Robot, Team, Variable
-from robochoc.run.incumbent import course
+from robochoc.run.incumbent import costs_by_cycle
 from robochoc.run.registry import protocol_named
 from robochoc.solver.agent_problem import RunParameters
 
@@ -54,14 +54,14 @@ def main() -> None:
     name, agents, degree, seed, cycles, *settings = sys.argv[1:]
     team = soft_colouring(int(agents), int(degree), int(seed))
     given = {"cycles": cycles, **dict(setting.split("=", 1) for setting in settings)}
-    run = Simulation(team, protocol_named(name), Concurrent(int(seed)), brief=RunParameters(int(seed), given))
+    run = Simulation(team, protocol_named(name), Concurrent(int(seed)), parameters=RunParameters(int(seed), given))
     cpu_s, wall_s = time.process_time(), time.perf_counter()
     result = run.search()
     cpu_s, wall_s = time.process_time() - cpu_s, time.perf_counter() - wall_s
     memory_mb = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
     trails = {name: found.trail for name, found in result.findings.items() if found.trail}
     told = {
-        "costs": list(course(run.compiled, trails)),
+        "costs": list(costs_by_cycle(run.compiled, trails)),
         "messages": sum(result.metrics.messages.values()),
         "bytes": result.metrics.bytes,
         "ncccs": result.metrics.ncccs,

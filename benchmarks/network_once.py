@@ -24,9 +24,9 @@ from typing import NamedTuple
 import zenoh
 from rally import End, LongRally, ManyBalls, Rally, ShortRally, pair, play, return_all
 
-from robochoc.authority.admission import Household
+from robochoc.authority.admission import InMemoryAuthority
 from robochoc.authority.identity import Identity, IdentityTexts
-from robochoc.communication.network.inbox import Arrived
+from robochoc.communication.network.inbox import FrameArrived
 from robochoc.communication.network.local import LOOPBACK, LocalNetwork
 from robochoc.communication.network.router import RefusalObserver, Router
 from robochoc.communication.network.settings import LEASE_MS, NetworkSettings
@@ -128,7 +128,7 @@ class PostEnd:
         """The next letter."""
         while True:
             item = self._post.inbox.get()
-            if isinstance(item, Arrived):
+            if isinstance(item, FrameArrived):
                 return item.content
 
     def close(self) -> None:
@@ -256,7 +256,7 @@ def _by_watched_post(balls: int, hits: int) -> float:
 
 
 def _by_letters(refused: RefusalObserver | None, balls: int, hits: int) -> float:
-    household = Household(ENDS)
+    household = InMemoryAuthority(ENDS)
     router = Router(_free(), household.master_identity((LOOPBACK,)), refused, LEASE_MS)
     router.open({"A": ("B",), "B": ("A",)})
     try:

@@ -23,7 +23,7 @@ from robochoc.model.problem import Team
 from robochoc.run.defaults import default_protocol
 from robochoc.run.options import Options, Runtime, Withdrawal
 from robochoc.run.orchestrator import solve
-from robochoc.run.registry import UnknownProtocolError, installed_spelling, offers
+from robochoc.run.registry import UnknownProtocolError, installed_protocols, installed_spelling
 from robochoc.run.scenario import Environment
 
 if TYPE_CHECKING:
@@ -35,7 +35,14 @@ _MASTER, _AGENT = "Master", "Agent"
 
 @dataclass(frozen=True)
 class Problem:
-    """A valid team: `team` is its data. Raises `InvalidInputError` for one that was built in Python and is not."""
+    """A constraint problem that a team of robots can solve.
+
+    Attributes:
+        team: The robots, their variables and constraints: from files, a generator, or built in Python.
+
+    Raises:
+        InvalidInputError: if the team is invalid. It lists every mistake.
+    """
 
     team: Team
 
@@ -54,13 +61,36 @@ class Problem:
         environment: Environment | None = None,
         **options: Any,  # noqa: ANN401 - the other fields of `Options`, by their names
     ) -> Outcome:
-        """Let the robots solve it together; see `robochoc.run.options.Options` for what else can be said.
+        """Let the robots solve the problem together.
 
-        Without a `protocol`, the one that suits the team. An `environment` gets each answer, and returns
-        what changes next (`robochoc.run.scenario.Environment`).
-        Raises what `robochoc.run.orchestrator.solve` raises, and `ValueError` or
-        `TypeError` where an option is none. A program that starts processes is to do so below
-        `if __name__ == "__main__":`.
+        The runtime `processes` starts processes. A program that uses it calls this below `if __name__ == "__main__":`.
+
+        Args:
+            protocol: The name of the protocol, in any case. None: the default protocol for the kind of problem.
+            runtime: `processes`, `simulator` or `network`.
+            order: The name of a priority order, such as `dom-deg`. None: the order of the files.
+            withdraw: Which robots may withdraw if there is no solution for all: `minimum` or `maximal`. None: none may.
+            settings: Settings of the protocol, by name.
+            observer: It is called with every event of the run.
+            environment: It gets each answer, and returns what changes next.
+            **options: Other fields of `robochoc.run.options.Options`, such as `seed` or `timeout`.
+
+        Returns:
+            The outcome: a verdict, the assignment, its cost, and what the run took.
+
+        Raises:
+            UnsupportedError: if problem, protocol, runtime and options do not go together.
+            RobotsLostError: if robots were lost, and the options do not say how to go on.
+            RefutedError: if the checker refutes the answer.
+            ValueError: if an option has a value that is not allowed.
+            TypeError: if there is no such option.
+
+        Example:
+            >>> import robochoc
+            >>> problem = robochoc.load("instances/queens3d-4")
+            >>> outcome = problem.solve("abt", runtime="simulator", withdraw="minimum")
+            >>> len(outcome.assignment)
+            10
         """
         asked = Options(
             protocol=installed_spelling(protocol) if protocol else default_protocol(self.team.kind),
@@ -74,22 +104,34 @@ class Problem:
 
 
 def load(path: Path | str) -> Problem:
-    """Return the team in the folder `path`. Raises `InvalidInputError` with every mistake's file and line."""
+    """Return the problem of the team whose files are in the folder `path`.
+
+    Args:
+        path: A folder with an XML file for each robot, and `scenario.xml` if the problem changes over time.
+
+    Raises:
+        InvalidInputError: if the files are invalid. It lists every mistake with its file and line.
+
+    Example:
+        >>> import robochoc
+        >>> robochoc.load("instances/queens3d-4").team.name
+        'queens3d-4'
+    """
     return Problem(read_team(Path(path)))
 
 
 @dataclass
 class AgentsContainer:
-    """What runs on one machine of several: the master, or robots. The paper's, line by line in Python's spelling.
+    """The agents that run on one of several machines: the master, or robots. The paper's Figures 3 and 4 in Python.
 
-    Figure 3, the master's machine:
+    The master's machine (Figure 3):
 
         main_container = AgentsContainer()
         main_container.set_agent_type("MasterABT")
         main_container.add_agent("MASTER", sniff=False)
         main_container.run()
 
-    Figure 4, a robot's:
+    A robot's machine (Figure 4):
 
         container = AgentsContainer()
         container.set_agent_type("AgentABT")
@@ -97,9 +139,7 @@ class AgentsContainer:
         container.set_main_container("192.168.1.14")
         container.run()
 
-    The type's second part names the protocol, as its class is called (`MasterAFCng`) or as it is installed. `run`
-    returns the outcome on the master's machine, and on a robot's how it ended there, by its name. Where the Authority
-    is, where to listen, tokens and identities: as on the command line (`set_listen`, `set_authority`, `set_identity`).
+    The second part of the type names the protocol: by its class (`MasterAFCng`), or by its installed name.
     """
 
     _type: str = ""
@@ -110,43 +150,82 @@ class AgentsContainer:
     _identities: dict[str, tuple[Path | None, str | None]] = field(default_factory=dict)
 
     def set_agent_type(self, kind: str) -> None:
-        """`MasterABT`, `AgentABT`: which end this is, and the protocol. Raises `ValueError`, `UnknownProtocolError`."""
+        """Say whether this container runs the master or robots, and name the protocol.
+
+        Args:
+            kind: `Master` or `Agent`, and the protocol: `MasterABT`, `AgentABT`.
+
+        Raises:
+            ValueError: if `kind` begins otherwise.
+            UnknownProtocolError: if no such protocol is installed.
+        """
         if not kind.startswith((_MASTER, _AGENT)):
             raise ValueError(f"{kind!r} is no type of agent: MasterABT or AgentABT, or with another protocol's name")
         protocol_called(kind.removeprefix(_MASTER).removeprefix(_AGENT))
         self._type = kind
 
     def add_agent(self, name: str, file: Path | str | None = None, *, sniff: bool = False) -> None:
-        """Run the agent `name`: a robot with its `file`, or the master, which has none.
+        """Add an agent to this container.
 
-        `sniff`: whoever watches at the master is told of all that it says and hears.
+        Args:
+            name: The name of the robot or the master.
+            file: The robot's XML file. The master has none.
+            sniff: Whether the sniffer at the master shows the messages that the agent sends and receives.
         """
         self._agents[name] = (None if file is None else Path(file), sniff)
 
     def set_main_container(self, place: str) -> None:
-        """Where the master listens: `HOST` or `HOST:PORT`. Raises `AddressError`."""
+        """Set the address of the master, for a robot.
+
+        Args:
+            place: `HOST` or `HOST:PORT`.
+
+        Raises:
+            AddressError: if it is no address.
+        """
         from robochoc.run.networked.address import Address  # noqa: PLC0415 - an extra
 
         self._main = Address.parse(place)
 
     def set_listen(self, place: str) -> None:
-        """The master: listen here, instead of on loopback. Raises `AddressError`."""
+        """Set the address at which the master listens. The default is this machine alone (loopback).
+
+        Args:
+            place: `HOST` or `HOST:PORT`.
+
+        Raises:
+            AddressError: if it is no address.
+        """
         from robochoc.run.networked.address import Address  # noqa: PLC0415 - an extra
 
         self._listen = Address.parse(place)
 
     def set_authority(self, folder: Path | str) -> None:
-        """The master: the Authority's folder, instead of the user's own."""
+        """Set the folder of the Authority, for the master. The default is in the user's data folder."""
         self._authority = Path(folder)
 
     def set_identity(self, name: str, folder: Path | str | None = None, token: str | None = None) -> None:
-        """A robot: where its key and certificate are, and a token, if it has to get them first."""
+        """Set where the robot `name` finds its identity.
+
+        Args:
+            name: The robot's name.
+            folder: The folder with its key and certificate. The default is in the user's data folder.
+            token: The token by which it enrols, if it has no certificate yet.
+        """
         self._identities[name] = (None if folder is None else Path(folder), token)
 
     def run(self, observer: Observer | None = None, **plan: Any) -> Outcome | dict[str, Ending]:  # noqa: ANN401
-        """Be the master, or the robots, of one run. `plan` holds further fields of `robochoc.run.networked.lead.Plan`.
+        """Run the agents of this container until the run is over.
 
-        Raises what `lead` and `join` raise.
+        Args:
+            observer: It is called with every event that the master sees.
+            **plan: Other fields of `robochoc.run.networked.master_run.Plan`, for the master.
+
+        Returns:
+            On the master's machine the outcome; on a robots' machine how each robot ended, by its name.
+
+        Raises:
+            ValueError: if the container has no type, or a robot no file or no master.
         """
         if not self._type:
             raise ValueError("say first what this container is: set_agent_type('MasterABT') or ('AgentABT')")
@@ -156,13 +235,13 @@ class AgentsContainer:
 
     def _lead(self, observer: Observer | None, plan: Mapping[str, Any]) -> Outcome:
         from robochoc.authority.authority import default_folder  # noqa: PLC0415 - an extra
-        from robochoc.run.networked.lead import HERE, Plan, lead  # noqa: PLC0415 - the same
+        from robochoc.run.networked.master_run import LOOPBACK_ADDRESS, MasterPlan, run_master  # noqa: PLC0415 - the same
 
         protocol = protocol_called(self._type.removeprefix(_MASTER))
         folder = self._authority or default_folder()
         watched = any(sniff for _, sniff in self._agents.values())
-        asked = Plan(folder, self._listen or HERE, protocol=protocol, **plan)
-        return lead(asked, observer=observer, watched=watched).outcome
+        asked = MasterPlan(folder, self._listen or LOOPBACK_ADDRESS, protocol=protocol, **plan)
+        return run_master(asked, observer=observer, watched=watched).outcome
 
     def _join(self) -> dict[str, Ending]:
         from concurrent.futures import ThreadPoolExecutor  # noqa: PLC0415 - robots' machines only
@@ -192,7 +271,7 @@ def protocol_called(word: str) -> str:
 
     Raises `UnknownProtocolError`.
     """
-    for offer in offers():
+    for offer in installed_protocols():
         if offer.protocol and word.casefold() in {offer.name.casefold(), offer.protocol.__name__.casefold()}:
             return offer.name
     raise UnknownProtocolError(f"no protocol {word!r} is installed; robochoc protocols lists them")

@@ -12,19 +12,19 @@ import os
 import re
 from collections.abc import Iterator
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, get_args
 
+import click
 from msgspec import Struct
 
-from robochoc.model.message import Message
-from robochoc.run.registry import offers
+from robochoc.cli.group import cli
+from robochoc.protocols.protocol import Protocol, Settings
+from robochoc.run.registry import installed_protocols
 
 if TYPE_CHECKING:
     from mkdocs.config.defaults import MkDocsConfig
     from mkdocs.structure.files import Files
     from mkdocs.structure.pages import Page
-
-    from robochoc.protocols.protocol import Protocol
 
 ROOT = Path(__file__).parents[2]
 DOCS = ROOT / "docs"
@@ -36,7 +36,8 @@ MOVED = {"benchmarks/RESULTS.md": "reference/results.md", "CHANGELOG.md": "refer
 
 def on_config(config: MkDocsConfig) -> MkDocsConfig:
     """Put the protocols' and the examples' pages into the navigation, beside their lists."""
-    protocols = [{Path(name).stem: name} for name in sorted({*protocol_pages()} - {PROTOCOLS})]
+    names = sorted(Path(name).stem for name in protocol_pages() if name != PROTOCOLS)
+    protocols = [{name: f"reference/protocols/{name}.md"} for name in names]
     for section in config.nav or []:
         for pages in section.values():
             if isinstance(pages, list) and PROTOCOLS in pages:
@@ -61,6 +62,7 @@ def on_files(files: Files, config: MkDocsConfig) -> Files:
 def on_page_markdown(markdown: str, *, page: Page, config: MkDocsConfig, files: Files) -> str:
     """Return the page's text, its links to files outside of the site's source changed to their pages."""
     del config, files
+    markdown = markdown.replace("<!-- commands -->", "\n".join(command_reference(cli, "robochoc", 2)))
     return with_links(markdown, f"docs/{page.file.src_uri}", page.file.src_uri)
 
 
@@ -93,10 +95,10 @@ def page_of(path: str) -> str:
 
 def protocol_pages() -> dict[str, str]:
     """Return the text of the protocols' pages and of their list, by the pages' names."""
-    protocols = {offer.name: offer.protocol for offer in offers() if offer.protocol}
+    protocols = {offer.name: offer.protocol for offer in installed_protocols() if offer.protocol}
     pages = {f"reference/protocols/{name}.md": protocol_page(name, kind) for name, kind in protocols.items()}
     rows = [
-        f"| [`{name}`]({name}.md) | {title(kind)} | {purpose(kind)} | {kind.traits.paper} |"
+        f"| [`{name}`]({name}.md) | {title(kind)} | {purpose(kind)} | {kind.traits.use_when} |"
         for name, kind in protocols.items()
     ]
     listing = [
@@ -104,7 +106,7 @@ def protocol_pages() -> dict[str, str]:
         "",
         "One page per protocol, from its docstring. See also [which protocol when](../../guides/which-protocol.md).",
         "",
-        "| name | | for | paper |",
+        "| name | | for | use when |",
         "| --- | --- | --- | --- |",
         *rows,
     ]
@@ -117,6 +119,7 @@ def protocol_page(name: str, kind: type[Protocol]) -> str:
     facts = {
         "name": f"`--protocol {name}`",
         "for": purpose(kind),
+        "use when": traits.use_when,
         "complete": "yes" if traits.complete else "no: it ends with a good answer, and proves nothing",
         "constraints": ", ".join(["n-ary" if traits.n_ary else "binary", *["PKC"] * traits.partially_known]),
         "problems that change": "goes on with what still holds" if traits.dynamic else "begins anew",
@@ -124,9 +127,7 @@ def protocol_page(name: str, kind: type[Protocol]) -> str:
         "paper": traits.paper,
     }
     table = "\n".join(f"| {key} | {value} |" for key, value in facts.items())
-    listed = [
-        f"::: {item.__module__}.{item.__qualname__}\n    options: {{heading_level: 3}}\n" for item in structs(kind)
-    ]
+    listed = [struct_block(item) for item in structs(kind)]
     whole = "{members: false, show_root_heading: false, show_root_toc_entry: false}"
     parts = [
         f"# {title(kind)}\n\n| | |\n| --- | --- |\n{table}\n",
@@ -134,6 +135,13 @@ def protocol_page(name: str, kind: type[Protocol]) -> str:
         *(["## Messages and settings\n", *listed] if listed else []),
     ]
     return "\n".join(parts)
+
+
+def struct_block(item: type[Struct]) -> str:
+    """Return the block for mkdocstrings that shows a message or settings, with the fields."""
+    fields = ", ".join(item.__struct_fields__)
+    options = f"{{heading_level: 3, members: [{fields}], show_if_no_docstring: true, show_root_full_path: false}}"
+    return f"::: {item.__module__}.{item.__qualname__}\n    options: {options}\n"
 
 
 def title(kind: type[Protocol]) -> str:
@@ -148,11 +156,35 @@ def purpose(kind: type[Protocol]) -> str:
 
 
 def structs(kind: type[Protocol]) -> Iterator[type[Struct]]:
-    """Yield the messages and the settings that a protocol's module defines, in its order."""
-    for item in vars(inspect.getmodule(kind)).values():
-        own = isinstance(item, type) and issubclass(item, Struct) and item.__module__ == kind.__module__
-        if own and (issubclass(item, Message) or item.__name__.endswith("Settings")):
-            yield item
+    """Yield the messages that a protocol's robots receive, and its settings."""
+    yield from get_args(kind.messages) or (kind.messages,)
+    if type(kind.settings) is not Settings:
+        yield type(kind.settings)
+
+
+# Commands
+
+
+def command_reference(command: click.Command, path: str, depth: int) -> Iterator[str]:
+    """Yield the reference of a command and of those below it: what `--help` shows, options in their groups.
+
+    mkdocs-click would list the options without the groups.
+    """
+    context = click.Context(command, info_name=path, max_content_width=82, terminal_width=82)
+    usage, options = context.make_formatter(), context.make_formatter()
+    command.format_usage(context, usage)
+    groups_are_pages = click.Command if isinstance(command, click.Group) else type(command)
+    groups_are_pages.format_options(command, context, options)
+    yield f"{'#' * depth} {path}\n"
+    for paragraph in re.split(r"\n\n+", inspect.cleandoc(command.help or "").partition("\f")[0]):
+        shown = paragraph.removeprefix("\b\n")
+        yield f"{shown}\n" if shown == paragraph else f"```text\n{shown}\n```\n"
+    yield f"```text\n{usage.getvalue()}\n{options.getvalue().rstrip()}\n```\n"
+    if isinstance(command, click.Group):
+        for name in command.list_commands(context):
+            below = command.get_command(context, name)
+            if below is not None and not below.hidden:
+                yield from command_reference(below, f"{path} {name}", depth + 1)
 
 
 # Examples

@@ -1,14 +1,14 @@
-"""The Authority: a small certification authority, and the registry of who may take part.
+"""The Authority: a small certification authority, and the registry of the names that may take part.
 
 A person enrols a name and carries the token to the robot; the robot makes a key of its own and shows the token once;
-the Authority signs a certificate that lives for a day and is renewed before. What is revoked is forgotten by nobody
-until it would have expired anyway. Whoever holds the folder's `ca.key` is the Authority.
+the Authority signs a certificate that is valid for a day and is renewed before. A revocation is kept until the
+certificate would have expired. The holder of the folder's `ca.key` is the Authority.
 """
 
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from datetime import timedelta
 from pathlib import Path
@@ -18,7 +18,6 @@ from cryptography.hazmat.primitives.asymmetric import ec
 from cryptography.x509 import Certificate
 
 from robochoc.authority.certificates import (
-    LONGEST_NAME,
     MASTER,
     CertificateError,
     ca_certificate,
@@ -35,20 +34,20 @@ from robochoc.authority.certificates import (
 )
 from robochoc.authority.events import AuthorityEvent, AuthorityObserver, Granted, Refused, unobserved
 from robochoc.authority.identity import Identity, private_folder, save
+from robochoc.authority.names import InvalidNameError, UnknownNameError, check_name, describe_enrolled
 from robochoc.authority.registry import (
     PRIVATE,
     AuthorityError,
+    EnrolledName,
     Invitation,
     Issued,
-    Member,
     Registry,
     Right,
     Role,
     locked,
 )
 from robochoc.authority.token import Token, digest
-from robochoc.formats.diagnostics import on_one_line, shortened, suggestion
-from robochoc.formats.names import is_name
+from robochoc.formats.diagnostics import on_one_line, shortened
 from robochoc.system.files import write_atomically
 
 TOKEN_LIFETIME = timedelta(hours=24)
@@ -59,23 +58,22 @@ _KEY, _CERTIFICATE, _MASTER = "ca.key", "ca.pem", "master"
 _OTHERS = 0o077
 
 
-class InvalidNameError(ValueError):
-    """A name that no robot can have, or that is reserved."""
-
-
-class UnknownNameError(LookupError):
-    """Nobody of that name is enrolled."""
-
-
 class NotGrantedError(Exception):
-    """The Authority refuses; the message says why, and may be told to whoever asked."""
+    """The Authority refuses. The message says why, and may be sent to the one that asked."""
 
 
 class Authority:
     """The Authority in `folder`; `create` and `open` make one.
 
-    `observer` hears of what is granted and refused, `clock` gives Unix time, certificates live for `lifetime`.
     Several threads and processes may use the same folder at once.
+
+    Args:
+        folder: Where its files are.
+        key: Its private key.
+        certificate: Its certificate.
+        observer: Receives what is granted and refused.
+        clock: Returns Unix time.
+        lifetime: How long certificates are valid.
     """
 
     def __init__(
@@ -105,7 +103,10 @@ class Authority:
         clock: Callable[[], float] = time.time,
         lifetime: timedelta = CERTIFICATE_LIFETIME,
     ) -> Authority:
-        """A new Authority in `folder`, which is closed to other users. Raises `AuthorityError` where one is already."""
+        """Return a new Authority in `folder`, which is closed to other users.
+
+        Raises `AuthorityError` where one is already.
+        """
         folder = Path(folder)
         private_folder(folder)
         with locked(folder):
@@ -128,7 +129,7 @@ class Authority:
         clock: Callable[[], float] = time.time,
         lifetime: timedelta = CERTIFICATE_LIFETIME,
     ) -> Authority:
-        """The Authority in `folder`. Raises `AuthorityError` where there is none that can be used."""
+        """Return the Authority in `folder`. Raises `AuthorityError` where there is none that can be used."""
         folder = Path(folder)
         try:
             content, mode = (folder / _KEY).read_bytes(), (folder / _KEY).stat().st_mode
@@ -152,7 +153,7 @@ class Authority:
     def enrol(
         self, name: str, role: Role = Role.ROBOT, ttl: timedelta = TOKEN_LIFETIME, may: Iterable[Right] = ()
     ) -> Token:
-        """A token for `name`, which works once, within `ttl`. See `enrol_all`."""
+        """Return a token for `name`, which works once, within `ttl`. See `enrol_all`."""
         return self.enrol_all([name], role, ttl, may)[name]
 
     def enrol_all(
@@ -162,7 +163,7 @@ class Authority:
         ttl: timedelta = TOKEN_LIFETIME,
         may: Iterable[Right] = (),
     ) -> dict[str, Token]:
-        """A token for each of `names`, or for none of them. Raises `InvalidNameError`.
+        """Return a token for each of `names`, or for none of them. Raises `InvalidNameError`.
 
         A name that is enrolled gets a new token as well; when that is redeemed, its certificates so far are revoked:
         a name has one key. One that was revoked is readmitted then. The role, and the rights that it has from now on
@@ -176,33 +177,30 @@ class Authority:
         with self._registry.change() as members:
             for name, token in tokens.items():
                 invitation = Invitation(digest(token.secret), self.clock() + ttl.total_seconds())
-                member = members.get(name) or Member(name, role)
+                member = members.get(name) or EnrolledName(name, role)
                 members[name] = msgspec.structs.replace(member, role=role, invitation=invitation, may=rights)
         return tokens
 
     def redeem(self, secret: bytes, request: bytes, origin: str = "") -> bytes:
-        """The certificate (PEM) that `request` (PKCS 10, PEM) asks for, against the secret of a token.
+        """Return the certificate (PEM) that `request` (PKCS 10, PEM) asks for, against the secret of a token.
 
-        `origin` says where the request came from, for the observer. Raises `NotGrantedError` when the secret is
-        unknown, used or expired, or the request is not in the token's name.
+        Args:
+            secret: The token's secret.
+            request: The request.
+            origin: Where the request came from, for the observer.
+
+        Raises:
+            NotGrantedError: when the secret is unknown, used or expired, or the request is not in the token's name.
         """
         what = "redeem a token"
         with self._answering(what, request, origin) as (name, holder), self._registry.change() as members:
-            now, known = self.clock(), digest(secret)
-            member = next((m for m in members.values() if m.invitation and m.invitation.digest == known), None)
-            if member is None or member.invitation is None:
-                raise NotGrantedError("the token is unknown here, or a newer one has replaced it")
-            if member.invitation.used:
-                raise NotGrantedError("the token has been used already")
-            if now >= member.invitation.expires:
-                raise NotGrantedError("the token has expired")
-            if member.name != name:
-                raise NotGrantedError("the token is not for this name")
+            now = self.clock()
+            member, invitation = _invited(members, digest(secret), name, now)
             certificate, issued = self._issue(holder, name)
-            members[name] = Member(
+            members[name] = EnrolledName(
                 name,
                 member.role,
-                msgspec.structs.replace(member.invitation, used=True),
+                msgspec.structs.replace(invitation, used=True),
                 (issued,),
                 (*member.withdrawn, *member.certificates),
                 may=member.may,
@@ -211,10 +209,13 @@ class Authority:
         return certificate
 
     def renew(self, request: bytes, current: Certificate, origin: str = "") -> bytes:
-        """A new certificate (PEM) for the holder of `current`, for the key in `request` (PKCS 10, PEM).
+        """Return a new certificate (PEM) for the holder of `current`, for the key in `request` (PKCS 10, PEM).
 
-        The caller has made sure that whoever asks holds the key of `current` (TLS does). That one stays in force
-        until it expires. Raises `NotGrantedError` when it is not in force, or the request is in another name.
+        The caller has made sure, by TLS, that the request comes from the holder of the key of `current`. That
+        certificate stays in force until it expires. `origin` says where the request came from, for the observer.
+
+        Raises:
+            NotGrantedError: when `current` is not in force, or the request is in another name.
         """
         what = "renew a certificate"
         with self._answering(what, request, origin) as (name, holder), self._registry.change() as members:
@@ -238,7 +239,7 @@ class Authority:
         return certificate
 
     def master_identity(self, hosts: Sequence[str], folder: Path | None = None) -> Identity:
-        """A new identity of the master, for servers that are reached at `hosts` (names or addresses).
+        """Return a new identity of the master, for servers that are reached at `hosts` (names or addresses).
 
         It is written to `folder` (the Authority's own `master` if None) and needs no token: only who has the
         Authority's key can make one. Raises `HostNameError`.
@@ -247,29 +248,33 @@ class Authority:
         with self._registry.change() as members:
             now = self.clock()
             content, issued = self._issue(key.public_key(), MASTER, hosts)
-            member = (members.get(MASTER) or Member(MASTER, Role.MASTER)).since(now)
+            member = (members.get(MASTER) or EnrolledName(MASTER, Role.MASTER)).since(now)
             members[MASTER] = msgspec.structs.replace(member, certificates=(*member.certificates, issued))
             place = folder or self.folder / _MASTER
             save(place, key, read_certificate(content), self.certificate)
             return Identity.load(place, now)
 
     def revoke(self, name: str) -> None:
-        """From now on nothing that `name` was given is good: neither certificates nor an unused token, nor a right.
+        """Revoke the certificates, the unused token and the rights of `name`.
 
-        Raises `UnknownNameError`, or `InvalidNameError` for the master: robots could not hear of it.
+        Raises:
+            UnknownNameError: when the name is not enrolled; the message lists names that are.
+            InvalidNameError: for the master, as robots would not learn of it.
         """
         if name == MASTER:
-            raise InvalidNameError(f"{MASTER} cannot be revoked, for robots would not hear of it: make a new Authority")
+            raise InvalidNameError(
+                f"{MASTER} cannot be revoked, for robots would not learn of it: make a new Authority"
+            )
         with self._registry.change() as members:
             member = members.get(name)
             if member is None:
                 what = f"no '{on_one_line(shortened(name))}' is enrolled"
-                raise UnknownNameError(f"{what} ({suggestion(name, members, 'names')})")
+                raise UnknownNameError(f"{what} ({describe_enrolled(name, members)})")
             withdrawn = (*member.withdrawn, *member.certificates)
-            members[name] = Member(name, member.role, None, (), withdrawn, revoked=True).since(self.clock())
+            members[name] = EnrolledName(name, member.role, None, (), withdrawn, revoked=True).since(self.clock())
 
     def is_revoked(self, who: str | int) -> bool:
-        """Whether the name, or the certificate with the serial number, `who` is to be turned away.
+        """Return whether the name, or the certificate with the serial number, `who` is refused.
 
         It is when it was revoked, and when this Authority does not know it: what is not granted is denied.
         """
@@ -280,10 +285,7 @@ class Authority:
         return not any(one.serial == serial for member in members.values() for one in member.certificates)
 
     def names(self, role: Role | None = None, right: Right | None = None, *, invited: bool = False) -> tuple[str, ...]:
-        """Who has a certificate in force now (in the role `role`, with the right `right`), sorted.
-
-        Also, if `invited`, who has a token and never had a certificate: whoever comes in that name has the new one.
-        """
+        """Return the names that have a certificate in force now, sorted. See `Admission.names`."""
         now = self.clock()
         return tuple(
             member.name
@@ -294,12 +296,12 @@ class Authority:
             and (member.since(now).certificates or (invited and member.never_certified))
         )
 
-    def members(self) -> tuple[Member, ...]:
-        """All that were ever enrolled, sorted by name."""
+    def members(self) -> tuple[EnrolledName, ...]:
+        """Return all that were ever enrolled, sorted by name."""
         return tuple(member for _, member in sorted(self._registry.members().items()))
 
     def report(self, event: AuthorityEvent) -> None:
-        """Tell the observer."""
+        """Report `event` to the observer."""
         self.observer(event)
 
     def _issue(
@@ -313,7 +315,7 @@ class Authority:
 
     @contextmanager
     def _answering(self, what: str, request: bytes, origin: str) -> Iterator[tuple[str, ec.EllipticCurvePublicKey]]:
-        """The name and the key in `request`; a refusal within is reported, whoever asks."""
+        """Yield the name and the key in `request`; a refusal within is reported."""
         who = "unknown"
         try:
             try:
@@ -327,21 +329,27 @@ class Authority:
             raise
 
 
+def _invited(members: Mapping[str, EnrolledName], known: str, name: str, now: float) -> tuple[EnrolledName, Invitation]:
+    """Return the entry and the invitation of the token with the digest `known`, if it can be redeemed for `name` now.
+
+    Raises `NotGrantedError`.
+    """
+    for member in members.values():
+        invitation = member.invitation
+        if invitation is None or invitation.digest != known:
+            continue
+        if invitation.used:
+            raise NotGrantedError("the token has been used already")
+        if now >= invitation.expires:
+            raise NotGrantedError("the token has expired")
+        if member.name != name:
+            raise NotGrantedError("the token is not for this name")
+        return member, invitation
+    raise NotGrantedError("the token is unknown here, or a newer one has replaced it")
+
+
 def default_folder() -> Path:
-    """Where the Authority is if nothing else is said: in the user's data folder."""
+    """Return the Authority's default folder, in the user's data folder."""
     from platformdirs import user_data_path  # noqa: PLC0415 - only who is given no folder needs it
 
     return user_data_path("robochoc") / "authority"
-
-
-def check_name(name: str, role: Role = Role.ROBOT) -> None:
-    """Raises `InvalidNameError` if `name` cannot take part as `role`."""
-    shown = on_one_line(shortened(name))
-    if not is_name(name):
-        raise InvalidNameError(f"'{shown}' is no robot's name: a letter, then letters, digits, '_' and '.'")
-    if len(name) > LONGEST_NAME:
-        raise InvalidNameError(f"'{shown}' is too long: a certificate names at most {LONGEST_NAME} characters")
-    if name.upper() == MASTER or role is Role.MASTER:
-        raise InvalidNameError(
-            f"the name {MASTER} is the master's own, which needs no token; choose another name, or role"
-        )

@@ -66,7 +66,7 @@ def moment(t: float) -> datetime:
 
 
 def new_key() -> ec.EllipticCurvePrivateKey:
-    """A new private key."""
+    """Return a new private key."""
     return ec.generate_private_key(ec.SECP256R1())
 
 
@@ -87,7 +87,7 @@ def fingerprint(certificate: x509.Certificate) -> bytes:
 
 
 def ca_certificate(key: ec.EllipticCurvePrivateKey, now: datetime) -> x509.Certificate:
-    """The Authority's own certificate, signed by itself."""
+    """Return the Authority's own certificate, signed by itself."""
     # The key's own identifier is a part of the name, so that no two Authorities are taken for each other.
     own = x509.SubjectKeyIdentifier.from_public_key(key.public_key())
     name = _named(f"robochoc authority {own.digest.hex()[:16]}")
@@ -107,7 +107,7 @@ def leaf_certificate(
     hosts: Sequence[str] | None,
     times: tuple[datetime, datetime],
 ) -> x509.Certificate:
-    """A certificate that says that `holder` is the key of `name`, within `times`. Raises `HostNameError`.
+    """Return a certificate that says that `holder` is the key of `name`, within `times`. Raises `HostNameError`.
 
     `hosts`: the names and addresses at which a server is to be believed; None: it is for a client only.
     """
@@ -131,7 +131,7 @@ def leaf_certificate(
 
 
 def signing_request(key: ec.EllipticCurvePrivateKey, name: str) -> bytes:
-    """A request (PKCS 10) for a certificate that says that `key` is the key of `name`, as PEM."""
+    """Return a request (PKCS 10) for a certificate that says that `key` is the key of `name`, as PEM."""
     request = x509.CertificateSigningRequestBuilder().subject_name(_named(name)).sign(key, hashes.SHA256())
     return request.public_bytes(serialization.Encoding.PEM)
 
@@ -150,7 +150,7 @@ def read_request(content: bytes) -> tuple[str, ec.EllipticCurvePublicKey]:
 
 
 def read_certificate(content: bytes) -> x509.Certificate:
-    """The one certificate in `content`. Raises `CertificateError`."""
+    """Return the one certificate in `content`. Raises `CertificateError`."""
     try:
         found = x509.load_pem_x509_certificates(content)
     except (ValueError, TypeError, x509.InvalidVersion) as error:
@@ -161,7 +161,7 @@ def read_certificate(content: bytes) -> x509.Certificate:
 
 
 def read_key(content: bytes) -> ec.EllipticCurvePrivateKey:
-    """The private key in `content`. Raises `CertificateError`."""
+    """Return the private key in `content`. Raises `CertificateError`."""
     try:
         key = serialization.load_pem_private_key(content, None)
     except (ValueError, TypeError, UnsupportedAlgorithm) as error:
@@ -173,7 +173,7 @@ def read_key(content: bytes) -> ec.EllipticCurvePrivateKey:
 
 
 def holder_of(certificate: x509.Certificate) -> ec.EllipticCurvePublicKey:
-    """The public key in `certificate`. Raises `CertificateError`."""
+    """Return the public key in `certificate`. Raises `CertificateError`."""
     try:
         return _on_p256(certificate.public_key())
     except (ValueError, UnsupportedAlgorithm) as error:
@@ -181,7 +181,7 @@ def holder_of(certificate: x509.Certificate) -> ec.EllipticCurvePublicKey:
 
 
 def common_name(subject: x509.Name) -> str:
-    """The name in a subject that is nothing but a name. Raises `CertificateError`."""
+    """Return the name in a subject that is nothing but a name. Raises `CertificateError`."""
     attributes = list(subject)
     if len(attributes) != 1 or attributes[0].oid != NameOID.COMMON_NAME or not isinstance(attributes[0].value, str):
         raise CertificateError("its subject is not one common name")
@@ -189,7 +189,7 @@ def common_name(subject: x509.Name) -> str:
 
 
 def check_issued(certificate: x509.Certificate, ca: x509.Certificate, now: datetime) -> str:
-    """The name that `certificate` proves: `ca` has issued it, and it is valid `now`. Raises `CertificateError`.
+    """Return the name that `certificate` proves: `ca` has issued it, and it is valid `now`. Raises `CertificateError`.
 
     X.509 path validation as `cryptography` does it, for a client's certificate (the master's is one too).
     """
@@ -210,7 +210,7 @@ def check_issued(certificate: x509.Certificate, ca: x509.Certificate, now: datet
 
 
 def hosts_of(certificate: x509.Certificate) -> tuple[str, ...]:
-    """The names and addresses at which the holder of `certificate` is to be believed as a server, but for its own."""
+    """Return the host names and addresses of `certificate`, without the holder's own name."""
     try:
         names = certificate.extensions.get_extension_for_class(x509.SubjectAlternativeName).value
     except x509.ExtensionNotFound:

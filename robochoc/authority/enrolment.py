@@ -31,7 +31,7 @@ from robochoc.authority.certificates import (
 from robochoc.authority.frames import (
     Answer,
     Certified,
-    Denied,
+    EnrolmentDenied,
     Exchange,
     FrameError,
     Introduce,
@@ -58,7 +58,7 @@ class NobodyThereError(EnrolmentError):
 
 
 class NotTrustedError(EnrolmentError):
-    """Whoever answers is not who the token, or the identity, is from. Nothing secret was sent."""
+    """The server is not the one that the token, or the identity, comes from. Nothing secret was sent."""
 
 
 def enrol(
@@ -82,7 +82,7 @@ def enrol(
 
 
 def renew(identity: Identity, host: str, port: int, patience_s: float = PATIENCE_S) -> Identity:
-    """The same identity with a new certificate, which is in its folder as well.
+    """Return the same identity with a new certificate, which is in its folder as well.
 
     The key stays: so one file is replaced, and no crash can part a key from its certificate. Raises `NotTrustedError`,
     `EnrolmentError`.
@@ -96,7 +96,7 @@ def renew(identity: Identity, host: str, port: int, patience_s: float = PATIENCE
 
 
 def _introduced(place: tuple[str, int], token: Token, patience_s: float) -> x509.Certificate:
-    """The certificate of the Authority that `token` is from, as whoever is at `place` shows it."""
+    """Return the certificate of the Authority of `token`, as the server at `place` shows it."""
     context = ssl.SSLContext(ssl.PROTOCOL_TLS_CLIENT)
     context.minimum_version = ssl.TLSVersion.TLSv1_3
     context.check_hostname = False
@@ -124,7 +124,7 @@ def _believing(ca: x509.Certificate) -> ssl.SSLContext:
 
 
 def _ask(place: tuple[str, int], question: Question, context: ssl.SSLContext, patience_s: float) -> Answer:
-    """The answer of whoever is at `place` and passes `context`."""
+    """Return the answer of the server at `place`, if it passes `context`."""
     try:
         raw = socket.create_connection(place, patience_s)
     except OSError as error:
@@ -157,9 +157,9 @@ def _unanswered(place: tuple[str, int], error: Exception) -> str:
 
 
 def _certified(answer: Answer, ca: x509.Certificate, key: ec.EllipticCurvePrivateKey, name: str) -> x509.Certificate:
-    """The certificate in `answer`, if `ca` says there that `key` is the key of `name`."""
+    """Return the certificate in `answer`, if `ca` says there that `key` is the key of `name`."""
     match answer:
-        case Denied():
+        case EnrolmentDenied():
             raise EnrolmentError(f"the Authority refuses: {on_one_line(answer.why)}")
         case Certified():
             try:

@@ -1,4 +1,4 @@
-"""The enrolment service: the Authority's desk on a TLS port, which the master runs.
+"""The enrolment service of the Authority on a TLS port, which the master runs.
 
 Everything goes over TLS 1.3 with the master's certificate. A robot that comes with a token has no certificate yet and
 need show none. Renewal goes by mutual TLS: the robot shows its certificate in the handshake, where OpenSSL checks
@@ -24,7 +24,7 @@ from robochoc.authority.events import Refused
 from robochoc.authority.frames import (
     Answer,
     Certified,
-    Denied,
+    EnrolmentDenied,
     Exchange,
     FrameError,
     Introduce,
@@ -89,7 +89,7 @@ class EnrolmentServer:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        """Hang up on everybody, and end all threads."""
+        """Close all connections, and end all threads."""
         with self._lock:
             self._closing = True
             for connection in self._open:
@@ -161,16 +161,16 @@ class EnrolmentServer:
         try:
             return self._answer(exchange.question(), connection.getpeercert(binary_form=True), origin)
         except NotGrantedError as refusal:  # which the Authority has reported
-            return Denied(str(refusal))
+            return EnrolmentDenied(str(refusal))
         except FrameError as error:
             self._refuse(origin, str(error))
-            return Denied(str(error))
+            return EnrolmentDenied(str(error))
         except AuthorityError as error:
             self._refuse(origin, str(error))
-            return Denied("the Authority cannot answer at the moment; ask whoever runs it")
+            return EnrolmentDenied("the Authority cannot answer at the moment; ask whoever runs it")
 
     def _answer(self, question: Question, shown: bytes | None, origin: str) -> Answer:
-        """The answer to whoever has `shown` a certificate (DER) in the handshake, or none."""
+        """Return the answer to a robot that has `shown` a certificate (DER) in the handshake, or none."""
         match question:
             case Introduce():
                 return Introduction(pem(self._authority.certificate))

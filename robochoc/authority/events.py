@@ -1,4 +1,4 @@
-"""What can be seen of the Authority: what it has granted, and every refusal, with its reason."""
+"""Events of the Authority: what it has granted, and every refusal, with its reason."""
 
 from __future__ import annotations
 
@@ -13,4 +13,4 @@ AuthorityObserver = Callable[[AuthorityEvent], None]
 
 
 def unobserved(_event: AuthorityEvent) -> None:
-    """The observer of an Authority that nobody watches."""
+    """Ignore an event: the observer of an Authority that nobody watches."""

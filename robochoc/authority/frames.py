@@ -1,4 +1,4 @@
-"""What robots and the enrolment service say to each other: one question, one answer, each a length and msgpack.
+"""The messages between robots and the enrolment service: one question, one answer, each a length and msgpack.
 
 The length is 4 bytes, most significant first. Whatever comes is read within a deadline and a size, and decoded into
 one of these structs or refused.
@@ -25,7 +25,7 @@ class _Frame(msgspec.Struct, frozen=True, tag=True, forbid_unknown_fields=True):
 
 
 class Introduce(_Frame, frozen=True):
-    """Which Authority do you speak for?"""
+    """Asks for the certificate of the server's Authority."""
 
 
 class Redeem(_Frame, frozen=True):
@@ -53,20 +53,20 @@ class Certified(_Frame, frozen=True):
     certificate: bytes
 
 
-class Denied(_Frame, frozen=True):
+class EnrolmentDenied(_Frame, frozen=True, tag="Denied"):
     """There is none, and why."""
 
     why: str
 
 
 Question = Introduce | Redeem | Renew
-Answer = Introduction | Certified | Denied
+Answer = Introduction | Certified | EnrolmentDenied
 _questions = msgspec.msgpack.Decoder(Question)
 _answers = msgspec.msgpack.Decoder(Answer)
 
 
 def decode_question(content: bytes) -> Question:
-    """The question in `content`. Raises `FrameError`."""
+    """Return the question in `content`. Raises `FrameError`."""
     try:
         question: Question = _questions.decode(content)
     except (msgspec.MsgspecError, RecursionError, UnicodeDecodeError) as error:
@@ -75,7 +75,7 @@ def decode_question(content: bytes) -> Question:
 
 
 def decode_answer(content: bytes) -> Answer:
-    """The answer in `content`. Raises `FrameError`."""
+    """Return the answer in `content`. Raises `FrameError`."""
     try:
         answer: Answer = _answers.decode(content)
     except (msgspec.MsgspecError, RecursionError, UnicodeDecodeError) as error:
@@ -104,11 +104,11 @@ class Exchange:
         self._connection.sendall(len(content).to_bytes(_LENGTH_BYTES, "big") + content)
 
     def question(self) -> Question:
-        """The next frame, a question. Raises `OSError`, `FrameError`."""
+        """Return the next frame, a question. Raises `OSError`, `FrameError`."""
         return decode_question(self._receive())
 
     def answer(self) -> Answer:
-        """The next frame, an answer. Raises `OSError`, `FrameError`."""
+        """Return the next frame, an answer. Raises `OSError`, `FrameError`."""
         return decode_answer(self._receive())
 
     def _receive(self) -> bytes:

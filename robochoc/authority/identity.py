@@ -1,7 +1,7 @@
-"""Identity: what a machine proves its name with, as a folder of three files.
+"""An identity: the proof of a machine's name, as a folder of three files.
 
-`key.pem` is made on the machine itself and never leaves it; `cert.pem` says whose it is; `ca.pem` is the certificate
-of the Authority that says so, and the only one that this machine believes.
+`key.pem` is made on the machine itself and never leaves it; `cert.pem` names its holder; `ca.pem` is the certificate of
+the Authority that issued it, and the only one that this machine accepts.
 """
 
 from __future__ import annotations
@@ -59,7 +59,7 @@ class Identity:
 
     @classmethod
     def load(cls, folder: Path | str, now: float | None = None) -> Identity:
-        """The identity in `folder`. `now`: Unix time, if not the clock's.
+        """Return the identity in `folder`. `now`: Unix time, if not the clock's.
 
         Raises `IdentityError` when something is missing or malformed, others may read the key, the key is not the
         certificate's, or the certificate is not the Authority's or not valid now.
@@ -77,7 +77,7 @@ class Identity:
 
     @classmethod
     def of(cls, texts: IdentityTexts) -> Identity:
-        """The identity that `texts` was made of, in this same program."""
+        """Return the identity that `texts` was made of, in this same program."""
         key, certificate, ca = read_key(texts.key), read_certificate(texts.certificate), read_certificate(texts.ca)
         return cls(Path(), common_name(certificate.subject), key, certificate, ca)
 
@@ -88,17 +88,17 @@ class Identity:
 
     @property
     def key_file(self) -> Path:
-        """Where the private key is."""
+        """The file of the private key."""
         return self.folder / KEY
 
     @property
     def certificate_file(self) -> Path:
-        """Where the certificate is."""
+        """The file of the certificate."""
         return self.folder / CERTIFICATE
 
     @property
     def ca_file(self) -> Path:
-        """Where the Authority's certificate is."""
+        """The file of the Authority's certificate."""
         return self.folder / CA
 
     @property
@@ -112,7 +112,7 @@ class Identity:
         return hosts_of(self.certificate)
 
     def is_due(self, now: float | None = None) -> bool:
-        """Whether more than half of the certificate's life is over at Unix time `now`: time to renew it."""
+        """Return whether more than half of the certificate's life is over at Unix time `now`: time to renew it."""
         left = self.expires - moment(time.time() if now is None else now)
         return left < (self.expires - self.certificate.not_valid_before_utc) / 2
 
@@ -145,7 +145,7 @@ def private_folder(folder: Path) -> None:
 
 
 def default_folder(name: str) -> Path:
-    """Where the identity of `name` is kept if nothing else is said: in the user's data folder."""
+    """Return the folder where the identity of `name` is kept by default: in the user's data folder."""
     from platformdirs import user_data_path  # noqa: PLC0415 - only who is given no folder needs it
 
     return user_data_path("robochoc") / "identities" / name

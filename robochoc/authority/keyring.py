@@ -1,4 +1,4 @@
-"""Key cards and key rings: what robots know each other's messages by, end to end.
+"""Key cards and key rings, by which robots authenticate each other's messages end to end.
 
 For each run a robot makes two fresh key pairs, which never leave its memory: Ed25519 (RFC 8032) to sign with, X25519
 (RFC 7748) to agree on secrets. It signs their public halves with the key of its certificate: its card. Whoever holds
@@ -51,12 +51,12 @@ class KeyCard(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     signature: bytes
 
     def encode(self) -> bytes:
-        """The card as msgpack, about 1,000 bytes."""
+        """Return the card as msgpack, about 1,000 bytes."""
         return msgspec.msgpack.encode(self)
 
     @classmethod
     def decode(cls, content: bytes) -> Self:
-        """The card in `content`, not checked yet: `KeyRing.admit` does that. Raises `KeyCardError`."""
+        """Return the card in `content`, not checked yet: `KeyRing.admit` does that. Raises `KeyCardError`."""
         if len(content) > _LARGEST_CARD_BYTES:
             raise KeyCardError(f"a key card has at most {_LARGEST_CARD_BYTES} bytes, this one {len(content)}")
         try:
@@ -65,7 +65,7 @@ class KeyCard(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
             raise KeyCardError(f"that is no key card: {error}") from error
 
     def signed_part(self) -> bytes:
-        """What the signature is over."""
+        """Return the bytes that the signature is over."""
         return bound(b"robochoc key card 1", self.name.encode(), self.run.encode(), self.signing, self.sealing)
 
 
@@ -91,7 +91,7 @@ class KeyRing:
         self.card = msgspec.structs.replace(unsigned, signature=signature)
 
     def admit(self, card: KeyCard, now: float) -> None:
-        """Believe `card` from now on (Unix time `now`), instead of an older one of that robot.
+        """Accept `card` from now on (Unix time `now`), instead of an older one of that robot.
 
         Raises `KeyCardError`: when the Authority has not issued its certificate, or that is not valid now or names
         somebody else, the signature is wrong, or the card is from another run.
@@ -118,22 +118,22 @@ class KeyRing:
         self._peers[card.name] = card
 
     def dismiss(self, name: str) -> None:
-        """Believe no card of `name` any more: its robot was revoked, or has left."""
+        """Accept no card of `name` any more: its robot was revoked, or has left."""
         self._peers.pop(name, None)
 
     def card_of(self, name: str) -> KeyCard:
-        """The card of `name`. Raises `UnknownPeerError`."""
+        """Return the card of `name`. Raises `UnknownPeerError`."""
         try:
             return self._peers[name]
         except KeyError:
             raise UnknownPeerError(f"no key card of {on_one_line(shortened(name))} was admitted") from None
 
     def sign(self, content: bytes) -> bytes:
-        """An Ed25519 signature, 64 bytes."""
+        """Return an Ed25519 signature, 64 bytes."""
         return self._signing.sign(content)
 
     def is_signed(self, name: str, signature: bytes, content: bytes) -> bool:
-        """Whether `name` has signed `content`. Raises `UnknownPeerError`."""
+        """Return whether `name` has signed `content`. Raises `UnknownPeerError`."""
         card = self.card_of(name)
         try:
             Ed25519PublicKey.from_public_bytes(card.signing).verify(signature, content)
@@ -142,7 +142,7 @@ class KeyRing:
         return True
 
     def shared_secret(self, sender: str, receiver: str, purpose: bytes) -> bytes:
-        """32 bytes that only `sender` and `receiver` can know, one of which is this robot; the same for both.
+        """Return 32 bytes that only `sender` and `receiver` can know, one of which is this robot; the same for both.
 
         X25519, then HKDF with SHA-256 (RFC 5869) over all that the two have agreed on: run, names, public keys and
         `purpose`. The way back has another secret. Raises `UnknownPeerError`.
@@ -156,7 +156,7 @@ class KeyRing:
         return HKDF(hashes.SHA256(), _SECRET_BYTES, salt=None, info=agreed).derive(secret)
 
     def next_number(self) -> int:
-        """A number that this key ring has not given before, whoever asks: what nonces are made of.
+        """Return a number that this key ring has not given before, whoever asks: what nonces are made of.
 
         Raises `RuntimeError` in a forked child, whose numbers its parent gives as well.
         """

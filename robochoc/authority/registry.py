@@ -1,4 +1,4 @@
-"""The Authority's registry: who is enrolled, with which certificates. One JSON file, safe between processes.
+"""The Authority's registry: enrolled names and their certificates. One JSON file, safe between processes.
 
 A change reads the file, and replaces it, while it holds the lock (flock(2)) of a file beside it: `robochoc authority
 enrol` and a running master do not lose each other's changes. Readers take no lock: they see the old file or the new
@@ -28,7 +28,7 @@ class AuthorityError(Exception):
 
 
 class Role(StrEnum):
-    """What a name takes part as."""
+    """The role in which a name takes part."""
 
     ROBOT = "robot"
     OBSERVER = "observer"
@@ -36,13 +36,13 @@ class Role(StrEnum):
 
 
 class Right(StrEnum):
-    """What a name may besides taking part in its role. Nobody has a right that was not given."""
+    """A right besides taking part in the role. It has to be given."""
 
     SNIFF = "sniff"  # follow runs: have the master's journal, with what robots say to each other
 
 
-class State(StrEnum):
-    """How it stands with a name."""
+class EnrolmentState(StrEnum):
+    """The state of an enrolment."""
 
     INVITED = "invited"  # it has a token that works
     IN_FORCE = "in force"
@@ -65,7 +65,7 @@ class Issued(msgspec.Struct, frozen=True):
     expires: float
 
 
-class Member(msgspec.Struct, frozen=True):
+class EnrolledName(msgspec.Struct, frozen=True):
     """All that the Authority knows of one name. Certificates that have expired are forgotten."""
 
     name: str
@@ -78,13 +78,15 @@ class Member(msgspec.Struct, frozen=True):
     revoked: bool = False
     may: tuple[Right, ...] = ()
 
-    def state(self, now: float) -> State:
-        """How it stands with this name at Unix time `now`."""
+    def state(self, now: float) -> EnrolmentState:
+        """Return the state of this name at Unix time `now`."""
         if self.invitation and not self.invitation.used and now < self.invitation.expires:
-            return State.INVITED
+            return EnrolmentState.INVITED
         if self.revoked:
-            return State.REVOKED
-        return State.IN_FORCE if any(now < one.expires for one in self.certificates) else State.EXPIRED
+            return EnrolmentState.REVOKED
+        return (
+            EnrolmentState.IN_FORCE if any(now < one.expires for one in self.certificates) else EnrolmentState.EXPIRED
+        )
 
     @property
     def never_certified(self) -> bool:
@@ -92,14 +94,14 @@ class Member(msgspec.Struct, frozen=True):
         return not self.certificates and not self.withdrawn
 
     def expires(self, now: float) -> float:
-        """Until when (Unix time) its token, if it is invited, or its last certificate was good; 0: it has neither."""
+        """Return when (Unix time) its token, if it is invited, or its last certificate expires; 0 if it has neither."""
         token = self.invitation.expires if self.invitation and not self.invitation.used else 0
-        if self.state(now) is State.INVITED:
+        if self.state(now) is EnrolmentState.INVITED:
             return token
         return max((one.expires for one in self.certificates), default=token)
 
-    def since(self, now: float) -> Member:
-        """The same, without the certificates that have expired."""
+    def since(self, now: float) -> EnrolledName:
+        """Return the same, without the certificates that have expired."""
         certificates = tuple(one for one in self.certificates if now < one.expires)
         withdrawn = tuple(one for one in self.withdrawn if now < one.expires)
         return msgspec.structs.replace(self, certificates=certificates, withdrawn=withdrawn)
@@ -108,7 +110,7 @@ class Member(msgspec.Struct, frozen=True):
 class _Content(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """The file."""
 
-    members: dict[str, Member]
+    members: dict[str, EnrolledName]
     version: Literal[1] = 1
 
 
@@ -117,10 +119,10 @@ class Registry:
 
     def __init__(self, folder: Path) -> None:
         self._folder = folder
-        self._known: tuple[tuple[int, ...], dict[str, Member]] = ((), {})
+        self._known: tuple[tuple[int, ...], dict[str, EnrolledName]] = ((), {})
 
-    def members(self) -> Mapping[str, Member]:
-        """All names, as they stand now. Raises `AuthorityError`."""
+    def members(self) -> Mapping[str, EnrolledName]:
+        """Return all names, as they stand now. Raises `AuthorityError`."""
         path = self._folder / _FILE
         try:
             status = path.stat()
@@ -139,8 +141,11 @@ class Registry:
         return known[1]
 
     @contextmanager
-    def change(self) -> Iterator[dict[str, Member]]:
-        """The members, to be changed by nobody else meanwhile; written at the end, unless that raises."""
+    def change(self) -> Iterator[dict[str, EnrolledName]]:
+        """Yield the entries for a change that nobody else can disturb.
+
+        They are written at the end, unless that raises.
+        """
         with locked(self._folder):
             members = dict(self.members())
             before = dict(members)
@@ -152,7 +157,7 @@ class Registry:
 
 @contextmanager
 def locked(folder: Path) -> Iterator[None]:
-    """While it lasts, no other process or thread is in here with the same folder."""
+    """Exclude all other processes and threads from `folder` for the duration."""
     descriptor = os.open(folder / _LOCK, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, PRIVATE)
     try:
         fcntl.flock(descriptor, fcntl.LOCK_EX)

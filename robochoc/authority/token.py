@@ -1,7 +1,7 @@
-"""Tokens: what a person carries from the Authority to a new robot, so that each knows the other.
+"""Tokens: a person carries one from the Authority to a new robot, so that each can recognise the other.
 
 A token holds a secret, which the robot shows once, and the fingerprint of the Authority's certificate, by which the
-robot knows whom it may show it to before it has any certificate. Its text is base32 in lower case (RFC 4648): it
+robot recognises the Authority before it has any certificate. Its text is base32 in lower case (RFC 4648): it
 survives being read aloud, and no letter is taken for a digit.
 """
 
@@ -30,12 +30,12 @@ class Token:
 
     @classmethod
     def new(cls, fingerprint: bytes) -> Token:
-        """A token with a secret that nobody can guess (160 bits)."""
+        """Return a token with a secret that nobody can guess (160 bits)."""
         return cls(secrets.token_bytes(SECRET_BYTES), fingerprint)
 
     @classmethod
     def parse(cls, text: str) -> Token:
-        """The token that `text` stands for; blanks around it and capitals do no harm. Raises `TokenError`."""
+        """Return the token that `text` stands for; blanks around it and capitals do no harm. Raises `TokenError`."""
         secret, dot, fingerprint = text.strip().partition(".")
         try:
             token = cls(_decoded(secret), _decoded(fingerprint))
@@ -56,7 +56,7 @@ class Token:
 
 
 def digest(secret: bytes) -> str:
-    """What the Authority keeps of a secret: who reads its registry can redeem nothing."""
+    """Return the digest of a secret that the Authority keeps. Nothing can be redeemed with it."""
     return hashlib.sha256(b"robochoc token\0" + secret).hexdigest()
 
 

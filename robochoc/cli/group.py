@@ -96,7 +96,7 @@ def cli() -> None:
 
 
 def run() -> int:
-    """Run the command line, and return the exit status that FORMAT.md promises; never a traceback."""
+    """Run the command line, and return the exit status that docs/reference/cli.md lists; never a traceback."""
     try:
         status = cli.main(standalone_mode=False)
     except click.ClickException as error:

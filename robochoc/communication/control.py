@@ -1,4 +1,4 @@
-"""What the parent and a robot's process say to each other over their control pipe.
+"""The control messages between the parent and a robot's process, over their control pipe.
 
 The parent is the paper's master: it waits for the confirmation of all robots before it orders the start, opens
 queues between robots that want to talk, finds out when all is quiet, and ends each epoch. It carries no protocol
@@ -26,7 +26,7 @@ class _Control(msgspec.Struct, frozen=True, tag=True, array_like=True):
 
 
 class OfEpoch(_Control, frozen=True):
-    """Words that say nothing once their epoch is over."""
+    """Messages that have no meaning once their epoch is over."""
 
     epoch: int
 
@@ -35,17 +35,17 @@ class OfEpoch(_Control, frozen=True):
 
 
 class Ready(OfEpoch, frozen=True):
-    """I am there, with my problem compiled."""
+    """The robot is there, with its problem compiled."""
 
 
 class OpenQueues(_Control, frozen=True):
-    """I want to put messages to `receivers`, at most `QUEUES_AT_ONCE` of them."""
+    """The robot needs queues to `receivers`, at most `QUEUES_AT_ONCE` of them."""
 
     receivers: list[str]
 
 
 class Counters(OfEpoch, frozen=True):
-    """My protocol messages of this epoch, `sent` and `received`; in answer to wave `wave`, or (0) as I am idle."""
+    """The robot's protocol messages of this epoch, in answer to wave `wave`, or (0) as it is idle."""
 
     wave: int
     sent: int
@@ -53,19 +53,19 @@ class Counters(OfEpoch, frozen=True):
 
 
 class Conclusion(OfEpoch, frozen=True):
-    """I alone can tell how the search ends; before `Ready`: a verdict stands in spite of the changes."""
+    """The robot alone has found how the search ends. Before `Ready`: a verdict stands in spite of the changes."""
 
     verdict: str
 
 
 class Events(_Control, frozen=True):
-    """What an observer is to be told, oldest first."""
+    """Events for the observer, oldest first."""
 
     events: list[AnyEvent]
 
 
 class Report(OfEpoch, frozen=True):
-    """What this epoch has come to: values of my variables, what I have counted, and what I know of the whole."""
+    """The end of an epoch: the values of the robot's variables, its counts, and what it knows of the whole team."""
 
     assignment: dict[str, int]
     metrics: Metrics
@@ -73,7 +73,7 @@ class Report(OfEpoch, frozen=True):
 
 
 class Failed(_Control, frozen=True):
-    """I cannot go on; `unsupported`: because of my problem, not because something broke.
+    """The robot cannot continue; `unsupported`: because of its problem, not because something broke.
 
     `elsewhere`: another protocol may be able to (`TooLargeError`).
     """
@@ -87,7 +87,7 @@ class Failed(_Control, frozen=True):
 
 
 class Begin(_Control, frozen=True):
-    """All robots are there: search. `began` is the run's beginning, on the monotonic clock.
+    """The order to search, as all robots are there. `began` is the run's beginning, on the monotonic clock.
 
     `lossless`: no message of the epoch before was lost.
     """
@@ -97,7 +97,7 @@ class Begin(_Control, frozen=True):
 
 
 class Pause(_Control, frozen=True):
-    """This epoch's search is over: be silent, and report."""
+    """The order to be silent and report, as this epoch's search is over."""
 
 
 class Change(_Control, frozen=True):
@@ -124,23 +124,23 @@ class QueueFrom(_Control, frozen=True):
 
 
 class Wave(_Control, frozen=True):
-    """Tell me your counters."""
+    """The order to report the counters."""
 
     number: int
 
 
-def sealed(part: AgentProblem, void: Invalidated) -> bytes:
-    """What `Change` holds."""
-    return bytes(ForkingPickler.dumps((part, void)))
+def sealed(part: AgentProblem, invalidated: Invalidated) -> bytes:
+    """Return the content of a `Change`."""
+    return bytes(ForkingPickler.dumps((part, invalidated)))
 
 
 def unsealed(change: bytes) -> tuple[AgentProblem, Invalidated]:
-    """What `sealed` was given. Only for bytes from the own parent, over the socket that only the two of them have.
+    """Return the arguments of `sealed`. Only for bytes from the own parent, over the socket that only the two have.
 
     A process is started with the same means (`multiprocessing`); no message of a protocol ever comes here.
     """
-    part, void = ForkingPickler.loads(change)
-    return part, void
+    part, invalidated = ForkingPickler.loads(change)
+    return part, invalidated
 
 
 RobotMessage = Ready | Counters | Conclusion | Events

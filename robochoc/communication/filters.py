@@ -40,11 +40,11 @@ class ChannelFilter(ABC):
 
     @abstractmethod
     def seal(self, receiver: str, content: bytes, context: bytes) -> bytes:
-        """What is sent instead of `content`. Each call may give something else. Raises `UnknownPeerError`."""
+        """Return what is sent instead of `content`. Each call may give something else. Raises `UnknownPeerError`."""
 
     @abstractmethod
     def open(self, sender: str, content: bytes, context: bytes) -> bytes:
-        """What `sender` has sealed; `content` may be anything. Raises `NotGenuineError`."""
+        """Return what `sender` has sealed; `content` may be anything. Raises `NotGenuineError`."""
 
 
 class FilterStack(ChannelFilter):
@@ -55,13 +55,13 @@ class FilterStack(ChannelFilter):
         self._filters = tuple(kind(ring) for kind in filters)
 
     def seal(self, receiver: str, content: bytes, context: bytes) -> bytes:
-        """What the last filter makes of what the first ones have made of `content`."""
+        """Return what the last filter makes of what the first ones have made of `content`."""
         for each in self._filters:
             content = each.seal(receiver, content, context)
         return content
 
     def open(self, sender: str, content: bytes, context: bytes) -> bytes:
-        """What the first filter has sealed.
+        """Return what the first filter has sealed.
 
         A filter that fails in whatever way has not opened it: `NotGenuineError`.
         """
@@ -89,12 +89,12 @@ class FilterOffer:
 
 
 def filter_offers() -> tuple[FilterOffer, ...]:
-    """All that installed packages offer, by name; what cannot be used too, with the reason."""
+    """Return all that installed packages offer, by name; what cannot be used too, with the reason."""
     return tuple(_offer(entry, namesakes) for entry, namesakes in all_entry_points(GROUP))
 
 
 def filter_named(name: str) -> type[ChannelFilter]:
-    """The filter called `name`. Raises `UnknownFilterError`, which names those there are."""
+    """Return the filter called `name`. Raises `UnknownFilterError`, which names those there are."""
     found = entry_points_named(GROUP, name)
     if not found:
         raise UnknownFilterError(not_installed_message(GROUP, "filter", name))

@@ -34,13 +34,16 @@ class Host:
 
     @classmethod
     def of(cls, protocol: type[Protocol], part: AgentProblem) -> Self:
-        """A host for the robot whose part of the problem is `part`. Raises `UnsupportedError` (see `LocalProblem`)."""
+        """Return a host for the robot whose part of the problem is `part`.
+
+        Raises `UnsupportedError` (see `LocalProblem`).
+        """
         return cls(protocol(LocalProblem(part), PriorityOrder(part.order, part.links)), part.parameters)
 
-    def __init__(self, protocol: Protocol, brief: RunParameters = DEFAULT_PARAMETERS) -> None:
+    def __init__(self, protocol: Protocol, parameters: RunParameters = DEFAULT_PARAMETERS) -> None:
         self.protocol = protocol
         self.name = protocol.problem.agent
-        self._equip(brief)
+        self._equip(parameters)
         self.clock = 0
         self.sent: dict[str, int] = {}
         self.bytes = self.largest = 0
@@ -58,7 +61,7 @@ class Host:
         self._then: Callable[[int], float] | None = None
 
     def observe(self, observer: Observer, now: Callable[[], float], then: Callable[[int], float] | None = None) -> None:
-        """From now on tell `observer` of each event, stamped with `now()`.
+        """Report each event to `observer` from now on, stamped with `now()`.
 
         Where time is counted in checks, `then(n)` is the time when the robot had done n: for what it takes in and says.
         """
@@ -82,14 +85,14 @@ class Host:
         self._begun = True
         return self._step(protocol.start)
 
-    def change(self, part: AgentProblem, void: Invalidated) -> None:
-        """A new epoch: the problem has changed to `part`, and counting begins again.
+    def change(self, part: AgentProblem, invalidated: Invalidated) -> None:
+        """Enter a new epoch: the problem has changed to `part`, and counting begins again.
 
         A protocol that can goes on with what it knows; any other is begun anew. Raises `UnsupportedError`.
         """
         problem, order = LocalProblem(part), PriorityOrder(part.order, part.links)
         if isinstance(self.protocol, DynamicProtocol):
-            self.protocol.change(problem, order, void)
+            self.protocol.change(problem, order, invalidated)
             self._forget_said()
         else:
             self.protocol = type(self.protocol)(problem, order)
@@ -145,15 +148,15 @@ class Host:
         return self._step(self.protocol.settle)
 
     def metrics(self) -> Metrics:
-        """What this robot has sent and checked so far; `ncccs` is its own clock."""
+        """Return what this robot has sent and checked so far; `ncccs` is its own clock."""
         return Metrics(dict(self.sent), self.bytes, self.clock, self.checks, largest=self.largest)
 
-    def _equip(self, brief: RunParameters) -> None:
+    def _equip(self, parameters: RunParameters) -> None:
         """Give the protocol what it cannot have of itself: what was set, and chance."""
         protocol = self.protocol
-        if brief.settings:
-            protocol.settings = settings_of(type(protocol), brief.settings)
-        protocol.chance = random.Random(f"{brief.seed} {self.name}").random  # noqa: S311 - a search is no secret
+        if parameters.settings:
+            protocol.settings = settings_of(type(protocol), parameters.settings)
+        protocol.chance = random.Random(f"{parameters.seed} {self.name}").random  # noqa: S311 - a search is no secret
 
     def _step(self, act: Callable[[], None]) -> list[Envelope]:
         """Let the protocol act, count its checks, and wrap what it has said."""
@@ -198,7 +201,7 @@ class Host:
         self.clock = before + self._checks
 
     def _time(self, checks: int) -> float:
-        """The time when so many checks were done."""
+        """Return the time when so many checks were done."""
         return self._now() if self._then is None else self._then(checks)
 
     @property

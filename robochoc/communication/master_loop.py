@@ -50,8 +50,8 @@ class MasterLoop(ABC):
         """Tell all robots to begin."""
 
     @abstractmethod
-    def _send_wave(self, wave: Wave) -> None:
-        """Ask all robots for their counters."""
+    def _send_all(self, message: Wave, /) -> None:
+        """Send a control message to all robots."""
 
     def schedule_kills(self, kills: KillSchedule, kill: Callable[[str], None]) -> None:
         """Have `kill` end robots' processes as `kills` says."""
@@ -95,11 +95,11 @@ class MasterLoop(ABC):
                 self._kill(name)
 
     def _detect_end(self, now: float) -> None:
-        """Begin a wave when it could show quiescence, or when somebody waits for the count of messages."""
+        """Begin a wave when it could show quiescence, or when the count of messages is wanted."""
         wanted = self._progress is not None and now - self._shown >= TICK_S
         if self._progress and wanted:
             self._shown = now
             self._progress(Progress(self.state.counters.sent, time.monotonic() - self._began))
         wave = self.state.next_wave(wanted=wanted)
         if wave is not None:
-            self._send_wave(Wave(wave))
+            self._send_all(Wave(wave))

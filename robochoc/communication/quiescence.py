@@ -5,8 +5,8 @@ that a first wave collects equal those of a second one, begun after the first ha
 as were sent, then nothing was under way when the second wave began, and nothing ever will be. No timer is part of
 the argument: slow messages only make it wait.
 
-Pure: the runtime carries the waves. As the first wave serves whatever was heard last from each robot, be it a
-report of its own accord or an answer to an earlier wave.
+Pure: the runtime carries the waves. The first wave is the latest counters of each robot, whether it reported them
+unasked or in answer to an earlier wave.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ class Counts(NamedTuple):
 
 
 class FourCounters:
-    """What the one who asks keeps: the counters heard last, and the wave under way."""
+    """The state of the one that asks: the latest counters, and the wave under way."""
 
     def __init__(self, robots: Iterable[str]) -> None:
         self._latest: dict[str, Counts | None] = dict.fromkeys(robots)
@@ -36,11 +36,11 @@ class FourCounters:
 
     @property
     def sent(self) -> int:
-        """Messages sent, as far as heard."""
+        """Messages sent, as far as reported."""
         return self._total.sent
 
     def hear(self, robot: str, counts: Counts) -> None:
-        """Take in counters that `robot` reports of its own accord."""
+        """Take in counters that `robot` reports unasked."""
         before = self._latest[robot]
         if before is None:
             self._unheard -= 1
@@ -52,22 +52,22 @@ class FourCounters:
 
     @property
     def total(self) -> Counts | None:
-        """Messages sent and taken in by all together; None while somebody has not been heard."""
+        """Messages sent and received by all robots together; None while the counters of a robot are unknown."""
         return None if self._unheard else self._total
 
     def latest(self, robot: str) -> Counts | None:
-        """The counters that `robot` has told last; None: it has told none."""
+        """Return the counters that `robot` has reported last; None if it has reported none."""
         return self._latest.get(robot)
 
     @property
     def silent(self) -> tuple[str, ...]:
-        """Who has never told its counters; else who has not answered the wave under way."""
+        """The robots whose counters are unknown; else those that have not answered the wave under way."""
         unheard = [robot for robot, counts in self._latest.items() if counts is None]
         return tuple(sorted(unheard or self._unanswered))
 
     @property
     def due(self) -> bool:
-        """Whether a wave is worth its cost: all have been heard, the sums balance, and none is under way."""
+        """Whether a wave is worth its cost: all counters are known, the sums balance, and no wave is under way."""
         return not self._unanswered and not self._unheard and self._total.sent == self._total.received
 
     def begin_wave(self) -> int:

@@ -38,7 +38,7 @@ class Progress(NamedTuple):
 class RunResult:
     """How a run ended. `assignments` maps each robot to its variables' values (empty: it has none).
 
-    `witness` is the robot that could tell the verdict alone; None when it follows from quiescence or a limit. `lost`
+    `witness` is the robot that concluded the verdict alone; None when it follows from quiescence or a limit. `lost`
     says why, by name, robots were lost whose loss broke the search off. `findings` is what robots know of the whole.
     """
 

@@ -33,7 +33,7 @@ class Sealed(ChannelFilter):
         return number + cipher.encrypt(_PADDING + number, content, context)
 
     def open(self, sender: str, content: bytes, context: bytes) -> bytes:
-        """The content, if `sender` has sealed it for this robot and `context`. Raises `NotGenuineError`."""
+        """Return the content, if `sender` has sealed it for this robot and `context`. Raises `NotGenuineError`."""
         number, encrypted = content[:_NUMBER_BYTES], content[_NUMBER_BYTES:]
         if len(number) < _NUMBER_BYTES:
             raise NotGenuineError("it is too short")
@@ -47,7 +47,7 @@ class Sealed(ChannelFilter):
             ) from error
 
     def _cipher(self, sender: str, receiver: str) -> ChaCha20Poly1305:
-        """The cipher of this direction; made anew when the peer has a new card."""
+        """Return the cipher of this direction; made anew when the peer has a new card."""
         card = self.ring.card_of(receiver if sender == self.ring.name else sender)
         known = self._ciphers.get((sender, receiver))
         if known is None or known[0] is not card:

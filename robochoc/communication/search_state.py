@@ -116,7 +116,7 @@ class SearchState:
         When the last wave has shown quiescence, the verdict is a solution (unless a robot has concluded another).
 
         Args:
-            wanted: Begin a wave unless one is under way, because somebody waits for the count of messages.
+            wanted: Begin a wave unless one is under way, as the count of messages is wanted.
         """
         if self.counters.quiescent:
             self.verdict = self.verdict or Verdict.SOLUTION
@@ -124,7 +124,7 @@ class SearchState:
         return self.counters.begin_wave() if self.wave_due or (wanted and not self.counters.waving) else None
 
     def has_reported(self, name: str) -> bool:
-        """Whether the robot has reported the end of its search."""
+        """Return whether the robot has reported the end of its search."""
         return name in self._reports
 
     @property

@@ -1,4 +1,4 @@
-"""A session: a team that searches, and goes on when its problem changes. What every runtime offers."""
+"""A session: a team that searches, and continues when its problem changes. Every runtime offers one."""
 
 from __future__ import annotations
 
@@ -20,15 +20,15 @@ class Epoch(NamedTuple):
 
     Attributes:
         compiled: The team, with compiled domains.
-        void: What of the epoch before no longer holds.
+        invalidated: What of the epoch before no longer holds.
         restarted: Robots that begin anew, though there may have been others of their names before.
-        brief: What robots are given besides the problem.
+        parameters: What robots are given besides the problem.
     """
 
     compiled: CompiledTeam
-    void: Invalidated = Invalidated(frozenset(), frozenset())
+    invalidated: Invalidated = Invalidated(frozenset(), frozenset())
     restarted: frozenset[str] = frozenset()
-    brief: RunParameters = DEFAULT_PARAMETERS
+    parameters: RunParameters = DEFAULT_PARAMETERS
 
     @property
     def team(self) -> Team:
@@ -36,13 +36,13 @@ class Epoch(NamedTuple):
         return self.compiled.team
 
     def parts(self, protocol: type[Protocol]) -> dict[str, AgentProblem]:
-        """What each robot knows when it speaks `protocol`."""
+        """Return each robot's part of the problem for `protocol`."""
         traits = protocol.traits
-        return agent_problems(self.compiled, self.brief, shared_scopes=traits.shared_scopes, tree=traits.tree)
+        return agent_problems(self.compiled, self.parameters, shared_scopes=traits.shared_scopes, tree=traits.tree)
 
 
 class Session(ABC):
-    """One team and one protocol in one runtime. Whoever opens it closes it: it is a context manager.
+    """One team and one protocol in one runtime. A context manager.
 
     `compiled` is what its robots work on: the `team` that it was opened with (compiled without a solver, where that was
     not done before), and after each `change` that epoch's. `anew`: robots know nothing of the epoch before, whatever
@@ -55,13 +55,13 @@ class Session(ABC):
         self.compiled = ensure_compiled(team)
 
     def workable(self, team: Team) -> Team:
-        """Return `team`, a later form of the one that the robots work on, as they can go on with it."""
+        """Return `team`, a later form of the one that the robots work on, as they can continue with it."""
         return team
 
     @property
     @abstractmethod
     def lossless(self) -> bool:
-        """Whether no message of the search before was lost: it came to rest, or there was none. Robots are told."""
+        """Whether no message of the search before was lost: it became quiescent, or there was none."""
 
     @abstractmethod
     def search(self, timeout: float | None = None, messages: int | None = None) -> RunResult:
@@ -77,10 +77,10 @@ class Session(ABC):
 
     @abstractmethod
     def close(self) -> None:
-        """Leave nothing behind."""
+        """Release all that the session uses."""
 
     def run(self, timeout: float | None = None) -> RunResult:
-        """One search, then the end."""
+        """Search once, then close the session."""
         with self:
             return self.search(timeout)
 
@@ -94,5 +94,5 @@ class Session(ABC):
 
 
 def over(deadline: float | None) -> bool:
-    """Whether `deadline` (on the monotonic clock; None: there is none) has come."""
+    """Return whether `deadline` (on the monotonic clock; None: there is none) has come."""
     return deadline is not None and time.monotonic() >= deadline

@@ -21,7 +21,7 @@ class Signed(ChannelFilter):
         return signature + content
 
     def open(self, sender: str, content: bytes, context: bytes) -> bytes:
-        """The content, if `sender` has signed it for this robot and `context`. Raises `NotGenuineError`."""
+        """Return the content, if `sender` has signed it for this robot and `context`. Raises `NotGenuineError`."""
         signature, plain = content[:_SIGNATURE_BYTES], content[_SIGNATURE_BYTES:]
         part = _signed_part(sender, self.ring.name, plain, context)
         try:

@@ -22,11 +22,11 @@ from dataclasses import replace
 import numpy as np
 import numpy.typing as npt
 
-from robochoc.flight.log import SAMPLE_RATE_HZ, ClosestApproach, FlightEvent, FlightLog, LegTimes
+from robochoc.flight.log import SAMPLE_RATE_HZ, FlightLog, LegTimes
 from robochoc.flight.mission import Goal, Mission
 from robochoc.flight.quadrotor.airframe import Array
 from robochoc.flight.quadrotor.bounds import check_homes, check_length, check_near, check_paths, origin_of
-from robochoc.flight.quadrotor.conditions import DISTANCE_MIN_M, FlightConditions, MotorFailure
+from robochoc.flight.quadrotor.conditions import DISTANCE_MIN_M, FlightConditions
 from robochoc.flight.quadrotor.free_points import nearest_distances, nearest_two
 from robochoc.flight.quadrotor.goals import Hazards, LegGoals, check_separation, start_delays
 from robochoc.flight.quadrotor.obstacles import ObstacleEncounter, encounters
@@ -35,18 +35,9 @@ from robochoc.flight.quadrotor.simulation import DT, QuadrotorSimulation
 from robochoc.flight.quadrotor.trajectory import STOP_S, Trajectory
 from robochoc.flight.reports import Blocked, OutOfOrder, Report
 from robochoc.flight.routes.motion import MotionLimits, RoutePlan
-from robochoc.flight.routes.timetable import NoRouteError, TooCloseError, plan_routes
-
-__all__ = [
-    "ClosestApproach",
-    "Flight",
-    "FlightConditions",
-    "FlightEvent",
-    "FlightLog",
-    "LegTimes",
-    "MotorFailure",
-    "fly",
-]
+from robochoc.flight.routes.moves import NoRouteError
+from robochoc.flight.routes.spacing import TooCloseError
+from robochoc.flight.routes.timetable import plan_routes
 
 DISTANCE_M = 0.5
 """The default distance between drones' centres."""

@@ -176,9 +176,9 @@ def mission_of(outcome: Outcome, team: Team | None = None, scale: float | None =
     else:
         robots, names = [], [*first, *outcome.withdrawn]
         others = [craft_of_variable(name, values) for values in decided for name in values]
-    cast = MissionBuilder(robots, first, names=names, others=others, leaving=_leaving(epochs, outcome), scale=scale)
-    legs = [cast.leg(epoch) for epoch in epochs[:-1]]
-    return cast.mission(outcome.team, [*legs, cast.leg(epochs[-1], outcome.withdrawn)])
+    builder = MissionBuilder(robots, first, names=names, others=others, leaving=_leaving(epochs, outcome), scale=scale)
+    legs = [builder.leg(epoch) for epoch in epochs[:-1]]
+    return builder.mission(outcome.team, [*legs, builder.leg(epochs[-1], outcome.withdrawn)])
 
 
 def all_robots(team: Team) -> list[Robot]:

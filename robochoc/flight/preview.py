@@ -44,7 +44,7 @@ class Preview:
 
 
 def preview_of(mission: Mission, progress: Callable[[str], None] | None = None) -> Preview:
-    """Return how the drones fly `mission` in calm air. If nobody is to fly, or they cannot, nothing was flown.
+    """Return how the drones fly `mission` in calm air. If no drone has a goal, or they cannot fly, nothing was flown.
 
     Args:
         mission: What the drones are asked to do.

@@ -1,4 +1,7 @@
-"""Robots and teams as XML files: reading them with every mistake told, and writing them (FORMAT.md, Figure 2)."""
+"""Read and write robots and teams as XML files; every mistake is reported.
+
+docs/reference/format.md; the paper, Figure 2.
+"""
 
 from robochoc.formats.definitions import PREDEFINED
 from robochoc.formats.diagnostics import Diagnostic, InvalidInputError, encodable, on_one_line

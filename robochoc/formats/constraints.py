@@ -1,4 +1,4 @@
-"""One `constraint` element: a definition applied to a scope (FORMAT.md, "One robot")."""
+"""One `constraint` element: a definition applied to a scope (docs/reference/format.md, "One robot")."""
 
 from __future__ import annotations
 
@@ -24,10 +24,10 @@ from robochoc.model.problem import INFINITE, Constraint, ConstraintModel, Predic
 
 @dataclass(frozen=True)
 class Context:
-    """What a file's constraints can refer to.
+    """The names that a file's constraints can refer to.
 
     `definitions` holds None, and `own` the name nevertheless, for what is defined but has a mistake of its own:
-    whoever refers to it is not to blame.
+    references to it are no mistakes.
     """
 
     kind: ProblemKind

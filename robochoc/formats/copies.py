@@ -17,7 +17,7 @@ from robochoc.model.expression import Apply, Constant, Expression, Name, Undefin
 from robochoc.model.problem import INFINITE, Constraint, ConstraintModel, Domain, Relation, Robot
 
 MAX_COMPARED = 1_000_000
-"""So many tuples are tried at most to find a difference."""
+"""The maximum number of tuples that are compared."""
 
 
 def differing_copies(members: TeamMembers, misplaced: Collection[str]) -> Iterator[Diagnostic]:

@@ -1,4 +1,4 @@
-"""What holds of domains, relations, predicates and topics, whoever made them (FORMAT.md, "One robot").
+"""Rules for domains, relations, predicates and topics of files and objects (docs/reference/format.md, "One robot").
 
 Expressions have no rules here: a tree is written down and handed to the parser, whose rules are the only ones.
 """
@@ -16,9 +16,9 @@ from robochoc.model.expression.parser import MAX_DEPTH, MAX_NODES
 from robochoc.model.problem import Domain, Predicate, ProblemKind, Relation, Semantics, Term, Topic
 
 MAX_VALUES = 100_000
-"""Of a domain."""
+"""The maximum size of a domain."""
 MAX_TUPLES = 1_000_000
-"""Of a relation."""
+"""The maximum number of tuples of a relation."""
 
 _PARAMETER = re.compile(r"[A-Za-z_][A-Za-z0-9_.]*")
 _OPERATORS = {"eq": "eq", "ne": "ne", "neq": "ne", "lt": "lt", "le": "le", "gt": "gt", "ge": "ge"}
@@ -135,31 +135,31 @@ def check_expression(what: str, expression: Expression, names: Sequence[str], wa
     """
     try:
         _check_size(expression)
-        said = text(expression)
-        again = parsed(said, tuple(names), wanted)
+        written = text(expression)
+        again = parsed(written, tuple(names), wanted)
     except ExpressionError as error:
         raise expression_mistake(what, error) from None
     if again != expression:
-        raise MistakeError(f"{what}: '{shortened(said)}' says something else", "use the operators of XCSP 2.1")
+        raise MistakeError(f"{what}: '{shortened(written)}' says something else", "use the operators of XCSP 2.1")
 
 
 @lru_cache(maxsize=256)
-def parsed(said: str, names: tuple[str, ...], wanted: Type) -> Expression:
+def parsed(written: str, names: tuple[str, ...], wanted: Type) -> Expression:
     """Return what `parse` returns.
 
     Robots of a team mostly have equal texts: these are parsed once and share one tree.
     """
-    return parse(said, names, wanted)
+    return parse(written, names, wanted)
 
 
 def expression_mistake(what: str, error: ExpressionError, line: int = 0) -> MistakeError:
     """Return what is wrong with the expression of `what`, which stands in that `line`."""
     message = f"{what}: {error.message}, at character {error.position + 1}"
-    return MistakeError(message, error.hint or "see FORMAT.md, 'Functional expressions'", line)
+    return MistakeError(message, error.hint or "see docs/reference/format.md, 'Functional expressions'", line)
 
 
 def _check_size(expression: object) -> None:
-    """Raise `ExpressionError` for a tree that cannot be written down, before anybody tries."""
+    """Raise `ExpressionError` for a tree that cannot be written down, before it is tried."""
     waiting: list[tuple[object, int]] = [(expression, 1)]
     nodes = 0
     while waiting:

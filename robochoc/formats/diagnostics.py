@@ -1,4 +1,4 @@
-"""What is wrong with an input, where, and what to do about it: a line for each mistake, all of them at once."""
+"""Diagnostics of inputs: all mistakes at once, each in a line, with its place and the next step."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from robochoc.model.priorities import natural_key
 from robochoc.system.plain_text import on_one_line as on_one_line  # noqa: PLC0414 - from here, too
 
 MAX_PER_FILE = 100
-"""So many mistakes of one file are told; who makes more needs no longer list."""
+"""The maximum number of mistakes of one file that are reported."""
 
 
 @dataclass(frozen=True, slots=True)

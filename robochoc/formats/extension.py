@@ -1,4 +1,4 @@
-"""What is listed value by value: domains, and constraints in extension (FORMAT.md, "One robot")."""
+"""Domains, and constraints in extension (docs/reference/format.md, "One robot")."""
 
 from __future__ import annotations
 

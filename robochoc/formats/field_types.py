@@ -1,7 +1,7 @@
-"""Whether Python objects are made as their dataclasses say: an `int` where an `int` belongs, tuples and no lists.
+"""Checks that Python objects have the field types of their dataclasses: an `int` for an `int`, no list for a tuple.
 
 Python does not look at annotations. What a reader of files makes is right by construction; what a program builds need
-not be, and everything behind counts on it: that a value is hashable, that nobody can change it afterwards, that it is
+not be, and all other code relies on it: that a value is hashable, that it cannot be changed afterwards, that it is
 written down as it was meant.
 """
 
@@ -21,7 +21,7 @@ _LEAVES = (Apply, Constant, Name)
 """Expressions: they may be too deep to be walked, and have a check of their own."""
 
 AS_BUILT = "build it as its class says"
-"""What to do about a `FieldTypeError`."""
+"""The hint for a `FieldTypeError`."""
 
 _Check = Callable[[object], None]
 
@@ -35,7 +35,7 @@ class FieldTypeError(TypeError):
         super().__init__(f"{shown} where {expected} should stand")
 
     @property
-    def told(self) -> str:
+    def explanation(self) -> str:
         """Return what is wrong, and where in the object."""
         where = self.path.lstrip(".")
         return f"{where}: {self}" if where else str(self)

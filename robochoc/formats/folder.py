@@ -16,13 +16,18 @@ _SURELY_READ = 1024 * 1024
 
 
 def write_team(team: Team, folder: Path, *, replace: bool = False) -> None:
-    """Write one XML file per robot into `folder`, which comes into being complete, or not at all.
+    """Write one XML file per robot into `folder`, which is then complete, or not there at all.
 
-    Raises `InvalidInputError` when the team is not valid, or says what robots' files cannot; when something is there
-    already, unless `replace` is set and it is a team's folder (one that holds nothing but XML files). Raises `OSError`
-    when the folder cannot be written.
+    Args:
+        team: A valid team.
+        folder: The folder to be written.
+        replace: Whether a folder of a team that is there already is replaced: one with XML files only.
+
+    Raises:
+        InvalidInputError: if the team is invalid, files cannot express it, or the folder is there and is not replaced.
+        OSError: if it cannot be written.
     """
-    import secrets  # noqa: PLC0415 - start-up: only who writes a team needs them
+    import secrets  # noqa: PLC0415 - start-up: only to write a team
     import shutil  # noqa: PLC0415 - the same
 
     check_writable(team)

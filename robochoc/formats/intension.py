@@ -1,4 +1,7 @@
-"""What is said by an expression: predicates, predefined ones included, and topics (FORMAT.md, "One robot")."""
+"""Read what is stated by an expression: predicates, predefined ones included, and topics.
+
+docs/reference/format.md, "One robot".
+"""
 
 from __future__ import annotations
 

@@ -50,7 +50,7 @@ def _names(things: Iterable[_Named], predefined: Mapping[str, _Named] = {}) -> d
 
 
 def _renamed(robot: Robot, domains: Mapping[Domain, str], definitions: Mapping[Relation | Predicate, str]) -> Robot:
-    def told(constraints: Iterable[Constraint]) -> tuple[Constraint, ...]:
+    def renamed(constraints: Iterable[Constraint]) -> tuple[Constraint, ...]:
         return tuple(
             replace(one, definition=replace(one.definition, name=definitions[one.definition]))
             if one.definition in definitions
@@ -64,7 +64,7 @@ def _renamed(robot: Robot, domains: Mapping[Domain, str], definitions: Mapping[R
             replace(one, domain=replace(one.domain, name=domains[one.domain])) if one.domain in domains else one
             for one in robot.variables
         ),
-        private=told(robot.private),
-        parents=tuple(replace(one, constraints=told(one.constraints)) for one in robot.parents),
-        children=tuple(replace(one, constraints=told(one.constraints)) for one in robot.children),
+        private=renamed(robot.private),
+        parents=tuple(replace(one, constraints=renamed(one.constraints)) for one in robot.parents),
+        children=tuple(replace(one, constraints=renamed(one.constraints)) for one in robot.children),
     )

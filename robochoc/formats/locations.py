@@ -1,4 +1,4 @@
-"""Where the parts of a robot stand, for messages: lines of its file, or what its objects are called."""
+"""The locations of a robot's parts, for messages: lines of its file, or names of its objects."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ class Location(NamedTuple):
 
 
 class Locations(Protocol):
-    """Where one robot and its parts stand."""
+    """The locations of one robot and its parts."""
 
     def robot(self) -> Location:
         """Return where the robot itself stands."""
@@ -42,7 +42,7 @@ class Locations(Protocol):
         """Return where a neighbour is listed."""
 
     def absent(self, name: str) -> tuple[str, str]:
-        """Return what is said of a neighbour that is not there, and what to do about it."""
+        """Return the message and the hint for a neighbour that is not there."""
 
 
 @dataclass(frozen=True)
@@ -77,7 +77,7 @@ class FileLocations:
 
 @dataclass(frozen=True)
 class ObjectLocations:
-    """A robot that was built in Python, and is called `name`: stale lines of files are not believed."""
+    """A robot that was built in Python. Lines of a file that it may once have been read from are ignored."""
 
     name: str
 

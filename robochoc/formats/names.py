@@ -1,4 +1,4 @@
-"""What can be a name, and what a number, in a robot's data (FORMAT.md, "One robot")."""
+"""Rules for names and numbers in a robot's data (docs/reference/format.md, "One robot")."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from robochoc.formats.diagnostics import MistakeError, shortened
 from robochoc.model.problem import INFINITE
 
 MAX_WEIGHT = 1_000_000
-"""Of a robot."""
+"""The maximum weight of a robot."""
 BEYOND = 10**18
 """Integers have at most 18 digits."""
 MAX_NAME = 251

@@ -1,4 +1,7 @@
-"""Who is in a team, and who is whose parent: what two robots say of each other (FORMAT.md, "The team")."""
+"""Check who is in a team and who is whose parent: what two robots state of each other.
+
+docs/reference/format.md, "The team".
+"""
 
 from __future__ import annotations
 

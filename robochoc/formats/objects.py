@@ -68,7 +68,7 @@ class Objects:
             check_field_types(robot, Robot)
         except FieldTypeError as error:
             name = robot.name if isinstance(getattr(robot, "name", None), str) else "?"
-            self._note(ObjectLocations(name).robot(), error.told, AS_BUILT)
+            self._note(ObjectLocations(name).robot(), error.explanation, AS_BUILT)
             return False
         return True
 
@@ -159,7 +159,7 @@ class Objects:
                 check_shared(constraint, own)
 
     def _applied(self, constraint: Constraint, kind: ProblemKind, places: ObjectLocations) -> bool:
-        """Look at a constraint, whoever holds it. False: its definition is to blame. Raises `MistakeError`."""
+        """Check a constraint. Return False if its definition has the mistake. Raises `MistakeError`."""
         definition = constraint.definition
         check_word(constraint.name)
         check_terms(constraint.scope)
@@ -172,7 +172,7 @@ class Objects:
         return right
 
     def _defined(self, thing: Definition, places: ObjectLocations) -> bool:
-        """Return whether a domain or a definition is right; the first who has it is told what is wrong."""
+        """Return whether a domain or a definition is right. Its mistake is noted for the first robot that has it."""
         known = self._known.get(id(thing))
         if known is None:
             known = self._known[id(thing)] = (thing, self._is_right(thing, places))
@@ -191,7 +191,7 @@ class Objects:
 
     @contextmanager
     def _at(self, place: Callable[..., Location], *part: object) -> Iterator[None]:
-        """Note a `MistakeError` raised inside; only then anybody asks for the `place` of the `part`."""
+        """Note a `MistakeError` raised inside. Only then the `place` of the `part` is computed."""
         try:
             yield
         except MistakeError as mistake:

@@ -1,11 +1,14 @@
-"""The JSON result (FORMAT.md, "What comes out"): one object for one team and run."""
+"""The JSON result: one object for one team and run (docs/reference/result.md)."""
 
 from __future__ import annotations
+
+from typing import Any
 
 import msgspec
 from msgspec import UNSET, UnsetType
 
 from robochoc.model.outcome import CheckCounts, EpochOutcome, Metrics, Outcome, PseudoTreeNode, Verdict
+from robochoc.system.decode_errors import describe_decode_error
 
 
 class ResultError(ValueError):
@@ -72,10 +75,29 @@ class _Form(msgspec.Struct, omit_defaults=True):
     checked: _CheckedForm | None = None
 
 
+_SAME = (
+    *("team", "protocol", "runtime", "seed", "verdict", "assignment", "cost", "verified", "count", "reason", "order"),
+    *("bound", "placed_by", "tree", "confirmed", "channel", "claimed_by"),
+)
+"""The fields that are the same in an outcome and in its JSON form."""
+
+
 def result_json(outcome: Outcome) -> bytes:
     """Return `outcome` as one line of JSON, without the line's end."""
-    spent = outcome.metrics
-    metrics = _MetricsForm(
+    same: dict[str, Any] = {name: getattr(outcome, name) for name in _SAME}
+    form = _Form(
+        **same,
+        withdrawn=list(outcome.withdrawn),
+        lost=list(outcome.lost),
+        epochs=[_epoch(epoch) for epoch in outcome.epochs],
+        metrics=_metrics(outcome.metrics),
+        checked=_CheckedForm(*outcome.checked) if outcome.checked else None,
+    )
+    return msgspec.json.encode(form)
+
+
+def _metrics(spent: Metrics) -> _MetricsForm:
+    return _MetricsForm(
         messages=sum(spent.messages.values()),
         bytes=spent.bytes,
         ncccs=spent.ncccs,
@@ -87,31 +109,6 @@ def result_json(outcome: Outcome) -> bytes:
         simulated_s=spent.simulated_s,
         largest=spent.largest,
     )
-    form = _Form(
-        team=outcome.team,
-        protocol=outcome.protocol,
-        runtime=outcome.runtime,
-        seed=outcome.seed,
-        verdict=outcome.verdict,
-        assignment=outcome.assignment,
-        cost=outcome.cost,
-        withdrawn=list(outcome.withdrawn),
-        epochs=[_epoch(epoch) for epoch in outcome.epochs],
-        metrics=metrics,
-        verified=outcome.verified,
-        count=outcome.count,
-        reason=outcome.reason,
-        lost=list(outcome.lost),
-        order=outcome.order,
-        bound=outcome.bound,
-        placed_by=outcome.placed_by,
-        tree=outcome.tree,
-        confirmed=outcome.confirmed,
-        channel=outcome.channel,
-        claimed_by=outcome.claimed_by,
-        checked=_CheckedForm(*outcome.checked) if outcome.checked else None,
-    )
-    return msgspec.json.encode(form)
 
 
 def _epoch(epoch: EpochOutcome) -> _EpochForm:
@@ -151,7 +148,7 @@ def _epoch_of(form: _EpochForm) -> EpochOutcome:
 
 
 def read_result(content: bytes) -> Outcome:
-    """Return the outcome that a JSON result tells of. Raises `ResultError`, saying what is wrong."""
+    """Return the outcome in a JSON result. Raises `ResultError`, which says what is wrong."""
     try:
         form = msgspec.json.decode(content, type=_Form)
     except UnicodeDecodeError as error:
@@ -159,31 +156,19 @@ def read_result(content: bytes) -> Outcome:
     except RecursionError as error:
         raise ResultError("it is nested too deep") from error
     except msgspec.MsgspecError as error:
-        raise ResultError(str(error)) from error
-    spent = form.metrics
-    messages = spent.messages_by_type or {"messages": spent.messages}
-    counts = spent.bytes, spent.ncccs, spent.checks, spent.wall_s, spent.compile_s, spent.memory, spent.simulated_s
+        raise ResultError(describe_decode_error(error, _Form)) from error
+    same: dict[str, Any] = {name: getattr(form, name) for name in _SAME}
     return Outcome(
-        team=form.team,
-        protocol=form.protocol,
-        runtime=form.runtime,
-        seed=form.seed,
-        verdict=form.verdict,
-        assignment=form.assignment,
-        cost=form.cost,
+        **same,
         withdrawn=tuple(form.withdrawn),
-        metrics=Metrics(messages, *counts, largest=spent.largest),
-        verified=form.verified,
-        count=form.count,
-        reason=form.reason,
         lost=tuple(form.lost),
-        order=form.order,
-        bound=form.bound,
-        placed_by=form.placed_by,
-        tree=form.tree,
-        confirmed=form.confirmed,
-        channel=form.channel,
-        claimed_by=form.claimed_by,
-        checked=CheckCounts(form.checked.by_both, form.checked.by_owner) if form.checked else None,
         epochs=tuple(map(_epoch_of, form.epochs)),
+        metrics=_metrics_of(form.metrics),
+        checked=CheckCounts(form.checked.by_both, form.checked.by_owner) if form.checked else None,
     )
+
+
+def _metrics_of(form: _MetricsForm) -> Metrics:
+    messages = form.messages_by_type or {"messages": form.messages}
+    counts = form.bytes, form.ncccs, form.checks, form.wall_s, form.compile_s, form.memory, form.simulated_s
+    return Metrics(messages, *counts, largest=form.largest)

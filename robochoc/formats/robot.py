@@ -1,4 +1,4 @@
-"""The third layer: what one robot's file means (FORMAT.md, "One robot"; Figure 2)."""
+"""The third layer: what one robot's file means (docs/reference/format.md, "One robot"; Figure 2)."""
 
 from __future__ import annotations
 
@@ -12,6 +12,7 @@ from lxml import etree
 from robochoc.formats.constraints import Context, read_private, read_shared
 from robochoc.formats.definitions import check_semantics, refuse_predefined
 from robochoc.formats.diagnostics import (
+    MAX_PER_FILE,
     Diagnostic,
     DiagnosticCollector,
     InvalidInputError,
@@ -23,7 +24,9 @@ from robochoc.formats.extension import check_count, read_domain, read_relation
 from robochoc.formats.intension import read_predicate, read_topic
 from robochoc.formats.locations import FileLocations
 from robochoc.formats.names import check_robot_name, check_unique
+from robochoc.formats.repair import without_schema_errors
 from robochoc.formats.rules import NEIGHBOURS_ONCE, check_shown_variables, refuse_nothing_to_decide, repeated_neighbours
+from robochoc.formats.schema import SchemaError, schema_for
 from robochoc.formats.team_members import TeamMember
 from robochoc.formats.xml import attribute, line, parsed_xml, read_xml
 from robochoc.model.problem import (
@@ -47,13 +50,16 @@ class RobotFile(TeamMember):
     """A robot, and what its file says beyond it: that is the team's to check, and then no longer needed."""
 
     context: Context
-    """What constraints that a scenario adds can refer to."""
+    """The names that constraints of a scenario can refer to."""
 
 
 def read_robot(path: Path | str) -> Robot:
-    """Return the robot in the XML file `path`, named after the file's stem.
+    """Return the robot in the XML file `path`. It is named after the file's stem.
 
-    Its neighbours are not looked at: `read_team` does that. Raises `InvalidInputError` with all mistakes of the file.
+    Its neighbours' files are not checked: `read_team` does that.
+
+    Raises:
+        InvalidInputError: with all mistakes of the file.
     """
     return read_robot_file(Path(path)).robot
 
@@ -61,17 +67,38 @@ def read_robot(path: Path | str) -> Robot:
 def read_robot_file(path: Path) -> RobotFile:
     """Return the robot in the XML file `path`, with what the team has to check. Raises `InvalidInputError`."""
     _check_name(path.stem, path)
-    return _Reader(path, read_xml(path, "instance")).whole()
+    try:
+        return _Reader(path, read_xml(path, "instance")).whole()
+    except SchemaError as refused:
+        raise InvalidInputError([*refused.diagnostics, *_other_mistakes(path, refused)]) from None
 
 
 def robot_in(content: bytes, name: str) -> Robot:
-    """Return the robot called `name`, whose XML file has this `content`. Nobody need have written such a file.
+    """Return the robot called `name`, whose XML file has this `content`. There need not be such a file.
 
-    The same limits hold as for a file. Raises `InvalidInputError`, which tells of the file `NAME.xml`.
+    The same limits hold as for a file.
+
+    Raises:
+        InvalidInputError: with all mistakes. Messages name the file `NAME.xml`.
     """
     path = Path(f"{name}.xml")
     _check_name(name, path)
     return _Reader(path, parsed_xml(content, path, "instance")).whole().robot
+
+
+def _other_mistakes(path: Path, refused: SchemaError) -> list[Diagnostic]:
+    """Return the mistakes of a file that its schema has `refused`, in lines where the schema finds none."""
+    if len(refused.diagnostics) > MAX_PER_FILE:
+        return []  # the file was not read to its end
+    tree = without_schema_errors(refused.tree, schema_for("instance"))
+    if tree is None:
+        return []
+    lines = {mistake.line for mistake in refused.diagnostics}
+    try:
+        _Reader(path, tree).whole()
+    except InvalidInputError as invalid:
+        return [mistake for mistake in invalid.diagnostics if mistake.line not in lines]
+    return []
 
 
 def _check_name(name: str, path: Path) -> None:
@@ -213,12 +240,12 @@ class _Reader:
             if kept:
                 copies[name] = kept
             scopes = itertools.chain.from_iterable(constraint.variables for constraint in held)
-            told = tuple(dict.fromkeys(variable for variable in scopes if variable in self._own))
+            shown = tuple(dict.fromkeys(variable for variable in scopes if variable in self._own))
             if agent.get("variable") is not None:
-                told = tuple((agent.get("variable") or "").split())
+                shown = tuple((agent.get("variable") or "").split())
                 with self._report.at(line(agent)):
-                    check_shown_variables(told, self._own)
-            yield Child(name, told, parts, line(agent), kept)
+                    check_shown_variables(shown, self._own)
+            yield Child(name, shown, parts, line(agent), kept)
 
     def _check_neighbours(self, parents: tuple[Parent, ...], children: tuple[Child, ...]) -> None:
         for neighbour, message in repeated_neighbours(self._name, parents, children):

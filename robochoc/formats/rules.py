@@ -1,4 +1,4 @@
-"""What holds of a robot's constraints and neighbours, whoever made it (FORMAT.md, "One robot").
+"""Rules for a robot's constraints and neighbours (docs/reference/format.md, "One robot").
 
 With `names` and `definitions` this is the one list of rules on a robot. The readers of files ask them of each element
 that they have read, `objects` asks them of every object of a robot that was built in Python. What two robots can get
@@ -26,9 +26,9 @@ from robochoc.model.problem import (
 )
 
 NEIGHBOURS_ONCE = "list every neighbour once, as parent or as child"
-"""What to do about neighbours that are `repeated_neighbours`."""
+"""The hint for `repeated_neighbours`."""
 NOBODY_LEFT = ("all robots have left after this event", "keep one, or add another")
-"""What is wrong with an event of a scenario after which there is no team, and what to do."""
+"""The message and the hint for an event of a scenario after which there is no team."""
 
 
 def check_terms(terms: Sequence[Term]) -> None:
@@ -70,7 +70,7 @@ def check_private(constraint: Constraint, own: Collection[str]) -> None:
 
 
 def refuse_no_model(model: ConstraintModel | str | None) -> None:
-    """Raise `MistakeError` for a shared constraint of which nobody says who knows it."""
+    """Raise `MistakeError` for a shared constraint without a model: TKC or PKC."""
     if not model:
         raise MistakeError("a shared constraint lacks its model", 'write model="TKC" or model="PKC"')
 
@@ -119,15 +119,15 @@ def refuse_nothing_to_decide(variables: Collection[object]) -> None:
         raise MistakeError("the robot has no variable", 'add <variable name="V1.1" domain="D1"/>')
 
 
-def check_shown_variables(told: Sequence[str], own: Collection[str]) -> None:
-    """Raise `MistakeError` unless a child is `told` of `own` variables, of each once."""
+def check_shown_variables(shown: Sequence[str], own: Collection[str]) -> None:
+    """Raise `MistakeError` unless the variables `shown` to a child are `own` ones, each once."""
     seen: set[str] = set()
-    for variable in told:
+    for variable in shown:
         if variable not in own:
             hint = suggestion(variable, own, "own variables")
-            raise MistakeError(f"the child is to be told '{shortened(variable)}', which is not the robot's own", hint)
+            raise MistakeError(f"the child must know '{shortened(variable)}', which is not the robot's own", hint)
         if variable in seen:
-            raise MistakeError(f"the child is to be told '{shortened(variable)}' twice", "name it once")
+            raise MistakeError(f"the child's variables list '{shortened(variable)}' twice", "name it once")
         seen.add(variable)
 
 

@@ -1,4 +1,4 @@
-"""`scenario.xml`: how a team's problem changes over time (FORMAT.md, "Changes over time")."""
+"""`scenario.xml`: how a team's problem changes over time (docs/reference/format.md, "Changes over time")."""
 
 from __future__ import annotations
 
@@ -51,8 +51,8 @@ def read_scenario(folder: Path, team: Team | None, files: Mapping[str, RobotFile
 class _Reader:
     """Walks through the events, and changes the team on the way.
 
-    What cannot be done is told and left out. Of names that would be there had it been done nothing is said after
-    that: one mistake is told once.
+    A change that the team cannot take is reported and left out. Names that it would have added are no mistakes after
+    that: one mistake is reported once.
     """
 
     def __init__(self, folder: Path, team: Team | None, files: Mapping[str, RobotFile]) -> None:
@@ -65,7 +65,7 @@ class _Reader:
         self._elsewhere: list[Diagnostic] = []
         """Mistakes in the files of added robots."""
         self._unread = False
-        """Whether such a file could not be read, so that nobody knows what is in it."""
+        """Whether such a file could not be read. Then its contents are not known."""
         self._missed: set[str] = set()
         """Robots, variables and constraints that could not be added."""
 
@@ -106,7 +106,7 @@ class _Reader:
             yield line(element), _change(element)
 
     def _added(self, name: str) -> Robot | None:
-        """Return the robot in the file `name`; None where it has mistakes, which are told with that file's lines."""
+        """Return the robot in the file `name`; None: it has mistakes, which are reported with that file's lines."""
         try:
             path = resolved(self._inside / name)
             there = path.is_file()
@@ -173,7 +173,7 @@ class _Reader:
             self._elsewhere.append(Diagnostic(robot.file, bad.line, message, bad.hint))
 
     def _excused(self, bad: ChangeError) -> bool:
-        """Return whether `bad` may only follow from a mistake that was told already."""
+        """Return whether `bad` may only follow from a mistake that was reported already."""
         return bool(bad.missing) and (self._unread or bad.missing in self._missed)
 
 

@@ -10,11 +10,11 @@ from typing import Protocol, cast
 
 from lxml import etree
 
-from robochoc.formats.diagnostics import DiagnosticCollector, shortened
+from robochoc.formats.diagnostics import Diagnostic, DiagnosticCollector, InvalidInputError, shortened
 
 _SCHEMAS = {"instance": "robot.xsd", "scenario": "scenario.xsd"}
 _OPTIONAL = {"topics", "relations", "predicates", "constraints"}
-"""Of the elements that libxml2 offers where one is missing, those that need not be there."""
+"""The optional elements among those that libxml2 names where one is missing."""
 
 _PARTS = (
     re.compile(r"Element '(?P<element>[^']*)'(?:, attribute '(?P<attribute>[^']*)')?: "),
@@ -26,7 +26,7 @@ _PARTS = (
     re.compile(r"(?s)The value '(?P<value>.*)' is greater than the maximum value allowed \((?P<rule>'[^']*')\)\.$"),
     re.compile(r"Expected is (?:one of )?\( (?P<expected>.*) \)\.$"),
 )
-"""What libxml2's messages are made of."""
+"""The parts of libxml2's messages."""
 
 _PHRASES = (
     ("[duplicate]", "a second <{element}>", "it may stand once: put the two together"),
@@ -41,7 +41,7 @@ _PHRASES = (
     ("Character content", "text inside <{element}>, where none belongs", "delete it"),
     ("", "{message}", "see the schemas in xsd/"),
 )
-"""What each kind of message says in plain words, and the next step; the first that fits."""
+"""Each kind of message in plain words, and the next step. The first that fits counts."""
 
 _PATTERNS = {
     "'[A-Za-z][A-Za-z0-9_.]*'": "a name: a letter, then letters, digits, '.' and '_'",
@@ -52,6 +52,18 @@ _PATTERNS = {
     "'1000000'": "an integer from 1 to 1000000",
     "'solved|[0-9]{1,18} messages'": "'solved', or a number and 'messages': 200 messages",
 }
+
+
+class SchemaError(InvalidInputError):
+    """An XML file that its schema refuses. It may have other mistakes too.
+
+    Attributes:
+        tree: What could be read of it.
+    """
+
+    def __init__(self, diagnostics: Iterable[Diagnostic], tree: etree._Element) -> None:
+        super().__init__(diagnostics)
+        self.tree = tree
 
 
 class LogEntry(Protocol):
@@ -80,7 +92,7 @@ def schema_for(root: str) -> etree.XMLSchema:
 
 
 def check_schema(tree: etree._Element, file: str, schema: etree.XMLSchema) -> None:
-    """Raise `InvalidInputError` unless `tree`, read from `file`, is valid."""
+    """Raise `SchemaError` unless `tree`, read from `file`, is valid."""
     if schema.validate(tree):
         return
     import difflib  # noqa: PLC0415 - start-up: only mistakes need it
@@ -95,7 +107,10 @@ def check_schema(tree: etree._Element, file: str, schema: etree.XMLSchema) -> No
             unknown.setdefault(entry.path, []).append(parts["attribute"])
         message, hint = next(phrase for sign, *phrase in _PHRASES if sign in parts["message"])
         report.add(entry.line, message.format_map(parts), hint.format_map(parts))
-    report.finish()
+    try:
+        report.finish()
+    except InvalidInputError as invalid:
+        raise SchemaError(invalid.diagnostics, tree) from None
 
 
 def _parts(entry: LogEntry) -> dict[str, str]:

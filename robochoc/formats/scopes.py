@@ -1,4 +1,7 @@
-"""Shared constraints and the robots of their scopes (FORMAT.md, "One robot" on n-ary constraints, and "The team")."""
+"""Check shared constraints against the robots of their scopes.
+
+docs/reference/format.md, "One robot" on n-ary constraints, and "The team".
+"""
 
 from __future__ import annotations
 
@@ -40,7 +43,7 @@ def _place(members: TeamMembers, robot: Robot, parent: Parent, constraint: Const
     """Return why the constraint should not stand under `parent`, if so."""
     found = [members.owners.get(name, []) for name in constraint.variables]
     if any(len(owners) != 1 for owners in found):
-        return None  # the mistake is another one, and told elsewhere
+        return None  # another mistake, which is reported elsewhere
     others = {owners[0] for owners in found} - {robot.name}
     if parent.name not in others:
         message = f"the scope has no variable of the parent '{parent.name}', under which it stands"
@@ -76,7 +79,7 @@ def _foreign_to_both(members: TeamMembers, robot: Robot, child: str, part: Const
 
 
 def _unshown(members: TeamMembers, child: str, part: Constraint) -> tuple[str, str] | None:
-    """Return a variable of `child` in its parent's part that the child, by its own file, shows to nobody."""
+    """Return the mistake that the parent's part has a variable which `child` shows to no robot."""
     if members.broken:
         return None
     robot = members.files[child].robot
@@ -97,7 +100,7 @@ def missing_shown_variables(members: TeamMembers) -> Iterator[Diagnostic]:
                 needed = members.needed(robot.name, child.name)
                 lacking = [name for name in needed if name not in child.variables]
                 if lacking:
-                    message = f"the child '{child.name}' must also be told {shortened(' '.join(lacking))}"
+                    message = f"the child '{child.name}' must also know {shortened(' '.join(lacking))}"
                     where = members.files[child.name].places.constraint(needed[lacking[0]])
                     hint = f'write variable="{shortened(" ".join([*child.variables, *lacking]))}", as {where} needs it'
                     yield members.files[robot.name].places.neighbour(child).mistake(message, hint)

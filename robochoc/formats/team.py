@@ -22,7 +22,10 @@ def find_teams(path: Path | str) -> list[Path]:
     """Return the folders of teams at `path` or below, in natural order.
 
     A folder with XML files in it is a team, and nothing is looked for below it; other folders are searched, hidden
-    ones and symbolic links left out. Raises `InvalidInputError` when there is no team, or a folder cannot be read.
+    ones and symbolic links left out.
+
+    Raises:
+        InvalidInputError: when there is no team, or a folder cannot be read.
     """
     teams = list(_teams(Path(path)))
     if not teams:
@@ -33,7 +36,11 @@ def find_teams(path: Path | str) -> list[Path]:
 def read_team(folder: Path | str) -> Team:
     """Return the team whose robots are the XML files in `folder`, in priority order.
 
-    Raises `InvalidInputError` with the mistakes of all its files, and of all pairs of files (FORMAT.md, "The team").
+    Args:
+        folder: A folder with an XML file for each robot, and `scenario.xml` if the problem changes over time.
+
+    Raises:
+        InvalidInputError: with the mistakes of all files, and of all pairs of files.
     """
     folder = Path(folder)
     paths = [folder / name for name in _xml_files(_listing(folder)) if name != SCENARIO]
@@ -64,8 +71,10 @@ def read_team(folder: Path | str) -> Team:
 def robot_names(folder: Path | str) -> tuple[str, ...]:
     """Return the names of the robots whose files are in `folder`, in natural order, from the files' names alone.
 
-    No file is opened: whoever only has to know who takes part need not see what each robot has to solve. Raises
-    `InvalidInputError` when the folder cannot be read, or has no robot.
+    No file is opened: to know the names, one need not know the robots' problems.
+
+    Raises:
+        InvalidInputError: when the folder cannot be read, or has no robot.
     """
     names = tuple(Path(name).stem for name in _xml_files(_listing(Path(folder))) if name != SCENARIO)
     if not names:
@@ -79,7 +88,7 @@ def _whole(folder: Path, members: TeamMembers) -> Team:
 
 
 def _informed(members: TeamMembers, name: str) -> Robot:
-    """Return the robot `name`; where its file does not say what a child must be told, the constraints do."""
+    """Return the robot `name`; where its file does not name the variables of a child, constraints do."""
     file = members.files[name]
     children = []
     for child in file.robot.children:

@@ -1,4 +1,4 @@
-"""The robots of a team side by side, read from files or built in Python: what the checks of a whole team ask."""
+"""The robots of a team, from files or built in Python, as the checks of a whole team need them."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from robochoc.model.problem import Child, Constraint, Parent, Robot
 
 
 class NeighbourRole(StrEnum):
-    """What a robot says that another is to it."""
+    """The role of a neighbour: parent or child."""
 
     PARENT = "parent"
     CHILD = "child"
@@ -26,19 +26,19 @@ class NeighbourRole(StrEnum):
 
 @dataclass(frozen=True)
 class TeamMember:
-    """A robot, and where its parts stand; with what only its file says, if it has one."""
+    """A robot with the locations of its parts, and what only its file says."""
 
     robot: Robot
     places: Locations
     copies: Mapping[str, tuple[Constraint, ...]] = field(default_factory=dict)
     """By child: the TKC constraints that the original platform's files repeat with the parent."""
     unsaid: frozenset[str] = frozenset()
-    """The children for which `variable` is left out: what they must be told follows from the scopes."""
+    """The children for which `variable` is left out: the variables they must know follow from the scopes."""
 
 
 @dataclass(frozen=True)
 class NeighbourEntry:
-    """What lists a neighbour: a line of a robot's file, or an object."""
+    """The entry of a neighbour: a line of a robot's file, or an object."""
 
     robot: Robot
     other: str
@@ -51,8 +51,8 @@ class TeamMembers:
     """The robots of a team, as far as each is right by itself.
 
     `broken` names the robots that have mistakes of their own. They are there, but nothing is known of them: a check
-    that would need them says nothing, so that one mistake is told once. `order` is the robots' order, where something
-    else than the links says it: a team that was built in Python has one.
+    that would need them says nothing, so that one mistake is reported once. `order` is the robots' order, where
+    something else than the links says it: a team that was built in Python has one.
     """
 
     files: Mapping[str, TeamMember]
@@ -66,7 +66,7 @@ class TeamMembers:
 
     @cached_property
     def entries(self) -> dict[tuple[str, str], NeighbourEntry]:
-        """Return who lists whom, by the names of the two."""
+        """The entries of neighbours, by the names of the two robots."""
         return {
             (name, neighbour.name): NeighbourEntry(
                 member.robot, neighbour.name, role, member.places.neighbour(neighbour)

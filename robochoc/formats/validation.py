@@ -1,7 +1,7 @@
-"""Whether a team is valid, whoever made it: the rules of FORMAT.md, asked of the data.
+"""Validation of teams by the rules of docs/reference/format.md, wherever they come from.
 
 A team that was read is valid: its reader has asked the same. A team that was built in Python, by hand, by a generator
-or by a change, is looked at when somebody wants to solve or to write it. What has been found valid is remembered for
+or by a change, is validated before it is solved or written. What has been found valid is remembered for
 as long as that very object lives: teams cannot be changed, and `dataclasses.replace` makes another object.
 """
 
@@ -37,7 +37,7 @@ from robochoc.model.problem import AddAgent, AddConstraint, AddValue, Change, Re
 from robochoc.model.team_edits import ChangeError
 
 MAX_BETWEEN = 1000
-"""So many mistakes between the robots of one team are told."""
+"""The maximum number of mistakes between the robots of one team that are reported."""
 
 _NOTHING = ScenarioEvent(())
 _Ended = TypeVar("_Ended")
@@ -47,7 +47,7 @@ _valid: dict[int, weakref.ref[Team]] = {}
 
 
 def check_team(team: Team) -> None:
-    """Raise `InvalidInputError` with every mistake of `team`, unless it is valid (FORMAT.md).
+    """Raise `InvalidInputError` with every mistake of `team`, unless it is valid (docs/reference/format.md).
 
     The messages are those for files; where a file's have its name and a line, these have the robot, and what of it is
     wrong. A team that was found valid before is not looked at again.
@@ -96,7 +96,7 @@ def check_robot(robot: Robot) -> None:
 def check_event(team: Team, event: ScenarioEvent) -> None:
     """Raise `InvalidInputError` when `event`, which happens to `team`, brings what no team could have.
 
-    What this team cannot take is no mistake here: it may have lost the robots that somebody has counted on.
+    Changes that this team cannot take are no mistake here: it may have lost the robots that they concern.
     """
     place = Location("an event")
     found = list(_of_the_shape(event, ScenarioEvent, place)) or [
@@ -107,12 +107,12 @@ def check_event(team: Team, event: ScenarioEvent) -> None:
 
 
 def with_checked_events(
-    field: Callable[[Team, _Ended, float | None], ScenarioEvent | None],
+    environment: Callable[[Team, _Ended, float | None], ScenarioEvent | None],
 ) -> Callable[..., ScenarioEvent | None]:
-    """Return `field`, which says what happens to a team, with its events held against the rules before they happen."""
+    """Return `environment`, whose events are validated before they happen."""
 
     def checked(team: Team, ended: _Ended, left_s: float | None) -> ScenarioEvent | None:
-        event = field(team, ended, left_s)
+        event = environment(team, ended, left_s)
         if event:
             check_event(team, event)
         return event
@@ -121,7 +121,7 @@ def with_checked_events(
 
 
 def note_valid(team: Team) -> None:
-    """Remember that `team` has been found valid, or was made by somebody who has asked all that is asked here."""
+    """Remember that `team` is valid: it has been validated here, or by its reader."""
     key = id(team)
     _valid[key] = weakref.ref(team, lambda _: _valid.pop(key, None))
 
@@ -186,7 +186,7 @@ def _of_the_shape(value: object, kind: type, place: Location) -> Iterator[Diagno
     try:
         check_field_types(value, kind)
     except FieldTypeError as error:
-        yield place.mistake(error.told, AS_BUILT)
+        yield place.mistake(error.explanation, AS_BUILT)
 
 
 def _mistakes(team: Team) -> list[Diagnostic]:

@@ -27,8 +27,10 @@ from robochoc.model.problem import (
 def robot_xml(robot: Robot) -> bytes:
     """Return `robot` as the content of its XML file: what `read_robot` reads back.
 
-    Where two different domains or definitions have one name, one of them gets another. Raises `ValueError` when the
-    robot cannot be written: a cost is no integer, or a name holds what XML cannot.
+    Where two different domains or definitions have one name, one of them gets another.
+
+    Raises:
+        ValueError: when the robot cannot be written: a cost is no integer, or a name holds what XML cannot.
     """
     robot = with_names_apart(robot)
     instance = etree.Element("instance")

@@ -15,7 +15,7 @@ def xcsp3(team: Team, solver: AceProcess | None = None) -> bytes:
     """Return the merged problem of `team` as an XCSP3-core document: tables over the true values, and allDifferent.
 
     Variables get names that XCSP3 allows; the attribute `note` says whose variable each is. With costs it is a COP:
-    what soft constraints charge are variables too, and their sum is to be minimised. Whoever exports many teams may
+    what soft constraints charge are variables too, and their sum is to be minimised. To export many teams, one may
     lend a `solver`. Raises `UnsupportedError`, and `SolverLostError` when pycsp3, which writes it in a process of its
     own, fails.
     """

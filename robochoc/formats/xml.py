@@ -39,13 +39,14 @@ _HINTS = {
     etree.ErrorTypes.ERR_TAG_NOT_FINISHED: "close every element by its own end tag; is the file complete?",
     etree.ErrorTypes.ERR_UNDECLARED_ENTITY: "only &lt; &gt; &amp; &quot; &apos; are known: write the character itself",
 }
-"""What to do about libxml2's more frequent messages."""
+"""The hints for libxml2's more frequent messages."""
 
 
 def read_xml(path: Path, root: str) -> etree._Element:
     """Return the root element of the XML file `path`, which must be a `root` and valid by its schema.
 
-    Raises `InvalidInputError` with every mistake that the failing layer shows.
+    Raises:
+        InvalidInputError: with every mistake that the failing layer shows.
     """
     try:
         content = _bytes(path)
@@ -103,7 +104,7 @@ def _parser(schema: etree.XMLSchema | None = None, *, recover: bool = False) -> 
 
 
 def _with_few_mistakes(tree: etree._Element, content: bytes, schema: etree.XMLSchema) -> etree._Element:
-    """Return `tree`, cut off where so many mistakes are found that no more are told.
+    """Return `tree`, cut off behind the last mistake that is reported.
 
     For each mistake lxml counts the siblings before it, and a million of them take it hours. A parser that validates
     while it reads does not, but knows no lines either: it only says how much to look at.

@@ -17,8 +17,17 @@ from robochoc.model.problem import Constraint, ProblemKind, Team
 def coloring(agents: int, colors: int, degree: float, seed: int = 0, *, connected: bool = False) -> Team:
     """Return the graph colouring problem of `agents` robots with `degree` neighbours on average that `seed` stands for.
 
-    `Robot3` owns `V3`. With `connected`, graphs are drawn until one is connected. Raises `ValueError` for a graph that
-    cannot be; its text says which number to change.
+    `Robot3` owns `V3`. Two neighbours of the same colour cost 1.
+
+    Args:
+        agents: The number of robots.
+        colors: The number of colours.
+        degree: The average number of neighbours.
+        seed: The same seed makes the same problem on every machine.
+        connected: Whether graphs are drawn until one is connected.
+
+    Raises:
+        ValueError: if there is no such graph. The text says which number to change.
     """
     for what, number, most in (("agents", agents, MAX_AGENTS), ("colors", colors, MAX_VALUES)):
         if not 1 <= number <= most:

@@ -32,14 +32,14 @@ Cell = tuple[int, int]
 
 
 class QueensModel(StrEnum):
-    """Whose queen it is: Figure 2's, or Allison's."""
+    """How queens attack: as in Figure 2, or as Allison's."""
 
     PLANAR = "planar"
     FULL = "full"
 
 
 class QueensRobots(StrEnum):
-    """What a robot flies: the drone of one cell, or those of a whole row."""
+    """The drones of a robot: that of one cell, or those of a row."""
 
     CELLS = "cells"
     ROWS = "rows"
@@ -56,9 +56,20 @@ NOT_ATTACKING = Predicate(
 def queens3d(
     n: int, model: QueensModel | str = QueensModel.PLANAR, robots: QueensRobots | str = QueensRobots.CELLS
 ) -> Team:
-    """Return the team for an n x n x n cube, in lexicographic priority order; a robot flies a cell's drone, or a row's.
+    """Return the team for an n x n x n cube, in lexicographic priority order.
 
-    Raises `ValueError` unless 1 <= n <= `MAX_N` and the model and the robots are known.
+    Args:
+        n: The size of the cube, at most `MAX_N`.
+        model: How queens attack: as in Figure 2 (`planar`), or in space as well (`full`).
+        robots: Whether a robot flies the drone of one cell (`cells`), or those of a row (`rows`).
+
+    Raises:
+        ValueError: if `n` is not from 1 to `MAX_N`, or the model or the robots are not known.
+
+    Example:
+        >>> from robochoc.generators.queens3d import queens3d
+        >>> len(queens3d(4).robots)
+        16
     """
     if not 1 <= n <= MAX_N:
         raise ValueError(f"n is {n}; it must be from 1 to {MAX_N}")
@@ -79,7 +90,7 @@ def queens3d(
 
 
 def _robot(name: str, cells: Sequence[Cell], flown_by: Mapping[Cell, str], levels: Domain, model: QueensModel) -> Robot:
-    """Return the robot that flies the drones of `cells`; it holds what they owe each other, and what they owe above."""
+    """Return the robot that flies the drones of `cells`, with their constraints."""
     n = len(levels)
     private, above, below = [], dict[str, list[Constraint]](), dict[str, list[str]]()
     for cell in cells:
@@ -120,7 +131,7 @@ def _attackable(cell: Cell, n: int) -> Iterator[Cell]:
 
 
 def _apart(parent: Cell, child: Cell, model: QueensModel) -> Constraint:
-    """Return what two robots owe each other; p1's i and j are the coordinates in which the cells differ."""
+    """Return the constraint between two cells. p1's i and j are the coordinates in which the cells differ."""
     names = (_variable(parent), _variable(child))
     diagonal = parent[0] != child[0] and parent[1] != child[1]
     if diagonal and model is QueensModel.PLANAR:

@@ -40,10 +40,10 @@ from robochoc.model.problem import (
 MAX_AGENTS = 1000
 MAX_VALUES = 1000
 MAX_FORBIDDEN_PAIRS = 1_000_000
-"""Of all constraints together: so no robot's file grows beyond what can be read. With costs: most pairs of values."""
+"""The maximum for all constraints together: robots' files stay readable. With costs: the maximum of pairs of values."""
 MAX_COST = 1_000_000
 MAX_GRAPH_DRAWS = 1000
-"""So many graphs are drawn in search of a connected one."""
+"""The maximum number of graphs that are drawn to find a connected one."""
 
 Edge = tuple[int, int]
 """Numbers of two robots, the smaller one first."""
@@ -59,12 +59,26 @@ def random_csp(
     connected: bool = False,
     max_cost: int | None = None,
 ) -> Team:
-    """Return a team in which `Robot3` owns `V3`. The lower robot of an edge holds the edge's constraint.
+    """Return the team of the problem <agents, domain, density, tightness> that `seed` stands for.
 
-    `Robot3` owns `V3` and holds its constraints with robots of smaller numbers. With `connected`, graphs are drawn
-    until one is connected, so that each connected graph is as likely as any other. With `max_cost`, it is a DisWCSP.
+    `Robot3` owns `V3` and holds its constraints with robots of smaller numbers.
 
-    Raises `ValueError` for a problem that cannot be, or is too large; its text says which number to change.
+    Args:
+        agents: The number of robots, each with one variable.
+        domain: The number of values of each variable.
+        density: The share of constrained pairs of variables, from 0 to 1.
+        tightness: The share of forbidden pairs of values in a constraint, from 0 to 1.
+        seed: The same seed makes the same problem on every machine.
+        connected: Whether graphs are drawn until one is connected. Each connected graph is then as likely as any other.
+        max_cost: The maximum cost of pairs of values that are not forbidden: the team is a DisWCSP. None: no costs.
+
+    Raises:
+        ValueError: if there is no such problem, or it is too large. The text says which number to change.
+
+    Example:
+        >>> from robochoc.generators.random_csp import random_csp
+        >>> len(list(random_csp(10, 3, 0.5, 0.33).constraints()))
+        22
     """
     pairs, rows = _sizes(agents, domain, density, tightness)
     count, forbidden = round(density * pairs), round(tightness * domain**2)

@@ -43,7 +43,7 @@ def _digest(before: bytes, packed: bytes, size: int) -> bytes:
 
 
 BEGINNING = blake2b(PREAMBLE, digest_size=_DIGEST).digest()
-"""What stands for the checksum before the first block's."""
+"""The checksum before the first block's."""
 
 
 def frame_block(content: bytes, before: bytes) -> tuple[bytes, bytes]:
@@ -79,10 +79,11 @@ class BlockReader:
         return f"byte {self._place:,}"
 
     def next(self) -> bytes | None:
-        """Return what the next block holds; None: it is not whole yet.
+        """Return the content of the next block. None: it is not complete yet.
 
-        Raises `JournalError` where it is no journal of this version, `JournalDamagedError` where a block is not as it
-        was written.
+        Raises:
+            JournalError: if it is no journal of this version.
+            JournalDamagedError: if a block is not as it was written.
         """
         if not self._before and not self._begin():
             return None

@@ -1,4 +1,4 @@
-"""What a block of a journal holds: its entries in columns, as msgpack (docs/guides/journal.md).
+"""The content of a journal's block: its entries in columns, as msgpack (docs/guides/journal.md).
 
 Most entries are of four kinds. What entries of these have in common stands side by side, as that is packed best; all
 others are written as they are. A block is read without those before it.
@@ -21,7 +21,7 @@ from robochoc.journal.entries import JournalEntry
 from robochoc.journal.events import Decided, Received, Sent, Settled
 
 SENT, RECEIVED, SETTLED, DECIDED, OTHER = range(5)
-"""What `_Block.kinds` says of each entry."""
+"""The kinds of entries in `_Block.kinds`."""
 NANOSECONDS = 1_000_000_000
 _DOUBLE = 8
 _LARGEST = 2**63
@@ -30,7 +30,7 @@ _Index = Annotated[int, Meta(ge=0)]
 
 
 class BlockError(ValueError):
-    """What a block holds is no entries."""
+    """The content of a block that is no entries."""
 
 
 class _Block(msgspec.Struct, array_like=True, forbid_unknown_fields=True, frozen=True, kw_only=True):
@@ -169,14 +169,19 @@ class _Columns:
 def _scaled(times: Iterable[float], *, exact: bool) -> tuple[Literal[0, 1, 1_000_000_000], list[int] | bytes]:
     """Return times as a scale and the steps between whole numbers of 1 / scale, or (0) as the doubles that they are."""
     times = array("d", times)
-    if all(map(float.is_integer, times)):
+    if all(map(float.is_integer, times)) and _fit_in_steps(times, 1):
         return 1, _steps(map(int, times))
-    if not exact and all(map(isfinite, times)):
+    if not exact and all(map(isfinite, times)) and _fit_in_steps(times, NANOSECONDS):
         return 1_000_000_000, _steps([round(t * NANOSECONDS) for t in times])
-    doubles = array("d", [t if isfinite(t) else 0.0 for t in times])  # what a stranger's clock says may be no number
+    doubles = array("d", [t if isfinite(t) else 0.0 for t in times])  # a clock of unknown origin may give no number
     if sys.byteorder == "big":
         doubles.byteswap()
     return 0, doubles.tobytes()
+
+
+def _fit_in_steps(times: Iterable[float], scale: int) -> bool:
+    """Return whether steps between `times` fit into 64 bits, in units of 1 / `scale`."""
+    return all(abs(t) * scale < _LARGEST // 2 for t in times)
 
 
 def _steps(numbers: Iterable[int]) -> list[int]:
@@ -191,7 +196,8 @@ _decode = msgspec.msgpack.Decoder(_Block).decode
 def entries_of(content: bytes) -> list[JournalEntry]:
     """Return the entries of a block that holds `content`.
 
-    Raises `BlockError` where that is anything but what is written.
+    Raises:
+        BlockError: if `content` is not what `columns_of` writes.
     """
     try:
         block = _decode(content)
@@ -282,7 +288,7 @@ def _times(block: _Block) -> Sequence[float]:
         return doubles
     if not block.scale:
         raise ValueError("times are whole numbers, but have no scale")
-    return [number / block.scale for number in accumulate(block.times)]
+    return [number / block.scale for number in _whole(accumulate(block.times))]
 
 
 def _finite(times: Iterable[float]) -> None:

@@ -1,4 +1,4 @@
-"""What stands in a journal: a header, the events of a run, and how it ended; and what may be wrong with it."""
+"""The entries of a journal: a header, the events of a run, and its outcome; and errors of journals."""
 
 from __future__ import annotations
 
@@ -8,9 +8,9 @@ from robochoc.journal.events import AnyEvent, Event
 from robochoc.model.outcome import Outcome
 
 VERSION = 2
-"""Of what entries mean. Raised when one is added, or gets another meaning; readers refuse what they do not know."""
+"""The version of the entries' meaning. It grows when one is added or changed; readers refuse unknown versions."""
 STAMPED_LATE = 1
-"""In this version the `clock` of what was said was that of the end of the step; and it came after what was decided."""
+"""In this version the `clock` of a sent message was that of the end of the step; and it came after the decision."""
 READ = (STAMPED_LATE, VERSION)
 """Versions that are read."""
 
@@ -20,7 +20,7 @@ class JournalError(ValueError):
 
 
 class Header(Event, frozen=True, kw_only=True, tag="Journal"):
-    """What was run, and the version of this format."""
+    """The header of a journal: what was run, and the version of the format."""
 
     t: float = 0
     team: str
@@ -35,7 +35,7 @@ class Header(Event, frozen=True, kw_only=True, tag="Journal"):
 
 
 class Ended(Event, frozen=True, kw_only=True):
-    """How it ended; absent in the journal of a run that broke off."""
+    """The outcome of the run. It is missing in the journal of a run that broke off."""
 
     t: float = 0
     outcome: Outcome

@@ -1,4 +1,4 @@
-"""What can be seen of a run. Runtimes report these events to whoever observes."""
+"""The events of a run, which runtimes report to observers."""
 
 from __future__ import annotations
 
@@ -30,15 +30,15 @@ class Began(Event, frozen=True):
 
 
 class Given(Event, frozen=True):
-    """What the robots know when a run, or an epoch, begins; follows its `Began`. Enough to play it again.
+    """The problem that robots get when a run, or an epoch, begins, after its `Began`. It is enough for a replay.
 
-    `order` is the priority order, and so says who is in the team; `robots` holds the XML files, by name, of those
+    `order` is the priority order, with all robots of the team; `robots` holds the XML files, by name, of those
     whose file is another than in the `Given` before (or all; empty, with the reason in `why`: it could not be
-    written). Whoever is in `fresh` begins anew; `void_keys` and `void_agents` are what no longer stands
+    written). Robots in `fresh` start again; `void_keys` and `void_agents` are what no longer stands
     (`solver/explanation.py`), and `quiet` says whether no message of the epoch before was lost. `seed`, `settings`
-    and `aside` are what all are told beside the problem (`solver/agent_problem.py`). What a file cannot say stands
-    beside the files, for all robots: `shown`, by name, own variables that neighbours see though the robot's file does
-    not say so, and `empty`, the variables that have no value left (`journal/given.py`).
+    and `aside` (the withdrawal cost) are the run's parameters (`solver/agent_problem.py`). What a file cannot say
+    stands beside the files, for all robots: `shown`, by name, own variables that neighbours see though the robot's file
+    does not say so, and `empty`, the variables that have no value left (`journal/given.py`).
     """
 
     order: tuple[str, ...]
@@ -62,7 +62,7 @@ class Registered(Event, frozen=True):
 
 
 class Sent(Event, frozen=True):
-    """`sender` has said a message; `clock` is its NCCC clock, `content` the message's fields."""
+    """`sender` has sent a message; `clock` is its NCCC clock, `content` the message's fields."""
 
     sender: str
     receiver: str
@@ -90,9 +90,9 @@ class Decided(Event, frozen=True):
 
 
 class Heard(Event, frozen=True):
-    """A robot has heard of, or found, an assignment of all robots that is cheaper than those before.
+    """A robot has found, or received, an assignment of all robots that is cheaper than those before: an incumbent.
 
-    `values` are the robots' values as others see them (null: one that steps aside).
+    `values` are the robots' values as others see them (null: a withdrawn one).
     """
 
     robot: str
@@ -101,10 +101,10 @@ class Heard(Event, frozen=True):
 
 
 class Improved(Event, frozen=True):
-    """What all robots have decided by now, or what one has heard of, is cheaper than all before.
+    """The present assignment, or an incumbent that a robot has received, is cheaper than all before.
 
-    Who has no value counts as stepping aside. No robot reports it: it follows from what they do, and stands in
-    journals only. Of what was heard of, variables that no neighbour sees are not known.
+    A robot without a value counts as withdrawn. No robot reports this event: it follows from others, and stands in
+    journals only. Of an incumbent, variables that no neighbour sees are not known.
     """
 
     cost: float | int
@@ -176,7 +176,7 @@ Observer = Callable[[AnyEvent], None]
 
 
 def actor(event: AnyEvent) -> str | None:
-    """Return the robot whose step `event` is part of; None where it is nobody's."""
+    """Return the robot whose step `event` is part of. None: it is not part of a step."""
     match event:
         case Sent():
             return event.sender

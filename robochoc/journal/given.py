@@ -1,4 +1,4 @@
-"""What robots are given when a run begins: a team as an event, for who plays the run again, and back.
+"""The problem that robots get when a run begins: a team as an event, for replays, and back.
 
 Robots travel as the XML files that they could have come from. What such a file cannot say stands beside them: the
 priority order, variables that neighbours see though nothing in the robot's own file says so, and domains that a
@@ -22,15 +22,15 @@ from robochoc.solver.explanation import Invalidated
 
 NOTHING_INVALIDATED = Invalidated(frozenset(), frozenset())
 _STAND_IN = (range(1),)
-"""What is written for an empty domain, as a file has none."""
+"""The domain that is written for an empty one, which a file cannot have."""
 
 
 class GivenProblemError(ValueError):
-    """What robots are said to have been given is no team."""
+    """An event of what robots were given that is no valid team."""
 
 
 class TeamWriter:
-    """Says what robots are given, of their files only what is new since it said so last."""
+    """Writes what robots are given. Of their files only those that have changed since the last time."""
 
     def __init__(self) -> None:
         self._robots: dict[str, Robot] = {}
@@ -39,23 +39,23 @@ class TeamWriter:
     def given(
         self,
         team: Team,
-        brief: RunParameters = DEFAULT_PARAMETERS,
-        void: Invalidated = NOTHING_INVALIDATED,
+        parameters: RunParameters = DEFAULT_PARAMETERS,
+        invalidated: Invalidated = NOTHING_INVALIDATED,
         *,
         fresh: Collection[str] = (),
         quiet: bool = True,
     ) -> Given:
-        """Return what `team`, in its order, is given; `why` in it tells why a robot cannot be written."""
+        """Return what `team`, in its order, is given. Its `why` says why a robot cannot be written."""
         event = Given(
             t=0,
             order=team.order,
             robots={},
-            seed=brief.seed,
-            settings=dict(brief.settings),
-            aside=brief.withdrawal_cost,
+            seed=parameters.seed,
+            settings=dict(parameters.settings),
+            aside=parameters.withdrawal_cost,
             fresh=tuple(sorted(fresh)),
-            void_keys=tuple(sorted(void.keys)),
-            void_agents=tuple(sorted(void.agents)),
+            void_keys=tuple(sorted(invalidated.keys)),
+            void_agents=tuple(sorted(invalidated.agents)),
             quiet=quiet,
             shown={robot.name: robot.shown for robot in team.robots if robot.shown},
             empty=tuple(name for name, variable in team.variables.items() if not variable.domain),
@@ -106,7 +106,7 @@ class TeamReader:
 
 
 def run_parameters_of(given: Given) -> RunParameters:
-    """Return what all robots were told beside the problem."""
+    """Return the parameters of the run."""
     return RunParameters(given.seed, given.settings, given.aside)
 
 
@@ -162,7 +162,7 @@ def _check_costs(constraint: Constraint) -> None:
             raise ValueError(f"the cost {cost} of {constraint.name} is no integer")
 
 
-# What strangers say
+# Events of unknown origin
 
 
 def _check(team: Team) -> None:
@@ -174,6 +174,6 @@ def _check(team: Team) -> None:
     for robot in team.robots:
         names = [*(one.name for one in robot.parents), *(one.name for one in robot.children)]
         names += [name for constraint in _constraints(robot) for name in constraint.variables]
-        strangers = [name for name in names if name not in team and name not in team.owner]
-        if strangers:
-            raise GivenProblemError(f"{robot.name} was given something on {strangers[0]}, which is not in the team")
+        unknown = [name for name in names if name not in team and name not in team.owner]
+        if unknown:
+            raise GivenProblemError(f"{robot.name} was given something on {unknown[0]}, which is not in the team")

@@ -20,6 +20,7 @@ from robochoc.journal.columns import BlockError, entries_of
 from robochoc.journal.entries import READ, Ended, Header, JournalEntry, JournalError
 from robochoc.journal.events import AnyEvent, Began
 from robochoc.model.outcome import Outcome
+from robochoc.system.decode_errors import describe_decode_error
 
 MOST_ENTRIES = 30_000_000
 """`read_journal` keeps no more: about 10 million messages, of which each takes a kilobyte of memory."""
@@ -54,7 +55,10 @@ def read_journal(content: bytes) -> Journal:
 
     Within a run, from one `Began` to the next, events are put in the order of their times; those of equal times stay
     in the order in which they came, which is each robot's own (`Improved` were written last, and so come after all of
-    their time). Raises `JournalError` where not even the header can be read.
+    their time).
+
+    Raises:
+        JournalError: where not even the header can be read.
     """
     with _without_cycles():
         follower = Follower(io.BytesIO(content))
@@ -118,8 +122,10 @@ class Follower:
     def read(self, most: int | None = None) -> list[JournalEntry]:
         """Return the entries that are complete since the last call, in the file's order. The first is the `Header`.
 
-        Stops after the block with which there are more than `most`. Raises `JournalError` when it turns out that the
-        file is no journal.
+        Stops after the block with which there are more than `most`.
+
+        Raises:
+            JournalError: when it turns out that the file is no journal.
         """
         lines: list[JournalEntry] = []
         while self.damage is None and (most is None or len(lines) <= most):
@@ -298,8 +304,10 @@ class _Text:
             entry = self._decode(line)
         except UnicodeDecodeError as error:
             raise JournalDamagedError(f"{self.place}: it is not UTF-8") from error
-        except (msgspec.MsgspecError, RecursionError) as error:
-            raise JournalDamagedError(f"{self.place}: {error}") from error
+        except msgspec.MsgspecError as error:
+            raise JournalDamagedError(f"{self.place}: {describe_decode_error(error, None)}") from error
+        except RecursionError as error:
+            raise JournalDamagedError(f"{self.place}: it is nested too deep") from error
         if not isfinite(entry.t):
             raise JournalDamagedError(f"{self.place}: its time is no number")
         return (entry,)

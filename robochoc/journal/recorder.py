@@ -71,7 +71,7 @@ class JournalRecorder:
                 self._close_block()
 
     def flush_if_due(self) -> None:
-        """Close the block if it has been open for long. For whoever is called now and then while nothing happens."""
+        """Close the block if it has been open for long. To be called now and then while nothing happens."""
         if self._pending and time.monotonic() >= self._due:
             self.flush()
 
@@ -81,7 +81,7 @@ class JournalRecorder:
             self._close_block()
 
     def close(self) -> None:
-        """Write what is left, and the `outcome`. What is told later is not written."""
+        """Write what is left, and the `outcome`. Later events are not written."""
         with self._lock:
             if self._closed:
                 return
@@ -229,7 +229,7 @@ class _Outlet:
 
 
 def improvements(events: Iterable[AnyEvent], objective: Objective) -> Iterator[AnyEvent]:
-    """Yield `events`, and an `Improved` after each that tells of something cheaper than ever.
+    """Yield `events`, and an `Improved` after each that makes the assignment cheaper than ever.
 
     What robots were given says which variables they show: `objective` may be of the team as the files have it.
     """
@@ -303,7 +303,7 @@ def _instead(line: JournalEntry, why: str) -> JournalEntry:
         case Header() | Ended():
             raise ValueError(why)
         case _:
-            who = actor(line)
-    if who is None:
+            robot = actor(line)
+    if robot is None:
         raise ValueError(why)
-    return Refused(t=line.t, who=who, what=f"have {type(line).__name__} written down", why=why)
+    return Refused(t=line.t, who=robot, what=f"have {type(line).__name__} written down", why=why)

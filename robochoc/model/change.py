@@ -1,4 +1,4 @@
-"""How a team changes: the paper's function delta (Section 3.1), which takes a DisCSP to the next one.
+"""Changes of a team: the paper's function delta (Section 3.1), which takes a DisCSP to the next one.
 
 Functions are pure: they take a team and a change, and return another team. Changes come from a scenario, from the
 robots' situation, or from the loss of a robot.

@@ -6,7 +6,7 @@ from robochoc.model.outcome import Outcome, Verdict
 
 
 def describe_outcome(
-    outcome: Outcome, total: int, *, flying: int | None = None, noun: str = "robot", weighted: bool = False
+    outcome: Outcome, total: int, *, flying: int | None = None, noun: str = "robot", weighted: bool | None = None
 ) -> str:
     """Return what happened, in a few words: "10 of 16 fly (proven maximum)", "solution for all 16 robots".
 
@@ -15,7 +15,8 @@ def describe_outcome(
         total: The number of robots that took part. If the outcome has epochs, those of the last epoch are counted.
         flying: How many of `total` have a place, where drones are counted and a robot decides about several.
         noun: What is counted, in the singular.
-        weighted: Whether robots differ in weight. The maximum is then one of weight, not of number.
+        weighted: Whether robots differ in weight; None if that is not known. A maximum is then one of weight, not of
+            number, or simply the best.
     """
     if flying is None:
         if outcome.epochs and outcome.epochs[-1].robots:
@@ -23,14 +24,14 @@ def describe_outcome(
         flying = total - len(outcome.withdrawn)
     match outcome.verdict:
         case Verdict.UNKNOWN:
-            so_far = f"; {flying} of {total} fly in the best answer so far" if outcome.aside else ""
+            so_far = f"; {flying} of {total} fly in the best answer so far" if outcome.withdrawn_alive else ""
             return f"no verdict, a limit was reached{so_far}"
         case Verdict.NO_SOLUTION:
             once_solved = any(epoch.assignment for epoch in outcome.epochs)
             return f"no solution{_left(outcome)}{' in the end' if once_solved else ''}"
-        case Verdict.SOLUTION | Verdict.OPTIMAL if outcome.aside:
+        case Verdict.SOLUTION | Verdict.OPTIMAL if outcome.withdrawn_alive:
             best = "proven" if outcome.verdict is Verdict.OPTIMAL else "not proven to be the"
-            what = "maximum by weight" if weighted else "maximum"
+            what = "best" if weighted is None else "maximum by weight" if weighted else "maximum"
             return f"{flying} of {total} fly ({best} {what}{_lost(outcome)})"
         case Verdict.SOLUTION | Verdict.OPTIMAL if outcome.lost:
             return f"{_solution(outcome)} for {flying} of {total} {noun}s ({len(outcome.lost)} lost)"

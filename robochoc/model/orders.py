@@ -38,20 +38,32 @@ class Order(StrEnum):
 
 
 class OrderError(Exception):
-    """The team cannot follow the order; says why in one sentence."""
+    """A team cannot follow an order. The message says why in one sentence."""
 
 
 def with_order(team: Team, order: Order | Sequence[str] | None, seed: int = 0) -> Team:
-    """Return `team` in the order called, or listed as, `order`; None: as it is. Raises `OrderError`."""
+    """Return `team` in the given priority order.
+
+    Args:
+        team: The team.
+        order: The name of an order, or the names of all robots. None: the team as it is.
+        seed: For the order `random`.
+
+    Raises:
+        OrderError: if the team cannot be reordered.
+    """
     if order is None:
         return team
     return with_priorities(team, compute_order(team, order, seed) if isinstance(order, Order) else order)
 
 
 def compute_order(team: Team, order: Order, seed: int = 0) -> tuple[str, ...]:
-    """Return the names of `team`'s robots in the order called `order`, highest priority first.
+    """Return the names of the robots of `team` in the given order, highest priority first.
 
-    `seed` is for `random`.
+    Args:
+        team: The team.
+        order: The name of the order.
+        seed: For the order `random`.
     """
     graph = constraint_graph(team)
     match order:
@@ -75,7 +87,7 @@ def compute_order(team: Team, order: Order, seed: int = 0) -> tuple[str, ...]:
 
 
 def with_dom_deg_order(team: Team) -> Team:
-    """Return `team` in an order that soon shows who has to step aside, if it can be turned around."""
+    """Return `team` in the order `dom-deg`, in which a withdrawal is found soon. Teams that cannot follow it stay."""
     try:
         return with_order(team, Order.DOM_DEG)
     except OrderError:
@@ -179,14 +191,18 @@ def _random(graph: Graph, seed: int) -> tuple[str, ...]:
 def with_priorities(team: Team, names: Sequence[str]) -> Team:
     """Return `team` with the priorities of `names`, highest first: the same constraints and solutions.
 
-    Each totally known constraint stands with the robot of its scope that is now the lowest, and the others are that
-    robot's parents. Links that are there for no constraint stay, turned where they have to be. Children are told
-    what their constraints need, and what the files have them told beyond that where the link was not turned. So the
-    team is what its author would have written with these priorities in mind. `Team.robots` follows `names`, which
-    may say more than the links do: robots that are not linked may stand in any order.
+    The robot of a totally known constraint's scope that is now the lowest holds it; the others are its parents. Links
+    without a constraint stay, and are reversed where necessary. Children know the variables that their constraints
+    need, and those that the files list where the link was not reversed. So the team is as its author would have written
+    it with these priorities. Robots that are not linked may stand in any order.
 
-    Raises `OrderError` where a partially known constraint (PKC) would have to be held the other way round, and for a
-    team with a scenario; `ValueError` unless `names` are the robots' names, each once.
+    Args:
+        team: The team.
+        names: The names of all its robots, each once.
+
+    Raises:
+        OrderError: if the holder of a partially known constraint would change, or the team has a scenario.
+        ValueError: if `names` are not the robots' names.
     """
     if sorted(names) != sorted(team.order):
         raise ValueError(f"the order must name each robot of {team.name} once")
@@ -194,11 +210,11 @@ def with_priorities(team: Team, names: Sequence[str]) -> Team:
         return team
     if team.dynamic:
         raise OrderError(f"{team.name} has a scenario.xml, which speaks of its links: it is solved in its given order")
-    return _Turned(team, names).team()
+    return _Reordering(team, names).team()
 
 
-class _Turned:
-    """A team on its way to other priorities: who holds what, and who is whose parent."""
+class _Reordering:
+    """A team that gets other priorities: its links, and the robots that hold its constraints."""
 
     def __init__(self, team: Team, names: Sequence[str]) -> None:
         self._old = team

@@ -1,4 +1,4 @@
-"""What a run comes to: the typed form of the JSON result (FORMAT.md, "What comes out")."""
+"""The outcome of a run: the typed form of the JSON result (docs/reference/result.md)."""
 
 from __future__ import annotations
 
@@ -7,8 +7,8 @@ from enum import StrEnum
 from typing import NamedTuple
 
 RULED_OUT = "has ruled everything out"
-"""What a robot has done that alone can tell that there is no solution, in words that are true in every protocol: by
-deriving the empty nogood, by trying all there is, or by bounds."""
+"""How a robot can know alone that there is no solution, in words that are true for every protocol: it has derived the
+empty nogood, tried all values, or used bounds."""
 
 
 class Verdict(StrEnum):
@@ -22,13 +22,18 @@ class Verdict(StrEnum):
 
 @dataclass(frozen=True)
 class Metrics:
-    """What a run cost. Definitions: `docs/reference/metrics.md`.
+    """What a run took. Definitions are in `docs/reference/metrics.md`.
 
-    `messages`: protocol messages sent, by type; `bytes`: of their encoded contents; `ncccs`: non-concurrent
-    constraint checks; `checks`: constraint checks of all robots; `wall_s`: seconds of wall-clock time;
-    `compile_s`: seconds before that, in which local domains were compiled; `memory`: bytes that the largest robot's
-    process had to itself at the end (0 where robots have no processes); `simulated_s`: seconds of simulated time, by a
-    channel model (0 where there was none); `largest`: bytes of the largest message's content.
+    Attributes:
+        messages: The number of protocol messages sent, by type.
+        bytes: The bytes of their encoded contents.
+        ncccs: Non-concurrent constraint checks.
+        checks: Constraint checks of all robots.
+        wall_s: Seconds of wall-clock time.
+        compile_s: Seconds before that, in which local domains were compiled.
+        memory: Bytes that the largest robot's process alone used in the end. 0: robots had no processes.
+        simulated_s: Seconds of simulated time, by a channel model. 0: there was none.
+        largest: Bytes of the largest message's content.
     """
 
     messages: dict[str, int] = field(default_factory=dict)
@@ -59,9 +64,11 @@ class Metrics:
 
 @dataclass(frozen=True)
 class PseudoTreeNode:
-    """A robot's place in a pseudo-tree: who stands right above it (None: a root), and who else of its neighbours does.
+    """A robot's place in a pseudo-tree.
 
-    `pseudo_parents` are neighbours further up, on the way to the root.
+    Attributes:
+        parent: The robot right above it. None: it is a root.
+        pseudo_parents: Its other neighbours on the way to the root.
     """
 
     parent: str | None
@@ -70,10 +77,21 @@ class PseudoTreeNode:
 
 @dataclass(frozen=True)
 class EpochOutcome:
-    """One epoch of a problem that changes over time, or whose robots were lost.
+    """The outcome of one epoch of a problem that changes over time, or whose robots were lost.
 
-    `robots` are those of the team then, in the files' order; `opened_by` says in a few words what opened the epoch;
-    `lost` names those whose loss ended it.
+    Attributes:
+        verdict: The answer to the problem.
+        robots: The robots of the team in this epoch, in the files' order.
+        opened_by: What opened the epoch, in a few words.
+        assignment: The values of all variables of the robots that are not withdrawn.
+        cost: The cost of the assignment. None: there is no assignment.
+        metrics: What the epoch took.
+        verified: As in `Outcome`.
+        witness: As in `Outcome`.
+        lost: The robots whose loss ended the epoch.
+        bound: As in `Outcome`.
+        tree: As in `Outcome`.
+        confirmed: As in `Outcome`.
     """
 
     verdict: Verdict
@@ -91,13 +109,15 @@ class EpochOutcome:
 
 
 ALL_ROBOTS = "all robots"
-"""Who claims what any one of them could have made untrue. No robot has such a name."""
+"""The `claimed_by` of a verdict that any one of the robots could have made untrue. No robot has such a name."""
 
 
 class CheckCounts(NamedTuple):
-    """How many constraints were checked by who holds them and by another robot too, and how many by their owner alone.
+    """Across machines: how many constraints were checked, and by whom.
 
-    Of robots that no one else sees into: across machines.
+    Attributes:
+        by_both: Checked by the robot that holds the constraint, and by another one.
+        by_owner: Checked by the robot that holds the constraint alone.
     """
 
     by_both: int
@@ -106,9 +126,35 @@ class CheckCounts(NamedTuple):
 
 @dataclass(frozen=True)
 class Outcome:
-    """One team, one run. `assignment` maps every variable of the robots that fly to its value.
+    """The result of a run. With several epochs the verdict is that of the last one, and metrics are summed up.
 
-    Where there were several epochs, the verdict is the last one's, and the metrics are their sums.
+    Attributes:
+        team: The name of the team.
+        protocol: The protocol that was asked for.
+        runtime: The runtime.
+        seed: The seed of the run.
+        verdict: The answer to the problem.
+        assignment: The values of all variables of the robots that are not withdrawn.
+        cost: The cost of the assignment. None: there is no assignment.
+        withdrawn: The names of the withdrawn robots, the lost ones included.
+        metrics: What the run took.
+        verified: Whether the checker has compared the assignment with every constraint of a team that was validated
+            before; for `no-solution`, whether the central solver has found the same.
+        witness: The robot that ended the search: for `no-solution`, the one that has `RULED_OUT`.
+        reason: Why, where it is not obvious: a robot without a local solution, or the limit that was reached.
+        count: The number of solutions, if it was asked for.
+        lost: The names of the withdrawn robots whose processes died, and that did not come back.
+        order: The name of the priority order that was asked for; `listed` for a list of names.
+        bound: A lower bound on the cost of any assignment; with withdrawal, on the weight of the withdrawn robots.
+            None: not known.
+        tree: The pseudo-tree that the robots have built, if their protocol builds one.
+        confirmed: Whether the central solver was asked, and has found the same `no-solution` or the same minimum cost.
+        epochs: The epochs, if there were several.
+        channel: The name of the channel model, if time was simulated by one.
+        placed_by: The protocol of the withdrawal, if it is not the one that was asked for.
+        claimed_by: Across machines: the robot whose claim the verdict rests on, as it cannot be checked; or
+            `ALL_ROBOTS`.
+        checked: Across machines: how many constraints were checked, and by whom.
     """
 
     team: str
@@ -121,36 +167,19 @@ class Outcome:
     withdrawn: tuple[str, ...] = ()
     metrics: Metrics = field(default_factory=Metrics)
     verified: bool = False
-    """Whether the checker has held the assignment against every constraint of a team that was found valid before; for
-    `no-solution`, whether the central judge has come to the same."""
     witness: str | None = None
-    """Who ended the search: for `no-solution`, the robot that has `RULED_OUT`."""
     reason: str | None = None
-    """Why, where that is not plain: a robot whose local problem has no solution, or the limit that was reached."""
     count: int | None = None
-    """The number of solutions, where it was asked for."""
     lost: tuple[str, ...] = ()
-    """Those of the withdrawn whose processes died, and that did not come back; the others stepped aside."""
     order: str | None = None
-    """The priority order that was asked for, by name; `listed` for one of the user's own."""
     bound: float | None = None
-    """No assignment costs less (with withdrawal: no fewer robots, by weight, step aside); None: nobody can tell."""
     tree: dict[str, PseudoTreeNode] = field(default_factory=dict)
-    """The pseudo-tree that the robots have built, if their protocol builds one."""
     confirmed: bool = False
-    """Whether the central judge, who was asked, comes to the same `no-solution` or the same least cost."""
     epochs: tuple[EpochOutcome, ...] = ()
-    """What happened in each epoch; empty where there was but one, as nothing changed."""
     channel: str | None = None
-    """The name of the channel model by which time was simulated, if it was."""
-
     placed_by: str | None = None
-    """The protocol that said who steps aside, where that is another than the one that was asked for."""
-
     claimed_by: str | None = None
-    """Across machines: whose word the verdict rests on, as nobody could check it; a robot, or `ALL_ROBOTS`."""
     checked: CheckCounts | None = None
-    """Across machines: who has checked the constraints of an answer."""
 
     @property
     def ruled_out(self) -> str | None:
@@ -170,6 +199,6 @@ class Outcome:
         return f"{self.protocol}, then {self.placed_by}" if self.placed_by else self.protocol
 
     @property
-    def aside(self) -> tuple[str, ...]:
-        """Those of the withdrawn that stepped aside, as they found no place."""
+    def withdrawn_alive(self) -> tuple[str, ...]:
+        """The withdrawn robots that are not lost: there was no place for them."""
         return tuple(name for name in self.withdrawn if name not in self.lost)

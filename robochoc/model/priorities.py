@@ -1,4 +1,4 @@
-"""Who ranks above whom: natural order of names, and total orders that respect the links of a team."""
+"""Priorities: natural order of names, and total orders that respect the links of a team."""
 
 from __future__ import annotations
 
@@ -24,7 +24,10 @@ def natural_key(name: str) -> tuple[tuple[int, str], ...]:
 def priority_order(parents: Mapping[str, Iterable[str]]) -> tuple[str, ...]:
     """Return the total order of the robots in `parents`: topological, ties broken by natural name order.
 
-    Parents that are not themselves keys are ignored. Raises `CycleError` when there is no such order.
+    Parents that are not themselves keys are ignored.
+
+    Raises:
+        CycleError: when there is no such order.
     """
     waiting = {name: {parent for parent in above if parent in parents} for name, above in parents.items()}
     children: dict[str, list[str]] = {name: [] for name in parents}

@@ -11,7 +11,7 @@ from dataclasses import replace
 from robochoc.model.problem import Child, Constraint, Parent, Robot, Team
 
 MAX_SHOWN = 60
-"""So many characters of a name, or of a list, stand in a message."""
+"""The maximum number of characters of a name, or of a list, in a message."""
 
 
 class ChangeError(ValueError):

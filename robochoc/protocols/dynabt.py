@@ -63,17 +63,19 @@ class DynABT(ABT, DynamicProtocol):
         self.untold = []
         super().start()
 
-    def change(self, problem: LocalProblem, order: PriorityOrder, void: Invalidated) -> None:
+    def change(self, problem: LocalProblem, order: PriorityOrder, invalidated: Invalidated) -> None:
         """The propagation phase: keep what still stands."""
-        for agent in void.agents:
+        for agent in invalidated.agents:
             self._update(agent, None)
-        self.store.drop(void.keys)
-        if not void.keys.isdisjoint(self.proof):
+        self.store.drop(invalidated.keys)
+        if not invalidated.keys.isdisjoint(self.proof):
             self.verdict, self.proof = None, NOTHING
-        self._adjust_nogoods(problem, order, void)
-        known = {*self.lower} - void.agents - {*self.untold}  # a change may follow another before the search goes on
+        self._adjust_nogoods(problem, order, invalidated)
+        known = (
+            {*self.lower} - invalidated.agents - {*self.untold}
+        )  # a change may follow another before the search goes on
         self.untold = [child for child in problem.children if child not in known]
-        self.higher = {*problem.parents, *(self.higher - void.agents)}
+        self.higher = {*problem.parents, *(self.higher - invalidated.agents)}
         # Who has asked for the own value and is still there keeps being told, even if others see it differently now.
         self.lower = list(dict.fromkeys((*problem.children, *(robot for robot in self.lower if robot in order.rank))))
         self.problem, self.order = problem, order
@@ -91,10 +93,10 @@ class DynABT(ABT, DynamicProtocol):
                 self.send(child, Ok(current))
         self.untold = []
 
-    def _adjust_nogoods(self, problem: LocalProblem, order: PriorityOrder, void: Invalidated) -> None:
+    def _adjust_nogoods(self, problem: LocalProblem, order: PriorityOrder, invalidated: Invalidated) -> None:
         """The store and the value, in the places that values have in the changed domain."""
         old, self.store = self.store, NogoodStore(order, len(problem.values))
-        known = {} if problem.agent in void.agents else {value: i for i, value in enumerate(self.problem.values)}
+        known = {} if problem.agent in invalidated.agents else {value: i for i, value in enumerate(self.problem.values)}
         for index, value in enumerate(problem.values):
             place = known.get(value)
             lhs = None if place is None else old[place]

@@ -116,8 +116,8 @@ class DynamicProtocol(Protocol):
     """
 
     @abstractmethod
-    def change(self, problem: LocalProblem, order: PriorityOrder, void: Invalidated) -> None:
-        """Take in the changed problem, and drop what rests on anything in `void`. Nobody is searching: say nothing.
+    def change(self, problem: LocalProblem, order: PriorityOrder, invalidated: Invalidated) -> None:
+        """Take in the changed problem, and drop what rests on anything `invalidated`. No robot searches: send nothing.
 
         A verdict that stands in spite of the changes is kept, and ends the epoch at once.
         """

@@ -7,6 +7,7 @@ from collections.abc import Mapping
 import msgspec
 
 from robochoc.protocols.protocol import Protocol, Settings
+from robochoc.system.decode_errors import describe_decode_error
 
 
 class SettingsError(ValueError):
@@ -24,4 +25,4 @@ def settings_of(protocol: type[Protocol], given: Mapping[str, str]) -> Settings:
     try:
         return msgspec.convert(dict(given), known, strict=False)
     except msgspec.ValidationError as error:
-        raise SettingsError(str(error)) from None
+        raise SettingsError(describe_decode_error(error, known)) from None

@@ -34,7 +34,7 @@ tables that are made before the search (see `LocalProblem.tables`), so all const
 >>> from robochoc.communication.simulator.simulator import Simulation
 >>> from robochoc.generators.queens3d import queens3d
 >>> from robochoc.solver.agent_problem import RunParameters
->>> result = Simulation(queens3d(4), SFB, Concurrent(seed=0), brief=RunParameters(withdrawal_cost=1)).run()
+>>> result = Simulation(queens3d(4), SFB, Concurrent(seed=0), parameters=RunParameters(withdrawal_cost=1)).run()
 >>> sum(bool(values) for values in result.assignments.values())  # of 16, and no more can fly
 10
 >>> result.findings["Robot1.1"].bound

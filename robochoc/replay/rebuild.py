@@ -19,7 +19,7 @@ from robochoc.model.team_edits import ChangeError, keep_interfaces, without_robo
 from robochoc.protocols.protocol import DynamicProtocol, Protocol
 from robochoc.protocols.settings import SettingsError
 from robochoc.replay.steps import RecordedRun
-from robochoc.run.registry import UnknownProtocolError, protocol_by_class, protocol_by_name
+from robochoc.run.registry import UnknownProtocolError, protocol_by_class, protocol_or_first_fit
 from robochoc.solver.ace import AceProcess
 from robochoc.solver.agent_problem import AgentProblem, RunParameters
 from robochoc.solver.cache import SolutionCache
@@ -133,7 +133,7 @@ class Rebuilder:
     @staticmethod
     def _named(name: str) -> type[Protocol]:
         try:
-            return protocol_by_name(name)
+            return protocol_or_first_fit(name)
         except UnknownProtocolError as unknown:
             raise CannotReplayError(str(unknown)) from unknown
 
@@ -163,10 +163,10 @@ class Rebuilder:
         seed = self._header.seed if self._header else 0
         asked = self._header.protocol if self._header else None
         if asked is None or self._named(asked) is protocol:
-            return Epoch(self._compiled(team), brief=RunParameters(seed, self._means.settings))
+            return Epoch(self._compiled(team), parameters=RunParameters(seed, self._means.settings))
         there = [robot for robot in filed.robots if run.given is not None or robot.name in team]
         aside = withdrawal_cost(replace(filed, robots=tuple(there))) if protocol.traits.costs else None
-        return Epoch(self._compiled(team), brief=RunParameters(seed, withdrawal_cost=aside))
+        return Epoch(self._compiled(team), parameters=RunParameters(seed, withdrawal_cost=aside))
 
     def _ordered(self, team: Team) -> Team:
         """Return `team` in the order of the run. Raises `OrderError`, `ValueError`."""
@@ -203,7 +203,7 @@ def _host(protocol: type[Protocol], part: AgentProblem, before: Host | None, epo
     try:
         if before is None or name in epoch.restarted:
             return Host.of(protocol, part)
-        before.change(part, epoch.void)
+        before.change(part, epoch.invalidated)
     except _UNCOMPILED:
         raise
     except Exception as error:  # a protocol that is being written, or a journal that is not what it says

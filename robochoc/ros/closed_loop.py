@@ -1,7 +1,7 @@
 """The closed loop: decisions reach robots, and the robots' situation changes the problem (the paper, Section 4.2).
 
-After each epoch the decision is published; then the robots' reports are awaited. The first that changes the problem
-opens the next epoch, together with what comes within `TOGETHER_S` of it, and the team solves again.
+After each epoch the decision is published; then reports of the robots are awaited. The first report that changes the
+problem opens the next epoch, together with what comes within `TOGETHER_S` of it, and the team solves again.
 """
 
 from __future__ import annotations
@@ -22,52 +22,62 @@ from robochoc.ros.sink_publisher import SinkPublisher
 from robochoc.ros.situation import BATTERY, Situation
 
 TOGETHER_S = 0.5
-"""What is reported within so many seconds of a report that changes the problem belongs to the same event."""
+"""Reports within so many seconds of one that changes the problem belong to the same event."""
 
 
 class Feedback(ABC):
-    """How a loop learns of its robots' situation: they fly in a simulation, or a source is listened to."""
+    """Where reports of the robots' situation come from: a simulated flight, or a source of messages."""
 
     publishers: Sequence[SinkPublisher] = ()
-    """Where reports are to be published as they come."""
+    """Reports are published there as they come."""
     idle: Callable[[], None] = staticmethod(lambda: None)
-    """Called now and then while nothing comes."""
+    """Called now and then while no report comes."""
     simulated: bool = False
-    """Whether the robots are not out there to publish what they report themselves."""
+    """Whether the robots are simulated here, and so do not publish their reports themselves."""
 
     @property
     def notes(self) -> list[str]:
-        """What came and could not be understood, in clear sentences."""
+        """Sentences about messages that could not be used."""
         return []
 
     @abstractmethod
     def now_ns(self) -> int:
-        """The time, by the clock of the reports."""
+        """Return the time, by the clock of the reports."""
 
     @abstractmethod
-    def decided(self, builder: MissionBuilder, leg: Leg, left_s: float | None) -> None:
-        """A decision was made and published: from now on, `next` gives what follows of it, for so many seconds."""
+    def on_decision(self, builder: MissionBuilder, leg: Leg, left_s: float | None) -> None:
+        """Take note of a decision that has been published. Reports that follow count for `left_s` seconds."""
 
     @abstractmethod
     def next(self, until_s: float | None) -> Report | None:
-        """The next report, or None: none comes any more. With `until_s`, one that comes no later than that."""
+        """Return the next report, with `until_s` one that comes no later than that; None if no more comes."""
 
 
 class ClosedLoop:
     """An environment of a run: publishes each decision, and opens an epoch when robots report a change.
 
-    `team` is as its files have it. Without `feedback`, nothing changes the problem. What is published goes into `sinks`
-    (opened, and closed, by others), with the times of `feedback`. What was heard over a ROS is not said there again, or
-    we would hear ourselves: recordings alone get it. `frame` is of places, `scale` in metres a unit of the
-    problem (None: `mission.py` says), `battery` the level below which a drone is out of order.
+    What was received over a ROS is not published there again; it goes to recordings alone.
 
-    Raises `NameClashError`, `NoMappingError`, `NothingToPublishError`; calls raise `SinkError` and `SourceError`.
+    Args:
+        team: The team as its files have it.
+        sinks: Where decisions and reports are published. The caller opens and closes them.
+        feedback: Where reports come from; None: nothing changes the problem. Its clock gives the times.
+        frame: The frame of all places.
+        scale: Metres a unit of the problem; None: as `mission.py` chooses.
+        battery: A drone with less charge is out of order.
+
+    Raises:
+        NameClashError: Two topics would have the same name in ROS.
+        NoMappingError: A topic has a type that no waypoint can become.
+        NothingToPublishError: No drone has a topic.
+        SinkError: Publishing failed; methods raise it, too.
+        SourceError: Raised by methods: the source failed.
     """
 
     events: list[ScenarioEvent]
     """What the robots' situation has changed."""
     publishers: list[SinkPublisher]
-    """What was published, for each of the sinks."""
+    """One for each sink."""
 
     def __init__(
         self,
@@ -97,7 +107,7 @@ class ClosedLoop:
             ]
 
     def __call__(self, team: Team, epoch: EpochOutcome, left_s: float | None) -> ScenarioEvent | None:
-        """Publish what `epoch` has decided for `team`, and see what follows of it within `left_s` seconds."""
+        """Publish what `epoch` has decided for `team`; return the event that follows within `left_s` seconds."""
         self._happened += not self._lost
         self._lost = bool(epoch.lost)
         builder = self._builder = self._builder or self._new_builder(epoch.assignment)
@@ -106,7 +116,7 @@ class ClosedLoop:
         self._decide(leg)
         if self.feedback is None:
             return None
-        self.feedback.decided(builder, leg, left_s)
+        self.feedback.on_decision(builder, leg, left_s)
         if epoch.lost or left_s == 0:
             return None
         event = self._sensed(self.feedback, self._coming(team), builder)
@@ -115,7 +125,7 @@ class ClosedLoop:
         return event
 
     def publish(self, outcome: Outcome) -> None:
-        """Publish what a run has decided that knew nothing of the loop."""
+        """Publish the decisions of a run that was not connected to this loop."""
         mission = mission_of(outcome, self._team, self._scale)
         self._legs = [*mission.legs]
         for leg in mission.legs:
@@ -123,7 +133,7 @@ class ClosedLoop:
 
     @property
     def team(self) -> Team:
-        """The team with all that was to happen, what the robots' situation has changed included, as its scenario."""
+        """The team with a scenario of all that was to happen, and all that robots have reported."""
         return replace(self._team, scenario=(*self._team.scenario, *self.events))
 
     @property
@@ -133,14 +143,14 @@ class ClosedLoop:
 
     @property
     def notes(self) -> list[str]:
-        """What was reported and could not be heeded, in clear sentences."""
-        heard = self.feedback.notes if self.feedback else []
-        return [*heard, *(self._situation.notes if self._situation else [])]
+        """Sentences about reports that could not be used."""
+        received = self.feedback.notes if self.feedback else []
+        return [*received, *(self._situation.notes if self._situation else [])]
 
     # Decisions
 
     def _new_builder(self, assignment: Assignment) -> MissionBuilder:
-        """Who flies, and where they stand: below where they go first, or could go as far as nobody has decided."""
+        """Return a builder for all drones. They stand below where they go first, or where they could go."""
         first = {**_values(self._robots, 0), **assignment}
         near = {**_values(self._robots, 0, VAST_M), **assignment}
         far = {**near, **_values(self._robots, -1, VAST_M)}
@@ -155,13 +165,13 @@ class ClosedLoop:
     # The situation
 
     def _coming(self, team: Team) -> Team:
-        """`team` after all that is already known to come."""
+        """Return `team` after all that is already known to come."""
         for event in self.team.scenario[self._happened :]:
             team, _ = apply_possible_changes(team, event.changes)
         return team
 
     def _sensed(self, feedback: Feedback, team: Team, builder: MissionBuilder) -> ScenarioEvent | None:
-        """The event that follows of a decision: the first reports that change `team`."""
+        """Return the event of the first reports that change `team`; None if there is no such report."""
         if self._situation is None:
             self._situation = Situation(builder.drones, builder.scale, self._battery)
         changes: list[Change] = []
@@ -176,13 +186,13 @@ class ClosedLoop:
 
 
 def drones_of(team: Team) -> tuple[Drone, ...]:
-    """All drones that ever take part, before anything is decided: who they are is known, where they stand is not."""
+    """Return all drones that ever take part. Where they stand is not known before the first decision."""
     robots = all_robots(team)
     return MissionBuilder(robots, _values(robots, 0)).drones
 
 
 def _values(robots: Sequence[Robot], place: int, span: float | None = None) -> dict[str, int]:
-    """Each variable's least value (`place` 0) or greatest (-1); only of those that span no more than `span`."""
+    """Return each variable's least value (`place` 0) or greatest (-1); only of those that span no more than `span`."""
     found = {}
     for variable in (variable for robot in robots for variable in robot.variables):
         ranges = variable.domain.ranges

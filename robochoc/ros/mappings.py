@@ -1,8 +1,8 @@
-"""How a waypoint becomes a message of the ROS type that its topic has.
+"""Mappings from waypoints to messages of the ROS type that a topic has.
 
 Some types are built in. Packages offer others under the entry point group `robochoc.waypoints`; the entry's name is the
-ROS type, such as `mavros_msgs/PositionTarget`. What it names is a function that makes a message's fields of a
-`Waypoint`, or a `WaypointMapping`, which also brings the definition of a type that no distribution of ROS has.
+ROS type, such as `mavros_msgs/PositionTarget`. It names a function that makes a message's fields of a `Waypoint`, or a
+`WaypointMapping`, which also brings the definition of a type that no distribution of ROS has.
 """
 
 from __future__ import annotations
@@ -27,12 +27,12 @@ _UPRIGHT = {"w": 1.0}
 
 
 class NoMappingError(Exception):
-    """Nobody says how a waypoint becomes a message of the type that a topic has: which, and what types there are."""
+    """A topic has a type that no waypoint can become. The message names the types that exist."""
 
 
 @dataclass(frozen=True)
 class WaypointMapping:
-    """How a waypoint becomes a message of one ROS type.
+    """Makes of a waypoint the fields of a message of one ROS type.
 
     `definition` is the text of the type's `.msg` file, for a type that no distribution of ROS has. Types of its fields
     that none has follow it, each after a line of 80 `=` and a line `MSG: package/Type`, as in a recording.
@@ -43,21 +43,22 @@ class WaypointMapping:
 
 
 def short_kind(kind: str) -> str:
-    """`geometry_msgs/PoseStamped`, also where it is called `geometry_msgs/msg/PoseStamped`. Others stay as they are."""
+    """Return `geometry_msgs/PoseStamped`, also for `geometry_msgs/msg/PoseStamped`. Other kinds stay as they are."""
     found = _SPELLING.fullmatch(kind.strip())
     return f"{found[1]}/{found[2]}" if found else kind
 
 
 def kinds() -> tuple[str, ...]:
-    """All types that a waypoint can become, built in and installed, sorted."""
+    """Return all types that a waypoint can become, built in and installed, sorted."""
     return tuple(sorted({*_BUILT_IN, *map(short_kind, entry_point_names(GROUP))}))
 
 
 @cache
 def mapping_for(kind: str) -> WaypointMapping | None:
-    """How a waypoint becomes a `kind`, in either spelling; None if nobody says.
+    """Return the mapping to `kind`, in either spelling; None if there is none.
 
-    Raises `NoMappingError`: it is broken.
+    Raises:
+        NoMappingError: The mapping that a package offers is broken.
     """
     short = short_kind(kind)
     if short in _BUILT_IN:
@@ -79,21 +80,18 @@ def mapping_for(kind: str) -> WaypointMapping | None:
 
 
 def mapping_of(topic: str, robot: str, kind: str) -> WaypointMapping:
-    """How waypoints of `robot` become what is published on `topic`.
-
-    Raises `NoMappingError`, which names those there are.
-    """
+    """Return the mapping for `topic` of `robot`. Raises `NoMappingError`."""
     found = mapping_for(kind)
     if found is None:
         who = f"topic {topic!r} of {robot}" if robot else f"topic {topic!r}"
-        told = f"{who} has the type {kind!r}, and nobody says how a waypoint becomes one"
+        problem = f"{who} has the type {kind!r}, and there is no mapping from waypoints to it"
         known = f"known are {', '.join(kinds())}; a package may offer others ({GROUP})"
-        raise NoMappingError(on_one_line(f"{told}: {known}"))
+        raise NoMappingError(on_one_line(f"{problem}: {known}"))
     return found
 
 
 def definition_of(kind: str) -> str:
-    """The definition of `kind` that an installed package brings; empty if none does."""
+    """Return the definition of `kind` that an installed package brings; empty if none does."""
     try:
         found = mapping_for(kind)
     except NoMappingError:
@@ -106,12 +104,12 @@ def _fault(found: object) -> str:
 
 
 def point(at: Point) -> Fields:
-    """The fields of a `geometry_msgs/Point`, or a `Vector3`."""
+    """Return the fields of a `geometry_msgs/Point`, or a `Vector3`."""
     return {"x": at[0], "y": at[1], "z": at[2]}
 
 
 def header(waypoint: Waypoint) -> Fields:
-    """The fields of a `std_msgs/Header`."""
+    """Return the fields of a `std_msgs/Header`."""
     return {"stamp": waypoint.stamp, "frame_id": waypoint.frame}
 
 

@@ -1,8 +1,8 @@
-"""Names for ROS: the team's files call a topic `/drone3.1/waypoint3.1`, and neither ROS 1 nor ROS 2 allows that name.
+"""Names for ROS. A team's files call a topic `/drone3.1/waypoint3.1`; neither ROS 1 nor ROS 2 allows that name.
 
 A name here is `/` and tokens of letters, digits and single underscores, each beginning with a letter: legal in ROS 1
-(wiki.ros.org/Names) and in ROS 2 (design.ros2.org, "Topic and Service name mapping to DDS"). What is legal stays as it
-is.
+(wiki.ros.org/Names) and in ROS 2 (design.ros2.org, "Topic and Service name mapping to DDS"). Legal names stay as they
+are.
 """
 
 from __future__ import annotations
@@ -25,34 +25,36 @@ REPORTS: Mapping[str, str] = MappingProxyType(
         "out_of_order": "std_msgs/String",
     }
 )
-"""What is published in a drone's space, besides its waypoints: the last token, and the ROS type."""
+"""The topics in a drone's namespace, besides its waypoints: the last token, and the ROS type."""
 
-LONGEST = 240
+NAME_MAX = 240
 """Characters of a name: ROS 2 passes on a few more to DDS."""
 
 _LEGAL = re.compile(r"[A-Za-z](?:_?[A-Za-z0-9])*_?")
-_TAKEN = {"/tf", "/tf_static", "/clock", "/rosout", "/rosout_agg", "/parameter_events", "/diagnostics", "/bond"}
+_RESERVED = {"/tf", "/tf_static", "/clock", "/rosout", "/rosout_agg", "/parameter_events", "/diagnostics", "/bond"}
 """Topics with a meaning of their own in every ROS."""
 
 
 class NameClashError(Exception):
-    """Two topics would have one name in ROS, or a name is too long for it: which, and what to do."""
+    """Two topics would have one name in ROS, or a name is too long for it. The message says what to do."""
 
 
 class TopicNames:
-    """The names in ROS of what `drones` publish; drones are known by their numbers. Raises `NameClashError`."""
+    """The names in ROS of what `drones` publish, by the drones' numbers. Raises `NameClashError`."""
 
     original: Mapping[str, str]
-    """The way back: from a waypoint's topic in ROS to its name in the robot's file, and, for a drone whose file names
-    no topic, from its space to the drone's name."""
+    """From a waypoint's topic in ROS to its name in the robot's file. For a drone without a topic, from its namespace
+    to the drone's name.
+    """
 
     def __init__(self, drones: Sequence[Drone]) -> None:
         self._waypoints = [None if drone.topic is None else ros_name(drone.topic.name) for drone in drones]
         self._namespaces = [*_namespaces(drones, self._waypoints)]
         owners: dict[str, int] = {}
         for number, topic in self._topics():
-            if len(topic) > LONGEST:
-                raise NameClashError(on_one_line(f"{_told(drones[number])}: the name is too long for ROS: shorten it"))
+            if len(topic) > NAME_MAX:
+                what = _described(drones[number])
+                raise NameClashError(on_one_line(f"{what}: the name is too long for ROS: shorten it"))
             other = owners.setdefault(topic, number)
             if other != number:
                 raise NameClashError(_clash(topic, drones[other], drones[number]))
@@ -62,15 +64,15 @@ class TopicNames:
         )
 
     def waypoint(self, number: int) -> str | None:
-        """The topic of a drone's waypoints; None if its robot's file names none."""
+        """Return the topic of a drone's waypoints; None if its robot's file names none."""
         return self._waypoints[number]
 
     def namespace(self, number: int) -> str:
-        """The namespace of what a drone reports: `/drone3_1`, so that its battery is `/drone3_1/battery`."""
+        """Return the namespace of a drone's reports: `/drone3_1`, so that its battery is `/drone3_1/battery`."""
         return self._namespaces[number]
 
     def reports(self) -> dict[str, str]:
-        """The topics of all that drones may report, and their types."""
+        """Return the topics of all that drones may report, and their types."""
         return {f"{space}/{token}": kind for space in self._namespaces for token, kind in REPORTS.items()}
 
     def _topics(self) -> Iterator[tuple[int, str]]:
@@ -83,10 +85,10 @@ class TopicNames:
 
 
 def ros_name(name: str) -> str:
-    """`name` as ROS allows it: `/drone3_1/waypoint3_1`. Different names may become the same."""
+    """Return `name` as ROS allows it: `/drone3_1/waypoint3_1`. Different names may become the same."""
     tokens = [_token(token) for token in name.split("/") if token] or [_token("")]
     found = "/" + "/".join(tokens)
-    return f"{found}_topic" if found in _TAKEN else found
+    return f"{found}_topic" if found in _RESERVED else found
 
 
 def _token(text: str) -> str:
@@ -98,7 +100,7 @@ def _token(text: str) -> str:
 
 
 def _plain(char: str) -> str:
-    """Letters and digits as they are, accents dropped, other alphabets by their code, the rest as underscores."""
+    """Return letters and digits without accents; letters of other alphabets by their code, the rest as underscores."""
     if char.isascii():
         return char if char.isalnum() else "_"
     if unicodedata.combining(char):
@@ -107,7 +109,7 @@ def _plain(char: str) -> str:
 
 
 def _namespaces(drones: Sequence[Drone], waypoints: Sequence[str | None]) -> Iterator[str]:
-    """The first token of the waypoints' topic where no other drone's topic has it, else all of that topic."""
+    """Yield the first token of the waypoints' topic where no other drone's topic has it, else all of that topic."""
     names = [ros_name(drone.name.replace("/", "_")) for drone in drones]
     first = ["/" + topic.split("/")[1] if topic else name for topic, name in zip(waypoints, names, strict=True)]
     shared = Counter(first)
@@ -119,12 +121,12 @@ def _namespaces(drones: Sequence[Drone], waypoints: Sequence[str | None]) -> Ite
 def _clash(topic: str, first: Drone, second: Drone) -> str:
     if first.topic and second.topic and first.topic.name == second.topic.name:
         who = [f"{drone.name} ({drone.robot})" if drone.robot else drone.name for drone in (first, second)]
-        told = f"{who[0]} and {who[1]} both publish on {second.topic.name!r}: give each a topic of its own"
+        clash = f"{who[0]} and {who[1]} both publish on {second.topic.name!r}: give each a topic of its own"
     else:
-        told = f"{_told(first)} and {_told(second)} would both publish on {topic} in ROS: rename one of them"
-    return on_one_line(told)
+        clash = f"{_described(first)} and {_described(second)} would both publish on {topic} in ROS: rename one of them"
+    return on_one_line(clash)
 
 
-def _told(drone: Drone) -> str:
+def _described(drone: Drone) -> str:
     what = f"drone {drone.name!r}" if drone.topic is None else f"topic {drone.topic.name!r}"
     return f"{what} of {drone.robot}" if drone.robot else what

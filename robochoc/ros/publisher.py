@@ -1,4 +1,4 @@
-"""Decisions, poses and reports of a mission's drones, as messages on their way into sinks."""
+"""Publishes decisions, poses and reports of a mission's drones as messages."""
 
 from __future__ import annotations
 
@@ -25,22 +25,27 @@ _NOT_MEASURED = {
 
 
 class NothingToPublishError(Exception):
-    """No drone of the team has a topic: why, and what to do."""
+    """No drone of the team has a topic. The message says what to do."""
 
 
 class Publisher:
     """Publishes what `drones` of `team` are to do, and what they report, to each of `sinks`, which it does not close.
 
-    Times are in nanoseconds since the epoch; places in metres, in `frame`. Raises `NameClashError`, `NoMappingError`,
-    `NothingToPublishError`, and `SinkError`; its methods raise `SinkError`, and `NoMappingError` where a package's
-    mapping fails.
+    Times are in nanoseconds since the epoch; places in metres, in `frame`. Its methods raise `SinkError`, and
+    `NoMappingError` where a package's mapping fails.
+
+    Raises:
+        NameClashError: Two topics would have the same name in ROS.
+        NoMappingError: A topic has a type that no waypoint can become.
+        NothingToPublishError: No drone has a topic.
+        SinkError: A sink does not take the topics.
     """
 
     def __init__(self, team: str, drones: Sequence[Drone], sinks: Sequence[Sink], frame: str = "map") -> None:
         if all(drone.topic is None for drone in drones):
-            told = f"no drone of {team or 'the team'} has a topic to publish its waypoints on"
+            problem = f"no drone of {team or 'the team'} has a topic to publish its waypoints on"
             raise NothingToPublishError(
-                on_one_line(f"{told}: give its robot's file a <topic> (docs/reference/format.md)")
+                on_one_line(f"{problem}: give its robot's file a <topic> (docs/reference/format.md)")
             )
         self.names = TopicNames(drones)
         self._drones = drones
@@ -60,12 +65,12 @@ class Publisher:
             sink.advertise({**topics, **self.names.reports()})
 
     def decide(self, leg: Leg, at_ns: int) -> None:
-        """Publish where `leg` sends drones: who flies, and who lands."""
+        """Publish the waypoints of `leg`: of drones that fly, and of those that land."""
         for waypoint in waypoints(leg, self._drones, self.names, self._frame, at_ns):
             self._publish(waypoint.topic, waypoint.kind, self._fields(waypoint), at_ns)
 
     def poses(self, positions: NDArray[np.float64], attitudes: NDArray[np.float64], at_ns: int) -> None:
-        """Publish where all drones are: metres (N, 3), and quaternions x y z w (N, 4)."""
+        """Publish all drones' poses: positions in metres (N, 3), and quaternions x, y, z, w (N, 4)."""
         header = self._header(at_ns)
         flown = zip(positions.tolist(), attitudes.tolist(), strict=True)
         for number, (at, (x, y, z, w)) in enumerate(flown):
@@ -73,7 +78,7 @@ class Publisher:
             self._report(number, "pose", {"header": header, "pose": _pose(at, turned)}, at_ns)
 
     def report(self, report: Report, at_ns: int) -> None:
-        """Publish what a drone reports. Raises `KeyError` if no drone has that name."""
+        """Publish a drone's report. Raises `KeyError` if no drone has that name."""
         number, header = self._numbers[report.drone], self._header(at_ns)
         match report:
             case Battery():
@@ -94,8 +99,8 @@ class Publisher:
         try:
             return self._mappings[waypoint.kind].fields(waypoint)
         except Exception as error:
-            told = f"what is installed for waypoints as {waypoint.kind} failed: {type(error).__name__}: {error}"
-            raise NoMappingError(on_one_line(told)) from error
+            problem = f"what is installed for waypoints as {waypoint.kind} failed: {type(error).__name__}: {error}"
+            raise NoMappingError(on_one_line(problem)) from error
 
     def _header(self, at_ns: int) -> Fields:
         return {"stamp": at_ns, "frame_id": self._frame}

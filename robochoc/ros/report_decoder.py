@@ -1,7 +1,7 @@
-"""From raw messages to reports: what robots publish of their situation, in either ROS.
+"""From messages to reports: what robots publish of their situation, in ROS 1 or ROS 2.
 
-A drone reports in its own namespace (`names.py`). Messages come from outside: whatever is not as it should be, a number
-that is none, a place in another frame, is passed over.
+A drone reports in its own namespace (`names.py`). Messages come from outside. What is not as it should be is ignored: a
+value that is no number, a place in another frame.
 """
 
 from __future__ import annotations
@@ -16,75 +16,75 @@ from robochoc.formats.diagnostics import on_one_line
 from robochoc.ros.names import REPORTS, TopicNames
 from robochoc.ros.source import ReceivedMessage
 
-LONGEST = 200
+REASON_MAX = 200
 """Characters of a reason that are kept."""
 _FAR_M = 1e9
-"""Nothing is further away than that: coordinates beyond it are no places."""
+"""Larger coordinates are no places."""
 
 
 class ReportDecoder:
-    """Reads what `drones` report. Raises `NameClashError` where their topics cannot be told apart.
+    """Decodes the reports of `drones`. Raises `NameClashError` where their topics would have the same name.
 
-    Places count in `frame`; a message that names no frame is taken to mean it.
+    Places count in `frame`. A message without a frame is taken to be in it.
     """
 
     topics: Mapping[str, str]
-    """What there is to listen to: topics and types, both by their ROS names."""
+    """The topics of reports and their types, both by their ROS names."""
     strange: dict[str, str]
-    """Topics on which places came in another frame, and the last one of these."""
+    """Topics with places in another frame, and the last one of these frames."""
 
     def __init__(self, drones: Sequence[Drone], frame: str) -> None:
         names = TopicNames(drones)
         self._frame = frame.removeprefix("/")
-        self._told = {
+        self._tokens = {
             f"{names.namespace(number)}/{token}": (drone.name, token)
             for number, drone in enumerate(drones)
             for token in REPORTS
         }
-        self.topics = {topic: REPORTS[token] for topic, (_, token) in self._told.items()}
+        self.topics = {topic: REPORTS[token] for topic, (_, token) in self._tokens.items()}
         self.strange = {}
 
-    def report(self, heard: ReceivedMessage) -> Report | None:
-        """What the message reports, at the time at which it was received; None where it says nothing."""
-        drone, token = self._told.get(heard.topic, ("", ""))
-        at_s = heard.at_ns / 1e9
+    def report(self, received: ReceivedMessage) -> Report | None:
+        """Return what the message reports, at the time at which it was received; None where it reports nothing."""
+        drone, token = self._tokens.get(received.topic, ("", ""))
+        at_s = received.at_ns / 1e9
         match token:
             case "battery":
-                level = _number(heard.fields, "percentage")
+                level = _number(received.fields, "percentage")
                 return None if level is None else Battery(drone, level, at_s)
             case "out_of_order":
-                why = heard.fields.get("data")
-                return OutOfOrder(drone, on_one_line(why[:LONGEST]) if isinstance(why, str) else "", at_s)
+                why = received.fields.get("data")
+                return OutOfOrder(drone, on_one_line(why[:REASON_MAX]) if isinstance(why, str) else "", at_s)
             case "pose":
-                place = self._place(heard, "pose", "position")
+                place = self._place(received, "pose", "position")
                 return None if place is None else Pose(drone, place, at_s)
             case "blocked" | "cleared":
-                place = self._place(heard, "point")
-                kind = Cleared if heard.topic.endswith("/cleared") else Blocked
+                place = self._place(received, "point")
+                kind = Cleared if received.topic.endswith("/cleared") else Blocked
                 return None if place is None else kind(drone, place, at_s)
             case _:
                 return None
 
-    def _place(self, heard: ReceivedMessage, *path: str) -> Point | None:
-        """The point that stands at `path` in the message, if it is one of our frame."""
-        frame = _at(heard.fields, ("header",)).get("frame_id")
+    def _place(self, received: ReceivedMessage, *path: str) -> Point | None:
+        """Return the point at `path` in the message; None if it is not in our frame."""
+        frame = _at(received.fields, ("header",)).get("frame_id")
         if isinstance(frame, str) and frame.removeprefix("/") not in {"", self._frame}:
-            self.strange[heard.topic] = on_one_line(frame[:LONGEST])
+            self.strange[received.topic] = on_one_line(frame[:REASON_MAX])
             return None
-        fields = _at(heard.fields, path)
+        fields = _at(received.fields, path)
         x, y, z = (_number(fields, axis) for axis in "xyz")
         return None if x is None or y is None or z is None else (x, y, z)
 
 
 def _at(fields: object, path: Sequence[str]) -> Mapping[str, object]:
-    """The fields at `path`; none where there is nothing of that kind."""
+    """Return the fields at `path`; none where there is nothing of that kind."""
     for name in path:
         fields = fields.get(name) if isinstance(fields, Mapping) else None
     return fields if isinstance(fields, Mapping) else {}
 
 
 def _number(fields: Mapping[str, object], name: str) -> float | None:
-    """A number that can be reckoned with."""
+    """Return a finite number that is not too large; None for anything else."""
     value = fields.get(name)
     if isinstance(value, bool) or not isinstance(value, int | float):
         return None

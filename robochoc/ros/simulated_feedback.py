@@ -1,4 +1,4 @@
-"""Feedback without robots: decisions are flown in the simulation, and what its drones meet is reported."""
+"""Feedback from a simulated flight: decisions are flown, and what its drones meet is reported."""
 
 from __future__ import annotations
 
@@ -9,34 +9,36 @@ from itertools import islice
 
 import numpy as np
 
-from robochoc.flight.flight import Flight, FlightConditions, FlightLog, MotorFailure
+from robochoc.flight.flight import Flight
 from robochoc.flight.layout import Point
+from robochoc.flight.log import FlightLog
 from robochoc.flight.mission import Drone, Goal, Leg, MissionBuilder
+from robochoc.flight.quadrotor.conditions import FlightConditions, MotorFailure
 from robochoc.flight.reports import OutOfOrder, Report
 from robochoc.formats.diagnostics import on_one_line
 from robochoc.ros.closed_loop import TOGETHER_S, Feedback
 from robochoc.ros.sink_publisher import FlightBroadcast, nanoseconds
 
-MOST_NAMES = 12
-"""So many drones stand in a message."""
+NAMES_MAX = 12
+"""Drones that are named in an error."""
 FAILS_S = 2.0
-"""When a drone fails, where nobody says when: it is in the air by then."""
+"""The default time of a failure: the drone is in the air by then."""
 
 
 class CannotFlyError(Exception):
-    """The decision cannot be flown as asked: why."""
+    """The decision cannot be flown. The message says why."""
 
 
 class UnknownDroneError(Exception):
-    """A drone is to fail that is not there: which, and who is."""
+    """A drone that is to fail does not exist. The message names those that do."""
 
 
 @dataclass(frozen=True)
 class FlightSettings:
-    """What a simulated flight meets.
+    """Conditions of a simulated flight, before its mission is known.
 
-    `failures` are names, of robots or of drones, with the second at which a motor stops; of a robot's drones, the
-    first fails. `obstacles` are in units of the problem. The rest is as in `flight.Conditions`.
+    `failures` are names, of robots or of drones, with the second at which a motor stops. Of a robot's drones, the first
+    fails. `obstacles` are in units of the problem. The rest is as in `FlightConditions`.
     """
 
     distance: float | None = None
@@ -47,11 +49,11 @@ class FlightSettings:
     obstacles: tuple[Point, ...] = ()
 
     def check(self, drones: Sequence[Drone]) -> None:
-        """Raise `UnknownDroneError` for a drone that is not there, and `ValueError` for what no flight can meet."""
+        """Raise `UnknownDroneError` for a drone that does not exist, and `ValueError` for impossible conditions."""
         self.conditions(drones, 1.0)
 
     def conditions(self, drones: Sequence[Drone], scale: float) -> FlightConditions:
-        """The same for a flight of `drones`, in metres. Raises `UnknownDroneError` and `ValueError`."""
+        """Return the conditions for a flight of `drones`, in metres. Raises `UnknownDroneError` and `ValueError`."""
         return FlightConditions(
             distance=self.distance,
             wind=self.wind,
@@ -63,33 +65,31 @@ class FlightSettings:
 
 
 def _named(drones: Sequence[Drone], name: str) -> str:
-    """The drone called `name`, or the first one of the robot of that name."""
+    """Return the name of the drone called `name`, or of the first one of that robot."""
     found = [drone for drone in drones if drone.name == name] or [drone for drone in drones if drone.robot == name]
     if not found:
         known = [drone.name for drone in drones]
-        more = f" and {len(known) - MOST_NAMES} more" * (len(known) > MOST_NAMES)
-        raise UnknownDroneError(
-            f"there is no drone {name!r} that could fail, but {', '.join(known[:MOST_NAMES])}{more}"
-        )
+        more = f" and {len(known) - NAMES_MAX} more" * (len(known) > NAMES_MAX)
+        raise UnknownDroneError(f"there is no drone {name!r} that could fail, but {', '.join(known[:NAMES_MAX])}{more}")
     return found[0].name
 
 
 @dataclass
 class SimulatedFeedback(Feedback):
-    """Flies each decision in the simulation, in `surroundings`; it is over when all have reached their places.
+    """Flies each decision in the simulation. It is over when all drones have reached their places.
 
-    Whatever a drone has to report ends the leg early: the others slow down and hover. A report that changes nothing
-    lets them fly on, and what was reported once is not reported again. Time begins at 0 with the first leg. Each
-    decision is a stage of what was flown, also one that was out of date before anybody could follow it. The team
-    decides while all hover, and not before all is there that belongs to one event: a recording tells the same story.
+    A report ends the leg early: all other drones slow down and hover. After a report that changes nothing they fly on.
+    What was reported once is not reported again. Time begins at 0 with the first leg. Each decision is a leg of the
+    log, also one that was out of date before a drone could follow it. The team decides while all hover, and not before
+    all reports of an event are there. So a recording of the reports leads to the same run.
     """
 
-    surroundings: FlightSettings
+    settings: FlightSettings
     simulated: bool = True
     _flight: Flight | None = None
     _leg: Leg | None = None
     _follows: bool = False
-    """Whether there is more to fly of the decision."""
+    """Whether more of the decision is to be flown."""
     _calls: list[int] = field(default_factory=list)
     """How often `Flight.fly` was called, for each decision."""
     _waiting: deque[Report] = field(default_factory=deque)
@@ -98,15 +98,15 @@ class SimulatedFeedback(Feedback):
     _broadcast: FlightBroadcast = field(default_factory=FlightBroadcast)
 
     def now_ns(self) -> int:
-        """See `Feedback.now_ns`: the flight's own time."""
+        """Return the flight's own time."""
         return nanoseconds(self._now_s)
 
-    def decided(self, builder: MissionBuilder, leg: Leg, left_s: float | None) -> None:  # noqa: ARG002 - it is fast
-        """See `Feedback.decided`."""
+    def on_decision(self, builder: MissionBuilder, leg: Leg, left_s: float | None) -> None:  # noqa: ARG002 - it is fast
+        """Take note of a decision: it is flown by `next`."""
         if self._flight is None:
             homes = np.array([drone.home for drone in builder.drones], dtype=float).reshape(-1, 3)
             try:
-                conditions = self.surroundings.conditions(builder.drones, builder.scale)
+                conditions = self.settings.conditions(builder.drones, builder.scale)
                 names = [drone.name for drone in builder.drones]
                 self._flight = Flight(names, homes, conditions, lambda _: self.idle())
             except ValueError as refused:
@@ -118,7 +118,7 @@ class SimulatedFeedback(Feedback):
         self._calls.append(0)
 
     def next(self, until_s: float | None) -> Report | None:
-        """See `Feedback.next`."""
+        """Return the next report; see `Feedback.next`."""
         while not self._waiting and until_s is None and self._follows and self._leg and self._flight:
             self._fly(self._flight, self._leg)
         if not self._waiting or (until_s is not None and self._waiting[0].at_s > until_s):
@@ -126,7 +126,7 @@ class SimulatedFeedback(Feedback):
         return self._waiting.popleft()
 
     def flown(self) -> FlightLog | None:
-        """All that was flown, a stage for each decision; None if nothing was. Raises `CannotFlyError`."""
+        """Return the flight log, a leg for each decision; None if nothing was flown. Raises `CannotFlyError`."""
         if self._flight is None or self._leg is None:
             return None
         if not self._calls[-1]:
@@ -139,7 +139,7 @@ class SimulatedFeedback(Feedback):
         )
 
     def _fly(self, flight: Flight, leg: Leg) -> None:
-        """Fly until somebody has something new to report, or all are where they are to be."""
+        """Fly until a drone has something new to report, or all have reached their goals."""
         reports = self._go(flight, leg, leg.goals, stop_on_report=True)
         new = self._new(reports)
         if reports and not new:
@@ -164,24 +164,24 @@ class SimulatedFeedback(Feedback):
             raise CannotFlyError(on_one_line(f"the decision cannot be flown: {refused}")) from refused
 
     def _fallen(self, flown: FlightLog) -> list[Report]:
-        """What those would report that have fallen while nobody asked."""
+        """Return reports of drones that have fallen without a report."""
         known = {report.drone for report in self._known if isinstance(report, OutOfOrder)}
         lost = [flown.names[number] for number in np.flatnonzero(np.isnan(flown.errors_m))]
         return [OutOfOrder(name, "has fallen", float(flown.times[-1])) for name in lost if name not in known]
 
     def _new(self, reports: Sequence[Report]) -> list[Report]:
-        """Those of `reports` that nobody has made before, by their times."""
+        """Return those of `reports` that were not made before, by their times."""
         new = sorted((one for one in reports if _what(one) not in self._known), key=lambda report: report.at_s)
         self._known.update(map(_what, new))
         return new
 
     def _tell(self, flown: FlightLog, reports: Sequence[Report]) -> None:
-        """Publish what was flown since the last time, and what was reported meanwhile, as time goes by."""
+        """Publish the flight since the last time, and the reports meanwhile, as time goes by."""
         self._now_s = float(flown.times[-1]) if len(flown.times) else self._now_s
         if self.publishers:
             self._broadcast.publish(self.publishers, flown, reports, self._now_s)
 
 
 def _what(report: Report) -> Report:
-    """`report`, whenever it was made."""
+    """Return `report` without its time."""
     return replace(report, at_s=0.0)

@@ -1,4 +1,4 @@
-"""What one robot publishes on its own machine: it knows its own decision, and nothing of where others are."""
+"""What one robot publishes on its own machine: it knows its own decision, and not where others are."""
 
 from __future__ import annotations
 
@@ -8,22 +8,29 @@ from robochoc.model.outcome import EpochOutcome, Verdict
 from robochoc.model.problem import Assignment, Robot
 
 _ANSWERED = (Verdict.SOLUTION, Verdict.OPTIMAL)
+_WITHDRAWN = ("withdr", "aside")
+"""Parts of the master's word that say that robots have withdrawn."""
 
 
 def drones_of_robot(robot: Robot) -> tuple[Drone, ...]:
-    """The drones of `robot`, before anything is decided."""
+    """Return the drones of `robot`, before anything is decided."""
     return MissionBuilder([robot], {}).drones
 
 
 def leg_of_robot(robot: Robot, why: str, assignment: Assignment, scale: float | None = None) -> Leg:
-    """What the end of a run asks of the drones of `robot`, by the numbers of `drones_of_robot`.
+    """Return what the end of a run asks of the drones of `robot`, by their numbers in `drones_of_robot`.
 
-    `why` is the master's word for how it ended (`optimal, 6 step aside`). A robot that stepped aside, and so has no
-    `assignment`, lands where it stood, below its cell: that spot is its own, while one at the edge might be another's.
-    A drone whose file says no cell stays where it is, as does everybody where nothing was found.
+    A robot that has withdrawn lands where it stood, below its cell: that point is its own, while one at the edge might
+    be another's. A drone without a cell in its file stays where it is; all drones do so if there is no solution.
+
+    Args:
+        robot: The robot.
+        why: The master's word for how the run ended: `optimal, 6 step aside`.
+        assignment: The robot's decision; empty if it has withdrawn.
+        scale: Metres a unit.
     """
     verdict, _, others = why.partition(",")
-    if verdict not in _ANSWERED or not (assignment or "aside" in others):
+    if verdict not in _ANSWERED or not (assignment or any(part in others for part in _WITHDRAWN)):
         return Leg(why, Verdict.UNKNOWN, {})
     builder = MissionBuilder([robot], assignment, scale=scale)
     known = {craft.name for craft in crafts_of(robot, assignment) if craft.cell}

@@ -8,31 +8,32 @@ from types import TracebackType
 from typing import Any, Self
 
 Fields = Mapping[str, Any]
-"""A message's fields by their ROS names, nested; times (`stamp`) are integers, in nanoseconds. What is not named is
-zero, or empty."""
+"""A message's fields by their ROS names, nested. Times (`stamp`) are integers, in nanoseconds. A field without a value
+is zero, or empty.
+"""
 
 
 class SinkError(Exception):
-    """The sink cannot be opened, or written to any more: why, and what might help."""
+    """The sink cannot be opened or written to. The message says why, and what might help."""
 
 
 class Sink(ABC):
-    """Takes messages. Whoever opens it closes it: it is a context manager.
+    """Takes messages. It is a context manager: the caller that opens it closes it.
 
-    `place` is what stands behind its name on the command line (`mcap:run.mcap`: `run.mcap`). Raises `SinkError`.
+    `place` is what follows its name on the command line (`mcap:run.mcap`: `run.mcap`). Raises `SinkError`.
     """
 
     live: bool = True
-    """Whether robots may hear what is published. A recording only keeps it."""
+    """Whether robots may receive what is published. A recording only keeps it."""
 
     def __init__(self, place: str) -> None:
         self.place = place
 
     def explain(self, original: Mapping[str, str]) -> None:  # noqa: B027 - only a recording can keep it
-        """What topics (by their ROS names) are called in the team's files. Raises `SinkError`."""
+        """Take the names that topics (by their ROS names) have in the team's files. Raises `SinkError`."""
 
     def advertise(self, topics: Mapping[str, str]) -> None:  # noqa: B027 - nothing to do for files
-        """Messages of these types will be published on these topics (both by their ROS names). Raises `SinkError`."""
+        """Announce topics and the types of their messages, both by their ROS names. Raises `SinkError`."""
 
     @abstractmethod
     def publish(self, topic: str, kind: str, fields: Fields, at_ns: int) -> None:
@@ -40,10 +41,10 @@ class Sink(ABC):
 
     @abstractmethod
     def close(self) -> None:
-        """All has been published. What is written becomes what was asked for only now. Raises `SinkError`."""
+        """Finish: everything has been published. A file appears in its place only now. Raises `SinkError`."""
 
     def discard(self) -> None:
-        """Something went wrong: leave nothing half-written."""
+        """Finish after an error: leave nothing half-written."""
         self.close()
 
     def __enter__(self) -> Self:

@@ -1,4 +1,4 @@
-"""An publisher: one sink of a run, and how much was published there."""
+"""Publishes a run into one sink, and counts what was published."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ POSES_HZ = 20
 
 
 class SinkPublisher:
-    """Publishes what `drones` of `team` do into one `sink`, and counts. Raises what `Publisher` raises."""
+    """Publishes decisions, poses and reports of `drones` of `team` into one `sink`. Raises what `Publisher` raises."""
 
     def __init__(self, team: str, drones: Sequence[Drone], sink: Sink, frame: str) -> None:
         self.live = sink.live
@@ -32,18 +32,18 @@ class SinkPublisher:
         self._counts = dict.fromkeys(("waypoint", "landing", "report", "pose"), 0)
 
     def decide(self, leg: Leg, at_ns: int) -> None:
-        """Publish where `leg` sends drones. Raises `SinkError`, `NoMappingError`."""
+        """Publish the waypoints of `leg`. Raises `SinkError`, `NoMappingError`."""
         for waypoint in waypoints(leg, self._drones, self._publisher.names, self._frame, at_ns):
             self._counts["landing" if waypoint.lands else "waypoint"] += 1
         self._publisher.decide(leg, at_ns)
 
     def report(self, report: Report) -> None:
-        """Publish what a drone reports, at the report's time. Raises `SinkError`."""
+        """Publish a drone's report, at the report's time. Raises `SinkError`."""
         self._counts["report"] += 1
         self._publisher.report(report, nanoseconds(report.at_s))
 
     def poses(self, positions: npt.NDArray[np.float64], attitudes: npt.NDArray[np.float64], at_s: float) -> None:
-        """Publish where all drones are, see `Publisher.poses`. Raises `SinkError`."""
+        """Publish all drones' poses, see `Publisher.poses`. Raises `SinkError`."""
         self._counts["pose"] += len(positions)
         self._publisher.poses(positions, attitudes, nanoseconds(at_s))
 
@@ -66,7 +66,10 @@ class FlightBroadcast:
     def publish(
         self, publishers: Sequence[SinkPublisher], flown: FlightLog, reports: Sequence[Report], until_s: float
     ) -> None:
-        """Publish what was not yet told of `flown` up to `until_s`, and `reports` among it. Raises `SinkError`."""
+        """Publish what of `flown` was not published yet, up to `until_s`, and `reports` among it.
+
+        Raises `SinkError`.
+        """
         untold = deque(reports)
         while (at_s := self._ticks / POSES_HZ) <= until_s:
             while untold and untold[0].at_s <= at_s:
@@ -80,7 +83,7 @@ class FlightBroadcast:
 
 
 def publish_flight(mission: Mission, flown: FlightLog, publishers: Sequence[SinkPublisher]) -> None:
-    """Publish a whole flight: each leg's waypoints as it begins, poses, and who falls. Raises `SinkError`."""
+    """Publish a whole flight: each leg's waypoints as it begins, poses, and drones that fall. Raises `SinkError`."""
     if not publishers:
         return
     fallen = {number for number, error in enumerate(flown.errors_m) if np.isnan(error)}
@@ -100,5 +103,5 @@ def _report(publishers: Sequence[SinkPublisher], report: Report) -> None:
 
 
 def nanoseconds(at_s: float) -> int:
-    """A time in seconds as ROS has it."""
+    """Return a time in seconds as nanoseconds."""
     return round(at_s * SECOND_NS)

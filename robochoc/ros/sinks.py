@@ -1,7 +1,7 @@
 """Sinks and sources by name, as installed packages offer them: `mcap:run.mcap`, `rosbridge://localhost:9090`, `rospy`.
 
-They stand under the entry point groups `robochoc.sinks` and `robochoc.sources`, and are called with what stands behind
-the name. Whoever opens one closes it.
+They are found under the entry point groups `robochoc.sinks` and `robochoc.sources`, and are called with what follows
+the name. The caller closes what it has opened.
 """
 
 from __future__ import annotations
@@ -19,40 +19,41 @@ from robochoc.system.installed import entry_points_named, load_entry_point, not_
 SINKS, SOURCES = "robochoc.sinks", "robochoc.sources"
 
 _ENDINGS = {".mcap": "mcap", ".bag": "rosbag"}
-"""Files that may stand alone, without the name of what writes or reads them."""
+"""Files that may stand alone, without the name of their format."""
 
 
 class UnknownSinkError(SinkError):
-    """Nothing of that name is installed, or it cannot be used: why, and what to install or write instead."""
+    """No sink of that name is installed, or it cannot be used. The message says what to install or write instead."""
 
 
 class UnknownSourceError(SourceError):
-    """Nothing of that name is installed, or it cannot be used: why, and what to install or write instead."""
+    """No source of that name is installed, or it cannot be used. The message says what to install or write instead."""
 
 
 def open_sink(text: str) -> Sink:
-    """The sink that `text` names. Raises `UnknownSinkError`, and `SinkError` where it cannot be opened."""
+    """Return the sink that `text` names. Raises `UnknownSinkError`, and `SinkError` if it cannot be opened."""
     name, place = _parts(text)
     return cast("type[Sink]", _offered(SINKS, "sink", name, Sink, UnknownSinkError))(place)
 
 
 def open_source(text: str) -> Source:
-    """The source that `text` names. Raises `UnknownSourceError`, and `SourceError` where it cannot be opened."""
+    """Return the source that `text` names. Raises `UnknownSourceError`, and `SourceError` if it cannot be opened."""
     name, place = _parts(text)
     return cast("type[Source]", _offered(SOURCES, "source", name, Source, UnknownSourceError))(place)
 
 
 def place_of(text: str) -> Path | str:
-    """What `text` names, the same however it is spelled: the file of a recording, else `text` itself.
+    """Return what `text` names, the same however it is spelled: the file of a recording, else `text` itself.
 
-    Raises `OSError` where symbolic links lead in a circle.
+    Raises:
+        OSError: Symbolic links form a circle.
     """
     name, place = _parts(text)
     return resolved(Path(place)) if place and name in _ENDINGS.values() else text
 
 
 def _parts(text: str) -> tuple[str, str]:
-    """The name, and what stands behind it: `rosbridge://localhost:9090` is `rosbridge` and `localhost:9090`."""
+    """Return the name and what follows it: `rosbridge` and `localhost:9090` for `rosbridge://localhost:9090`."""
     name, colon, place = text.partition(":")
     alone = next((kind for ending, kind in _ENDINGS.items() if text.endswith(ending)), None)
     if alone and (not colon or "/" in name):
@@ -61,7 +62,7 @@ def _parts(text: str) -> tuple[str, str]:
 
 
 def _offered(group: str, kind: str, name: str, base: type, wrong: type[Exception]) -> object:
-    """The class that is installed as `name`. Raises `wrong`."""
+    """Return the class that is installed as `name`. Raises `wrong`."""
     namesakes = entry_points_named(group, name)
     if not namesakes:
         hint = "" if name else f"; a {kind} is written NAME:PLACE, such as mcap:run.mcap"
@@ -81,7 +82,7 @@ def _fault(found: object, base: type) -> str:
 
 
 def _lacking(entry: EntryPoint) -> str:
-    """What to install, if what `entry` needs is an extra of its package that is not there; else empty."""
+    """Return what to install, if what `entry` needs is an extra of its package that is missing; else empty."""
     try:
         entry.load()
     except ModuleNotFoundError as error:
@@ -89,6 +90,6 @@ def _lacking(entry: EntryPoint) -> str:
         if entry.dist and entry.name in extras:
             wanted = f"{entry.dist.name}[{entry.name}]"
             return f"{entry.name} needs {error.name}, which is not installed: pip install '{wanted}'"
-    except (Exception, SystemExit):  # noqa: BLE001 - told by whoever loads it once more
+    except (Exception, SystemExit):  # noqa: BLE001 - raised when it is loaded once more
         return ""
     return ""

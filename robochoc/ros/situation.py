@@ -1,7 +1,7 @@
 """What robots report, and what it means for the problem: the paper's "read the robot situation" (Section 4.2).
 
-An obstacle takes values away, a drone that cannot fly any more takes its robot out of the team, and what is clear again
-gives values back. Pure: a team and a report go in, changes of that team come out.
+An obstacle removes values. A drone that cannot fly any more removes its robot from the team. When an obstacle is gone,
+values come back. Pure: a team and a report go in, changes of that team come out.
 """
 
 from __future__ import annotations
@@ -21,19 +21,19 @@ from robochoc.model.expression import Expression, Name, UndefinedValueError, eva
 from robochoc.model.problem import AddValue, Change, Domain, RemoveAgent, RemoveValue, Robot, Team
 
 BATTERY = 0.2
-"""A drone whose battery holds less is out of order, where nobody says otherwise."""
+"""The default charge below which a drone is out of order."""
 WITHIN = 0.5
-"""An obstacle takes what lies within so many units of it."""
-MOST_VALUES = 10_000
-"""A variable with more values is not looked through one by one."""
-MOST_PLACES = 10_000
-"""So many obstacles are kept in mind."""
-MOST_NOTES = 20
-"""So many reports that change nothing are told of."""
+"""An obstacle blocks places within so many units."""
+VALUES_MAX = 10_000
+"""The values of a larger domain are not tried one by one."""
+OBSTACLES_MAX = 10_000
+"""Obstacles that are remembered."""
+NOTES_MAX = 20
+"""Notes about reports that change nothing."""
 FLIES, LIES = 0.5, 0.25
-"""A drone flies that is so many units above where it stood; one that is less than the other lies on the ground."""
+"""A drone this many units above its home flies; one lower than the second number lies on the ground."""
 LIES_S, LIES_TIMES = 1.0, 3
-"""A drone that has flown, and is seen so often on the ground, over so many seconds, is out of order."""
+"""A drone that has flown and is seen on the ground so often, over so many seconds, is out of order."""
 _HAIR = 1e-6
 
 
@@ -47,19 +47,21 @@ class _Seen:
 
 
 class Situation:
-    """What is known of the robots' surroundings and of themselves.
-
-    `drones` are all that ever fly, `scale` is in metres a unit of the problem, `battery` the level (0 to 1) below
-    which a drone is out of order.
+    """What is known of obstacles and of the drones.
 
     A drone is also out of order when its poses say so: it was seen in the air (`FLIES`), and now lies on the ground
     (`LIES`) for at least `LIES_TIMES` reports over at least `LIES_S` seconds, though its robot is in the team and so
-    is not to land. How far it is from its goal says nothing: it may be on its way, wait for others to pass, or hover
+    is not to land. Its distance from its goal says nothing: it may be on its way, wait for others to pass, or hover
     while the team decides.
+
+    Args:
+        drones: All drones that ever fly.
+        scale: Metres a unit of the problem.
+        battery: The charge, 0 to 1, below which a drone is out of order.
     """
 
     notes: list[str]
-    """What was reported and could not be heeded, in clear sentences."""
+    """Sentences about reports that could not be used."""
 
     def __init__(self, drones: Sequence[Drone], scale: float, battery: float = BATTERY) -> None:
         namesakes = Counter(drone.name for drone in drones)
@@ -73,7 +75,7 @@ class Situation:
         self.notes = []
 
     def changes(self, team: Team, report: Report) -> tuple[Change, ...]:
-        """What `report` changes in `team`, which can take these changes; nothing if its robot is not there."""
+        """Return the changes of `team` that follow from `report`; none if the drone's robot is not in the team."""
         drone = self._drones.get(report.drone)
         if drone is None or drone.robot not in team:
             return ()
@@ -96,18 +98,18 @@ class Situation:
     def _blocked(self, team: Team, place: Point) -> tuple[Change, ...]:
         if self._obstacles.any_near(place, _HAIR):
             return ()
-        if len(self._obstacles) >= MOST_PLACES:
-            self._note(f"more than {MOST_PLACES:,} places are blocked: further ones are passed over")
+        if len(self._obstacles) >= OBSTACLES_MAX:
+            self._note(f"more than {OBSTACLES_MAX:,} places are blocked: further ones are passed over")
             return ()
         self._obstacles.add(place)
-        told = len(self.notes)
+        noted = len(self.notes)
         found = tuple(self._taking(team, place))
-        if not found and len(self.notes) == told:
-            self._note(f"nobody is ever sent to the obstacle at {_shown(place)}: it changes nothing")
+        if not found and len(self.notes) == noted:
+            self._note(f"no drone is ever sent to the obstacle at {_shown(place)}: it changes nothing")
         return found
 
     def _cleared(self, team: Team, place: Point) -> tuple[Change, ...]:
-        """Give back what no other obstacle is in the way of."""
+        """Return the values that no other obstacle blocks."""
         if not self._obstacles.remove_near(place, WITHIN + _HAIR):
             return ()
         free = [
@@ -134,7 +136,7 @@ class Situation:
             yield from (RemoveValue(variable, value) for variable, value in sorted(gone))
 
     def _values_at(self, robot: Robot, number: int, craft: Craft, place: Point) -> Iterator[tuple[str, int, Point]]:
-        """The variable and the values that would send a drone to `place`, and where exactly that is."""
+        """Yield the variable and the values that would send a drone to `place`, and where exactly that is."""
         if not _may_reach(craft, self._homes.get((robot.name, craft.name)), place):
             return
         if len(craft.decided_by) != 1:
@@ -145,7 +147,7 @@ class Situation:
         domain = next((own.domain for own in robot.variables if own.name == variable), None)
         values = _candidates(craft, variable, domain, place) if domain else ()
         if values is None:
-            self._regret(craft, place, f"{variable} has too many values to look through (more than {MOST_VALUES:,})")
+            self._regret(craft, place, f"{variable} has too many values to look through (more than {VALUES_MAX:,})")
             return
         for value in values:
             there = self._place_of(crafts_of(robot, {variable: value})[number])
@@ -153,7 +155,7 @@ class Situation:
                 yield variable, value, there
 
     def _place_of(self, craft: Craft) -> Point | None:
-        """Where a craft flies, in units; one without a cell flies above where it stood."""
+        """Return where a craft flies, in units; one without a cell flies above its home."""
         home = self._homes.get((craft.robot, craft.name))
         across = craft.cell or (home[:2] if home else None)
         return None if craft.level is None or across is None else (*across, craft.level)
@@ -162,13 +164,13 @@ class Situation:
         self._note(f"the obstacle at {_shown(place)} may be in the way of {craft.name}, and changes nothing: {why}")
 
     def _note(self, text: str) -> None:
-        if text not in self.notes and len(self.notes) < MOST_NOTES:
+        if text not in self.notes and len(self.notes) < NOTES_MAX:
             self.notes.append(text)
 
     # Poses
 
     def _is_down(self, drone: Drone, pose: Pose) -> bool:
-        """Whether the drone has fallen, see `Situation`."""
+        """Return whether the drone has fallen, see `Situation`."""
         seen = self._seen.setdefault(drone.name, _Seen())
         height = (pose.place[2] - drone.home[2]) / self._scale
         if height >= FLIES:
@@ -186,7 +188,7 @@ class Situation:
 
 
 def _may_reach(craft: Craft, home: Point | None, place: Point) -> bool:
-    """Whether what is fixed of a craft's place, whatever is decided, lies near `place`."""
+    """Return whether what is fixed of a craft's place, whatever is decided, lies near `place`."""
     topic = craft.topic
     across: list[float | None] = [None, None]
     if topic and topic.x is not None and topic.y is not None:
@@ -198,7 +200,7 @@ def _may_reach(craft: Craft, home: Point | None, place: Point) -> bool:
 
 
 def _candidates(craft: Craft, variable: str, domain: Domain, place: Point) -> Iterable[int] | None:
-    """The values of `domain` that might send the craft near `place`; None if there are too many to look at."""
+    """Return the values of `domain` that might send the craft near `place`; None if there are too many to try."""
     topic = craft.topic
     given: list[Expression | None] = [topic.x, topic.y, topic.z] if topic else [None, None, None]
     if given[2] is None:
@@ -207,11 +209,11 @@ def _candidates(craft: Craft, variable: str, domain: Domain, place: Point) -> It
         if expression == Name(variable):
             around = range(math.ceil(at - WITHIN - _HAIR), math.floor(at + WITHIN + _HAIR) + 1)
             return [value for value in around if value in domain]
-    return domain if sum(len(part) for part in domain.ranges) <= MOST_VALUES else None
+    return domain if sum(len(part) for part in domain.ranges) <= VALUES_MAX else None
 
 
 def _fixed(expression: Expression | None) -> int | None:
-    """What `expression` is, if no variable is in it."""
+    """Return the value of `expression`; None if it has a variable, or no value."""
     if expression is None or names(expression):
         return None
     try:

@@ -11,11 +11,11 @@ from robochoc.ros.sink import Fields
 
 
 class SourceError(Exception):
-    """The source cannot be opened, or read any further: why, and what might help."""
+    """The source cannot be opened or read. The message says why, and what might help."""
 
 
 class ReceivedMessage(NamedTuple):
-    """A message: where it was published, its ROS type, its fields (as a sink takes them), and when it was received."""
+    """A message: its topic, its ROS type, its fields (as a sink takes them), and when it was received."""
 
     topic: str
     kind: str
@@ -24,9 +24,9 @@ class ReceivedMessage(NamedTuple):
 
 
 class Source(ABC):
-    """Gives messages. Whoever opens it closes it: it is a context manager.
+    """Gives messages. It is a context manager: the caller that opens it closes it.
 
-    `place` is what stands behind its name on the command line (`mcap:run.mcap`: `run.mcap`). Raises `SourceError`.
+    `place` is what follows its name on the command line (`mcap:run.mcap`: `run.mcap`). Raises `SourceError`.
     """
 
     live: bool = True
@@ -35,22 +35,25 @@ class Source(ABC):
     def __init__(self, place: str) -> None:
         self.place = place
         self.others: dict[str, str] = {}
-        """Topics, with their types, that a recording holds and nobody listens to; the first of them."""
+        """Topics of a recording that are not wanted, with their types; the first of them."""
 
     @abstractmethod
     def listen(self, topics: Mapping[str, str]) -> None:
-        """From now on, give what is published on these topics with these types (both by their ROS names).
+        """Subscribe to these topics with these types, both by their ROS names. Raises `SourceError`.
 
-        What stands on such a topic with another type is passed over. Raises `SourceError`.
+        Messages of another type on such a topic are ignored.
         """
 
     @abstractmethod
     def next(self, wait_s: float) -> ReceivedMessage | None:
-        """The next message. None: a recording is over, or nothing came within `wait_s`. Raises `SourceError`."""
+        """Return the next message; None if a recording is over, or nothing came within `wait_s`.
+
+        Raises `SourceError`.
+        """
 
     @abstractmethod
     def close(self) -> None:
-        """Leave nothing behind."""
+        """Close the source."""
 
     def __enter__(self) -> Self:
         return self

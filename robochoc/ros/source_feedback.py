@@ -15,44 +15,44 @@ from robochoc.ros.report_decoder import ReportDecoder
 from robochoc.ros.source import Source
 
 PATIENCE_S = 10.0
-"""How long a live source is listened to after a decision, where nobody says otherwise."""
-_MOST_NOTES = 12
+"""How long reports of a live source are awaited after a decision, by default."""
+_NOTES_MAX = 12
 _SLICE_S = 0.2
-"""How often somebody who watches is told that we wait."""
+"""How often `idle` is called."""
 
 
 class SourceFeedback(Feedback):
-    """What `source` gives, read by `reading`.
+    """Reports from `source`, decoded by `decoder`.
 
     After each decision a live source has `patience_s` seconds for a report that changes something; then the run is
-    over. A recording is read to its end, as fast as it goes: its messages' times are the clock.
+    over. A recording is read to its end, as fast as possible: the clock is that of its messages.
     """
 
-    def __init__(self, source: Source, reading: ReportDecoder, patience_s: float = PATIENCE_S) -> None:
+    def __init__(self, source: Source, decoder: ReportDecoder, patience_s: float = PATIENCE_S) -> None:
         self._source = source
-        self._reading = reading
+        self._decoder = decoder
         self._patience_s = patience_s
         self._deadline: float | None = None
-        self._held: Report | None = None
+        self._kept: Report | None = None
         self._now_ns: int | None = None
-        source.listen(reading.topics)
+        source.listen(decoder.topics)
         if not source.live:
-            self._held = self._pulled(None)
+            self._kept = self._pull(None)
 
     @property
     def notes(self) -> list[str]:
-        """See `Feedback.notes`: places in a frame that is not ours, and what of a recording nobody could use."""
+        """Sentences about places in another frame, and about topics of a recording that could not be used."""
         frames = [
             f"places on {topic} are in the frame '{frame}', and were passed over (--frame says which is ours)"
-            for topic, frame in self._reading.strange.items()
+            for topic, frame in self._decoder.strange.items()
         ]
         others = [*filter(None, starmap(self._unused, self._source.others.items()))]
-        more = [f"and {len(others) - _MOST_NOTES:,} more topics were passed over"] * (len(others) > _MOST_NOTES)
-        return [*frames, *others[:_MOST_NOTES], *more]
+        more = [f"and {len(others) - _NOTES_MAX:,} more topics were passed over"] * (len(others) > _NOTES_MAX)
+        return [*frames, *others[:_NOTES_MAX], *more]
 
     def _unused(self, topic: str, kind: str) -> str:
-        """Why nobody listened to a topic that looks as if somebody should; empty for others."""
-        wanted = self._reading.topics.get(topic)
+        """Return why a topic was not used that looks like a report; empty for others."""
+        wanted = self._decoder.topics.get(topic)
         if wanted:
             return on_one_line(f"{topic} holds {kind}, not {wanted}, and was passed over")
         if REPORTS.get(topic.rpartition("/")[2]) == short_kind(kind):
@@ -60,43 +60,43 @@ class SourceFeedback(Feedback):
         return ""
 
     def now_ns(self) -> int:
-        """See `Feedback.now_ns`: the wall clock's, or that of the recording."""
+        """Return the wall clock's time, or that of the recording."""
         return time.time_ns() if self._source.live or self._now_ns is None else self._now_ns
 
-    def decided(self, builder: MissionBuilder, leg: Leg, left_s: float | None) -> None:  # noqa: ARG002 - the robots were told
-        """See `Feedback.decided`."""
+    def on_decision(self, builder: MissionBuilder, leg: Leg, left_s: float | None) -> None:  # noqa: ARG002 - the decision was published
+        """Take note of a decision: reports are awaited from now on."""
         limits = [left_s, self._patience_s if self._source.live else None]
         wait_s = min((limit for limit in limits if limit is not None), default=None)
         self._deadline = None if wait_s is None else time.monotonic() + wait_s
 
     def next(self, until_s: float | None) -> Report | None:
-        """See `Feedback.next`."""
+        """Return the next report; see `Feedback.next`."""
         deadline = self._deadline
         if until_s is not None and self._source.live:
             soon = time.monotonic() + min(max(until_s - time.time(), 0), TOGETHER_S)
             deadline = soon if deadline is None else min(soon, deadline)
-        report, self._held = self._held or self._pulled(deadline), None
+        report, self._kept = self._kept or self._pull(deadline), None
         if report is not None and until_s is not None and report.at_s > until_s:
-            self._held = report
+            self._kept = report
             return None
         if report is not None:
             for publisher in self.publishers:
                 publisher.report(report)
         return report
 
-    def _pulled(self, deadline: float | None) -> Report | None:
-        """The next report that the source gives before the deadline."""
+    def _pull(self, deadline: float | None) -> Report | None:
+        """Return the next report of the source before the deadline; None if there is none."""
         while True:
             left_s = _SLICE_S if deadline is None else min(_SLICE_S, deadline - time.monotonic())
             if left_s <= 0:
                 return None
-            heard = self._source.next(left_s)
-            if heard is None:
+            received = self._source.next(left_s)
+            if received is None:
                 if not self._source.live:
                     return None
                 self.idle()
                 continue
-            self._now_ns = heard.at_ns
-            report = self._reading.report(heard)
+            self._now_ns = received.at_ns
+            report = self._decoder.report(received)
             if report is not None:
                 return report

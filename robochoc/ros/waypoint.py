@@ -1,4 +1,4 @@
-"""Waypoints: what a decision asks of one drone, ready to be published."""
+"""Waypoints: what a decision asks of one drone, to be published."""
 
 from __future__ import annotations
 
@@ -15,25 +15,22 @@ class Waypoint:
     """Where a drone is to be: the paper's `/drone3.1/waypoint3.1` (Section 4.2)."""
 
     drone: int
-    """Its number in the mission."""
+    """The drone's number in the mission."""
     topic: str
-    """By its name in ROS."""
+    """The topic, by its name in ROS."""
     kind: str
-    """The ROS type in which the robot's file wants it."""
+    """The ROS type that the robot's file asks for."""
     at: Point
     """In metres, in `frame`."""
     lands: bool
-    """It is to be on the ground there: its robot takes part no more."""
+    """Whether the drone is to be on the ground there, as its robot takes part no more."""
     frame: str
     stamp: int
     """When it was decided, in nanoseconds."""
 
 
 def waypoints(leg: Leg, drones: Sequence[Drone], names: TopicNames, frame: str, stamp: int) -> tuple[Waypoint, ...]:
-    """What `leg` has `drones` publish, by their numbers: who flies, and who lands. Who stays publishes nothing.
-
-    Nor does a drone whose robot's file names no topic.
-    """
+    """Return the waypoints of `leg`, of drones that fly and of those that land. Drones without a topic have none."""
     found = []
     for number, goal in sorted(leg.goals.items()):
         topic, name = drones[number].topic, names.waypoint(number)

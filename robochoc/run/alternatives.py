@@ -8,7 +8,7 @@ from robochoc.model.problem import Team
 from robochoc.protocols.traits import Traits
 from robochoc.run.compatibility import CENTRAL_TRAITS, max_total, refuse_options, refuse_unfit
 from robochoc.run.options import CENTRAL, Options, Runtime
-from robochoc.run.registry import offers
+from robochoc.run.registry import installed_protocols
 from robochoc.solver.encoding import UnsupportedError
 from robochoc.solver.exact_costs import EXACT, check_exact
 from robochoc.solver.weighted import MAX_TOTAL_COST
@@ -27,7 +27,7 @@ def alternatives(team: Team, options: Options, *, complete: bool = False, costs:
     """
     names = [
         offer.name
-        for offer in offers()
+        for offer in installed_protocols()
         if offer.protocol
         and offer.name != options.protocol
         and offer.protocol.traits.complete >= complete
@@ -37,7 +37,7 @@ def alternatives(team: Team, options: Options, *, complete: bool = False, costs:
     if names:
         return f"; these do: {', '.join(names)} (--protocol)"
     if _central_solver_fits(team, options):
-        return f"; no protocol does, but the central judge (--protocol {CENTRAL})"
+        return f"; no protocol does, but the central solver (--protocol {CENTRAL})"
     too_high = max_total(team, options) >= EXACT
     return f"; no protocol that is installed does{' (scale the costs down)' if too_high else ''}"
 

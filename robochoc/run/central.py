@@ -11,7 +11,7 @@ from robochoc.model.outcome import Metrics, Outcome, Verdict
 from robochoc.model.problem import ProblemKind, Team
 from robochoc.run.context import RunContext
 from robochoc.run.evaluation import Answer, check
-from robochoc.run.incumbent import absent
+from robochoc.run.incumbent import robots_without_values
 from robochoc.run.options import CENTRAL, Options, Withdrawal
 from robochoc.solver.central import CentralAnswer, CentralSolver
 from robochoc.solver.failures import SolverLostError
@@ -68,8 +68,8 @@ def _decide(solver: CentralSolver, team: Team, options: Options) -> _Decision:
     began = time.monotonic()
     solutions = None
     if options.count:
-        judgement = solver.judge(team, count=True)
-        answer, solutions = Answer(judgement.verdict), judgement.count
+        found = solver.solve(team, count=True)
+        answer, solutions = Answer(found.verdict), found.count
     else:
         answer = _answer(solver, team, options)
     if answer.verified:
@@ -80,27 +80,30 @@ def _decide(solver: CentralSolver, team: Team, options: Options) -> _Decision:
 def _answer(solver: CentralSolver, team: Team, options: Options) -> Answer:
     """Return the solver's answer; as few robots as possible withdraw, if that is asked for and necessary."""
     price = None
-    judgement = None
+    found = None
     if options.withdraw is not Withdrawal.MINIMUM or team.kind is ProblemKind.DISCSP:
-        judgement = solver.judge(team)
-    if judgement is None or (options.withdraw is not None and judgement.verdict is Verdict.NO_SOLUTION):
+        found = solver.solve(team)
+    if found is None or (options.withdraw is not None and found.verdict is Verdict.NO_SOLUTION):
         price = int(withdrawal_cost(team))
-        judgement = solver.judge(team, aside=price)
-    return _answer_of(judgement, team, price, options)
+        found = solver.solve(team, withdrawal_cost=price)
+    return _answer_of(found, team, price, options)
 
 
-def _answer_of(judgement: CentralAnswer, team: Team, price: int | None, options: Options) -> Answer:
-    """Return the answer for a `judgement`; `price` is the withdrawal cost (None: no robot may withdraw)."""
-    verdict, assignment, bound = judgement.verdict, judgement.assignment, None
-    if judgement.cost is not None:
+def _answer_of(found: CentralAnswer, team: Team, price: int | None, options: Options) -> Answer:
+    """Return what the central solver has `found` as an answer.
+
+    `price` is the withdrawal cost of a robot of weight 1 (None: no robot may withdraw).
+    """
+    verdict, assignment, bound = found.verdict, found.assignment, None
+    if found.cost is not None:
         total = total_cost(team, assignment, price)
-        if total != judgement.cost:
-            raise SolverLostError(f"the constraint solver's answer costs {total:,}, and it says {judgement.cost:,}")
-    if verdict is Verdict.UNKNOWN and judgement.bound is not None:
-        bound = judgement.bound // (price or 1)
-    if verdict is Verdict.OPTIMAL and team.kind is ProblemKind.DISCSP and not absent(team, assignment):
+        if total != found.cost:
+            raise SolverLostError(f"the constraint solver's answer costs {total:,}, and it says {found.cost:,}")
+    if verdict is Verdict.UNKNOWN and found.bound is not None:
+        bound = found.bound // (price or 1)
+    if verdict is Verdict.OPTIMAL and team.kind is ProblemKind.DISCSP and not robots_without_values(team, assignment):
         verdict = Verdict.SOLUTION
-    found = judgement.cost is not None or verdict is Verdict.SOLUTION
-    withdrawn = absent(team, assignment) if found and options.withdraw else ()
-    paid = assignment_cost(team, assignment) if found else None
-    return Answer(verdict, assignment=assignment, cost=paid, withdrawn=withdrawn, bound=bound, verified=found)
+    has_answer = found.cost is not None or verdict is Verdict.SOLUTION
+    withdrawn = robots_without_values(team, assignment) if has_answer and options.withdraw else ()
+    paid = assignment_cost(team, assignment) if has_answer else None
+    return Answer(verdict, assignment=assignment, cost=paid, withdrawn=withdrawn, bound=bound, verified=has_answer)

@@ -1,13 +1,13 @@
-"""What solves a team, unless something else is asked for."""
+"""The protocols that are used unless another one is asked for."""
 
-SATISFIES = "abt"
-"""A team without costs."""
-MINIMISES = "sfb"
-"""One with costs; it also says who steps aside, when the protocol that was asked for cannot."""
+DEFAULT_PROTOCOL = "abt"
+"""For a problem without costs."""
+DEFAULT_COST_PROTOCOL = "sfb"
+"""For a problem with costs. It also finds a minimum withdrawal where the protocol asked for cannot."""
 FIRST_FIT = "first-fit"
-"""Says who steps aside with `--withdraw maximal`. Nobody can ask for it by name."""
+"""It decides which robots withdraw with `--withdraw maximal`. It cannot be asked for by name."""
 
 
 def default_protocol(kind: str) -> str:
-    """The protocol for a team of this `Kind`."""
-    return SATISFIES if kind == "DisCSP" else MINIMISES
+    """Return the name of the protocol for a problem of this `ProblemKind`."""
+    return DEFAULT_PROTOCOL if kind == "DisCSP" else DEFAULT_COST_PROTOCOL

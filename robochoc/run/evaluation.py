@@ -13,7 +13,7 @@ from typing import NamedTuple
 from robochoc.communication.run_result import RunResult
 from robochoc.model.outcome import CheckCounts, EpochOutcome, Metrics, Outcome, PseudoTreeNode, Verdict
 from robochoc.model.problem import ProblemKind, Team
-from robochoc.run.incumbent import absent, best_of, bound_of, joined, tree_of
+from robochoc.run.incumbent import best_known, lower_bound, merged_values, pseudo_tree, robots_without_values
 from robochoc.run.withdrawal import Phase
 from robochoc.solver.compiled_team import CompiledTeam
 from robochoc.verification.checker import RefutedError, assignment_cost, needlessly_withdrawn, violations
@@ -127,7 +127,7 @@ def evaluate(phase: Phase, search: Search, kind: ProblemKind) -> Answer:
     """
     result = search.result
     ended = result.verdict is Verdict.SOLUTION
-    answer = Answer(result.verdict, result.metrics, result.witness, tree=tree_of(result.findings), ended=ended)
+    answer = Answer(result.verdict, result.metrics, result.witness, tree=pseudo_tree(result.findings), ended=ended)
     if result.lost or result.verdict is Verdict.NO_SOLUTION or not (ended or phase.traits.costs):
         return answer
     bound = None if is_proven(phase, result) else _bound_of(phase, result)
@@ -169,13 +169,13 @@ def check_with_files(phase: Phase, result: RunResult, team: Team, compiled: Comp
     """
     proven = is_proven(phase, result)
     if proven:
-        assignment = joined(result.assignments)
+        assignment = merged_values(result.assignments)
     else:
-        best = best_of(compiled, result, phase.parameters.withdrawal_cost)
+        best = best_known(compiled, result, phase.parameters.withdrawal_cost)
         if best is None:
             return None
         assignment = best.assignment
-    withdrawn = absent(team, assignment) if phase.withdrawal else ()
+    withdrawn = robots_without_values(team, assignment) if phase.withdrawal else ()
     check(team, assignment, withdrawn, maximal=proven)
     in_order = {name: assignment[name] for name in team.variables if name in assignment}
     return CheckedAssignment(in_order, assignment_cost(team, assignment), withdrawn)
@@ -196,7 +196,7 @@ def check(team: Team, assignment: Mapping[str, int], withdrawn: Sequence[str] = 
     faults = [*violations(team, assignment, withdrawn)]
     if maximal:
         faults += [
-            f"{name} has stepped aside and could be added" for name in needlessly_withdrawn(team, assignment, withdrawn)
+            f"{name} has withdrawn and could be added" for name in needlessly_withdrawn(team, assignment, withdrawn)
         ]
     if faults:
         raise RefutedError(f"the checker refutes the answer for {team.name}: {faults[0]} ({len(faults)} objections)")
@@ -216,6 +216,6 @@ def _verdict_of(phase: Phase, result: RunResult, kind: ProblemKind, found: Check
 
 def _bound_of(phase: Phase, result: RunResult) -> float | None:
     """Return the lower bound of the cost; where robots may withdraw, of the weight of those that do."""
-    bound = bound_of(result.findings)
+    bound = lower_bound(result.findings)
     withdrawal_cost = phase.parameters.withdrawal_cost
     return bound if bound is None or withdrawal_cost is None else bound // withdrawal_cost

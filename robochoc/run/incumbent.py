@@ -1,8 +1,8 @@
 """The best that is known of a search that minimises: of one that has ended, or that a limit has cut short.
 
-Robots tell what they know (`protocols/findings.py`): an assignment of all that one of them has heard of, the values
-that each has had in every cycle, or just the values that they have now. All of these are assignments whose cost
-anybody who sees the files can tell; the cheapest is the answer.
+Robots report what they know (`protocols/findings.py`): the best assignment of the whole team that one of them has
+received, the values that each has had in every cycle, or just the values that they have now. All of these are
+assignments whose cost can be computed from the files. The cheapest is the answer.
 """
 
 from __future__ import annotations
@@ -19,74 +19,86 @@ from robochoc.solver.compiled_team import CompiledTeam
 from robochoc.verification.objective import Objective
 
 
-class Found(NamedTuple):
-    """An assignment of the robots that do not step aside, and what it costs: what constraints and absences charge."""
+class BestKnown(NamedTuple):
+    """An assignment of the robots that do not withdraw, and its cost, withdrawal costs included."""
 
     assignment: dict[str, int]
     cost: float
 
 
-def best_of(compiled: CompiledTeam, result: RunResult, aside: float | None = None) -> Found | None:
-    """The cheapest assignment that `result` tells of; None when all that it tells of break hard constraints.
+def best_known(compiled: CompiledTeam, result: RunResult, withdrawal_cost: float | None = None) -> BestKnown | None:
+    """Return the cheapest assignment in a result.
 
-    `compiled` is what the robots have worked on.
+    Args:
+        compiled: The team that the robots have worked on.
+        result: What they have reported.
+        withdrawal_cost: The withdrawal cost of a robot of weight 1 (None: no robot may withdraw).
+
+    Returns:
+        The assignment, or None if all break hard constraints.
     """
-    best: Found | None = None
-    for own in (result.assignments, *_heard_of(compiled, result.findings), *_best_cycle(compiled, result, aside)):
-        objective = Objective(compiled.team, aside)
+    best: BestKnown | None = None
+    for own in (
+        result.assignments,
+        *_received_assignments(compiled, result.findings),
+        *_best_cycle(compiled, result, withdrawal_cost),
+    ):
+        objective = Objective(compiled.team, withdrawal_cost)
         objective.change(own)
         if objective.cost < (best.cost if best else INFINITE):
-            best = Found(joined(own), objective.cost)
+            best = BestKnown(merged_values(own), objective.cost)
     return best
 
 
-def course(compiled: CompiledTeam, trails: Mapping[str, Trail], aside: float | None = None) -> Iterator[float]:
-    """The cost of the values that all robots had in cycle 0, 1, ..., as far as all have come."""
-    objective = Objective(compiled.team, aside)
+def costs_by_cycle(
+    compiled: CompiledTeam, trails: Mapping[str, Trail], withdrawal_cost: float | None = None
+) -> Iterator[float]:
+    """Yield the cost of the values that the robots had in cycle 0, 1, ..., as far as all of them have come."""
+    objective = Objective(compiled.team, withdrawal_cost)
     for changed in _changes(compiled, trails):
         objective.change(changed)
         yield objective.cost
 
 
-def bound_of(findings: Mapping[str, Findings]) -> float | None:
-    """No assignment costs less; None when nobody can tell."""
+def lower_bound(findings: Mapping[str, Findings]) -> float | None:
+    """Return a lower bound of the cost of all assignments; None if no robot knows one."""
     bounds = [found.bound for found in findings.values() if found.bound is not None]
     least = sum(bounds)
     return int(least) if bounds and least < INFINITE else None
 
 
-def tree_of(findings: Mapping[str, Findings]) -> dict[str, PseudoTreeNode]:
-    """The pseudo-tree that the robots have built: those that have their place in it."""
+def pseudo_tree(findings: Mapping[str, Findings]) -> dict[str, PseudoTreeNode]:
+    """Return the pseudo-tree that the robots have built: the robots that have their place in it."""
     return {name: found.place for name, found in findings.items() if found.place is not None}
 
 
-def joined(own: Mapping[str, Mapping[str, int]]) -> dict[str, int]:
-    """The values of all robots' variables."""
+def merged_values(own: Mapping[str, Mapping[str, int]]) -> dict[str, int]:
+    """Return the values of all variables, from the values by robot."""
     return {name: value for values in own.values() for name, value in values.items()}
 
 
-def absent(team: Team, assignment: Mapping[str, int]) -> tuple[str, ...]:
-    """The robots that have no values: they step aside."""
+def robots_without_values(team: Team, assignment: Mapping[str, int]) -> tuple[str, ...]:
+    """Return the robots without values: they withdraw."""
     return tuple(robot.name for robot in team.robots if robot.variables[0].name not in assignment)
 
 
 _Own = dict[str, dict[str, int]]
 
 
-def _heard_of(compiled: CompiledTeam, findings: Mapping[str, Findings]) -> Iterator[_Own]:
-    """The cheapest assignment that some robot has heard of."""
+def _received_assignments(compiled: CompiledTeam, findings: Mapping[str, Findings]) -> Iterator[_Own]:
+    """Yield the cheapest assignment of the whole team that some robot has received."""
     bests = [found.best for found in findings.values() if found.best is not None]
     if bests:
         best = min(bests, key=lambda one: one.cost)
         yield {name: compiled[name].behind(value) for name, value in best.values.items()}
 
 
-def _best_cycle(compiled: CompiledTeam, result: RunResult, aside: float | None) -> Iterator[_Own]:
-    """What the robots had in the cheapest cycle, the first of several."""
+def _best_cycle(compiled: CompiledTeam, result: RunResult, withdrawal_cost: float | None) -> Iterator[_Own]:
+    """Yield the values that the robots had in the cheapest cycle, the first of several."""
     trails = {name: found.trail for name, found in result.findings.items() if found.trail is not None}
     if len(trails) < len(compiled.team.robots):
         return
-    costs = list(course(compiled, trails, aside))
+    costs = list(costs_by_cycle(compiled, trails, withdrawal_cost))
     if costs:
         own: _Own = {}
         for changed in itertools.islice(_changes(compiled, trails), costs.index(min(costs)) + 1):
@@ -95,7 +107,7 @@ def _best_cycle(compiled: CompiledTeam, result: RunResult, aside: float | None) 
 
 
 def _changes(compiled: CompiledTeam, trails: Mapping[str, Trail]) -> Iterator[_Own]:
-    """For each cycle that all robots have behind them, the values of those that have changed."""
+    """Yield the changed values of each cycle that all robots have completed."""
     changes: dict[int, _Own] = {}
     for name, trail in trails.items():
         for cycle, index in trail.entries:

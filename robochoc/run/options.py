@@ -8,7 +8,7 @@ from enum import StrEnum
 from typing import TYPE_CHECKING, Self
 
 from robochoc.model.orders import Order
-from robochoc.run.defaults import SATISFIES
+from robochoc.run.defaults import DEFAULT_PROTOCOL
 from robochoc.solver.compile import Limits
 
 if TYPE_CHECKING:
@@ -85,7 +85,7 @@ class Options:
         filters: The names of the channel filters that messages on a network go through, in this order.
     """
 
-    protocol: str = SATISFIES
+    protocol: str = DEFAULT_PROTOCOL
     runtime: Runtime = Runtime.PROCESSES
     seed: int = 0
     timeout: float | None = None

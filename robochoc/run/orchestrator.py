@@ -11,7 +11,6 @@ from robochoc.journal.events import Observer
 from robochoc.model.orders import OrderError
 from robochoc.model.outcome import Outcome, Verdict
 from robochoc.model.problem import Team
-from robochoc.run.alternatives import alternatives
 from robochoc.run.compatibility import (
     CENTRAL_TRAITS,
     UnfitProtocolError,
@@ -94,17 +93,24 @@ def _solve_distributed(team: Team, context: RunContext, environment: Environment
     try:
         refuse_unfit(team, options, protocol.traits)
     except UnfitProtocolError as unfit:
-        raise UnsupportedError(f"{unfit}{alternatives(team, options, complete=unfit.complete)}") from None
+        raise UnsupportedError(f"{unfit}{_alternatives(team, options, complete=unfit.complete)}") from None
     deployment = ThisMachine(team, context, environment)
     header = _header(team, options)
     try:
         return solve_distributed(deployment, protocol, header)
     except TooLargeError as refused:
-        raise UnsupportedError(f"{refused}{alternatives(team, options, complete=True, costs=True)}") from None
+        raise UnsupportedError(f"{refused}{_alternatives(team, options, complete=True, costs=True)}") from None
     except (TooManySolutionsError, CompileTimeoutError, OutOfTimeError) as limit:
         return deployment.outcome(header, deployment.limit_reached(str(limit)))
     finally:
         context.kills.warn_of_pending()
+
+
+def _alternatives(team: Team, options: Options, *, complete: bool, costs: bool = False) -> str:
+    """Return what would do instead. See `run/alternatives.py`."""
+    from robochoc.run.alternatives import alternatives  # noqa: PLC0415 - start-up: only refusals need it
+
+    return alternatives(team, options, complete=complete, costs=costs)
 
 
 def _header(team: Team, options: Options) -> Outcome:

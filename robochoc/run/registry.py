@@ -10,7 +10,7 @@ from typing import cast
 from robochoc.protocols.first_fit import FirstFit
 from robochoc.protocols.protocol import DynamicProtocol, Protocol, Settings
 from robochoc.protocols.traits import Traits
-from robochoc.run.defaults import FIRST_FIT, MINIMISES
+from robochoc.run.defaults import DEFAULT_COST_PROTOCOL, FIRST_FIT
 from robochoc.run.options import CENTRAL
 from robochoc.system.entry_points import EntryPoint
 from robochoc.system.installed import (
@@ -29,8 +29,8 @@ class UnknownProtocolError(LookupError):
 
 
 @dataclass(frozen=True)
-class Offer:
-    """What a package offers as a protocol: the class that `entry` stands for, or why there is none."""
+class InstalledProtocol:
+    """A protocol that a package offers: the class that `entry` names, or why it cannot be used."""
 
     entry: EntryPoint
     protocol: type[Protocol] | None
@@ -39,7 +39,7 @@ class Offer:
 
     @property
     def name(self) -> str:
-        """What the protocol is called."""
+        """The protocol's name."""
         return self.entry.name
 
     @property
@@ -54,7 +54,7 @@ class Offer:
 
 
 def protocol_names() -> tuple[str, ...]:
-    """The names of all protocols that are installed, ours and others', sorted."""
+    """Return the names of all protocols that are installed, ours and others', sorted."""
     return entry_point_names(GROUP)
 
 
@@ -65,13 +65,13 @@ def installed_spelling(name: str) -> str:
     return spellings[0] if name not in names and len(spellings) == 1 else name
 
 
-def offers() -> tuple[Offer, ...]:
-    """All that installed packages offer, by name; what cannot be used too, with the reason."""
+def installed_protocols() -> tuple[InstalledProtocol, ...]:
+    """Return all protocols that packages offer, sorted by name; also those that cannot be used, with the reason."""
     return tuple(_offer(entry, namesakes) for entry, namesakes in all_entry_points(GROUP))
 
 
-def offer_named(name: str) -> Offer:
-    """What is offered as `name`. Raises `UnknownProtocolError`, which names those there are."""
+def installed_protocol(name: str) -> InstalledProtocol:
+    """Return the protocol that is offered as `name`. Raises `UnknownProtocolError`, which lists those there are."""
     found = entry_points_named(GROUP, name)
     if not found:
         raise UnknownProtocolError(not_installed_message(GROUP, "protocol", name))
@@ -79,41 +79,46 @@ def offer_named(name: str) -> Offer:
 
 
 def protocol_named(name: str) -> type[Protocol]:
-    """The class of the protocol called `name`. Raises `UnknownProtocolError`, which names those there are."""
-    offer = offer_named(name)
+    """Return the class of the protocol called `name`. Raises `UnknownProtocolError`, which lists those there are."""
+    offer = installed_protocol(name)
     if offer.protocol is None:
         raise UnknownProtocolError(f"{offer.place}, installed as protocol {name!r}, {offer.broken}")
     return offer.protocol
 
 
-def protocol_by_name(name: str) -> type[Protocol]:
-    """Like `protocol_named`, of all that robots can be told to speak: also what only says who steps aside."""
+def protocol_or_first_fit(name: str) -> type[Protocol]:
+    """Return what `protocol_named` does, or the protocol `FIRST_FIT`, which cannot be asked for."""
     return FirstFit if name == FIRST_FIT else protocol_named(name)
 
 
 def protocol_by_class(class_name: str, likely: Iterable[str] = ()) -> tuple[str, type[Protocol]] | None:
-    """Name and class of the protocol whose class is called `class_name`, as journals have it; `likely` names first.
+    """Return name and class of the protocol whose class is called `class_name`, as in journals.
 
-    None: nothing that is installed is called that.
+    Args:
+        class_name: The name of the class.
+        likely: Names of protocols that are tried first.
+
+    Returns:
+        Name and class, or None if no installed protocol has such a class.
     """
-    for name in (*likely, FIRST_FIT, MINIMISES):
+    for name in (*likely, FIRST_FIT, DEFAULT_COST_PROTOCOL):
         with suppress(UnknownProtocolError):
-            protocol = protocol_by_name(name)
+            protocol = protocol_or_first_fit(name)
             if protocol.__name__ == class_name:
                 return name, protocol
-    for offer in offers():
+    for offer in installed_protocols():
         if offer.protocol is not None and offer.protocol.__name__ == class_name:
             return offer.name, offer.protocol
     return None
 
 
-def _offer(entry: EntryPoint, namesakes: Sequence[EntryPoint]) -> Offer:
+def _offer(entry: EntryPoint, namesakes: Sequence[EntryPoint]) -> InstalledProtocol:
     found = load_entry_point(entry, namesakes, _fault)
-    return Offer(entry, cast("type[Protocol] | None", found.what), found.broken)
+    return InstalledProtocol(entry, cast("type[Protocol] | None", found.what), found.broken)
 
 
 def _fault(loaded: object) -> str:
-    """Why `loaded` cannot be used as a protocol; empty when it can."""
+    """Return why `loaded` cannot be used as a protocol; empty if it can."""
     if not (isinstance(loaded, type) and issubclass(loaded, Protocol)):
         return "is no subclass of Protocol"
     if loaded.__abstractmethods__:

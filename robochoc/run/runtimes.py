@@ -1,11 +1,15 @@
-"""The three runtimes: a session for a protocol and a team in the one that the options ask for.
+"""Runtimes by name: each is a function that opens a session.
 
-Each is imported when it is asked for: a run needs one of them.
+It is found by its name and imported when it is asked for. A run needs one runtime, and the network is an extra that the
+core does not depend on.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass
+from pkgutil import resolve_name
+from types import MappingProxyType
 from typing import TYPE_CHECKING, TypedDict, assert_never
 
 from robochoc.communication.kill_schedule import KillSchedule
@@ -22,70 +26,95 @@ if TYPE_CHECKING:
     from robochoc.communication.simulator.schedule import Schedule
 
 
-class _Rest(TypedDict):
-    brief: RunParameters
+class CommonArguments(TypedDict):
+    """The arguments that the sessions of all runtimes take."""
+
+    parameters: RunParameters
     observer: Observer | None
     progress: Callable[[Progress], None] | None
 
 
-def open_session(
-    protocol: type[Protocol],
-    team: CompiledTeam,
-    brief: RunParameters,
-    options: Options,
-    observer: Observer | None,
-    progress: Callable[[Progress], None] | None,
-    kills: KillSchedule | None = None,
-) -> Session:
-    """Return a session of `protocol` in the runtime of `options`.
+@dataclass(frozen=True)
+class SessionRequest:
+    """What a session is opened for.
 
-    Raises `UnsupportedError` when it is not installed.
+    Attributes:
+        protocol: The protocol by which the robots search.
+        team: The team with its compiled domains.
+        parameters: What all robots are given beside the problem.
+        options: How to run.
+        observer: Gets all events.
+        progress: Gets the number of messages so far, now and then.
+        kills: The robots whose processes are to be killed.
     """
-    rest: _Rest = {"brief": brief, "observer": observer, "progress": progress}
-    match options.runtime:
-        case Runtime.PROCESSES:
-            from robochoc.communication.processes.processes import ProcessesRun  # noqa: PLC0415 - one runtime is enough
 
-            survive = options.survives_losses
-            run = ProcessesRun(team, protocol, survive=survive, patience_s=options.patience, **rest)
-            if kills:
-                run.schedule_kills(kills, run.kill)
-            return run
-        case Runtime.SIMULATOR:
-            from robochoc.communication.simulator.simulator import Simulation  # noqa: PLC0415 - one runtime is enough
+    protocol: type[Protocol]
+    team: CompiledTeam
+    parameters: RunParameters
+    options: Options
+    observer: Observer | None = None
+    progress: Callable[[Progress], None] | None = None
+    kills: KillSchedule | None = None
 
-            return Simulation(team, protocol, schedule_of(options), **rest)
-        case Runtime.NETWORK:
-            return _network(protocol, team, options, kills, rest)
-        case never:
-            assert_never(never)
+    @property
+    def common(self) -> CommonArguments:
+        """The arguments that the sessions of all runtimes take."""
+        return {"parameters": self.parameters, "observer": self.observer, "progress": self.progress}
 
 
-def _network(
-    protocol: type[Protocol], team: CompiledTeam, options: Options, kills: KillSchedule | None, rest: _Rest
-) -> Session:
+OpenSession = Callable[[SessionRequest], Session]
+
+OPENERS = MappingProxyType(
+    {
+        Runtime.PROCESSES: "robochoc.run.runtimes:open_processes",
+        Runtime.SIMULATOR: "robochoc.run.runtimes:open_simulator",
+        Runtime.NETWORK: "robochoc.run.networked.local_runtime:open_network",
+    }
+)
+"""Module and name of each runtime's `OpenSession`."""
+
+
+def open_session(request: SessionRequest) -> Session:
+    """Return a session in the runtime that the options name. Raises `UnsupportedError` when it is not installed."""
+    name = request.options.runtime
     try:
-        from robochoc.communication.network.local import LocalNetwork  # noqa: PLC0415 - and it is an extra
-        from robochoc.communication.network.settings import PATIENCE_S, NetworkSettings  # noqa: PLC0415 - as above
-    except ModuleNotFoundError as missing:
-        raise UnsupportedError(
-            f"--runtime network needs {missing.name}; say: pip install 'robochoc[network]'"
-        ) from None
-    survive, patience_s = options.survives_losses, options.patience or PATIENCE_S
-    settings = NetworkSettings(filters=options.filters, survive=survive, patience_s=patience_s)
-    network = LocalNetwork(team, protocol, settings=settings, **rest)
-    if kills:
-        network.master.schedule_kills(kills, network.kill)
-    return network
+        opener: OpenSession = resolve_name(OPENERS[name])
+    except ModuleNotFoundError as absent:
+        raise UnsupportedError(f"--runtime {name} needs {absent.name}; say: pip install 'robochoc[{name}]'") from None
+    return opener(request)
 
 
-def schedule_of(options: Options) -> Schedule:
+def open_processes(request: SessionRequest) -> Session:
+    """Open a session in which each robot is an OS process."""
+    from robochoc.communication.processes.processes import ProcessesRun  # noqa: PLC0415 - one runtime is enough
+
+    options = request.options
+    session = ProcessesRun(
+        request.team,
+        request.protocol,
+        survive=options.survives_losses,
+        patience_s=options.patience,
+        **request.common,
+    )
+    if request.kills:
+        session.schedule_kills(request.kills, session.kill)
+    return session
+
+
+def open_simulator(request: SessionRequest) -> Session:
+    """Open a session in which all robots live in one thread."""
+    from robochoc.communication.simulator.simulator import Simulation  # noqa: PLC0415 - one runtime is enough
+
+    return Simulation(request.team, request.protocol, _schedule_of(request.options), **request.common)
+
+
+def _schedule_of(options: Options) -> Schedule:
     """Return the simulator's schedule that `options` ask for."""
     if options.channel:
         from robochoc.communication.simulator.timed import Timed  # noqa: PLC0415 - start-up: seldom asked for
 
         return Timed(options.seed, options.channel)
-    from robochoc.communication.simulator.schedule import Concurrent, RandomChannels  # noqa: PLC0415 - start-up: the simulator's
+    from robochoc.communication.simulator.schedule import Concurrent, RandomChannels  # noqa: PLC0415 - the simulator's
 
     match options.schedule:
         case ScheduleName.CONCURRENT:

@@ -132,7 +132,7 @@ class ScenarioRun:
             on_start: is called before each epoch.
         """
         opened = "the start"
-        epoch = Epoch(session.compiled, brief=self._parameters)
+        epoch = Epoch(session.compiled, parameters=self._parameters)
         for number in count():
             on_start(EpochStart(epoch, number, opened))
             result = self._search(session)

@@ -35,4 +35,4 @@ class StartEvents:
         self._observer(Began(t=0, protocol=protocol.__name__, **detail))
         fresh = epoch.team.order if session and session.anew else epoch.restarted
         lossless = session is None or session.lossless
-        self._observer(self._writer.given(epoch.team, epoch.brief, epoch.void, fresh=fresh, quiet=lossless))
+        self._observer(self._writer.given(epoch.team, epoch.parameters, epoch.invalidated, fresh=fresh, quiet=lossless))

@@ -14,7 +14,7 @@ from robochoc.model.problem import INFINITE, ProblemKind, Team
 from robochoc.run.context import RunContext
 from robochoc.run.distributed import Deployment
 from robochoc.run.evaluation import Answer, Search, check_with_files
-from robochoc.run.runtimes import open_session
+from robochoc.run.runtimes import SessionRequest, open_session
 from robochoc.run.scenario import Environment, EpochStart, FinishedEpoch, ScenarioRun
 from robochoc.run.start_events import StartEvents
 from robochoc.run.withdrawal import Phase
@@ -95,7 +95,7 @@ class ThisMachine(Deployment):
         team = self._scenario.ordered_team()
         if phase.takes_over and phase.traits.costs and self.options.order is None:
             team = with_dom_deg_order(team)  # to be fast: nobody has asked for another order
-        epoch = Epoch(self._compiler.compile(team, every=True), brief=phase.parameters)
+        epoch = Epoch(self._compiler.compile(team, every=True), parameters=phase.parameters)
         self._start_events.report(phase.protocol, EpochStart(epoch))
         with self._session(phase, epoch.compiled) as session:
             result = session.search(self.left_s(), self.options.messages)
@@ -109,9 +109,9 @@ class ThisMachine(Deployment):
 
         cost = phase.parameters.withdrawal_cost
         if answer.verdict is Verdict.NO_SOLUTION:
-            return self._confirmed(aside=cost)
+            return self._confirmed(withdrawal_cost=cost)
         total = total_cost(self._scenario.team, answer.assignment, cost)
-        return self._confirmed(total=total, aside=cost)
+        return self._confirmed(total=total, withdrawal_cost=cost)
 
     def limit_reached(self, why: str) -> Answer:
         """Return the answer of a run that a limit has ended before the robots could search."""
@@ -169,16 +169,19 @@ class ThisMachine(Deployment):
     def _session(self, phase: Phase, compiled: CompiledTeam) -> Session:
         """Open a session of the phase's protocol."""
         context = self._context
-        return open_session(
+        request = SessionRequest(
             phase.protocol, compiled, phase.parameters, self.options, context.observer, context.progress, context.kills
         )
+        return open_session(request)
 
-    def _confirmed(self, alone: str | None = None, *, total: float = INFINITE, aside: float | None = None) -> bool:
+    def _confirmed(
+        self, alone: str | None = None, *, total: float = INFINITE, withdrawal_cost: float | None = None
+    ) -> bool:
         """Return whether the central solver agrees, if it is asked. For the arguments see `confirmed`."""
         if not self.options.verify:
             return False
         from robochoc.verification.second_opinion import confirmed  # noqa: PLC0415 - start-up: seldom asked for
 
-        cost = None if aside is None else int(aside)
+        cost = None if withdrawal_cost is None else int(withdrawal_cost)
         solver = self._context.central_solver()
-        return confirmed(solver, self._scenario.team, self.options.protocol, alone, total=total, aside=cost)
+        return confirmed(solver, self._scenario.team, self.options.protocol, alone, total=total, withdrawal_cost=cost)

@@ -1,4 +1,4 @@
-"""What agents tell the Directory Facilitator about themselves, and when it is what somebody looks for (FIPA00023)."""
+"""Agents' descriptions in the Directory Facilitator, and when one matches a template (FIPA00023)."""
 
 from __future__ import annotations
 
@@ -79,7 +79,7 @@ class AgentDescription(msgspec.Struct, frozen=True):
 
 
 def matches(template: AgentDescription, description: AgentDescription) -> bool:
-    """Whether `description` has all that `template` gives (FIPA00023, the search function).
+    """Return whether `description` has all that `template` gives (FIPA00023, the search function).
 
     Equal names, or equal parts before `@` where the template has no more; of sets all that the template has; for each
     service of the template one that matches it in turn. The lease is nothing to look for.

@@ -50,7 +50,7 @@ class Directory:
         self._next_end = math.inf
 
     def __len__(self) -> int:
-        """How many are registered, those included whose lease has ended since a time was last given."""
+        """Return how many are registered, those included whose lease has ended since a time was last given."""
         return len(self._registered)
 
     def register(self, description: AgentDescription, now: float, *, requester: str) -> None:
@@ -66,7 +66,7 @@ class Directory:
         self._put(description, now)
 
     def modify(self, description: AgentDescription, now: float, *, requester: str) -> None:
-        """`description` takes the place of what `requester` has told before; its lease begins again."""
+        """Replace the description of `requester` by `description`; its lease begins again."""
         check(description)
         _authorise(description.name, requester)
         self._lapse(now)
@@ -74,7 +74,7 @@ class Directory:
         self._put(description, now)
 
     def renew(self, name: str, now: float, *, requester: str) -> None:
-        """The lease of `name` begins again."""
+        """Begin the lease of `name` again."""
         _authorise(name, requester)
         self._lapse(now)
         description = self._known(name).description
@@ -91,7 +91,7 @@ class Directory:
     def search(
         self, template: AgentDescription, now: float, max_results: int | None = None
     ) -> tuple[AgentDescription, ...]:
-        """Who matches `template`, by name, and of them the first `max_results` only (None or negative: all)."""
+        """Return the agents that match `template`, by name; at most `max_results` (None or negative: all)."""
         check_bounds(template)
         self._lapse(now)
         known = self._registered
@@ -107,7 +107,7 @@ class Directory:
         return names
 
     def subscribe(self, subscriber: str, template: AgentDescription, now: float) -> None:
-        """Tell `subscriber` who matches `template`, now and whenever that changes. The same again is told again."""
+        """Notify `subscriber` of the agents that match `template`, now and whenever that changes."""
         check_bounds(template)
         if (subscriber, template) not in self._subscriptions:
             if len(self._subscriptions) >= MAX_SUBSCRIPTIONS:
@@ -119,7 +119,7 @@ class Directory:
             self._note(subscriber, description.name, description)
 
     def unsubscribe(self, subscriber: str, template: AgentDescription | None = None) -> None:
-        """Tell `subscriber` no more about `template`; None: about anything, and nothing that is still to be told."""
+        """End the subscription to `template`; None: all subscriptions, with notices that were not sent yet."""
         kept = [
             one for one in self._subscriptions if one[0] != subscriber or (template is not None and one[1] != template)
         ]
@@ -130,10 +130,10 @@ class Directory:
             self._notices = {key: notice for key, notice in self._notices.items() if key[0] != subscriber}
 
     def notices(self) -> Sequence[Notice]:
-        """What subscribers are to be told, oldest first, and each of an agent only what is newest; told once."""
-        told = tuple(self._notices.values())
+        """Return notices for subscribers, once each, oldest first; of each agent only the newest."""
+        notices = tuple(self._notices.values())
         self._notices.clear()
-        return told
+        return notices
 
     def _known(self, name: str) -> _Registration:
         if name not in self._registered:
@@ -145,10 +145,10 @@ class Directory:
         ends = _end(description, now)
         self._registered[description.name] = _Registration(description, ends)
         self._next_end = min(self._next_end, ends)
-        self._tell(description.name, before.description if before else None, description)
+        self._notify(description.name, before.description if before else None, description)
 
     def _remove(self, name: str) -> None:
-        self._tell(name, self._registered.pop(name).description, None)
+        self._notify(name, self._registered.pop(name).description, None)
 
     def _lapse(self, now: float) -> None:
         """Remove those whose lease has ended by `now`. `_next_end` is never later than the first end to come."""
@@ -159,7 +159,7 @@ class Directory:
             self._lapsed[name] = None
         self._next_end = min((known.ends for known in self._registered.values()), default=math.inf)
 
-    def _tell(self, name: str, before: AgentDescription | None, after: AgentDescription | None) -> None:
+    def _notify(self, name: str, before: AgentDescription | None, after: AgentDescription | None) -> None:
         """Note for each subscriber that `name` was described as `before`, and is as `after`."""
         concerned: dict[str, bool] = {}
         for subscriber, template in self._subscriptions:

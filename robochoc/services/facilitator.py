@@ -43,7 +43,7 @@ def handle(directory: Directory, requester: str, content: str, now: float) -> tu
 
 
 def subscribe(directory: Directory, requester: str, content: str, now: float) -> tuple[Performative, str]:
-    """From now on tell `requester` of what a SUBSCRIBE's `content` searches for (see `told`), and say AGREE.
+    """Notify `requester` from now on of what a SUBSCRIBE's `content` searches for (see `notification`), and agree.
 
     By fipa-subscribe (FIPA00035), where the content would be an `iota` expression, which SL0 does not have: here it is
     the search action that would find the same. What is refused comes as from `handle`.
@@ -61,8 +61,8 @@ def subscribe(directory: Directory, requester: str, content: str, now: float) ->
     return Performative.AGREE, content_of(action.whole, Word("true"))
 
 
-def told(df: AgentIdentifier, notice: Notice) -> str:
-    """The content of the INFORM that tells a subscriber of `notice`: what a search for that agent finds now."""
+def notification(df: AgentIdentifier, notice: Notice) -> str:
+    """Return the content of the INFORM that tells a subscriber of `notice`: what a search for that agent finds now."""
     searched = described(AgentDescription(notice.name))
     action = listed("action", expression_of(df), listed(Function.SEARCH, searched))
     found = [] if notice.description is None else [described(notice.description)]
@@ -109,5 +109,5 @@ def _arguments(action: Action, at_most: int) -> tuple[Expression, ...]:
 
 
 def _proposition(reason: Reason, about: Sequence[str]) -> Expression:
-    """A proposition without arguments is the bare word in SL0."""
+    """Return the proposition `reason` in SL0; one without arguments is the bare word."""
     return listed(reason, *map(name, about)) if about else Word(reason)

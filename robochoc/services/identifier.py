@@ -42,7 +42,10 @@ class AgentIdentifier(msgspec.Struct, frozen=True):
 
 
 def identifier_on(platform: str, local: str, addresses: tuple[str, ...] = ()) -> AgentIdentifier:
-    """The agent called `local` on `platform`. Raises `ValueError` where the two could not be told apart again."""
+    """Return the agent called `local` on `platform`.
+
+    Raises `ValueError` where the two could not be told apart again.
+    """
     if not local or not platform or "@" in platform:
         raise ValueError(f"{local!r} on platform {platform!r}: both need a name, and the platform's has no '@'")
     return AgentIdentifier(f"{local}@{platform}", addresses)
@@ -59,7 +62,7 @@ def expression_of(identifier: AgentIdentifier) -> List:
 
 
 def identifier_of(expression: Expression) -> AgentIdentifier:
-    """The identifier that `expression` is; parameters of others' own (`:X-...`) are passed over.
+    """Return the identifier that `expression` is; parameters of others' own (`:X-...`) are passed over.
 
     Raises `SymbolicExpressionError`. Recurses into resolvers, as deep as the reader of the expression allowed.
     """

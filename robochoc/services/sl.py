@@ -1,4 +1,4 @@
-"""What is said to and by the Directory Facilitator, in FIPA-SL0 (FIPA00008), with FIPA00023's words.
+"""The content of messages to and from the Directory Facilitator, in FIPA-SL0 (FIPA00008), with the terms of FIPA00023.
 
 >>> from robochoc.services.descriptions import AgentDescription
 >>> print(request(df_on("host:7447/robochoc"), Function.SEARCH, AgentDescription(protocols=("abt",)), max_results=2))
@@ -61,14 +61,14 @@ class Action(NamedTuple):
 
 
 def df_on(platform: str) -> AgentIdentifier:
-    """The Directory Facilitator of `platform`."""
+    """Return the Directory Facilitator of `platform`."""
     return identifier_on(platform, DIRECTORY)
 
 
 def request(
     df: AgentIdentifier, function: Function, description: AgentDescription, max_results: int | None = None
 ) -> str:
-    """The content of a REQUEST that `df` does `function` with `description`; for a search, that is a template."""
+    """Return the content of a REQUEST for `function` to `df`; for a search, `description` is a template."""
     arguments: list[Expression] = [described(description)]
     if function is Function.SEARCH:
         constraints = () if max_results is None else (Word(":max-results"), Word(str(max_results)))
@@ -77,7 +77,7 @@ def request(
 
 
 def action_in(content: str) -> Action:
-    """The one action that the content of a REQUEST is about. Raises `SymbolicExpressionError`."""
+    """Return the one action that the content of a REQUEST is about. Raises `SymbolicExpressionError`."""
     (whole,) = _content(content, REQUEST_CAPS)
     what = "an action"
     actor_and_act = items_of(whole, ("action",), what)
@@ -89,7 +89,7 @@ def action_in(content: str) -> Action:
 
 
 def descriptions_in(content: str) -> tuple[AgentDescription, ...]:
-    """What a search has found: the content of the INFORM that answers it, `((result <action> (set ...)))`.
+    """Return what a search has found: the content of the INFORM that answers it, `((result <action> (set ...)))`.
 
     Raises `SymbolicExpressionError`, and `RequestRefusedError` where a description has what no description has.
     """
@@ -101,7 +101,7 @@ def descriptions_in(content: str) -> tuple[AgentDescription, ...]:
 
 
 def searched_in(content: str) -> AgentDescription:
-    """What the search was for whose result `content` tells.
+    """Return what the search was for whose result `content` tells.
 
     Raises `SymbolicExpressionError`, and `RequestRefusedError`.
     """
@@ -112,7 +112,7 @@ def searched_in(content: str) -> AgentDescription:
 
 
 def content_of(*expressions: Expression) -> str:
-    """The content of a message: SL puts all that it says between parentheses."""
+    """Return the content of a message: SL puts all that it says between parentheses."""
     return written(List(expressions))
 
 
@@ -129,7 +129,7 @@ def described(description: AgentDescription) -> List:
 
 
 def description_of(expression: Expression) -> AgentDescription:
-    """The agent that `(df-agent-description ...)` describes.
+    """Return the agent that `(df-agent-description ...)` describes.
 
     Raises `SymbolicExpressionError` where it is no such thing, and `RequestRefusedError` for parameters and values that
     it may not have.
@@ -148,7 +148,7 @@ def description_of(expression: Expression) -> AgentDescription:
 
 
 def max_results_of(expression: Expression) -> int | None:
-    """How many results `(search-constraints ...)` wants; None: all. Its other parameters are for federations.
+    """Return how many results `(search-constraints ...)` wants; None: all. Its other parameters are for federations.
 
     Raises as `description_of` does.
     """
@@ -162,7 +162,7 @@ def max_results_of(expression: Expression) -> int | None:
 
 
 def _content(content: str, caps: Caps) -> tuple[Expression]:
-    """The only expression between the outer parentheses."""
+    """Return the only expression between the outer parentheses."""
     outer = read(content, caps)
     if not isinstance(outer, List) or len(outer.items) != 1:
         raise SymbolicExpressionError(
@@ -206,7 +206,7 @@ def _property_of(expression: Expression) -> tuple[str, str]:
 
 
 def _slots(expression: Expression, what: str, known: set[str]) -> dict[str, Expression]:
-    """The parameters of `(what ...)`.
+    """Return the parameters of `(what ...)`.
 
     Others' own ones (`:X-...`) are passed over; `RequestRefusedError` for what is unknown.
     """
@@ -218,7 +218,7 @@ def _slots(expression: Expression, what: str, known: set[str]) -> dict[str, Expr
 
 
 def _members(expression: Expression | None, what: str) -> tuple[Expression, ...]:
-    """What is in a set; in a sequence as well, as JADE writes one where FIPA00023 has a set."""
+    """Return what is in a set; in a sequence as well, as JADE writes one where FIPA00023 has a set."""
     return () if expression is None else items_of(expression, ("set", "sequence"), what)
 
 
@@ -241,7 +241,7 @@ def _set(key: str, members: Iterable[Expression]) -> list[Expression]:
 
 
 def _lease_text(lease_s: float) -> str:
-    """A relative DateTime of FIPA00008, in whole milliseconds and at least one: days, hours, minutes, seconds."""
+    """Return a relative DateTime of FIPA00008, in whole milliseconds and at least one."""
     seconds, milliseconds = divmod(max(1, round(lease_s * 1000)), 1000)
     minutes, second = divmod(seconds, 60)
     hours, minute = divmod(minutes, 60)

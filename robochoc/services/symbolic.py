@@ -66,11 +66,12 @@ _SHOWN = 40
 
 
 def read(text: str, caps: Caps) -> Expression:
-    """The one expression that `text` is. Raises `SymbolicExpressionError`, which says what is wrong and where."""
-    if len(text) > caps.characters:
-        raise SymbolicExpressionError(
-            f"{len(text)} characters are too many: at most {caps.characters}", caps.characters
-        )
+    """Return the one expression that `text` is.
+
+    Raises `SymbolicExpressionError`, which says what is wrong and where.
+    """
+    if (size := len(text)) > caps.characters:
+        raise SymbolicExpressionError(f"{size} characters are too many: at most {caps.characters}", caps.characters)
     opened: list[tuple[int, list[Expression]]] = []
     count = 0
     at = _after_space(text, 0)
@@ -96,7 +97,7 @@ def read(text: str, caps: Caps) -> Expression:
 
 
 def written(expression: Expression) -> str:
-    """The text of `expression`: one line but for what strings hold; `read` gives the same expression again.
+    """Return the text of `expression`: one line but for what strings hold; `read` gives the same expression again.
 
     Raises `ValueError` for a word that cannot be written as one.
     """
@@ -120,26 +121,29 @@ def name(text: str) -> Word | String:
 
 
 def listed(head: str, *items: Expression) -> List:
-    """The list that begins with the word `head`."""
+    """Return the list that begins with the word `head`."""
     return List((Word(head), *items))
 
 
 def text_of(expression: Expression, what: str) -> str:
-    """The text of a word or a string. Raises `SymbolicExpressionError`, which calls the expression `what`."""
+    """Return the text of a word or a string. Raises `SymbolicExpressionError`, which calls the expression `what`."""
     if isinstance(expression, List):
         raise SymbolicExpressionError(f"{what} is to be a word or a string, not a list", expression.at)
     return expression.text
 
 
 def head_of(expression: Expression, what: str) -> str:
-    """The word, in small letters, that a list begins with. Raises `SymbolicExpressionError` where there is none."""
+    """Return the word, in small letters, that a list begins with.
+
+    Raises `SymbolicExpressionError` where there is none.
+    """
     if not isinstance(expression, List) or not expression.items or not isinstance(expression.items[0], Word):
         raise SymbolicExpressionError(f"{what} is to be a list that begins with a word", expression.at)
     return expression.items[0].text.lower()
 
 
 def items_of(expression: Expression, heads: tuple[str, ...], what: str) -> tuple[Expression, ...]:
-    """What follows in a list that begins with one of `heads`.
+    """Return what follows in a list that begins with one of `heads`.
 
     Raises `SymbolicExpressionError` for any other expression.
     """
@@ -179,7 +183,7 @@ def _closed(text: str, at: int, opened: list[tuple[int, list[Expression]]]) -> t
 
 
 def _atom(text: str, at: int) -> tuple[Word | String, int]:
-    """The word or string at `at`, and where it ends."""
+    """Return the word or string at `at`, and where it ends."""
     if text[at] == '"':
         return _string(text, at)
     if sized := _SIZE.match(text, at):
@@ -200,7 +204,7 @@ def _string(text: str, began: int) -> tuple[String, int]:
 
 
 def _sized_string(text: str, began: int, start: int, size: int) -> tuple[String, int]:
-    """A string that says how many bytes of UTF-8 it has (FIPA00070, ByteLengthEncodedString)."""
+    """Return a string that says how many bytes of UTF-8 it has (FIPA00070, ByteLengthEncodedString)."""
     content = text[start : start + size].encode("utf-8", "surrogatepass")[:size]
     try:
         decoded = content.decode()

@@ -15,7 +15,7 @@ from typing import Literal
 
 from robochoc.view.content_security import content_security_policy
 from robochoc.view.label import printable
-from robochoc.view.script import viewer_script
+from robochoc.view.script import labels_script, viewer_script
 
 Mode = Literal["served", "embedded"]
 
@@ -35,7 +35,7 @@ def page(mode: Mode, embedded: Mapping[str, bytes] | None = None, title: str = "
     connections = "'self'" if mode == "served" else "'none'"
     scripts = [_asset(name) for name in _scripts()]
     if mode == "served" or "scene" in answers:
-        scripts.append(viewer_script())  # the last: the page need not wait until it has been read
+        scripts += [labels_script(), viewer_script()]  # the last: the page need not wait until it has been read
     head = (
         f'<meta http-equiv="Content-Security-Policy" content="{content_security_policy(scripts, connections)}">\n'
         f'<link rel="icon" href="data:,">\n<style>\n{_asset("style.css")}</style>\n'

@@ -17,6 +17,7 @@ from typing import Any, assert_never
 import msgspec
 
 from robochoc.formats.result import result_json
+from robochoc.model.headline import describe_outcome
 from robochoc.model.outcome import EpochOutcome, Outcome, Verdict
 from robochoc.model.priorities import natural_key
 from robochoc.sniffer.acl import text
@@ -222,11 +223,10 @@ def verdict_of(trace: Trace) -> str:
 def _ending(trace: Trace, outcome: Outcome) -> str:
     reason = f": {outcome.reason}" if outcome.reason else ""
     out = f"; lost: {_cut(outcome.lost)}" if outcome.lost else ""
-    if outcome.aside:
+    if outcome.withdrawn_alive:
         witness = f", as {outcome.ruled_out}" if outcome.ruled_out else ""
-        flying = len({*trace.robots}.difference(outcome.withdrawn))
-        better = ", no better team could" if outcome.verdict is Verdict.OPTIMAL else ""
-        return f"No solution for all{witness}. {flying} fly{better}; aside: {_cut(outcome.aside)}{out}."
+        headline = describe_outcome(outcome, len(trace.robots))
+        return f"{headline}: no solution for all{witness}; withdrawn: {_cut(outcome.withdrawn_alive)}{out}."
     said = _said(outcome.verdict)
     cost = f", of cost {outcome.cost:g}" if outcome.cost else ""
     return f"{said[0].upper()}{said[1:]}{cost}{_by(outcome)}{reason}{out}."

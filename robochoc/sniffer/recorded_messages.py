@@ -25,7 +25,7 @@ from msgspec.inspect import (
 from robochoc.model.communicative_acts import INFORM, Act
 from robochoc.model.message import Message
 from robochoc.protocols.protocol import Protocol
-from robochoc.run.registry import UnknownProtocolError, protocol_by_class, protocol_by_name
+from robochoc.run.registry import UnknownProtocolError, protocol_by_class, protocol_or_first_fit
 from robochoc.sniffer.trace import Trace
 
 _LISTS = (CollectionType, TupleType, StructType)
@@ -101,7 +101,7 @@ def _installed(trace: Trace, run: int) -> tuple[str, type[Protocol]] | None:
     name = trace.runs[run].protocol
     if name == trace.header.protocol:
         with suppress(UnknownProtocolError):
-            return name, protocol_by_name(name)
+            return name, protocol_or_first_fit(name)
     return protocol_by_class(name, [trace.header.protocol])
 
 

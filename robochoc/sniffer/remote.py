@@ -10,16 +10,16 @@ from typing import NamedTuple
 
 from robochoc.authority.identity import Identity
 from robochoc.communication.network.access import journal_key
-from robochoc.communication.network.control_messages import Sniff, Sniffable
+from robochoc.communication.network.control_messages import JournalAnswer, JournalRequest
 from robochoc.communication.network.framing import MASTER, FrameRefusedError, Framing
-from robochoc.communication.network.inbox import Arrived
+from robochoc.communication.network.inbox import FrameArrived
 from robochoc.communication.network.journal_server import piece_in, question
 from robochoc.communication.network.refusals import LONGEST
 from robochoc.communication.network.transport import Transport
 from robochoc.journal.blocks import BlockReader, JournalDamagedError
 from robochoc.journal.entries import JournalError
 from robochoc.run.networked.address import Address
-from robochoc.run.networked.consult import ANSWER_S, ASK_AGAIN_S, NoAnswerError
+from robochoc.run.networked.directory_query import ANSWER_S, ASK_AGAIN_S, NoAnswerError
 
 LOOK_S = 0.1
 """How often it is asked for what is new."""
@@ -74,8 +74,8 @@ def receive(
     is called when the master has agreed, `stopped` asked now and then whether to stop. Raises `CannotConnectError` and,
     when the master does not agree, `NoAnswerError`.
     """
-    with Transport(str(place), identity, watch=(), patience_s=patience_s) as post:
-        sniffer = _Sniffer(place, post)
+    with Transport(str(place), identity, watch=(), patience_s=patience_s) as transport:
+        sniffer = _Sniffer(place, transport)
         run = sniffer.admitted(max(ANSWER_S, patience_s), stopped)
         if run is None:
             return STOPPED
@@ -122,13 +122,13 @@ class Arriving:
 
 
 class _Sniffer:
-    """One who asks the master at `place`, by its `post`."""
+    """One who asks the master at `place`, by its `transport`."""
 
-    def __init__(self, place: Address, post: Transport) -> None:
+    def __init__(self, place: Address, transport: Transport) -> None:
         self._place = place
-        self._name = post.name
-        self._post = post
-        self._letters = Framing(post.name)
+        self._name = transport.name
+        self._transport = transport
+        self._framing = Framing(transport.name)
         self._number = secrets.randbits(_NUMBER_BITS)
 
     def admitted(self, patience_s: float, stopped: Callable[[], bool]) -> str | None:
@@ -155,7 +155,7 @@ class _Sniffer:
         """Ask for piece after piece."""
         heard = time.monotonic()
         while not stopped():
-            content = self._post.ask(journal_key(self._name), journal.question, PIECE_S)
+            content = self._transport.ask(journal_key(self._name), journal.question, PIECE_S)
             if content is not None:
                 heard = time.monotonic()
                 ending = journal.take(content)
@@ -172,10 +172,10 @@ class _Sniffer:
         return STOPPED
 
     def _ask(self) -> None:
-        self._post.send(MASTER, self._letters.write(MASTER, Sniff(self._number)))
+        self._transport.send(MASTER, self._framing.write(MASTER, JournalRequest(self._number)))
 
     def _refused(self) -> Followed | None:
-        """Ask by letter why there is no answer; None: there is no reason, or nobody says it."""
+        """Ask by frame why there is no answer; None: there is no reason, or nobody says it."""
         self._ask()
         answer = self._answer(PIECE_S)
         if answer is None or not answer.why:
@@ -184,23 +184,23 @@ class _Sniffer:
             over=False, why=f"the master at {self._place} lets {self._name} sniff no more: {answer.why[:LONGEST]}"
         )
 
-    def _answer(self, patience_s: float) -> Sniffable | None:
+    def _answer(self, patience_s: float) -> JournalAnswer | None:
         """What the master says next, within `patience_s`."""
         until = time.monotonic() + patience_s
         while (left := until - time.monotonic()) > 0:
             try:
-                item = self._post.inbox.get(timeout=left)
+                item = self._transport.inbox.get(timeout=left)
             except Empty:
                 break
-            if isinstance(item, Arrived) and item.sender == MASTER:
+            if isinstance(item, FrameArrived) and item.sender == MASTER:
                 answer = self._read(item)
                 if answer and answer.number == self._number:
                     return answer
         return None
 
-    def _read(self, item: Arrived) -> Sniffable | None:
+    def _read(self, item: FrameArrived) -> JournalAnswer | None:
         try:
-            word = self._letters.read(item.sender, item.content).word
+            word = self._framing.read(item.sender, item.content).message
         except FrameRefusedError:
             return None
-        return word if isinstance(word, Sniffable) else None
+        return word if isinstance(word, JournalAnswer) else None

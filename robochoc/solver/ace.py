@@ -113,10 +113,19 @@ class AceProcess:
         strategy: Strategy = "default",
         deadline: float | None = None,
     ) -> SolverAnswer:
-        """Return all solutions of `network`, up to `limit`; by `deadline` on the monotonic clock.
+        """Return the solutions of `network`.
 
-        Raises `SolverMissingError`, `SolverLostError`, `SolverTimeoutError`; after the last two the process is gone,
-        and the next task starts another.
+        Args:
+            network: The network.
+            limit: How many solutions are wanted. None: all.
+            count_only: Whether only their number is wanted.
+            strategy: How ACE searches.
+            deadline: The end of the time, on the monotonic clock.
+
+        Raises:
+            SolverMissingError: if there is no Java.
+            SolverLostError: if the solver's process died. The next task starts another.
+            SolverTimeoutError: if the time is over. The process is ended, and the next task starts another.
         """
         self.begin(network, limit=limit, count_only=count_only, strategy=strategy)
         return self.answer(deadline)
@@ -166,20 +175,20 @@ class AceProcess:
             raise SolverLostError("the constraint solver stopped before it had seen everything")
         numbers = array("i")
         numbers.frombytes(word.solutions)
-        rows = sorted(question.rows(numbers))  # whoever has found them, solutions are in the same order
+        rows = sorted(question.rows(numbers))  # the same order as of enumerated solutions
         return question.answered(word.found, complete=word.complete, solutions=rows, means=SolvedBy.ACE)
 
     def give_up(self) -> SolverTimeoutError:
         """End the process: there is no time left for the task in hand. What it has found so far goes with it."""
-        question, said = self._question, b""
+        question, output = self._question, b""
         if question is not None and question.costs and self._folder is not None:
             with suppress(OSError):
-                said = (self._folder / BEST).read_bytes()
+                output = (self._folder / BEST).read_bytes()
         self.close()
-        if question is None or b"</values>" not in said:
+        if question is None or b"</values>" not in output:
             return SolverTimeoutError()
         width = len(question.asked.domains)
-        rows = question.rows(codes_of(said, width)[-width:])
+        rows = question.rows(codes_of(output, width)[-width:])
         best = question.answered(1, complete=False, solutions=rows, means=SolvedBy.ACE)
         return SolverTimeoutError(best.solutions[0])
 
@@ -241,7 +250,7 @@ class AceProcess:
     def _start(self) -> None:
         self._folder = Path(tempfile.mkdtemp(prefix="robochoc-"))
         ours, theirs = socket.socketpair()
-        # The process reads from this pipe, whose other end nobody else has: it ends with us, however we go.
+        # The process reads from this pipe, whose other end only this process has: it ends with this process.
         watched, self._lifeline = os.pipe()
         try:
             with (self._folder / "stderr").open("wb") as stderr:
@@ -264,7 +273,7 @@ class AceProcess:
         self._socket = ours
 
     def _ask(self, task: ToSolver) -> None:
-        if self._searching:  # for an answer that nobody wants any more
+        if self._searching:  # for an answer that is no longer wanted
             self.close()
         self.start()
         body = msgspec.msgpack.encode(task)
@@ -312,17 +321,17 @@ class AceProcess:
 
     def _lose(self) -> None:
         """Raise `SolverLostError`, which says how the process ended."""
-        status, said = None, ""
+        status, output = None, ""
         if self._process is not None and self._folder is not None:
             with suppress(subprocess.TimeoutExpired):
                 status = self._process.wait(1)
             lines = (self._folder / "stderr").read_text(errors="replace").split("\n")
-            said = next((line.strip() for line in reversed(lines) if line.strip()), "")
+            output = next((line.strip() for line in reversed(lines) if line.strip()), "")
         self.close()
         fate = "was lost" if status is None else f"ended with status {status}"
         if status is not None and status < 0:
             fate = f"was killed by {signal.Signals(-status).name}"
-        raise SolverLostError(f"the constraint solver's process {fate}" + (f" ({said})" if said else ""))
+        raise SolverLostError(f"the constraint solver's process {fate}" + (f" ({output})" if output else ""))
 
 
 def _task(network: Network, limit: int | None, *, count_only: bool, strategy: Strategy) -> Task:

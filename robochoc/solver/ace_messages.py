@@ -1,4 +1,4 @@
-"""What the solver's process and its parent say to each other: msgpack, each word after its length."""
+"""The messages between the solver's process and its parent: msgpack, each after its length."""
 
 from __future__ import annotations
 
@@ -20,9 +20,9 @@ Strategy = Literal["default", "static"]
 """How ACE searches: as it does by itself (weighted degrees, restarts), or in the order of the variables."""
 
 
-def codes_of(said: bytes, width: int) -> array[int]:
+def codes_of(output: bytes, width: int) -> array[int]:
     """Return the codes of all solutions in what ACE has printed, `width` each. Raises `ValueError`."""
-    numbers = array("i", map(int, b" ".join(_VALUES.findall(said)).split()))
+    numbers = array("i", map(int, b" ".join(_VALUES.findall(output)).split()))
     if len(numbers) % width:
         raise ValueError("ACE's answer has values missing")
     return numbers

@@ -157,11 +157,11 @@ class _Ace:
         each = () if task.count_only else ("-xe",)
         output = self._buffer()
         found = self._run((*each, *ACE_OPTIONS, *STRATEGIES[task.strategy]), task.limit, output)
-        said = bytes(output.toByteArray())
-        _check(said)
-        solutions = b"" if task.count_only else codes_of(said, len(task.domains)).tobytes()
+        printed = bytes(output.toByteArray())
+        _check(printed)
+        solutions = b"" if task.count_only else codes_of(printed, len(task.domains)).tobytes()
         # A search that a limit cut off says so; neither a status line nor the number of solutions does.
-        return Solved(found, b"d COMPLETE EXPLORATION" in said, solutions)
+        return Solved(found, b"d COMPLETE EXPLORATION" in printed, solutions)
 
     def _minimise(self, width: int) -> Solved:
         """Return the cheapest solution, the last that ACE has printed.
@@ -173,11 +173,11 @@ class _Ace:
             self._run(("-xe", *ACE_OPTIONS, *MINIMISE), None, output)
         finally:
             output.close()
-            said = self._best.read_bytes()
+            printed = self._best.read_bytes()
             self._best.unlink()
-        _check(said)
-        last = codes_of(said, width)[-width:]
-        return Solved(len(last) // width, b"d COMPLETE EXPLORATION" in said, last.tobytes())
+        _check(printed)
+        last = codes_of(printed, width)[-width:]
+        return Solved(len(last) // width, b"d COMPLETE EXPLORATION" in printed, last.tobytes())
 
     def _run(self, options: tuple[str, ...], limit: int | None, output: Any) -> int:  # noqa: ANN401 - a Java object
         """Return how many solutions ACE has found, up to `limit`; what it prints goes to `output`."""
@@ -197,9 +197,9 @@ class _Ace:
         return int(head.solver.solutions.found)
 
 
-def _check(said: bytes) -> None:
+def _check(printed: bytes) -> None:
     """Raise `RuntimeError` when ACE has printed an error."""
-    if b"! ERROR" in said:
+    if b"! ERROR" in printed:
         raise RuntimeError("ACE gave up on the model, for a reason of its own")
 
 

@@ -97,7 +97,7 @@ class SolutionCache:
 
 def cache_folder() -> Path:
     """Return where the user's cache is (`~/.cache/robochoc` on Linux; `XDG_CACHE_HOME` is respected)."""
-    from platformdirs import user_cache_path  # noqa: PLC0415 - only who solves has a cache
+    from platformdirs import user_cache_path  # noqa: PLC0415 - only solvers have a cache
 
     return user_cache_path("robochoc")
 

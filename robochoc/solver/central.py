@@ -1,8 +1,8 @@
-"""The central judge: a whole team's problem as one, decided, counted or minimised; by ACE, if it is not small.
+"""The central solver: solves, counts or minimises a whole team's problem at once. Large problems go to ACE.
 
-It sees every file, which no robot does. What it is for: to hold a team's verdict against an independent one, and to
-say how many solutions there are. Robots that share nothing are solved apart; what is left goes to ACE with cliques
-made explicit (`solver/cliques.py`), in two ways at once, and the first to be ready is believed.
+It sees every file, which no robot does. It confirms or refutes the verdict of a team, and counts solutions. Components
+that share no constraint are solved apart. The rest goes to ACE with cliques made explicit (`solver/cliques.py`). Two
+strategies run at once, and the first answer counts.
 """
 
 from __future__ import annotations
@@ -29,9 +29,9 @@ from robochoc.solver.weighted import WeightedComponent, components_with_withdraw
 MAX_CLIQUE_ROWS = 20_000
 """A clique with more solutions than this stays an allDifferent."""
 TABLE_PATIENCE_S = 20.0
-"""So long, all in all, may it take to make tables of cliques."""
+"""The maximum time for all tables of cliques together."""
 MAX_ORBITS = 20_000
-"""So many solutions up to symmetry are looked at one by one to be counted; of more only the number is asked."""
+"""Up to so many solutions up to symmetry are listed to count all. If there are more, ACE counts."""
 MANY_ROWS = 100_000
 """For a team whose tables have so many rows ACE is started at once, while the first task is still made ready."""
 HEDGE_S = 5.0
@@ -42,9 +42,14 @@ NO_SOLUTIONS = SolverAnswer(0, complete=True, solutions=())
 
 @dataclass(frozen=True)
 class CentralAnswer:
-    """What the judge has found. `count` is None unless it was asked for.
+    """The answer of the central solver.
 
-    Where something is minimised: `cost` is what the assignment comes to, and nothing comes to less than `bound`.
+    Attributes:
+        verdict: The answer to the problem.
+        assignment: A solution; where costs are minimised, the cheapest that was found.
+        count: The number of solutions, if it was asked for.
+        cost: The cost of the assignment, where costs are minimised.
+        bound: A lower bound on the cost of all assignments, where costs are minimised.
     """
 
     verdict: Verdict
@@ -56,7 +61,7 @@ class CentralAnswer:
 
 @dataclass(frozen=True)
 class _Wanted:
-    """What to find: up to `limit` solutions, or their number. `in_order`: in the variables' order at first."""
+    """The task: find up to `limit` solutions, or their number. `in_order`: in the variables' order at first."""
 
     limit: int | None = None
     count_only: bool = False
@@ -90,15 +95,25 @@ class CentralSolver:
         self._progress = progress
         self._tables: dict[Network, tuple[Codes, ...] | None] = {}
 
-    def judge(self, team: Team, *, count: bool = False, aside: int | None = None) -> CentralAnswer:
-        """Return the verdict on `team`, with a solution (of a DisWCSP: the cheapest) or (`count`) the number of all.
+    def solve(self, team: Team, *, count: bool = False, withdrawal_cost: int | None = None) -> CentralAnswer:
+        """Solve `team`, or count its solutions.
 
-        With `aside`, robots may step aside, one of weight 1 at this price, and costs and prices are minimised; those
-        that do have no values. `unknown` when the time was over, with the cheapest that was found until then. Raises
-        `SolverMissingError`, `SolverLostError`, `UnsupportedError`.
+        Args:
+            team: The team. Of a DisWCSP the cost is minimised.
+            count: Whether to return the number of solutions instead of one.
+            withdrawal_cost: The cost of withdrawing a robot of weight 1, if robots may withdraw. Costs and withdrawals
+                are then minimised together. Withdrawn robots have no values.
+
+        Returns:
+            The answer. Its verdict is `unknown` when the time was over; then it has the best solution so far.
+
+        Raises:
+            SolverMissingError: if ACE is needed, and there is no Java.
+            SolverLostError: if the solver's process died.
+            UnsupportedError: if a constraint or its costs are too large.
         """
-        if aside is not None:
-            return self._minimum(team, components_with_withdrawal(team, aside))
+        if withdrawal_cost is not None:
+            return self._minimum(team, components_with_withdrawal(team, withdrawal_cost))
         if team.kind is ProblemKind.DISWCSP and not count:
             return self._minimum(team, weighted_components(team.variables.values(), list(team.constraints())))
         with ExitStack() as processes:

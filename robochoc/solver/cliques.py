@@ -17,7 +17,7 @@ from robochoc.solver.propagation import is_small_permutation
 
 
 class Demand(StrEnum):
-    """What a binary table demands of two variables: that they differ, that and more, or something else."""
+    """The kind of a binary table: two variables differ, they differ and more, or something else."""
 
     DIFFER = "differ"
     DIFFER_AND_MORE = "differ and more"
@@ -65,7 +65,7 @@ def cliques(pairs: Iterable[Codes]) -> list[Codes]:
 
 
 def with_cliques(network: Network, solutions: Callable[[Network], tuple[Codes, ...] | None]) -> Network:
-    """Return `network` with allDifferent on cliques of `ne`, and with tables for the cliques that owe each other more.
+    """Return `network` with allDifferent on cliques of `ne`, and with tables for the cliques with more constraints.
 
     Tables are for cliques that need every value there is: there they pay, as almost nothing is left to choose.
 

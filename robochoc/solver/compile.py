@@ -20,12 +20,12 @@ if TYPE_CHECKING:
     from robochoc.solver.query import SolverAnswer
 
 PATIENCE_S = 60.0
-"""How long the compilation of one robot may take, unless more is asked for."""
+"""The default maximum time for compiling one robot."""
 
 
 @dataclass(frozen=True)
 class Limits:
-    """What compiling one robot may come to: a number of local solutions, and seconds of ACE's time.
+    """The limits of compiling one robot: a number of local solutions, and seconds of ACE's time.
 
     With `always_ace`, ACE solves small local problems too.
     """
@@ -36,7 +36,7 @@ class Limits:
 
 
 class CompiledFrom(StrEnum):
-    """Where a robot's local solutions come from; of several, the one that cost most."""
+    """The source of a robot's local solutions; of several, the most expensive one."""
 
     DIRECT = "direct"
     EQUAL = "equal"
@@ -109,9 +109,13 @@ class Compiler:
     def compile(self, robot: Robot) -> Compilation:
         """Return the compiled domain of `robot`.
 
-        Raises `TooManySolutionsError`, `CompileTimeoutError`, `CompileError`, `SolverMissingError`, and
-        `UnsupportedError` when a constraint is too large; and `SolverTimeoutError` when the time for all together is
-        over.
+        Raises:
+            TooManySolutionsError: if it has more local solutions than the limit.
+            CompileTimeoutError: if its local problem takes too long.
+            CompileError: if the solver's process died.
+            SolverMissingError: if ACE is needed, and there is no Java.
+            UnsupportedError: if a constraint is too large.
+            SolverTimeoutError: if the time for all robots is over.
         """
         began = time.monotonic()
         sources = [CompiledFrom.DIRECT]

@@ -29,7 +29,7 @@ if TYPE_CHECKING:
     from robochoc.solver.cost_table import CostTable
 
 LexicographicCost = tuple[int, float]
-"""How many constraints a value breaks, and what all others charge for it. Pairs compare as tuples do: a broken
+"""The number of constraints that a value violates, and the cost of all others. Pairs compare as tuples: a violated
 constraint weighs more than any cost, and differences are never `inf - inf`."""
 
 MIN_TABLE_VALUES = 64
@@ -40,16 +40,15 @@ MAX_BOUNDED_ROWS = 65_536
 
 
 class LocalProblem:
-    """What one robot knows: its compiled domain, its neighbours, and the constraints it has to check.
+    """The local problem of one robot: its compiled domain, its neighbours, and the constraints it has to check.
 
     `values[i]` is the i-th value as neighbours see it; `solution(i)` are the own variables' values behind it.
     `parents` and `children` are the links that the files name, `neighbours` are they and all others in a constraint
     that this robot knows; each in priority order. `pkc_parents` are the parents with whom a partially known constraint
     is shared: they have to hear of the own value too. `checks` counts constraint checks so far.
 
-    `charges[i]` is what the i-th value costs before anybody else has said a word: what its private constraints
-    charge. Where robots may step aside, the last value is to do so: all its parts are None, it breaks nothing, and no
-    constraint asks anything of whoever is there with it.
+    `charges[i]` is the private cost of the i-th value. Where robots may withdraw, the last value means withdrawal: all
+    its parts are None, and all constraints with it hold.
     """
 
     def __init__(self, part: AgentProblem) -> None:
@@ -65,7 +64,13 @@ class LocalProblem:
             self.values = (*self.values, (None,) * len(robot.interface))
             self.charges = (*self.charges, part.parameters.withdrawal_cost * robot.weight)
         self.checks = 0
-        own = OwnValues(robot.interface, self.values)
+        self._rank = rank
+        self._part = part
+        self._set_constraints(part, OwnValues(robot.interface, self.values))
+
+    def _set_constraints(self, part: AgentProblem, own: OwnValues) -> None:
+        """Compile the constraints of `part` for the values `own`, and set all that depends on them."""
+        robot, rank = part.robot, self._rank
         owners = {name: agent for agent, names in part.interfaces.items() for name in names if agent != self.agent}
 
         def ready(known: KeyedConstraint) -> SharedConstraint:
@@ -77,7 +82,6 @@ class LocalProblem:
         copies = [ready(known) for known in part.copies]
         shared = [*(constraint for _, constraint in above), *copies]
         self._constraints = sorted_by_lowest_agent(shared, rank)
-        self._rank = rank
         self._depths = [rank[constraint.agents[-1]] if constraint.agents else -1 for constraint in self._constraints]
         met = {agent for constraint in shared for agent in constraint.agents}
         self.neighbours = tuple(sorted({*self.parents, *self.children, *met}, key=rank.__getitem__))
@@ -88,7 +92,6 @@ class LocalProblem:
         self.pkc_parents = tuple(parent for parent in self.parents if parent in secretive)
         below = itertools.chain.from_iterable(self._below.values())
         self._filtering = _by_robot([*copies, *below, *parts_above])
-        self._part = part
 
     def solution(self, index: int) -> dict[str, int]:
         """Return the values of all own variables for `values[index]`. Empty if the robot is withdrawn."""
@@ -98,7 +101,7 @@ class LocalProblem:
         """Return why `values[index]` is against `view`: what the first constraint that it breaks sees, or None.
 
         Constraints whose other variables are not all known in `view` are passed over, and so are those whose lowest
-        robot stands higher in the order than place `since`: who asks knows that they hold. The order is that of their
+        robot stands higher in the order than place `since`: the caller knows that they hold. The order is that of their
         lowest robot, the highest first, so the first conflict is also the one with the highest possible lowest
         variable. Of each robot only what the constraint looks at is named (`None` elsewhere).
         """
@@ -133,7 +136,7 @@ class LocalProblem:
         """Return which values of `receiver` go with `values[index]`, by all that this robot has to check towards it.
 
         That is, towards a child, what is totally known (where all robots of a scope know it) and the own parts;
-        towards a parent the own parts; for anybody else everything goes. Every pair that a constraint can tell apart
+        towards a parent the own parts; for other robots all values. Every pair that a constraint can tell apart
         is one check, so that the count says nothing of the answers. See `solver/filters.py`.
         """
         evaluated, allowed = self._filters.of(index, receiver)
@@ -196,8 +199,8 @@ class LocalProblem:
     def lower_bounds(self, robots: Container[str]) -> list[float]:
         """Return, for each own value, a lower bound on its cost in constraints whose other robots are all in `robots`.
 
-        These may take any values that their files declare. Nothing is charged for sure where robots may step aside,
-        and nothing is said of a constraint with more than `MAX_BOUNDED_ROWS` combinations of values.
+        These may take any values that their files declare. The bound is 0 where robots may withdraw, and for a
+        constraint with more than `MAX_BOUNDED_ROWS` combinations of values.
         """
         least: list[list[float]] = []
         for constraint in self._constraints:
@@ -234,7 +237,7 @@ class LocalProblem:
     def interchangeable(self, value: Value) -> Sequence[int]:
         """Return the places of all own values that agree with `value` wherever that is not None.
 
-        They are interchangeable to whoever looks at nothing else: neighbourhood partial interchangeability
+        Neighbours that see nothing else cannot tell them apart: neighbourhood partial interchangeability
         (Burke and Brown, "Applying interchangeability to complex local problems in distributed constraint
         reasoning", AAMAS workshop DCR 2006).
         """

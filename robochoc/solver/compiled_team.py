@@ -2,7 +2,7 @@
 
 What the values of a robot mean depends on what it shows its neighbours, and that on the links of its team: the files'
 team, the same team turned to another priority order, and what is left of it after a change have other domains. So
-domains are never passed around alone. Whoever has a `CompiledTeam` has the domains of exactly that team.
+domains are never passed around alone. A `CompiledTeam` has the domains of exactly its team.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""What a constraint charges for every combination of values, as an array: for protocols that compute with tables.
+"""The costs of a constraint for all combinations of values, as an array: for protocols that compute with tables.
 
 Costs are floats, as a broken hard constraint costs `inf`; integers up to 2^53 are exact in them (`exact.py`). A table
 has at most as many entries as a constraint may have tuples of values to be tried on (`MAX_TUPLES`).
@@ -22,7 +22,7 @@ Array = NDArray[np.float64]
 
 
 class CostTable(NamedTuple):
-    """What the constraint called `key` charges: an axis for each of `agents`, then one for the own values.
+    """The costs of the constraint called `key`: an axis for each of `agents`, then one for the own values.
 
     Axes are in the order of `agents`, places on an axis in the order of the values that were given for the robot.
     """
@@ -37,7 +37,8 @@ def cost_table(
 ) -> tuple[int, CostTable]:
     """Return how many checks it takes, and the table of `constraint` over `domains` and the `size` own values.
 
-    Raises `UnsupportedError` when that is too large.
+    Raises:
+        UnsupportedError: when that is too large.
     """
     columns = [domains[agent] for agent in constraint.agents]
     entries = math.prod(map(len, columns)) * size

@@ -17,7 +17,7 @@ from robochoc.model.problem import Constraint, Robot
 from robochoc.solver.encoding import Codes, Component, Network, UnsupportedError, components, cost_function, is_soft
 
 MAX_SOLUTIONS = 100_000
-"""How many local solutions a robot may have, unless more are asked for."""
+"""The default maximum of local solutions of a robot."""
 
 SolveNetwork = Callable[[Network], Iterable[Sequence[int]]]
 """All solutions of a network of several variables, in codes; `solver/ace.py` has one."""
@@ -59,7 +59,7 @@ class CompiledDomain:
         return {} if index == len(self.values) else dict(zip(self.variables, self.solutions[index], strict=True))
 
     def behind(self, value: Value) -> dict[str, int]:
-        """Return the same for `value`, as neighbours see it: one that the robot does not have is to step aside."""
+        """Return the same for `value`, as neighbours see it. A value that the robot does not have means withdrawal."""
         return self.solution(self.values.index(value) if value in self.values else len(self.values))
 
 
@@ -79,8 +79,14 @@ class _Group:
 def compile_domain(robot: Robot, solve: SolveNetwork | None = None, limit: int = MAX_SOLUTIONS) -> CompiledDomain:
     """Return the compiled domain of `robot`, values in the order of its variables and their values.
 
-    `solve` is asked for the solutions of what private constraints connect; a robot without such needs none. Raises
-    `TooManySolutionsError`, and `UnsupportedError` when there is a part to solve and no `solve`.
+    Args:
+        robot: The robot.
+        solve: Returns all solutions of a network. It is called for variables that private constraints connect.
+        limit: The maximum number of local solutions.
+
+    Raises:
+        TooManySolutionsError: if there are more.
+        UnsupportedError: if a network has to be solved, and there is no `solve`.
     """
     soft = [constraint for constraint in robot.private if is_soft(constraint)]
     parts = components(robot.variables, robot.private, [constraint.variables for constraint in soft])

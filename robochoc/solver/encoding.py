@@ -17,7 +17,7 @@ from robochoc.model.expression import UndefinedValueError, compile_expression
 from robochoc.model.problem import INFINITE, Constraint, Predicate, Relation, Semantics, Variable
 
 MAX_TUPLES = 4_000_000
-"""How many tuples of values a constraint may have to be tried on."""
+"""The maximum number of tuples of values that a constraint is tried on."""
 
 MAX_ALLOWED_ROWS = 100_000
 """A constraint on so many combinations of values is a table of allowed tuples, however few it forbids."""
@@ -78,8 +78,10 @@ def components(
     """Return the connected components of `variables` under the hard part of `constraints`.
 
     Components are in the order of their first variables, variables within in their given order. Constraints are on
-    `variables` only; so are the scopes in `together`, each of which is to be in one component. Raises
-    `UnsupportedError` when a constraint has too many tuples to be made a table.
+    `variables` only; so are the scopes in `together`, each of which is to be in one component.
+
+    Raises:
+        UnsupportedError: when a constraint has too many tuples to be made a table.
     """
     domains = {variable.name: sorted(variable.domain) for variable in variables}
     unary: list[Constraint] = []

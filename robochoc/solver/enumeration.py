@@ -7,7 +7,7 @@ that it stands in (dom/deg: Bessiere and Regin, "MAC and combined heuristics", C
 is branch and bound: what the cost variables come to at least is the bound.
 
 How much may be done is counted in steps, never in seconds: the same network is settled here, or is not, on every
-machine. Nobody predicts it: the search begins, and breaks off when the steps are used up.
+machine. It is not predicted: the search starts, and stops when the steps are used up.
 """
 
 from __future__ import annotations
@@ -18,9 +18,9 @@ from typing import NamedTuple
 from robochoc.solver.encoding import Codes, Network, Table
 
 STEPS_EACH = 100_000
-"""So many steps a task may always take: about as long as ACE takes where it runs already."""
+"""The steps that every task may take: about as long as ACE takes where it runs already."""
 STEPS_BEFORE_ACE = 1_500_000
-"""So many steps more all tasks may take together before ACE is started: about as long as it takes to start."""
+"""The further steps of all tasks together before ACE is started: about as long as its start takes."""
 
 ROWS_A_STEP = 256
 """A step looks at one value in a table of so many rows; in a longer table, or a wider domain, that takes more."""
@@ -48,7 +48,7 @@ class Budget:
 
 
 class Enumeration(NamedTuple):
-    """How many solutions there are, whether there are no others, and (unless only counted) which, in order."""
+    """The number of solutions, whether there are no others, and (unless only counted) the solutions, in order."""
 
     number: int
     complete: bool
@@ -58,7 +58,10 @@ class Enumeration(NamedTuple):
 def enumerate_solutions(network: Network, budget: Budget, *, limit: int | None, count_only: bool) -> Enumeration:
     """Return the solutions of `network`, up to `limit`, in lexicographic order.
 
-    `network` is propagated. Raises `OutOfStepsError` when the budget does not suffice.
+    `network` is propagated.
+
+    Raises:
+        OutOfStepsError: when the budget does not suffice.
     """
     search = _Search(network, budget)
     solutions: list[Codes] = []
@@ -70,7 +73,7 @@ def enumerate_solutions(network: Network, budget: Budget, *, limit: int | None, 
             solutions += several
         if limit is not None and count > limit:
             return Enumeration(limit, complete=False, solutions=sorted(solutions)[:limit])
-        if count == limit and limit == 1:  # whoever asks for one does not ask whether it is alone
+        if count == limit and limit == 1:  # for one solution it does not matter whether there are others
             return Enumeration(1, complete=False, solutions=solutions)
     return Enumeration(count, complete=True, solutions=sorted(solutions))
 
@@ -78,7 +81,10 @@ def enumerate_solutions(network: Network, budget: Budget, *, limit: int | None, 
 def minimum_solution(network: Network, budget: Budget, costs: Codes) -> Codes | None:
     """Return a solution of `network` in which the codes at the places `costs` sum up to the least, if there is one.
 
-    `network` is propagated. Raises `OutOfStepsError` when the budget does not suffice.
+    `network` is propagated.
+
+    Raises:
+        OutOfStepsError: when the budget does not suffice.
     """
     return _Search(network, budget).cheapest(costs)
 
@@ -115,7 +121,7 @@ class _Search:
 
     def _by_value(self, table: Table) -> list[dict[int, int]]:
         """Return, for each variable of `table` and each bit of its domain, the rows with that value."""
-        if not table.allowed:  # propagation leaves only those of which more is allowed than anybody should list
+        if not table.allowed:  # propagation leaves only those with too many allowed rows
             self._budget.spend(self._budget.steps + 1)
         weight = 1 + len(table.rows) // ROWS_A_STEP
         self._budget.spend(sum(len(table.rows) + weight * len(self._bit[place]) for place in table.scope))

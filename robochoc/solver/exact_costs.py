@@ -1,4 +1,4 @@
-"""Costs that floats hold exactly. Without numpy: whoever has to refuse others does not compute with tables."""
+"""Costs that floats hold exactly. Without numpy: a check need not import what computes with tables."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What explanations of nogoods are made of, and what a change of the problem makes void.
+"""Explanations of nogoods, and what a change of the problem invalidates.
 
 A nogood that was derived from some constraints and domains holds as long as these stand (DynABT: Omomowo, Arana and
 Ahriz 2008). Constraints and domains are named by keys, the same in every robot.
@@ -20,9 +20,11 @@ class KeyedConstraint(NamedTuple):
 
 
 class Invalidated(NamedTuple):
-    """What a change has made void: `keys` of constraints and domains that no longer rule out what they did.
+    """What a change has invalidated.
 
-    Of `agents` not even the values mean what they meant: they have left, or show other variables than before.
+    Attributes:
+        keys: The keys of constraints and domains that no longer rule out what they did.
+        agents: The agents whose values mean something else: they have left, or have other interface variables.
     """
 
     keys: frozenset[str]

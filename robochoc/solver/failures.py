@@ -1,4 +1,4 @@
-"""How the constraint solver fails. A file of its own, as whoever only has to know these starts no solver."""
+"""Errors of the constraint solver. In a file of their own: to catch them one need not import the solver."""
 
 from __future__ import annotations
 

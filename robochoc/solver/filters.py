@@ -1,6 +1,6 @@
-"""Filters: which values of another robot go with an own value, said without naming a value.
+"""Filters: which values of another robot are consistent with an own value, without naming values.
 
-A filter is a bitmap over the values that the other robot could have as far as everybody knows: the product of its
+A filter is a bitmap over the values that the other robot could have by common knowledge: the product of its
 interface variables' declared domains, in ascending order. Bit 0 of byte 0 is the first (Brito, Meisels, Meseguer
 and Zivan, Constraints 14, 2009: the "filtered domain" that DisFC sends instead of the own value).
 """
@@ -22,8 +22,10 @@ MAX_FILTER_BITS = 65_536
 class Filters:
     """Makes the filters that one robot sends, and says where its own values stand in those that it gets.
 
-    `constraints` are those to be looked at for each receiver; whoever is not in it has a full filter. Raises
-    `UnsupportedError` when the robot's own values are too many for a filter.
+    `constraints` are those with each receiver; robots that are not in it get a full filter.
+
+    Raises:
+        UnsupportedError: when the robot's own values are too many for a filter.
     """
 
     def __init__(

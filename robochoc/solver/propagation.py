@@ -16,7 +16,7 @@ from dataclasses import replace
 from robochoc.solver.encoding import MAX_ALLOWED_ROWS, Codes, Network, Table
 
 LARGEST_PERMUTATION = 5
-"""So many variables that share out as many values are a table (120 rows); ACE does so up to 4."""
+"""Up to so many variables that all differ and need all values are a table (120 rows); ACE does so up to 4."""
 
 
 def propagate(network: Network) -> Network:
@@ -88,7 +88,7 @@ class _Filter:
         return all(domains)
 
     def _keep(self, place: int, values: set[int]) -> None:
-        """Restrict the domain at `place` to `values`, and have whoever looks at it look again."""
+        """Restrict the domain at `place` to `values`, and check its tables again."""
         if not self.domains[place] <= values:
             self.domains[place] &= values
             self._waiting.update(dict.fromkeys(self._looking[place]))

@@ -1,4 +1,4 @@
-"""What of a network has to be asked after propagation, and how the answer for the whole follows from that."""
+"""The part of a network that a solver has to solve after propagation, and the answer for the whole network."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from robochoc.solver.encoding import Codes, Network
 
 
 class SolvedBy(StrEnum):
-    """What an answer comes from: propagation alone, enumeration in this process, or ACE."""
+    """The source of an answer: propagation alone, enumeration in this process, or ACE."""
 
     PROPAGATION = "propagation"
     ENUMERATION = "enumeration"
@@ -32,7 +32,7 @@ class SolverAnswer:
 
 @dataclass(frozen=True)
 class Query:
-    """What of a network has to be asked: `asked` is the network of the variables at `places`.
+    """The part of a network that has to be solved: `asked` is the network of the variables at `places`.
 
     These are the variables that a table looks at after propagation. The others are `free`: every combination of
     their values goes with every solution. Wanted are solutions up to `limit`, or their number (`count_only`).
@@ -44,7 +44,7 @@ class Query:
     limit: int | None
     count_only: bool
     costs: Codes
-    """Of the variables at `places`, those whose codes are minimised. The `free` ones' least come first of all."""
+    """The variables at `places` whose codes are minimised. Of `free` ones the smallest code comes first."""
 
     @property
     def trivial(self) -> bool:

@@ -14,7 +14,7 @@ Conflict = Mapping[str, Value]
 """Assignments of other robots that rule out an own value: the left side of a nogood."""
 
 OtherValues = tuple[int, ...]
-"""What a constraint sees of the others: their variables' values, in the order in which it looks at them."""
+"""The values of other robots' variables in a constraint, in its order."""
 
 
 class OwnValues:
@@ -89,7 +89,7 @@ class SharedConstraint:
         self.codes, self._distinct = own.codes(self._places)
 
     def other_values(self, view: Mapping[str, Value]) -> OtherValues | None:
-        """Return what the constraint sees in `view`; None as long as a part of it is unknown, or has stepped aside."""
+        """Return what the constraint sees in `view`; None: a value is unknown, or a robot is withdrawn."""
         try:
             seen = [view[agent][place] for agent, place in self._seen]
         except KeyError:
@@ -101,7 +101,7 @@ class SharedConstraint:
         return [self._holds((*others, *own)) for own in self._distinct]
 
     def _holds(self, values: Sequence[int | None]) -> bool:
-        """Return whether the constraint holds on `values`; of a robot that steps aside (None) it asks nothing."""
+        """Return whether the constraint holds on `values`; it always holds if one robot is withdrawn (None)."""
         return None in values or self._test(values)  # type: ignore[arg-type]
 
     @property
@@ -120,7 +120,7 @@ class SharedConstraint:
     def lower_bounds(self, domains: Mapping[str, Iterable[int]], wide: int) -> tuple[int, list[float]]:
         """Return the number of checks, and a lower bound on the cost of each own value over the others' `domains`.
 
-        With more than `wide` combinations nobody looks, and it is 0.
+        With more than `wide` combinations the bound is 0 without a look.
         """
         least: list[float] = [0] * len(self.codes)
         columns = [list(domains[name]) for name in self._names]

@@ -34,7 +34,8 @@ class OutOfTimeError(Exception):
 class TeamCompiler:
     """Compiles teams of one run. `seconds` is how long solvers took for it; no solver, no time.
 
-    `deadline` is on the monotonic clock. `stage` is told in a few words how far it is. For the others see `Compiler`.
+    `deadline` is on the monotonic clock. `stage` is called with a few words on the progress. For the others see
+    `Compiler`.
     """
 
     seconds: float = 0.0
@@ -53,8 +54,9 @@ class TeamCompiler:
     def compile(self, team: Team, *, every: bool = False) -> CompiledTeam:
         """Return `team`, which is what robots will work on, compiled.
 
-        Raises `NoLocalSolutionError` at the first robot without values, unless `every` robot is wanted;
-        `OutOfTimeError`; and as `Compiler.compile` does.
+        Raises:
+            NoLocalSolutionError: at the first robot without values, unless `every` robot is wanted;
+                `OutOfTimeError`; and as `Compiler.compile` does.
         """
         began = time.monotonic()
         solved, number = False, count(1)

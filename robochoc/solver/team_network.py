@@ -21,10 +21,12 @@ MAX_SPREAD = 2**31 - 1
 def team_network(team: Team) -> tuple[Network, Codes]:
     """Return all variables of `team`, in its order, with all its constraints; codes are values.
 
-    Unary constraints are folded into domains, cliques of `ne` are said outright. What soft constraints charge are
+    Unary constraints are folded into domains, cliques of `ne` are made explicit. What soft constraints charge are
     variables too, after the others: those at the places that are returned, whose sum is what the problem costs.
-    Raises `UnsupportedError` for a team that changes over time, and when a constraint is too large to be a table, or
-    charges too much, or a value is none that XCSP3's solvers take.
+
+    Raises:
+        UnsupportedError: for a team that changes over time, and when a constraint is too large to be a table, or
+            charges too much, or a value is none that XCSP3's solvers take.
     """
     if team.dynamic:
         raise UnsupportedError(f"{team.name} has a scenario.xml; an XCSP3 file holds one problem, not its changes")
@@ -37,28 +39,34 @@ def team_network(team: Team) -> tuple[Network, Codes]:
     impossible = False
     for part in components(team.variables.values(), team.constraints(), [one.variables for one in soft]):
         places = [place[name] for name in part.names]
-        said = with_cliques(part.network, lambda _: None)
-        for name, codes in zip(part.names, said.domains, strict=True):
+        network = with_cliques(part.network, lambda _: None)
+        for name, codes in zip(part.names, network.domains, strict=True):
             domains[name] = part.decoded(codes) or domains[name]  # no format has an empty domain
         impossible = impossible or part.network.impossible
-        tables += [_over_values(table, part, places) for table in said.tables]
-        different += [tuple([places[member] for member in scope]) for scope in said.different]
+        tables += [_over_values(table, part, places) for table in network.tables]
+        different += [tuple([places[member] for member in scope]) for scope in network.different]
         if not part.network.impossible:
             known = set(part.names)
             charges += _charges(part, places, [one for one in soft if one.variables[0] in known])
-    paid = [tuple(sorted({row[-1] for row in table.rows})) for table in charges]
-    anyway = constant_costs(team)
-    if anyway or (team.kind is ProblemKind.DISWCSP and not paid):
-        paid.append((anyway,))
-    if sum(map(max, paid)) > MAX_TOTAL_COST:
-        raise UnsupportedError(
-            f"{team.name} has costs that add up to more than {MAX_TOTAL_COST:,}, too much for XCSP3's solvers"
-        )
+    paid = _cost_domains(team, charges)
     costs = tuple(range(len(domains), len(domains) + len(paid)))
     tables += [replace(table, scope=(*table.scope, cost)) for table, cost in zip(charges, costs, strict=False)]
     _refuse_far_values(team, domains)
     network = Network((*domains.values(), *paid), tuple(tables), tuple(different))
     return _readable(network, impossible=impossible), costs
+
+
+def _cost_domains(team: Team, charges: Sequence[Table]) -> list[Codes]:
+    """Return the domains of the cost variables: one for each table of `charges`, one for constant costs."""
+    domains = [tuple(sorted({row[-1] for row in table.rows})) for table in charges]
+    constant = constant_costs(team)
+    if constant or (team.kind is ProblemKind.DISWCSP and not domains):
+        domains.append((constant,))
+    if sum(map(max, domains)) > MAX_TOTAL_COST:
+        raise UnsupportedError(
+            f"{team.name} has costs that add up to more than {MAX_TOTAL_COST:,}, too much for XCSP3's solvers"
+        )
+    return domains
 
 
 def _readable(network: Network, *, impossible: bool) -> Network:
@@ -84,9 +92,9 @@ def _refuse_far_values(team: Team, domains: Mapping[str, Codes]) -> None:
     for name, values in domains.items():
         far = [f"{value:,}" for value in (values[0], values[-1]) if not MIN_VALUE <= value <= MAX_VALUE]
         if far or values[-1] - values[0] > MAX_SPREAD:
-            told = far[0] if far else f"{values[0]:,} and {values[-1]:,}"
+            shown = far[0] if far else f"{values[0]:,} and {values[-1]:,}"
             raise UnsupportedError(
-                f"{team.name} has a variable {name} with the value {told}; XCSP3's solvers compute with 32 bits: ACE"
+                f"{team.name} has a variable {name} with the value {shown}; XCSP3's solvers compute with 32 bits: ACE"
                 f" takes values from {MIN_VALUE:,} to {MAX_VALUE:,}, and in one domain no further apart than"
                 f" {MAX_SPREAD:,}; shift the problem's values, or scale them"
             )

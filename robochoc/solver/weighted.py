@@ -1,8 +1,8 @@
-"""Problems with costs, as the solver is handed them: what is charged becomes a column of tables, never an expression.
+"""Problems with costs, as the solver gets them: costs are a column of tables, never an expression.
 
-For the variables that share charges there is one more variable, whose codes are what they are charged, and a table
-that says which of them goes with which codes of theirs. What is left for the solver to compute is a sum of these
-variables, none of which is negative; what is minimised is checked again by whoever knows the problem.
+For each scope with costs there is one more variable, whose codes are the costs, and a table that relates them to the
+codes of the scope. The solver only minimises the sum of these variables, none of which is negative; the minimum is
+checked again with the original problem.
 """
 
 from __future__ import annotations
@@ -26,19 +26,19 @@ from robochoc.solver.encoding import (
 from robochoc.solver.propagation import propagate
 
 MAX_COST_ROWS = 1_000_000
-"""How many combinations of values may have a price each."""
+"""The maximum number of combinations of values in a cost table."""
 MAX_TOTAL_COST = 2**30
-"""So much may all charges come to, at worst, in units of their greatest common divisor: ACE's codes are small."""
+"""The maximum of all costs together, in units of their greatest common divisor: ACE's codes are small."""
 
 CostRows = dict[Codes, float]
-"""What combinations of codes are charged; those that are not there are forbidden."""
+"""The costs of combinations of codes. Combinations that are not in it are forbidden."""
 
 
 @dataclass(frozen=True)
 class WeightedComponent:
-    """The variables of `part`, which come first in `network`, and what they are charged.
+    """A component with costs. In `network`, the variables of `part` come first.
 
-    That is `base`, and `unit` times the sum of the codes at the places `costs`.
+    The cost of a solution is `base`, plus `unit` times the sum of the codes at the places `costs`.
     """
 
     part: Component
@@ -52,7 +52,7 @@ class WeightedComponent:
         return self.base + self.unit * sum(codes[place] for place in self.costs)
 
     def decoded(self, codes: Sequence[int]) -> dict[str, int]:
-        """Return the values of the variables behind a solution of `network`; those that are aside have none."""
+        """Return the values of the variables behind a solution of `network`; withdrawn ones have none."""
         values = self.part.values
         own = zip(self.part.names, codes, strict=False)
         return {name: values[code] for name, code in own if code < len(values)}
@@ -61,8 +61,10 @@ class WeightedComponent:
 def weighted_components(variables: Iterable[Variable], constraints: Sequence[Constraint]) -> list[WeightedComponent]:
     """Return the problem of `variables` and `constraints`, split into what does not depend on each other.
 
-    What constraints on constants charge is left out. Raises `UnsupportedError` when a constraint has too many tuples,
-    or charges are too high.
+    What constraints on constants charge is left out.
+
+    Raises:
+        UnsupportedError: when a constraint has too many tuples, or charges are too high.
     """
     soft = [constraint for constraint in constraints if is_soft(constraint) and constraint.variables]
     parts = components(variables, constraints, [constraint.variables for constraint in soft])
@@ -104,7 +106,10 @@ def _by_scope(part: Component, soft: Iterable[Constraint]) -> dict[Codes, list[C
 def with_cost_variables(part: Component, network: Network, charges: Mapping[Codes, CostRows]) -> WeightedComponent:
     """Return `network`, which is that of `part`, with a variable for every scope that is charged.
 
-    Combinations of codes that a scope has no price for are forbidden. Raises `UnsupportedError` when they are too high.
+    Combinations of codes that a scope has no price for are forbidden.
+
+    Raises:
+        UnsupportedError: when they are too high.
     """
     least = {scope: int(min(prices.values(), default=0)) for scope, prices in charges.items()}
     above = {scope: {row: int(price) - least[scope] for row, price in charges[scope].items()} for scope in charges}
@@ -112,7 +117,7 @@ def with_cost_variables(part: Component, network: Network, charges: Mapping[Code
     worst = sum(max(prices.values(), default=0) for prices in above.values()) // unit
     if worst > MAX_TOTAL_COST:
         raise UnsupportedError(
-            f"costs add up to {worst * unit:,} at worst, which is more than the central judge can minimise; costs that"
+            f"costs add up to {worst * unit:,} at worst, which is more than the central solver can minimise; costs that"
             " stand for 'never' are better written as infinity"
         )
     domains, tables, costs = list(network.domains), list(network.tables), []
@@ -125,10 +130,10 @@ def with_cost_variables(part: Component, network: Network, charges: Mapping[Code
     return WeightedComponent(part, Network(tuple(domains), tuple(tables)), tuple(costs), sum(least.values()), unit)
 
 
-def components_with_withdrawal(team: Team, aside: int) -> list[WeightedComponent]:
+def components_with_withdrawal(team: Team, withdrawal_cost: int) -> list[WeightedComponent]:
     """Return the components of `team`, where robots may withdraw, with all their constraints.
 
-    `aside` is the cost of withdrawing a robot of weight 1.
+    `withdrawal_cost` is the cost of withdrawing a robot of weight 1.
 
     Its variables then have a code that stands for no value.
     """
@@ -154,7 +159,7 @@ def components_with_withdrawal(team: Team, aside: int) -> list[WeightedComponent
             first, *others = (place[name] for name in own[robot.name])
             network = replace(network, tables=(*network.tables, *_all_or_none(network, first, others, absent)))
             prices = charges.setdefault((first,), {(code,): 0 for code in network.domains[first]})
-            prices[absent,] += robot.weight * aside
+            prices[absent,] += robot.weight * withdrawal_cost
         found.append(with_cost_variables(part, network, charges))
     return found
 
@@ -199,7 +204,7 @@ def _prices(part: Component, network: Network, scope: Codes, charging: Iterable[
         names = ", ".join(constraint.name for constraint in charging)
         raise UnsupportedError(
             f"constraint {names} has a price for {size:,} combinations of values, more than {MAX_COST_ROWS:,} that the"
-            " central judge can list; split it"
+            " central solver can list; split it"
         )
     prices = [cost_function(constraint, [part.names[place] for place in scope]) for constraint in charging]
     found = {}

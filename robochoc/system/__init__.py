@@ -1,1 +1,1 @@
-"""What Python and the operating system offer, each wrapped once: files, plug-ins, text for terminals."""
+"""Wrappers of Python and the operating system: files, plug-ins, text for terminals."""

@@ -1,4 +1,4 @@
-"""What installed packages offer under an entry point group: protocols, filters. Code of whoever wrote the package."""
+"""Entry points of installed packages, such as protocols and filters. Their code need not be ours."""
 
 from __future__ import annotations
 
@@ -11,11 +11,11 @@ from typing import NamedTuple
 from robochoc.system.entry_points import EntryPoint, entry_points
 
 Fault = Callable[[object], str]
-"""Why something that was loaded cannot be used; empty when it can."""
+"""Returns why a loaded object cannot be used. Empty: it can."""
 
 
 class Loaded(NamedTuple):
-    """What stands behind an entry point, or, if it cannot be used, why."""
+    """The object of an entry point, or why it cannot be used."""
 
     what: object
     broken: str
@@ -37,7 +37,7 @@ def _read(group: str, _path: tuple[tuple[str, int], ...]) -> tuple[EntryPoint, .
 
 def _changed_ns(place: str) -> int:
     try:
-        return os.stat(place or os.curdir).st_mtime_ns  # noqa: PTH116 - a name of sys.path, as often as anybody asks
+        return os.stat(place or os.curdir).st_mtime_ns  # noqa: PTH116 - names of sys.path, often
     except OSError:
         return 0
 
@@ -69,7 +69,7 @@ def not_installed_message(group: str, kind: str, name: str) -> str:
 
 
 def load_entry_point(entry: EntryPoint, namesakes: Sequence[EntryPoint], fault: Fault) -> Loaded:
-    """Return what stands behind `entry`. Whatever goes wrong is told: one broken package must not hide the others."""
+    """Return the object of `entry`, or why it cannot be used. One broken package must not hide the others."""
     if len(namesakes) > 1:
         places = " and ".join(sorted(f"{one.value} ({one.dist.name if one.dist else 'unknown'})" for one in namesakes))
         return Loaded(None, f"is offered by several packages, and only one may: {places}")

@@ -1,4 +1,4 @@
-"""What becomes of a process when its parent dies, however that went."""
+"""Processes end when their parent dies, for whatever reason."""
 
 from __future__ import annotations
 

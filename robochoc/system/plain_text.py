@@ -1,22 +1,22 @@
 """Text of others as it may be shown: on a terminal, on a page, in a journal in words. One function, for all of it.
 
-Names, reasons and messages come from files and from robots of other owners. Whoever writes them must not speak to the
-terminal (escape sequences), turn what is read around (bidirectional overrides), break the line, or fill the screen.
+Names, reasons and messages come from files and from robots of other owners. Their authors must not be able to speak to
+the terminal (escape sequences), turn what is read around (bidirectional overrides), break the line, or fill the screen.
 """
 
 from __future__ import annotations
 
 LONGEST = 10_000
-"""Characters. No line of ours is as long, unless somebody wants it to be."""
+"""Characters. Our own lines are shorter."""
 LONGEST_REASON = 500
-"""Of what a participant says why it ends, or is refused."""
+"""The maximum number of characters of the reason why a participant ends, or is refused."""
 
 
 def on_one_line(text: str, longest: int = LONGEST) -> str:
     """Return `text` as it may be shown: what does not print is escaped, and what is beyond `longest` left out.
 
     Controls, line breaks, marks that change the direction of writing, lone surrogates: none of them prints. Markup is
-    only text here: who shows it by means that know markup (HTML) has to escape that as well.
+    only text here: code that shows it as HTML has to escape that as well.
     """
     shown = "".join(char if char.isprintable() else ascii(char)[1:-1] for char in text[:longest])
     return shown if len(text) <= longest else f"{shown}... ({len(text) - longest:,} more characters)"

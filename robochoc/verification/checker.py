@@ -1,7 +1,7 @@
-"""The checker: holds what a team claims against every constraint of every file.
+"""The checker: checks the answer of a team with every constraint of every file.
 
-It shares nothing with the protocols and with what they see of a problem (`solver/`): constraints are evaluated as
-the files state them, tuple by tuple and term by term.
+It shares no code with the protocols and the solver: constraints are evaluated as the files state them, tuple by tuple
+and term by term.
 """
 
 from __future__ import annotations
@@ -12,15 +12,15 @@ from robochoc.model.expression import UndefinedValueError, evaluate
 from robochoc.model.problem import INFINITE, Assignment, Constraint, Relation, Robot, Semantics, Team, Variable
 
 MAX_TRIES = 20_000
-"""Values to be tried for the variables of a robot that stepped aside."""
+"""The maximum number of values that are tried for the variables of a withdrawn robot."""
 
 
 class RefutedError(Exception):
-    """What a protocol claims is refuted by the checker, or by a second opinion: a fault of the protocol, or ours."""
+    """An answer that the checker or the central solver refutes: a fault of the protocol, or of this program."""
 
 
 def violations(team: Team, assignment: Assignment, withdrawn: Collection[str] = ()) -> Iterator[str]:
-    """Yield why `assignment` is no answer for the robots of `team` that have not withdrawn; nothing when it is one.
+    """Yield why `assignment` is no solution for the robots of `team` that are not withdrawn. Nothing: it is one.
 
     Every variable of a flying robot has a value of its domain and every constraint among flying robots holds.
     """
@@ -41,15 +41,15 @@ def violations(team: Team, assignment: Assignment, withdrawn: Collection[str] = 
 
 
 def assignment_cost(team: Team, assignment: Assignment) -> float:
-    """Return what `assignment` pays in all, over the constraints whose variables it covers."""
+    """Return the cost of `assignment`: of all constraints whose variables have values."""
     met = (c for c in team.constraints() if all(name in assignment for name in c.variables))
     return sum(constraint_cost(constraint, assignment) for constraint in met)
 
 
 def needlessly_withdrawn(team: Team, assignment: Assignment, withdrawn: Collection[str]) -> Iterator[str]:
-    """Yield robots that stepped aside although they had a place beside those that fly.
+    """Yield withdrawn robots for which there is a place beside the others.
 
-    A robot of many variables is given `MAX_TRIES` tries; who has found no place by then is believed.
+    For each robot at most `MAX_TRIES` values are tried.
     """
     constraints = list(team.constraints())
     for name in withdrawn:
@@ -88,7 +88,7 @@ def _has_a_place(
 
 
 def constraint_cost(constraint: Constraint, assignment: Assignment) -> float:
-    """Return what `assignment` pays at `constraint`: 0 where it holds, `INFINITE` where it is broken and hard."""
+    """Return the cost of `constraint` for `assignment`: 0 if it holds, `INFINITE` if it is hard and violated."""
     values = tuple(assignment[term] if isinstance(term, str) else term for term in constraint.parameters)
     definition = constraint.definition
     if isinstance(definition, Relation):

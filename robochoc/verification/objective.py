@@ -1,4 +1,4 @@
-"""What a team minimises, seen from outside: the costs of its constraints, and of robots that step aside."""
+"""The objective of a team: the costs of its constraints, and of withdrawn robots."""
 
 from __future__ import annotations
 
@@ -10,16 +10,20 @@ from robochoc.solver.encoding import cost_function, max_cost
 
 
 class Objective:
-    """What is minimised, for values that change: the costs of `team`'s constraints, and of those who step aside.
+    """The objective for an assignment that changes.
 
-    `aside` is what it costs that a robot of weight 1 does so (None: nobody may, and without values there is no cost).
-    `interfaces` are the variables that each robot shows to its neighbours. They are `team`'s, until somebody says
-    that robots work on the team in another form.
+    Args:
+        team: The team.
+        withdrawal_cost: The cost of withdrawing a robot of weight 1. Robots without values are withdrawn. None: no
+            robot may withdraw, and the cost is infinite until all have values.
+
+    Attributes:
+        interfaces: The interface variables of each robot. Runs that reorder the team replace them.
     """
 
-    def __init__(self, team: Team, aside: float | None = None) -> None:
+    def __init__(self, team: Team, withdrawal_cost: float | None = None) -> None:
         self._weights = {robot.name: robot.weight for robot in team.robots}
-        self._aside = aside
+        self._withdrawal_cost = withdrawal_cost
         self._constraints = [(c.variables, cost_function(c, c.variables)) for c in team.constraints()]
         self._paid: list[float] = [0] * len(self._constraints)
         self._on: dict[str, list[int]] = {name: [] for name in team.variables}
@@ -58,10 +62,10 @@ class Objective:
 
     @property
     def cost(self) -> float:
-        """Return what it comes to now."""
-        if self._absent and self._aside is None:
+        """The cost of the present assignment."""
+        if self._absent and self._withdrawal_cost is None:
             return INFINITE
-        return sum(self._paid) + sum(self._weights[name] for name in self._absent) * (self._aside or 0)
+        return sum(self._paid) + sum(self._weights[name] for name in self._absent) * (self._withdrawal_cost or 0)
 
 
 def withdrawal_cost(team: Team) -> float:

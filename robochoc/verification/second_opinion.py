@@ -17,7 +17,7 @@ def confirmed(
     alone: str | None = None,
     *,
     total: float = INFINITE,
-    aside: int | None = None,
+    withdrawal_cost: int | None = None,
 ) -> bool:
     """Return whether the central solver agrees with a protocol.
 
@@ -28,7 +28,7 @@ def confirmed(
         alone: a robot that has no local solution. The checker looks at it as well, as the central solver and the
             compiler of domains share their encoding.
         total: the minimum cost that is claimed, withdrawal costs included; infinite: that there is no solution.
-        aside: the withdrawal cost of a robot of weight 1 (None: no robot may withdraw).
+        withdrawal_cost: the withdrawal cost of a robot of weight 1 (None: no robot may withdraw).
 
     Returns:
         Whether it agrees; false if it has not come to an end.
@@ -36,11 +36,11 @@ def confirmed(
     Raises:
         RefutedError: when it has found something else.
     """
-    opinion = solver.judge(team, aside=aside)
+    opinion = solver.solve(team, withdrawal_cost=withdrawal_cost)
     against = contradiction(opinion, total)
     if against or (alone is not None and has_local_solution(team[alone])):
         claim = "no solution" if total == INFINITE else f"a solution of the least cost, {total:,}"
-        found = f"{team.name} has {claim}, and a judge has found {against or 'one'}"
+        found = f"{team.name} has {claim}, and the central solver has found {against or 'one'}"
         raise RefutedError(f"{protocol} says that {found}")
     return opinion.verdict is not Verdict.UNKNOWN
 

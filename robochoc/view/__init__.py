@@ -1,1 +1,1 @@
-"""The team in 3D: drones on the ground, then flying at their places (Section 5, Figures 5 and 6)."""
+"""The team in 3D: drones on the ground, then flying to their places (Section 5, Figures 5 and 6)."""

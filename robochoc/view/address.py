@@ -1,4 +1,4 @@
-"""Where pages of ours are to be found: on the loopback interface of this machine alone."""
+"""Addresses of pages that are served here: on the loopback interface of this machine alone."""
 
 from __future__ import annotations
 
@@ -10,15 +10,18 @@ _SECRET_BYTES = 18
 
 
 def loopback_socket(port: int = 0) -> socket:
-    """A socket that listens on the loopback interface; port 0 is any free one. Raises `OSError` when it is taken."""
+    """Return a socket that listens on the loopback interface; port 0 is any free one.
+
+    Raises `OSError` if it is taken.
+    """
     return create_server((_LOOPBACK, port))
 
 
 def url_of(listener: socket, path: str = "") -> str:
-    """Where a browser of this machine finds `path`."""
+    """Return the URL of `path` for a browser of this machine."""
     return f"http://{_LOOPBACK}:{listener.getsockname()[1]}/{path}"
 
 
 def secret_path() -> str:
-    """A path that nobody guesses: others may use this machine, too."""
+    """Return an unguessable path, as other users may use this machine, too."""
     return token_urlsafe(_SECRET_BYTES)

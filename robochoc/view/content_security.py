@@ -1,7 +1,7 @@
-"""What a page of ours may do, said to the browser as a Content-Security-Policy.
+"""The Content-Security-Policy of pages: what a browser lets them do.
 
-Nothing is loaded from anywhere, and no script runs but those that the page was made with, known by their hashes: what
-strangers' names might smuggle into a page stays text.
+Nothing is loaded from anywhere, and no script runs but those that the page was made with, known by their hashes. What
+names from foreign files might smuggle into a page stays text.
 """
 
 from __future__ import annotations
@@ -12,9 +12,9 @@ from collections.abc import Iterable
 
 
 def content_security_policy(scripts: Iterable[str], connections: str = "'none'") -> str:
-    """The policy of a page with these `scripts`, that may ask `connections` (CSP's words) for data.
+    """Return the policy of a page with these `scripts`, which may connect to `connections` (in CSP's form).
 
-    Styles may stand in the page, as meshcat's viewer makes some of its own.
+    Styles may be inline, as meshcat's viewer makes some of its own.
     """
     hashes = " ".join(map(_hashed, scripts))
     return (

@@ -21,7 +21,7 @@ from robochoc.view.quadrotor import HUB, Shape, box, disc, joined, quadrotor
 from robochoc.view.scene import DrawnDrone, Scene
 
 _Corners = npt.NDArray[np.float64]
-"""The lowest and the highest x, y and z of something, a row each."""
+"""The lowest and the highest x, y and z, a row each."""
 _Corner = npt.NDArray[np.float64]
 """An x, a y and a z."""
 
@@ -31,32 +31,32 @@ _WHITE: Colour = (1, 1, 1)
 _MARGIN = 0.8
 """Ground around the outermost drones, in cells."""
 _EYE = np.array([0.7, -1.0, 0.42])
-"""Where the camera states from: in front of row 1, a little to the right, from above."""
+"""The direction of the camera: in front of row 1, a little to the right, from above."""
 _FIELD_OF_VIEW_DEG = 28
 _ROOM = 1.06
-"""Of the view, for what the scene itself fills: the axes' labels need some."""
+"""The share of the view for the scene itself: the axes' labels need some."""
 _TEXT = 0.045
-"""Height of text, as a part of the scene's radius."""
+"""The height of text, as a part of the scene's radius."""
 _READABLE = 0.03
-"""Height of text that can still be read, likewise."""
+"""The least height of text, likewise."""
 _NAME_WIDTH = 0.8
-"""Of a drone's name, at most, in cells: the neighbour needs room for its own."""
+"""The greatest width of a drone's name, in cells: its neighbour's needs room, too."""
 FPS = 30
-"""Frames a second, of the animation."""
+"""Frames a second of the animation."""
 _FADE = 25
-"""Frames in which a drone that steps aside turns grey."""
+"""Frames in which a drone that withdraws turns grey."""
 _CLOSE = 0.002
-"""Of a cell: so much may an animated drone be off where it was flown."""
+"""How far, in cells, an animated drone may be from where it was flown."""
 _ALIKE = math.radians(0.5)
-"""So much may it be turned."""
+"""By which angle, in radians, it may be turned."""
 _IN_THE_WAY = 0.9
-"""Of a cell, that an obstacle takes up."""
+"""The size of an obstacle, in cells."""
 _OPACITIES = {"body": 0.35, "edges": 0.9}
-"""Of an obstacle's parts."""
+"""Opacities of an obstacle's parts."""
 
 
 def commands(scene: Scene) -> list[bytes]:
-    """The packed commands that make meshcat's viewer show `scene` and play its playback once."""
+    """Return the packed commands that make meshcat's viewer show `scene` and play its flight once."""
     if scene.playback is None:
         return _drawn(scene, [drone.end for drone in scene.drones]).commands
     meshcat = _drawn(scene, [drone.home for drone in scene.drones])
@@ -66,20 +66,20 @@ def commands(scene: Scene) -> list[bytes]:
 
 
 def still(scene: Scene) -> list[bytes]:
-    """The same without the playback: every drone stays at home."""
+    """Return the same without the flight: every drone stays at home."""
     return _drawn(scene, [drone.home for drone in scene.drones]).commands
 
 
 def path_of(number: int, name: str) -> str:
-    """Where in meshcat's tree, below its root, the drone called `name` is: the scene's `number`-th, counted from 0.
+    """Return the path in meshcat's tree, below its root, of the drone called `name`: the `number`-th, counted from 0.
 
-    The number keeps paths apart, and away from names that mean something in JavaScript.
+    The number keeps paths apart, and different from names that mean something in JavaScript.
     """
     return f"drones/{number + 1} " + re.sub(r"[^\w.-]", "_", name)
 
 
 def corners(scene: Scene) -> list[list[float]]:
-    """Points around all there is to see, names of axes included, in a frame scaled to radius 1 around the drones."""
+    """Return points around all that is visible, axes' names too, in a frame scaled to radius 1 around the drones."""
     extent, radius = _measured(scene)
     names = [2 * name_at - origin for _, _, origin, name_at in _beside(scene.axes, _TEXT * radius)]
     found: list[list[float]] = ((np.array([*_corners(extent), *names]) - extent.mean(axis=0)) / radius).tolist()
@@ -87,12 +87,12 @@ def corners(scene: Scene) -> list[list[float]]:
 
 
 def cell_of(scene: Scene) -> float:
-    """How long a cell is in that frame."""
+    """Return the length of a cell in that frame."""
     return 1 / _measured(scene)[1]
 
 
 def _drawn(scene: Scene, points: Sequence[Point]) -> MeshcatCommands:
-    """Everything, each drone at its point of `points`."""
+    """Draw everything, each drone at its point of `points`."""
     meshcat = MeshcatCommands()
     extent, radius = _measured(scene)
     _aim(meshcat, extent, radius)
@@ -104,7 +104,7 @@ def _drawn(scene: Scene, points: Sequence[Point]) -> MeshcatCommands:
 
 
 def _measured(scene: Scene) -> tuple[_Corners, float]:
-    """What the scene takes up, and the radius of the sphere around that."""
+    """Return the extent of the scene, and the radius of the sphere around it."""
     points = [point for drone in scene.drones for point in (drone.home, drone.place, drone.landing) if point]
     everything = np.array([*points, *_box(scene.axes)])
     margin = np.array([_MARGIN, _MARGIN, 0])
@@ -134,17 +134,17 @@ def _aim(meshcat: MeshcatCommands, extent: _Corners, radius: float) -> None:
 
 
 def _from_where_to_see(corners: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
-    """Where, in the direction of `_EYE`, a camera that states at the origin just has all `corners` in a square view."""
+    """Return where, in the direction of `_EYE`, a camera that looks at the origin has all `corners`."""
     back: npt.NDArray[np.float64] = _EYE / np.linalg.norm(_EYE)
     right = np.cross([0, 0, 1], back)
     right /= np.linalg.norm(right)
-    aside = np.abs(corners @ np.column_stack([right, np.cross(back, right)])).max(axis=1)
-    distance = corners @ back + _ROOM * aside / math.tan(math.radians(_FIELD_OF_VIEW_DEG / 2))
+    across = np.abs(corners @ np.column_stack([right, np.cross(back, right)])).max(axis=1)
+    distance = corners @ back + _ROOM * across / math.tan(math.radians(_FIELD_OF_VIEW_DEG / 2))
     return back * float(distance.max())
 
 
 def _draw_ground(meshcat: MeshcatCommands, scene: Scene, extent: _Corners) -> None:
-    """A plane, and on it each drone's pad in the colour of its row."""
+    """Draw a plane, and on it each drone's pad in the colour of its row."""
     (left, front, _), (right, back, _) = extent
     corners = np.array([[left, front, 0], [right, front, 0], [right, back, 0], [left, back, 0]])
     plane = Shape(corners, np.array([[0, 1, 2], [0, 2, 3]]), np.ones((4, 3)))
@@ -158,7 +158,7 @@ def _draw_ground(meshcat: MeshcatCommands, scene: Scene, extent: _Corners) -> No
 
 
 def _draw_box(meshcat: MeshcatCommands, axes: Sequence[Axis]) -> None:
-    """The edges, the walls behind and below with their grid, and very faintly every cell."""
+    """Draw the edges, the walls behind and below with their grid, and very faintly every cell."""
     low, high = _box(axes)
     walls = [np.arange(a, b + 0.5) for a, b in zip(low, high, strict=True)]
     parts = {
@@ -173,7 +173,7 @@ def _draw_box(meshcat: MeshcatCommands, axes: Sequence[Axis]) -> None:
 
 
 def _label_axes(meshcat: MeshcatCommands, axes: Sequence[Axis], height: float) -> None:
-    """Each named axis' name and numbers, beside the edge of the box that is nearest to the viewer."""
+    """Draw each named axis' name and numbers, beside the edge of the box that is nearest to the viewer."""
     for number, axis, origin, name_at in _beside(axes, height):
         for at, text in axis.ticks:
             spot = origin.copy()
@@ -183,7 +183,7 @@ def _label_axes(meshcat: MeshcatCommands, axes: Sequence[Axis], height: float) -
 
 
 def _beside(axes: Sequence[Axis], height: float) -> Iterator[tuple[int, Axis, _Corner, _Corner]]:
-    """The named axes by their numbers, the line beside the box for the numbers of each, the spot for its name."""
+    """Yield the named axes: number, axis, the middle of the line for its numbers, the point for its name."""
     low, high = _box(axes)
     middle = (low + high) / 2
     near = 1.2 * height
@@ -198,7 +198,7 @@ def _beside(axes: Sequence[Axis], height: float) -> Iterator[tuple[int, Axis, _C
 
 
 def _lattice(walls: Sequence[npt.NDArray[np.float64]]) -> npt.NDArray[np.float64]:
-    """Both ends of every line parallel to an axis, where walls meet."""
+    """Return both ends of every line parallel to an axis, where walls meet."""
     ends = []
     for along in range(3):
         across = [walls[axis] if axis != along else walls[axis][[0, -1]] for axis in range(3)]
@@ -248,7 +248,7 @@ def _animate(meshcat: MeshcatCommands, drones: Sequence[DrawnDrone], playback: P
 
 
 def _moves(path: str, playback: Playback, number: int) -> Iterator[Track]:
-    """How a drone moves and tilts, if it does at all."""
+    """Yield the tracks of a drone's positions and attitudes, if it moves at all."""
     frames = FPS * playback.times
     positions, attitudes = playback.positions[:, number], playback.attitudes[:, number]
     if np.linalg.norm(positions - positions[0], axis=1).max() > _CLOSE:
@@ -263,7 +263,7 @@ def _keys(frames: Samples, values: Samples, keys: Keys) -> list[tuple[float, lis
 
 
 def _painting(path: str, states: Sequence[tuple[float, DroneState]], colour: Colour) -> Track:
-    """How a drone changes its colour."""
+    """Return the track of a drone's colour."""
     keys: list[tuple[float, Colour]] = [(0, colour)]
     for at_s, look in states:
         begin, now = max(FPS * at_s, keys[-1][0]), keys[-1][1]
@@ -272,13 +272,13 @@ def _painting(path: str, states: Sequence[tuple[float, DroneState]], colour: Col
 
 
 def _appearing(path: str, at_s: float, opacity: float) -> Track:
-    """How something comes into sight."""
+    """Return the track of an obstacle that comes into sight."""
     begin = FPS * at_s
     return Track(path, "material.opacity", "number", [(0, [0.0]), (begin, [0.0]), (begin + _FADE, [opacity])])
 
 
 def _texts(names: Sequence[str], readable: float) -> list[str]:
-    """What to write on the drones: their names; where those would be too small, the 3.1 of `Robot3.1`."""
+    """Return the texts on the drones: their names; where those would be too small, the 3.1 of `Robot3.1`."""
     if all(_NAME_WIDTH / label(name).aspect >= readable for name in names):
         return list(names)
     word = re.split("[0-9]", names[0])[0]
@@ -294,14 +294,14 @@ def _write(meshcat: MeshcatCommands, path: str, text: str, at: npt.NDArray[np.fl
 
 
 def row_colours(drones: Sequence[DrawnDrone]) -> list[Colour]:
-    """The colour of each drone: that of its row."""
+    """Return the colour of each drone: that of its row."""
     groups = sorted({drone.group for drone in drones})
     shades = dict(zip(groups, colours(len(groups)), strict=True))
     return [shades[drone.group] for drone in drones]
 
 
 def colour_of(look: DroneState, colour: Colour) -> Colour:
-    """What a drone states like, if it is of that `colour` by itself."""
+    """Return the colour of a drone in this state, if that of its row is `colour`."""
     match look:
         case DroneState.FLIES:
             return colour

@@ -1,4 +1,4 @@
-"""Key frames: what of a motion's samples a player needs, that goes straight (or turns evenly) from key to key."""
+"""Key frames: the samples of a motion that a player needs. It interpolates between them."""
 
 from __future__ import annotations
 
@@ -13,11 +13,11 @@ Keys = npt.NDArray[np.int64]
 """The numbers of the samples that are kept, in order; always the first and the last."""
 
 _NEARLY_ONE = 1 - 1e-9
-"""Quaternions whose product is more are as good as equal."""
+"""Quaternions with a larger product are as good as equal."""
 
 
 def position_keys(times: Samples, positions: Samples, tolerance: float) -> Keys:
-    """The samples to keep so that straight moves between them are never further off a sample than `tolerance`."""
+    """Return the samples to keep so that straight moves between them are never further off than `tolerance`."""
 
     def off(first: int, last: int, between: Samples) -> Samples:
         start, end = positions[first], positions[last]
@@ -28,7 +28,7 @@ def position_keys(times: Samples, positions: Samples, tolerance: float) -> Keys:
 
 
 def attitude_keys(times: Samples, attitudes: Samples, tolerance: float) -> Keys:
-    """The same for attitudes, which turn evenly from key to key (slerp); `tolerance` is an angle, in radians."""
+    """Return the same for attitudes, with even turns between them (slerp). `tolerance` is an angle, in radians."""
 
     def off(first: int, last: int, between: Samples) -> Samples:
         turned = slerp(attitudes[first], attitudes[last], between)
@@ -38,7 +38,7 @@ def attitude_keys(times: Samples, attitudes: Samples, tolerance: float) -> Keys:
 
 
 def slerp(start: Samples, end: Samples, between: Samples) -> Samples:
-    """Attitudes on the shortest turn from `start` to `end`, at the fractions `between` (T,)."""
+    """Return attitudes on the shortest turn from `start` to `end`, at the fractions `between` (T,)."""
     cosine = float(start @ end)
     if cosine < 0:
         end, cosine = -end, -cosine
@@ -52,7 +52,7 @@ def slerp(start: Samples, end: Samples, between: Samples) -> Samples:
 
 
 def angle(one: Samples, other: Samples) -> Samples:
-    """The angles, in radians, between two rows of attitudes."""
+    """Return the angles, in radians, between two rows of attitudes."""
     # By the sine: the cosine of a small angle is 1, whatever it is.
     apart = np.minimum(_lengths(one - other), _lengths(one + other))
     return np.asarray(4 * np.arcsin(np.clip(apart / 2, 0, 1)))
@@ -63,7 +63,7 @@ def _lengths(rows: Samples) -> Samples:
 
 
 def _kept(times: Samples, off: Callable[[int, int, Samples], Samples], tolerance: float) -> Keys:
-    """Douglas and Peucker's way: between two keys the sample that is furthest off becomes one, until none is far off.
+    """Return the samples to keep, after Douglas and Peucker: the furthest sample between two keys becomes a key.
 
     D. Douglas, T. Peucker: Algorithms for the reduction of the number of points required to represent a digitized
     line. Cartographica 10(2), 1973.

@@ -1,4 +1,4 @@
-"""Text for the scene, as pictures: SVG, which the browser draws in its own fonts, whatever the script."""
+"""Labels of the scene, as pictures: SVG, which the browser draws in its own fonts, whatever the script."""
 
 from __future__ import annotations
 
@@ -13,14 +13,14 @@ _LONGEST = 24
 
 
 class Label(NamedTuple):
-    """A picture and how many times wider than high it is."""
+    """A picture, and its width divided by its height."""
 
     svg: str
     aspect: float
 
 
 def label(text: str) -> Label:
-    """`text` in white with a dark rim, to be read on any background; cut where it is too long."""
+    """Return `text` in white with a dark rim, readable on any background; cut where it is too long."""
     shown = printable(text)
     if len(shown) > _LONGEST:
         shown = shown[: _LONGEST - 1] + "…"
@@ -36,5 +36,5 @@ def label(text: str) -> Label:
 
 
 def printable(text: str) -> str:
-    """`text` with a mark in place of each sign that is not one: control characters, half a surrogate pair."""
+    """Return `text` with a mark in place of what is not printable: control characters, half a surrogate pair."""
     return "".join(sign if sign.isprintable() else "\N{REPLACEMENT CHARACTER}" for sign in text)

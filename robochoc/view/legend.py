@@ -23,16 +23,17 @@ def legend(scene: Scene) -> str:
 def _rows(scene: Scene) -> Iterator[str]:
     """Yield an entry for each row, by the first axis: drones of a row have the same colour."""
     rows = sorted({drone.group for drone in scene.drones})
-    name = scene.axes[0].name or "row"
+    axis = scene.axes[0].name or "row"
+    name = f"{axis} = " if axis == "x" else f"{axis} "
     ramp = colours(len(rows))
     if len(rows) <= 1:
         return
     if len(rows) <= _SWATCHES_MAX:
         for row, colour in zip(rows, ramp, strict=True):
-            yield _entry(web(colour), f"{name} {row}")
+            yield _entry(web(colour), f"{name}{row}")
     else:
         yield _entry(
-            f"linear-gradient(to right, {', '.join(map(web, ramp))})", f"{name} {rows[0]} to {rows[-1]}", "ramp"
+            f"linear-gradient(to right, {', '.join(map(web, ramp))})", f"{name}{rows[0]} to {rows[-1]}", "ramp"
         )
 
 
@@ -45,7 +46,7 @@ def _states(scene: Scene) -> Iterator[str]:
     if DroneState.FALLEN in seen:
         yield _named(RED, "fallen")
     if scene.playback and scene.playback.obstacles:
-        yield _named(RED, "obstacle")
+        yield _entry(f"{web(RED)}59", "obstacle", "edged")
 
 
 def _named(colour: Colour, text: str) -> str:

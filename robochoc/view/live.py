@@ -24,7 +24,14 @@ def serve(
 ) -> None:
     """Show `scene` to every browser of this machine that asks, until interrupted (Ctrl-C); then return.
 
-    Port 0 is any free one. `ready` is told the URL once it can be opened. Raises `OSError` when the port is taken.
+    Args:
+        scene: What to show.
+        port: The port; 0 is any free one.
+        open_browser: Whether the user's browser is asked to show it.
+        ready: Called with the URL once it can be opened.
+
+    Raises:
+        OSError: The port is taken.
     """
     with suppress(KeyboardInterrupt):
         asyncio.run(_serve(scene, port, ready, open_browser=open_browser))

@@ -1,8 +1,8 @@
-"""A web server of this machine's own, for pages of ours.
+"""A web server for pages on this machine alone.
 
-It listens on the loopback interface only, in the calling thread, and ends with it. Everything lives below a path that
-cannot be guessed, as others may use this machine too. Other sites in the same browser get nothing from it: a Host that
-is not this machine's (DNS rebinding) is not found, and tornado refuses a WebSocket of another Origin.
+It listens on the loopback interface only, in the calling thread, and ends with it. All paths are below an unguessable
+one, as others may use this machine, too. Other sites in the same browser get nothing from it: a Host that is not this
+machine's (DNS rebinding) is not found, and tornado refuses a WebSocket of another Origin.
 """
 
 from __future__ import annotations
@@ -23,11 +23,11 @@ from robochoc.view.redirect import RedirectFile
 
 _HOSTS = r"(127\.0\.0\.1|localhost)$"
 _LONGEST_MESSAGE_BYTES = 1024
-"""Of a browser, which has nothing to say."""
+"""Browsers have nothing to send."""
 
 
 def application(handlers: Sequence[tuple[Any, ...]], *, compress: bool = False) -> Application:
-    """`handlers` (tornado's: pattern, class, arguments), for requests that are meant for this machine."""
+    """Return `handlers` (tornado's: pattern, class, arguments) for requests that are meant for this machine."""
     made = Application(
         compress_response=compress,
         websocket_max_message_size=_LONGEST_MESSAGE_BYTES,
@@ -39,7 +39,7 @@ def application(handlers: Sequence[tuple[Any, ...]], *, compress: bool = False) 
 
 @asynccontextmanager
 async def served(application: Application, listening: socket) -> AsyncIterator[None]:
-    """While it lasts, `application` answers on the socket `listening`."""
+    """Serve `application` on a socket for as long as the context lasts."""
     listening.setblocking(False)
     server = HTTPServer(application)
     server.add_socket(listening)
@@ -52,9 +52,9 @@ async def served(application: Application, listening: socket) -> AsyncIterator[N
 
 @asynccontextmanager
 async def in_browser(url: str, *, wanted: bool) -> AsyncIterator[None]:
-    """Ask the user's browser to show `url`, if that is `wanted`; its command line does not have the secret path.
+    """Ask the user's browser to show `url`, if `wanted`. Its command line does not have the secret path.
 
-    In a thread: a browser for the terminal returns when it is closed.
+    It is started in a thread: a browser for the terminal returns when it is closed.
     """
     if not wanted:
         yield
@@ -65,28 +65,28 @@ async def in_browser(url: str, *, wanted: bool) -> AsyncIterator[None]:
 
 
 def check_secret(given: str, secret: str) -> None:
-    """Raise `HTTPError` 404 unless the path `given` is the `secret` one; how long it takes tells nothing."""
+    """Raise `HTTPError` 404 unless the path `given` is the `secret` one, in constant time."""
     if not hmac.compare_digest(given.encode(), secret.encode()):
         raise HTTPError(404)
 
 
 class SecretHandler(RequestHandler):
-    """Answers those who know the secret path, the first part of the URL's, and no page of another site.
+    """Answers requests with the secret path, the first part of the URL's; none from a page of another site.
 
-    Nothing is kept by browsers: the next server at this port is another.
+    Browsers store nothing: the next server at this port is another.
     """
 
     secret: str
 
     def prepare(self) -> None:
-        """Refuse everybody else."""
+        """Refuse other requests."""
         check_secret(self.path_args[0], self.secret)
         origin = self.request.headers.get("Origin")
         if origin is not None and origin != f"http://{self.request.host}":
             raise HTTPError(403)
 
     def set_default_headers(self) -> None:
-        """Nothing is kept, framed, or told to other sites."""
+        """Forbid storing, framing, and sending the URL to other sites."""
         for name, value in (
             ("Cache-Control", "no-store"),
             ("Referrer-Policy", "no-referrer"),
@@ -98,10 +98,10 @@ class SecretHandler(RequestHandler):
             self.set_header(name, value)
 
     def compute_etag(self) -> None:
-        """None: nothing is kept, so nothing is compared."""
+        """Return None: nothing is stored, so nothing is compared."""
 
     def write_error(self, status_code: int, **_: Any) -> None:  # noqa: ANN401 - tornado's signature
-        """Say what is wrong in one line of text."""
+        """Answer with one line of text that says what is wrong."""
         self.set_header("Content-Type", "text/plain; charset=utf-8")
         self.finish(f"{status_code}: {self._reason}")
 
@@ -110,25 +110,25 @@ class SecretPage(SecretHandler):
     """A page that does not change."""
 
     def initialize(self, secret: str, page: bytes) -> None:
-        """`page` is HTML, UTF-8."""
+        """Take the page: HTML, UTF-8."""
         self.secret = secret
         self.page = page
 
     def get(self, _secret: str) -> None:
-        """Give it."""
+        """Send the page."""
         self.set_header("Content-Type", "text/html; charset=utf-8")
         self.write(self.page)
 
 
 class SecretSocket(WebSocketHandler):
-    """A WebSocket for those who know the secret path; what browsers say is ignored."""
+    """A WebSocket at the secret path. What browsers send is ignored."""
 
     secret: str
 
     def prepare(self) -> None:
-        """Refuse everybody else."""
+        """Refuse other requests."""
         check_secret(self.path_args[0], self.secret)
 
     def on_message(self, message: str | bytes) -> None:
-        """Nothing is done."""
+        """Ignore a message."""
         del message

@@ -1,8 +1,8 @@
 """meshcat without its server: what would go to it is kept, packed as its viewer reads it.
 
-The only module that knows meshcat's Python side. meshcat is imported when a scene is drawn, not before: it brings a
-web server, zmq and IPython, a third of a second that no other command should pay. `Visualizer()` alone would start
-a server on all interfaces; given a window of ours, it only talks to that.
+Only this module knows meshcat's Python side. meshcat is imported when a scene is drawn, not before: it brings a web
+server, zmq and IPython, a third of a second that other commands do not need. `Visualizer()` alone would start a server
+on all interfaces; given a window of ours, it only talks to that.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from robochoc.view.quadrotor import Shape
 
 
 class Track(NamedTuple):
-    """How a property (`position`, `quaternion`, `material.color`) of the object at `path` changes: values by frame."""
+    """The changes of a property (`position`, `quaternion`, `material.color`) of the object at `path`, by frame."""
 
     path: str
     name: str
@@ -30,13 +30,13 @@ class Track(NamedTuple):
 
 
 class _Command(Protocol):
-    """What meshcat sends: `lower` makes it a dict of plain values."""
+    """A command of meshcat: `lower` makes it a dict of plain values."""
 
     def lower(self) -> dict[str, Any]: ...
 
 
 class MeshcatCommands:
-    """Draws by meshcat into `commands`: the packed messages that make its viewer show the same, in their order.
+    """Draws by meshcat into `commands`: the packed messages that make its viewer show the same, in order.
 
     Paths are meshcat's: names joined by `/`, below `/meshcat` unless they begin with `/`. The same calls make the
     same bytes.
@@ -48,11 +48,11 @@ class MeshcatCommands:
         self._root = self._meshcat.Visualizer(window=self)
 
     def send(self, command: _Command) -> None:
-        """Keep what meshcat would send to its server: meshcat calls this."""
+        """Keep what meshcat would send to its server. meshcat calls this."""
         self._keep(command.lower())
 
     def mesh(self, path: str, shape: Shape, colour: Colour, opacity: float = 1) -> None:
-        """A solid at `path`, its faces flat, its shades times `colour`."""
+        """Draw a solid at `path`. Its faces are flat, its colours are its shades times `colour`."""
         three = self._meshcat.geometry
         geometry = three.TriangularMeshGeometry(shape.vertices, shape.faces)
         # Bytes where they do: half the size, times every drone.
@@ -67,7 +67,7 @@ class MeshcatCommands:
         self._keep(drawing)
 
     def segments(self, path: str, points: npt.NDArray[np.float64], colour: Colour, opacity: float = 1) -> None:
-        """Thin lines at `path`: of the N x 3 `points`, each two are the ends of one."""
+        """Draw thin lines at `path`. Each two of the N x 3 `points` are the ends of one."""
         three = self._meshcat.geometry
         material = three.LineBasicMaterial(color=_hex(colour), opacity=opacity, depthWrite=False)
         self._keep(self._drawing(path, three.LineSegments(three.PointsGeometry(points.T), material)))
@@ -120,7 +120,7 @@ class MeshcatCommands:
     def _keep(self, message: dict[str, Any]) -> None:
         import umsgpack  # noqa: PLC0415 - comes with meshcat, and like it only when a scene is drawn
 
-        # Key frames are many, and finer than single precision nobody sees.
+        # Key frames are many, and single precision is fine enough to see.
         precision = "single" if message["type"] == "set_animation" else "double"
         self.commands.append(umsgpack.packb(message, force_float_precision=precision))
 

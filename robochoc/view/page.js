@@ -28,12 +28,12 @@ try {
   const camera = new Camera(viewer, playback.corners, playback.cell, free, still);
   const fit = () => { trails.resize(); camera.fit(); timeline?.spread(); };
   const drones = playback.drones.map((drone) => object(drone.path));
-  const names = new Names(viewer, playback.drones.map((drone) => object(`${drone.path}/name`)), object("axes"));
+  const labels = new Labels(viewer, playback.drones.map((drone) => object(`${drone.path}/name`)), object("axes"));
 
   const frame = (now) => {
     player.step(now);
     camera.step(now);
-    names.step(now);
+    labels.step(now);
     requestAnimationFrame(frame);
   };
 
@@ -91,10 +91,10 @@ try {
   const follow = (number) => {
     chosen.value = String(number);
     camera.follow(drones[number]);
-    names.followed = number;
+    labels.followed = number;
   };
   camera.onview = (view) => {
-    if (view !== "follow") names.followed = -1;
+    if (view !== "follow") labels.followed = -1;
     for (const name of [...views, "follow"]) element(name).setAttribute("aria-pressed", name === view);
   };
   for (const view of views) element(view).addEventListener("click", () => camera.see(view));
@@ -176,7 +176,7 @@ try {
   viewer.set_3d_pane_size();
   fit();
   requestAnimationFrame(frame);
-  globalThis.Playback = { viewer, camera, player, trails, drones, names };
+  globalThis.Playback = { viewer, camera, player, trails, drones, labels };
 } catch (error) {
   const trouble = document.getElementById("trouble");
   trouble.append(error.message);

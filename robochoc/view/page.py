@@ -1,7 +1,7 @@
 """A scene as one self-contained HTML page: meshcat's viewer, the commands that fill it, a caption and a player.
 
-Team and robot names come from files of strangers. Here they reach HTML as escaped text only, and the page's
-Content-Security-Policy lets no other script run than the two it was made with, and nothing be loaded from anywhere.
+Names of teams and robots may come from foreign files. They reach HTML as escaped text only. The page's
+Content-Security-Policy lets no script run but the two it was made with, and nothing be loaded from anywhere.
 """
 
 from __future__ import annotations
@@ -19,17 +19,20 @@ from robochoc.view.playback_json import playback_json
 from robochoc.view.scene import Scene
 from robochoc.view.script import viewer_script
 
-_PLAYER = ("names.js", "trails.js", "camera.js", "player.js", "timeline.js", "page.js")
-"""The player's parts, in this order one script."""
+_PLAYER = ("labels.js", "trails.js", "camera.js", "player.js", "timeline.js", "page.js")
+"""The player's parts. In this order they are one script."""
 
 
 def page(scene: Scene) -> bytes:
-    """The page, UTF-8. It plays by itself once, needs no server and no network, and is the same for equal scenes."""
+    """Return the page, UTF-8.
+
+    It plays by itself once, needs no server and no network, and is the same for equal scenes.
+    """
     return _filled(scene, "\n".join(base64.b64encode(command).decode() for command in commands(scene)), "'none'")
 
 
 def live_page(scene: Scene, port: int) -> bytes:
-    """The same page without its commands: it asks the server that it came from for them, on this machine's `port`."""
+    """Return the same page without its commands: it asks the server that it came from, at this machine's `port`."""
     return _filled(scene, "", f"ws://127.0.0.1:{port} ws://localhost:{port}")
 
 

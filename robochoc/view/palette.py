@@ -8,9 +8,9 @@ Colour = tuple[float, float, float]
 """Red, green and blue, 0 to 1."""
 
 GREY: Colour = (0.62, 0.64, 0.67)
-"""Of those that withdrew."""
+"""Of withdrawn drones."""
 RED: Colour = (0.86, 0.16, 0.18)
-"""Of what is in the way, and of those that fell."""
+"""Of obstacles, and of fallen drones."""
 
 _RAMP = np.array(
     [
@@ -25,7 +25,7 @@ _RAMP = np.array(
 
 
 def colours(count: int) -> list[Colour]:
-    """`count` colours, evenly spaced along the ramp."""
+    """Return `count` colours, evenly spaced along the ramp."""
     stops = np.linspace(0, 1, len(_RAMP))
     at = np.linspace(0, 1, count)
     red, green, blue = (np.interp(at, stops, _RAMP[:, part]) for part in range(3))
@@ -33,5 +33,5 @@ def colours(count: int) -> list[Colour]:
 
 
 def web(colour: Colour) -> str:
-    """`colour` as a web page writes it."""
+    """Return `colour` as a web page writes it."""
     return "#" + "".join(f"{round(255 * part):02x}" for part in colour)

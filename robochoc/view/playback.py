@@ -1,4 +1,4 @@
-"""What was flown, as a picture shows it: where each drone was when, the epochs on a line of time, what happened.
+"""A flight log prepared for playback: where each drone was when, the epochs on the time line, and events.
 
 Lengths are in cells, as in `scene`; times in seconds from the beginning.
 """
@@ -19,13 +19,13 @@ from robochoc.flight.mission import Leg, Mission
 from robochoc.model.outcome import Verdict
 
 _HIT = "hits the ground"
-"""What the flight says in the end of one that falls."""
+"""The last event of a drone that falls."""
 
 _Array = npt.NDArray[np.float64]
 
 
 class DroneState(StrEnum):
-    """What a drone states like: in the colour of its row, or grey, or red."""
+    """The state that a drone's colour shows: that of its row, grey, or red."""
 
     FLIES = "flies"
     WITHDRAWN = "withdrawn"
@@ -34,7 +34,7 @@ class DroneState(StrEnum):
 
 @dataclass(frozen=True)
 class Chapter:
-    """An epoch: when its flight begins, what opened it, and what came of it."""
+    """An epoch: when its flight begins, what opened it, and its result."""
 
     begins_s: float
     opened_by: str
@@ -43,7 +43,7 @@ class Chapter:
 
 @dataclass(frozen=True)
 class EventMark:
-    """Something that happened to a drone, by its number."""
+    """An event of a drone, by its number."""
 
     at_s: float
     drone: int
@@ -52,9 +52,9 @@ class EventMark:
 
 @dataclass(frozen=True, eq=False)
 class Playback:
-    """A flight to be shown. Arrays have a row for each of T times, and in it one for each of N drones.
+    """A flight to be shown: arrays over T times and N drones.
 
-    `states` are for each drone its changes, in order: from when on it states how.
+    `states` are each drone's changes of state, in order: since when it is in which.
     """
 
     times: _Array
@@ -66,16 +66,16 @@ class Playback:
     chapters: tuple[Chapter, ...] = ()
     marks: tuple[EventMark, ...] = ()
     obstacles: tuple[tuple[float, Point], ...] = ()
-    """Since when each is seen, and where it is."""
+    """When each obstacle was seen first, and where it is."""
 
     @property
     def duration_s(self) -> float:
-        """How long it lasts."""
+        """The duration, in seconds."""
         return float(self.times[-1]) if len(self.times) else 0.0
 
 
 def playback_of(mission: Mission, flown: FlightLog) -> Playback:
-    """How `flown` states in the box of `mission`, whose drones it flew."""
+    """Return the playback of `flown` in the box of `mission`, whose drones it flew."""
     marks = [EventMark(event.at_s, event.drone, event.what) for event in flown.events]
     obstacles = [in_cells(mission, np.array(place)) for place in flown.obstacles]
     return Playback(
@@ -93,15 +93,15 @@ def playback_of(mission: Mission, flown: FlightLog) -> Playback:
 
 
 def fell(flown: FlightLog) -> dict[int, FlightEvent]:
-    """Who lies fallen in the end, and what made it fall: the last that happened to it before it hit the ground."""
-    told: dict[int, list[FlightEvent]] = {}
+    """Return the drones that have fallen, with the cause: their last event before they hit the ground."""
+    events: dict[int, list[FlightEvent]] = {}
     for event in flown.events:
         if np.isnan(flown.errors_m[event.drone]):
-            told.setdefault(event.drone, []).append(event)
-    for own in told.values():
+            events.setdefault(event.drone, []).append(event)
+    for own in events.values():
         if len(own) > 1 and own[-1].what == _HIT:
             own.pop()
-    return {number: own[-1] for number, own in told.items()}
+    return {number: own[-1] for number, own in events.items()}
 
 
 def _states(number: int, mission: Mission, flown: FlightLog) -> Iterator[tuple[float, DroneState]]:
@@ -119,7 +119,7 @@ def _states(number: int, mission: Mission, flown: FlightLog) -> Iterator[tuple[f
 
 
 def _begun(mission: Mission, flown: FlightLog) -> list[tuple[Leg, float]]:
-    """The legs that were flown, and when each began."""
+    """Return the legs that were flown, and when each began."""
     return [(leg, times.begins_s) for leg, times in zip(mission.legs, flown.legs, strict=False)]
 
 
@@ -128,15 +128,15 @@ def _chapters(mission: Mission, flown: FlightLog) -> Iterator[Chapter]:
     for leg, begins_s in _begun(mission, flown):
         for number, goal in leg.goals.items():
             (flying.discard if goal.lands else flying.add)(number)
-        yield Chapter(begins_s, leg.opened_by, f"{_told(leg.verdict)}, {_flying(flying, leg)}")
+        yield Chapter(begins_s, leg.opened_by, f"{_words(leg.verdict)}, {_flying(flying, leg)}")
 
 
-def _told(verdict: Verdict) -> str:
+def _words(verdict: Verdict) -> str:
     return verdict.value.replace("-", " ")
 
 
 def _flying(flying: set[int], leg: Leg) -> str:
     if not flying:
-        return "nobody flies"
+        return "no drone flies"
     stay = leg.verdict in {Verdict.NO_SOLUTION, Verdict.UNKNOWN}
     return f"{len(flying)} {'hover on' if stay else 'fly'}"

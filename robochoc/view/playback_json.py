@@ -1,4 +1,4 @@
-"""What the page's player needs to know of a scene, beside meshcat's commands: JSON that may stand in HTML."""
+"""What the page's player needs besides meshcat's commands: JSON that may stand in HTML."""
 
 from __future__ import annotations
 
@@ -14,10 +14,10 @@ from robochoc.view.scene import Scene
 
 
 def playback_json(scene: Scene) -> str:
-    """The drones, by their names, paths and colours; the epochs and what happened, by when; and the room they take.
+    """Return the drones by names, paths and colours, the epochs and events by time, and the extent of the scene.
 
-    Times are in seconds, `corners` and `cell` in meshcat's frame as `stage` scales it. Names are strangers': they are
-    text, and no sign of them ends the script that this is put into.
+    Times are in seconds. `corners` and `cell` are in meshcat's frame as `drawing` scales it. Names may come from
+    foreign files: they are text, and no character of them ends the script that contains this.
     """
     whole = {
         "corners": [[round(part, 5) for part in corner] for corner in corners(scene)],

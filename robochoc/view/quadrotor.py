@@ -19,7 +19,7 @@ _REACH = 0.23
 _DECK = 0.17
 """Height of the arms."""
 HUB = (0.0, 0.0, _DECK)
-"""What it turns about, from where it stands."""
+"""The point about which it turns, from where it stands."""
 
 
 class Shape(NamedTuple):
@@ -32,7 +32,7 @@ class Shape(NamedTuple):
 
 @cache
 def quadrotor() -> Shape:
-    """The one shape all drones share, around its `HUB`; so small that every drone can carry a copy of it."""
+    """Return the shape that all drones share, around its `HUB`. It is so small that every drone can have a copy."""
     corners = [(x, y) for x in (-_REACH, _REACH) for y in (-_REACH, _REACH)]
     parts = [_body(), _bar((-_REACH, -_REACH), (_REACH, _REACH)), _bar((-_REACH, _REACH), (_REACH, -_REACH))]
     parts += [_rotor(x, y) for x, y in corners]
@@ -42,7 +42,7 @@ def quadrotor() -> Shape:
 
 
 def disc(centre: tuple[float, float, float], radius: float, colour: tuple[float, float, float]) -> Shape:
-    """A flat round, for a pad on the ground."""
+    """Return a flat disc, for a pad on the ground."""
     sides = 16
     vertices = np.concatenate([[centre], _circle(radius, 0, sides) + np.array(centre)])
     here = np.arange(sides)
@@ -51,7 +51,7 @@ def disc(centre: tuple[float, float, float], radius: float, colour: tuple[float,
 
 
 def box(centre: tuple[float, float, float], size: float) -> Shape:
-    """A cube, for what is in the way."""
+    """Return a cube, for an obstacle."""
     corners = np.array([*product((-0.5, 0.5), repeat=3)]) * size + np.array(centre)
     sides = [(0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3)]
     faces = np.array([face for a, b, c, d in sides for face in ((a, b, c), (a, c, d))])
@@ -59,7 +59,7 @@ def box(centre: tuple[float, float, float], size: float) -> Shape:
 
 
 def joined(parts: list[Shape]) -> Shape:
-    """Several shapes as one."""
+    """Return several shapes as one."""
     before = np.cumsum([0, *(len(part.vertices) for part in parts)])
     return Shape(
         np.concatenate([part.vertices for part in parts]),
@@ -78,7 +78,7 @@ def _circle(radius: float, height: float, sides: int) -> _Vertices:
 
 
 def _band(sides: int) -> _Faces:
-    """Faces between two circles of `sides` vertices each, the first one's vertices first."""
+    """Return faces between two circles of `sides` vertices each, the first one's vertices first."""
     here = np.arange(sides)
     there = (here + 1) % sides
     return np.concatenate(
@@ -87,7 +87,7 @@ def _band(sides: int) -> _Faces:
 
 
 def _body() -> Shape:
-    """A faceted dome."""
+    """Return a faceted dome."""
     sides = 8
     rings = [_circle(0.09, _DECK - 0.05, sides), _circle(0.14, _DECK, sides), _circle(0.08, _DECK + 0.08, sides)]
     vertices = np.concatenate([*rings, [[0, 0, _DECK + 0.1]]])
@@ -97,7 +97,7 @@ def _body() -> Shape:
 
 
 def _bar(start: tuple[float, float], stop: tuple[float, float]) -> Shape:
-    """An arm from one rotor through the body to the opposite one: a flat box."""
+    """Return an arm from one rotor through the body to the opposite one: a flat box."""
     ends = np.array([start, stop])
     along = (ends[1] - ends[0]) / np.linalg.norm(ends[1] - ends[0])
     side = 0.025 * np.array([-along[1], along[0]])
@@ -110,7 +110,7 @@ def _bar(start: tuple[float, float], stop: tuple[float, float]) -> Shape:
 
 
 def _rotor(x: float, y: float) -> Shape:
-    """A ring, the guard, around two blades."""
+    """Return a ring, the guard, around two blades."""
     sides, height = 12, _DECK + 0.03
     ring = np.concatenate([_circle(0.13, height, sides), _circle(0.17, height, sides)])
     guard = _painted(ring, _band(sides), _ROTOR)
@@ -121,7 +121,7 @@ def _rotor(x: float, y: float) -> Shape:
 
 
 def _skid(side: float) -> Shape:
-    """A runner on two legs."""
+    """Return a runner on two legs."""
     runner = np.array([[x, side + dy, z] for x in (-0.17, 0.17) for dy, z in ((-0.015, 0), (0.015, 0), (0, 0.025))])
     legs = [
         np.array([[x - 0.012, side, 0.02], [x + 0.012, side, 0.02], [x * 0.6, side * 0.6, _DECK - 0.04]])

@@ -1,7 +1,7 @@
-"""How a browser is told a secret address: by a file of the user's own that leads there, as Jupyter does it.
+"""A file that leads a browser to a secret address, as Jupyter does it.
 
-What stands on a command line, or in the environment of some processes, everybody on the machine can read. So the
-browser is given the path of a file, mode 0600 in a folder with mode 0700, and the file holds the address.
+All users of a machine can read command lines, and the environment of some processes. So the browser is given the path
+of a file with mode 0600, in a folder with mode 0700, and the file holds the address.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ _PAGE = """\
 
 
 class RedirectFile:
-    """A file that leads a browser to `url`, until it is closed. Raises `OSError` where none can be written."""
+    """A file that leads a browser to `url`, until it is closed. Raises `OSError` if it cannot be written."""
 
     def __init__(self, url: str) -> None:
         self._folder = Path(tempfile.mkdtemp(prefix="robochoc-"))
@@ -35,7 +35,7 @@ class RedirectFile:
             self.close()
             raise
         self.url = file.as_uri()
-        """What a browser is to open: `file://...`, which is no secret."""
+        """The URL for the browser: `file://...`, which is no secret."""
 
     def __enter__(self) -> Self:
         return self
@@ -44,5 +44,5 @@ class RedirectFile:
         self.close()
 
     def close(self) -> None:
-        """Take it away. Does nothing when that has been done."""
+        """Remove the file. Does nothing the second time."""
         shutil.rmtree(self._folder, ignore_errors=True)

@@ -1,6 +1,6 @@
-"""What there is to see of an outcome, as data: the drones, how they flew, and the box around them.
+"""The scene of an outcome, as data: the drones, how they flew, and the box around them.
 
-Lengths are in cells: one cell is one row, one column or one level. Nothing here draws; `stage` does.
+Lengths are in cells: one cell is one row, one column or one level. `drawing` draws it.
 """
 
 from __future__ import annotations
@@ -21,11 +21,14 @@ from robochoc.view.playback import Playback, fell, playback_of
 
 @dataclass(frozen=True)
 class DrawnDrone:
-    """Begins at `home`, on the ground. It ends at its `place` in the air, or `aside`, or (neither) stays there."""
+    """A drone that begins at `home`, on the ground.
+
+    It ends at its `place` in the air, or at its `landing`, or stays there.
+    """
 
     name: str
     group: int
-    """Its row: drones of a row look alike."""
+    """Its row: drones of a row have the same colour."""
     home: Point
     place: Point | None = None
     landing: Point | None = None
@@ -38,7 +41,7 @@ class DrawnDrone:
 
 @dataclass(frozen=True)
 class Scene:
-    """One run, ready to be drawn. `facts` is the caption: pairs of a label and what it says, in plain text.
+    """One run, to be drawn. `facts` is the caption: pairs of a label and a text.
 
     Without a `playback`, drones are where they are to be in the end.
     """
@@ -51,7 +54,7 @@ class Scene:
 
     @property
     def ground(self) -> float:
-        """The height on which drones stand: one level below the lowest place."""
+        """The height of the ground: one level below the lowest place."""
         return self.axes[2].ground
 
 
@@ -62,6 +65,7 @@ def scene_of(
     *,
     flown_mission: Mission | None = None,
     why_not: str = "",
+    weighted: bool | None = None,
 ) -> Scene:
     """Return the scene of `outcome`. Without a flight, the drones are where they are to be in the end.
 
@@ -72,26 +76,27 @@ def scene_of(
         flown_mission: The mission that was flown, if it is not `mission` itself but the same in cells of another size.
             Distances are then not to scale, and the scene names none.
         why_not: Why nothing was flown, for the caption.
+        weighted: Whether robots differ in weight, if that is known.
     """
     flown_mission = flown_mission or mission
     drones = tuple(_drones(flown_mission))
-    title = f"{outcome.team}: {_headline(outcome, mission, drones)}"
+    title = f"{outcome.team}: {_headline(outcome, mission, drones, weighted=weighted)}"
     flight = _flight_facts(flown, why_not, is_to_scale=flown_mission is mission)
     playback = playback_of(flown_mission, flown) if flown else None
     return Scene(title, (*_facts(outcome, mission), *flight), drones, mission.axes, playback)
 
 
-def _headline(outcome: Outcome, mission: Mission, drones: Sequence[DrawnDrone]) -> str:
+def _headline(outcome: Outcome, mission: Mission, drones: Sequence[DrawnDrone], *, weighted: bool | None) -> str:
     """Return what happened, counted in robots; in drones where robots have several, or are not known."""
     robots = {drone.robot for drone in mission.drones if drone.robot}
     if len(robots) == len(drones):
-        return describe_outcome(outcome, len(robots))
+        return describe_outcome(outcome, len(robots), weighted=weighted)
     flying = sum(drone.place is not None for drone in drones)
     return describe_outcome(outcome, len(drones), flying=flying, noun="drone")
 
 
 def _drones(mission: Mission) -> Iterator[DrawnDrone]:
-    """Each drone, and where the last leg that says something of it wants it to be."""
+    """Yield each drone, with its goal in the last leg that has one for it."""
     last: dict[int, Goal] = {}
     for leg in mission.legs:
         last.update(leg.goals)
@@ -111,7 +116,7 @@ def _cell(mission: Mission, metres: Point) -> Point:
 
 
 def _flight_facts(flown: FlightLog | None, why_not: str, *, is_to_scale: bool) -> Iterator[tuple[str, str]]:
-    """How the flight went, distances only where they are to scale; or why there was none."""
+    """Yield how the flight went, distances only where they are to scale; or why there was none."""
     if flown is None:
         if why_not:
             yield "flight", f"none: {why_not}"
@@ -128,9 +133,9 @@ def _flight_facts(flown: FlightLog | None, why_not: str, *, is_to_scale: bool) -
 def _facts(outcome: Outcome, mission: Mission) -> tuple[tuple[str, str], ...]:
     checked = ", checked" if outcome.verified else ""
     facts = [("verdict", f"{outcome.verdict}{checked}"), ("protocol", outcome.protocols)]
-    if outcome.aside:
+    if outcome.withdrawn_alive:
         facts[0] = ("verdict", f"no solution for all {len(mission.drones)}{checked}")
-        facts.append(("withdrawn", f"{len(outcome.aside)}"))
+        facts.append(("withdrawn", f"{len(outcome.withdrawn_alive)}"))
     if outcome.lost:
         facts.append(("lost", ", ".join(outcome.lost)))
     if outcome.cost:

@@ -149,10 +149,10 @@ def test_filters_act_as_one_types(page: Page) -> None:
     left = sum(t >= 20 for t in TRACE.messages.t)
     text_is(page, "#counts", f"{left} of {ALL}")
     page.fill("#filters input[type=search] >> nth=0", "Robot9.1")
-    text_is(page, ".nobody:not([hidden])", "No robot is named Robot9.1; there are Robot1.1 and Robot1.2.")
+    text_is(page, ".unknown:not([hidden])", "No robot is named Robot9.1; there are Robot1.1 and Robot1.2.")
     assert page.evaluate(CONTRAST) == []
     page.fill("#filters input[type=search] >> nth=0", "")
-    until(lambda: not page.locator(".nobody:not([hidden])").count(), "it still says so")
+    until(lambda: not page.locator(".unknown:not([hidden])").count(), "it still says so")
 
 
 def test_the_verdict_leads_to_the_step_that_decided(page: Page) -> None:

@@ -91,7 +91,7 @@ def test_damage_and_an_empty_journal_are_told(browser: Any, tmp_path: Path) -> N
             assert "The journal is damaged" in page.inner_text("#notices")
     file.write_bytes(journal_of([], OUTCOME))
     with sniffer_server(Session(file)) as server, shown(browser, server.url, "0 messages") as page:
-        until(lambda: "Nobody has said anything" in page.inner_text("#notices"), "an empty page, and nobody says why")
+        until(lambda: "There are no messages" in page.inner_text("#notices"), "an empty page without a notice")
 
 
 def test_names_of_strangers_are_text(browser: Any, tmp_path: Path) -> None:  # noqa: ANN401
@@ -154,3 +154,15 @@ def test_a_narrow_window_has_all_in_reach(browser: Any, server: SnifferServer) -
         assert page.evaluate(NAMELESS) == []
         page.keyboard.press("Escape")
         assert not page.locator("#right").is_visible()
+
+
+@pytest.mark.parametrize("width", [360, 1280, 1920])
+def test_the_toolbar_is_one_row_and_its_menu_closes(browser: Any, server: SnifferServer, width: int) -> None:  # noqa: ANN401
+    with shown(browser, server.url, viewport={"width": width, "height": 760}) as page:
+        tops = page.eval_on_selector_all("#layout, #display", "parts => parts.map((part) => part.offsetTop)")
+        assert max(tops) - min(tops) < 10
+        page.click("#display summary")
+        box = page.locator("#display dl").bounding_box()
+        assert 0 <= box["x"] <= width - box["width"]
+        page.keyboard.press("Escape")
+        assert page.locator("#display dl").is_hidden()

@@ -113,7 +113,7 @@ def test_of_names_that_would_cover_each_other_one_is_written(player: Page) -> No
 
     def named() -> list[bool]:
         written: list[bool] = player.evaluate(
-            "Playback.names.choose(), Playback.names.names.map((name) => name.visible)"
+            "Playback.labels.choose(), Playback.labels.names.map((name) => name.visible)"
         )
         return written
 
@@ -318,6 +318,22 @@ def test_epochs_that_begin_together_are_told_together(small: Page) -> None:
     assert "Epoch 2 (0 to 2)" in said
     boxes = [small.locator("#marks button").nth(number).bounding_box() for number in range(3)]
     assert boxes[1]["x"] + boxes[1]["width"] <= boxes[2]["x"] + 0.5
+
+
+def test_labels_and_legend_can_be_read_on_a_narrow_page(small: Page) -> None:
+    high = """Playback.labels.names.filter((name) => name.visible).map((name) => {
+      const [at, size] = [new MeshCat.THREE.Vector3(), new MeshCat.THREE.Vector3()];
+      const lens = Playback.viewer.camera;
+      const depth = -name.getWorldPosition(at).applyMatrix4(lens.matrixWorldInverse).z;
+      const height = name.getWorldScale(size).y * name.children[0].scale.y;
+      return height * innerHeight / 2 / depth / Math.tan(lens.fov * Math.PI / 360);
+    })"""
+    until(lambda: small.evaluate(high), "no drone has a label")
+    assert min(small.evaluate(high)) > 15
+    assert small.locator("#legend li").count() >= 5
+    assert small.evaluate(
+        "document.getElementById('legend').scrollWidth <= document.getElementById('caption').clientWidth"
+    )
 
 
 def test_a_narrow_dark_page_has_room_for_all(small: Page) -> None:

@@ -15,7 +15,13 @@ from robochoc import __version__
 from robochoc.cli.group import cli
 from robochoc.cli.reports.protocols import print_protocols, rows
 from robochoc.protocols import abt
-from robochoc.run.registry import UnknownProtocolError, offer_named, offers, protocol_named, protocol_names
+from robochoc.run.registry import (
+    UnknownProtocolError,
+    installed_protocol,
+    installed_protocols,
+    protocol_named,
+    protocol_names,
+)
 from tests.support.program import robochoc
 
 WITHOUT_DOCSTRING = """
@@ -30,7 +36,7 @@ WITHOUT_DOCSTRING = """
             partially_known=True, dynamic=True, privacy="decisions",
         )
 
-        def change(self, problem, order, void): ...
+        def change(self, problem, order, invalidated): ...
 
         def resume(self, *, lossless): ...
 
@@ -149,9 +155,9 @@ def test_what_is_broken_is_shown_with_its_reason(name: str, reason: str) -> None
 
 def test_of_two_with_one_name_none_is_taken(package: Path) -> None:
     (package / "entry_points.txt").write_text("[robochoc.protocols]\nabt = others:Other\n")
-    first, second = (offer for offer in offers() if offer.name == "abt")
+    first, second = (offer for offer in installed_protocols() if offer.name == "abt")
     assert {first.package, second.package} == {"others-protocols 1.2", f"robochoc {__version__}"}
-    assert first.protocol is second.protocol is offer_named("abt").protocol is None
+    assert first.protocol is second.protocol is installed_protocol("abt").protocol is None
     assert "several packages, and only one may" in run().stdout
     with pytest.raises(UnknownProtocolError, match=r"others:Other \(others-protocols\)"):
         protocol_named("abt")
@@ -185,7 +191,7 @@ def test_a_protocol_is_explained_by_its_docstring() -> None:
     assert place == f"robochoc.protocols.abt:ABT, from the package robochoc {__version__}"
     assert abt.__doc__ is not None
     assert doc.splitlines() == abt.__doc__.strip().splitlines()
-    assert "judge" in run("central").stdout
+    assert "central solver" in " ".join(run("central").stdout.split())
 
 
 @pytest.mark.usefixtures("package")

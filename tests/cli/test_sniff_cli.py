@@ -111,7 +111,7 @@ def test_no_process_shows_the_secret_address_to_others(
     [
         (b"what is this?", "it does not begin as a journal does"),
         (b"<html>" * 1000, "it does not begin as a journal does"),
-        (b'{"event":"Journal"}\n', "missing required field"),
+        (b'{"event":"Journal"}\n', "is missing"),
     ],
 )
 def test_what_is_no_journal_is_told_in_one_line(tmp_path: Path, content: bytes, said: str) -> None:

@@ -1,4 +1,4 @@
-"""Complex robots: compiled domains, ABT and the central judge against brute force."""
+"""Complex robots: compiled domains, ABT and the central solver against brute force."""
 
 from __future__ import annotations
 
@@ -89,7 +89,7 @@ def test_ace_abt_the_judge_and_brute_force_agree(batch: int) -> None:
                 check_domain(robot, compiler.compile(robot).domain)
             count = sum(1 for _ in solutions(team))
             expected = Verdict.SOLUTION if count else Verdict.NO_SOLUTION
-            assert CentralSolver(solver=solver).judge(team, count=True).count == count
+            assert CentralSolver(solver=solver).solve(team, count=True).count == count
             assert solve(team, Options(protocol="central", cache=False), solver=solver).verdict is expected
             options = replace(random_schedule(chance), cache=False, order=any_order(team, chance))
             assert solve(team, options, solver=solver).verdict is expected

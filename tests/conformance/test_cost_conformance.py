@@ -17,7 +17,7 @@ from robochoc.solver.encoding import UnsupportedError
 from tests.support.cost_problems import minimum_withdrawal, random_complex_cost_team, random_cost_team
 from tests.support.loose_problems import any_order, loosened, minimum_cost
 from tests.support.problems import ON_ONE_MACHINE, random_team
-from tests.support.random_options import MAX_MESSAGES, random_options
+from tests.support.random_options import MAX_MESSAGES, on_runtime, random_options
 
 MINIMISING = [name for name in protocol_names() if protocol_named(name).traits.costs]
 COMPLETE = [name for name in MINIMISING if protocol_named(name).traits.complete]
@@ -90,7 +90,7 @@ def test_what_is_not_proven_is_no_better_than_the_least(
     for _ in range(20 if runtime is Runtime.SIMULATOR else 3):
         team = team_for(protocol, chance)
         cheapest = minimum_cost(team)
-        schedule = replace(random_options(team, protocol, chance), runtime=runtime)
+        schedule = on_runtime(random_options(team, protocol, chance), runtime)
         outcome = solve(team, replace(schedule, messages=MAX_MESSAGES, settings=SHORT), solver=warm)
         if cheapest == INFINITE:
             assert outcome.verdict in {Verdict.UNKNOWN, Verdict.NO_SOLUTION}

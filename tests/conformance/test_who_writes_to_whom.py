@@ -8,7 +8,7 @@ from random import Random
 
 import pytest
 
-from robochoc.communication.network.profile import acquaintances
+from robochoc.communication.network.profile import possible_neighbours
 from robochoc.communication.simulator.schedule import RandomChannels
 from robochoc.communication.simulator.simulator import Simulation
 from robochoc.journal.events import AnyEvent, Sent
@@ -37,17 +37,17 @@ def name_of(protocol: type[Protocol]) -> str:
 
 
 def strangers(
-    team: Team, protocol: type[Protocol], seed: int, brief: RunParameters = DEFAULT_PARAMETERS
+    team: Team, protocol: type[Protocol], seed: int, parameters: RunParameters = DEFAULT_PARAMETERS
 ) -> set[tuple[str, str]]:
     """Who has written to whom without sharing a constraint."""
-    known = acquaintances(profiles_of(team))
+    known = possible_neighbours(profiles_of(team))
     found = set()
 
     def look(event: AnyEvent) -> None:
         if isinstance(event, Sent) and event.receiver not in known[event.sender]:
             found.add((event.sender, event.receiver))
 
-    with Simulation(team, protocol, RandomChannels(seed), observer=look, brief=brief) as session:
+    with Simulation(team, protocol, RandomChannels(seed), observer=look, parameters=parameters) as session:
         session.search(messages=MESSAGES)
     return found
 

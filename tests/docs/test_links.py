@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import tomllib
 from pathlib import Path
 
 import pytest
@@ -54,3 +55,20 @@ def test_every_page_of_the_navigation_is_there_and_every_page_is_in_it() -> None
     only_there = {"reference/protocols/index.md", "reference/results.md", "reference/changes.md"}
     pages = {str(page.relative_to(ROOT / "docs")) for page in PAGES if page.is_relative_to(ROOT / "docs")}
     assert named - only_there == pages
+
+
+def test_the_rooms_of_the_page_stand_in_the_order_of_the_layers() -> None:
+    """`docs/explanation/house.md` against the contract that import-linter checks."""
+    contract = tomllib.loads((ROOT / "pyproject.toml").read_text())["tool"]["importlinter"]["contracts"][0]
+    layers = [room for layer in contract["layers"] for room in layer.split(" | ") if room != "__main__"]
+    page = (ROOT / "docs" / "explanation" / "house.md").read_text()
+    rooms = [room.removesuffix(".py") for room in re.findall(r"^\| `([a-z.]+)` \|", page, re.MULTILINE)]
+    assert {*rooms} == {*layers}
+    beside = {room: number for number, layer in enumerate(contract["layers"]) for room in layer.split(" | ")}
+    assert [beside[room] for room in rooms] == sorted(beside[room] for room in rooms)
+
+
+def test_the_readme_is_short_and_shows_where_to_read_on() -> None:
+    readme = ROOT / "README.md"
+    assert readme.stat().st_size <= 6_000
+    assert {f"docs/{place}/index.md" for place in ("tutorials", "guides")} <= {*links_of(readme)}

@@ -6,11 +6,16 @@ import re
 import subprocess
 import sys
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import pytest
 
-from robochoc.run.registry import offers
+from robochoc.run.registry import installed_protocols
+from tests.support.browser_pages import watched_page
 from tests.support.program import ROOT
+
+if TYPE_CHECKING:
+    from playwright.sync_api import Browser
 
 pytest.importorskip("material", reason="the extra docs is not installed: make docs")
 
@@ -34,8 +39,24 @@ def test_pages_load_nothing_from_elsewhere(site: Path) -> None:
 
 
 def test_there_is_a_page_for_each_protocol_and_for_each_command(site: Path) -> None:
-    for offer in offers():
+    for offer in installed_protocols():
         page = (site / "reference" / "protocols" / f"{offer.name}.html").read_text()
         assert f"--protocol {offer.name}" in page
     commands = (site / "reference" / "cli.html").read_text()
     assert all(f"robochoc {name}" in commands for name in ("solve", "master", "journal export", "generate queens3d"))
+
+
+def test_search_works_from_files_and_asks_for_nothing_elsewhere(site: Path, browser: Browser) -> None:
+    with watched_page(browser, viewport={"width": 1280, "height": 800}) as (page, complaints, asked):
+        page.goto((site / "index.html").as_uri())
+        page.fill("input.md-search__input", "nogood")
+        page.wait_for_selector(".md-search-result__article", timeout=60_000)
+        assert not [address for address in asked if not address.startswith(("file:", "data:"))]
+        assert not complaints
+
+
+@pytest.mark.parametrize("name", ["index", "guides/which-protocol", "reference/cli", "reference/protocols/abt"])
+def test_pages_fit_a_telephone(site: Path, browser: Browser, name: str) -> None:
+    with watched_page(browser, viewport={"width": 360, "height": 800}) as (page, _, _):
+        page.goto((site / f"{name}.html").as_uri())
+        assert page.evaluate("document.documentElement.scrollWidth") <= 360

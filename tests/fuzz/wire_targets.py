@@ -1,4 +1,4 @@
-"""What comes over the wire: letters and what is in them, requests to the Directory, ACL, questions of newcomers."""
+"""What comes over the wire: frames and what is in them, requests to the Directory, ACL, questions of newcomers."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ from robochoc.authority.certificates import (
 )
 from robochoc.authority.frames import (
     Certified,
-    Denied,
+    EnrolmentDenied,
     FrameError,
     Introduce,
     Introduction,
@@ -40,13 +40,13 @@ from robochoc.communication.network.framing import MASTER, FrameRefusedError, Fr
 from robochoc.communication.network.profile import (
     Profile,
     ProfileError,
-    acquaintances,
     contradictions,
     domain_of,
     in_priority_order,
     missing,
+    possible_neighbours,
     profile_of,
-    silhouette,
+    visible_robot,
 )
 from robochoc.communication.network.shared import SharedConstraintError, SharedRecord, known_of, record_of
 from robochoc.formats import on_one_line
@@ -87,12 +87,12 @@ def _packed(value: object) -> bytes:
     return msgspec.msgpack.encode(value)
 
 
-# Letters
+# Frames
 
 
 @cache
-def letters(receiver: str) -> Sequence[bytes]:
-    """Letters to the master, or to a robot, with every word."""
+def frames(receiver: str) -> Sequence[bytes]:
+    """Frames to the master, or to a robot, with every word."""
     metrics = Metrics({"Ok": 3}, 80, 5, 9, 0.25)
     epoch = 1
     findings = Findings(bound=3, place=PseudoTreeNode("R", ("S",)))
@@ -100,27 +100,27 @@ def letters(receiver: str) -> Sequence[bytes]:
         Sent(t=0, sender="A", receiver="B", type="Ok", content={"value": [1]}, bytes=9, clock=3),
         Decided(t=0.5, robot="A", assignment={"V": 1}, clock=4),
     ]
-    said: list[words.Word] = [
-        *(words.Register(profile_of(one), "visit") for one in _robots()),
-        words.Joined("visit", b""),
-        words.Shown({"V": ((1, 3), (5, 7))}),
+    said: list[words.ControlMessage] = [
+        *(words.Register(profile_of(one), "incarnation") for one in _robots()),
+        words.Joined("incarnation", b""),
+        words.DomainAnswer({"V": ((1, 3), (5, 7))}),
         Ready(epoch),
         Counters(epoch, 1, 7, 7),
         Conclusion(epoch, Verdict.NO_SOLUTION),
         Events(events),
-        words.Account(epoch, assigned=True, assignment={"V": 1}, metrics=metrics, findings=findings),
-        words.Checked(epoch, allowed=True, cost=3),
+        words.DetailedReport(epoch, assigned=True, assignment={"V": 1}, metrics=metrics, findings=findings),
+        words.CheckResult(epoch, allowed=True, cost=3),
         Failed("it broke"),
-        words.Objection("A", "a letter", "it is a replay"),
-        words.Ask(1, _requests()[0].decode()),
-        words.Sniff(2),
+        words.Objection("A", "a frame", "it is a replay"),
+        words.DirectoryRequest(1, _requests()[0].decode()),
+        words.JournalRequest(2),
         words.Bye(),
     ]
     if receiver != MASTER:
         said = [
-            words.Welcome("visit", "run", ("sealed",), observed=True, private=False),
-            words.Denied("visit", "revoked"),
-            words.Show(("V", "W")),
+            words.Welcome("incarnation", "run", ("sealed",), observed=True, private=False),
+            words.RegistrationDenied("incarnation", "revoked"),
+            words.DomainRequest(("V", "W")),
             words.Task(
                 epoch,
                 protocol="abt",
@@ -134,21 +134,21 @@ def letters(receiver: str) -> Sequence[bytes]:
                 aside=None,
                 cards=(b"card",),
             ),
-            words.Search(epoch),
+            words.StartSearch(epoch),
             Wave(3),
             Pause(),
-            words.Judge(epoch, {"V": 1}),
+            words.CheckRequest(epoch, {"V": 1}),
             words.Revoked("B"),
-            words.Told(1, "inform", "((done x))"),
-            words.Sniffable(2, "run", ""),
+            words.DirectoryAnswer(1, "inform", "((done x))"),
+            words.JournalAnswer(2, "run", ""),
             words.Leave("solved", failed=False),
         ]
         said += [words.ProtocolMessage(epoch, 5, b"\x92\xa2Ok\x91\x01"), words.Copies(epoch, records()[0])]
     return [_packed(["run", place + 1, word]) for place, word in enumerate(said)]
 
 
-def check_letter(receiver: str, content: bytes) -> bool:
-    """A letter is read or refused; a word that is accepted can be looked at, and written again."""
+def check_frame(receiver: str, content: bytes) -> bool:
+    """A frame is read or refused; a word that is accepted can be looked at, and written again."""
     senders = [MASTER] if receiver == MASTER else [MASTER, "B"]
     accepted = False
     for sender in senders[::-1] if receiver != MASTER else ["B"]:
@@ -166,23 +166,23 @@ def check_letter(receiver: str, content: bytes) -> bool:
                 on_one_line(str(refused)).encode()
                 continue
             accepted = True
-            _look_into(opened.word)
+            _look_into(opened.message)
             writer = Framing(sender, "run")
-            again = Framing(receiver, "run").read(sender, writer.write(receiver, opened.word))
-            assert repr(again.word) == repr(opened.word), "another word is read from what was written"
+            again = Framing(receiver, "run").read(sender, writer.write(receiver, opened.message))
+            assert repr(again.message) == repr(opened.message), "another word is read from what was written"
     return accepted
 
 
-def _look_into(word: words.Word) -> None:
+def _look_into(word: words.ControlMessage) -> None:
     match word:
         case words.Register(profile):
             _introduce(profile)
-        case words.Shown(variables):
+        case words.DomainAnswer(variables):
             for name, ranges in variables.items():
                 _refused_or(ProfileError, partial(domain_of, name, ranges))
         case words.Joined(_, card):
             _refused_or(KeyCardError, partial(KeyCard.decode, card))
-        case words.Ask(_, text):
+        case words.DirectoryRequest(_, text):
             check_request(text.encode())
         case words.Copies(_, content):
             check_records(content)
@@ -202,7 +202,7 @@ def _refused_or(refusal: type[ValueError], act: Callable[[], object]) -> bool:
 
 def _introduce(profile: Profile) -> bool:
     try:
-        robot = silhouette(profile, {})
+        robot = visible_robot(profile, {})
     except ProfileError as bad:
         assert_said(bad)
         return False
@@ -210,7 +210,7 @@ def _introduce(profile: Profile) -> bool:
     profiles = {**others, profile.name: profile}
     wrong = list(contradictions(profiles))
     missing(profiles)
-    acquaintances(profiles)
+    possible_neighbours(profiles)
     if not wrong:
         in_priority_order(profiles)
     for one in robot.variables:
@@ -329,7 +329,14 @@ def _authority() -> tuple[bytes, bytes, bytes]:
 def questions() -> Sequence[bytes]:
     """Questions of robots that want to be certified, and answers to them."""
     ca, leaf, asked = _authority()
-    frames = (Introduce(), Redeem(b"s" * 32, asked), Renew(asked), Introduction(ca), Certified(leaf), Denied("no"))
+    frames = (
+        Introduce(),
+        Redeem(b"s" * 32, asked),
+        Renew(asked),
+        Introduction(ca),
+        Certified(leaf),
+        EnrolmentDenied("no"),
+    )
     return [_packed(frame) for frame in frames]
 
 
@@ -364,8 +371,8 @@ def _look_at(content: bytes) -> None:
 _of_msgpack = one_of(spoilt_msgpack, spoilt_msgpack, spoilt_msgpack, spoilt_bytes)
 _of_text = one_of(spoilt_text, spoilt_text, spoilt_bytes)
 TARGETS = (
-    Target("letter-to-master", partial(letters, MASTER), _of_msgpack, partial(check_letter, MASTER)),
-    Target("letter-to-robot", partial(letters, "A"), _of_msgpack, partial(check_letter, "A")),
+    Target("frame-to-master", partial(frames, MASTER), _of_msgpack, partial(check_frame, MASTER)),
+    Target("frame-to-robot", partial(frames, "A"), _of_msgpack, partial(check_frame, "A")),
     Target("shared-constraints", records, _of_msgpack, check_records),
     Target("directory", _requests, _of_text, check_request),
     Target("acl", acts, _of_text, check_act),

@@ -11,10 +11,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from robochoc.communication.network.access import ALL, access_control, journal_key, letter_key, life_key, name_in
+from robochoc.communication.network.access import ALL, access_control, frame_key, journal_key, life_key, name_in
 from robochoc.communication.network.framing import MASTER
 from robochoc.communication.network.members import Members
-from robochoc.communication.network.profile import acquaintances
+from robochoc.communication.network.profile import possible_neighbours
 from robochoc.model.problem import Team
 from tests.support.problems import random_team
 from tests.support.sparse_teams import profiles_of, sparse_team
@@ -65,9 +65,9 @@ def passes(control: Mapping[str, Any], sender: str, reader: str, key: str) -> bo
 
 
 def keys(names: Sequence[str]) -> Iterator[tuple[str, str, str]]:
-    """Keys of letters and of their recovery, with receiver and sender."""
+    """Keys of frames and of their recovery, with receiver and sender."""
     for receiver, sender in itertools.product(names, repeat=2):
-        key = letter_key(receiver, sender)
+        key = frame_key(receiver, sender)
         for each in (key, f"{key}/@adv/pub/1234/6/_", f"{key}/@adv/sub/1234/6/_"):
             yield receiver, sender, each
 
@@ -75,7 +75,7 @@ def keys(names: Sequence[str]) -> Iterator[tuple[str, str, str]]:
 def ways(control: Mapping[str, Any], names: Sequence[str]) -> dict[str, set[str]]:
     """To whom each can write."""
     return {
-        name: {other for other in names if allows(control, name, "ingress", "put", letter_key(other, name))}
+        name: {other for other in names if allows(control, name, "ingress", "put", frame_key(other, name))}
         for name in names
     }
 
@@ -100,7 +100,7 @@ def test_the_matcher(wide: str, narrow: str, expected: bool) -> None:  # noqa: F
     assert includes(wide, narrow) is expected
 
 
-def test_nobody_writes_in_anothers_name_or_reads_anothers_letters() -> None:
+def test_nobody_writes_in_anothers_name_or_reads_anothers_frames() -> None:
     for reach in ((), (ALL,), NAMES):
         control = access_control(dict.fromkeys(NAMES, reach))
         for who in EVERYBODY:
@@ -119,12 +119,12 @@ def test_nobody_listens_to_everything(key: str) -> None:
         assert not any(allows(control, who, "ingress", message, key) for message in ("put", "declare_subscriber"))
 
 
-def test_everybody_reads_its_own_letters_and_asks_for_what_it_missed() -> None:
+def test_everybody_reads_its_own_frames_and_asks_for_what_it_missed() -> None:
     control = access_control(dict.fromkeys(NAMES, ()))
     for who in EVERYBODY:
         for message in READS:
-            assert allows(control, who, "ingress", message, letter_key(who, ALL))
-            assert allows(control, who, "ingress", message, f"{letter_key(who, ALL)}/@adv/**")
+            assert allows(control, who, "ingress", message, frame_key(who, ALL))
+            assert allows(control, who, "ingress", message, f"{frame_key(who, ALL)}/@adv/**")
 
 
 def test_before_the_team_is_closed_robots_write_to_the_master_only() -> None:
@@ -132,7 +132,7 @@ def test_before_the_team_is_closed_robots_write_to_the_master_only() -> None:
     assert ways(control, EVERYBODY) == {**{name: {MASTER} for name in NAMES}, MASTER: set(EVERYBODY)}
 
 
-def test_letters_and_their_recovery_go_where_they_may() -> None:
+def test_frames_and_their_recovery_go_where_they_may() -> None:
     reach = {"R1": ("R2",), "R2": ("R1", "R21"), "R21": (), "r2": (ALL,)}
     control = access_control(reach)
     names = [*reach, MASTER]
@@ -169,7 +169,7 @@ def test_rules_name_everybody_once() -> None:
 
 
 def test_names_in_keys() -> None:
-    assert name_in(letter_key("R1", "R2.1")) == "R2.1"
+    assert name_in(frame_key("R1", "R2.1")) == "R2.1"
     assert name_in(life_key("R2.1")) == "R2.1"
     assert name_in(journal_key("R2.1")) == "R2.1"
 
@@ -196,8 +196,8 @@ def test_who_stays_within_writes_to_neighbours_and_sharers_only(seed: int, make:
     team: Team = make(seed)
     members = Members()
     for name, profile in profiles_of(team).items():
-        members.register(name, profile, "visit")
-    met = acquaintances(profiles_of(team))
+        members.register(name, profile, "incarnation")
+    met = possible_neighbours(profiles_of(team))
     names = (*team.order, MASTER)
     within = ways(access_control(members.reach(writes_to_non_neighbours=False)), names)
     assert within == {**{name: {MASTER, *met[name]} for name in team.order}, MASTER: set(names)}
@@ -208,7 +208,7 @@ def test_who_stays_within_writes_to_neighbours_and_sharers_only(seed: int, make:
 def test_nobody_writes_to_who_is_lost() -> None:
     members = Members()
     for name, profile in profiles_of(sparse_team(1)).items():
-        members.register(name, profile, "visit")
+        members.register(name, profile, "incarnation")
     members.remove(["RX03"])
     reach = members.reach(writes_to_non_neighbours=False)
     assert "RX03" not in reach

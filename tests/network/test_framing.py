@@ -1,4 +1,4 @@
-"""Letters: numbers, replays, sizes, directions, and bytes of any kind."""
+"""Frames: numbers, replays, sizes, directions, and bytes of any kind."""
 
 from __future__ import annotations
 
@@ -13,33 +13,33 @@ from hypothesis import strategies as st
 from robochoc.communication.control import Counters, Events, Failed, Ready, Wave
 from robochoc.communication.network.control_messages import (
     LATEST,
-    Account,
-    Ask,
+    CheckRequest,
+    ControlMessage,
     Copies,
-    Denied,
+    DetailedReport,
+    DirectoryAnswer,
+    DirectoryRequest,
     Exchanged,
-    Gap,
     Joined,
-    Judge,
+    JournalAnswer,
+    JournalRequest,
     Leave,
+    LostFrames,
     ProtocolMessage,
     Register,
-    Sniff,
-    Sniffable,
+    RegistrationDenied,
     Task,
-    Told,
     ToMaster,
     ToPeer,
     ToRobot,
     Welcome,
-    Word,
 )
 from robochoc.communication.network.framing import (
-    LARGEST_LETTER,
+    LARGEST_FRAME,
     MASTER,
+    Frame,
     FrameRefusedError,
     Framing,
-    Letter,
     MessageTooLargeError,
     Opened,
 )
@@ -50,7 +50,16 @@ from robochoc.model.problem import ProblemKind
 from robochoc.protocols.findings import Best, Findings, Trail
 
 PROFILE = Profile("R1", ProblemKind.DISCSP, ("R0",), (), {"X": ((1, 3), (5, 5))}, {}, 1, 0, ("/R1/goal",))
-OUTSIDE = (Register, Welcome, Denied, Joined, Ask, Told, Sniff, Sniffable)
+OUTSIDE = (
+    Register,
+    Welcome,
+    RegistrationDenied,
+    Joined,
+    DirectoryRequest,
+    DirectoryAnswer,
+    JournalRequest,
+    JournalAnswer,
+)
 WORDS = get_args(ToMaster), get_args(ToRobot), get_args(ToPeer)
 
 
@@ -66,9 +75,9 @@ TEXTS = st.text(max_size=5)
 NUMBERS = st.integers(-(2**63), 2**64 - 1)
 SEVERAL = st.lists(TEXTS, max_size=3).map(tuple)
 DOMAINS = st.dictionaries(TEXTS, st.lists(st.tuples(NUMBERS, NUMBERS), max_size=2).map(tuple), max_size=2)
-SPECIAL: dict[type[Word], st.SearchStrategy[Word]] = {
-    Account: st.builds(
-        Account,
+SPECIAL: dict[type[ControlMessage], st.SearchStrategy[ControlMessage]] = {
+    DetailedReport: st.builds(
+        DetailedReport,
         NUMBERS,
         st.dictionaries(TEXTS, NUMBERS, max_size=2),
         st.builds(Metrics, st.dictionaries(TEXTS, NUMBERS, max_size=2), NUMBERS, NUMBERS, NUMBERS),
@@ -78,10 +87,10 @@ SPECIAL: dict[type[Word], st.SearchStrategy[Word]] = {
         st.booleans(),
         st.dictionaries(TEXTS, st.builds(Exchanged, NUMBERS, NUMBERS, NUMBERS), max_size=2),
     ),
-    Gap: st.builds(Gap, TEXTS, st.integers(1, 2**53)),
+    LostFrames: st.builds(LostFrames, TEXTS, st.integers(1, 2**53)),
     Register: st.builds(Register, st.just(PROFILE), TEXTS),
     Events: st.just(Events([Received(t=1.5, sender="R1", receiver="R2", type="Ok", clock=3)])),
-    Judge: st.builds(Judge, NUMBERS, st.dictionaries(TEXTS, NUMBERS)),
+    CheckRequest: st.builds(CheckRequest, NUMBERS, st.dictionaries(TEXTS, NUMBERS)),
     ProtocolMessage: st.builds(ProtocolMessage, NUMBERS, st.integers(0, LATEST), st.binary(max_size=5)),
     Task: st.builds(
         Task,
@@ -101,12 +110,12 @@ SPECIAL: dict[type[Word], st.SearchStrategy[Word]] = {
 
 
 @cache
-def some(kind: type[Word]) -> st.SearchStrategy[Word]:
+def some(kind: type[ControlMessage]) -> st.SearchStrategy[ControlMessage]:
     """Words of one kind: what their types allow, as far as it can travel."""
     return SPECIAL[kind] if kind in SPECIAL else st.from_type(kind).filter(_travels)
 
 
-def _travels(word: Word) -> bool:
+def _travels(word: ControlMessage) -> bool:
     """Not NaN, which is not equal to itself, nor integers of more than 64 bits."""
     try:
         return msgspec.msgpack.decode(msgspec.msgpack.encode(word), type=type(word)) == word
@@ -115,16 +124,16 @@ def _travels(word: Word) -> bool:
 
 
 @pytest.mark.parametrize("kind", [kind for direction in WORDS for kind in direction], ids=lambda one: one.__name__)
-def test_every_word_comes_as_it_was_sent(kind: type[Word]) -> None:
+def test_every_word_comes_as_it_was_sent(kind: type[ControlMessage]) -> None:
     sender, receiver = ("R1", MASTER) if kind in WORDS[0] else (MASTER, "R1") if kind in WORDS[1] else ("R1", "R2")
 
     @given(word=some(kind))
     @settings(max_examples=15, deadline=None)
-    def arrives(word: Word) -> None:
+    def arrives(word: ControlMessage) -> None:
         writer, reader = pair(sender, receiver)
         opened = reader.read(sender, writer.write(receiver, word))
-        assert opened.word == word
-        assert type(opened.word) is kind
+        assert opened.message == word
+        assert type(opened.message) is kind
         assert opened.number == (0 if kind in OUTSIDE else 1)
 
     arrives()
@@ -133,7 +142,7 @@ def test_every_word_comes_as_it_was_sent(kind: type[Word]) -> None:
 # Numbers
 
 
-def test_letters_are_numbered_by_pair_and_come_once() -> None:
+def test_frames_are_numbered_by_pair_and_come_once() -> None:
     writer, reader = pair()
     contents = [writer.write("R2", said(n)) for n in (1, 2, 3)]
     assert writer.next_number("R2") == 4
@@ -142,7 +151,7 @@ def test_letters_are_numbered_by_pair_and_come_once() -> None:
         opened = reader.read("R1", content)
         assert opened == Opened(number, said(number))
         reader.take("R1", opened.number)
-        with pytest.raises(FrameRefusedError, match=f"replay: letter {number} has come before"):
+        with pytest.raises(FrameRefusedError, match=f"replay: frame {number} has come before"):
             reader.read("R1", content)
 
 
@@ -155,13 +164,13 @@ def test_what_was_not_taken_may_come_again() -> None:
         reader.read("R1", content)
 
 
-def test_a_missing_letter_is_missed() -> None:
+def test_a_missing_frame_is_missed() -> None:
     writer, reader = pair()
     first, second = (writer.write("R2", said(n)) for n in (1, 2))
-    with pytest.raises(FrameRefusedError, match="letter 1 is missing before letter 2"):
+    with pytest.raises(FrameRefusedError, match="frame 1 is missing before frame 2"):
         reader.read("R1", second)
     reader.take("R1", reader.read("R1", first).number)
-    assert reader.read("R1", second).word == said(2)
+    assert reader.read("R1", second).message == said(2)
 
 
 def test_senders_do_not_use_up_each_others_numbers() -> None:
@@ -169,17 +178,17 @@ def test_senders_do_not_use_up_each_others_numbers() -> None:
     for sender in ("R1", "R2"):
         opened = reader.read(sender, Framing(sender, "run").write("R9", said(1)))
         reader.take(sender, opened.number)
-    with pytest.raises(FrameRefusedError, match="letter 2 is missing before letter 3"):
-        reader.read("R2", msgspec.msgpack.encode(Letter("run", 3, said(3))))
+    with pytest.raises(FrameRefusedError, match="frame 2 is missing before frame 3"):
+        reader.read("R2", msgspec.msgpack.encode(Frame("run", 3, said(3))))
 
 
 @pytest.mark.parametrize("number", [0, -1, -(2**63)])
 def test_numbers_begin_at_1(number: int) -> None:
     with pytest.raises(FrameRefusedError, match="replay"):
-        pair()[1].read("R1", msgspec.msgpack.encode(Letter("run", number, said(1))))
+        pair()[1].read("R1", msgspec.msgpack.encode(Frame("run", number, said(1))))
 
 
-def test_letters_of_another_run_are_replays() -> None:
+def test_frames_of_another_run_are_replays() -> None:
     old, reader = Framing("R1", "before"), Framing("R2", "run")
     content = old.write("R2", said(1))
     with pytest.raises(FrameRefusedError, match="another run"):
@@ -213,13 +222,13 @@ def test_another_life_begins_at_1_for_that_robot_only() -> None:
 
 def test_words_before_a_run_have_no_number() -> None:
     robot, master = Framing("R1"), Framing(MASTER, "run")
-    content = robot.write(MASTER, Register(PROFILE, "visit"))
+    content = robot.write(MASTER, Register(PROFILE, "incarnation"))
     for _ in range(2):
         opened = master.read("R1", content)
-        assert opened == Opened(0, Register(PROFILE, "visit"))
+        assert opened == Opened(0, Register(PROFILE, "incarnation"))
         master.take("R1", opened.number)
     assert robot.next_number(MASTER) == 1
-    answer = master.write("R1", Welcome("visit", "run", (), observed=False, private=False))
+    answer = master.write("R1", Welcome("incarnation", "run", (), observed=False, private=False))
     assert robot.read(MASTER, answer).number == 0
     assert master.read("R1", Framing("R1", "run").write(MASTER, Ready(1))).number == 1
 
@@ -227,24 +236,24 @@ def test_words_before_a_run_have_no_number() -> None:
 # Sizes
 
 
-def test_a_letter_that_is_too_large_is_not_written_and_uses_no_number() -> None:
+def test_a_frame_that_is_too_large_is_not_written_and_uses_no_number() -> None:
     writer, reader = pair()
     with pytest.raises(MessageTooLargeError, match=r"R1 to R2 has 8,\d\d\d,\d\d\d bytes, more than 8,388,608"):
-        writer.write("R2", ProtocolMessage(1, 0, bytes(LARGEST_LETTER)))
+        writer.write("R2", ProtocolMessage(1, 0, bytes(LARGEST_FRAME)))
     assert reader.read("R1", writer.write("R2", said(1))).number == 1
 
 
-def test_a_letter_that_is_too_large_is_not_read() -> None:
-    content = msgspec.msgpack.encode(Letter("run", 1, ProtocolMessage(1, 0, bytes(LARGEST_LETTER))))
+def test_a_frame_that_is_too_large_is_not_read() -> None:
+    content = msgspec.msgpack.encode(Frame("run", 1, ProtocolMessage(1, 0, bytes(LARGEST_FRAME))))
     with pytest.raises(FrameRefusedError, match="more than 8,388,608"):
         pair()[1].read("R1", content)
 
 
-def test_the_largest_letter_passes() -> None:
+def test_the_largest_frame_passes() -> None:
     writer, reader = pair()
-    spare = len(msgspec.msgpack.encode(Letter("run", 1, ProtocolMessage(1, 0, bytes(70_000))))) - 70_000
-    content = writer.write("R2", ProtocolMessage(1, 0, bytes(LARGEST_LETTER - spare)))
-    assert len(content) == LARGEST_LETTER
+    spare = len(msgspec.msgpack.encode(Frame("run", 1, ProtocolMessage(1, 0, bytes(70_000))))) - 70_000
+    content = writer.write("R2", ProtocolMessage(1, 0, bytes(LARGEST_FRAME - spare)))
+    assert len(content) == LARGEST_FRAME
     assert reader.read("R1", content).number == 1
 
 
@@ -264,10 +273,10 @@ def test_words_of_another_direction_are_refused(
     for place, kinds in enumerate(WORDS):
         for kind in kinds:
             word = data.draw(some(kind))
-            content = msgspec.msgpack.encode(Letter("run", 1, word))
+            content = msgspec.msgpack.encode(Frame("run", 1, word))
             reader = Framing(receiver, "run")
             if place == direction:
-                assert type(reader.read(sender, content).word) is kind
+                assert type(reader.read(sender, content).message) is kind
             else:
                 with pytest.raises(FrameRefusedError, match="malformed"):
                     reader.read(sender, content)
@@ -284,10 +293,10 @@ def test_arbitrary_bytes_are_refused(sender: str, receiver: str, content: bytes)
         Framing(receiver, "run").read(sender, content)
 
 
-LETTERS = [
-    (sender, receiver, msgspec.msgpack.encode(Letter("run", 1, word)))
+FRAMES = [
+    (sender, receiver, msgspec.msgpack.encode(Frame("run", 1, word)))
     for sender, receiver, word in (
-        ("R1", MASTER, Register(PROFILE, "visit")),
+        ("R1", MASTER, Register(PROFILE, "incarnation")),
         ("R1", MASTER, Failed("why", unsupported=True)),
         ("R1", MASTER, Counters(1, 2, 3, 4)),
         (MASTER, "R1", Leave("over", failed=False)),
@@ -297,10 +306,10 @@ LETTERS = [
 ]
 
 
-@given(letter=st.sampled_from(LETTERS), data=st.data())
+@given(frame=st.sampled_from(FRAMES), data=st.data())
 @settings(max_examples=300, deadline=None)
-def test_damaged_letters_are_refused_or_read_never_worse(letter: tuple[str, str, bytes], data: st.DataObject) -> None:
-    sender, receiver, content = letter
+def test_damaged_frames_are_refused_or_read_never_worse(frame: tuple[str, str, bytes], data: st.DataObject) -> None:
+    sender, receiver, content = frame
     bit = data.draw(st.integers(0, 8 * len(content) - 1))
     flipped = bytearray(content)
     flipped[bit // 8] ^= 1 << bit % 8

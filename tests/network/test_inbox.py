@@ -6,7 +6,7 @@ from queue import Empty
 
 import pytest
 
-from robochoc.communication.network.inbox import Arrived, Inbox, Item, Missed, Woken
+from robochoc.communication.network.inbox import FrameArrived, FramesLost, Inbox, Item, WakeUp
 from robochoc.communication.network.quotas import BURST_S, OF_A_ROBOT, OF_AN_OBSERVER, Allowance, Share
 
 
@@ -20,48 +20,54 @@ def all_in(inbox: Inbox) -> list[Item]:
 def test_what_is_more_than_a_senders_share_is_dropped_and_told_once() -> None:
     inbox = Inbox(lambda _sender: Share(2, 100), clock=lambda: 0.0)
     for number in range(1000):
-        inbox.put(Arrived("A", str(number).encode()))
-    inbox.put(Arrived("B", b"mine"))
-    inbox.put(Woken())
-    expected = [Arrived("A", b"0"), Arrived("A", b"1"), Missed("A", 998, dropped=True), Arrived("B", b"mine"), Woken()]
+        inbox.put(FrameArrived("A", str(number).encode()))
+    inbox.put(FrameArrived("B", b"mine"))
+    inbox.put(WakeUp())
+    expected = [
+        FrameArrived("A", b"0"),
+        FrameArrived("A", b"1"),
+        FramesLost("A", 998, dropped=True),
+        FrameArrived("B", b"mine"),
+        WakeUp(),
+    ]
     assert all_in(inbox) == expected
-    inbox.put(Arrived("A", b"again"))
-    assert all_in(inbox) == [Arrived("A", b"again")], "there is room again"
+    inbox.put(FrameArrived("A", b"again"))
+    assert all_in(inbox) == [FrameArrived("A", b"again")], "there is room again"
 
 
 def test_news_of_gaps_is_bounded_too() -> None:
     inbox = Inbox(lambda _sender: Share(2, 100), clock=lambda: 0.0)
     for _ in range(1000):
-        inbox.put(Missed("A", 5))
-    assert all_in(inbox) == [Missed("A", 5), Missed("A", 5), Missed("A", 998, dropped=True)]
-    inbox.put(Missed("A", 5))
-    assert all_in(inbox) == [Missed("A", 5)]
+        inbox.put(FramesLost("A", 5))
+    assert all_in(inbox) == [FramesLost("A", 5), FramesLost("A", 5), FramesLost("A", 998, dropped=True)]
+    inbox.put(FramesLost("A", 5))
+    assert all_in(inbox) == [FramesLost("A", 5)]
 
 
 def test_bytes_that_wait_are_bounded() -> None:
     inbox = Inbox(lambda _sender: Share(1000, 100), clock=lambda: 0.0)
     for _ in range(5):
-        inbox.put(Arrived("A", bytes(40)))
-    assert all_in(inbox) == [Arrived("A", bytes(40))] * 2 + [Missed("A", 3, dropped=True)]
-    inbox.put(Arrived("A", bytes(101)))
-    assert all_in(inbox) == [Missed("A", 1, dropped=True)]
+        inbox.put(FrameArrived("A", bytes(40)))
+    assert all_in(inbox) == [FrameArrived("A", bytes(40))] * 2 + [FramesLost("A", 3, dropped=True)]
+    inbox.put(FrameArrived("A", bytes(101)))
+    assert all_in(inbox) == [FramesLost("A", 1, dropped=True)]
 
 
 def test_so_many_a_second_in_the_long_run() -> None:
     now = 0.0
     inbox = Inbox(lambda _sender: OF_AN_OBSERVER, clock=lambda: now)
 
-    def taken(letters: int) -> int:
+    def taken(frames: int) -> int:
         count = 0
-        for _ in range(letters):
-            inbox.put(Arrived("A", b""))
-            count += isinstance(inbox.get_nowait(), Arrived)
+        for _ in range(frames):
+            inbox.put(FrameArrived("A", b""))
+            count += isinstance(inbox.get_nowait(), FrameArrived)
         return count
 
-    burst = BURST_S * OF_AN_OBSERVER.letters_a_second
+    burst = BURST_S * OF_AN_OBSERVER.frames_a_second
     assert taken(10_000) == burst
     now += 2
-    assert taken(10_000) == 2 * OF_AN_OBSERVER.letters_a_second
+    assert taken(10_000) == 2 * OF_AN_OBSERVER.frames_a_second
     now += 10_000
     assert taken(10_000) == burst
 
@@ -75,7 +81,7 @@ def test_what_a_sender_may_have_is_asked_once() -> None:
 
     inbox = Inbox(share_of)
     for sender in ("A", "B", "A", "B"):
-        inbox.put(Arrived(sender, b""))
+        inbox.put(FrameArrived(sender, b""))
     assert asked == ["A", "B"]
 
 

@@ -13,7 +13,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from robochoc.communication.network import journal_server as module
-from robochoc.communication.network.control_messages import Sniff, Sniffable
+from robochoc.communication.network.control_messages import JournalAnswer, JournalRequest
 from robochoc.communication.network.journal_server import (
     ANSWERED_AT_MOST,
     PIECE_BYTES,
@@ -109,10 +109,10 @@ def test_where_nothing_can_be_written_the_run_goes_on_and_followers_are_told() -
         publication = Publication(full.fileno())
         desk = JournalServer(RUN, lambda _name: True, MasterEvents(None))
         desk.publication = publication
-        assert desk.welcome("Eye", Sniff(1)).why == ""
+        assert desk.welcome("Eye", JournalRequest(1)).why == ""
         publication.write(b"block")
         publication.write(b"block")
-        assert "cannot be kept any more: No space left" in desk.welcome("Eye", Sniff(1)).why
+        assert "cannot be kept any more: No space left" in desk.welcome("Eye", JournalRequest(1)).why
         assert desk.answer("Eye", question(RUN, 0)) is None
 
 
@@ -148,7 +148,7 @@ def test_the_desk_asks_who_may_and_tells_what_it_said(publication: Publication) 
     told: list[AnyEvent] = []
     may: set[str] = {"Eye"}
     desk = JournalServer(RUN, may.__contains__, MasterEvents(told.append))
-    assert desk.welcome("Eye", Sniff(1)).why.endswith("it needs --sniffable")
+    assert desk.welcome("Eye", JournalRequest(1)).why.endswith("it needs --sniffable")
     assert desk.answer("Eye", question(RUN, 0)) is None
     assert not desk.lagging
     told.clear()
@@ -156,12 +156,12 @@ def test_the_desk_asks_who_may_and_tells_what_it_said(publication: Publication) 
     desk.publication = publication
     publication.write(b"all")
     for _ in range(3):
-        assert desk.welcome("Eye", Sniff(7)) == Sniffable(7, RUN, "")
+        assert desk.welcome("Eye", JournalRequest(7)) == JournalAnswer(7, RUN, "")
     assert (desk.answer("Eye", question(RUN, 0)), desk.lagging) != (None, False)
     assert [(event.who, event.what) for event in told if isinstance(event, Granted)] == [("Eye", SNIFF)]
     told.clear()
 
     may.clear()
-    assert "authority enrol Eye --may sniff" in desk.welcome("Eye", Sniff(8)).why
+    assert "authority enrol Eye --may sniff" in desk.welcome("Eye", JournalRequest(8)).why
     assert desk.answer("Ear", question(RUN, 0)) is None
     assert [(event.who, event.what) for event in told if isinstance(event, Refused)] == [("Eye", SNIFF), ("Ear", SNIFF)]

@@ -23,15 +23,15 @@ PROFILES = profiles_of(team_of(dict.fromkeys("ABC", (1, 2)), TRIANGLE))
 RA, RB, RC = PROFILES
 
 
-def join(members: Members, *names: str, visit: str = "first") -> None:
+def join(members: Members, *names: str, incarnation: str = "first") -> None:
     for name in names:
-        members.register(name, PROFILES[name], visit).joined = True
+        members.register(name, PROFILES[name], incarnation).joined = True
 
 
-def refused(members: Members, name: str, profile: Profile, visit: str = "first") -> str:
+def refused(members: Members, name: str, profile: Profile, incarnation: str = "first") -> str:
     before = dict(members.robots)
     with pytest.raises(RegistrationRefusedError) as caught:
-        members.register(name, profile, visit)
+        members.register(name, profile, incarnation)
     assert members.robots == before
     return str(caught.value)
 
@@ -54,10 +54,10 @@ def test_a_name_is_one_robots() -> None:
 def test_who_was_away_may_come_in_another_life_while_the_team_is_open() -> None:
     members = Members()
     join(members, RA)
-    members.robots[RA].gone = 12.5
+    members.robots[RA].away_since = 12.5
     now = members.register(RA, PROFILES[RA], "second")
-    assert (now.visit, now.joined, now.gone) == ("second", False, None)
-    now.gone = 13.5
+    assert (now.incarnation, now.joined, now.away_since) == ("second", False, None)
+    now.away_since = 13.5
     assert "start it anew" in refused(members, RA, PROFILES[RA], "first")
     members.closed = True
     assert "registered already" in refused(members, RA, PROFILES[RA], "third")
@@ -68,7 +68,7 @@ def test_who_was_given_up_comes_in_another_life_or_not_at_all() -> None:
     join(members, RA)
     members.remove([RA, "nobody"])
     assert "away for too long; start it anew" in refused(members, RA, PROFILES[RA], "first")
-    assert members.register(RA, PROFILES[RA], "second").visit == "second"
+    assert members.register(RA, PROFILES[RA], "second").incarnation == "second"
 
 
 def test_a_certificate_is_for_one_file() -> None:
@@ -101,7 +101,7 @@ def test_absurd_profiles_and_contradictions_are_not_taken() -> None:
 def test_who_comes_again_is_not_held_against_its_former_life() -> None:
     members = Members()
     join(members, RA)
-    members.robots[RA].gone = 1.0
+    members.robots[RA].away_since = 1.0
     other = msgspec.structs.replace(PROFILES[RA], children=(), variables={}, kind=ProblemKind.DISWCSP)
     assert members.register(RA, other, "second").profile is other
 
@@ -170,7 +170,7 @@ def test_variables_that_a_parent_looks_at_are_shown() -> None:
     assert members.unseen() == {}
     members.register("B", looked_at()["B"], "first")
     assert members.unseen() == {"B": ("Z",)}
-    members.robots["B"].also["Z"] = ((3, 4),)
+    members.robots["B"].shown_later["Z"] = ((3, 4),)
     assert members.unseen() == {}
     task = members.tasks(1, "abt", Traits(), DEFAULT_PARAMETERS)["A"]
     assert task.interfaces == {"A": ("X",), "B": ("Y", "Z")}
@@ -240,8 +240,8 @@ def test_a_robot_that_was_away_may_come_back_in_another_life() -> None:
     members.register("A", robot("A"), "first")
     with pytest.raises(RegistrationRefusedError, match="registered already"):
         members.register("A", robot("A"), "second")
-    members.robots["A"].doubtful = True
-    assert members.register("A", robot("A"), "second").visit == "second"
+    members.robots["A"].unconfirmed = True
+    assert members.register("A", robot("A"), "second").incarnation == "second"
 
 
 def test_a_team_is_not_complete_while_one_that_has_come_is_away_or_may_be_another() -> None:
@@ -288,5 +288,5 @@ def test_all_kinds_of_teams_are_taken_in_any_order() -> None:
             members = Members([name for name, _ in profiles])
             for name, profile in profiles:
                 assert not members.complete
-                members.register(name, profile, "visit").joined = True
+                members.register(name, profile, "incarnation").joined = True
             assert members.complete

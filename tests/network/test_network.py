@@ -115,7 +115,7 @@ def test_costs(protocol: str, seed: int) -> None:
 def test_local_search_ends_by_itself() -> None:
     """An incomplete protocol need not find the best; what it decides is told, and its cost agreed on."""
     team = random_cost_team(Random("network mgm"), n_ary=False)
-    with LocalNetwork(team, protocol_named("mgm"), brief=RunParameters(settings={"cycles": "20"})) as network:
+    with LocalNetwork(team, protocol_named("mgm"), parameters=RunParameters(settings={"cycles": "20"})) as network:
         result = network.search(TIMEOUT_S)
         held, told = network.master.checked(result.assignments)
     assert set(result.assignments) == set(team.order)
@@ -171,7 +171,7 @@ def test_limits() -> None:
 
 def test_when_the_time_is_over_there_is_what_was_decided_so_far() -> None:
     def searched(limit: float) -> RunResult:
-        with LocalNetwork(CHAIN, PausedABT, brief=RunParameters(settings={"file": "/nowhere"})) as network:
+        with LocalNetwork(CHAIN, PausedABT, parameters=RunParameters(settings={"file": "/nowhere"})) as network:
             return network.search(timeout=limit)
 
     result = once(lambda result: len(result.assignments) == len(CHAIN.order), searched)

@@ -13,14 +13,14 @@ from typing import Any
 import msgspec
 import pytest
 
-from robochoc.authority.admission import Household
+from robochoc.authority.admission import InMemoryAuthority
 from robochoc.authority.certificates import leaf_certificate, moment, new_key
 from robochoc.authority.identity import Identity
 from robochoc.communication.control import Conclusion
-from robochoc.communication.network.access import letter_key
-from robochoc.communication.network.control_messages import Ask, ProtocolMessage, Register
-from robochoc.communication.network.framing import LARGEST_LETTER, MASTER
-from robochoc.communication.network.inbox import Arrived
+from robochoc.communication.network.access import frame_key
+from robochoc.communication.network.control_messages import DirectoryRequest, ProtocolMessage, Register
+from robochoc.communication.network.framing import LARGEST_FRAME, MASTER
+from robochoc.communication.network.inbox import FrameArrived
 from robochoc.communication.network.profile import profile_of
 from robochoc.communication.network.robot import NetworkRobot
 from robochoc.communication.network.router import Router
@@ -30,7 +30,7 @@ from robochoc.model.outcome import Verdict
 from robochoc.protocols.abt import Ok
 from robochoc.protocols.protocol import Protocol
 from robochoc.solver.compiled_team import CompiledRobot
-from tests.support.network_runs import NetworkRun, free_endpoint, letter, put
+from tests.support.network_runs import NetworkRun, frame, free_endpoint, put
 from tests.support.paused_abt import CHAIN, PausedABT
 
 A_DAY_S = 86_400
@@ -60,17 +60,17 @@ def shaken(endpoint: str) -> socket.socket:
 
 
 def test_a_robot_that_is_not_of_the_team(run: NetworkRun) -> None:
-    with run.post("Intruder") as post:
-        post.send(MASTER, letter(run, "Intruder", MASTER, Register(profile_of(CHAIN.robots[0]), "x")))
-        put(post, letter_key("RX0", "Intruder"))
+    with run.transport("Intruder") as transport:
+        transport.send(MASTER, frame(run, "Intruder", MASTER, Register(profile_of(CHAIN.robots[0]), "x")))
+        put(transport, frame_key("RX0", "Intruder"))
         run.wait_for_refusal("Intruder", "connect", "not registered with the Authority")
         run.wait_for_progress()
-        assert post.inbox.empty()
+        assert transport.inbox.empty()
     assert "Intruder" not in run.master.members.robots
 
 
 def test_a_certificate_of_another_authority(run: NetworkRun) -> None:
-    other = Household(CHAIN.order).identity("RX0")
+    other = InMemoryAuthority(CHAIN.order).identity("RX0")
     with pytest.raises(CannotConnectError, match="does not let RX0 in"):
         Transport(run.endpoint, other, patience_s=SOON_S)
     run.wait_for_refusal("somebody", "connect", "does not believe the master")
@@ -87,7 +87,7 @@ def test_a_certificate_that_has_expired(run: NetworkRun) -> None:
     run.wait_for_progress()
 
 
-def out_of_date(household: Household, name: str) -> Identity:
+def out_of_date(household: InMemoryAuthority, name: str) -> Identity:
     key, now = new_key(), time.time()
     times = (moment(now - 2 * A_DAY_S), moment(now - A_DAY_S))
     issuer = (household._certificate, household._key)  # noqa: SLF001
@@ -122,7 +122,7 @@ def test_many_connections_that_say_nothing(run: NetworkRun) -> None:
     with ExitStack() as stack:
         mute = [stack.enter_context(shaken(run.endpoint)) for _ in range(12)]
         mute[0].sendall(b"\x16\x03")
-        with run.post("RX3"):
+        with run.transport("RX3"):
             run.wait_for_progress()
     run.wait_for_refusal("somebody", "connect", r"hung up in the middle of the handshake \(10 times so far\)")
     run.wait_for_progress()
@@ -135,17 +135,17 @@ def test_a_robot_that_poses_as_the_master(run: NetworkRun) -> None:
     with closing(router):
         router.open({"RX0": ()})
         with pytest.raises(CannotConnectError):
-            run.post("RX0", endpoint=endpoint, patience_s=SOON_S)
+            run.transport("RX0", endpoint=endpoint, patience_s=SOON_S)
 
 
 # What those who are let in may not do
 
 
 def test_a_forged_sender(run: NetworkRun) -> None:
-    with run.post("RX3") as post:
-        put(post, letter_key("RX2", "RX1"), letter(run, "RX1", "RX2", ProtocolMessage(1, 0, encode(Ok((0,))))))
-        put(post, letter_key(MASTER, "RX1"), letter(run, "RX1", MASTER, Conclusion(1, "no-solution")))
-        put(post, letter_key("RX2", MASTER))
+    with run.transport("RX3") as transport:
+        put(transport, frame_key("RX2", "RX1"), frame(run, "RX1", "RX2", ProtocolMessage(1, 0, encode(Ok((0,))))))
+        put(transport, frame_key(MASTER, "RX1"), frame(run, "RX1", MASTER, Conclusion(1, "no-solution")))
+        put(transport, frame_key("RX2", MASTER))
         run.wait_for_refusal("RX3", "put rc/msg/RX2/RX1", "no rule")
         run.wait_for_refusal("RX3", "put rc/msg/MASTER/RX1", "no rule")
         run.wait_for_refusal("RX3", "put rc/msg/RX2/MASTER", "no rule")
@@ -153,10 +153,10 @@ def test_a_forged_sender(run: NetworkRun) -> None:
 
 
 @pytest.mark.parametrize("key", ["rc/msg/RX1/*", "rc/msg/*/RX1", "rc/**", "**", "rc/msg/RX1/RX0/@adv/**"])
-def test_reading_the_letters_of_others(run: NetworkRun, key: str) -> None:
+def test_reading_the_frames_of_others(run: NetworkRun, key: str) -> None:
     heard: list[Any] = []
-    with run.post("RX3") as post:
-        session = post._session  # noqa: SLF001
+    with run.transport("RX3") as transport:
+        session = transport._session  # noqa: SLF001
         subscriber = session.declare_subscriber(key, heard.append)
         assert not list(session.get(key))
         run.wait_for_refusal("RX3", f"declare subscriber {key}".replace("*", r"\*"), "no rule")
@@ -169,25 +169,25 @@ def test_reading_the_letters_of_others(run: NetworkRun, key: str) -> None:
 def test_a_robot_that_writes_to_one_it_has_nothing_to_do_with(run: NetworkRun) -> None:
     """RX0 and RX3 share no constraint, and the protocol says that it goes `beyond` none."""
     assert not PausedABT.traits.writes_to_non_neighbours
-    with run.post("RX3") as post:
-        put(post, letter_key("RX0", "RX3"), letter(run, "RX3", "RX0", ProtocolMessage(1, 0, encode(Ok((0,))))))
+    with run.transport("RX3") as transport:
+        put(transport, frame_key("RX0", "RX3"), frame(run, "RX3", "RX0", ProtocolMessage(1, 0, encode(Ok((0,))))))
         run.wait_for_refusal("RX3", "put rc/msg/RX0/RX3", "no rule")
         run.wait_for_progress()
 
 
 def test_posing_as_there(run: NetworkRun) -> None:
-    with run.post("RX3") as post:
-        token = post._session.liveliness().declare_token("rc/live/RX0")  # noqa: SLF001
+    with run.transport("RX3") as transport:
+        token = transport._session.liveliness().declare_token("rc/live/RX0")  # noqa: SLF001
         run.wait_for_refusal("RX3", "liveliness token rc/live/RX0", "no rule")
         del token
 
 
-def test_thousands_of_forbidden_letters(run: NetworkRun) -> None:
+def test_thousands_of_forbidden_frames(run: NetworkRun) -> None:
     """They cost a few events, that say how many there were."""
     before = len(run.refusals)
-    with run.post("RX2") as post:
+    with run.transport("RX2") as transport:
         for _ in range(JUNK):
-            put(post, letter_key("RX1", "RX0"), b"junk")
+            put(transport, frame_key("RX1", "RX0"), b"junk")
         run.wait_for_refusal("RX2", "put rc/msg/RX1/RX0", r"no rule .*1,000 times so far")
     assert len(run.refusals) < before + 20
     run.wait_for_progress()
@@ -196,34 +196,36 @@ def test_thousands_of_forbidden_letters(run: NetworkRun) -> None:
 # What those who are let in send to whom they may
 
 
-def test_a_letter_of_an_earlier_run(run: NetworkRun) -> None:
-    with run.post("RX1") as post:
-        post.send("RX2", letter(run, "RX1", "RX2", ProtocolMessage(1, 0, encode(Ok((0,)))), of_run="0123456789abcdef"))
-        post.send(MASTER, letter(run, "RX1", MASTER, Conclusion(1, "no-solution"), of_run="0123456789abcdef"))
-        run.wait_for_refusal("RX1", "letter to RX2", "replay: it was written in another run")
-        run.wait_for_refusal("RX1", "letter to the master", "replay: it was written in another run")
+def test_a_frame_of_an_earlier_run(run: NetworkRun) -> None:
+    with run.transport("RX1") as transport:
+        transport.send(
+            "RX2", frame(run, "RX1", "RX2", ProtocolMessage(1, 0, encode(Ok((0,)))), of_run="0123456789abcdef")
+        )
+        transport.send(MASTER, frame(run, "RX1", MASTER, Conclusion(1, "no-solution"), of_run="0123456789abcdef"))
+        run.wait_for_refusal("RX1", "frame to RX2", "replay: it was written in another run")
+        run.wait_for_refusal("RX1", "frame to the master", "replay: it was written in another run")
     run.wait_for_progress()
 
 
-def test_a_letter_that_comes_twice(run: NetworkRun) -> None:
+def test_a_frame_that_comes_twice(run: NetworkRun) -> None:
     """Recorded where it may be read, and sent again by the one session that may write in its sender's name."""
-    with run.post("RX0") as reader, run.post("RX1") as writer:
+    with run.transport("RX0") as reader, run.transport("RX1") as writer:
         recorded = next(
             item.content
             for item in iter(lambda: reader.inbox.get(timeout=10), None)
-            if isinstance(item, Arrived) and item.sender == "RX1"
+            if isinstance(item, FrameArrived) and item.sender == "RX1"
         )
         writer.send("RX0", recorded)
-        run.wait_for_refusal("RX1", "letter to RX0", r"replay: letter \d+ has come before")
+        run.wait_for_refusal("RX1", "frame to RX0", r"replay: frame \d+ has come before")
     run.wait_for_progress()
 
 
-def test_a_letter_from_the_future(run: NetworkRun) -> None:
-    with run.post("RX1") as post:
-        post.send("RX2", letter(run, "RX1", "RX2", ProtocolMessage(1, 0, encode(Ok((0,)))), number=10**6))
-        run.wait_for_refusal("RX1", "letter to RX2", "is missing before letter 1000000")
-        post.send("RX2", letter(run, "RX1", "RX2", ProtocolMessage(10**6, 0, encode(Ok((0,))))))
-        run.wait_for_refusal("RX1", "letter to RX2", "it is of epoch 1000000")
+def test_a_frame_from_the_future(run: NetworkRun) -> None:
+    with run.transport("RX1") as transport:
+        transport.send("RX2", frame(run, "RX1", "RX2", ProtocolMessage(1, 0, encode(Ok((0,)))), number=10**6))
+        run.wait_for_refusal("RX1", "frame to RX2", "is missing before frame 1000000")
+        transport.send("RX2", frame(run, "RX1", "RX2", ProtocolMessage(10**6, 0, encode(Ok((0,))))))
+        run.wait_for_refusal("RX1", "frame to RX2", "it is of epoch 1000000")
 
 
 DEEP = b"\x93\xa3run\x01" + b"\x91" * 100_000
@@ -231,11 +233,11 @@ DEEP = b"\x93\xa3run\x01" + b"\x91" * 100_000
 
 @pytest.mark.parametrize("content", [b"", b"\xc1", b"\xff" * 1000, DEEP, b"\x93\xa1\xff\x01\x92\xa4Said\x01", b"\x90"])
 @pytest.mark.parametrize("receiver", ["RX0", MASTER])
-def test_malformed_letters(run: NetworkRun, content: bytes, receiver: str) -> None:
+def test_malformed_frames(run: NetworkRun, content: bytes, receiver: str) -> None:
     before = len(run.refusals)
-    with run.post("RX1") as post:
-        post.send(receiver, content)
-        run.wait_for_refusal("RX1", "letter to (RX0|the master)", "malformed")
+    with run.transport("RX1") as transport:
+        transport.send(receiver, content)
+        run.wait_for_refusal("RX1", "frame to (RX0|the master)", "malformed")
         run.wait_for_progress()
     assert len(run.refusals) <= before + 2
 
@@ -244,47 +246,47 @@ def test_malformed_letters(run: NetworkRun, content: bytes, receiver: str) -> No
     "content", [b"", b"\xc1", b"\x01", msgspec.msgpack.encode(["Ok", "text"]), b"\x91\xa2\xff\xff"]
 )
 def test_a_peer_that_speaks_no_protocol(run: NetworkRun, content: bytes) -> None:
-    """Such a letter does not take the place of the right one."""
-    with run.post("RX2") as post:
-        post.send("RX1", letter(run, "RX2", "RX1", ProtocolMessage(1, 0, content)))
-        run.wait_for_refusal("RX2", "letter to RX1", "no message of the protocol")
+    """Such a frame does not take the place of the right one."""
+    with run.transport("RX2") as transport:
+        transport.send("RX1", frame(run, "RX2", "RX1", ProtocolMessage(1, 0, content)))
+        run.wait_for_refusal("RX2", "frame to RX1", "no message of the protocol")
     run.wait_for_progress()
 
 
-def test_letters_that_are_too_large(run: NetworkRun) -> None:
+def test_frames_that_are_too_large(run: NetworkRun) -> None:
     """What zenoh takes is refused aloud; what is more than that ends the connection of who has sent it."""
-    with run.post("RX1") as post:
-        post.send("RX2", bytes(LARGEST_LETTER + 1))
-        post.send(MASTER, bytes(LARGEST_LETTER + 1))
-        run.wait_for_refusal("RX1", "letter to RX2", "has 8,388,609 bytes, more than")
-        run.wait_for_refusal("RX1", "letter to the master", "has 8,388,609 bytes, more than")
-        put(post, letter_key(MASTER, "RX1"), bytes(5 * LARGEST_LETTER))
+    with run.transport("RX1") as transport:
+        transport.send("RX2", bytes(LARGEST_FRAME + 1))
+        transport.send(MASTER, bytes(LARGEST_FRAME + 1))
+        run.wait_for_refusal("RX1", "frame to RX2", "has 8,388,609 bytes, more than")
+        run.wait_for_refusal("RX1", "frame to the master", "has 8,388,609 bytes, more than")
+        put(transport, frame_key(MASTER, "RX1"), bytes(5 * LARGEST_FRAME))
         run.wait_for_progress()
 
 
 @pytest.mark.parametrize("receiver", ["RX0", MASTER])
-def test_thousands_of_junk_letters(run: NetworkRun, receiver: str) -> None:
+def test_thousands_of_junk_frames(run: NetworkRun, receiver: str) -> None:
     before = len(run.refusals)
     content = {"RX0": b"\x00junk", MASTER: b"\x01junk"}[receiver]
-    with run.post("RX1") as post:
+    with run.transport("RX1") as transport:
         for _ in range(JUNK):
-            post.send(receiver, content)
+            transport.send(receiver, content)
         run.wait_for_refusal(
-            "RX1", f"letter to {'RX0' if receiver == 'RX0' else 'the master'}", r"malformed.*\(10,000 times so far\)"
+            "RX1", f"frame to {'RX0' if receiver == 'RX0' else 'the master'}", r"malformed.*\(10,000 times so far\)"
         )
         run.wait_for_progress()
     assert len(run.refusals) < before + 20
 
 
 def test_a_robot_of_a_name_that_is_there_already(run: NetworkRun) -> None:
-    with run.post("RX2") as post:
-        robot = NetworkRobot(CompiledRobot(CHAIN["RX2"]), run.household.identity("RX2"), post, protocol_named)
+    with run.transport("RX2") as transport:
+        robot = NetworkRobot(CompiledRobot(CHAIN["RX2"]), run.household.identity("RX2"), transport, protocol_named)
         ending = robot.run()
     assert ending.failed
     assert ending.why == "the master does not take RX2: a robot called RX2 is registered already"
     run.wait_for_refusal("RX2", "register", "a robot called RX2 is registered already")
     run.wait_for_progress()
-    assert run.master.members.robots["RX2"].gone is None, "the first one is there as before"
+    assert run.master.members.robots["RX2"].away_since is None, "the first one is there as before"
 
 
 def protocol_named(_name: str) -> type[Protocol]:
@@ -292,8 +294,8 @@ def protocol_named(_name: str) -> type[Protocol]:
 
 
 def test_who_asks_the_directory_without_end(run: NetworkRun) -> None:
-    with run.post("RX3") as post:
+    with run.transport("RX3") as transport:
         for number in range(JUNK):
-            post.send(MASTER, letter(run, "RX3", MASTER, Ask(number, "(")))
+            transport.send(MASTER, frame(run, "RX3", MASTER, DirectoryRequest(number, "(")))
         run.wait_for_refusal("RX3", "ask the Directory", r"\(1,000 times so far\)")
     run.wait_for_progress()

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from robochoc.communication.network.control_messages import Bye, Joined, Leave, Register, Welcome
 from robochoc.communication.network.framing import MASTER, Framing, Opened
-from robochoc.communication.network.inbox import Arrived
+from robochoc.communication.network.inbox import FrameArrived
 from robochoc.communication.network.profile import profile_of
 from robochoc.communication.network.transport import Transport
 from tests.support.network_runs import SLICE_S, NetworkRun
@@ -23,7 +23,7 @@ def test_robots_that_are_away_for_a_moment_hear_the_masters_farewell(tmp_path: P
         members = run.master.members.robots
         run.wait_until(lambda: len(members) == len(CHAIN.order) - 1, "robots do not register")
         relay.cut()
-        run.wait_until(lambda: all(member.gone for member in members.values()), "they do not go")
+        run.wait_until(lambda: all(member.away_since for member in members.values()), "they do not go")
         run.give_up()
         time.sleep(2 * SLICE_S)
         relay.mend()
@@ -33,21 +33,21 @@ def test_robots_that_are_away_for_a_moment_hear_the_masters_farewell(tmp_path: P
 
 def test_who_joins_while_the_master_says_farewell_hears_it(tmp_path: Path) -> None:
     """Not before: it may not have been welcomed yet, and would take it for another run's."""
-    with NetworkRun(tmp_path, absent=CHAIN.order) as run, run.post("RX0") as post:
-        letters = Framing("RX0")
-        post.send(MASTER, letters.write(MASTER, Register(profile_of(CHAIN["RX0"]), "a life")))
+    with NetworkRun(tmp_path, absent=CHAIN.order) as run, run.transport("RX0") as transport:
+        framing = Framing("RX0")
+        transport.send(MASTER, framing.write(MASTER, Register(profile_of(CHAIN["RX0"]), "a life")))
         run.give_up()
-        welcomes = [heard(post, letters) for _ in range(4)]  # until it answers
-        assert {type(opened.word) for opened in welcomes} == {Welcome}
-        letters.begin(run.master.run)
-        post.send(MASTER, letters.write(MASTER, Joined("a life", b"")))
-        while isinstance((opened := heard(post, letters)).word, Welcome):
+        welcomes = [heard(transport, framing) for _ in range(4)]  # until it answers
+        assert {type(opened.message) for opened in welcomes} == {Welcome}
+        framing.begin(run.master.run)
+        transport.send(MASTER, framing.write(MASTER, Joined("a life", b"")))
+        while isinstance((opened := heard(transport, framing)).message, Welcome):
             pass
         assert opened == Opened(1, Leave("the run is over", failed=False))
-        post.send(MASTER, letters.write(MASTER, Bye()))
+        transport.send(MASTER, framing.write(MASTER, Bye()))
 
 
-def heard(post: Transport, letters: Framing) -> Opened:
-    item = post.inbox.get(timeout=10)
-    assert isinstance(item, Arrived)
-    return letters.read(MASTER, item.content)
+def heard(transport: Transport, framing: Framing) -> Opened:
+    item = transport.inbox.get(timeout=10)
+    assert isinstance(item, FrameArrived)
+    return framing.read(MASTER, item.content)

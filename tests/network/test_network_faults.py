@@ -94,8 +94,8 @@ class Team:
 @contextmanager
 def held_team(folder: Path, settings: NetworkSettings = NetworkSettings()) -> Iterator[Team]:
     events: list[AnyEvent] = []
-    brief = RunParameters(settings={"file": str(folder / "go")})
-    with LocalNetwork(CHAIN, PausedABT, observer=events.append, settings=settings, brief=brief) as network:
+    parameters = RunParameters(settings={"file": str(folder / "go")})
+    with LocalNetwork(CHAIN, PausedABT, observer=events.append, settings=settings, parameters=parameters) as network:
         team = Team(network, events, folder / "go")
         try:
             yield team
@@ -303,9 +303,9 @@ class Elsewhere:
 
     def _take_part(self, name: str, patience_s: float) -> None:
         identity = self.identities[name]
-        with Transport(self.endpoint, identity, watch=(), patience_s=30) as post:
+        with Transport(self.endpoint, identity, watch=(), patience_s=30) as transport:
             robot = NetworkRobot(
-                CompiledRobot(CHAIN[name]), identity, post, lambda _: PausedABT, RobotSettings(patience_s)
+                CompiledRobot(CHAIN[name]), identity, transport, lambda _: PausedABT, RobotSettings(patience_s)
             )
             self.endings[name] = robot.run()
 

@@ -1,4 +1,4 @@
-"""Gaps in letters, true ones and made-up ones: whom they concern, and that the others' run goes on."""
+"""Gaps in frames, true ones and made-up ones: whom they concern, and that the others' run goes on."""
 
 from __future__ import annotations
 
@@ -10,13 +10,13 @@ from pathlib import Path
 import pytest
 import zenoh
 
-from robochoc.authority.admission import Household
+from robochoc.authority.admission import InMemoryAuthority
 from robochoc.authority.registry import Right, Role
 from robochoc.communication.control import Failed
-from robochoc.communication.network.access import ALL, letter_key
-from robochoc.communication.network.control_messages import Ask, ProtocolMessage, Register
+from robochoc.communication.network.access import ALL, frame_key
+from robochoc.communication.network.control_messages import DirectoryRequest, ProtocolMessage, Register
 from robochoc.communication.network.framing import MASTER
-from robochoc.communication.network.inbox import Arrived, Missed
+from robochoc.communication.network.inbox import FrameArrived, FramesLost
 from robochoc.communication.network.profile import profile_of
 from robochoc.communication.network.router import Router
 from robochoc.communication.network.settings import LEASE_MS, NetworkSettings
@@ -24,7 +24,7 @@ from robochoc.communication.network.transport import Transport
 from robochoc.communication.run_result import RobotsLostError
 from robochoc.model.outcome import Verdict
 from tests.support.faults import wait_until
-from tests.support.network_runs import NetworkRun, free_endpoint, letter
+from tests.support.network_runs import NetworkRun, frame, free_endpoint
 from tests.support.paused_abt import CHAIN
 
 FAR = 5000
@@ -32,7 +32,7 @@ WATCHER = "Watcher"
 PATIENCE_S = 30.0
 
 
-class Watched(Household):
+class Watched(InMemoryAuthority):
     """A household with an observer."""
 
     def names(self, role: Role | None = None, right: Right | None = None, *, invited: bool = False) -> tuple[str, ...]:
@@ -52,10 +52,10 @@ def watched(folder: Path, conditions: NetworkSettings = NetworkSettings()) -> It
         yield run
 
 
-def put_with_a_gap(post: Transport, receiver: str, content: bytes) -> None:
+def put_with_a_gap(transport: Transport, receiver: str, content: bytes) -> None:
     """Three packets on the own key, of a source of the own, the last one with a number far beyond."""
-    key = letter_key(receiver, post.name)
-    publisher = post._session.declare_publisher(  # noqa: SLF001
+    key = frame_key(receiver, transport.name)
+    publisher = transport._session.declare_publisher(  # noqa: SLF001
         key, congestion_control=zenoh.CongestionControl.BLOCK
     )
     wait_until(lambda: publisher.matching_status.matching, "nobody hears it", PATIENCE_S)  # type: ignore[attr-defined]  # zenoh's stubs
@@ -64,30 +64,30 @@ def put_with_a_gap(post: Transport, receiver: str, content: bytes) -> None:
 
 
 def test_an_observers_gap_is_its_own(tmp_path: Path) -> None:
-    """The master gave the whole run up: "4997 letters to it were lost for good"."""
+    """The master gave the whole run up: "4997 frames to it were lost for good"."""
     with watched(tmp_path) as run:
-        with run.post(WATCHER) as post:
-            put_with_a_gap(post, MASTER, letter(run, WATCHER, MASTER, Ask(1, "(")))
-            refused = run.wait_for_refusal(WATCHER, "a letter to the master", "lost for good")
-        assert refused.why == f"{FAR - 3:,} letters of it were lost for good"
+        with run.transport(WATCHER) as transport:
+            put_with_a_gap(transport, MASTER, frame(run, WATCHER, MASTER, DirectoryRequest(1, "(")))
+            refused = run.wait_for_refusal(WATCHER, "a frame to the master", "lost for good")
+        assert refused.why == f"{FAR - 3:,} frames of it were lost for good"
         run.wait_for_progress()
         assert run.let_go().verdict is Verdict.SOLUTION
     assert not run.losses
 
 
 def test_a_robots_gap_is_its_loss(tmp_path: Path) -> None:
-    with watched(tmp_path, NetworkSettings(survive=True, patience_s=2)) as run, run.post("RX3") as post:
-        put_with_a_gap(post, MASTER, b"anything")
+    with watched(tmp_path, NetworkSettings(survive=True, patience_s=2)) as run, run.transport("RX3") as transport:
+        put_with_a_gap(transport, MASTER, b"anything")
         result = run.wait_for_result()
-    assert result.lost == {"RX3": f"{FAR - 3:,} letters of it were lost for good on the way to the master"}
+    assert result.lost == {"RX3": f"{FAR - 3:,} frames of it were lost for good on the way to the master"}
     assert [lost.robot for lost in run.losses] == ["RX3"]
 
 
 def test_a_gap_between_robots_that_is_none_is_told_and_ends_nothing(tmp_path: Path) -> None:
     with watched(tmp_path) as run:
-        with run.post("RX3") as post:
-            put_with_a_gap(post, "RX2", b"anything")
-            run.wait_for_refusal("RX3", "a letter to RX2", r"4,997 letters of it to RX2 were lost .*RX2 says so")
+        with run.transport("RX3") as transport:
+            put_with_a_gap(transport, "RX2", b"anything")
+            run.wait_for_refusal("RX3", "a frame to RX2", r"4,997 frames of it to RX2 were lost .*RX2 says so")
         run.wait_for_progress()
         assert run.let_go().verdict is Verdict.SOLUTION
     assert not run.losses
@@ -95,18 +95,18 @@ def test_a_gap_between_robots_that_is_none_is_told_and_ends_nothing(tmp_path: Pa
 
 @pytest.mark.slow
 def test_a_gap_between_robots_that_is_one_names_the_sender(tmp_path: Path) -> None:
-    """With the key of RX3 somebody has taken the number of a letter of RX3, and there is a gap."""
+    """With the key of RX3 somebody has taken the number of a frame of RX3, and there is a gap."""
     with watched(tmp_path, NetworkSettings(patience_s=3)) as run:
-        with run.post("RX3") as post:
-            put_with_a_gap(post, "RX2", letter(run, "RX3", "RX2", ProtocolMessage(0, 0, b"")))
-            run.wait_for_refusal("RX3", "a letter to RX2", "lost for good")
+        with run.transport("RX3") as transport:
+            put_with_a_gap(transport, "RX2", frame(run, "RX3", "RX2", ProtocolMessage(0, 0, b"")))
+            run.wait_for_refusal("RX3", "a frame to RX2", "lost for good")
         with pytest.raises(RobotsLostError, match=r"RX3 was lost: .*RX2 says so"):
             run.let_go()
 
 
 def test_a_gap_is_put_down_to_whose_key_it_came_on() -> None:
-    """B uses the source of A: where each sender has a subscriber of its own, A's letters come all the same."""
-    household = Household(("A", "B", "C"))
+    """B uses the source of A: where each sender has a subscriber of its own, A's frames come all the same."""
+    household = InMemoryAuthority(("A", "B", "C"))
     router = Router(free_endpoint(), household.master_identity(("127.0.0.1",)), None, LEASE_MS)
     router.open({"A": (ALL,), "B": (ALL,), "C": (ALL,)})
     join = partial(Transport, router.endpoint, watch=(), patience_s=PATIENCE_S)
@@ -119,24 +119,24 @@ def test_a_gap_is_put_down_to_whose_key_it_came_on() -> None:
         ):
             a.send("C", b"1")
             for reader in (c, careful):
-                assert reader.inbox.get(timeout=PATIENCE_S) == Arrived("A", b"1")
+                assert reader.inbox.get(timeout=PATIENCE_S) == FrameArrived("A", b"1")
             source = a._publishers["C"]  # noqa: SLF001
             forged = zenoh.SourceInfo(source.id, FAR)
-            b._session.put(letter_key("C", "B"), b"forged", source_info=forged)  # noqa: SLF001
-            assert c.inbox.get(timeout=PATIENCE_S) == Missed("B", FAR - 1)
-            assert c.inbox.get(timeout=PATIENCE_S) == Arrived("B", b"forged")
-            assert careful.inbox.get(timeout=PATIENCE_S) == Arrived("B", b"forged")
+            b._session.put(frame_key("C", "B"), b"forged", source_info=forged)  # noqa: SLF001
+            assert c.inbox.get(timeout=PATIENCE_S) == FramesLost("B", FAR - 1)
+            assert c.inbox.get(timeout=PATIENCE_S) == FrameArrived("B", b"forged")
+            assert careful.inbox.get(timeout=PATIENCE_S) == FrameArrived("B", b"forged")
             a.send("C", b"2")
-            assert careful.inbox.get(timeout=PATIENCE_S) == Arrived("A", b"2")
+            assert careful.inbox.get(timeout=PATIENCE_S) == FrameArrived("A", b"2")
     finally:
         router.close()
 
 
 def test_why_a_robot_fails_reaches_other_owners_as_plain_text(tmp_path: Path) -> None:
-    with NetworkRun(tmp_path, absent=["RX3"]) as run, run.post("RX3") as post:
-        post.send(MASTER, letter(run, "RX3", MASTER, Register(profile_of(CHAIN["RX3"]), "1")))
+    with NetworkRun(tmp_path, absent=["RX3"]) as run, run.transport("RX3") as transport:
+        transport.send(MASTER, frame(run, "RX3", MASTER, Register(profile_of(CHAIN["RX3"]), "1")))
         run.wait_until(lambda: "RX3" in run.master.members.robots, "it is not registered")
-        post.send(MASTER, letter(run, "RX3", MASTER, Failed("\x1b[2J\u202e" + "x" * 1_000_000)))
+        transport.send(MASTER, frame(run, "RX3", MASTER, Failed("\x1b[2J\u202e" + "x" * 1_000_000)))
         with pytest.raises(RobotsLostError) as lost:
             run.wait_for_result()
     assert str(lost.value).startswith(r"RX3 was lost: \x1b[2J\u202exxx")

@@ -49,11 +49,11 @@ def test_those_who_are_left_go_on_with_the_values_that_they_had(tmp_path: Path) 
             go.touch()
         events.append(event)
 
-    brief = RunParameters(settings={"file": str(go)})
-    journey = ScenarioRun(TEAM, None, CompiledTeam, lambda: None, parameters=brief)
+    parameters = RunParameters(settings={"file": str(go)})
+    journey = ScenarioRun(TEAM, None, CompiledTeam, lambda: None, parameters=parameters)
     played: list[FinishedEpoch] = []
     with LocalNetwork(
-        journey.compiled(), PausedABT, observer=observe, settings=NetworkSettings(survive=True), brief=brief
+        journey.compiled(), PausedABT, observer=observe, settings=NetworkSettings(survive=True), parameters=parameters
     ) as network:
         for one in journey.epochs(network, lambda _: None):
             played.append(one)

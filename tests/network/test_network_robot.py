@@ -1,4 +1,4 @@
-"""A robot at its post: what it does in what order, and what it objects to."""
+"""A robot at its transport: what it does in what order, and what it objects to."""
 
 from __future__ import annotations
 
@@ -10,27 +10,27 @@ import pytest
 
 from robochoc.communication.control import Counters, Failed, Pause, Ready, Wave
 from robochoc.communication.network.control_messages import (
-    Account,
     Bye,
     Charge,
-    Checked,
+    CheckRequest,
+    CheckResult,
+    ControlMessage,
     Copies,
-    Denied,
+    DetailedReport,
+    DomainAnswer,
+    DomainRequest,
     Exchanged,
     Joined,
-    Judge,
     Leave,
     Objection,
     ProtocolMessage,
     Register,
-    Search,
-    Show,
-    Shown,
+    RegistrationDenied,
+    StartSearch,
     Welcome,
-    Word,
 )
-from robochoc.communication.network.framing import MASTER, Framing, Letter
-from robochoc.communication.network.inbox import Arrived, Item, Presence, Woken
+from robochoc.communication.network.framing import MASTER, Frame, Framing
+from robochoc.communication.network.inbox import FrameArrived, Item, PresenceChanged, WakeUp
 from robochoc.communication.network.robot import Ending, NetworkRobot
 from robochoc.communication.network.robot_settings import RobotSettings
 from robochoc.communication.network.transport import Transport
@@ -41,111 +41,111 @@ from tests.support.lone_robot import LEAVE, UNPROVEN, chain_of_three, ok, played
 
 
 def test_a_run_from_beginning_to_end() -> None:
-    def script(post: ScriptedTransport, word: Word) -> Iterator[Word | Item]:
+    def script(transport: ScriptedTransport, word: ControlMessage) -> Iterator[ControlMessage | Item]:
         match word:
             case Joined():
-                yield from (Presence("RA", there=True), Woken(), Show(("B", "Z")), task())
+                yield from (PresenceChanged("RA", there=True), WakeUp(), DomainRequest(("B", "Z")), task())
             case Ready():
-                yield Search(1)
-                yield post.letter(ProtocolMessage(1, 5, ok(1)), "RA")
+                yield StartSearch(1)
+                yield transport.frame(ProtocolMessage(1, 5, ok(1)), "RA")
             case Counters(_, 0, _, 1):
                 yield Wave(7)
             case Counters(_, 7):
                 yield Pause()
-            case Account():
-                yield Judge(1, {"A": 1, "C": 1})
-            case Checked():
+            case DetailedReport():
+                yield CheckRequest(1, {"A": 1, "C": 1})
+            case CheckResult():
                 yield LEAVE
             case _:
                 pass
 
-    ending, post = played(script)
+    ending, transport = played(script)
     assert ending == Ending("over", failed=False, assignment={"B": 2})
-    assert post.heard_of(Shown) == [Shown({"B": ((1, 2),)})]
-    (account,) = post.heard_of(Account)
-    assert isinstance(account, Account)
+    assert transport.heard_of(DomainAnswer) == [DomainAnswer({"B": ((1, 2),)})]
+    (account,) = transport.heard_of(DetailedReport)
+    assert isinstance(account, DetailedReport)
     assert (account.assigned, account.assignment) == (True, {"B": 2})
     shared = (Charge("RB", ("A", "B"), 1, 0),)
-    assert post.heard_of(Checked) == [Checked(1, allowed=True, cost=0, held=1, shared=shared)]
+    assert transport.heard_of(CheckResult) == [CheckResult(1, allowed=True, cost=0, held=1, shared=shared)]
     assert account.exchanged == {"RA": Exchanged(0, 1, 5), "RC": Exchanged(2, 0, 0)}
-    assert isinstance(post.heard[-1], Bye)
-    assert {receiver for receiver, _ in post.sent} == {"RC"}
+    assert isinstance(transport.heard[-1], Bye)
+    assert {receiver for receiver, _ in transport.sent} == {"RC"}
 
 
 def test_what_others_say_before_the_task_and_the_start_waits() -> None:
-    def script(post: ScriptedTransport, word: Word) -> Iterator[Word | Item]:
+    def script(transport: ScriptedTransport, word: ControlMessage) -> Iterator[ControlMessage | Item]:
         match word:
             case Joined():
-                yield post.letter(ProtocolMessage(1, 0, ok(1)), "RA")
+                yield transport.frame(ProtocolMessage(1, 0, ok(1)), "RA")
                 yield task()
-                yield post.letter(ProtocolMessage(1, 0, ok(2)), "RA")
+                yield transport.frame(ProtocolMessage(1, 0, ok(2)), "RA")
             case Ready():
-                yield post.letter(ProtocolMessage(1, 0, ok(1)), "RA")
-                yield Search(1)
+                yield transport.frame(ProtocolMessage(1, 0, ok(1)), "RA")
+                yield StartSearch(1)
             case Counters(_, _, _, 3):
                 yield LEAVE
             case _:
                 pass
 
-    ending, post = played(script)
+    ending, transport = played(script)
     assert ending.assignment == {"B": 2}
-    assert not post.heard_of(Objection)
+    assert not transport.heard_of(Objection)
 
 
 def test_what_was_said_in_another_search_is_passed_over() -> None:
-    def script(post: ScriptedTransport, word: Word) -> Iterator[Word | Item]:
+    def script(transport: ScriptedTransport, word: ControlMessage) -> Iterator[ControlMessage | Item]:
         match word:
             case Joined():
                 yield task()
             case Ready(1):
                 yield Pause()
-            case Account(1):
-                yield post.letter(ProtocolMessage(1, 0, ok(3)), "RA")
-                yield post.letter(Copies(1, b"\x90"), "RA")
+            case DetailedReport(1):
+                yield transport.frame(ProtocolMessage(1, 0, ok(3)), "RA")
+                yield transport.frame(Copies(1, b"\x90"), "RA")
                 yield task(epoch=2)
             case Ready(2):
-                yield Search(2)
-                yield post.letter(ProtocolMessage(2, 0, ok(1)), "RA")
-                yield post.letter(ProtocolMessage(1, 0, b"late, and no message"), "RA")
-                yield post.letter(ProtocolMessage(3, 0, b"early, and no message"), "RA")
+                yield StartSearch(2)
+                yield transport.frame(ProtocolMessage(2, 0, ok(1)), "RA")
+                yield transport.frame(ProtocolMessage(1, 0, b"late, and no message"), "RA")
+                yield transport.frame(ProtocolMessage(3, 0, b"early, and no message"), "RA")
             case Counters(2, _, _, 1):
                 yield LEAVE
             case _:
                 pass
 
-    ending, post = played(script)
+    ending, transport = played(script)
     assert ending == Ending("over", failed=False, assignment={"B": 2})
-    assert not post.heard_of(Failed)
+    assert not transport.heard_of(Failed)
 
 
 def test_what_comes_with_the_end_of_a_search_changes_nothing_any_more() -> None:
-    def script(post: ScriptedTransport, word: Word) -> Iterator[Word | Item]:
+    def script(transport: ScriptedTransport, word: ControlMessage) -> Iterator[ControlMessage | Item]:
         match word:
             case Joined():
                 yield task()
             case Ready():
-                yield Search(1)
+                yield StartSearch(1)
             case Counters(_, 0, _, 0):
-                yield post.letter(ProtocolMessage(1, 0, ok(1)), "RA")
+                yield transport.frame(ProtocolMessage(1, 0, ok(1)), "RA")
                 yield Pause()
-            case Account():
+            case DetailedReport():
                 yield LEAVE
             case _:
                 pass
 
-    ending, post = played(script)
-    (account,) = post.heard_of(Account)
-    assert isinstance(account, Account)
+    ending, transport = played(script)
+    (account,) = transport.heard_of(DetailedReport)
+    assert isinstance(account, DetailedReport)
     assert account.assignment == ending.assignment == {"B": 1}
 
 
 @pytest.mark.parametrize(
     "word",
-    [Search(1), Wave(1), Pause(), Judge(1, {})],
+    [StartSearch(1), Wave(1), Pause(), CheckRequest(1, {})],
     ids=lambda word: type(word).__name__,
 )
-def test_orders_out_of_place_are_objected_to(word: Word) -> None:
-    def script(_post: ScriptedTransport, heard: Word) -> Iterator[Word | Item]:
+def test_orders_out_of_place_are_objected_to(word: ControlMessage) -> None:
+    def script(_post: ScriptedTransport, heard: ControlMessage) -> Iterator[ControlMessage | Item]:
         match heard:
             case Joined():
                 yield word
@@ -154,16 +154,16 @@ def test_orders_out_of_place_are_objected_to(word: Word) -> None:
             case _:
                 pass
 
-    ending, post = played(script)
+    ending, transport = played(script)
     assert not ending.failed
-    assert post.heard_of(Objection) == [
-        Objection(MASTER, "a letter to RB", f"{type(word).__name__} is nothing to be told now")
+    assert transport.heard_of(Objection) == [
+        Objection(MASTER, "a frame to RB", f"{type(word).__name__} is nothing to be told now")
     ]
 
 
-@pytest.mark.parametrize("word", [Search(2), Judge(2, {})], ids=lambda word: type(word).__name__)
-def test_orders_of_another_search_are_objected_to(word: Word) -> None:
-    def script(_post: ScriptedTransport, heard: Word) -> Iterator[Word | Item]:
+@pytest.mark.parametrize("word", [StartSearch(2), CheckRequest(2, {})], ids=lambda word: type(word).__name__)
+def test_orders_of_another_search_are_objected_to(word: ControlMessage) -> None:
+    def script(_post: ScriptedTransport, heard: ControlMessage) -> Iterator[ControlMessage | Item]:
         match heard:
             case Joined():
                 yield task()
@@ -181,121 +181,127 @@ def test_orders_of_another_search_are_objected_to(word: Word) -> None:
     ("content", "why"),
     [
         (b"", "malformed"),
-        (msgspec.msgpack.encode(Letter(RUN, 1, ProtocolMessage(1, 2**64 - 1, ok(1)))), "malformed"),
-        (msgspec.msgpack.encode(Letter(RUN, 1, ProtocolMessage(1, -1, ok(1)))), "malformed"),
+        (msgspec.msgpack.encode(Frame(RUN, 1, ProtocolMessage(1, 2**64 - 1, ok(1)))), "malformed"),
+        (msgspec.msgpack.encode(Frame(RUN, 1, ProtocolMessage(1, -1, ok(1)))), "malformed"),
         (b"\x93\xa3run\x01", "malformed"),
-        (msgspec.msgpack.encode(Letter(RUN, 1, Pause())), "malformed"),
-        (msgspec.msgpack.encode(Letter(RUN, 1, Leave("now", failed=False))), "malformed"),
-        (msgspec.msgpack.encode(Letter(RUN, 1, Welcome("v", RUN, (), observed=False, private=False))), "malformed"),
+        (msgspec.msgpack.encode(Frame(RUN, 1, Pause())), "malformed"),
+        (msgspec.msgpack.encode(Frame(RUN, 1, Leave("now", failed=False))), "malformed"),
+        (msgspec.msgpack.encode(Frame(RUN, 1, Welcome("v", RUN, (), observed=False, private=False))), "malformed"),
         (Framing("RA", "another").write("RB", ProtocolMessage(1, 0, ok(1))), "another run"),
-        (msgspec.msgpack.encode(Letter(RUN, 2, ProtocolMessage(1, 0, ok(1)))), "letter 1 is missing"),
-        (msgspec.msgpack.encode(Letter(RUN, 0, ProtocolMessage(1, 0, ok(1)))), "replay"),
+        (msgspec.msgpack.encode(Frame(RUN, 2, ProtocolMessage(1, 0, ok(1)))), "frame 1 is missing"),
+        (msgspec.msgpack.encode(Frame(RUN, 0, ProtocolMessage(1, 0, ok(1)))), "replay"),
     ],
 )
-def test_letters_that_are_refused_are_objected_to_and_change_nothing(content: bytes, why: str) -> None:
-    def script(post: ScriptedTransport, word: Word) -> Iterator[Word | Item]:
+def test_frames_that_are_refused_are_objected_to_and_change_nothing(content: bytes, why: str) -> None:
+    def script(transport: ScriptedTransport, word: ControlMessage) -> Iterator[ControlMessage | Item]:
         match word:
             case Joined():
                 yield task()
             case Ready():
-                yield Search(1)
-                yield Arrived("RA", content)
-                yield post.letter(ProtocolMessage(1, 0, ok(1)), "RA")
+                yield StartSearch(1)
+                yield FrameArrived("RA", content)
+                yield transport.frame(ProtocolMessage(1, 0, ok(1)), "RA")
             case Counters(_, _, _, 1):
                 yield LEAVE
             case _:
                 pass
 
-    ending, post = played(script)
+    ending, transport = played(script)
     assert ending.assignment == {"B": 2}
-    (objection,) = post.heard_of(Objection)
+    (objection,) = transport.heard_of(Objection)
     assert isinstance(objection, Objection)
-    assert (objection.who, objection.what) == ("RA", "a letter to RB")
+    assert (objection.who, objection.what) == ("RA", "a frame to RB")
     assert why in objection.why
 
 
 def test_replays_are_objected_to() -> None:
-    def script(post: ScriptedTransport, word: Word) -> Iterator[Word | Item]:
+    def script(transport: ScriptedTransport, word: ControlMessage) -> Iterator[ControlMessage | Item]:
         match word:
             case Joined():
                 yield task()
             case Ready():
-                yield Search(1)
-                yield from [post.letter(ProtocolMessage(1, 0, ok(1)), "RA")] * 3
+                yield StartSearch(1)
+                yield from [transport.frame(ProtocolMessage(1, 0, ok(1)), "RA")] * 3
             case Counters(_, 0, _, 1):
                 yield LEAVE
             case _:
                 pass
 
-    ending, post = played(script)
+    ending, transport = played(script)
     assert not ending.failed
-    assert len(post.heard_of(Objection)) == 1  # of a kind, the 1st, the 10th, ...
+    assert len(transport.heard_of(Objection)) == 1  # of a kind, the 1st, the 10th, ...
 
 
 def test_what_is_no_message_is_refused_and_takes_no_place() -> None:
-    def script(_post: ScriptedTransport, word: Word) -> Iterator[Word | Item]:
+    def script(_post: ScriptedTransport, word: ControlMessage) -> Iterator[ControlMessage | Item]:
         match word:
             case Joined():
                 yield task()
             case Ready():
-                yield Search(1)
+                yield StartSearch(1)
                 for content in (b"no message", ok(1)):
-                    yield Arrived("RA", Framing("RA", RUN).write("RB", ProtocolMessage(1, 0, content)))
+                    yield FrameArrived("RA", Framing("RA", RUN).write("RB", ProtocolMessage(1, 0, content)))
             case Counters(_, 0, _, 1):
                 yield LEAVE
             case _:
                 pass
 
-    ending, post = played(script)
+    ending, transport = played(script)
     assert ending == Ending("over", failed=False, assignment={"B": 2})
-    assert len(post.heard_of(Objection)) == 1
+    assert len(transport.heard_of(Objection)) == 1
 
 
 def test_who_takes_no_part_is_not_heard() -> None:
     """Such as a robot that was lost before: the protocol knows nothing of it."""
 
-    def script(post: ScriptedTransport, word: Word) -> Iterator[Word | Item]:
+    def script(transport: ScriptedTransport, word: ControlMessage) -> Iterator[ControlMessage | Item]:
         match word:
             case Joined():
                 yield task()
             case Ready():
-                yield Search(1)
-                yield post.letter(ProtocolMessage(1, 0, ok(1)), "R9")
-                yield post.letter(ProtocolMessage(1, 0, ok(1)), "RA")
+                yield StartSearch(1)
+                yield transport.frame(ProtocolMessage(1, 0, ok(1)), "R9")
+                yield transport.frame(ProtocolMessage(1, 0, ok(1)), "RA")
             case Counters(_, 0, _, 1):
                 yield LEAVE
             case _:
                 pass
 
-    ending, post = played(script)
+    ending, transport = played(script)
     assert ending == Ending("over", failed=False, assignment={"B": 2})
-    assert post.heard_of(Objection) == [Objection("R9", "a letter to RB", "R9 takes no part in this search")]
+    assert transport.heard_of(Objection) == [Objection("R9", "a frame to RB", "R9 takes no part in this search")]
 
 
 def test_objections_are_limited() -> None:
-    def script(_post: ScriptedTransport, word: Word) -> Iterator[Word | Item]:
+    def script(_post: ScriptedTransport, word: ControlMessage) -> Iterator[ControlMessage | Item]:
         if isinstance(word, Joined):
-            yield from [Arrived("RA", b"noise")] * 150
+            yield from [FrameArrived("RA", b"noise")] * 150
             yield LEAVE
 
-    ending, post = played(script)
+    ending, transport = played(script)
     assert not ending.failed
-    assert len(post.heard_of(Objection)) == 3  # the 1st, the 10th and the 100th
+    assert len(transport.heard_of(Objection)) == 3  # the 1st, the 10th and the 100th
 
 
 def test_noise_before_the_welcome_is_nothing_to_tell() -> None:
-    def script(_post: ScriptedTransport, word: Word) -> Iterator[Word | Item]:
+    def script(_post: ScriptedTransport, word: ControlMessage) -> Iterator[ControlMessage | Item]:
         if isinstance(word, Joined):
             yield LEAVE
 
-    post = ScriptedTransport("RB", lambda _word: ())
-    post.inbox.put(Arrived("RA", b"noise"))
-    post.inbox.put(Arrived(MASTER, msgspec.msgpack.encode(Letter("", 1, LEAVE))))
-    post.inbox.put(Arrived(MASTER, msgspec.msgpack.encode(Letter("", 0, Denied("another's", "no")))))
-    post.router = ""
+    transport = ScriptedTransport("RB", lambda _word: ())
+    transport.inbox.put(FrameArrived("RA", b"noise"))
+    transport.inbox.put(FrameArrived(MASTER, msgspec.msgpack.encode(Frame("", 1, LEAVE))))
+    transport.inbox.put(
+        FrameArrived(MASTER, msgspec.msgpack.encode(Frame("", 0, RegistrationDenied("another's", "no"))))
+    )
+    transport.router = ""
     robot = NetworkRobot(
-        CompiledRobot(chain_of_three()["RB"]), UNPROVEN, cast("Transport", post), lambda _name: ABT, RobotSettings(0.01)
+        CompiledRobot(chain_of_three()["RB"]),
+        UNPROVEN,
+        cast("Transport", transport),
+        lambda _name: ABT,
+        RobotSettings(0.01),
     )
     assert robot.run().why == "the master is gone: no link to it for 0.01 s"
-    assert [type(word) for word in post.heard] == [Register]
+    assert [type(word) for word in transport.heard] == [Register]
     assert not played(script)[0].failed

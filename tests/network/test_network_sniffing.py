@@ -17,15 +17,15 @@ import pytest
 import zenoh
 
 from robochoc.communication.network.access import ALL, journal_key
-from robochoc.communication.network.control_messages import Sniff, Sniffable
+from robochoc.communication.network.control_messages import JournalAnswer, JournalRequest
 from robochoc.communication.network.framing import MASTER, Framing
-from robochoc.communication.network.inbox import Arrived
+from robochoc.communication.network.inbox import FrameArrived
 from robochoc.communication.network.journal_server import ANSWERED_AT_MOST, Publication, piece_in, question
 from robochoc.communication.network.transport import CannotConnectError
 from robochoc.journal.blocks import BEGINNING, PREAMBLE, frame_block
 from robochoc.model.outcome import Verdict
 from robochoc.run.networked.address import Address
-from robochoc.run.networked.consult import NoAnswerError
+from robochoc.run.networked.directory_query import NoAnswerError
 from robochoc.sniffer.remote import Followed, receive
 from tests.support.clocks import waiting
 from tests.support.network_runs import NetworkRun
@@ -43,12 +43,12 @@ from robochoc.communication.network.transport import Transport
 from robochoc.communication.network.journal_server import question
 
 texts, endpoint, run = json.loads(sys.stdin.readline())
-post = Transport(endpoint, Identity.of(IdentityTexts(*map(str.encode, texts))), watch=())
-while not post.ask(journal_key("Eye"), question(run, 0), 1):
+transport = Transport(endpoint, Identity.of(IdentityTexts(*map(str.encode, texts))), watch=())
+while not transport.ask(journal_key("Eye"), question(run, 0), 1):
     time.sleep(0.1)
 waited_for = {"congestion_control": zenoh.CongestionControl.BLOCK, "priority": zenoh.Priority.REAL_TIME}
 for _ in range(1000):
-    post._session.get(journal_key("Eye"), zenoh.handlers.RingChannel(1), payload=question(run, 0), **waited_for)
+    transport._session.get(journal_key("Eye"), zenoh.handlers.RingChannel(1), payload=question(run, 0), **waited_for)
 os.kill(os.getpid(), signal.SIGSTOP)
 """
 PATIENCE_S = 2.0
@@ -173,9 +173,9 @@ def test_the_router_lets_nobody_ask_who_may_not_or_in_anothers_name(run: Network
     publication.write(BLOCKS[0])
     run.household.enrol("Eye", sniffs=True)
     asked = question(run.master.run, 0)
-    with run.post("Eye") as eye:
+    with run.transport("Eye") as eye:
         run.wait_until(lambda: bool(eye.ask(journal_key("Eye"), asked, PATIENCE_S)), "it gets no answer")
-    with run.post("RX0") as robot:
+    with run.transport("RX0") as robot:
         for key in map(journal_key, ("RX0", "Eye", ALL)):
 
             def is_refused(key: str = key) -> bool:
@@ -215,10 +215,10 @@ def test_who_asks_without_end_and_reads_nothing(run: NetworkRun, publication: Pu
         publication.write(each)
     run.household.enrol("Eye", sniffs=True)
     asked = question(run.master.run, 0)
-    with run.post("Eye") as eye:
+    with run.transport("Eye") as eye:
         run.wait_until(lambda: bool(eye.ask(journal_key("Eye"), asked, PATIENCE_S)), "it gets no answer")
         for _ in range(FLOOD):
-            eye._session.get(  # noqa: SLF001 - as no post of ours would
+            eye._session.get(  # noqa: SLF001 - as no transport of ours would
                 journal_key("Eye"), zenoh.handlers.RingChannel(1), payload=asked, timeout=PATIENCE_S
             )
         run.wait_for_refusal("Eye", "sniff", "questions a second")
@@ -259,13 +259,13 @@ def test_a_master_that_gives_nothing_out(tmp_path: Path) -> None:
         eye = Sniffing(run, "Eye")
         assert "it needs --sniffable" in str(eye.ended())
         run.wait_for_refusal("Eye", "sniff", "--sniffable")
-        with run.post("Eye") as post:
-            assert post.ask(journal_key("Eye"), question(run.master.run, 0), PATIENCE_S) is None
-            letters = Framing("Eye")
+        with run.transport("Eye") as transport:
+            assert transport.ask(journal_key("Eye"), question(run.master.run, 0), PATIENCE_S) is None
+            framing = Framing("Eye")
             for number in range(50):
-                post.send(MASTER, letters.write(MASTER, Sniff(number)))
+                transport.send(MASTER, framing.write(MASTER, JournalRequest(number)))
             run.wait_for_refusal("Eye", "ask", "more than 20 requests a second")
-            first = post.inbox.get(timeout=10)
-            assert isinstance(first, Arrived)
-            assert isinstance(letters.read(MASTER, first.content).word, Sniffable)
+            first = transport.inbox.get(timeout=10)
+            assert isinstance(first, FrameArrived)
+            assert isinstance(framing.read(MASTER, first.content).message, JournalAnswer)
         assert run.let_go().verdict is Verdict.SOLUTION

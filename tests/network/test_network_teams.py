@@ -6,7 +6,7 @@ from random import Random
 
 import pytest
 
-from robochoc.authority.admission import Household
+from robochoc.authority.admission import InMemoryAuthority
 from robochoc.model.outcome import Verdict
 from robochoc.model.problem import INFINITE
 from robochoc.protocols.abt import ABT
@@ -45,8 +45,8 @@ def test_nobody_is_doubted_who_is_honest(name: str) -> None:
     protocol = protocol_named(name)
     chance = Random(4)
     team = random_cost_team(chance, n_ary=False) if protocol.traits.costs else random_team(chance, n_ary=False)
-    brief = RunParameters(settings={"cycles": "5"} if hasattr(protocol.settings, "cycles") else {})
-    office = InMemoryNetwork(known_to_both(team), protocol, brief=brief)
+    parameters = RunParameters(settings={"cycles": "5"} if hasattr(protocol.settings, "cycles") else {})
+    office = InMemoryNetwork(known_to_both(team), protocol, parameters=parameters)
     result = office.search()
     assert not office.failures
     assert not office.state.doubts_about_counts
@@ -83,7 +83,7 @@ def test_partially_known_constraints_stay_with_their_holders() -> None:
 
 def test_messages_go_through_filters() -> None:
     team = random_team(Random(3))
-    household = Household(team.order)
+    household = InMemoryAuthority(team.order)
     identities = {name: household.identity(name) for name in team.order}
     office = InMemoryNetwork(team, ABT, identities, ("signed", "sealed"))
     result = office.search()

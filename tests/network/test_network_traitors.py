@@ -9,9 +9,15 @@ from pathlib import Path
 import msgspec
 import pytest
 
-from robochoc.communication.network.control_messages import Copies, Denied, ProtocolMessage, Register, Word
+from robochoc.communication.network.control_messages import (
+    ControlMessage,
+    Copies,
+    ProtocolMessage,
+    Register,
+    RegistrationDenied,
+)
 from robochoc.communication.network.framing import MASTER, Framing
-from robochoc.communication.network.inbox import Arrived
+from robochoc.communication.network.inbox import FrameArrived
 from robochoc.communication.network.profile import Profile, profile_of
 from robochoc.communication.network.settings import NetworkSettings
 from robochoc.communication.network.transport import Transport
@@ -20,7 +26,7 @@ from robochoc.model.message import encode
 from robochoc.model.outcome import Verdict
 from robochoc.model.problem import ProblemKind
 from robochoc.protocols.abt import Ok
-from tests.support.network_runs import NetworkRun, letter
+from tests.support.network_runs import NetworkRun, frame
 from tests.support.paused_abt import CHAIN, TRIANGLE, PausedABT
 
 # Revoked in the middle of a run
@@ -73,53 +79,53 @@ def test_profiles_that_lie(tmp_path: Path) -> None:
     truth = profile_of(CHAIN["RX3"])
     with NetworkRun(tmp_path, absent=["RX3"]) as run:
         run.wait_until(lambda: len(run.master.members.robots) == 3, "the others do not come")
-        with run.post("RX3") as post:
+        with run.transport("RX3") as transport:
             for number, (why, lie) in enumerate(LIES.items()):
-                post.send(MASTER, letter(run, "RX3", MASTER, Register(lie(truth), str(number))))
+                transport.send(MASTER, frame(run, "RX3", MASTER, Register(lie(truth), str(number))))
                 run.wait_for_refusal("RX3", "register", why.replace("'", "."))
-                assert told(post, str(number)), f"it is told so: {why}"
+                assert told(transport, str(number)), f"it is told so: {why}"
         run.start("RX3")
         run.wait_for_progress()
         assert run.let_go().verdict is Verdict.SOLUTION
 
 
-def told(post: Transport, visit: str) -> bool:
-    """Whether the master denies the registration `visit`."""
-    letters = Framing(post.name)
-    while isinstance(item := post.inbox.get(timeout=10), Arrived):
-        word = letters.read(item.sender, item.content).word
-        if isinstance(word, Denied) and word.visit == visit:
+def told(transport: Transport, incarnation: str) -> bool:
+    """Whether the master denies the registration `incarnation`."""
+    framing = Framing(transport.name)
+    while isinstance(item := transport.inbox.get(timeout=10), FrameArrived):
+        word = framing.read(item.sender, item.content).message
+        if isinstance(word, RegistrationDenied) and word.incarnation == incarnation:
             return True
     return False
 
 
 def test_what_the_directory_cannot_take_does_not_keep_a_robot_out(tmp_path: Path) -> None:
     boastful = changed(profile_of(CHAIN["RX3"]), topics=("x" * 10_000, *map(str, range(200))))
-    with NetworkRun(tmp_path, absent=["RX3"]) as run, run.post("RX3") as post:
-        post.send(MASTER, letter(run, "RX3", MASTER, Register(boastful, "1")))
+    with NetworkRun(tmp_path, absent=["RX3"]) as run, run.transport("RX3") as transport:
+        transport.send(MASTER, frame(run, "RX3", MASTER, Register(boastful, "1")))
         run.wait_for_refusal("RX3", "be in the directory", "unrecognised-parameter-value")
         assert "RX3" in run.master.members.robots
         run.give_up()
 
 
-# Whoever carries the letters
+# Whoever carries the frames
 
 
 @pytest.mark.parametrize(
     "filters", [("sealed",), *(pytest.param(f, marks=pytest.mark.slow) for f in (("signed",), ("signed", "sealed")))]
 )
-def test_a_router_that_changes_letters(tmp_path: Path, filters: tuple[str, ...]) -> None:
+def test_a_router_that_changes_frames(tmp_path: Path, filters: tuple[str, ...]) -> None:
     """It can put on any key. What it makes up, changes or moves elsewhere is not genuine, whoever it is from."""
     with NetworkRun(tmp_path, TRIANGLE, NetworkSettings(filters)) as run:
         run.wait_for_progress()
-        with run.post("RX0") as reader, run.post("RX1") as carrier:
+        with run.transport("RX0") as reader, run.transport("RX1") as carrier:
             true = recorded_said(reader)
             made_up = encode(Ok((0,)))
             altered = true.content[:-1] + bytes([true.content[-1] ^ 1])
             for content in (made_up, altered, true.content, b""):
-                carrier.send("RX2", letter(run, "RX1", "RX2", ProtocolMessage(1, 0, content)))
+                carrier.send("RX2", frame(run, "RX1", "RX2", ProtocolMessage(1, 0, content)))
             for why in {"signed": ["signature is wrong"], "sealed": ["was changed", "too short"]}[filters[-1]]:
-                run.wait_for_refusal("RX1", "letter to RX2", why)
+                run.wait_for_refusal("RX1", "frame to RX2", why)
         run.wait_for_progress()
         assert run.let_go().verdict is Verdict.NO_SOLUTION
 
@@ -132,8 +138,8 @@ def test_constraints_that_others_have_to_know_are_sealed_too(
     sent: list[bytes] = []
     write = Framing.write
 
-    def recorded(letters: Framing, receiver: str, word: Word) -> bytes:
-        content = write(letters, receiver, word)
+    def recorded(frames: Framing, receiver: str, word: ControlMessage) -> bytes:
+        content = write(frames, receiver, word)
         if isinstance(word, Copies):
             sent.append(content)
         return content
@@ -146,9 +152,9 @@ def test_constraints_that_others_have_to_know_are_sealed_too(
 
 
 def recorded_said(reader: Transport) -> ProtocolMessage:
-    letters = Framing(reader.name)
-    while isinstance(item := reader.inbox.get(timeout=10), Arrived):
-        word = letters._of_robot.decode(item.content).word if item.sender != MASTER else None  # noqa: SLF001
+    framing = Framing(reader.name)
+    while isinstance(item := reader.inbox.get(timeout=10), FrameArrived):
+        word = framing._of_robot.decode(item.content).message if item.sender != MASTER else None  # noqa: SLF001
         if isinstance(word, ProtocolMessage):
             return word
     raise AssertionError
@@ -156,12 +162,12 @@ def recorded_said(reader: Transport) -> ProtocolMessage:
 
 @pytest.mark.slow
 def test_a_message_that_is_lost_for_good_ends_the_run(tmp_path: Path) -> None:
-    """With the key of RX2 somebody has said nothing, in a letter that bears the number of RX2's first one."""
+    """With the key of RX2 somebody has said nothing, in a frame that bears the number of RX2's first one."""
     with NetworkRun(tmp_path, settings=NetworkSettings(patience_s=3)) as run:
         run.wait_for_progress()
-        with run.post("RX2") as post:
-            post.send("RX3", letter(run, "RX2", "RX3", ProtocolMessage(0, 0, b"")))
-            post.send("RX3", letter(run, "RX2", "RX3", ProtocolMessage(0, 0, b"")))
-            run.wait_for_refusal("RX2", "letter to RX3", "letter 1 has come before")
+        with run.transport("RX2") as transport:
+            transport.send("RX3", frame(run, "RX2", "RX3", ProtocolMessage(0, 0, b"")))
+            transport.send("RX3", frame(run, "RX2", "RX3", ProtocolMessage(0, 0, b"")))
+            run.wait_for_refusal("RX2", "frame to RX3", "frame 1 has come before")
         with pytest.raises(RobotsLostError, match="MASTER was lost: 1 messages between robots were lost for good"):
             run.let_go()

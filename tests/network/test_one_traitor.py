@@ -12,8 +12,8 @@ import pytest
 from robochoc.cli.reports.outcome import report
 from robochoc.communication.control import Conclusion, Counters, Ready
 from robochoc.communication.network.audited_state import AuditedSearchState
-from robochoc.communication.network.control_messages import Account, Charge, Exchanged
-from robochoc.communication.network.plausibility import Declared
+from robochoc.communication.network.control_messages import Charge, DetailedReport, Exchanged
+from robochoc.communication.network.plausibility import Declarations
 from robochoc.communication.processes.processes import ProcessesRun
 from robochoc.communication.run_result import RobotsLostError
 from robochoc.formats.result import read_result, result_json
@@ -127,7 +127,7 @@ def test_no_solution_rests_on_its_word(lied: Callable[..., InMemoryNetwork]) -> 
 
 
 def begun(traits: Traits = AFC.traits) -> AuditedSearchState:
-    state = AuditedSearchState(1, ("RA", "RB", "RC"), None, Declared(traits))
+    state = AuditedSearchState(1, ("RA", "RB", "RC"), None, Declarations(traits))
     state.ordered = True
     return state
 
@@ -375,7 +375,7 @@ def test_more_taken_in_than_was_sent(lied: Callable[..., InMemoryNetwork]) -> No
 def exchanging(change: Callable[[Exchanged], Exchanged], who: str = "RA") -> Lie:
     """What it says of its messages with another is changed, and its sums go with that."""
 
-    def reported(account: Account) -> Account:
+    def reported(account: DetailedReport) -> DetailedReport:
         exchanged = {**account.exchanged, who: change(account.exchanged.get(who, Exchanged()))}
         sent = sum(one.sent for one in exchanged.values())
         metrics = replace(account.metrics, messages={"Ok": sent}, bytes=max(account.metrics.bytes, sent))
@@ -404,7 +404,7 @@ def test_messages_that_nobody_has_sent(
     assert not office.state.doubts_about_verdict, "a solution is checked, whatever was counted"
 
 
-def quiet(accounts: dict[str, Account], heard: dict[str, tuple[int, int]], traits: Traits) -> AuditedSearchState:
+def quiet(accounts: dict[str, DetailedReport], heard: dict[str, tuple[int, int]], traits: Traits) -> AuditedSearchState:
     """All have answered two waves, and reported."""
     state = begun(traits)
     for _ in range(2):
@@ -417,9 +417,9 @@ def quiet(accounts: dict[str, Account], heard: dict[str, tuple[int, int]], trait
     return state
 
 
-def reported(kind: str = "Ok", checks: int = 0, **exchanged: Exchanged) -> Account:
+def reported(kind: str = "Ok", checks: int = 0, **exchanged: Exchanged) -> DetailedReport:
     sent = sum(one.sent for one in exchanged.values())
-    return Account(
+    return DetailedReport(
         1,
         {},
         Metrics({kind: sent}, sent, 0, checks, largest=min(sent, 1)),

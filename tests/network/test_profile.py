@@ -21,14 +21,14 @@ from robochoc.communication.network.profile import (
     MOST_VARIABLES,
     Profile,
     ProfileError,
-    acquaintances,
     among,
     contradictions,
     domain_of,
     missing,
+    possible_neighbours,
     profile_of,
     ranges_of,
-    silhouette,
+    visible_robot,
 )
 from robochoc.formats import read_team
 from robochoc.formats.extension import MAX_VALUES
@@ -65,10 +65,10 @@ def registered(team: Team) -> Members:
     robots = list(team.robots)
     Random(len(team.name)).shuffle(robots)
     for robot in robots:
-        members.register(robot.name, profile_of(robot), "visit").joined = True
+        members.register(robot.name, profile_of(robot), "incarnation").joined = True
     for name, variables in members.unseen().items():
         domains = {variable.name: variable.domain for variable in team[name].variables}
-        members.robots[name].also.update({one: ranges_of(domains[one]) for one in variables})
+        members.robots[name].shown_later.update({one: ranges_of(domains[one]) for one in variables})
     assert members.complete
     assert not members.unseen()
     return members
@@ -81,10 +81,10 @@ def nothing_of(_robot: Robot) -> CompiledDomain:
 
 def part_of(robot: Robot, task: Task) -> AgentProblem:
     """What a robot knows across machines."""
-    brief = RunParameters(task.seed, task.settings, task.aside)
+    parameters = RunParameters(task.seed, task.settings, task.aside)
     domains = {name: domain_of(name, ranges) for name, ranges in task.domains.items()}
     own = CompiledRobot(among(robot, task.interfaces), nothing_of)
-    return AgentProblem(own, task.order, task.interfaces, (), domains, task.links, task.secretive, brief)
+    return AgentProblem(own, task.order, task.interfaces, (), domains, task.links, task.secretive, parameters)
 
 
 def comparable(part: AgentProblem) -> AgentProblem:
@@ -99,10 +99,10 @@ def comparable(part: AgentProblem) -> AgentProblem:
     )
 
 
-def assert_same(team: Team, members: Members, robots: Sequence[Robot], brief: RunParameters) -> None:
+def assert_same(team: Team, members: Members, robots: Sequence[Robot], parameters: RunParameters) -> None:
     """What robots know by the master's word is what they would know in a process of the whole team."""
-    expected = agent_problems(CompiledTeam(team, nothing_of), brief, tree=True)
-    tasks = members.tasks(1, "abt", TREE, brief)
+    expected = agent_problems(CompiledTeam(team, nothing_of), parameters, tree=True)
+    tasks = members.tasks(1, "abt", TREE, parameters)
     assert list(tasks) == list(expected)
     for robot in robots:
         known = part_of(robot, tasks[robot.name])
@@ -113,8 +113,8 @@ def assert_same(team: Team, members: Members, robots: Sequence[Robot], brief: Ru
 @pytest.mark.parametrize("folder", FOLDERS, ids=lambda folder: folder.name)
 def test_robots_of_files_know_what_the_whole_team_would_tell_them(folder: Path) -> None:
     team = read_team(folder)
-    brief = RunParameters(3, {"p": "0.5"}, 17.5)
-    assert_same(team, registered(team), team.robots, brief)
+    parameters = RunParameters(3, {"p": "0.5"}, 17.5)
+    assert_same(team, registered(team), team.robots, parameters)
 
 
 @given(team=random_teams)
@@ -156,7 +156,7 @@ def test_profiles_travel_and_agree(team: Team) -> None:
 @given(team=random_teams)
 @settings(max_examples=60, deadline=None)
 def test_acquaintances_are_neighbours_and_sharers_of_constraints(team: Team) -> None:
-    met = acquaintances(profiles_of(team))
+    met = possible_neighbours(profiles_of(team))
     for robot in team.robots:
         mine = {robot.name, *met[robot.name]}
         assert len(mine) == len(met[robot.name]) + 1
@@ -174,7 +174,7 @@ def test_a_profile_tells_nothing_of_what_nobody_sees() -> None:
         for make in MAKERS:
             for robot in make(Random(seed)).robots:
                 assert set(profile_of(robot).variables) == set(robot.interface)
-                shape = silhouette(profile_of(robot), {})
+                shape = visible_robot(profile_of(robot), {})
                 assert shape.interface == robot.interface
                 assert not shape.private
                 assert not shape.shared
@@ -189,8 +189,8 @@ def changed(**news: object) -> Profile:
     return msgspec.structs.replace(GOOD, **news)
 
 
-def test_a_silhouette_shows_what_was_told() -> None:
-    shape = silhouette(GOOD, {"Y": ((0, 0),)})
+def test_a_visible_robot_shows_what_is_in_the_profile() -> None:
+    shape = visible_robot(GOOD, {"Y": ((0, 0),)})
     assert [(one.name, list(one.domain)) for one in shape.variables] == [("X", [1, 2, 3, 5]), ("Y", [0])]
     assert shape.interface == ("X", "Y")
     assert ([p.name for p in shape.parents], [c.name for c in shape.children]) == (["R0"], ["R2"])
@@ -231,14 +231,14 @@ def test_a_silhouette_shows_what_was_told() -> None:
 )
 def test_absurd_profiles_are_refused(profile: Profile, why: str) -> None:
     with pytest.raises(ProfileError, match=why):
-        silhouette(profile, {})
+        visible_robot(profile, {})
 
 
 def test_what_is_shown_later_is_looked_at_as_well() -> None:
     with pytest.raises(ProfileError, match="Y has 0 values"):
-        silhouette(GOOD, {"Y": ()})
+        visible_robot(GOOD, {"Y": ()})
     with pytest.raises(ProfileError, match="is no name"):
-        silhouette(GOOD, {"": ((1, 1),)})
+        visible_robot(GOOD, {"": ((1, 1),)})
 
 
 @given(

@@ -11,7 +11,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from robochoc.authority.admission import Household
+from robochoc.authority.admission import InMemoryAuthority
 from robochoc.communication.network.router import Log, Refusal, Router
 
 NO_RULE = "no rule of the Authority allows it"
@@ -51,7 +51,7 @@ TOLD = [
 ]
 ALONE = dict(zip(range(14, 18), TOLD[3:], strict=True))
 """What lines tell that need no other."""
-IDENTITY = Household([]).master_identity(("127.0.0.1",))
+IDENTITY = InMemoryAuthority([]).master_identity(("127.0.0.1",))
 
 
 def refusals(log: bytes) -> Iterator[Refusal]:

@@ -6,18 +6,20 @@ import pytest
 
 from robochoc.communication.control import Conclusion, Counters, OfEpoch, Ready
 from robochoc.communication.network.audited_state import AuditedSearchState
-from robochoc.communication.network.control_messages import Account, Checked, Exchanged, ProtocolMessage
+from robochoc.communication.network.control_messages import CheckResult, DetailedReport, Exchanged, ProtocolMessage
 from robochoc.model.outcome import Metrics, Verdict
 from robochoc.protocols.findings import NOTHING, Findings
 
 ROBOTS = ("R1", "R2", "R3")
 
 
-def account(epoch: int = 1, values: dict[str, int] | None = None, to: str = "R3", **spent: int) -> Account:
+def account(epoch: int = 1, values: dict[str, int] | None = None, to: str = "R3", **spent: int) -> DetailedReport:
     """What a robot reports that has sent all its messages `to` one, and heard nothing."""
     sent = spent.pop("ok", 0)
     exchanged = {to: Exchanged(sent)} if sent else {}
-    return Account(epoch, values or {}, Metrics(messages={"Ok": sent}, **spent), NOTHING, bool(values), exchanged)
+    return DetailedReport(
+        epoch, values or {}, Metrics(messages={"Ok": sent}, **spent), NOTHING, bool(values), exchanged
+    )
 
 
 def begun(state: AuditedSearchState) -> AuditedSearchState:
@@ -48,7 +50,7 @@ def test_nothing_is_awaited_before_the_first_search() -> None:
     state = AuditedSearchState()
     assert state.ready
     assert not state.handle("R1", Ready(0))
-    assert not state.handle("R1", Account(0, {"X": 1}, Metrics(), NOTHING, assigned=True))
+    assert not state.handle("R1", DetailedReport(0, {"X": 1}, Metrics(), NOTHING, assigned=True))
     assert state.result(0).verdict is Verdict.UNKNOWN
     assert not state.assigned
 
@@ -61,7 +63,7 @@ def test_late_words_of_other_searches_say_nothing(epoch: int) -> None:
         Counters(epoch, 0, 7, 7),
         Conclusion(epoch, "no-solution"),
         account(epoch, {"X": 1}),
-        Checked(epoch, allowed=False, cost=5),
+        CheckResult(epoch, allowed=False, cost=5),
     ):
         all_hear(state, word)
     assert not state.ready
@@ -155,7 +157,7 @@ def test_accounts_make_the_result() -> None:
     state.handle("R1", account(1, {"X": 1}, ok=3, bytes=10, largest=4, ncccs=5, checks=6))
     state.handle("R2", account(1, {"Y": 2}, ok=4, bytes=20, largest=8, ncccs=1, checks=9))
     assert list(state.pending_reports) == ["R3"]
-    state.handle("R3", Account(1, {}, Metrics(), Findings(bound=4), assigned=False))
+    state.handle("R3", DetailedReport(1, {}, Metrics(), Findings(bound=4), assigned=False))
     assert not list(state.pending_reports)
     result = state.result(0)
     assert result.assignments == {"R1": {"X": 1}, "R2": {"Y": 2}, "R3": {}}
@@ -193,10 +195,10 @@ def checked(state: AuditedSearchState) -> bool:
 def test_all_have_to_check() -> None:
     state = AuditedSearchState(1, ROBOTS)
     all_hear(state, account(1, {"X": 1}))
-    state.handle("R1", Checked(1, allowed=True, cost=2))
-    state.handle("R2", Checked(1, allowed=True, cost=3))
+    state.handle("R1", CheckResult(1, allowed=True, cost=2))
+    state.handle("R2", CheckResult(1, allowed=True, cost=3))
     assert not checked(state)
-    state.handle("R3", Checked(1, allowed=True, cost=0))
+    state.handle("R3", CheckResult(1, allowed=True, cost=0))
     assert checked(state)
     assert state.held
     assert state.cost == 5
@@ -204,7 +206,7 @@ def test_all_have_to_check() -> None:
 
 def test_one_broken_constraint_is_enough() -> None:
     state = AuditedSearchState(1, ROBOTS)
-    all_hear(state, Checked(1, allowed=True, cost=0))
-    state.handle("R2", Checked(1, allowed=False, cost=0))
+    all_hear(state, CheckResult(1, allowed=True, cost=0))
+    state.handle("R2", CheckResult(1, allowed=False, cost=0))
     assert not state.unchecked
     assert not state.held

@@ -12,10 +12,10 @@ from robochoc.communication.host import BadMessageError
 from robochoc.communication.network.audited_state import AuditedSearchState
 from robochoc.communication.network.control_messages import (
     LATEST,
-    Account,
     Charge,
-    Checked,
+    CheckResult,
     Copies,
+    DetailedReport,
     ProtocolMessage,
     Task,
     ToMaster,
@@ -69,22 +69,22 @@ def chain(cost: float = INFINITE) -> Team:
     return team_of(dict.fromkeys("ABC", (1, 2)), [*constraints, Constraint("P", PREDEFINED["lt"], ("B", 9), ("B", 9))])
 
 
-def tasks(team: Team, protocol: type[Protocol], brief: RunParameters = DEFAULT_PARAMETERS) -> dict[str, Task]:
+def tasks(team: Team, protocol: type[Protocol], parameters: RunParameters = DEFAULT_PARAMETERS) -> dict[str, Task]:
     members = Members()
     for name, profile in profiles_of(team).items():
-        members.register(name, profile, "visit")
-    return members.tasks(1, protocol.__name__, protocol.traits, brief)
+        members.register(name, profile, "incarnation")
+    return members.tasks(1, protocol.__name__, protocol.traits, parameters)
 
 
 def searcher(
     around: RobotContext,
     protocol: type[Protocol] = ABT,
-    brief: RunParameters = DEFAULT_PARAMETERS,
+    parameters: RunParameters = DEFAULT_PARAMETERS,
     team: Team | None = None,
 ) -> Searcher:
     """RB's."""
     team = team or chain()
-    return Searcher(CompiledRobot(team["RB"]), tasks(team, protocol, brief)["RB"], protocol, around)
+    return Searcher(CompiledRobot(team["RB"]), tasks(team, protocol, parameters)["RB"], protocol, around)
 
 
 def ok(value: int | None, clock: int = 0) -> Envelope:
@@ -153,8 +153,8 @@ def test_after_the_end_nothing_is_taken_in() -> None:
     one.take_in([ok(1)])
     one.pause()
     sent = len(around.sent)
-    (account,) = around.heard(Account)
-    assert isinstance(account, Account)
+    (account,) = around.heard(DetailedReport)
+    assert isinstance(account, DetailedReport)
     assert account.assignment == {"B": 2}
     assert not one.admit(ok(2))
     one.take_in([ok(2), Envelope("RA", "RB", b"no message", 0)])
@@ -197,7 +197,7 @@ def test_who_never_was_ready_reports_all_the_same() -> None:
     one.prepare()
     one.pause()
     (account,) = around.said
-    assert isinstance(account, Account)
+    assert isinstance(account, DetailedReport)
     assert (account.assigned, account.assignment, account.findings) == (False, {}, NOTHING)
 
 
@@ -208,8 +208,8 @@ def test_in_a_private_run_values_stay_at_home() -> None:
         one.prepare()
         one.begin(0)
         one.pause()
-        (account,) = around.heard(Account)
-        assert isinstance(account, Account)
+        (account,) = around.heard(DetailedReport)
+        assert isinstance(account, DetailedReport)
         assert account.assigned
         assert account.assignment == ({} if private else {"B": 1})
         assert sum(account.metrics.messages.values()) == len(around.sent)
@@ -251,13 +251,13 @@ def test_checking_is_by_the_own_file() -> None:
     assert one.check_constraints({"A": 1, "C": 1}) == judgement(price=0)
     assert one.check_constraints({"A": 2, "C": 2}) == judgement(price=INFINITE)
     assert one.check_constraints({"A": 1, "B": 1}) == judgement(price=0)  # its own value it knows itself
-    assert one.check_constraints({"C": 2}) == Checked(1, allowed=True, cost=0, held=1)  # RA has stepped aside
+    assert one.check_constraints({"C": 2}) == CheckResult(1, allowed=True, cost=0, held=1)  # RA has stepped aside
 
 
-def judgement(price: float) -> Checked:
+def judgement(price: float) -> CheckResult:
     """Of RB's two constraints the private one holds, and RA can know the other."""
     allowed = price < INFINITE
-    return Checked(1, allowed, price if allowed else 0, held=2, shared=(Charge("RB", ("A", "B"), 1, price),))
+    return CheckResult(1, allowed, price if allowed else 0, held=2, shared=(Charge("RB", ("A", "B"), 1, price),))
 
 
 def test_checking_adds_up_what_its_constraints_charge() -> None:
@@ -272,18 +272,18 @@ def test_checking_adds_up_what_its_constraints_charge() -> None:
 
 def test_who_steps_aside_answers_for_nothing() -> None:
     around = Around()
-    one = searcher(around.context(), brief=RunParameters(withdrawal_cost=1))
+    one = searcher(around.context(), parameters=RunParameters(withdrawal_cost=1))
     one.prepare()
-    assert one.check_constraints({"A": 1, "C": 1}) == Checked(1, allowed=True, cost=0)
+    assert one.check_constraints({"A": 1, "C": 1}) == CheckResult(1, allowed=True, cost=0)
 
 
 # What others tell it must not make it say what cannot be: it would be lost for that
 
 
-def believed(around: Around) -> Account:
+def believed(around: Around) -> DetailedReport:
     """Its account, which the master believes."""
-    (account,) = around.heard(Account)
-    assert isinstance(account, Account)
+    (account,) = around.heard(DetailedReport)
+    assert isinstance(account, DetailedReport)
     assert not AuditedSearchState(1, ("RA", "RB", "RC")).handle("RB", account)
     return account
 

@@ -13,12 +13,11 @@ from pathlib import Path
 
 import pytest
 
-from robochoc.authority.admission import Household
+from robochoc.authority.admission import InMemoryAuthority
 from robochoc.communication.control import Failed
-from robochoc.communication.network import transport as post
 from robochoc.communication.network.access import ALL, access_control
-from robochoc.communication.network.framing import LARGEST_LETTER, MASTER, Framing, MessageTooLargeError
-from robochoc.communication.network.inbox import Arrived, Item
+from robochoc.communication.network.framing import LARGEST_FRAME, MASTER, Framing, MessageTooLargeError
+from robochoc.communication.network.inbox import FrameArrived, Item
 from robochoc.communication.network.local import LocalNetwork
 from robochoc.communication.network.members import Members, RegistrationRefusedError
 from robochoc.communication.network.profile import profile_of
@@ -43,12 +42,12 @@ def free() -> str:
 
 
 @pytest.fixture(scope="module")
-def household() -> Household:
-    return Household(("A", "B"))
+def household() -> InMemoryAuthority:
+    return InMemoryAuthority(("A", "B"))
 
 
 @pytest.fixture(scope="module")
-def router(household: Household) -> Iterator[Router]:
+def router(household: InMemoryAuthority) -> Iterator[Router]:
     opened = Router(free(), household.master_identity(("127.0.0.1",)), None, LEASE_MS)
     opened.open(REACH)
     yield opened
@@ -56,13 +55,13 @@ def router(household: Household) -> Iterator[Router]:
 
 
 @pytest.fixture
-def posts(household: Household, router: Router) -> Iterator[tuple[Transport, Transport]]:
+def posts(household: InMemoryAuthority, router: Router) -> Iterator[tuple[Transport, Transport]]:
     join = partial(Transport, router.endpoint, watch=(), patience_s=PATIENCE_S)
     with join(household.identity("A")) as a, join(household.identity("B")) as b:
         yield a, b
 
 
-def letter(of: Transport) -> Item:
+def frame(of: Transport) -> Item:
     return of.inbox.get(timeout=PATIENCE_S)
 
 
@@ -108,7 +107,7 @@ def test_nothing_listens_but_the_router_and_nothing_looks_for_others() -> None:
 
 
 def test_the_router_is_ours_whatever_is_in_the_working_directory(
-    household: Household, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    household: InMemoryAuthority, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """It is given the master's key."""
     (tmp_path / "zenoh.py").write_text("raise SystemExit('not ours')")
@@ -121,46 +120,49 @@ def test_the_router_is_ours_whatever_is_in_the_working_directory(
 # What is dropped without a word
 
 
-def test_letters_wait_for_a_receiver_that_does_not_look(posts: tuple[Transport, Transport]) -> None:
+def test_frames_wait_for_a_receiver_that_does_not_look(posts: tuple[Transport, Transport]) -> None:
     sender, receiver = posts
     for number in range(5_000):
         sender.send("B", number.to_bytes(2) * 200)
     sender.send("B", b"last")
-    came = [letter(receiver) for _ in range(5_001)]
-    assert came == [*(Arrived("A", number.to_bytes(2) * 200) for number in range(5_000)), Arrived("A", b"last")]
+    came = [frame(receiver) for _ in range(5_001)]
+    assert came == [
+        *(FrameArrived("A", number.to_bytes(2) * 200) for number in range(5_000)),
+        FrameArrived("A", b"last"),
+    ]
 
 
-def test_the_largest_letter_arrives(posts: tuple[Transport, Transport]) -> None:
+def test_the_largest_frame_arrives(posts: tuple[Transport, Transport]) -> None:
     sender, receiver = posts
-    content = os.urandom(LARGEST_LETTER)
+    content = os.urandom(LARGEST_FRAME)
     sender.send("B", content)
-    assert letter(receiver) == Arrived("A", content)
+    assert frame(receiver) == FrameArrived("A", content)
 
 
 def test_a_larger_one_is_refused_before_it_is_sent() -> None:
-    assert RX_BYTES > LARGEST_LETTER
-    letters = Framing("A", "run")
+    assert RX_BYTES > LARGEST_FRAME
+    framing = Framing("A", "run")
     with pytest.raises(
         MessageTooLargeError, match=r"a message of A to MASTER has 8,388,\d+ bytes, more than 8,388,608"
     ):
-        letters.write(MASTER, Failed("x" * LARGEST_LETTER))
-    assert letters.next_number(MASTER) == 1, "what was not sent leaves no gap"
+        framing.write(MASTER, Failed("x" * LARGEST_FRAME))
+    assert framing.next_number(MASTER) == 1, "what was not sent leaves no gap"
 
 
 def test_what_was_sent_in_an_outage_arrives_without_a_heartbeat(
     router: Router, posts: tuple[Transport, Transport], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """The receiver asks for it as it sees the sender again. So heartbeats, which cost much, can be rare."""
-    monkeypatch.setattr(post, "HEARTBEAT_S", 3600)
+    monkeypatch.setattr("robochoc.communication.network.transport.HEARTBEAT_S", 3600)
     sender, receiver = posts
     sender.send("B", b"before")
-    assert letter(receiver) == Arrived("A", b"before")
+    assert frame(receiver) == FrameArrived("A", b"before")
     router.close()
-    sent = [Arrived("A", number.to_bytes(2)) for number in range(50)]
+    sent = [FrameArrived("A", number.to_bytes(2)) for number in range(50)]
     for each in sent:
         sender.send("B", each.content)
     router.open(REACH)
-    assert [letter(receiver) for _ in sent] == sent
+    assert [frame(receiver) for _ in sent] == sent
 
 
 # What hangs
@@ -176,7 +178,7 @@ def test_a_program_forks_after_a_network_run_runs_another_and_ends() -> None:
     assert said == ["solution"] * 3 + ["closed"]
 
 
-def test_sessions_open_and_close_at_once(household: Household, router: Router) -> None:
+def test_sessions_open_and_close_at_once(household: InMemoryAuthority, router: Router) -> None:
     with waiting(5):  # it takes some hundredths of a second; a machine may be busy
         for _ in range(5):
             with Transport(router.endpoint, household.identity("A"), watch=(), patience_s=PATIENCE_S) as one:
@@ -204,4 +206,4 @@ def test_a_profile_names_nobody_who_is_no_part_of_a_key() -> None:
         profile.name, profile.kind, ("*",), (), profile.variables, {}, profile.weight, profile.max_cost, ()
     )
     with pytest.raises(RegistrationRefusedError, match=r"'\*' is no name"):
-        Members().register(profile.name, bad, "visit")
+        Members().register(profile.name, bad, "incarnation")

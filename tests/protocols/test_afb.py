@@ -38,10 +38,10 @@ def chain() -> Team:
     return team_of(dict.fromkeys("ABCD", (1, 2)), constraints)
 
 
-def agent(team: Team, name: str, brief: RunParameters = DEFAULT_PARAMETERS) -> AFB:
+def agent(team: Team, name: str, parameters: RunParameters = DEFAULT_PARAMETERS) -> AFB:
     """The protocol object of one robot, started, with nothing left to say."""
     robot = AFB(
-        LocalProblem(agent_problems(team, parameters=brief, shared_scopes=True)[name]), PriorityOrder(team.order)
+        LocalProblem(agent_problems(team, parameters=parameters, shared_scopes=True)[name]), PriorityOrder(team.order)
     )
     robot.start()
     robot.outbox.clear()

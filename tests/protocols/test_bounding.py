@@ -13,7 +13,7 @@ from robochoc.model.outcome import PseudoTreeNode, Verdict
 from robochoc.model.problem import INFINITE
 from robochoc.protocols import adopt, bnb_adopt
 from robochoc.protocols.bounding import BoundingProtocol, Terminate
-from robochoc.run.incumbent import bound_of
+from robochoc.run.incumbent import lower_bound
 from tests.support.agents import replies
 from tests.support.cost_problems import least_cost, random_cost_team
 from tests.support.pseudo_trees import context, placed, priced, root, to, unplaced
@@ -149,4 +149,4 @@ def test_when_nobody_speaks_all_have_ended_and_the_roots_bounds_are_the_least_co
         else:
             assert all(robot.terminated for robot in ends)
             assert len(ends) == len(team.robots)
-            assert bound_of(result.findings) == least_cost(team)
+            assert lower_bound(result.findings) == least_cost(team)

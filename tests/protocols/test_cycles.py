@@ -19,7 +19,7 @@ from robochoc.protocols.mgm import MGM
 from robochoc.protocols.mgm2 import MGM2
 from robochoc.protocols.settings import SettingsError, settings_of
 from robochoc.run import Options, Runtime, Withdrawal, solve
-from robochoc.run.incumbent import best_of
+from robochoc.run.incumbent import best_known
 from robochoc.run.registry import protocol_named
 from robochoc.solver.agent_problem import RunParameters
 from robochoc.solver.compiled_team import CompiledTeam
@@ -146,10 +146,10 @@ def test_who_may_step_aside_does_so_rather_than_break_anything(protocol: type[Cy
     for seed in range(40):
         team = random_hard_team(chance)
         price = withdrawal_cost(team)
-        brief = RunParameters(seed, {"cycles": "25"}, withdrawal_cost=price)
-        result = Simulation(team, protocol, any_schedule(chance), brief=brief).search()
+        parameters = RunParameters(seed, {"cycles": "25"}, withdrawal_cost=price)
+        result = Simulation(team, protocol, any_schedule(chance), parameters=parameters).search()
         assert result.verdict is Verdict.SOLUTION
-        found = best_of(CompiledTeam(team), result, price)
+        found = best_known(CompiledTeam(team), result, price)
         assert found
         assert not list(violations(team, found.assignment, _absent(team, found.assignment)))
         aside += len(_absent(team, found.assignment)) > 0

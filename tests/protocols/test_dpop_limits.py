@@ -188,4 +188,6 @@ def test_a_value_that_comes_twice_is_refused() -> None:
 def test_the_limit_is_the_robots_too() -> None:
     """As the run's settings reach them."""
     with pytest.raises(TooLargeError):
-        Simulation(products("AB", "AB"), DPOP, RandomChannels(0), brief=RunParameters(settings={"memory": "9"})).run()
+        Simulation(
+            products("AB", "AB"), DPOP, RandomChannels(0), parameters=RunParameters(settings={"memory": "9"})
+        ).run()

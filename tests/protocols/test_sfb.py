@@ -182,9 +182,9 @@ def keeps_to_its_share(seed: int) -> None:
     memory, window = chance.choice((1, 7, 50, 300, 2000)), chance.choice((1, 1, 3))
     watcher = Watcher(memory / (len(problem.robots) * window), window)
     settings = {"memory": str(memory), "window": str(window), "batch": str(chance.choice((1, 3, 4096)))}
-    end = Simulation(problem, SFB, RandomChannels(seed), observer=watcher, brief=RunParameters(settings=settings)).run(
-        60
-    )
+    end = Simulation(
+        problem, SFB, RandomChannels(seed), observer=watcher, parameters=RunParameters(settings=settings)
+    ).run(60)
     least, best = least_cost(problem), end.findings["RX00"].best
     assert (INFINITE if best is None else best.cost) == least
     assert (end.verdict is Verdict.NO_SOLUTION) == (best is None)

@@ -1,4 +1,4 @@
-"""rosbridge: what is published arrives, what is reported is heard; whatever the server does, it ends, and is told."""
+"""rosbridge: what is published arrives, what is reported is received; whatever the server does, the run ends."""
 
 from __future__ import annotations
 
@@ -204,9 +204,9 @@ def test_garbage_is_passed_over_or_ends_it(garbage: str | bytes, capfd: pytest.C
             with pytest.raises(SourceError, match="has closed the connection"):
                 source.next(5)
         else:
-            heard = source.next(5)
-            assert heard is not None
-            assert heard.fields["point"]["x"] == 1
+            received = source.next(5)
+            assert received is not None
+            assert received.fields["point"]["x"] == 1
     assert capfd.readouterr() == ("", "")
 
 
@@ -323,7 +323,7 @@ def test_a_loud_topic_does_not_push_out_others() -> None:
         inbox.put(ReceivedMessage("/battery", "b", {}, number))
     inbox.put(ReceivedMessage("/long", "c", {}, 0), 900)
     inbox.put(ReceivedMessage("/long", "c", {}, 1), 980)
-    heard = []
+    received = []
     while (one := inbox.get(0)) is not None:
-        heard.append((one.topic, one.at_ns))
-    assert heard == [("/blocked", 0), *(("/battery", number) for number in range(90, 100)), ("/long", 1)]
+        received.append((one.topic, one.at_ns))
+    assert received == [("/blocked", 0), *(("/battery", number) for number in range(90, 100)), ("/long", 1)]

@@ -172,7 +172,7 @@ def bombs() -> Iterator[tuple[str, bytes]]:
 
 def test_bombs_are_refused_and_eat_no_memory(monkeypatch: pytest.MonkeyPatch) -> None:
     for module in ("recording", "mcap_file"):
-        monkeypatch.setattr(f"robochoc.ros.recordings.{module}.BLOCK_AT_MOST", 1 << 22)
+        monkeypatch.setattr(f"robochoc.ros.recordings.{module}.BLOCK_BYTES_MAX", 1 << 22)
     read(write(FILES[0], messages(1)))  # what is imported only once is not counted
     for ending, content in bombs():
         file = Path(f"bomb.{ending}")
@@ -188,10 +188,10 @@ def test_bombs_are_refused_and_eat_no_memory(monkeypatch: pytest.MonkeyPatch) ->
 def test_a_file_larger_than_it_says_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("robochoc.ros.recordings.mcap_file._CHUNK_BYTES", 500)
     file = write(FILES[0], messages(200))
-    monkeypatch.setattr(recording, "WAITING_AT_MOST", 1000)
+    monkeypatch.setattr(recording, "WAITING_BYTES_MAX", 1000)
     with pytest.raises(SourceError, match="out of order"):
         read(file)
-    monkeypatch.setattr(recording, "UNPACKED_AT_MOST", 1000)
+    monkeypatch.setattr(recording, "UNPACKED_BYTES_MAX", 1000)
     monkeypatch.setattr(recording, "_RATIO", 0)
     with pytest.raises(SourceError, match="bytes unpack to"):
         read(file)

@@ -8,8 +8,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 import pytest
 
-from robochoc.flight.flight import FlightLog
 from robochoc.flight.layout import Point
+from robochoc.flight.log import FlightLog
 from robochoc.flight.mission import Mission
 from robochoc.formats import read_team
 from robochoc.model.change import team_after_events

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from robochoc.flight.mission import Drone
 from robochoc.model.problem import Topic
-from robochoc.ros.names import LONGEST, REPORTS, NameClashError, TopicNames, ros_name
+from robochoc.ros.names import NAME_MAX, REPORTS, NameClashError, TopicNames, ros_name
 
 TOKEN = re.compile(r"[A-Za-z][A-Za-z0-9_]*")
 TOPICS = st.text(min_size=1, max_size=30) | st.from_regex(
@@ -116,7 +116,7 @@ def test_drones_without_topics_clash_by_their_names() -> None:
 
 def test_a_name_that_is_too_long_is_refused() -> None:
     with pytest.raises(NameClashError, match="too long"):
-        TopicNames([drone("A", "/" + "a" * LONGEST)])
+        TopicNames([drone("A", "/" + "a" * NAME_MAX)])
 
 
 def test_a_clash_does_not_speak_to_the_terminal() -> None:

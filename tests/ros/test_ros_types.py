@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from mcap_ros2._dynamic import generate_dynamic
 
 from robochoc.ros.names import REPORTS
-from robochoc.ros.recordings.definitions import LONGEST, same_fields
+from robochoc.ros.recordings.definitions import DEFINITION_MAX, same_fields
 from robochoc.ros.recordings.types import FieldsError, UnknownTypeError, Version, types_of
 
 POSE = "geometry_msgs/PoseStamped"
@@ -172,7 +172,7 @@ def test_a_definition_that_has_the_same_fields_is_the_same() -> None:
         ("MSG: std_msgs/Header", "MSG: other_msgs/Header"),
         ("Pose pose ", "__import__('os').system('true') pose "),
         ("Pose pose ", "other_msgs/Pose pose "),
-        ("# A pose", "#" * LONGEST),
+        ("# A pose", "#" * DEFINITION_MAX),
     ],
 )
 def test_a_definition_with_other_fields_is_another(old: str, new: str) -> None:

@@ -223,7 +223,9 @@ def test_a_mapping_that_fails_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
         publisher.decide(LANDS, NOW)
 
 
-@pytest.mark.parametrize(("name", "told"), [("LOOSE", "needs types that nobody defines"), ("WRONG", "brings is wrong")])
+@pytest.mark.parametrize(
+    ("name", "told"), [("LOOSE", "needs types that are not defined"), ("WRONG", "brings is wrong")]
+)
 def test_a_definition_that_cannot_be_used_is_told(monkeypatch: pytest.MonkeyPatch, name: str, told: str) -> None:
     installed(monkeypatch, **{f"my_msgs__{name.title()}": f"tests.ros.test_ros_waypoints:{name}"})
     with pytest.raises(UnknownTypeError, match=told):

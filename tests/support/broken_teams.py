@@ -133,15 +133,15 @@ NEIGHBOURS = [
     case(
         "a child told what is not one's own",
         [(R2, 'variable="V2"', 'variable="V1"')],
-        (R2, 'variable="V1"', ("told 'V1'", "known own variables: V2")),
+        (R2, 'variable="V1"', ("must know 'V1'", "known own variables: V2")),
     ),
     case(
-        "a child told twice", [(R2, 'variable="V2"', 'variable="V2 V2"')], (R2, 'variable="V2 V2"', "told 'V2' twice")
+        "a child told twice", [(R2, 'variable="V2"', 'variable="V2 V2"')], (R2, 'variable="V2 V2"', "list 'V2' twice")
     ),
     case(
         "a child told too little",
         [(R1, 'variable="V1 W1"', 'variable="V1"')],
-        (R1, 'name="Robot3"', ("must also be told W1", "Robot3.xml:30")),
+        (R1, 'name="Robot3"', ("must also know W1", "Robot3.xml:30")),
     ),
     case(
         "a copy that the child does not have",
@@ -228,7 +228,7 @@ MANY = [
         (R2, "<functional", "operator 'nee'"),
         (R2, "<variable ", "unknown domain 'D2'"),
         (R2, 'name="C3"', "unknown reference 'lee'"),
-        (R2, '<agent name="Robot3"', "told 'V9'"),
+        (R2, '<agent name="Robot3"', "must know 'V9'"),
         (R3, "</topic>", "not well-formed XML"),
     ),
     case(

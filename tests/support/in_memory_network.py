@@ -10,20 +10,20 @@ from robochoc.authority.identity import Identity
 from robochoc.communication.control import Failed, OfEpoch, Pause, Wave
 from robochoc.communication.network.audited_state import AuditedSearchState
 from robochoc.communication.network.control_messages import (
+    CheckRequest,
+    ControlMessage,
+    DomainAnswer,
+    DomainRequest,
     Joined,
-    Judge,
     Leave,
     Objection,
     Register,
-    Search,
-    Show,
-    Shown,
+    StartSearch,
     ToRobot,
     Welcome,
-    Word,
 )
 from robochoc.communication.network.framing import MASTER, Framing
-from robochoc.communication.network.inbox import Arrived, Item
+from robochoc.communication.network.inbox import FrameArrived, Item
 from robochoc.communication.network.members import Members
 from robochoc.communication.network.robot import Ending, NetworkRobot
 from robochoc.communication.network.transport import Transport
@@ -45,37 +45,37 @@ class ScriptedTransport:
 
     router = "here"
 
-    def __init__(self, name: str, script: Callable[[Word], Iterable[Item]]) -> None:
+    def __init__(self, name: str, script: Callable[[ControlMessage], Iterable[Item]]) -> None:
         self.inbox: SimpleQueue[Item] = SimpleQueue()
-        self.heard: list[Word] = []
+        self.heard: list[ControlMessage] = []
         self.sent: list[tuple[str, bytes]] = []
         self._name = name
         self._script = script
-        self._letters = {MASTER: Framing(MASTER, RUN)}
+        self._framing = {MASTER: Framing(MASTER, RUN)}
 
     def send(self, receiver: str, content: bytes) -> None:
         if receiver != MASTER:
             self.sent.append((receiver, content))
             return
-        letters = self._letters[MASTER]
-        opened = letters.read(self._name, content)
-        letters.take(self._name, opened.number)
-        self.heard.append(opened.word)
-        for item in self._script(opened.word):
+        framing = self._framing[MASTER]
+        opened = framing.read(self._name, content)
+        framing.take(self._name, opened.number)
+        self.heard.append(opened.message)
+        for item in self._script(opened.message):
             self.inbox.put(item)
 
-    def letter(self, word: Word, sender: str = MASTER) -> Arrived:
-        """The next letter of `sender` to the robot."""
-        letters = self._letters.setdefault(sender, Framing(sender, RUN))
-        return Arrived(sender, letters.write(self._name, word))
+    def frame(self, word: ControlMessage, sender: str = MASTER) -> FrameArrived:
+        """The next frame of `sender` to the robot."""
+        framing = self._framing.setdefault(sender, Framing(sender, RUN))
+        return FrameArrived(sender, framing.write(self._name, word))
 
-    def heard_of(self, kind: type[Word]) -> list[Word]:
+    def heard_of(self, kind: type[ControlMessage]) -> list[ControlMessage]:
         """The words of one kind."""
         return [word for word in self.heard if isinstance(word, kind)]
 
 
 class InMemoryNetwork:
-    """A team of robots whose letters stay in this thread, and a master who does no more than has to be."""
+    """A team of robots whose frames stay in this thread, and a master who does no more than has to be."""
 
     def __init__(
         self,
@@ -83,7 +83,7 @@ class InMemoryNetwork:
         protocol: type[Protocol],
         identities: dict[str, Identity] | None = None,
         filters: Sequence[str] = (),
-        brief: RunParameters = DEFAULT_PARAMETERS,
+        parameters: RunParameters = DEFAULT_PARAMETERS,
         traitor: str = "",
     ) -> None:
         self.traitor = traitor
@@ -94,9 +94,9 @@ class InMemoryNetwork:
         self.failures: dict[str, Failed] = {}
         self._protocol = protocol
         self._filters = tuple(filters)
-        self._brief = brief
+        self._brief = parameters
         self._searching = False
-        self._letters = Framing(MASTER, RUN)
+        self._framing = Framing(MASTER, RUN)
         unproven = cast("Identity", None)
         self._robots = {
             robot.name: SteppedRobot(
@@ -108,7 +108,7 @@ class InMemoryNetwork:
             one.begin()
         self._settle()
         for name, variables in self.members.unseen().items():
-            self.tell(name, Show(variables))
+            self.tell(name, DomainRequest(variables))
         self._settle()
 
     def search(self) -> RunResult:
@@ -121,7 +121,7 @@ class InMemoryNetwork:
             self.tell(name, task)
         self._settle()
         if state.ready:
-            self._tell_all(Search(state.epoch))
+            self._tell_all(StartSearch(state.epoch))
             self._searching = state.ordered = True
             self._settle()
             while not (state.verdict or state.counters.quiescent or state.broken_off) and state.wave_due:
@@ -137,7 +137,7 @@ class InMemoryNetwork:
     def judge(self, values: dict[str, dict[str, int]]) -> tuple[bool, float]:
         """Have all check what was decided."""
         for name in self.members.order:
-            self.tell(name, Judge(self.state.epoch, self.members.neighbourhood(name, values)))
+            self.tell(name, CheckRequest(self.state.epoch, self.members.neighbourhood(name, values)))
         self._settle()
         return self.state.held, self.state.cost
 
@@ -148,7 +148,7 @@ class InMemoryNetwork:
 
     def tell(self, name: str, word: ToRobot) -> None:
         """Say something to a robot."""
-        self.inboxes[name].put(Arrived(MASTER, self._letters.write(name, word)))
+        self.inboxes[name].put(FrameArrived(MASTER, self._framing.write(name, word)))
 
     def _weigh(self, name: str, fault: str) -> None:
         """Who says what cannot be is lost; of nobody but the `traitor` that is to be expected."""
@@ -168,23 +168,23 @@ class InMemoryNetwork:
             for name, robot in self._robots.items():
                 robot.step(_drained(self.inboxes[name]))
             for item in _drained(self.inboxes[MASTER]):
-                if isinstance(item, Arrived):
+                if isinstance(item, FrameArrived):
                     self._hear(*item)
             if all(inbox.empty() for inbox in self.inboxes.values()):
                 for robot in self._robots.values():
                     robot.step([])
 
     def _hear(self, name: str, content: bytes) -> None:
-        opened = self._letters.read(name, content)
-        self._letters.take(name, opened.number)
-        match opened.word:
-            case Register(profile, visit):
-                self.members.register(name, profile, visit)
-                self.tell(name, Welcome(visit, RUN, self._filters, observed=False, private=False))
-            case Joined(visit, card):
-                self.members.robots[name].join(visit, card)
-            case Shown(variables):
-                self.members.robots[name].also.update(variables)
+        opened = self._framing.read(name, content)
+        self._framing.take(name, opened.number)
+        match opened.message:
+            case Register(profile, incarnation):
+                self.members.register(name, profile, incarnation)
+                self.tell(name, Welcome(incarnation, RUN, self._filters, observed=False, private=False))
+            case Joined(incarnation, card):
+                self.members.robots[name].join(incarnation, card)
+            case DomainAnswer(variables):
+                self.members.robots[name].shown_later.update(variables)
             case Objection() as objection:
                 self.objections.append(objection)
             case Failed() as failed:
@@ -196,7 +196,7 @@ class InMemoryNetwork:
 
 
 class InMemoryTransport:
-    """One robot's post in the office."""
+    """One robot's transport in the office."""
 
     router = "here"
 
@@ -206,7 +206,7 @@ class InMemoryTransport:
         self._name = name
 
     def send(self, receiver: str, content: bytes) -> None:
-        self._office.inboxes[receiver].put(Arrived(self._name, content))
+        self._office.inboxes[receiver].put(FrameArrived(self._name, content))
 
 
 class SteppedRobot(NetworkRobot):

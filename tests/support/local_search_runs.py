@@ -47,8 +47,8 @@ def played(
     team: Team, protocol: type[CycleProtocol], schedule: Schedule, seed: int = 0, **settings: object
 ) -> RunResult:
     """A run of simple robots to its own end."""
-    brief = RunParameters(seed, {name: str(value) for name, value in settings.items()})
-    result = Simulation(team, protocol, schedule, brief=brief).search()
+    parameters = RunParameters(seed, {name: str(value) for name, value in settings.items()})
+    result = Simulation(team, protocol, schedule, parameters=parameters).search()
     assert result.verdict in {Verdict.SOLUTION, Verdict.NO_SOLUTION}
     return result
 

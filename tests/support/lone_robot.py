@@ -7,13 +7,13 @@ from typing import cast
 
 from robochoc.authority.identity import Identity
 from robochoc.communication.network.control_messages import (
+    ControlMessage,
     Leave,
     Register,
     Task,
     Welcome,
-    Word,
 )
-from robochoc.communication.network.inbox import Arrived, Item, Missed, Presence, Woken
+from robochoc.communication.network.inbox import FrameArrived, FramesLost, Item, PresenceChanged, WakeUp
 from robochoc.communication.network.members import Members
 from robochoc.communication.network.profile import profile_of
 from robochoc.communication.network.robot import Ending, NetworkRobot
@@ -42,7 +42,7 @@ def chain_of_three() -> Team:
 def task(protocol: type[Protocol] = ABT, epoch: int = 1) -> Task:
     members = Members()
     for robot in chain_of_three().robots:
-        members.register(robot.name, profile_of(robot), "visit")
+        members.register(robot.name, profile_of(robot), "incarnation")
     return members.tasks(epoch, protocol.__name__, protocol.traits, DEFAULT_PARAMETERS)["RB"]
 
 
@@ -50,7 +50,7 @@ def ok(value: int) -> bytes:
     return encode(Ok((value,)))
 
 
-Script = Callable[[ScriptedTransport, Word], Iterable[Word | Item]]
+Script = Callable[[ScriptedTransport, ControlMessage], Iterable[ControlMessage | Item]]
 
 
 def played(
@@ -58,19 +58,23 @@ def played(
 ) -> tuple[Ending, ScriptedTransport]:
     """How RB fares when all its words to the master are answered by `script`; it is welcomed, as a rule."""
 
-    def answers(word: Word) -> Iterator[Item]:
-        if isinstance(word, Register) and len(post.heard) == 1:
-            yield post.letter(Welcome(word.visit, RUN, (), observed=False, private=False))
-        for said in script(post, word):
-            yield said if isinstance(said, Arrived | Missed | Presence | Woken) else post.letter(said)
+    def answers(word: ControlMessage) -> Iterator[Item]:
+        if isinstance(word, Register) and len(transport.heard) == 1:
+            yield transport.frame(Welcome(word.incarnation, RUN, (), observed=False, private=False))
+        for said in script(transport, word):
+            yield (
+                said
+                if isinstance(said, FrameArrived | FramesLost | PresenceChanged | WakeUp)
+                else transport.frame(said)
+            )
 
     def named(name: str) -> type[Protocol]:
         if name != protocol.__name__:
             raise LookupError(f"no protocol {name!r}")
         return protocol
 
-    post = ScriptedTransport("RB", answers)
+    transport = ScriptedTransport("RB", answers)
     robot = NetworkRobot(
-        CompiledRobot(chain_of_three()["RB"]), UNPROVEN, cast("Transport", post), named, RobotSettings(patience_s)
+        CompiledRobot(chain_of_three()["RB"]), UNPROVEN, cast("Transport", transport), named, RobotSettings(patience_s)
     )
-    return robot.run(), post
+    return robot.run(), transport

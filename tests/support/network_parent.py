@@ -13,9 +13,9 @@ from tests.support.paused_abt import CHAIN, PausedABT
 
 def main() -> None:
     signal.signal(signal.SIGTERM, lambda *_: sys.exit(128 + signal.SIGTERM))
-    brief = RunParameters(settings={"file": "/nowhere"})
+    parameters = RunParameters(settings={"file": "/nowhere"})
     try:
-        with LocalNetwork(CHAIN, PausedABT, brief=brief, progress=tell) as network:
+        with LocalNetwork(CHAIN, PausedABT, parameters=parameters, progress=tell) as network:
             network.search()
     except KeyboardInterrupt:
         sys.exit(128 + signal.SIGINT)

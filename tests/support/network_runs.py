@@ -14,8 +14,8 @@ from typing import Self
 
 import zenoh
 
-from robochoc.authority.admission import Household
-from robochoc.communication.network.control_messages import Word
+from robochoc.authority.admission import InMemoryAuthority
+from robochoc.communication.network.control_messages import ControlMessage
 from robochoc.communication.network.framing import Framing
 from robochoc.communication.network.journal_server import Publication
 from robochoc.communication.network.local import LOOPBACK
@@ -43,16 +43,18 @@ def free_endpoint() -> str:
         return f"{LOOPBACK}:{trial.getsockname()[1]}"
 
 
-def put(post: Transport, key: str, content: bytes = b"anything") -> None:
-    """Put on a key that the post itself would not put on."""
-    post._session.put(key, content, congestion_control=zenoh.CongestionControl.BLOCK)  # noqa: SLF001
+def put(transport: Transport, key: str, content: bytes = b"anything") -> None:
+    """Put on a key that the transport itself would not put on."""
+    transport._session.put(key, content, congestion_control=zenoh.CongestionControl.BLOCK)  # noqa: SLF001
 
 
-def letter(run: NetworkRun, sender: str, receiver: str, word: Word, number: int = 1, of_run: str = "") -> bytes:
-    """A letter of this run as `sender` would write it."""
-    letters = Framing(sender, of_run or run.master.run)
-    letters._written[receiver] = number - 1  # noqa: SLF001
-    return letters.write(receiver, word)
+def frame(
+    run: NetworkRun, sender: str, receiver: str, word: ControlMessage, number: int = 1, of_run: str = ""
+) -> bytes:
+    """A frame of this run as `sender` would write it."""
+    framing = Framing(sender, of_run or run.master.run)
+    framing._written[receiver] = number - 1  # noqa: SLF001
+    return framing.write(receiver, word)
 
 
 class NetworkRun:
@@ -72,7 +74,7 @@ class NetworkRun:
         publication: Publication | None = None,
     ) -> None:
         self.team = team
-        self.household = Household(team.order)
+        self.household = InMemoryAuthority(team.order)
         self.events: list[AnyEvent] = []
         self.result: RunResult | None = None
         self.error: Exception | None = None
@@ -121,7 +123,7 @@ class NetworkRun:
         self.threads[name] = threading.Thread(target=self._take_part, args=[name, endpoint or self.endpoint])
         self.threads[name].start()
 
-    def post(self, name: str, *, endpoint: str = "", patience_s: float = 10) -> Transport:
+    def transport(self, name: str, *, endpoint: str = "", patience_s: float = 10) -> Transport:
         """A connection of somebody who has an identity of `name` from the household."""
         place, identity = endpoint or self.endpoint, self.household.identity(name)
         return Transport(place, identity, watch=(), patience_s=patience_s, lease_ms=self.settings.lease_ms)
@@ -198,8 +200,8 @@ class NetworkRun:
             while not self._given_up and time.monotonic() < deadline and not self.master.members.closed:
                 self.master.gather(time.monotonic() + SLICE_S)
             if self.master.members.closed:
-                brief = RunParameters(settings={"file": str(self._gate)})
-                self.result = self.master.search("held", PausedABT.traits, brief, self._seconds)
+                parameters = RunParameters(settings={"file": str(self._gate)})
+                self.result = self.master.search("held", PausedABT.traits, parameters, self._seconds)
                 if not self.result.lost and self.result.assignments:
                     self.held = self.master.checked(self.result.assignments)
         except Exception as error:  # noqa: BLE001 - the test is told
@@ -207,11 +209,11 @@ class NetworkRun:
         self.master.leave("the run is over", failed=self.error is not None)
 
     def _take_part(self, name: str, endpoint: str) -> None:
-        with self.post(name, endpoint=endpoint) as post:
+        with self.transport(name, endpoint=endpoint) as transport:
             robot = NetworkRobot(
                 CompiledRobot(self.team[name]),
                 self.household.identity(name),
-                post,
+                transport,
                 lambda _name: PausedABT,
                 RobotSettings(self.settings.patience_s),
             )

@@ -28,3 +28,11 @@ def random_schedule(chance: Random) -> Options:
         seed=chance.getrandbits(32),
         timeout=60,
     )
+
+
+def on_runtime(options: Options, runtime: Runtime) -> Options:
+    """Return `options` for `runtime`. Schedule and delay go with the simulator only."""
+    if runtime is Runtime.SIMULATOR:
+        return options
+    defaults = Options()
+    return replace(options, runtime=runtime, schedule=defaults.schedule, delay=defaults.delay)

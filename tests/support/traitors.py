@@ -12,7 +12,7 @@ from dataclasses import replace
 import msgspec
 
 from robochoc.communication.control import Conclusion, Counters, Ready
-from robochoc.communication.network.control_messages import Account, Checked, Exchanged, Task, ToMaster
+from robochoc.communication.network.control_messages import CheckResult, DetailedReport, Exchanged, Task, ToMaster
 from robochoc.communication.network.searcher import RobotContext, Searcher
 from robochoc.model.outcome import Metrics
 from robochoc.protocols.findings import Findings
@@ -45,11 +45,11 @@ def counting(sent: Callable[[int], int], received: Callable[[int], int] = lambda
     return lie
 
 
-def reporting(change: Callable[[Account], Account]) -> Lie:
+def reporting(change: Callable[[DetailedReport], DetailedReport]) -> Lie:
     """What it reports at the end is another."""
 
     def lie(_me: Searcher, word: ToMaster) -> Iterator[ToMaster]:
-        yield change(word) if isinstance(word, Account) else word
+        yield change(word) if isinstance(word, DetailedReport) else word
 
     return lie
 
@@ -69,11 +69,11 @@ def valued(**values: int) -> Lie:
     return reporting(lambda account: changed(account, assignment={**account.assignment, **values}))
 
 
-def judging(change: Callable[[Checked], Checked]) -> Lie:
+def judging(change: Callable[[CheckResult], CheckResult]) -> Lie:
     """What it has found of the decision is another."""
 
     def lie(_me: Searcher, word: ToMaster) -> Iterator[ToMaster]:
-        yield change(word) if isinstance(word, Checked) else word
+        yield change(word) if isinstance(word, CheckResult) else word
 
     return lie
 
@@ -81,9 +81,9 @@ def judging(change: Callable[[Checked], Checked]) -> Lie:
 def taking_what_its_parent_has(_me: Searcher, word: ToMaster) -> Iterator[ToMaster]:
     """RB says that it has the value that RA has, and that its constraint with RA holds nevertheless."""
     match word:
-        case Account(assignment={"B": value}):
+        case DetailedReport(assignment={"B": value}):
             word = changed(word, assignment={"B": 3 - value})
-        case Checked(shared=shared):
+        case CheckResult(shared=shared):
             word = changed(word, allowed=True, cost=0, shared=tuple(one._replace(price=0) for one in shared))
         case _:
             pass
@@ -100,7 +100,7 @@ def keeping_awake() -> Lie:
             case Counters():
                 more += 500
                 word = changed(word, sent=word.sent + more, received=word.received + more)
-            case Account(metrics=spent, exchanged=exchanged):
+            case DetailedReport(metrics=spent, exchanged=exchanged):
                 true = exchanged.get("RA", Exchanged())
                 with_ra = Exchanged(true.sent + more, true.received + more, true.clock)
                 metrics = replace(spent, messages={"Ok": sum(spent.messages.values()) + more}, bytes=spent.bytes + more)
@@ -165,9 +165,9 @@ def install(lie: Lie, name: str, patch: Callable[[type, str, object], None] = se
 
     judge = Searcher.check_constraints
 
-    def judge_lying(me: Searcher, told: Mapping[str, int]) -> Checked:
+    def judge_lying(me: Searcher, told: Mapping[str, int]) -> CheckResult:
         (found,) = lie(me, judge(me, told)) if me.name == name else (judge(me, told),)
-        assert isinstance(found, Checked)
+        assert isinstance(found, CheckResult)
         return found
 
     patch(Searcher, "__init__", begin_lying)

@@ -167,7 +167,7 @@ def _opened(folder: Path | None) -> Iterator[Authority]:
 def _failures_told() -> Iterator[None]:
     """Turn the Authority's errors into `Failure`: one line and an exit status."""
     try:
-        from robochoc.authority.authority import InvalidNameError, UnknownNameError
+        from robochoc.authority.names import InvalidNameError, UnknownNameError
         from robochoc.authority.registry import AuthorityError
     except ModuleNotFoundError as missing:
         if missing.name is None or missing.name.partition(".")[0] != "cryptography":

@@ -56,38 +56,38 @@ def directory(
     if sl and as_json:
         raise click.UsageError("--sl and --json are two forms of one answer; drop one")
     with network_failures_told(place):
-        from robochoc.run.networked.consult import consult, found, search_words, watch
+        from robochoc.run.networked.directory_query import agents_in, query_directory, search_request, watch_directory
         from robochoc.run.networked.join import identity_of
 
-        words = search_words(place, given["slots"], given["at_most"])
+        words = search_request(place, given["slots"], given["at_most"])
         patience_s = given["patience_s"]
         proof = identity_of(name, place, identity, token, patience_s)
         if watching:
-            for answer in watch(place, proof, words, patience_s):
+            for answer in watch_directory(place, proof, words, patience_s):
                 _tell(answer, sl=sl, as_json=as_json)
             return
-        answer = consult(place, proof, words, patience_s)
+        answer = query_directory(place, proof, words, patience_s)
         if sl or as_json:
             _tell(answer, sl=sl, as_json=as_json)
         else:
-            _print_table(found(answer))
+            _print_table(agents_in(answer))
 
 
 def _tell(answer: str, *, sl: bool, as_json: bool) -> None:
     """One answer, line by line; of one who has gone the name is all that is left."""
     import msgspec
 
-    from robochoc.run.networked.consult import about, found
+    from robochoc.run.networked.directory_query import agents_in, subject_of
     from robochoc.system.plain_text import on_one_line
 
     if sl:
         click.echo(on_one_line(answer, len(answer)))
         return
-    agents = found(answer)
+    agents = agents_in(answer)
     for agent in agents:
         kinds = ", ".join(f"{one.type} {one.name}" for one in agent.services)
         click.echo(msgspec.json.encode(agent).decode() if as_json else on_one_line(f"{agent.name}: {kinds}"))
-    gone = "" if agents else about(answer)
+    gone = "" if agents else subject_of(answer)
     if gone:
         told = msgspec.json.encode({"name": gone, "gone": True}).decode()
         click.echo(told if as_json else on_one_line(f"{gone} has gone"))

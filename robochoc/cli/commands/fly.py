@@ -15,13 +15,13 @@ from robochoc.cli.options.ros import (
     flight_options,
     ros_options,
 )
-from robochoc.cli.options.ros_setup import conditions_of, open_sinks, ros_errors_fail
+from robochoc.cli.options.ros_setup import conditions_of, open_sinks, ros_errors_fail, sink_places
 from robochoc.cli.options.saved import saved_outcome, team_of, team_option
 from robochoc.cli.options.sections import COMMON, SectionedCommand, Sections
 from robochoc.cli.reports.failures import INVALID, LOST, Failure, invalid_input_fails
 
 if TYPE_CHECKING:
-    from robochoc.flight.flight import FlightLog
+    from robochoc.flight.log import FlightLog
     from robochoc.flight.mission import Mission
 
 
@@ -55,7 +55,12 @@ def fly(saved: Path, folder: Path | None, html: Path | None, *, serve: bool, as_
     """  # noqa: D301 - \\b is how click is told to leave the lines as they are
     from robochoc.cli.reports.flight import as_planned, flight_json, report, too_late
 
-    refuse_same_places({"--html": html}, {"the result": saved}, teams=[folder] if folder else [], sinks=given["sinks"])
+    refuse_same_places(
+        {"--html": html},
+        {"the result": saved},
+        teams=[folder] if folder else [],
+        more_outputs=sink_places(given["sinks"]),
+    )
     outcome = saved_outcome(saved)
     team = team_of(outcome, saved, folder)
     if given["sinks"] and team is None:

@@ -31,7 +31,7 @@ if TYPE_CHECKING:
     from robochoc.journal.journal import Header, JournalRecorder
     from robochoc.model.outcome import Outcome
     from robochoc.run.networked.address import Address
-    from robochoc.run.networked.lead import Led, Plan
+    from robochoc.run.networked.master_run import MasterPlan, MasterResult
 
 
 _SECTIONS: Sections = {
@@ -107,7 +107,7 @@ def master(
     sniffable: bool,
     folder: Path | None,
     team: Path | None,
-    **given: Any,  # noqa: ANN401 - the fields of `Plan` and `NetworkSettings`, by their names
+    **given: Any,  # noqa: ANN401 - the fields of `MasterPlan` and `NetworkSettings`, by their names
 ) -> None:
     """Register robots of other machines, and let them solve their problem together.
 
@@ -138,12 +138,12 @@ def master(
     context.exit(LIMIT if led.outcome.verdict == "unknown" else 0)
 
 
-def _plan(folder: Path | None, team: Path | None, given: dict[str, Any]) -> Plan:
+def _plan(folder: Path | None, team: Path | None, given: dict[str, Any]) -> MasterPlan:
     from robochoc.authority.authority import default_folder
     from robochoc.communication.filters import UnknownFilterError, filter_named
     from robochoc.communication.network.settings import NetworkSettings
     from robochoc.formats import robot_names
-    from robochoc.run.networked.lead import Plan
+    from robochoc.run.networked.master_run import MasterPlan
     from robochoc.run.options import Withdrawal
 
     try:
@@ -158,7 +158,7 @@ def _plan(folder: Path | None, team: Path | None, given: dict[str, Any]) -> Plan
         survive=given.pop("on_loss") == "withdraw",
     )
     withdraw = given.pop("withdraw")
-    return Plan(
+    return MasterPlan(
         authority=folder or default_folder(),
         conditions=conditions,
         settings=protocol_settings(given.pop("settings_given")),
@@ -183,9 +183,9 @@ def _publication(*, sniffable: bool) -> Iterator[Publication | None]:
         yield publication
 
 
-def _led(plan: Plan, recorder: JournalRecorder | None, publication: Publication | None) -> Led:
+def _led(plan: MasterPlan, recorder: JournalRecorder | None, publication: Publication | None) -> MasterResult:
     """The run, with whatever watches it."""
-    from robochoc.run.networked.lead import lead
+    from robochoc.run.networked.master_run import run_master
 
     if recorder and publication:
         publication.fresh = recorder.flush_if_due
@@ -208,7 +208,7 @@ def _led(plan: Plan, recorder: JournalRecorder | None, publication: Publication 
                 publication.end()
 
         watched = recorder is not None
-        return lead(
+        return run_master(
             plan,
             observer=observe,
             watched=watched,
@@ -219,7 +219,7 @@ def _led(plan: Plan, recorder: JournalRecorder | None, publication: Publication 
         )
 
 
-def _tell(led: Led, *, as_json: bool) -> None:
+def _tell(led: MasterResult, *, as_json: bool) -> None:
     if as_json:
         from robochoc.formats.result import result_json
 
@@ -230,12 +230,12 @@ def _tell(led: Led, *, as_json: bool) -> None:
         click.echo(report(led.team, led.outcome))
 
 
-def _header(plan: Plan) -> Header:
+def _header(plan: MasterPlan) -> Header:
     """What the journal says of the run."""
     from robochoc.journal.journal import Header
-    from robochoc.run.defaults import SATISFIES
+    from robochoc.run.defaults import DEFAULT_PROTOCOL
 
-    return Header(team=plan.name, protocol=plan.protocol or SATISFIES, runtime="network", seed=plan.seed)
+    return Header(team=plan.name, protocol=plan.protocol or DEFAULT_PROTOCOL, runtime="network", seed=plan.seed)
 
 
 def _tell_event(event: AnyEvent) -> None:

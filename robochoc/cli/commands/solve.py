@@ -24,7 +24,7 @@ from robochoc.cli.options.ros import (
     situation_options,
     take_ros_options,
 )
-from robochoc.cli.options.ros_setup import closed_loop
+from robochoc.cli.options.ros_setup import closed_loop, sink_places, source_places
 from robochoc.cli.options.sections import COMMON, Sections
 from robochoc.cli.options.solve import (
     Products,
@@ -187,7 +187,11 @@ def solve(
     products = Products(html, journal, serve, watching(settings["sniff"], open_browser=settings["open_browser"]))
     folders = teams_at(paths)
     refuse_same_places(
-        {"--html": html, "--journal": journal}, given, teams=folders, sinks=ros.sinks, situation=ros.situation
+        {"--html": html, "--journal": journal},
+        given,
+        teams=folders,
+        more_outputs=sink_places(ros.sinks),
+        more_inputs=source_places(ros.situation),
     )
     check_products(products, wanted, options, teams=len(folders))
     context.exit(worst([_solve_one(folder, options, products, wanted) for folder in folders]))

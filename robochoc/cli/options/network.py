@@ -70,16 +70,16 @@ def patience_option(text: str, default_s: float, name: str = "patience_s") -> Ca
 def network_failures_told(place: object) -> Iterator[None]:
     """Whatever ends a run across machines becomes one line, and an exit status."""
     try:
-        from robochoc.authority.authority import InvalidNameError
         from robochoc.authority.certificates import HostNameError
         from robochoc.authority.enrolment import EnrolmentError
         from robochoc.authority.identity import IdentityError
+        from robochoc.authority.names import InvalidNameError
         from robochoc.authority.registry import AuthorityError
         from robochoc.authority.token import TokenError
         from robochoc.communication.network.router import RouterError
         from robochoc.communication.network.transport import CannotConnectError
-        from robochoc.run.networked.consult import NoAnswerError, TemplateError
-        from robochoc.run.networked.lead import TeamIncompleteError
+        from robochoc.run.networked.directory_query import NoAnswerError, TemplateError
+        from robochoc.run.networked.master_run import TeamIncompleteError
     except ModuleNotFoundError as missing:
         package = (missing.name or "").partition(".")[0]
         if package not in _EXTRA:

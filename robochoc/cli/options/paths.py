@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping
 from contextlib import suppress
 from pathlib import Path
 from types import MappingProxyType
@@ -68,25 +68,27 @@ class OutputFile(click.Path):
         return path
 
 
+Place = tuple[Path | str, str]
+"""A place, the same however it is spelled, and what the command line calls it."""
+
+
 def refuse_same_places(
     outputs: Mapping[str, Path | None],
     inputs: Mapping[str, Path | None] = MappingProxyType({}),
     *,
     teams: Iterable[Path] = (),
-    sinks: Sequence[str] = (),
-    situation: str | None = None,
+    more_outputs: Iterable[Place] = (),
+    more_inputs: Iterable[Place] = (),
 ) -> None:
     """Raise `click.UsageError` where a command would write over what it reads, or two things to one place.
 
     `outputs` and `inputs` are files, by what they are called on the command line; `teams` are folders whose files are
-    read; `sinks` and `situation` are what `--ros` and `--situation` name. Devices and pipes may be shared.
+    read; `more_outputs` and `more_inputs` are places that need not be files. Devices and pipes may be shared.
     """
     from robochoc.system.files import resolved
 
-    taken = dict(_named(inputs))
-    if situation:
-        taken[_place_of(f"--situation {situation}", situation)] = f"--situation {situation}"
-    written = [*_named(outputs), *((_place_of(f"--ros {text}", text), f"--ros {text}") for text in sinks)]
+    taken = dict([*_named(inputs), *more_inputs])
+    written = [*_named(outputs), *more_outputs]
     folders = [resolved(team) for team in teams if team.is_dir()]
     for place, option in written:
         other = taken.setdefault(place, option)
@@ -99,7 +101,7 @@ def refuse_same_places(
                     raise click.UsageError(f"{option} would be a file of the team in {folder}; name another")
 
 
-def _named(files: Mapping[str, Path | None]) -> Iterator[tuple[Path | str, str]]:
+def _named(files: Mapping[str, Path | None]) -> Iterator[Place]:
     """Where each file is that is given, and how it is called; no devices, and nothing that is nowhere."""
     from robochoc.system.files import resolved
 
@@ -107,16 +109,6 @@ def _named(files: Mapping[str, Path | None]) -> Iterator[tuple[Path | str, str]]
         with suppress(OSError):  # whoever reads or writes it says what is wrong
             if path and (path.is_file() or not path.exists()):
                 yield resolved(path), f"{what} {path}"
-
-
-def _place_of(option: str, text: str) -> Path | str:
-    """Where a sink or a source is. Raises `click.UsageError`."""
-    from robochoc.ros.sinks import place_of
-
-    try:
-        return place_of(text)
-    except OSError as error:
-        raise click.UsageError(f"{option}: {error.strerror}; name another file") from error
 
 
 def teams_at(paths: Iterable[Path]) -> list[Path]:

@@ -8,13 +8,13 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from robochoc.cli.options.paths import refuse_same_places
+from robochoc.cli.options.paths import Place, refuse_same_places
 from robochoc.cli.options.ros import CONDITIONS, FLIGHT, FRAME, IN_FRAME, NOT_PUBLISHED, RosOptions, refuse
 from robochoc.cli.reports.failures import INVALID, USAGE, Failure
 
 if TYPE_CHECKING:
-    from robochoc.flight.flight import FlightConditions
     from robochoc.flight.mission import Drone, Mission
+    from robochoc.flight.quadrotor.conditions import FlightConditions
     from robochoc.model.problem import Assignment, Robot, Team
     from robochoc.ros.closed_loop import ClosedLoop, Feedback
     from robochoc.ros.simulated_feedback import FlightSettings
@@ -141,7 +141,7 @@ def robot_publisher(robot: Robot, given: dict[str, Any]) -> Iterator[Callable[[s
     from robochoc.ros.single_robot import drones_of_robot, leg_of_robot
     from robochoc.ros.sink_publisher import SinkPublisher
 
-    refuse_same_places({}, sinks=texts)
+    refuse_same_places({}, more_outputs=sink_places(texts))
     with ros_errors_fail(), ExitStack() as stack:
         opened = open_sinks(texts, stack)
         found = [SinkPublisher(robot.name, drones_of_robot(robot), sink, frame or FRAME) for sink in opened]
@@ -153,3 +153,22 @@ def robot_publisher(robot: Robot, given: dict[str, Any]) -> Iterator[Callable[[s
             return [f"{publisher.place}: {publisher.summary}" for publisher in found]
 
         yield publish
+
+
+def sink_places(sinks: Sequence[str]) -> list[Place]:
+    """Return where `--ros` publishes. Raises `click.UsageError`."""
+    return [_place_of("--ros", text) for text in sinks]
+
+
+def source_places(situation: str | None) -> list[Place]:
+    """Return where `--situation` reads. Raises `click.UsageError`."""
+    return [_place_of("--situation", situation)] if situation else []
+
+
+def _place_of(option: str, text: str) -> Place:
+    from robochoc.ros.sinks import place_of
+
+    try:
+        return place_of(text), f"{option} {text}"
+    except OSError as error:
+        raise click.UsageError(f"{option} {text}: {error.strerror}; name another file") from error

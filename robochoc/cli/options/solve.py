@@ -21,7 +21,7 @@ from robochoc.cli.options.sections import SectionedCommand
 from robochoc.cli.reports.failures import failures_told
 from robochoc.cli.reports.live_sniffer import Watching
 from robochoc.communication.kill_schedule import Kill
-from robochoc.run.defaults import MINIMISES, SATISFIES
+from robochoc.run.defaults import DEFAULT_COST_PROTOCOL, DEFAULT_PROTOCOL
 
 if TYPE_CHECKING:
     from robochoc.run.options import Options
@@ -46,7 +46,8 @@ class WithdrawalName(click.Choice[str]):
 def protocol_option(*, central: bool) -> Callable[[Command], Command]:
     """Return the option `--protocol NAME`; `central` says that there may also be no protocol, but one model."""
     alone = "; central: no robots, one model of all files" if central else ""
-    words = f"The protocol, as 'robochoc protocols' lists them{alone}.  [default: {SATISFIES}; with costs {MINIMISES}]"
+    default = f"[default: {DEFAULT_PROTOCOL}; with costs {DEFAULT_COST_PROTOCOL}]"
+    words = f"The protocol, as 'robochoc protocols' lists them{alone}.  {default}"
     return click.option("--protocol", type=ProtocolName(), metavar="NAME", help=words)
 
 
@@ -105,7 +106,7 @@ filter_option = click.option(
 )
 
 
-_SAME_NAMES = ("seed", "timeout", "delay", "count", "verify", "messages", "spares", "patience", "filters")
+_SAME_NAMES = ("seed", "timeout", "delay", "count", "verify", "messages", "spares", "patience", "filters", "kill")
 """Arguments of `robochoc solve` that are called as in `robochoc.run.Options`."""
 
 
@@ -209,7 +210,7 @@ def options_of(arguments: dict[str, Any], *, environment: bool) -> Options:
         channel = channel_for(arguments.pop("channel"))
     withdraw, on_loss = arguments.pop("withdraw"), arguments.pop("on_loss")
     options = Options(
-        protocol=arguments["protocol"] or SATISFIES,
+        protocol=arguments["protocol"] or DEFAULT_PROTOCOL,
         order=None if arguments["order"] == GIVEN else (),  # which one, each team's robots say
         local=limits(
             arguments.pop("local_solutions"), arguments.pop("local_timeout"), always_ace=arguments.pop("always_ace")

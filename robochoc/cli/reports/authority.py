@@ -7,11 +7,11 @@ from datetime import UTC, datetime
 
 import msgspec
 
-from robochoc.authority.registry import Member
+from robochoc.authority.registry import EnrolledName
 from robochoc.cli.reports.table import print_table
 
 
-def members_json(members: Sequence[Member], now: float) -> bytes:
+def members_json(members: Sequence[EnrolledName], now: float) -> bytes:
     """Return one JSON object per line: name, role, rights, state at Unix time `now`, and expiry or null."""
     rows = (
         {
@@ -26,7 +26,7 @@ def members_json(members: Sequence[Member], now: float) -> bytes:
     return b"".join(msgspec.json.encode(row) + b"\n" for row in rows)
 
 
-def print_members(members: Sequence[Member], now: float) -> None:
+def print_members(members: Sequence[EnrolledName], now: float) -> None:
     """Print name, role, rights, state and expiry (UTC) of each of `members`."""
     rows = []
     for member in members:
@@ -36,6 +36,6 @@ def print_members(members: Sequence[Member], now: float) -> None:
     print_table(("name", "role", "may", "state", "expires (UTC)"), rows)
 
 
-def _expiry(member: Member, now: float) -> datetime | None:
+def _expiry(member: EnrolledName, now: float) -> datetime | None:
     until = member.expires(now)
     return datetime.fromtimestamp(int(until), UTC) if until else None

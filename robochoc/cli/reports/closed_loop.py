@@ -10,7 +10,7 @@ from robochoc.cli.options.ros import FLIGHT, RosOptions
 from robochoc.cli.reports.failures import LOST
 
 if TYPE_CHECKING:
-    from robochoc.flight.flight import FlightLog
+    from robochoc.flight.log import FlightLog
     from robochoc.flight.mission import Mission
     from robochoc.ros.closed_loop import ClosedLoop
 
@@ -20,7 +20,7 @@ def told_of(loop: ClosedLoop) -> list[str]:
     return [*(f"{publisher.place}: {publisher.summary}" for publisher in loop.publishers), *loop.notes]
 
 
-class Flight(NamedTuple):
+class FlownMission(NamedTuple):
     """What a simulated flight has come to, if there was one."""
 
     status: int = 0
@@ -28,21 +28,21 @@ class Flight(NamedTuple):
     flown: FlightLog | None = None
 
 
-def flight_told(loop: ClosedLoop | None, ros: RosOptions, *, quiet: bool) -> Flight:
+def flight_told(loop: ClosedLoop | None, ros: RosOptions, *, quiet: bool) -> FlownMission:
     """How a simulated flight went, which is told. Whoever fell has left the team: that alone is no failure."""
     if loop is None or ros.situation != FLIGHT:
-        return Flight()
+        return FlownMission()
     from robochoc.cli.reports.flight import as_planned, how_it_went, too_late
 
     flight = _flown_by(loop)
     if flight is None:
-        return Flight()
+        return FlownMission()
     mission, flown = flight
     if not quiet:
         click.echo(how_it_went(flown))
         for line in too_late(ros.flight.get("failures", ()), flown):
             click.echo(line, err=True)
-    return Flight(0 if as_planned(flown, may_fall=True) else LOST, mission, flown)
+    return FlownMission(0 if as_planned(flown, may_fall=True) else LOST, mission, flown)
 
 
 def _flown_by(loop: ClosedLoop) -> tuple[Mission, FlightLog] | None:

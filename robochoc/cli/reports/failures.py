@@ -1,4 +1,4 @@
-"""How failures become one clear message and an exit status (FORMAT.md)."""
+"""How failures become one clear message and an exit status (docs/reference/cli.md)."""
 
 from __future__ import annotations
 

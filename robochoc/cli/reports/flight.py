@@ -8,7 +8,7 @@ from math import isfinite, isnan
 import msgspec
 
 from robochoc.cli.reports.table import table_lines
-from robochoc.flight.flight import ClosestApproach, FlightLog
+from robochoc.flight.log import ClosestApproach, FlightLog
 from robochoc.flight.mission import Leg, Mission
 from robochoc.formats import on_one_line
 from robochoc.formats.diagnostics import shortened

@@ -26,8 +26,11 @@ def report(team: Team, outcome: Outcome) -> str:
     team = team_after_events(team, outcome.events)
     if outcome.assignment:
         lines += _board(team, outcome.assignment) or _list(team, outcome.assignment)
-    if outcome.aside:
-        lines += [f"  {len(outcome.aside)} withdrawn{_weight(team, outcome)}:", *_wrapped(outcome.aside)]
+    if outcome.withdrawn_alive:
+        lines += [
+            f"  {len(outcome.withdrawn_alive)} withdrawn{_weight(team, outcome)}:",
+            *_wrapped(outcome.withdrawn_alive),
+        ]
     if outcome.lost:
         lost = sorted(outcome.lost, key=natural_key)
         lines += [f"  {len(lost)} lost:", *_wrapped(lost)]
@@ -83,7 +86,7 @@ def _verdict(team: Team, outcome: Outcome) -> str:
             return f"unknown: {outcome.reason or 'a limit was reached before a verdict'}{_so_far(team, outcome)}"
         case _ if outcome.count is not None:
             return f"{outcome.count:,} solution{'s' * (outcome.count != 1)}"
-        case Verdict.SOLUTION | Verdict.OPTIMAL if not outcome.aside:
+        case Verdict.SOLUTION | Verdict.OPTIMAL if not outcome.withdrawn_alive:
             return f"{headline}{_not_proven(team, outcome)}, {_checked(outcome)}{confirmed}{_trusted(outcome)}"
         case Verdict.SOLUTION | Verdict.OPTIMAL:
             whole = f"no solution{left or ' for the whole team'}{because}"
@@ -104,7 +107,7 @@ def _trusted(outcome: Outcome) -> str:
     """Return which claim could not be checked, and rests on what all robots reported."""
     if outcome.claimed_by != ALL_ROBOTS or not outcome.verified or outcome.confirmed:
         return ""
-    what = "the minimum withdrawal" if outcome.aside else "the minimum cost"
+    what = "the minimum withdrawal" if outcome.withdrawn_alive else "the minimum cost"
     return f"; {what} is what all robots report"
 
 
@@ -117,7 +120,7 @@ def _weight(team: Team, outcome: Outcome) -> str:
     """Return the weight of the withdrawn robots, if robots differ in weight."""
     if all(robot.weight == 1 for robot in team.robots):
         return ""
-    return f" (weight {sum(team[name].weight for name in outcome.aside)})"
+    return f" (weight {sum(team[name].weight for name in outcome.withdrawn_alive)})"
 
 
 def _number(cost: float | None) -> str:
@@ -128,10 +131,10 @@ def _number(cost: float | None) -> str:
 def _so_far(team: Team, outcome: Outcome) -> str:
     """Return the incumbent and the lower bound when a limit is reached."""
     bound = outcome.bound
-    if outcome.aside:
+    if outcome.withdrawn_alive:
         lower = f" (lower bound {_number(bound)})" if bound else ""
-        withdraw = "withdraws" if len(outcome.aside) == 1 else "withdraw"
-        return f"; in the best answer so far {len(outcome.aside)} {withdraw}{_weight(team, outcome)}{lower}"
+        withdraw = "withdraws" if len(outcome.withdrawn_alive) == 1 else "withdraw"
+        return f"; in the best answer so far {len(outcome.withdrawn_alive)} {withdraw}{_weight(team, outcome)}{lower}"
     if team.kind is ProblemKind.DISCSP:
         return ""
     known = [f"the best so far costs {_number(outcome.cost)}"] if outcome.assignment else []

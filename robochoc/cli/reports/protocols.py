@@ -16,7 +16,7 @@ from robochoc.formats import on_one_line
 from robochoc.protocols.protocol import NO_SETTINGS, Settings
 from robochoc.protocols.traits import Traits
 from robochoc.run.options import CENTRAL
-from robochoc.run.registry import Offer, offers
+from robochoc.run.registry import InstalledProtocol, installed_protocols
 from robochoc.solver import central
 
 _KEYS = {"shared_scopes": "everywhere", "writes_to_non_neighbours": "beyond"}
@@ -40,7 +40,7 @@ class Row:
 
 def rows() -> list[Row]:
     """Return all that `robochoc solve --protocol` accepts, and what is broken, with the reason."""
-    return [*map(_row, offers()), _central_solver()]
+    return [*map(_row, installed_protocols()), _central_solver()]
 
 
 def protocols_json(found: Sequence[Row], *, explain: bool = False) -> bytes:
@@ -94,7 +94,7 @@ def _in_a_line(traits: Traits) -> str:
     return "; ".join(words)
 
 
-def _row(offer: Offer) -> Row:
+def _row(offer: InstalledProtocol) -> Row:
     if offer.protocol is None:
         return Row(offer.name, offer.place, offer.package, None, offer.broken)
     protocol = offer.protocol

@@ -34,11 +34,14 @@ def scene_for(
     from robochoc.view.scene import scene_of
 
     mission = mission or mission_of(outcome, team)
+    weighted = None if team is None else any(robot.weight != 1 for robot in team.robots)
     if flown is not None:
-        return scene_of(outcome, mission, flown)
+        return scene_of(outcome, mission, flown, weighted=weighted)
     with stages(outcome.team) as progress:
         preview = preview_of(mission, progress)
-    return scene_of(outcome, mission, preview.flown, flown_mission=preview.mission, why_not=preview.why_not)
+    return scene_of(
+        outcome, mission, preview.flown, flown_mission=preview.mission, why_not=preview.why_not, weighted=weighted
+    )
 
 
 def write_page(scene: Scene, path: Path, *, quiet: bool = False) -> None:

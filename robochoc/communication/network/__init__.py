@@ -1,6 +1,6 @@
 """Several machines, on eclipse-zenoh: a master that listens, and robots that know their own file and its address.
 
-`robot.py` and `master.py` are the two ends, `words.py` what they say, `letters.py` what goes around each word,
-`post.py` and `router.py` what zenoh does for them (nothing else imports it), `access.py` who may write to whom,
-`profile.py` and `shared.py` what a robot tells of its file, `local.py` all of it on one machine.
+`robot.py` and `master.py` are the two ends, `control_messages.py` their messages, `framing.py` what goes around each
+message, `transport.py` and `router.py` what zenoh does for them (nothing else imports it), `access.py` who may write to
+whom, `profile.py` and `shared.py` what a robot tells of its file, `local.py` all of it on one machine.
 """

@@ -1,7 +1,7 @@
 """Who may write to whom: zenoh's access control, default deny, bound to the name in a certificate.
 
-The key of a letter is `rc/msg/RECEIVER/SENDER`. A robot may put on keys that end with its own name only, and read those
-that begin with it, so that nobody writes in another's name or reads another's letters. Of the keys that end with its
+The key of a frame is `rc/msg/RECEIVER/SENDER`. A robot may put on keys that end with its own name only, and read those
+that begin with it, so that nobody writes in another's name or reads another's frames. Of the keys that end with its
 name it may use those to the master, and once the team is closed those to the robots it has to do with. Recovery
 (zenoh's advanced publishers) asks for what was missed under `@adv` below the same keys, and has the same rules.
 
@@ -17,26 +17,26 @@ from robochoc.communication.network.framing import MASTER
 from robochoc.formats.names import is_name
 
 ALL = "*"
-"""Whoever there is."""
+"""All participants."""
 
 
-def letter_key(receiver: str, sender: str) -> str:
-    """Where letters from `sender` to `receiver` go."""
+def frame_key(receiver: str, sender: str) -> str:
+    """Return where frames from `sender` to `receiver` go."""
     return f"rc/msg/{receiver}/{sender}"
 
 
 def life_key(name: str) -> str:
-    """The liveliness token of `name`."""
+    """Return the liveliness token of `name`."""
     return f"rc/live/{name}"
 
 
 def journal_key(name: str) -> str:
-    """Where `name` asks for the run's journal."""
+    """Return where `name` asks for the run's journal."""
     return f"rc/journal/{name}"
 
 
 def name_in(key: str) -> str:
-    """The sender in a letter's key, whose life a token is, or who asks for the journal."""
+    """Return the sender in a frame's key, whose life a token is, or who asks for the journal."""
     return key.rpartition("/")[2]
 
 
@@ -53,7 +53,7 @@ def access_control(reach: Mapping[str, Sequence[str]], sniffers: Collection[str]
     policies = []
     for name, others in {**reach, MASTER: [ALL]}.items():
         receivers = [ALL] if ALL in others else dict.fromkeys([MASTER, *others])
-        mine = _rules(name, [letter_key(other, name) for other in receivers])
+        mine = _rules(name, [frame_key(other, name) for other in receivers])
         if sniffers is not None and name in sniffers:
             mine += _sniffing(name, journal_key(name), asks="ingress", answers="egress")
         elif sniffers is not None and name == MASTER:
@@ -71,7 +71,7 @@ def access_control(reach: Mapping[str, Sequence[str]], sniffers: Collection[str]
 
 
 def yielding() -> dict[str, Any]:
-    """Zenoh's `qos` for the journal: it yields to letters, and what a slow sniffer does not take is dropped.
+    """Zenoh's `qos` for the journal: it yields to frames, and what a slow sniffer does not take is dropped.
 
     Answers are sent as the question is, and a sniffer might ask for one that is waited for, and stop to read.
     """
@@ -85,15 +85,15 @@ def yielding() -> dict[str, Any]:
 
 
 def _rules(name: str, written: Sequence[str]) -> list[dict[str, Any]]:
-    """What `name` may do, who writes letters to the keys `written`."""
-    read = [letter_key(name, ALL)]
+    """Return the rules for `name`, which writes frames to the keys `written`."""
+    read = [frame_key(name, ALL)]
     says = ["put", "reply", "declare_queryable", "liveliness_token"]
     hears = ["declare_subscriber", "query", "declare_liveliness_subscriber", "liveliness_query", "liveliness_token"]
     return [
         _rule(f"{name} writes", "ingress", says, [*written, *map(_recovery, written)]),
         _rule(f"{name} reads", "ingress", hears, [*read, *map(_recovery, read)]),
         _rule(f"{name} receives", "egress", says, [*read, *map(_recovery, read)]),
-        _rule(f"{name} is asked", "egress", hears, [letter_key(ALL, ALL), _recovery(letter_key(ALL, ALL))]),
+        _rule(f"{name} is asked", "egress", hears, [frame_key(ALL, ALL), _recovery(frame_key(ALL, ALL))]),
         _rule(f"{name} lives", "ingress", ["liveliness_token"], [life_key(name)]),
         _rule(f"{name} watches", "ingress", ["declare_liveliness_subscriber", "liveliness_query"], [life_key(ALL)]),
         _rule(f"{name} sees", "egress", ["liveliness_token"], [life_key(ALL)]),

@@ -6,12 +6,12 @@ from collections.abc import Mapping, Sequence
 from itertools import islice
 
 from robochoc.communication.control import OfEpoch, Report
-from robochoc.communication.network.control_messages import Account, Checked
+from robochoc.communication.network.control_messages import CheckResult, DetailedReport
 from robochoc.communication.network.plausibility import (
     NOTHING_DECLARED,
-    Course,
-    Declared,
+    Declarations,
     Doubt,
+    FinishedSearch,
     doubts_about_checks,
     doubts_about_messages,
     doubts_about_values,
@@ -45,7 +45,7 @@ class AuditedSearchState(SearchState):
         epoch: int = 0,
         order: Sequence[str] = (),
         max_messages: int | None = None,
-        declared: Declared = NOTHING_DECLARED,
+        declared: Declarations = NOTHING_DECLARED,
     ) -> None:
         super().__init__(epoch, order, max_messages, declared.traits)
         self.stuck = ""
@@ -53,8 +53,8 @@ class AuditedSearchState(SearchState):
         self._declared = declared
         self._late: tuple[str, ...] = ()
         self._received_before: int | None = None
-        self._accounts: dict[str, Account] = {}
-        self._checks: dict[str, Checked] = {}
+        self._accounts: dict[str, DetailedReport] = {}
+        self._checks: dict[str, CheckResult] = {}
         self._contradictions: list[Doubt] = []
         self._still: Counts | None = None
         self._still_since = 0.0
@@ -62,7 +62,7 @@ class AuditedSearchState(SearchState):
 
     def handle(self, name: str, message: OfEpoch) -> str:
         """See `SearchState.handle`. Robots also report what their constraints charge."""
-        if isinstance(message, Checked) and message.epoch == self.epoch and name in self._present:
+        if isinstance(message, CheckResult) and message.epoch == self.epoch and name in self._present:
             return self._take_check(name, message)
         return super().handle(name, message)
 
@@ -94,17 +94,17 @@ class AuditedSearchState(SearchState):
         return ""
 
     def _take_report(self, name: str, report: Report) -> str:
-        if not isinstance(report, Account):
+        if not isinstance(report, DetailedReport):
             return "it is none for the master"
         counts = self.counters.latest(name) or Counts(0, 0)
-        course = Course(self.order, counts, self.duration_s, self.by_quiescence)
+        course = FinishedSearch(self.order, counts, self.duration_s, self.by_quiescence)
         fault = fault_of_account(name, report, self._declared, course)
         if not fault:
             self._accounts[name] = report
             super()._take_report(name, report)
         return fault
 
-    def _take_check(self, name: str, check: Checked) -> str:
+    def _take_check(self, name: str, check: CheckResult) -> str:
         fault = fault_of_check(name, check, self._declared, self.order)
         if not fault:
             self._checks[name] = check

@@ -1,4 +1,4 @@
-"""The gate: who may connect now, and write to whom. It follows the Authority's registry, and works the router."""
+"""The connection policy: who may connect now, and write to whom. It follows the Authority's registry."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ class ConnectionPolicy:
         self._rules: tuple[dict[str, tuple[str, ...]], tuple[str, ...] | None] | None = None
 
     def open(self) -> None:
-        """Let in all whom the Authority has certified, or invited; they may write to the master, and by the ways."""
+        """Admit all that the Authority has certified, or invited; they may write to the master, and by the ways."""
         self.follow()
 
     def open_ways(self, ways: Reach) -> None:
@@ -67,27 +67,27 @@ class ConnectionPolicy:
             self._router.open(*rules)
 
     def may_sniff(self, name: str) -> bool:
-        """Whether this run's journal is given out, and `name` has the right to it."""
+        """Return whether this run's journal is given out, and `name` has the right to it."""
         return self.sniffable and name in self._admission.names(right=Right.SNIFF)
 
     def is_revoked(self, name: str) -> bool:
-        """Whether `name` is to be turned away."""
+        """Return whether `name` is refused."""
         return self._admission.is_revoked(name)
 
     def admits(self, name: str) -> bool:
-        """Whether `name` has a certificate in force now, whatever the router knows yet."""
+        """Return whether `name` has a certificate in force now, whatever the router knows yet."""
         return name in self._admission.names()
 
     def is_robot(self, name: str) -> bool:
-        """Whether `name` may take part, and not only ask."""
+        """Return whether `name` may take part, and not only ask."""
         return name in self._admission.names(Role.ROBOT)
 
     def share_of(self, name: str) -> Share:
-        """What `name` may send to the master."""
+        """Return what `name` may send to the master."""
         return OF_A_ROBOT if self.is_robot(name) else OF_AN_OBSERVER
 
     def revoked(self, names: Collection[str]) -> list[str]:
-        """Those of `names` that are to be turned away now."""
+        """Return those of `names` that are refused now."""
         return [name for name in names if self.is_revoked(name)]
 
     @property
@@ -96,5 +96,5 @@ class ConnectionPolicy:
         return self._router.ended
 
     def close(self) -> None:
-        """Let everybody go."""
+        """End the router."""
         self._router.close()

@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from itertools import islice
 
-from robochoc.communication.network.control_messages import Charge, Checked
+from robochoc.communication.network.control_messages import Charge, CheckResult
 from robochoc.communication.network.plausibility import MOST_CHARGES
 from robochoc.model.problem import INFINITE, Constraint, ConstraintModel, Robot
 
@@ -19,7 +19,7 @@ def check_constraints(
     values: Mapping[str, int],
     assignment: Mapping[str, int],
     learnt: Mapping[str, Sequence[Constraint]],
-) -> Checked:
+) -> CheckResult:
     """Return what the constraints charge that `robot` knows.
 
     Args:
@@ -39,7 +39,7 @@ def check_constraints(
     charges = (one for holder, theirs in known for one in _charges(holder, theirs, values))
     copies = tuple(islice(charges, max(0, MOST_CHARGES - len(shared))))  # others may have told any number
     allowed = cost < INFINITE
-    return Checked(epoch, allowed, cost if allowed else 0, len(held), shared, copies)
+    return CheckResult(epoch, allowed, cost if allowed else 0, len(held), shared, copies)
 
 
 def _charges(holder: str, constraints: Iterable[Constraint], values: Mapping[str, int]) -> Iterator[Charge]:

@@ -1,4 +1,4 @@
-"""What the master and robots say to each other across machines. Letters (`letters.py`) carry these words.
+"""The control messages between the master and robots across machines. Frames (`framing.py`) carry them.
 
 The master is the paper's: it registers robots, waits until all are there, orders the start, finds out when all is
 quiet, and stops all (Figure 3). Of robots' files it knows what their profiles say. Protocol messages
@@ -17,35 +17,38 @@ from robochoc.communication.control import Conclusion, Counters, Events, Failed,
 from robochoc.communication.network.profile import Profile, Ranges
 
 LATEST = 2**53
-"""The latest that a clock of constraint checks can be. Each says its own, and must not overflow another's."""
+"""The largest clock of constraint checks. A robot reports its own, and must not overflow another's."""
 
 
-class _Word(msgspec.Struct, frozen=True, tag=True, array_like=True):
+class _Message(msgspec.Struct, frozen=True, tag=True, array_like=True):
     pass
 
 
 # From a robot to the master
 
 
-class Register(_Word, frozen=True):
-    """I am there: this is what my file says to all. `visit` names this life of mine: who comes back is another."""
+class Register(_Message, frozen=True):
+    """Registers the robot of `profile`.
 
-    profile: Profile
-    visit: str
-
-
-class Joined(_Word, frozen=True):
-    """I, in the life `visit`, have read your welcome: said to each, for an answer may get lost.
-
-    `card` holds my keys of this run (`KeyCard`; empty: no filter needs any).
+    `incarnation` names this process of the robot: one that is started again has another.
     """
 
-    visit: str
+    profile: Profile
+    incarnation: str
+
+
+class Joined(_Message, frozen=True):
+    """Confirms the welcome of an incarnation; sent for each welcome, as an answer may get lost.
+
+    `card` holds the robot's keys of this run (`KeyCard`; empty: no filter needs any).
+    """
+
+    incarnation: str
     card: bytes
 
 
-class Shown(_Word, frozen=True):
-    """The domains that you asked for."""
+class DomainAnswer(_Message, frozen=True):
+    """The domains that the master asked for."""
 
     variables: dict[str, Ranges]
 
@@ -58,7 +61,7 @@ class Exchanged(NamedTuple):
     clock: int = 0
 
 
-class Account(Report, frozen=True):
+class DetailedReport(Report, frozen=True):
     """A report with what the master needs to check it. In private runs `assignment` and findings stay empty.
 
     `assigned` says whether the robot has values. `exchanged` counts the messages with each other robot, so that what
@@ -78,11 +81,11 @@ class Charge(NamedTuple):
     price: int | float
 
 
-class Checked(OfEpoch, frozen=True):
-    """What the constraints that I hold charge for the values that you told me; `allowed`: none is broken.
+class CheckResult(OfEpoch, frozen=True):
+    """What the robot's constraints charge for the decided values; `allowed`: none is broken.
 
-    `held` is how many they are. Of these, `shared` are those that others may know too; `copies` are others' constraints
-    that I know.
+    `held` is their number. Of these, `shared` are those that others may know too; `copies` are constraints of others
+    that the robot knows.
     """
 
     allowed: bool
@@ -92,25 +95,25 @@ class Checked(OfEpoch, frozen=True):
     copies: tuple[Charge, ...] = ()
 
 
-class Objection(_Word, frozen=True):
-    """I have refused something: `who` has claimed to be allowed `what`."""
+class Objection(_Message, frozen=True):
+    """Reports that the robot has refused `what` of `who`."""
 
     who: str
     what: str
     why: str
 
 
-class Gap(_Word, frozen=True):
-    """So many `letters` of `who` to me are lost for good."""
+class LostFrames(_Message, frozen=True):
+    """Reports that so many `frames` of `who` to the robot are lost for good."""
 
     who: str
-    letters: Annotated[int, msgspec.Meta(ge=1, le=2**53)]
+    frames: Annotated[int, msgspec.Meta(ge=1, le=2**53)]
 
 
-class Ask(_Word, frozen=True):
-    """To the Directory Facilitator, in SL0; answers have the same `number`.
+class DirectoryRequest(_Message, frozen=True):
+    """A request to the Directory Facilitator, in SL0. Answers have the same `number`.
 
-    `subscribe`: tell me now and whenever it changes what this search finds.
+    `subscribe`: answer now, and whenever the result of this search changes.
     """
 
     number: int
@@ -118,44 +121,44 @@ class Ask(_Word, frozen=True):
     subscribe: bool = False
 
 
-class Sniff(_Word, frozen=True):
-    """May I have the journal of your run? The answer has the same `number`; it is asked for by `publication.py`."""
+class JournalRequest(_Message, frozen=True):
+    """A request for the journal of the run. The answer has the same `number`."""
 
     number: int
 
 
-class Bye(_Word, frozen=True):
-    """I have heard that the run is over."""
+class Bye(_Message, frozen=True):
+    """Confirms that the run is over."""
 
 
 # From the master to a robot
 
 
-class Welcome(_Word, frozen=True):
-    """You are registered, in your life `visit`, for the run `run`; messages go through these `filters`."""
+class Welcome(_Message, frozen=True):
+    """Confirms the registration of an incarnation for the run `run`, whose messages go through `filters`."""
 
-    visit: str
+    incarnation: str
     run: str
     filters: tuple[str, ...]
     observed: bool
     private: bool
 
 
-class Denied(_Word, frozen=True):
-    """You are not registered."""
+class RegistrationDenied(_Message, frozen=True):
+    """Refuses a registration."""
 
-    visit: str
+    incarnation: str
     why: str
 
 
-class Show(_Word, frozen=True):
-    """Parts of partially known constraints look at these variables of yours: show them."""
+class DomainRequest(_Message, frozen=True):
+    """Asks for the domains of variables that parts of partially known constraints look at."""
 
     variables: tuple[str, ...]
 
 
 class Task(OfEpoch, frozen=True):
-    """What all robots know of each other (see `solver/agent_problem.py`), and how they are to search."""
+    """A search: what all robots know of each other (see `solver/agent_problem.py`), and how they search."""
 
     protocol: str
     order: tuple[str, ...]
@@ -169,23 +172,23 @@ class Task(OfEpoch, frozen=True):
     cards: tuple[bytes, ...]
 
 
-class Search(OfEpoch, frozen=True):
-    """All robots are ready: begin."""
+class StartSearch(OfEpoch, frozen=True):
+    """The order to begin, as all robots are ready."""
 
 
-class Judge(OfEpoch, frozen=True):
-    """These are the values that all who share constraints with you have decided on, and your own: check them."""
+class CheckRequest(OfEpoch, frozen=True):
+    """The decided values of the robot and of those that share constraints with it: the robot checks them."""
 
     values: Mapping[str, int]
 
 
-class Revoked(_Word, frozen=True):
-    """Believe nothing that `name` says any more."""
+class Revoked(_Message, frozen=True):
+    """The order to accept nothing more from `name`."""
 
     name: str
 
 
-class Told(_Word, frozen=True):
+class DirectoryAnswer(_Message, frozen=True):
     """The Directory Facilitator's answer: a performative, and content in SL0."""
 
     number: int
@@ -193,15 +196,15 @@ class Told(_Word, frozen=True):
     content: str
 
 
-class Sniffable(_Word, frozen=True):
-    """You may have the journal of the run `run`; or not, because of `why`."""
+class JournalAnswer(_Message, frozen=True):
+    """The answer to a `JournalRequest`: the run's name, or why the journal is refused."""
 
     number: int
     run: str
     why: str
 
 
-class Leave(_Word, frozen=True):
+class Leave(_Message, frozen=True):
     """The run is over. `failed`: it could not be completed, because of `why`; otherwise that is the verdict."""
 
     why: str
@@ -219,7 +222,7 @@ class ProtocolMessage(OfEpoch, frozen=True):
 
 
 class Copies(OfEpoch, frozen=True):
-    """The totally known constraints that I hold and you are in: your protocol wants you to know them.
+    """The totally known constraints of the sender whose scopes the receiver is in, for protocols with shared scopes.
 
     `content` holds `SharedRecord`s, as the filters have sealed it.
     """
@@ -230,20 +233,33 @@ class Copies(OfEpoch, frozen=True):
 ToMaster = (
     Register
     | Joined
-    | Shown
+    | DomainAnswer
     | Ready
     | Counters
     | Conclusion
     | Events
-    | Account
-    | Checked
+    | DetailedReport
+    | CheckResult
     | Failed
     | Objection
-    | Gap
-    | Ask
-    | Sniff
+    | LostFrames
+    | DirectoryRequest
+    | JournalRequest
     | Bye
 )
-ToRobot = Welcome | Denied | Show | Task | Search | Wave | Pause | Judge | Revoked | Told | Sniffable | Leave
+ToRobot = (
+    Welcome
+    | RegistrationDenied
+    | DomainRequest
+    | Task
+    | StartSearch
+    | Wave
+    | Pause
+    | CheckRequest
+    | Revoked
+    | DirectoryAnswer
+    | JournalAnswer
+    | Leave
+)
 ToPeer = ProtocolMessage | Copies
-Word = ToMaster | ToRobot | ToPeer
+ControlMessage = ToMaster | ToRobot | ToPeer

@@ -1,4 +1,4 @@
-"""The Directory Facilitator as the master serves it: robots are entered when they register, and anybody may ask."""
+"""The master's Directory Facilitator: robots are entered when they register, and all participants may ask."""
 
 from __future__ import annotations
 
@@ -6,12 +6,12 @@ import time
 from collections.abc import Iterator
 from contextlib import suppress
 
-from robochoc.communication.network.control_messages import Ask, Told
+from robochoc.communication.network.control_messages import DirectoryAnswer, DirectoryRequest
 from robochoc.communication.network.profile import Profile
 from robochoc.model.communicative_acts import Performative
 from robochoc.services.descriptions import MAX_SERVICES, AgentDescription, RequestRefusedError, ServiceDescription
 from robochoc.services.directory import Directory
-from robochoc.services.facilitator import handle, subscribe, told
+from robochoc.services.facilitator import handle, notification, subscribe
 from robochoc.services.sl import df_on
 
 ASKED_AT_MOST = 20
@@ -19,7 +19,7 @@ ASKED_AT_MOST = 20
 
 
 class TooManyRequestsError(ValueError):
-    """Somebody asks too often."""
+    """A participant asks too often."""
 
 
 class DirectoryFacilitator:
@@ -35,7 +35,7 @@ class DirectoryFacilitator:
         """The number under which each subscriber has asked last."""
 
     def enter(self, profile: Profile) -> str:
-        """The robot of `profile` can be found: by its protocol, its variables, its topics.
+        """Return the robot of `profile` can be found: by its protocol, its variables, its topics.
 
         By as many of them as a description holds. Returns why it cannot be found, if so; it takes part all the same.
         """
@@ -55,7 +55,7 @@ class DirectoryFacilitator:
         return ""
 
     def leave(self, name: str) -> None:
-        """The robot called `name` cannot be found any more."""
+        """Remove the robot called `name` from the directory."""
         with suppress(RequestRefusedError):
             self._directory.deregister(self._aid(name), requester=self._aid(name))
 
@@ -71,26 +71,29 @@ class DirectoryFacilitator:
             raise TooManyRequestsError(f"more than {ASKED_AT_MOST} requests a second")
         self._asked[requester] = [*recent, now]
 
-    def answer(self, requester: str, ask: Ask) -> Told:
-        """The answer to what `requester` asks in SL0; `notices` has what it subscribes to."""
+    def answer(self, requester: str, ask: DirectoryRequest) -> DirectoryAnswer:
+        """Return the answer to what `requester` asks in SL0; `notices` has what it subscribes to."""
         now = time.time()
         aid = self._aid(requester)
         if not ask.subscribe:
-            return _told(ask.number, handle(self._directory, aid, ask.content, now))
+            return _answer_to(ask.number, handle(self._directory, aid, ask.content, now))
         self._numbers[aid] = ask.number
-        return _told(ask.number, subscribe(self._directory, aid, ask.content, now))
+        return _answer_to(ask.number, subscribe(self._directory, aid, ask.content, now))
 
-    def notices(self) -> Iterator[tuple[str, Told]]:
-        """What subscribers are to be told, each with the subscriber's name."""
+    def notices(self) -> Iterator[tuple[str, DirectoryAnswer]]:
+        """Yield answers for subscribers, each with the subscriber's name."""
         for notice in self._directory.notices():
             number = self._numbers.get(notice.subscriber, 0)
-            yield notice.subscriber.partition("@")[0], _told(number, (Performative.INFORM, told(self._df, notice)))
+            yield (
+                notice.subscriber.partition("@")[0],
+                _answer_to(number, (Performative.INFORM, notification(self._df, notice))),
+            )
 
     def _aid(self, name: str) -> str:
-        """The name of a participant's agent identifier: `Robot3.1@host:port/robochoc`."""
+        """Return the name of a participant's agent identifier: `Robot3.1@host:port/robochoc`."""
         return f"{name}@{self._endpoint}/robochoc"
 
 
-def _told(number: int, answer: tuple[Performative, str]) -> Told:
+def _answer_to(number: int, answer: tuple[Performative, str]) -> DirectoryAnswer:
     performative, content = answer
-    return Told(number, str(performative), content)
+    return DirectoryAnswer(number, str(performative), content)

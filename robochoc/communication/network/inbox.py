@@ -1,7 +1,7 @@
-"""What has come and waits to be read: bounded for each sender, so that nobody's flood fills the memory.
+"""The inbox: items that have come and wait to be read, bounded for each sender, so that no flood fills the memory.
 
-Letters beyond a sender's share (`quotas.py`) are dropped before anybody looks at them, and counted: `Missed` stands in
-the queue where the first of them was. That is a loss of that sender's, and of nobody else. Threads may share it.
+Frames beyond a sender's share (`quotas.py`) are dropped before anybody looks at them, and counted: `FramesLost` stands
+in the queue where the first of them was. That is a loss of that sender's, and of nobody else. Threads may share it.
 """
 
 from __future__ import annotations
@@ -16,36 +16,36 @@ from typing import NamedTuple
 from robochoc.communication.network.quotas import OF_A_NEIGHBOUR, Share, Usage
 
 
-class Arrived(NamedTuple):
-    """A letter from `sender`."""
+class FrameArrived(NamedTuple):
+    """A frame from `sender`."""
 
     sender: str
     content: bytes
 
 
-class Missed(NamedTuple):
-    """So many `letters` of `sender` are lost for good, or it has made it look so: zenoh believes its numbers.
+class FramesLost(NamedTuple):
+    """So many `frames` of `sender` are lost for good, or it has made it look so: zenoh believes its numbers.
 
     `dropped`: they were more than its share, and were dropped here.
     """
 
     sender: str
-    letters: int
+    frames: int
     dropped: bool = False
 
 
-class Presence(NamedTuple):
+class PresenceChanged(NamedTuple):
     """`name` is there, or is not any more as far as the router knows."""
 
     name: str
     there: bool
 
 
-class Woken(NamedTuple):
+class WakeUp(NamedTuple):
     """Somebody in this process has something new to look at."""
 
 
-Item = Arrived | Missed | Presence | Woken
+Item = FrameArrived | FramesLost | PresenceChanged | WakeUp
 
 
 class Inbox:
@@ -63,34 +63,37 @@ class Inbox:
         self._changed = threading.Condition()
 
     def put(self, item: Item) -> None:
-        """Append `item`, or drop a letter, or news of a gap, that is beyond its sender's share."""
+        """Append `item`, or drop a frame, or news of a gap, that is beyond its sender's share."""
         with self._changed:
-            if isinstance(item, Arrived | Missed):
+            if isinstance(item, FrameArrived | FramesLost):
                 usage = self._usage_of(item.sender)
                 if not usage.takes(_size(item), self._clock()):
                     usage.dropped += 1
                     if usage.dropped > 1:
                         return
-                    item = Missed(item.sender, 1, dropped=True)
+                    item = FramesLost(item.sender, 1, dropped=True)
             self._items.append(item)
             self._changed.notify()
 
     def get(self, timeout: float | None = None) -> Item:
-        """The oldest item, as soon as there is one. Raises `Empty` when there is none within `timeout` seconds."""
+        """Return the oldest item, as soon as there is one.
+
+        Raises `Empty` when there is none within `timeout` seconds.
+        """
         with self._changed:
             if not self._changed.wait_for(lambda: self._items, timeout):
                 raise Empty
             return self._taken()
 
     def get_nowait(self) -> Item:
-        """The oldest item. Raises `Empty`."""
+        """Return the oldest item. Raises `Empty`."""
         with self._changed:
             if not self._items:
                 raise Empty
             return self._taken()
 
     def empty(self) -> bool:
-        """Whether nothing waits."""
+        """Return whether nothing waits."""
         return not self._items
 
     def _usage_of(self, sender: str) -> Usage:
@@ -102,17 +105,17 @@ class Inbox:
     def _taken(self) -> Item:
         item = self._items.popleft()
         match item:
-            case Missed(sender, dropped=True):
+            case FramesLost(sender, dropped=True):
                 usage = self._usage[sender]
-                letters, usage.dropped = usage.dropped, 0
-                return item._replace(letters=letters)
-            case Arrived() | Missed():
+                frames, usage.dropped = usage.dropped, 0
+                return item._replace(frames=frames)
+            case FrameArrived() | FramesLost():
                 self._usage[item.sender].release(_size(item))
             case _:
                 pass
         return item
 
 
-def _size(item: Arrived | Missed) -> int:
-    """Bytes. That letters are missing counts as a letter, an empty one: who makes it look so may do it without end."""
-    return len(item.content) if isinstance(item, Arrived) else 0
+def _size(item: FrameArrived | FramesLost) -> int:
+    """Bytes. That frames are missing counts as a frame, an empty one: who makes it look so may do it without end."""
+    return len(item.content) if isinstance(item, FrameArrived) else 0

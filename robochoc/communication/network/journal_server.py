@@ -1,8 +1,8 @@
-"""The run's journal as the master gives it out while it grows, to those who have the right to sniff.
+"""The run's journal, which the master offers while it grows to participants with the right to sniff.
 
-Whoever follows a run asks for the bytes from `start` on, and gets a piece of bounded size; what it has not asked for
-waits in the journal's file. So a follower may come late, be slow, or stop: nothing is kept for it, nothing waits for
-it, and neither the master nor a robot is slowed. The router proves who asks (`access.py`). Threads may share it.
+A follower asks for the bytes from `start` on, and gets a piece of bounded size; the rest waits in the journal's file.
+So a follower may come late, be slow, or stop: nothing is kept for it, nothing waits for it, and neither the master nor
+a robot is slowed. The router proves who asks (`access.py`). Threads may share it.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from typing import Annotated
 
 import msgspec
 
-from robochoc.communication.network.control_messages import Sniff, Sniffable
+from robochoc.communication.network.control_messages import JournalAnswer, JournalRequest
 from robochoc.communication.network.master_events import MasterEvents
 from robochoc.journal.entries import JournalError
 
@@ -26,7 +26,7 @@ PIECE_BYTES = 60_000
 ANSWERED_AT_MOST = 200
 """Questions of one follower in a second; those beyond are not answered, and it asks again."""
 PRESENT_S = 2.0
-"""Whoever has not asked for so long does not follow any more, as far as the end of the run waits for it."""
+"""A follower that has not asked for so many seconds is not waited for at the end of the run."""
 LARGEST = 2**53
 """Bytes: no journal is as long."""
 _LARGEST_QUESTION = 200
@@ -61,7 +61,7 @@ class Publication:
 
     def __init__(self, descriptor: int, fresh: Callable[[], None] = lambda: None) -> None:
         self.run = ""
-        """The run whose journal it is, as letters name it; the master sets it."""
+        """The run whose journal it is, as frames name it; the master sets it."""
         self.fresh = fresh
         self.trouble = ""
         """Why nothing is written, and so nothing given out, any more; empty: all is well."""
@@ -74,7 +74,7 @@ class Publication:
         self._lock = threading.Lock()
 
     def write(self, block: bytes) -> None:
-        """Append a block. Where that cannot be done, the run goes on, and who follows it is told (`trouble`)."""
+        """Append a block. Where that fails, the run goes on, and followers learn of it (`trouble`)."""
         done = 0
         try:
             while done < len(block) and not self.trouble:
@@ -85,11 +85,11 @@ class Publication:
             self._size += done
 
     def end(self) -> None:
-        """All has been written."""
+        """Note that all has been written."""
         self._over = True
 
     def close(self) -> None:
-        """Answer nobody any more."""
+        """Answer no questions any more."""
         with self._lock:
             self._closed = True
 
@@ -101,7 +101,10 @@ class Publication:
             return not self._closed and any(now - asked < PRESENT_S for asked in self._behind.values())
 
     def answer(self, name: str, content: bytes) -> bytes:
-        """The answer to the question `content` of `name`, who has the right to ask. Raises `NotAnsweredError`."""
+        """Return the answer to the question `content` of `name`, who has the right to ask.
+
+        Raises `NotAnsweredError`.
+        """
         self._count(name)
         question = _question(content)
         if question.run == self.run and question.start >= self._size and not self._over:
@@ -133,12 +136,12 @@ class Publication:
 
 
 def question(run: str, start: int) -> bytes:
-    """What whoever follows `run` asks for all from byte `start` on."""
+    """Return the question for the journal of `run` from byte `start` on."""
     return msgspec.msgpack.encode(Question(run, start))
 
 
 def piece_in(content: bytes) -> Piece:
-    """The piece in an answer. Raises `JournalError`."""
+    """Return the piece in an answer. Raises `JournalError`."""
     try:
         return msgspec.msgpack.decode(content, type=Piece)
     except (msgspec.MsgspecError, RecursionError, UnicodeDecodeError) as error:
@@ -155,7 +158,7 @@ def _question(content: bytes) -> Question:
 
 
 class JournalServer:
-    """Where the master is asked for the journal of its `run`: by letter who may have it, then for piece after piece.
+    """Where the master is asked for the journal of its `run`: by frame who may have it, then for piece after piece.
 
     `publication` is None where it gives none out. `may` says who has the right now.
     """
@@ -172,18 +175,18 @@ class JournalServer:
         """Whether somebody has not got the end of the journal yet."""
         return self.publication is not None and self.publication.lagging
 
-    def welcome(self, name: str, sniff: Sniff) -> Sniffable:
-        """What `name` is told who wants to sniff."""
+    def welcome(self, name: str, sniff: JournalRequest) -> JournalAnswer:
+        """Return the answer to `name`, which wants to sniff."""
         why = self._why_not(name)
         if why:
             self._chronicle.refuse(name, SNIFF, why)
         elif name not in self._known:
             self._known.add(name)
             self._chronicle.granted(name, SNIFF)
-        return Sniffable(sniff.number, self._run, why)
+        return JournalAnswer(sniff.number, self._run, why)
 
     def answer(self, name: str, content: bytes) -> bytes | None:
-        """The answer to a question of `name`, as the router says it is; None: there is none."""
+        """Return the answer to a question of `name`, as the router says it is; None: there is none."""
         why = self._why_not(name)
         if not why and self.publication:
             try:

@@ -14,18 +14,19 @@ import threading
 import time
 from collections.abc import Callable, Mapping
 from dataclasses import replace
+from functools import partial
 from multiprocessing.connection import wait
 from multiprocessing.context import ForkServerContext
 from multiprocessing.process import BaseProcess
 from multiprocessing.util import get_temp_dir
 from typing import cast
 
-from robochoc.authority.admission import Household
+from robochoc.authority.admission import InMemoryAuthority
 from robochoc.communication.network import fork_server
 from robochoc.communication.network.master import Master
 from robochoc.communication.network.members import Members, reach
 from robochoc.communication.network.profile import profile_of
-from robochoc.communication.network.robot_process import START_S, Given, robot_process
+from robochoc.communication.network.robot_process import START_S, RobotStart, robot_process
 from robochoc.communication.network.router import RouterError
 from robochoc.communication.network.settings import NetworkSettings
 from robochoc.communication.processes.process_status import describe_end
@@ -42,7 +43,7 @@ from robochoc.solver.encoding import UnsupportedError
 
 LOOPBACK = "127.0.0.1"
 FAREWELL_S = 1.0
-"""How long to tell robots that they may go: whoever does not hear it, because it is stopped, is killed."""
+"""How long the end of the run is announced to robots. Those that do not confirm it, as they are stopped, are killed."""
 GRACE_S = 2.0
 """How long robots that were sent home get to end by themselves."""
 _ATTEMPTS = 5
@@ -70,39 +71,48 @@ class LocalNetwork(Session):
         observer: Observer | None = None,
         progress: Callable[[Progress], None] | None = None,
         settings: NetworkSettings = NetworkSettings(),
-        brief: RunParameters = DEFAULT_PARAMETERS,
+        parameters: RunParameters = DEFAULT_PARAMETERS,
     ) -> None:
         super().__init__(team)
         team = self.compiled.team
         require_descriptors(_DESCRIPTORS + _DESCRIPTORS_PER_ROBOT * len(team.robots))
         self._protocol = protocol
-        self._brief = brief
+        self._parameters = parameters
         self._context = _fork_server(protocol)
         settings = replace(settings, scratch=get_temp_dir())
         self._settings = settings
         self._processes: dict[str, BaseProcess] = {}
-        self._sent_home = False
-        self._household = Household(team.order)
-        self._waiting = list(self.compiled.robots.values())
-        watched = observer is not None
+        self._is_closed = False
+        self._authority = InMemoryAuthority(team.order)
+        self._unstarted = list(self.compiled.robots.values())
+        self._master = self._open_master(partial(self._make_master, team, observer, progress))
+
+    def _make_master(
+        self,
+        team: Team,
+        observer: Observer | None,
+        progress: Callable[[Progress], None] | None,
+        endpoint: str,
+    ) -> Master:
         profiles = {robot.name: profile_of(robot) for robot in team.robots}
-        ways = reach(profiles, writes_to_non_neighbours=protocol.traits.writes_to_non_neighbours)
-        self._master = self._opened(
-            lambda endpoint: Master(
-                self._household,
-                self._household.master_identity((LOOPBACK,)),
-                endpoint,
-                Members(team.order, order=team.order, ways=ways),
-                settings,
-                observer=observer,
-                watched=watched,
-                progress=progress,
-            )
+        ways = reach(profiles, writes_to_non_neighbours=self._protocol.traits.writes_to_non_neighbours)
+        return Master(
+            self._authority,
+            self._authority.master_identity((LOOPBACK,)),
+            endpoint,
+            Members(team.order, order=team.order, ways=ways),
+            self._settings,
+            observer=observer,
+            watched=observer is not None,
+            progress=progress,
         )
 
     @staticmethod
-    def _opened(make: Callable[[str], Master]) -> Master:
-        """The master at a free port of loopback; somebody else may be quicker, then at another."""
+    def _open_master(make: Callable[[str], Master]) -> Master:
+        """Return the master, open at a free port of loopback.
+
+        Another program may take that port first: then at another.
+        """
         for attempt in range(_ATTEMPTS):
             with socket.create_server((LOOPBACK, 0)) as trial:
                 port = trial.getsockname()[1]
@@ -140,7 +150,7 @@ class LocalNetwork(Session):
                 awaited = ", ".join(sorted(self._master.members.awaited)[:5])
                 raise UnsupportedError(f"robots did not register within {START_S:g} s: {awaited}")
         left = None if deadline is None else max(0.0, deadline - time.monotonic())
-        return self._master.search(self._protocol.__name__, self._protocol.traits, self._brief, left, messages)
+        return self._master.search(self._protocol.__name__, self._protocol.traits, self._parameters, left, messages)
 
     def workable(self, team: Team) -> Team:
         """Return what is left of the team: robots whose values still mean what they meant. See `Session.workable`."""
@@ -151,13 +161,13 @@ class LocalNetwork(Session):
         self.compiled = epoch.compiled
         gone = [name for name in self._master.members.robots if name not in epoch.team]
         self._master.members.remove(gone)
-        self._brief = epoch.brief
+        self._parameters = epoch.parameters
 
     def close(self) -> None:
-        """Send all home, and leave nothing behind."""
-        if self._sent_home:
+        """End the run and all processes."""
+        if self._is_closed:
             return
-        self._sent_home = True
+        self._is_closed = True
         try:
             self._master.leave("the run is over", farewell_s=FAREWELL_S)
             wait([process.sentinel for process in self._processes.values()], 0)
@@ -172,15 +182,15 @@ class LocalNetwork(Session):
             self._processes[name].kill()
 
     def _launch(self) -> None:
-        """Start the robots' processes, and somebody who watches for their ends."""
-        waiting, self._waiting = self._waiting, []
-        if not waiting:
+        """Start the robots' processes, and a thread that watches for their ends."""
+        unstarted, self._unstarted = self._unstarted, []
+        if not unstarted:
             return
-        for own in waiting:
+        for own in unstarted:
             name = own.robot.name
-            texts = self._household.identity(name).texts
+            texts = self._authority.identity(name).texts
             limits = (self._settings.patience_s, self._settings.lease_ms)
-            given = Given(own, texts, self._master.endpoint, self._protocol, *limits)
+            given = RobotStart(own, texts, self._master.endpoint, self._protocol, *limits)
             process = self._context.Process(target=robot_process, name=name, args=(given,), daemon=True)
             with signals_held():  # half begun, it would wait for the rest for ever, and the end of the program for it
                 process.start()
@@ -190,10 +200,10 @@ class LocalNetwork(Session):
     def _watch(self, processes: dict[str, BaseProcess]) -> None:
         """Tell the master of processes that end, which it would notice later by itself."""
         names = {process.sentinel: name for name, process in processes.items()}
-        while names and not self._sent_home:
+        while names and not self._is_closed:
             for sentinel in wait(list(names), 0.2):
                 name = names.pop(cast("int", sentinel))
-                if not self._sent_home:
+                if not self._is_closed:
                     self._master.lose(name, describe_end(processes[name]))
 
     def _end_processes(self) -> None:

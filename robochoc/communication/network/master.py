@@ -18,30 +18,30 @@ from typing import Self
 
 from robochoc.authority.admission import Admission
 from robochoc.authority.identity import Identity
-from robochoc.communication.control import Events, Failed, OfEpoch, Pause, Wave
+from robochoc.communication.control import Events, Failed, OfEpoch, Pause
 from robochoc.communication.master_loop import TICK_S, MasterLoop
 from robochoc.communication.network.audited_state import AuditedSearchState
 from robochoc.communication.network.control_messages import (
-    Ask,
     Bye,
-    Gap,
+    CheckRequest,
+    ControlMessage,
+    DirectoryRequest,
+    DomainAnswer,
+    DomainRequest,
     Joined,
-    Judge,
+    JournalRequest,
     Leave,
+    LostFrames,
     Objection,
     Register,
     Revoked,
-    Search,
-    Show,
-    Shown,
-    Sniff,
+    StartSearch,
     ToRobot,
-    Word,
 )
 from robochoc.communication.network.facilitator import DirectoryFacilitator
+from robochoc.communication.network.frame_loss import TO_MASTER, LossTracker
 from robochoc.communication.network.framing import MASTER
-from robochoc.communication.network.gaps import TO_MASTER, Gaps
-from robochoc.communication.network.inbox import Arrived, Item, Missed, Presence, Woken
+from robochoc.communication.network.inbox import FrameArrived, FramesLost, Item, PresenceChanged, WakeUp
 from robochoc.communication.network.journal_server import Publication
 from robochoc.communication.network.master_connection import MasterConnection
 from robochoc.communication.network.master_events import MasterEvents
@@ -98,17 +98,14 @@ class Master(MasterLoop):
         self._settings = settings
         self._registry_read = 0.0
         self.events = MasterEvents(observer)
-        self._connection = MasterConnection(
-            self.run, identity, admission, endpoint, members.ways, settings, self.events
-        )
-        self._send = self._connection.send
-        self._policy = self._connection.policy
-        self._journal_server = self._connection.journal_server
+        connection = MasterConnection(self.run, identity, admission, endpoint, members.ways, settings, self.events)
+        self._connection, self._send, self._policy = connection, connection.send, connection.policy
+        self._journal_server = connection.journal_server
         self._facilitator = DirectoryFacilitator(endpoint, settings.protocol)
         self._requests = Requests(self._journal_server, self._facilitator, self._send, self.events.refuse)
-        self._registrar = Registrar(members, self._connection, self._facilitator, self.events, settings, watched)
+        self._registrar = Registrar(members, connection, self._facilitator, self.events, settings, watched)
         self._dead: dict[str, str] = {}
-        self._gaps = Gaps(members, self.events.refuse, self._lose)
+        self._frame_loss = LossTracker(members, self.events.refuse, self._lose)
 
     def __enter__(self) -> Self:
         """Listen. Raises `RouterError` and `CannotConnectError`."""
@@ -138,7 +135,7 @@ class Master(MasterLoop):
         unseen = self.members.unseen()
         while unseen and not over(deadline):
             for name, variables in unseen.items():
-                self._send(name, Show(variables))
+                self._send(name, DomainRequest(variables))
             self._serve_until(lambda before=unseen: self.members.unseen() != before, deadline)  # type: ignore[misc]
             unseen = self.members.unseen()
         self.members.closed = self.members.complete and not unseen
@@ -151,7 +148,7 @@ class Master(MasterLoop):
         self,
         protocol: str,
         traits: Traits,
-        brief: RunParameters,
+        parameters: RunParameters,
         timeout: float | None = None,
         messages: int | None = None,
     ) -> RunResult:
@@ -163,12 +160,12 @@ class Master(MasterLoop):
         """
         began = time.monotonic()
         self.events.begin()
-        self._gaps.begin()
+        self._frame_loss.begin()
         deadline = None if timeout is None else began + timeout
         self._policy.open_ways(self.members.reach(writes_to_non_neighbours=traits.writes_to_non_neighbours))
         epoch, declared = self.state.epoch + 1, self.members.declared(traits)
         state = self.state = AuditedSearchState(epoch, self.members.order, messages, declared)
-        for name, task in self.members.tasks(epoch, protocol, traits, brief).items():
+        for name, task in self.members.tasks(epoch, protocol, traits, parameters).items():
             self._send(name, task)
         self._search_until(deadline)
         state.note_end(time.monotonic() - began, in_time=not over(deadline))
@@ -176,7 +173,7 @@ class Master(MasterLoop):
         return state.result(state.duration_s)
 
     def _order_start(self) -> None:
-        self._send_all(Search(self.state.epoch))
+        self._send_all(StartSearch(self.state.epoch))
         self.events.begin()
 
     def _collect(self) -> None:
@@ -201,7 +198,7 @@ class Master(MasterLoop):
         """
         state = self.state
         for name in self.members.order:
-            self._send(name, Judge(state.epoch, self.members.neighbourhood(name, assignments)))
+            self._send(name, CheckRequest(state.epoch, self.members.neighbourhood(name, assignments)))
         away_s = REPORTS_S + self._settings.patience_s + self._settings.lease_ms / 1000
         self._serve_until(lambda: not state.unchecked, time.monotonic() + away_s)
         if state.unchecked or state.lost:
@@ -237,14 +234,14 @@ class Master(MasterLoop):
 
     def _handle_item(self, item: Item) -> None:
         match item:
-            case Arrived(sender, content):
+            case FrameArrived(sender, content):
                 self._read(sender, content)
-            case Presence(name, there):
+            case PresenceChanged(name, there):
                 if member := self.members.robots.get(name):
                     member.note_presence(there=there)
-            case Missed():
-                self._gaps.at_the_master(item)
-            case Woken():
+            case FramesLost():
+                self._frame_loss.note_at_master(item)
+            case WakeUp():
                 pass
 
     def _check_robots(self, now: float) -> None:
@@ -275,7 +272,7 @@ class Master(MasterLoop):
     def _detect_end(self, now: float) -> None:
         """See `MasterLoop._detect_end`. The search also ends when messages are missing that nobody has lost."""
         missing = self.state.missing(now, self._settings.patience_s)
-        if missing and not self._gaps.explain_missing():
+        if missing and not self._frame_loss.explain_missing():
             self.state.stuck = f"{missing:,} messages between robots were lost for good"
         else:
             super()._detect_end(now)
@@ -286,33 +283,30 @@ class Master(MasterLoop):
         for name in self.members.listening:
             self._send(name, message)
 
-    def _send_wave(self, wave: Wave) -> None:
-        self._send_all(wave)
-
     def _read(self, sender: str, content: bytes) -> None:
         opened = self._connection.read(sender, content)
         if opened is None:
             return
         member = self.members.robots.get(sender)
-        match opened.word:
+        match opened.message:
             case Register(profile, incarnation):
                 if self._registrar.register(sender, profile, incarnation) and self._progress:
                     elapsed_s, number = time.monotonic() - self._began, len(self.members.robots)
                     self._progress(Progress(0, elapsed_s, f"{number} robots registered"))
-            case Ask() | Sniff():
-                self._requests.answer(sender, opened.word)
+            case DirectoryRequest() | JournalRequest():
+                self._requests.answer(sender, opened.message)
             case _ if member is None:
                 self.events.refuse(sender, TO_MASTER, "it is not registered")
             case message:
                 self._handle(sender, member, message)
 
-    def _handle(self, name: str, member: Member, message: Word) -> None:
+    def _handle(self, name: str, member: Member, message: ControlMessage) -> None:
         match message:
             case OfEpoch():
                 self._note_failure(name, self.state.handle(name, message))
             case Joined(incarnation, card):
                 member.join(incarnation, card)
-            case Shown(variables):
+            case DomainAnswer(variables):
                 self._note_failure(name, self.members.show(name, variables))
             case Events(events):
                 self.events.relay_from(name, events)
@@ -321,8 +315,8 @@ class Master(MasterLoop):
                 self._note_failure(name, why, refusal if unsupported else None)
             case Objection(who, what, why):
                 self.events.refuse(who, what, f"{why} ({name} says so)")
-            case Gap():
-                self._gaps.between(name, message)
+            case LostFrames():
+                self._frame_loss.note_between(name, message)
             case Bye():
                 member.left = True
             case _:

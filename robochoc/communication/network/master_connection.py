@@ -9,8 +9,8 @@ from robochoc.authority.identity import Identity
 from robochoc.communication.network.access import ALL, journal_key
 from robochoc.communication.network.connection_policy import ConnectionPolicy, Reach
 from robochoc.communication.network.control_messages import ToRobot
+from robochoc.communication.network.frame_loss import TO_MASTER
 from robochoc.communication.network.framing import MASTER, FrameRefusedError, Framing, Opened
-from robochoc.communication.network.gaps import TO_MASTER
 from robochoc.communication.network.inbox import Inbox, Item
 from robochoc.communication.network.journal_server import JournalServer, Publication
 from robochoc.communication.network.master_events import MasterEvents

@@ -1,4 +1,4 @@
-"""What the master's observer is told: who comes and is lost, what is granted and refused, what robots tell."""
+"""The master's events: registrations, losses, what is granted and refused, and the events of robots."""
 
 from __future__ import annotations
 
@@ -14,14 +14,14 @@ from robochoc.journal.events import AnyEvent, Granted, Lost, Observer, Refused, 
 
 
 class MasterEvents:
-    """Tells `observer`, if there is one. Refusals and grants may come from any thread."""
+    """Reports events to `observer`, if there is one. Refusals and grants may come from any thread."""
 
     def __init__(self, observer: Observer | None) -> None:
         self._observer = observer
         self._began = time.monotonic()
         self._events: dict[str, Allowance] = {}
         self.refuse = Refusals(self._refused).note
-        """Told who was refused, what, and why."""
+        """Reports a refusal: who, what, and why."""
 
     @property
     def observed(self) -> bool:
@@ -29,27 +29,27 @@ class MasterEvents:
         return self._observer is not None
 
     def begin(self) -> None:
-        """A search begins: times are since then from now on, as those of its robots are."""
+        """Begin a search: from now on times are counted from here, as those of its robots are."""
         self._began = time.monotonic()
 
     def registered(self, robot: str) -> None:
-        """`robot` is there."""
+        """Report that `robot` has registered."""
         self._tell(Registered(t=self._now, robot=robot))
 
     def lost(self, robot: str, why: str) -> None:
-        """`robot` is lost."""
+        """Report that `robot` is lost."""
         self._tell(Lost(t=self._now, robot=robot, why=why))
 
     def granted(self, who: str, what: str) -> None:
-        """`who` was granted `what`."""
+        """Report that `who` was granted `what`."""
         self._tell(Granted(t=self._now, who=who, what=what))
 
     def relay(self, event: Granted | Refused) -> None:
-        """What the Authority tells, whose time is another."""
+        """Report an event of the Authority, whose time is another."""
         self._tell(msgspec.structs.replace(event, t=self._now))
 
     def relay_from(self, name: str, events: Sequence[AnyEvent]) -> None:
-        """What a robot tells of itself, as it is watched or wants to be; of others it may not tell."""
+        """Report a robot's events. Events that are not about itself are refused."""
         if not self._is_within_quota(name, len(events)):
             self.refuse(name, "tell of events", f"more than {EVENTS_A_SECOND:,} a second")
             return
@@ -60,7 +60,7 @@ class MasterEvents:
                 self.refuse(name, f"tell of {type(event).__name__}", "it is not about itself")
 
     def doubted(self, doubts: Sequence[Doubt]) -> str:
-        """Of two robots each, one has not told the truth; returns all of it in words, after a semicolon."""
+        """Report pairs of robots of which one has not told the truth; return that in words, after a semicolon."""
         for doubt in doubts:
             for name in doubt.between:
                 self.refuse(name, "its counts of messages", doubt.why)

@@ -1,4 +1,4 @@
-"""Who has registered with the master: profiles, lives, and what of them is common knowledge. Pure."""
+"""The robots that have registered with the master: profiles, incarnations, and what all robots know of them. Pure."""
 
 from __future__ import annotations
 
@@ -9,17 +9,17 @@ from types import MappingProxyType
 
 from robochoc.communication.network.access import ALL
 from robochoc.communication.network.control_messages import Task
-from robochoc.communication.network.plausibility import Declared
+from robochoc.communication.network.plausibility import Declarations
 from robochoc.communication.network.profile import (
     Profile,
     ProfileError,
     Ranges,
-    acquaintances,
     contradictions,
     in_priority_order,
     missing,
+    possible_neighbours,
     ranges_of,
-    silhouette,
+    visible_robot,
 )
 from robochoc.model.problem import Robot
 from robochoc.protocols.traits import Traits
@@ -27,10 +27,10 @@ from robochoc.solver.agent_problem import RunParameters
 
 
 def reach(profiles: Mapping[str, Profile], *, writes_to_non_neighbours: bool) -> dict[str, tuple[str, ...]]:
-    """To whom each of a team may write besides the master. See `Members.reach`."""
+    """Return to whom each robot of a team may write besides the master. See `Members.reach`."""
     if writes_to_non_neighbours:
         return dict.fromkeys(profiles, (ALL,))
-    met = acquaintances(profiles)
+    met = possible_neighbours(profiles)
     return {name: tuple(sorted(profiles.keys() & others)) for name, others in met.items()}
 
 
@@ -40,48 +40,60 @@ class RegistrationRefusedError(ValueError):
 
 @dataclass
 class Member:
-    """A registered robot in its life `visit`; `gone` since when it is away (None: it is there).
+    """A registered robot.
 
-    `doubtful`: it was away since its last word, and who is there now may be another life. `also` are variables that it
-    has shown since, as it was `asked` for them.
+    Attributes:
+        profile: What it has declared of its file.
+        incarnation: The process of it that is registered.
+        shown_later: Variables that it has shown since, as it was asked for them.
+        card: Its key card of this run.
+        joined: It has confirmed the welcome.
+        away_since: Since when it is away, on the monotonic clock; None while it is there.
+        unconfirmed: It was away since its last message, and may have been started again since.
+        asked: Variables that it was asked for.
+        left: It has confirmed that the run is over.
     """
 
     profile: Profile
-    visit: str
-    also: dict[str, Ranges] = field(default_factory=dict)
+    incarnation: str
+    shown_later: dict[str, Ranges] = field(default_factory=dict)
     card: bytes = b""
     joined: bool = False
-    gone: float | None = None
-    doubtful: bool = False
+    away_since: float | None = None
+    unconfirmed: bool = False
     asked: set[str] = field(default_factory=set)
     left: bool = False
 
     @property
     def robot(self) -> Robot:
-        """Its silhouette."""
-        return silhouette(self.profile, self.also)
+        """The robot as others see it."""
+        return visible_robot(self.profile, self.shown_later)
 
-    def join(self, visit: str, card: bytes) -> None:
-        """It has read the welcome; a word from another life of it is none of this one's."""
-        if visit == self.visit:
-            self.card, self.joined, self.doubtful = card, True, False
+    def join(self, incarnation: str, card: bytes) -> None:
+        """Note that it has read the welcome. Messages of another incarnation change nothing."""
+        if incarnation == self.incarnation:
+            self.card, self.joined, self.unconfirmed = card, True, False
 
     def note_presence(self, *, there: bool) -> None:
-        """It is there, or is not any more, as far as the router knows."""
-        self.gone = None if there else self.gone or time.monotonic()
-        self.doubtful = self.doubtful or not there
+        """Note whether it is there, as far as the router knows."""
+        self.away_since = None if there else self.away_since or time.monotonic()
+        self.unconfirmed = self.unconfirmed or not there
 
     def is_away(self, for_s: float) -> bool:
-        """Whether it has been away for longer than that. For a moment all are, behind a router that is opened anew."""
-        return self.gone is not None and time.monotonic() - self.gone > for_s
+        """Return whether it has been away for longer than that.
+
+        For a moment all are, behind a router that is opened anew.
+        """
+        return self.away_since is not None and time.monotonic() - self.away_since > for_s
 
 
 class Members:
     """All registered robots, by name.
 
-    `expected` names who alone may come (None: whoever the Authority lets in), `number` says how many do. Without either
-    the team is complete when every neighbour that a robot names is there. `order` is the priority order, where it is
-    known before; parents come before their children in it. `ways` are those that it will have (`reach`), likewise.
+    `expected` names the only robots that may come (None: all that the Authority admits), `number` says how many do.
+    Without either the team is complete when every neighbour that a robot names is there. `order` is the priority order,
+    where it is known before; parents come before their children in it. `ways` are those that it will have (`reach`),
+    likewise.
     """
 
     def __init__(
@@ -100,64 +112,71 @@ class Members:
         self._known: frozenset[tuple[str, str]] = frozenset()
         self._acquainted: dict[str, tuple[str, ...]] = {}
         self._over: set[str] = set()
-        """Lives that have ended. In one that goes on after all, letters are numbered as nobody expects."""
+        """Incarnations that have ended. In one that goes on after all, frames are numbered as nobody expects."""
 
     @property
     def profiles(self) -> dict[str, Profile]:
-        """What all have told of themselves."""
+        """The profiles of all registered robots, by name."""
         return {name: member.profile for name, member in self.robots.items()}
 
-    def register(self, sender: str, profile: Profile, visit: str, *, admitted: bool = True) -> Member:
-        """Take `sender` in, if it is `admitted`, or find it there already in the same life.
+    def register(self, sender: str, profile: Profile, incarnation: str, *, admitted: bool = True) -> Member:
+        """Register `sender`, or return its registration if it is there in the same incarnation.
 
-        Raises `RegistrationRefusedError`.
+        Raises:
+            RegistrationRefusedError: when it is not `admitted`, or its profile does not fit.
         """
         known = self.robots.get(sender)
-        if known and known.visit == visit:
-            known.gone, known.doubtful = None, False
+        if known and known.incarnation == incarnation:
+            known.away_since, known.unconfirmed = None, False
             return known
         if not admitted:
             raise RegistrationRefusedError(
                 "it is enrolled to observe, not to take part; say: robochoc authority enrol NAME"
             )
-        if profile.name != sender:
-            raise RegistrationRefusedError(f"its file is {profile.name[:80]!r}'s, and its certificate {sender}'s")
-        if visit in self._over:
-            raise RegistrationRefusedError("it was away for too long; start it anew")
-        if known and (self.closed or not (known.doubtful or known.gone)):
-            raise RegistrationRefusedError(f"a robot called {sender} is registered already")
-        if self.closed or (self.expected is not None and sender not in self.expected):
-            raise RegistrationRefusedError(
-                "the team is complete without it" if self.closed else "it is not one of the team"
-            )
-        try:
-            silhouette(profile, {})
-        except ProfileError as bad:
-            raise RegistrationRefusedError(str(bad)) from None
-        others = {name: other for name, other in self.profiles.items() if name != sender}
-        wrong = next(contradictions({**others, sender: profile}), None)
-        if wrong:
-            raise RegistrationRefusedError(wrong)
+        if fault := self._fault_of_incarnation(sender, incarnation) or self._fault_of_profile(sender, profile):
+            raise RegistrationRefusedError(fault)
         if known:
-            self._over.add(known.visit)
-        self.robots[sender] = Member(profile, visit)
+            self._over.add(known.incarnation)
+        self.robots[sender] = Member(profile, incarnation)
         return self.robots[sender]
+
+    def _fault_of_incarnation(self, sender: str, incarnation: str) -> str:
+        """Return why this incarnation of `sender` cannot be registered now; empty if it can."""
+        known = self.robots.get(sender)
+        if incarnation in self._over:
+            return "it was away for too long; start it anew"
+        if known and (self.closed or not (known.unconfirmed or known.away_since)):
+            return f"a robot called {sender} is registered already"
+        if self.closed:
+            return "the team is complete without it"
+        return "" if self.expected is None or sender in self.expected else "it is not one of the team"
+
+    def _fault_of_profile(self, sender: str, profile: Profile) -> str:
+        """Return why `profile` is none of `sender`, or contradicts those of others; empty if it fits."""
+        if profile.name != sender:
+            return f"its file is {profile.name[:80]!r}'s, and its certificate {sender}'s"
+        try:
+            visible_robot(profile, {})
+        except ProfileError as bad:
+            return str(bad)
+        others = {name: other for name, other in self.profiles.items() if name != sender}
+        return next(contradictions({**others, sender: profile}), "")
 
     @property
     def awaited(self) -> set[str]:
-        """Who has to come yet, as far as that is known by name."""
+        """The robots that have to register yet, as far as they are known by name."""
         return (set(self.expected or ()) | missing(self.profiles)) - self.robots.keys()
 
     @property
     def complete(self) -> bool:
-        """Whether all are there now: as many as were asked for, or all that somebody names."""
+        """Whether all are there now: as many as were asked for, and all that are named as neighbours."""
         enough = bool(self.robots) and (self.number is None or len(self.robots) >= self.number)
-        return enough and not self.awaited and all(m.joined and not m.doubtful for m in self.robots.values())
+        return enough and not self.awaited and all(m.joined and not m.unconfirmed for m in self.robots.values())
 
     def unseen(self) -> dict[str, tuple[str, ...]]:
         """Variables that neighbours' constraints look at, by those who have not shown them and may own them.
 
-        A parent need not say which variables a child has to be told: the child's constraints do.
+        A parent need not say which of its variables a child has to know: the child's constraints do.
         """
         owners = self._owners()
         wanted: dict[str, dict[str, None]] = {}
@@ -172,7 +191,7 @@ class Members:
         for name, variables in wanted.items():
             member_asked = self.robots.get(name)
             if member_asked:
-                known = {*member_asked.profile.variables, *member_asked.also, *member_asked.asked}
+                known = {*member_asked.profile.variables, *member_asked.shown_later, *member_asked.asked}
                 unseen[name] = tuple(variable for variable in variables if variable not in known)
         return {name: variables for name, variables in unseen.items() if variables}
 
@@ -188,15 +207,15 @@ class Members:
             return "it has shown variables that it was not asked for"
         shown = {variable: variables[variable] for variable in wanted if variable in variables}
         try:
-            silhouette(member.profile, {**member.also, **shown})
+            visible_robot(member.profile, {**member.shown_later, **shown})
         except ProfileError as bad:
             return str(bad)
         member.asked.update(wanted)
-        member.also.update(shown)
+        member.shown_later.update(shown)
         return ""
 
     def strangers(self) -> Iterator[str]:
-        """Constraints over variables that no neighbour has, in words; once nothing is `unseen` any more."""
+        """Yield constraints over variables that no neighbour has, in words; once nothing is `unseen` any more."""
         owners = self._owners()
         for name, member in self.robots.items():
             looked_at = [one for names in member.profile.looks_at.values() for one in names]
@@ -205,15 +224,15 @@ class Members:
                     yield f"{name} holds a constraint over {variable}, which is a variable of none of its neighbours"
 
     def _owners(self) -> dict[str, str]:
-        """Who has the variables that are shown."""
+        """Return the owners of the variables that are shown."""
         return {
             variable: name
             for name, member in self.robots.items()
-            for variable in (*member.profile.variables, *member.also)
+            for variable in (*member.profile.variables, *member.shown_later)
         }
 
     def remove(self, names: Collection[str]) -> None:
-        """Robots are out for good: whoever named them as neighbours does so no more.
+        """Remove robots for good, also as neighbours of others.
 
         Once the team is complete, those who are left keep their places in the order, as they do in every runtime.
         """
@@ -222,23 +241,27 @@ class Members:
         for name in names:
             member = self.robots.pop(name, None)
             if member:
-                self._over.add(member.visit)
+                self._over.add(member.incarnation)
 
     def to_welcome(self) -> dict[str, str]:
-        """Of an open team, the lives of those who are there, and have answered no welcome since they came (back).
+        """Return the incarnations of robots that are there and have not answered a welcome, while the team is open.
 
-        Their answer may have got lost; and of two lives of one name only the one that is still there answers.
+        Their answer may have been lost; and of two incarnations only the one that is still there answers.
         """
-        waiting = {name: m.visit for name, m in self.robots.items() if m.gone is None and (m.doubtful or not m.joined)}
+        waiting = {
+            name: m.incarnation
+            for name, m in self.robots.items()
+            if m.away_since is None and (m.unconfirmed or not m.joined)
+        }
         return {} if self.closed else waiting
 
     @property
     def listening(self) -> list[str]:
-        """Who has joined, and not left. Others may not have been welcomed yet: a word of this run is none to them."""
+        """The robots that have joined, and not left. Others do not know this run yet."""
         return [name for name, member in self.robots.items() if member.joined and not member.left]
 
     def staying(self, away_s: float, besides: Collection[str]) -> list[str]:
-        """Who has neither taken leave nor been away for longer than `away_s`, `besides` those."""
+        """Return the robots, `besides` those, that have neither left nor been away for longer than `away_s` seconds."""
         stay = (name for name, member in self.robots.items() if not (member.left or member.is_away(away_s)))
         return [name for name in stay if name not in besides]
 
@@ -250,11 +273,11 @@ class Members:
         return tuple(in_priority_order(self.profiles))
 
     def reach(self, *, writes_to_non_neighbours: bool) -> dict[str, tuple[str, ...]]:
-        """To whom each may write: everybody, if the protocol goes beyond those it may share constraints with."""
+        """Return to whom each robot may write: to all, if the protocol writes to non-neighbours."""
         return reach(self.profiles, writes_to_non_neighbours=writes_to_non_neighbours)
 
-    def tasks(self, epoch: int, protocol: str, traits: Traits, brief: RunParameters) -> dict[str, Task]:
-        """What each robot is told for a search, in priority order."""
+    def tasks(self, epoch: int, protocol: str, traits: Traits, parameters: RunParameters) -> dict[str, Task]:
+        """Return the task of each robot for a search, in priority order."""
         order = self.order
         shown = {name: self.robots[name].robot for name in order}
         domains = {
@@ -271,25 +294,25 @@ class Members:
                 domains,
                 links,
                 tuple(parent for parent in self._links(name) if name in self.robots[parent].profile.looks_at),
-                brief.seed,
-                dict(brief.settings),
-                brief.withdrawal_cost,
+                parameters.seed,
+                dict(parameters.settings),
+                parameters.withdrawal_cost,
                 cards,
             )
             for name in order
         }
 
-    def declared(self, traits: Traits) -> Declared:
-        """What robots' words in a search are held against."""
+    def declared(self, traits: Traits) -> Declarations:
+        """Return the declarations that robots' reports in a search are checked against."""
         shown = {
             name: {variable.name: variable.domain for variable in member.robot.variables}
             for name, member in self.robots.items()
         }
         dearest = {name: member.profile.max_cost for name, member in self.robots.items()}
-        return Declared(traits, shown, dearest)
+        return Declarations(traits, shown, dearest)
 
     def neighbourhood(self, name: str, values: Mapping[str, Mapping[str, int]]) -> dict[str, int]:
-        """Of the decided `values`, by robot, those that all whom `name` may share a constraint with show."""
+        """Return those of the decided `values` that robots show which `name` may share a constraint with."""
         found: dict[str, int] = {}
         for other in self._met()[name]:
             if other in self.robots:
@@ -298,10 +321,10 @@ class Members:
         return found
 
     def _met(self) -> dict[str, tuple[str, ...]]:
-        """See `acquaintances`; worked out once for all who are there."""
-        there = frozenset((name, member.visit) for name, member in self.robots.items())
+        """See `possible_neighbours`; worked out once for all who are there."""
+        there = frozenset((name, member.incarnation) for name, member in self.robots.items())
         if self._known != there:
-            self._known, self._acquainted = there, acquaintances(self.profiles)
+            self._known, self._acquainted = there, possible_neighbours(self.profiles)
         return self._acquainted
 
     def _links(self, name: str) -> tuple[str, ...]:

@@ -1,4 +1,4 @@
-"""What a robot may say of itself and of what it has seen: where one lies, who it is, or between which two. Pure.
+"""Plausibility of what robots report: which one lies, or which of two. Pure.
 
 The master has seen no file. It knows what robots have declared (profiles), what each protocol's robots may conclude
 (traits), and that whatever one robot says it has sent another, that one has had, or will not have had. So a lie is held
@@ -14,8 +14,8 @@ from itertools import chain
 from types import MappingProxyType
 from typing import NamedTuple
 
-from robochoc.communication.network.control_messages import Account, Charge, Checked, Exchanged
-from robochoc.communication.network.framing import LARGEST_LETTER
+from robochoc.communication.network.control_messages import Charge, CheckResult, DetailedReport, Exchanged
+from robochoc.communication.network.framing import LARGEST_FRAME
 from robochoc.communication.network.profile import LONGEST_NAME, MOST_VARIABLES
 from robochoc.communication.quiescence import Counts
 from robochoc.formats.diagnostics import shortened
@@ -47,7 +47,7 @@ class Doubt(NamedTuple):
 
 
 @dataclass(frozen=True)
-class Declared:
+class Declarations:
     """What the master knows of a search before it begins: how robots may end it, and what their profiles say.
 
     `shown` are the robots' variables with their domains, `dearest` is the most that each one's constraints charge
@@ -59,10 +59,10 @@ class Declared:
     dearest: Mapping[str, float] = field(default_factory=lambda: MappingProxyType({}))
 
 
-NOTHING_DECLARED = Declared()
+NOTHING_DECLARED = Declarations()
 
 
-class Course(NamedTuple):
+class FinishedSearch(NamedTuple):
     """What the master knows of a search that is over.
 
     `order` names its robots, `counts` holds the last counters of one of them, `duration_s` is how many seconds it
@@ -75,7 +75,7 @@ class Course(NamedTuple):
     by_quiescence: bool
 
 
-# One robot's words
+# Reports of one robot
 
 
 def fault_of_counters(counts: Counts, before: Counts | None) -> str:
@@ -90,7 +90,7 @@ def fault_of_counters(counts: Counts, before: Counts | None) -> str:
     return ""
 
 
-def fault_of_account(name: str, account: Account, declared: Declared, course: Course) -> str:
+def fault_of_account(name: str, account: DetailedReport, declared: Declarations, course: FinishedSearch) -> str:
     """Return why the robot `name` cannot report `account`; empty if it can."""
     return (
         next(_faults_of_values(name, account, declared), "")
@@ -100,7 +100,7 @@ def fault_of_account(name: str, account: Account, declared: Declared, course: Co
     )
 
 
-def _faults_of_values(name: str, account: Account, declared: Declared) -> Iterator[str]:
+def _faults_of_values(name: str, account: DetailedReport, declared: Declarations) -> Iterator[str]:
     values, own = account.assignment, declared.shown.get(name, {})
     if values and not account.assigned:
         yield "it has reported values, and that it has none"
@@ -116,7 +116,7 @@ def _faults_of_values(name: str, account: Account, declared: Declared) -> Iterat
             yield f"it has reported a value of {variable}, which is {other}'s"
 
 
-def _fault_of_exchange(name: str, account: Account, course: Course) -> str:
+def _fault_of_exchange(name: str, account: DetailedReport, course: FinishedSearch) -> str:
     exchanged = account.exchanged
     if name in exchanged or not exchanged.keys() <= set(course.order):
         return "it has reported messages with somebody who is not of the team"
@@ -132,13 +132,13 @@ def _fault_of_exchange(name: str, account: Account, course: Course) -> str:
     return ""
 
 
-def total_of(account: Account) -> Counts:
+def total_of(account: DetailedReport) -> Counts:
     """Return all messages that a robot says it has sent and taken in."""
     exchanged = account.exchanged.values()
     return Counts(sum(one.sent for one in exchanged), sum(one.received for one in exchanged))
 
 
-def _fault_of_metrics(account: Account, duration_s: float) -> str:
+def _fault_of_metrics(account: DetailedReport, duration_s: float) -> str:
     spent = account.metrics
     if len(spent.messages) > MOST_KINDS or not all(
         is_name(kind) and len(kind) <= LONGEST_NAME for kind in spent.messages
@@ -148,7 +148,7 @@ def _fault_of_metrics(account: Account, duration_s: float) -> str:
     if any(not 0 <= count <= LARGEST_COUNT for count in counts):
         return "it has reported counts that cannot be"
     sent = sum(spent.messages.values())
-    if not (sent <= spent.bytes <= sent * LARGEST_LETTER and spent.largest <= spent.bytes <= sent * spent.largest):
+    if not (sent <= spent.bytes <= sent * LARGEST_FRAME and spent.largest <= spent.bytes <= sent * spent.largest):
         many = f"{sent:,} messages of {spent.bytes:,} bytes together, the largest of {spent.largest:,}"
         return f"it has reported {many}, which cannot be"
     if spent.checks > CHECKS_PER_S * (duration_s + 1):
@@ -178,7 +178,7 @@ def fault_of_findings(findings: Findings, order: Collection[str]) -> str:
     return "it tells of cycles that cannot be" if any(place < 0 for place in chain.from_iterable(entries)) else ""
 
 
-def fault_of_check(name: str, check: Checked, declared: Declared, order: Collection[str]) -> str:
+def fault_of_check(name: str, check: CheckResult, declared: Declarations, order: Collection[str]) -> str:
     """Return why the robot `name` cannot have checked its constraints so; empty if it can."""
     judged = (*check.shared, *check.copies)
     if not 0 <= check.cost <= declared.dearest.get(name, LARGEST_COUNT) * _ROUNDED < INFINITE:
@@ -198,10 +198,10 @@ def fault_of_check(name: str, check: Checked, declared: Declared, order: Collect
     return ""
 
 
-# Words of two robots
+# Reports of two robots
 
 
-def doubts_about_messages(accounts: Mapping[str, Account], *, quiet: bool) -> Iterator[Doubt]:
+def doubts_about_messages(accounts: Mapping[str, DetailedReport], *, quiet: bool) -> Iterator[Doubt]:
     """Yield what two robots say of the messages between them that cannot both be so.
 
     Nobody speaks after its account, so a message that was taken in was sent; and where all were `quiet`, and nobody has
@@ -223,7 +223,7 @@ def doubts_about_messages(accounts: Mapping[str, Account], *, quiet: bool) -> It
                 yield Doubt((other, name), f"{why} came to {accounts[other].metrics.ncccs:,}")
 
 
-def widest_gap(accounts: Mapping[str, Account]) -> str:
+def widest_gap(accounts: Mapping[str, DetailedReport]) -> str:
     """Return, in words, between which two robots by far too many messages are under way; empty if there are none."""
     widest, found = 0, ""
     for name, account in accounts.items():
@@ -239,7 +239,7 @@ def _gap(name: str, sent: int, other: str, had: int) -> str:
     return f"{name} says that it has sent {other} {sent:,} messages, and {other} that it has had {had:,} of it"
 
 
-def doubts_about_values(accounts: Mapping[str, Account]) -> Iterator[Doubt]:
+def doubts_about_values(accounts: Mapping[str, DetailedReport]) -> Iterator[Doubt]:
     """Yield which variables two robots call their own."""
     owners: dict[str, str] = {}
     for name, account in accounts.items():
@@ -249,7 +249,7 @@ def doubts_about_values(accounts: Mapping[str, Account]) -> Iterator[Doubt]:
                 yield Doubt((other, name), f"the variable {variable} is {other}'s, and {name}'s too")
 
 
-def thoroughness(checks: Mapping[str, Checked]) -> CheckCounts:
+def thoroughness(checks: Mapping[str, CheckResult]) -> CheckCounts:
     """Return how many constraints others than those who hold them have checked too, and how many nobody else has.
 
     Where two say that they are differently many over the same variables, those count that both say there are.
@@ -262,7 +262,7 @@ def thoroughness(checks: Mapping[str, Checked]) -> CheckCounts:
     return CheckCounts(both, held - both)
 
 
-def doubts_about_checks(checks: Mapping[str, Checked]) -> Iterator[Doubt]:
+def doubts_about_checks(checks: Mapping[str, CheckResult]) -> Iterator[Doubt]:
     """Yield which constraints charge one thing by who holds them, and another by a robot that knows them as well."""
     prices = {_key(one): one.price for check in checks.values() for one in check.shared}
     for name, check in checks.items():
@@ -276,7 +276,7 @@ def doubts_about_checks(checks: Mapping[str, Checked]) -> Iterator[Doubt]:
                 yield Doubt((one.holder, name), why)
 
 
-def objections(checks: Mapping[str, Checked]) -> Iterator[str]:
+def objections(checks: Mapping[str, CheckResult]) -> Iterator[str]:
     """Yield, in words, which constraints are broken, by who says so."""
     for name, check in checks.items():
         broken = [shortened(" ".join(one.variables)) for one in check.shared if one.price == INFINITE]

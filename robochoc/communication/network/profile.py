@@ -1,7 +1,7 @@
-"""What a robot tells the master of its file: who its neighbours are, and the variables that they see. Not more.
+"""A robot's profile, which the master gets instead of its file: its neighbours, and the variables that they see.
 
-The master makes silhouettes of profiles: robots without constraints and without what nobody sees. With them it works
-out what is common knowledge anyway: the priority order, the interfaces, the declared domains.
+From profiles the master makes robots as others see them, without constraints and without hidden variables. With them it
+works out what all robots know anyway: the priority order, the interfaces, the declared domains.
 """
 
 from __future__ import annotations
@@ -60,7 +60,7 @@ class Profile(msgspec.Struct, frozen=True, array_like=True):
 
 
 def profile_of(robot: Robot) -> Profile:
-    """What `robot` tells of itself."""
+    """Return the profile of `robot`."""
     shown = set(robot.interface)
     own = {variable.name for variable in robot.variables}
     parts = [constraint for child in robot.children for constraint in child.constraints]
@@ -90,7 +90,7 @@ def ranges_of(domain: Domain) -> Ranges:
 
 
 def domain_of(name: str, ranges: Ranges) -> Domain:
-    """The domain of the variable `name`. Raises `ProfileError`; nothing is made of absurd ones."""
+    """Return the domain of the variable `name`. Raises `ProfileError`; nothing is made of absurd ones."""
     last: int | None = None
     size = 0
     for low, high in ranges:
@@ -102,8 +102,8 @@ def domain_of(name: str, ranges: Ranges) -> Domain:
     return Domain(name, tuple(range(low, high + 1) for low, high in ranges))
 
 
-def silhouette(profile: Profile, also: Mapping[str, Ranges]) -> Robot:
-    """The robot as others see it; `also` are variables that it has shown since. Raises `ProfileError`."""
+def visible_robot(profile: Profile, also: Mapping[str, Ranges]) -> Robot:
+    """Return the robot as others see it; `also` are variables that it has shown since. Raises `ProfileError`."""
     looked_at = [name for names in profile.looks_at.values() for name in names]
     names = (profile.name, *profile.neighbours, *profile.variables, *looked_at, *profile.wants, *also)
     bad = next((name for name in names if not is_name(name) or len(name) > LONGEST_NAME), None)
@@ -134,7 +134,7 @@ def silhouette(profile: Profile, also: Mapping[str, Ranges]) -> Robot:
 
 
 def contradictions(profiles: Mapping[str, Profile]) -> Iterator[str]:
-    """What cannot be if all of `profiles` are of one team: neighbours that disagree, variables with two owners."""
+    """Yield contradictions between profiles of one team: neighbours that disagree, variables with two owners."""
     owner: dict[str, str] = {}
     for profile in profiles.values():
         for variable in profile.variables:
@@ -161,7 +161,7 @@ def missing(profiles: Mapping[str, Profile]) -> set[str]:
     return {name for profile in profiles.values() for name in profile.neighbours} - profiles.keys()
 
 
-def acquaintances(profiles: Mapping[str, Profile]) -> dict[str, tuple[str, ...]]:
+def possible_neighbours(profiles: Mapping[str, Profile]) -> dict[str, tuple[str, ...]]:
     """For each robot the others that it may share a constraint with: its neighbours, and other parents of a child.
 
     A constraint over more than two robots stands with its lowest robot, and the others are parents of that one.
@@ -174,7 +174,7 @@ def acquaintances(profiles: Mapping[str, Profile]) -> dict[str, tuple[str, ...]]
 
 
 def in_priority_order(profiles: Mapping[str, Profile]) -> Sequence[str]:
-    """The total priority order of a team whose profiles do not contradict each other."""
+    """Return the total priority order of a team whose profiles do not contradict each other."""
     return priority_order({profile.name: profile.parents for profile in profiles.values()})
 
 

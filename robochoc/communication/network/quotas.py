@@ -1,4 +1,4 @@
-"""What a sender may have of a receiver: letters and bytes that wait, and letters, bytes and events a second. Pure.
+"""Quotas of a sender at a receiver: frames and bytes that wait, and frames, bytes and events a second. Pure.
 
 The limits are far beyond what honest robots need: docs/guides/security.md has the measurement.
 """
@@ -11,21 +11,21 @@ MIB = 2**20
 BURST_S = 60.0
 """What was not used in so many seconds may be used at once: after an outage all comes together."""
 EVENTS_A_SECOND = 10_000
-"""That a robot may tell the master, in the long run."""
+"""The events that a robot may report to the master, in the long run."""
 NO_LIMIT = 1e15
 
 
 class Share(NamedTuple):
-    """What one sender may have: so many letters and bytes waiting, and so many a second in the long run."""
+    """The quota of one sender: frames and bytes that wait, and frames and bytes a second in the long run."""
 
-    letters: int
+    frames: int
     size: int
-    letters_a_second: float = NO_LIMIT
+    frames_a_second: float = NO_LIMIT
     size_a_second: float = NO_LIMIT
 
 
 OF_A_NEIGHBOUR = Share(200_000, 256 * MIB)
-"""At a robot, wherever letters wait: how fast neighbours talk is the protocol's affair, and what waits is memory."""
+"""At a robot, wherever frames wait: how fast neighbours talk is the protocol's affair, and what waits is memory."""
 OF_A_ROBOT = Share(50_000, 64 * MIB, 2_000, 16 * MIB)
 """At the master."""
 OF_AN_OBSERVER = Share(1_000, 16 * MIB, 50, MIB)
@@ -41,13 +41,13 @@ class Allowance:
         self._since = now
 
     def has(self, amount: float, now: float) -> bool:
-        """Whether `amount` is left at the time `now`."""
+        """Return whether `amount` is left at the time `now`."""
         grown = (now - self._since) * self._a_second
         self._left, self._since = min(BURST_S * self._a_second, self._left + grown), now
         return amount <= self._left
 
     def use(self, amount: float) -> None:
-        """So much of it is gone."""
+        """Use `amount` of it."""
         self._left -= amount
 
 
@@ -56,41 +56,41 @@ class Usage:
 
     def __init__(self, share: Share, now: float) -> None:
         self.dropped = 0
-        """Letters that were too much, and that nobody was told of yet."""
+        """Frames that were too many, and that were not reported yet."""
         self._share = share
-        self._letters = self._size = 0
-        self._often = Allowance(share.letters_a_second, now)
+        self._framing = self._size = 0
+        self._often = Allowance(share.frames_a_second, now)
         self._much = Allowance(share.size_a_second, now)
 
     def takes(self, size: int, now: float) -> bool:
-        """Whether a letter of `size` bytes is within the share; if so, it waits from now on."""
-        if self._letters >= self._share.letters or self._size + size > self._share.size:
+        """Return whether a frame of `size` bytes is within the share; if so, it waits from now on."""
+        if self._framing >= self._share.frames or self._size + size > self._share.size:
             return False
         if not (self._often.has(1, now) and self._much.has(size, now)):
             return False
         self._often.use(1)
         self._much.use(size)
-        self._letters += 1
+        self._framing += 1
         self._size += size
         return True
 
     def release(self, size: int) -> None:
-        """A letter of `size` bytes waits no more."""
-        self._letters -= 1
+        """Note that a frame of `size` bytes waits no more."""
+        self._framing -= 1
         self._size -= size
 
 
-class Kept:
-    """What of each sender is kept for later, up to what may wait of it; how fast it comes does not matter."""
+class Backlog:
+    """Frames of each sender that are kept for later, within its share; how fast they come does not matter."""
 
     def __init__(self, share: Share = OF_A_NEIGHBOUR) -> None:
-        self._share = share._replace(letters_a_second=NO_LIMIT, size_a_second=NO_LIMIT)
+        self._share = share._replace(frames_a_second=NO_LIMIT, size_a_second=NO_LIMIT)
         self._usage: dict[str, Usage] = {}
 
     def takes(self, sender: str, size: int) -> bool:
-        """Whether `size` bytes more of `sender` may be kept; if so, they are from now on."""
+        """Return whether `size` bytes more of `sender` may be kept; if so, they are from now on."""
         return self._usage.setdefault(sender, Usage(self._share, 0.0)).takes(size, 0.0)
 
     def clear(self) -> None:
-        """Nothing is kept any more."""
+        """Forget all that is kept."""
         self._usage.clear()

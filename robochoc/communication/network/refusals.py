@@ -1,7 +1,7 @@
-"""Refusals as the master's observer hears of them: each kind is told of, and a flood of them costs next to nothing.
+"""Refusals, as they are reported: each kind is reported, and a flood of them costs next to nothing.
 
-Whoever is refused may try again for ever, under ever new names. So each kind is told at its 1st, 10th, 100th, ... time,
-with how often it has been by then; kinds, and those who are refused, are remembered up to a number.
+A participant that is refused may try again for ever, under ever new names. So each kind is reported at its 1st, 10th,
+100th, ... time, with the count so far; kinds and participants are remembered up to a number.
 """
 
 from __future__ import annotations
@@ -12,25 +12,25 @@ from collections.abc import Callable
 from robochoc.system.plain_text import on_one_line
 
 KINDS = 50
-"""So many kinds of refusals of one and the same are told apart."""
+"""So many kinds of refusals of one and the same are distinguished."""
 WHO = 1000
-"""So many who are refused are told apart."""
+"""So many who are refused are distinguished."""
 LONGEST = 200
-"""Characters. What is refused may be as long as whoever sends it likes."""
+"""Characters. What is refused may be of any length."""
 _OTHERS = "others"
 _ELSE = ("other things", "see what was refused before")
 
 
 class Refusals:
-    """Counts refusals, and calls `tell` (who, what, why) for those that are to be told of. Threads may share it."""
+    """Counts refusals, and calls `report` (who, what, why) for those that are reported. Threads may share it."""
 
-    def __init__(self, tell: Callable[[str, str, str], None]) -> None:
-        self._tell = tell
+    def __init__(self, report: Callable[[str, str, str], None]) -> None:
+        self._report = report
         self._counts: dict[str, dict[tuple[str, str], int]] = {}
         self._lock = threading.Lock()
 
     def note(self, who: str, what: str, why: str) -> None:
-        """`who` was refused `what`, because `why`."""
+        """Count that `who` was refused `what`, because of `why`."""
         who, what, why = (on_one_line(word[:LONGEST]) for word in (who, what, why))
         with self._lock:
             if who not in self._counts and len(self._counts) >= WHO:
@@ -40,4 +40,4 @@ class Refusals:
                 what, why = _ELSE
             count = kinds[what, why] = kinds.get((what, why), 0) + 1
             if str(count).rstrip("0") == "1":
-                self._tell(who, what, why if count == 1 else f"{why} ({count:,} times so far)")
+                self._report(who, what, why if count == 1 else f"{why} ({count:,} times so far)")

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from robochoc.communication.network.control_messages import Denied, Welcome
+from robochoc.communication.network.control_messages import RegistrationDenied, Welcome
 from robochoc.communication.network.facilitator import DirectoryFacilitator
 from robochoc.communication.network.master_connection import MasterConnection
 from robochoc.communication.network.master_events import MasterEvents
@@ -46,7 +46,7 @@ class Registrar:
             member = self._members.register(name, profile, incarnation, admitted=self._connection.policy.is_robot(name))
         except RegistrationRefusedError as refusal:
             self._events.refuse(name, "register", str(refusal))
-            self._connection.send(name, Denied(incarnation, str(refusal)))
+            self._connection.send(name, RegistrationDenied(incarnation, str(refusal)))
             return False
         if member is not known:
             self._connection.framing.forget(name)

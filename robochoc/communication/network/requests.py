@@ -1,35 +1,44 @@
-"""What anybody may ask of the master besides taking part: the Directory Facilitator's answers, and the journal."""
+"""Requests to the master of those that need not take part: to the Directory Facilitator, and for the journal."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 
-from robochoc.communication.network.control_messages import Ask, Sniff, Sniffable, Told
+from robochoc.communication.network.control_messages import (
+    DirectoryAnswer,
+    DirectoryRequest,
+    JournalAnswer,
+    JournalRequest,
+)
 from robochoc.communication.network.facilitator import DirectoryFacilitator, TooManyRequestsError
 from robochoc.communication.network.journal_server import JournalServer
 
 
 class Requests:
-    """Answers requests, so many a second of each: `tell` takes answers, and `refuse` who was refused what, and why."""
+    """Answers requests, so many a second of each: `send` sends answers, and `refuse` reports refusals."""
 
     def __init__(
         self,
-        desk: JournalServer,
+        journal_server: JournalServer,
         facilitator: DirectoryFacilitator,
-        tell: Callable[[str, Told | Sniffable], None],
+        send: Callable[[str, DirectoryAnswer | JournalAnswer], None],
         refuse: Callable[[str, str, str], None],
     ) -> None:
-        self._desk = desk
+        self._journal_server = journal_server
         self._facilitator = facilitator
-        self._tell = tell
+        self._send = send
         self._refuse = refuse
 
-    def answer(self, sender: str, word: Ask | Sniff) -> None:
+    def answer(self, sender: str, request: DirectoryRequest | JournalRequest) -> None:
         """Answer `sender`, unless it asks too often."""
         try:
             self._facilitator.count(sender)
         except TooManyRequestsError as often:
             self._refuse(sender, "ask the Directory Facilitator", str(often))
             return
-        told = self._desk.welcome(sender, word) if isinstance(word, Sniff) else self._facilitator.answer(sender, word)
-        self._tell(sender, told)
+        answer = (
+            self._journal_server.welcome(sender, request)
+            if isinstance(request, JournalRequest)
+            else self._facilitator.answer(sender, request)
+        )
+        self._send(sender, answer)

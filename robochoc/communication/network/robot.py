@@ -21,31 +21,31 @@ from robochoc.communication.filters import NotGenuineError
 from robochoc.communication.host import BadMessageError
 from robochoc.communication.network.control_messages import (
     Bye,
+    CheckRequest,
+    ControlMessage,
     Copies,
-    Denied,
-    Gap,
+    DirectoryAnswer,
+    DomainAnswer,
+    DomainRequest,
     Joined,
-    Judge,
+    JournalAnswer,
     Leave,
+    LostFrames,
     Objection,
     ProtocolMessage,
     Register,
+    RegistrationDenied,
     Revoked,
-    Search,
-    Show,
-    Shown,
-    Sniffable,
+    StartSearch,
     Task,
-    Told,
     ToMaster,
     ToPeer,
     Welcome,
-    Word,
 )
 from robochoc.communication.network.framing import MASTER, FrameRefusedError, Opened
-from robochoc.communication.network.inbox import Arrived, Item, Missed, Presence, Woken
+from robochoc.communication.network.inbox import FrameArrived, FramesLost, Item, PresenceChanged, WakeUp
 from robochoc.communication.network.profile import among, profile_of, ranges_of
-from robochoc.communication.network.quotas import Kept
+from robochoc.communication.network.quotas import Backlog
 from robochoc.communication.network.refusals import Refusals
 from robochoc.communication.network.registration import Registration, RunOverError
 from robochoc.communication.network.robot_settings import DEFAULT_SETTINGS, RobotSettings
@@ -109,7 +109,7 @@ class NetworkRobot:
         self._searcher: Searcher | None = None
         self._ahead: list[tuple[str, Opened]] = []
         """Frames of an epoch that the master has not told this robot of yet."""
-        self._kept = Kept()
+        self._kept = Backlog()
         self._lost_frames: set[tuple[int, str]] = set()
         """In which search the loss of whose frames was reported: nobody floods the master through this robot."""
         self._refusals = Refusals(lambda who, what, why: self._say(Objection(who, what, why)))
@@ -150,13 +150,13 @@ class NetworkRobot:
         packet: list[Envelope] = []
         for item in items:
             match item:
-                case Arrived(sender, content):
+                case FrameArrived(sender, content):
                     self._read(sender, content, packet)
-                case Missed(sender, frames) if sender == MASTER:
-                    raise UnsupportedError(f"{frames:,} letters of the master to {self._robot.name} were lost for good")
-                case Missed(sender, frames) if self._registration.welcome:
+                case FramesLost(sender, frames) if sender == MASTER:
+                    raise UnsupportedError(f"{frames:,} frames of the master to {self._robot.name} were lost for good")
+                case FramesLost(sender, frames) if self._registration.welcome:
                     self._report_lost_frames(sender, frames)
-                case Missed() | Presence() | Woken():
+                case FramesLost() | PresenceChanged() | WakeUp():
                     pass
         if self._searcher:
             self._searcher.take_in(packet)
@@ -172,7 +172,7 @@ class NetworkRobot:
         loss = (self._searcher.epoch if self._searcher else 0, sender)
         if loss not in self._lost_frames:
             self._lost_frames.add(loss)
-            self._say(Gap(sender, frames))
+            self._say(LostFrames(sender, frames))
 
     # Frames
 
@@ -201,7 +201,7 @@ class NetworkRobot:
             NotGenuineError: when the filters find that it was changed.
             UnknownPeerError: when the sender's key card is not known.
         """
-        message, epoch = opened.word, self._searcher.epoch if self._searcher else 0
+        message, epoch = opened.message, self._searcher.epoch if self._searcher else 0
         if not isinstance(message, ToPeer):
             self._channel.take(sender, opened.number)
             self._obey(message)
@@ -237,42 +237,42 @@ class NetworkRobot:
     def _object(self, sender: str, why: str) -> None:
         """Tell the master of a frame that was refused."""
         if self._registration.welcome is not None:
-            self._refusals.note(sender, f"a letter to {self._robot.name}", why)
+            self._refusals.note(sender, f"a frame to {self._robot.name}", why)
 
     # The master's orders
 
-    def _obey(self, order: Word) -> None:
+    def _obey(self, order: ControlMessage) -> None:
         match order:
             case Welcome():
                 self._enter(order)
-            case Denied(incarnation, why) if incarnation == self._registration.incarnation:
+            case RegistrationDenied(incarnation, why) if incarnation == self._registration.incarnation:
                 raise RunOverError(f"the master does not take {self._robot.name}: {why}", failed=True)
-            case Show(variables):
+            case DomainRequest(variables):
                 domains = {variable.name: variable.domain for variable in self._robot.variables}
-                self._say(Shown({name: ranges_of(domains[name]) for name in variables if name in domains}))
+                self._say(DomainAnswer({name: ranges_of(domains[name]) for name in variables if name in domains}))
             case Revoked(name):
                 self._channel.revoke(name)
             case Leave(why, failed):
                 self._say(Bye())
                 raise RunOverError(why, failed=failed)
-            case Denied() | Told() | Sniffable():
+            case RegistrationDenied() | DirectoryAnswer() | JournalAnswer():
                 pass
             case _:
                 self._obey_in_search(order)
 
-    def _obey_in_search(self, order: Word) -> None:
+    def _obey_in_search(self, order: ControlMessage) -> None:
         searcher = self._searcher
         match order:
             case Task():
                 self._take_task(order)
-            case Search(epoch) if searcher and epoch == searcher.epoch:
+            case StartSearch(epoch) if searcher and epoch == searcher.epoch:
                 self._settings.stage("searching")
                 searcher.begin(time.monotonic())
             case Wave(number) if searcher:
                 searcher.report_counters(number)
             case Pause() if searcher:
                 searcher.pause()
-            case Judge(epoch, values) if searcher and epoch == searcher.epoch:
+            case CheckRequest(epoch, values) if searcher and epoch == searcher.epoch:
                 self._say(searcher.check_constraints(values))
             case _:
                 self._object(MASTER, f"{type(order).__name__} is nothing to be told now")
@@ -282,12 +282,12 @@ class NetworkRobot:
 
     def _enter(self, welcome: Welcome) -> None:
         """Enter the run. A second welcome comes after an outage, and one of another run from another master."""
-        if welcome.visit != self._registration.incarnation:
+        if welcome.incarnation != self._registration.incarnation:
             return
         if self._registration.accept(welcome):
             self._channel.begin(welcome.run, welcome.filters)
             self._settings.stage("registered, waiting for the others")
-        self._say(Joined(welcome.visit, self._channel.card))
+        self._say(Joined(welcome.incarnation, self._channel.card))
 
     def _take_task(self, task: Task) -> None:
         """Enter a new epoch."""
@@ -323,7 +323,7 @@ class NetworkRobot:
         until = time.monotonic() + self._settings.patience_s
         while time.monotonic() < until and self._transport.router:
             for item in self._items():
-                if isinstance(item, Arrived) and item.sender == MASTER and self._is_leave(item.content):
+                if isinstance(item, FrameArrived) and item.sender == MASTER and self._is_leave(item.content):
                     self._say(Bye())
                     return
 
@@ -333,4 +333,4 @@ class NetworkRobot:
         except FrameRefusedError:
             return False
         self._channel.take(MASTER, opened.number)
-        return isinstance(opened.word, Leave)
+        return isinstance(opened.message, Leave)

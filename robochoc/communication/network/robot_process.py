@@ -26,8 +26,8 @@ _LOWEST_NICE = 19
 _PR_SET_NAME = 15
 
 
-class Given(NamedTuple):
-    """With what a robot's process begins."""
+class RobotStart(NamedTuple):
+    """What a robot's process starts with."""
 
     own: CompiledRobot
     identity: IdentityTexts
@@ -37,8 +37,8 @@ class Given(NamedTuple):
     lease_ms: int
 
 
-def robot_process(given: Given) -> None:
-    """What a robot's process runs. Ctrl-C reaches the whole process group, and is left to the parent."""
+def robot_process(given: RobotStart) -> None:
+    """Run one robot in this process. Ctrl-C reaches the whole process group, and is left to the parent."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     signal.signal(signal.SIGTERM, signal.SIG_DFL)
     signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGINT, signal.SIGTERM})
@@ -55,9 +55,9 @@ def robot_process(given: Given) -> None:
         os.setpriority(os.PRIO_PROCESS, 0, max(wanted, os.getpriority(os.PRIO_PROCESS, 0)))
 
     try:
-        with Transport(given.endpoint, identity, watch=(), patience_s=START_S, lease_ms=given.lease_ms) as post:
+        with Transport(given.endpoint, identity, watch=(), patience_s=START_S, lease_ms=given.lease_ms) as transport:
             settings = RobotSettings(given.patience_s, set_rank=set_niceness)
-            NetworkRobot(given.own, identity, post, lambda _name: given.protocol, settings).run()
+            NetworkRobot(given.own, identity, transport, lambda _name: given.protocol, settings).run()
     except CannotConnectError as error:
         sys.exit(str(error))
 

@@ -1,9 +1,9 @@
 """The router: the one process that all connect to. It checks certificates and who may write to whom.
 
-It is a process of its own (`router_process.py`) that holds no letters but those under way. zenoh's access control
+It is a process of its own (`router_process.py`) that holds no frames but those under way. zenoh's access control
 cannot be changed while it runs: to register or revoke somebody, the router is closed and opened anew with other rules,
-in a fraction of a second; what was sent meanwhile is recovered (`post.py`). What it refuses it tells in its log only,
-so that is read (`Log`).
+in a fraction of a second; what was sent meanwhile is recovered (`transport.py`). What it refuses it tells in its log
+only, so that is read (`Log`).
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ _PROCESS = "robochoc.communication.network.router_process"
 _READY = "listening"
 _LOG = "warn"
 _LOG_OF_REFUSALS = "warn,zenoh::net::routing::interceptor=trace,zenoh_link_tls=debug"
-"""With what is allowed as well, several lines for each letter: that costs more than the letters themselves."""
+"""With what is allowed as well, several lines for each frame: that costs more than the frames themselves."""
 _CHUNK = 65536
 _DENIED = re.compile(
     rb"(?:CertCommonName\([^)]*\)\S*\+|Using cached result: )([0-9a-f]+) is unauthorized to ([A-Za-z/ ]+?)"
@@ -50,7 +50,7 @@ _MEANINGS = {
     "received fatal alert: UnknownCA": "it does not believe the master, whom its own Authority has not certified",
     "tls handshake eof": "it has hung up in the middle of the handshake",
 }
-"""What zenoh's words for a connection that it does not take come to; the first that fits counts."""
+"""The meanings of zenoh's texts for refused connections; the first that fits counts."""
 _KEPT_SESSIONS = 10_000
 _COLOURS = re.compile(rb"\x1b\[[0-9;]*m")
 
@@ -114,7 +114,7 @@ class Router:
         return self._process is not None and self._process.poll() is not None
 
     def close(self) -> None:
-        """Let everybody go. Its process ends at once."""
+        """End all links. The router's process ends at once."""
         process, self._process = self._process, None
         if process is None:
             return
@@ -145,7 +145,7 @@ class Router:
         }
 
     def _wait_until_ready(self, output: IO[bytes]) -> bytes:
-        """What it has said until it was ready: who waits at the door comes in before that."""
+        """Return what it has said until it was ready: who waits at the door comes in before that."""
         said: list[bytes] = []
         watch = threading.Timer(START_S, self._give_up)
         watch.start()
@@ -164,7 +164,7 @@ class Router:
             self._process.kill()
 
     def _read(self, output: IO[bytes], log: Log, said: bytes) -> None:
-        """Read the log to its end, and tell of refusals. In chunks: at full load there are 80,000 lines a second."""
+        """Read the log to its end, and report refusals. In chunks: at full load there are 80,000 lines a second."""
         rest = b""
         for refusal in log.refusals(said):
             if self._refused:
@@ -190,7 +190,7 @@ class Log:
         """Whose sessions there are: zenoh names a certificate's holder only where it looks a right up anew."""
 
     def refusals(self, log: bytes) -> Iterator[Refusal]:
-        """What a part of the log tells of refusals; it ends with a whole line."""
+        """Yield what a part of the log tells of refusals; it ends with a whole line."""
         plain = _COLOURS.sub(b"", log)
         for name in _ACCEPTED.findall(plain):
             who = name.decode(errors="replace")

@@ -16,19 +16,19 @@ from robochoc.communication.host import BadMessageError, Host
 from robochoc.communication.network.constraint_check import check_constraints
 from robochoc.communication.network.control_messages import (
     LATEST,
-    Account,
-    Checked,
+    CheckResult,
     Copies,
+    DetailedReport,
     Exchanged,
     ProtocolMessage,
     Task,
     ToMaster,
     ToPeer,
 )
-from robochoc.communication.network.framing import LARGEST_LETTER
+from robochoc.communication.network.framing import LARGEST_FRAME
 from robochoc.communication.network.plausibility import fault_of_findings
 from robochoc.communication.network.profile import ProfileError, domain_of
-from robochoc.communication.network.quotas import Kept
+from robochoc.communication.network.quotas import Backlog
 from robochoc.communication.network.shared import SharedConstraintError, SharedRecord, known_of, record_of
 from robochoc.communication.resources import own_memory
 from robochoc.communication.robot_loop import RobotLoop
@@ -76,7 +76,7 @@ class Searcher(RobotLoop):
         UnsupportedError: when the task is one for another robot.
     """
 
-    bundle_bytes = LARGEST_LETTER // 4
+    bundle_bytes = LARGEST_FRAME // 4
 
     def __init__(self, own: CompiledRobot, task: Task, protocol: type[Protocol], context: RobotContext) -> None:
         super().__init__(task.epoch, observed=context.observed)
@@ -87,7 +87,7 @@ class Searcher(RobotLoop):
         self._context = context
         self._copies: dict[str, tuple[SharedRecord, ...]] = {}
         self._learnt: dict[str, list[Constraint]] = {}
-        self._early_share = Kept()
+        self._early_share = Backlog()
         self._decode = msgspec.msgpack.Decoder(protocol.messages).decode
         self._sent_to: Counter[str] = Counter()
         self._received_from: Counter[str] = Counter()
@@ -159,8 +159,10 @@ class Searcher(RobotLoop):
             raise UnsupportedError(f"{self._robot.name} was told what cannot be: {bad}") from None
         self._learnt = {sender: [one.constraint for one in theirs] for sender, theirs in known.items()}
         copies = _sorted([one for theirs in known.values() for one in theirs], task.order)
-        brief = RunParameters(task.seed, task.settings, task.aside)
-        return AgentProblem(self._own, task.order, task.interfaces, copies, domains, task.links, task.secretive, brief)
+        parameters = RunParameters(task.seed, task.settings, task.aside)
+        return AgentProblem(
+            self._own, task.order, task.interfaces, copies, domains, task.links, task.secretive, parameters
+        )
 
     def _known(self, sender: str, record: SharedRecord) -> KeyedConstraint:
         """Return a constraint that `sender` holds: it has to be a child, and this robot's variables in the scope."""
@@ -219,14 +221,14 @@ class Searcher(RobotLoop):
 
     def _report_end(self) -> None:
         if self._host is None:  # others have not told which constraints they hold, and perhaps never will
-            self._context.say(Account(self.epoch, {}, Metrics(), NOTHING, assigned=False))
+            self._context.say(DetailedReport(self.epoch, {}, Metrics(), NOTHING, assigned=False))
             return
         protocol = self._host.protocol
         metrics = self._host.metrics()
         metrics = replace(metrics, ncccs=min(metrics.ncccs, LATEST), memory=own_memory())
         assigned = bool(protocol.assignment)  # a withdrawn robot has a value, and none of its variables has
         values, findings = ({}, NOTHING) if self._context.private else (protocol.assignment, self._findings(protocol))
-        self._context.say(Account(self.epoch, values, metrics, findings, assigned, self._exchanged()))
+        self._context.say(DetailedReport(self.epoch, values, metrics, findings, assigned, self._exchanged()))
 
     def _findings(self, protocol: Protocol) -> Findings:
         """Return the findings, some of which come from others; nothing if one of those cannot be true."""
@@ -240,7 +242,7 @@ class Searcher(RobotLoop):
             for other in others
         }
 
-    def check_constraints(self, values: Mapping[str, int]) -> Checked:
+    def check_constraints(self, values: Mapping[str, int]) -> CheckResult:
         """Check the robot's constraints against what all have decided. See `check_constraints`."""
         return check_constraints(self.epoch, self._robot, {**values, **self.assignment}, self.assignment, self._learnt)
 

@@ -1,4 +1,4 @@
-"""Under which conditions a run across machines takes place."""
+"""The settings of a run across machines."""
 
 from __future__ import annotations
 
@@ -12,14 +12,18 @@ LEASE_MS = 10_000
 
 @dataclass(frozen=True)
 class NetworkSettings:
-    """What the master is told besides the problem.
+    """The settings of a run, besides the problem.
 
-    `filters` are the channel filters that messages go through. In a `private` run nobody tells its values. A robot may
-    be away for `patience_s`; a link that is silent for `lease_ms` counts as down. With `survive`, robots that are
-    lost break the search off, and are told of in its result; otherwise `RobotsLostError` is raised. `protocol` is what
-    the Directory Facilitator says that robots speak. `listen` is where the router listens (`HOST:PORT`), if that is not
-    where it is reached: all addresses of a machine are the name of none. `scratch` is a folder of this process that the
-    router removes should it outlive the process (empty: there is none).
+    Attributes:
+        filters: The channel filters that messages go through.
+        private: No robot tells its values.
+        patience_s: How long a robot may be away.
+        lease_ms: A link that is silent for so long counts as down.
+        survive: Lost robots break the search off, and are named in its result. Otherwise `RobotsLostError` is raised.
+        protocol: The protocol that the Directory Facilitator says robots use.
+        listen: Where the router listens (`HOST:PORT`), if that is not where it is reached: all addresses of a machine
+            are the name of none.
+        scratch: A folder of this process that the router removes should it outlive the process (empty: there is none).
     """
 
     filters: tuple[str, ...] = ()

@@ -59,7 +59,7 @@ def record_of(known: KeyedConstraint) -> SharedRecord:
 
 
 def known_of(record: SharedRecord) -> KeyedConstraint:
-    """The constraint in `record`. Raises `SharedConstraintError`."""
+    """Return the constraint in `record`. Raises `SharedConstraintError`."""
     if max(len(record.scope), len(record.parameters)) > MOST_TERMS:
         raise SharedConstraintError(f"{shortened(record.name)!r} has more than {MOST_TERMS} terms")
     variables = [term for term in record.scope if isinstance(term, str)]

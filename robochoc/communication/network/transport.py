@@ -1,7 +1,7 @@
-"""The post: what zenoh does for one participant. It carries letters both ways, and tells who is there.
+"""The transport of one participant by zenoh: it carries frames both ways, and knows who is there.
 
-Letters travel by zenoh's advanced publishers and subscribers, which number what they carry, keep it, and ask again for
-what an outage has swallowed; plain ones lose messages without a word. Nothing but this file and the router's imports
+Frames travel by zenoh's advanced publishers and subscribers, which number what they carry, keep it, and ask again for
+what an outage has swallowed; plain ones lose messages silently. Nothing but this file and the router's imports
 zenoh. Its callbacks run in threads of its own, and only put what comes into `inbox`.
 """
 
@@ -19,21 +19,21 @@ import zenoh
 import zenoh.ext
 
 from robochoc.authority.identity import Identity
-from robochoc.communication.network.access import ALL, letter_key, life_key, name_in
+from robochoc.communication.network.access import ALL, frame_key, life_key, name_in
 from robochoc.communication.network.framing import MASTER
-from robochoc.communication.network.inbox import Arrived, Inbox, Missed, Presence, Woken
+from robochoc.communication.network.inbox import FrameArrived, FramesLost, Inbox, PresenceChanged, WakeUp
 from robochoc.communication.network.settings import LEASE_MS
 from robochoc.communication.network.zenoh_config import config
 from robochoc.communication.resources import require_descriptors
 
 RETRY = {"period_init_ms": 50, "period_max_ms": 500, "period_increase_factor": 1.5}
 HEARTBEAT_S = 5.0
-"""How soon a receiver learns that the last letter is missing, at the latest; that of others it sees at the next letter.
+"""How soon a receiver learns that the last frame is missing, at the latest; that of others it sees at the next frame.
 
 Each pair that has ever spoken has its own, at about 0.2 ms of CPU: 121 robots are some 4,000 pairs. What was sent in an
 outage does not wait for it: a receiver asks for that as soon as it sees the sender again.
 """
-KEPT_LETTERS = 100_000
+KEPT_FRAMES = 100_000
 _LATE_S = 1.0
 _FIRST_ATTEMPT_S, _LONGEST_ATTEMPT_S = 2.0, 10.0
 """So long are attempts to connect; a busy router may take its time for a handshake."""
@@ -51,13 +51,13 @@ TEAM = (MASTER, ALL)
 """Whom robots hear: the master by a subscriber of its own, and all others."""
 _Subscriber = tuple[zenoh.ext.AdvancedSubscriber[None], zenoh.ext.SampleMissListener[None]]
 Answering = Callable[[str, bytes], bytes | None]
-"""The answer to somebody's question; None: it gets none."""
+"""The answer to a question of a participant; None: there is none."""
 
 
 class Transport:
     """The connection of `identity` with the router at `endpoint` (`HOST:PORT`); a context manager.
 
-    It knows of the lives of those in `watch`, and gets the letters of those in `heard` (more: `hear`) into `inbox`.
+    It notices whether those in `watch` are there, and puts the frames of those in `heard` (more: `hear`) into `inbox`.
     `lease_ms` is how long a silent link counts as alive. Raises `CannotConnectError` when there is no connection within
     `patience_s`.
     """
@@ -86,10 +86,10 @@ class Transport:
         ]
 
     def hear(self, senders: Iterable[str]) -> None:
-        """From now on take the letters of `senders`, too; what they have written before comes soon.
+        """From now on take the frames of `senders`, too; what they have written before comes soon.
 
         Each has a subscriber of its own, for zenoh believes what a packet says of its source and number. In one for
-        all, a sender can use the source of another, whose letters then count as old ones, or as missing. It is dear:
+        all, a sender can use the source of another, whose frames then count as old ones, or as missing. It is dear:
         the router knows of every pair, so robots hear their neighbours by one (`ALL`) and the master by its own.
         """
         for sender in senders:
@@ -97,14 +97,14 @@ class Transport:
                 self._subscribers[sender] = self._subscribed(sender)
 
     def send(self, receiver: str, content: bytes) -> None:
-        """Put a letter on its way. While the link is down it waits here; afterwards it is sent, or asked for."""
+        """Put a frame on its way. While the link is down it waits here; afterwards it is sent, or asked for."""
         publisher = self._publishers.get(receiver)
         if publisher is None:
             publisher = self._publishers[receiver] = zenoh.ext.declare_advanced_publisher(
                 self._session,
-                letter_key(receiver, self.name),
+                frame_key(receiver, self.name),
                 congestion_control=zenoh.CongestionControl.BLOCK,
-                cache=zenoh.ext.CacheConfig(KEPT_LETTERS),
+                cache=zenoh.ext.CacheConfig(KEPT_FRAMES),
                 sample_miss_detection=zenoh.ext.MissDetectionConfig(heartbeat=HEARTBEAT_S, sporadic_heartbeat=None),
                 publisher_detection=True,
             )
@@ -126,7 +126,7 @@ class Transport:
         self._answering = self._session.declare_queryable(key, reply)
 
     def ask(self, key: str, content: bytes, patience_s: float) -> bytes | None:
-        """What is answered to `content` on `key`; None: nothing is, within `patience_s`.
+        """Return the answer to `content` on `key`; None if none comes within `patience_s` seconds.
 
         The answer yields to all that robots say, and is dropped if it does not get through at once.
         """
@@ -147,8 +147,8 @@ class Transport:
         return None
 
     def wake(self) -> None:
-        """Have whoever waits at the inbox look up."""
-        self.inbox.put(Woken())
+        """End a wait for the inbox."""
+        self.inbox.put(WakeUp())
 
     def close(self) -> None:
         """End the connection. What zenoh has taken over is sent before."""
@@ -163,11 +163,10 @@ class Transport:
         self.close()
 
     def _subscribed(self, sender: str) -> _Subscriber:
-        """What hears `sender` alone (`ALL`: all that have no subscriber of their own), and that letters are lost.
+        """Return a subscriber to `sender` alone (`ALL`: to all others), which also notices lost frames.
 
-        zenoh tells of a gap just before the letter behind it, in the same thread (not `indirect`: that would be one of
-        Python's own for each). So a gap is put down to the sender of that letter, whom the router has proven, and not
-        to the source that the packet claims.
+        zenoh reports a gap just before the frame behind it, in the same thread (not `indirect`: one thread for each).
+        So the sender of that frame, which the router has proven, has lost frames, not the source that a packet claims.
         """
         gap = 0
 
@@ -179,15 +178,12 @@ class Transport:
             nonlocal gap
             lost, gap = gap, 0
             of = name_in(str(sample.key_expr))
-            if sender == ALL and of in self._subscribers:
-                return
-            if lost:
-                self.inbox.put(Missed(of, lost))
-            self.inbox.put(Arrived(of, sample.payload.to_bytes()))
+            if sender != ALL or of not in self._subscribers:
+                self._put(of, lost, sample.payload.to_bytes())
 
         subscriber = zenoh.ext.declare_advanced_subscriber(
             self._session,
-            letter_key(self.name, sender),
+            frame_key(self.name, sender),
             zenoh.handlers.Callback(take, indirect=False),
             history=zenoh.ext.HistoryConfig(detect_late_publishers=True),
             recovery=zenoh.ext.RecoveryConfig(periodic_queries=None, heartbeat=True),
@@ -195,14 +191,19 @@ class Transport:
         )
         return subscriber, subscriber.sample_miss_listener(zenoh.handlers.Callback(note_miss, indirect=False))
 
-    # What zenoh's threads call
+    # Called by zenoh's threads
+
+    def _put(self, sender: str, lost: int, content: bytes) -> None:
+        if lost:
+            self.inbox.put(FramesLost(sender, lost))
+        self.inbox.put(FrameArrived(sender, content))
 
     def _note_presence(self, sample: zenoh.Sample) -> None:
-        self.inbox.put(Presence(name_in(str(sample.key_expr)), sample.kind == zenoh.SampleKind.PUT))
+        self.inbox.put(PresenceChanged(name_in(str(sample.key_expr)), sample.kind == zenoh.SampleKind.PUT))
 
 
 def _opened(endpoint: str, identity: Identity, patience_s: float, lease_ms: int) -> zenoh.Session:
-    """A session. zenoh does not hear Ctrl-C while it connects, so it is not left to that for long."""
+    """Return a session. zenoh does not hear Ctrl-C while it connects, so it is not left to that for long."""
     if endpoint.startswith("["):
         raise CannotConnectError(
             f"{endpoint}: zenoh cannot check whose IPv6 address that is; call the master by a host name"
@@ -223,7 +224,7 @@ def _opened(endpoint: str, identity: Identity, patience_s: float, lease_ms: int)
 
 
 def client_config(endpoint: str, identity: Identity, patience_s: float, lease_ms: int) -> zenoh.Config:
-    """How a participant connects: to that one router, by mutual TLS, and in no other way."""
+    """Return how a participant connects: to that one router, by mutual TLS, and in no other way."""
     texts = identity.texts
     tls = {
         "root_ca_certificate_base64": encoded(texts.ca),

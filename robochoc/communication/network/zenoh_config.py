@@ -8,11 +8,11 @@ from collections.abc import Mapping
 import zenoh
 
 RX_BYTES = 32 * 2**20
-"""What zenoh takes from the network at once: more than a letter, so that one that is too large is refused aloud."""
+"""What zenoh takes from the network at once: more than a frame, so that one that is too large is refused aloud."""
 
 
 def config(settings: Mapping[str, object]) -> zenoh.Config:
-    """A configuration of zenoh: `settings`, and nothing that looks for others or listens where it was not told to."""
+    """Return a configuration of zenoh with `settings`, and without discovery or other listeners."""
     made = zenoh.Config()
     common = {
         "scouting/multicast/enabled": False,

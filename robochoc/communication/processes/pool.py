@@ -159,10 +159,10 @@ class ProcessPool:
                 if not reported(robot.name):
                     robot.process.kill()
                 robot.control.close()
-            everybody = [*self.robots.values(), *self._dismissed]
+            all_robots = [*self.robots.values(), *self._dismissed]
             self.robots, self._dismissed = {}, []
-            _await([robot.process.sentinel for robot in everybody])
-            for robot in everybody:
+            _await([robot.process.sentinel for robot in all_robots])
+            for robot in all_robots:
                 # Also one that seems to have ended: a sentinel is a pipe, and a process can close it and live on.
                 robot.process.kill()
                 robot.process.join()

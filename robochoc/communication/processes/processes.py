@@ -5,7 +5,7 @@ queue when a robot wants to talk to another for the first time, detects quiescen
 epoch. Protocol messages go from robot to robot and never through the parent.
 
 Crash detection: the parent watches every process's sentinel; a robot's control pipe ends with the parent. Why fork, why
-queues are opened on demand, and what was measured: docs/design.md, "Processes".
+queues are opened on demand, and what was measured: docs/explanation/design.md, "Processes".
 """
 
 from __future__ import annotations
@@ -25,7 +25,6 @@ from robochoc.communication.control import (
     OpenQueues,
     Pause,
     Ready,
-    Wave,
     sealed,
 )
 from robochoc.communication.master_loop import MasterLoop
@@ -65,7 +64,7 @@ class ProcessesRun(Session, MasterLoop):
         survive: Robots whose processes end break the search off, and are named in its result. Otherwise
             `RobotsLostError` is raised.
         patience_s: A robot whose process is stopped (SIGSTOP) for so many seconds is lost. None: it is waited for.
-        brief: What robots are given besides the problem.
+        parameters: What robots are given besides the problem.
     """
 
     def __init__(
@@ -78,7 +77,7 @@ class ProcessesRun(Session, MasterLoop):
         start_method: StartMethod = "fork",
         survive: bool = False,
         patience_s: float | None = None,
-        brief: RunParameters = DEFAULT_PARAMETERS,
+        parameters: RunParameters = DEFAULT_PARAMETERS,
     ) -> None:
         Session.__init__(self, team)
         MasterLoop.__init__(self, progress)
@@ -89,7 +88,7 @@ class ProcessesRun(Session, MasterLoop):
         self._pool = ProcessPool(start_method)
         self._lossless = True
         self._deadline: float | None = None
-        self._unstarted = Epoch(self.compiled, brief=brief).parts(protocol)
+        self._unstarted = Epoch(self.compiled, parameters=parameters).parts(protocol)
         self.state = SearchState(0, self.compiled.team.order, traits=protocol.traits)
 
     @property
@@ -137,7 +136,7 @@ class ProcessesRun(Session, MasterLoop):
             elif robot.ended:  # after its report, so that the epoch before could do without it
                 self._lose(name, robot.describe_end())
             else:
-                self._send(robot, Change(self.state.epoch, sealed(part, epoch.void), left))
+                self._send(robot, Change(self.state.epoch, sealed(part, epoch.invalidated), left))
 
     def kill(self, name: str) -> None:
         """Kill the robot's process, if it has one."""
@@ -308,9 +307,6 @@ class ProcessesRun(Session, MasterLoop):
     def _send_all(self, order: FromParent) -> None:
         for robot in list(self._pool.robots.values()):
             self._send(robot, order)
-
-    def _send_wave(self, wave: Wave) -> None:
-        self._send_all(wave)
 
     def _send(self, robot: RobotLink, order: FromParent) -> None:
         try:

@@ -155,7 +155,7 @@ class QueueRobot(RobotLoop):
 
     def _change(self, order: Change) -> None:
         """Enter the next epoch, with a changed problem and no message under way."""
-        part, void = unsealed(order.change)
+        part, invalidated = unsealed(order.change)
         for name in order.gone:
             if name in self._readers:
                 self._close_reader(self._readers[name])
@@ -164,7 +164,7 @@ class QueueRobot(RobotLoop):
         self.epoch = order.epoch
         self._reset()
         if self._host is not None:
-            self._host.change(part, void)
+            self._host.change(part, invalidated)
             self.confirm(self._host)
 
     # Queues

@@ -53,7 +53,7 @@ class QueueReader:
         os.set_blocking(fd, False)
 
     def get(self) -> list[bytes]:
-        """What one read brings: a writer that never pauses must not keep the reader from others.
+        """Return the bodies that one read brings: a writer that never pauses must not keep the reader from others.
 
         `ended` tells afterwards whether the writer is gone.
         """
@@ -61,7 +61,7 @@ class QueueReader:
         return list(unpack(self._buffer))
 
     def get_all(self) -> list[bytes]:
-        """All bodies that are left once the writer has ended."""
+        """Return all bodies that are left once the writer has ended."""
         while self._read():
             pass
         return list(unpack(self._buffer))

@@ -19,6 +19,7 @@ from typing import NamedTuple
 import msgspec
 
 from robochoc.formats.diagnostics import Diagnostic, InvalidInputError, shortened, suggestion
+from robochoc.system.decode_errors import describe_decode_error
 
 LARGEST_FILE = 2**16
 """A channel's file has no more bytes."""
@@ -97,7 +98,7 @@ class ChannelModel(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fie
             raise ValueError(f"longest_timeout_ms: expected at least timeout_ms, which is {self.timeout_ms:g}")
 
     def crossing(self, size: int, chance: Random) -> Crossing:
-        """What a message of `size` bytes needs this time; an empty one has a frame, too."""
+        """Return what a message of `size` bytes needs this time; an empty one has a frame, too."""
         whole, rest = divmod(size, self.payload_bytes)
         full, last = self._air(self.payload_bytes), self._air(rest)
         frames = whole + 1 if rest or not whole else whole
@@ -117,7 +118,10 @@ class ChannelModel(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fie
         return bytes_ns + round(self.frame_us * NS_PER_US)
 
     def _latency(self, chance: Random) -> int:
-        """A draw from the log-normal distribution. One each time, so that other fields do not shift the chance."""
+        """Return a draw from the log-normal distribution.
+
+        One each time, so that other fields do not shift the chance.
+        """
         minimum = round(self.minimum_ms * NS_PER_MS)
         median = round(self.latency_ms * NS_PER_MS) - minimum
         return minimum + round(median * chance.lognormvariate(0, self.sigma))
@@ -150,11 +154,12 @@ _SHIPPED = (
 CHANNELS = MappingProxyType({model.name: model for model in _SHIPPED})
 """The models that are shipped, by name."""
 
-_PLACE = re.compile(r" - at `\$\.?(\w*)[^`]*`$")
-
 
 def read_channel(path: Path) -> ChannelModel:
-    """The model in the TOML file at `path`, named for the file unless it says otherwise. Raises `InvalidInputError`."""
+    """Return the model in the TOML file at `path`, named for the file unless it says otherwise.
+
+    Raises `InvalidInputError`.
+    """
     text = _text(path)
     try:
         fields = tomllib.loads(text)
@@ -171,10 +176,7 @@ def read_channel(path: Path) -> ChannelModel:
     try:
         return msgspec.convert(fields, ChannelModel)
     except msgspec.ValidationError as wrong:
-        said = str(wrong)
-        place = _PLACE.search(said)
-        field = f"{place[1]}: " if place and place[1] else ""
-        raise _invalid(path, field + _PLACE.sub("", said)) from None
+        raise _invalid(path, describe_decode_error(wrong, ChannelModel)) from None
 
 
 def _text(path: Path) -> str:

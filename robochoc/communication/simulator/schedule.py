@@ -27,7 +27,7 @@ class Schedule(ABC):
 
     @abstractmethod
     def get(self) -> Sequence[Envelope]:
-        """The next packet, all for one robot, oldest first in each channel; empty when nothing is under way."""
+        """Return the next packet, all for one robot, oldest first in each channel; empty when nothing is under way."""
 
     @abstractmethod
     def clear(self) -> None:
@@ -40,7 +40,7 @@ class Schedule(ABC):
         """
 
     def time(self, checks: int) -> float:  # noqa: ARG002 - not every schedule has to know
-        """The time of events, so many checks after a robot has begun with its packet."""
+        """Return the time of events, so many checks after a robot has begun with its packet."""
         return float(self.now)
 
     @property
@@ -82,7 +82,7 @@ class Concurrent(Schedule):
             self._note(envelope.receiver)
 
     def get(self) -> Sequence[Envelope]:
-        """All that has reached the robot that gets to its inbox first."""
+        """Return all that has reached the robot that gets to its inbox first."""
         while self._agenda:
             due, _, robot = heapq.heappop(self._agenda)
             inbox = self._inboxes[robot]
@@ -105,13 +105,13 @@ class Concurrent(Schedule):
         self.now = 0
 
     def done(self, robot: str, clock: int, checks: int) -> None:  # noqa: ARG002 - they are in the clock
-        """The robot is free from `clock` on, for what has come or will come."""
+        """Note that the robot is free from `clock` on."""
         self._busy_until[robot] = clock
         if self._inboxes.get(robot):
             self._note(robot)
 
     def _wakes(self, robot: str) -> int:
-        """When `robot` gets to its inbox: something has arrived, and it is not busy."""
+        """Return when `robot` gets to its inbox: something has arrived, and it is not busy."""
         return max(self._inboxes[robot][0][0], self._busy_until.get(robot, 0))
 
     def _note(self, robot: str) -> None:
@@ -157,7 +157,7 @@ class RandomChannels(Schedule):
         self._waiting.clear()
 
     def _take(self, place: int) -> Envelope:
-        """The head of the waiting channel at `place`; an empty channel leaves the list, unordered."""
+        """Return the head of the waiting channel at `place`; an empty channel leaves the list, unordered."""
         edge = self._waiting[place]
         channel = self._channels[edge]
         head = channel.popleft()

@@ -28,9 +28,15 @@ PROGRESS_EVERY = 256
 
 
 class Simulation(Session):
-    """One team in this thread. `observer` is told of all events, with the schedule's time.
+    """One team in this thread.
 
-    `brief` is what robots are told beside the problem.
+    Args:
+        team: The team, compiled or not.
+        protocol: The protocol that its robots run.
+        schedule: Decides which messages arrive next.
+        observer: Receives all events, with the schedule's time.
+        progress: Receives the count of messages now and then.
+        parameters: What robots are given besides the problem.
     """
 
     def __init__(
@@ -41,7 +47,7 @@ class Simulation(Session):
         *,
         observer: Observer | None = None,
         progress: Callable[[Progress], None] | None = None,
-        brief: RunParameters = DEFAULT_PARAMETERS,
+        parameters: RunParameters = DEFAULT_PARAMETERS,
     ) -> None:
         super().__init__(team)
         self._protocol = protocol
@@ -52,7 +58,7 @@ class Simulation(Session):
         self._checks = 0
         self._verdict: Verdict | None = None
         self._witness: str | None = None
-        parts = Epoch(self.compiled, brief=brief).parts(protocol)
+        parts = Epoch(self.compiled, parameters=parameters).parts(protocol)
         self._hosts = {name: self._host(part) for name, part in parts.items()}
 
     @property
@@ -87,13 +93,13 @@ class Simulation(Session):
         for name, part in epoch.parts(self._protocol).items():
             if name in before and name not in epoch.restarted:
                 self._hosts[name] = before[name]
-                before[name].change(part, epoch.void)
+                before[name].change(part, epoch.invalidated)
                 self._note_verdict(before[name])
             else:
                 self._hosts[name] = self._host(part)
 
     def close(self) -> None:
-        """Nothing to leave behind."""
+        """Do nothing: there is nothing to release."""
 
     def _host(self, part: AgentProblem) -> Host:
         host = Host.of(self._protocol, part)
@@ -133,7 +139,7 @@ class Simulation(Session):
         self._note_verdict(host)
 
     def _time(self, checks: int) -> float:
-        """The time when the robot that is at work had done so many checks."""
+        """Return the time when the robot that is at work had done so many checks."""
         return self._schedule.time(checks - self._checks)
 
     def _note_verdict(self, host: Host) -> None:

@@ -53,7 +53,7 @@ class Timed(Schedule):
         self._said.append((self.now + checks * self._channel.check_ns, envelope))
 
     def done(self, robot: str, clock: int, checks: int) -> None:  # noqa: ARG002 - time is not the NCCC clock
-        """The robot has done so many checks since it began, and is free again."""
+        """Note that the robot has done so many checks since it began, and is free again."""
         free = self.now + checks * self._channel.check_ns
         self._end_ns = max(self._end_ns, free)
         self._busy_until[robot] = free
@@ -65,7 +65,7 @@ class Timed(Schedule):
             self._wake(robot)
 
     def get(self) -> Sequence[Envelope]:
-        """All that has reached the robot that gets to its inbox first."""
+        """Return all that has reached the robot that gets to its inbox first."""
         while self._agenda:
             due, _, _, _, what = heapq.heappop(self._agenda)
             if isinstance(what, Envelope):
@@ -113,7 +113,7 @@ class Timed(Schedule):
             self._wake(envelope.receiver)
 
     def _wakes(self, robot: str) -> int:
-        """When `robot` gets to its inbox: something has arrived, and it is not busy."""
+        """Return when `robot` gets to its inbox: something has arrived, and it is not busy."""
         return max(self._inboxes[robot][0][0], self._busy_until.get(robot, 0))
 
     def _wake(self, robot: str) -> None:

@@ -50,13 +50,13 @@ class FlightConditions:
 
     def __post_init__(self) -> None:
         if self.distance is not None and not DISTANCE_MIN_M <= self.distance < math.inf:
-            told = f"a positive number of metres, {DISTANCE_MIN_M:g} at least, not {self.distance}"
-            raise ValueError(f"the distance between drones has to be {told}")
+            wanted = f"a positive number of metres, {DISTANCE_MIN_M:g} at least, not {self.distance}"
+            raise ValueError(f"the distance between drones has to be {wanted}")
         if not 0 <= self.gusts <= WIND_MAX_M_S:
             raise ValueError(f"gusts have to be a number from 0 to {WIND_MAX_M_S:g} m/s, not {self.gusts}")
         if max(map(abs, self.wind), default=0) > WIND_MAX_M_S:
-            told = ", ".join(f"{part:g}" for part in self.wind)
-            raise ValueError(f"a wind of ({told}) is faster than {WIND_MAX_M_S:g} m/s")
+            speed = ", ".join(f"{part:g}" for part in self.wind)
+            raise ValueError(f"a wind of ({speed}) is faster than {WIND_MAX_M_S:g} m/s")
         if self.seed < 0:
             raise ValueError(f"a seed has to be a number from 0 on, not {self.seed}")
         for what, point in (("wind", self.wind), *(("obstacle", place) for place in self.obstacles)):

@@ -42,7 +42,7 @@ def free_point(wish: Array, taken: Array, radii: Array, ground: float, *, low: b
     free = (_distances(spots, taken) >= radii).all(1)
     if free.any():
         return np.asarray(spots[free.argmax()])
-    # All is full around here: beyond everybody, beside or above.
+    # No free point around: take one beyond all others, beside or above.
     beyond = np.array([wish[0], wish[1], ground if low else wish[2]])
     side = 0 if low else 2
     beyond[side] = taken[:, side].max() + 2.001 * step

@@ -73,7 +73,7 @@ class LegGoals:
         Goals give way to hazards. Drones that only stay where they are give way to others' goals. Each gets the free
         point that is nearest to its `preferred` one (N, 3).
         """
-        told = []
+        moved = []
         going = np.array([number for number in self.who.tolist() if number in self.goals], dtype=np.intp)
         for number in self.who.tolist():
             goal, place = self.goals.get(number), self.places[number].copy()
@@ -91,9 +91,9 @@ class LegGoals:
             radii = np.full(len(others), self._distance + MARGIN_M)
             taken = Hazards(np.vstack((others, hazards.points)), np.concatenate((radii, hazards.radii)))
             self.places[number] = free_point(preferred[number], taken.points, taken.radii, ground, low=bool(low))
-            aside = float(np.sqrt(np.square(self.places[number] - place).sum()))
-            told.append((number, f"{'lands' if low else 'hovers'} {aside:.2f} m aside: {why}"))
-        return told
+            off = float(np.sqrt(np.square(self.places[number] - place).sum()))
+            moved.append((number, f"{'lands' if low else 'hovers'} {off:.2f} m beside its place: {why}"))
+        return moved
 
     def standing(self, hazards: Hazards, starts: Array, planned: float) -> Array:
         """Return the hazards that routes can avoid: no drone starts or ends too near to them."""
@@ -116,7 +116,7 @@ def check_separation(what: str, names: Sequence[str], places: Mapping[int, Point
     for (first, one), (second, other) in combinations(places.items(), 2):
         gap = math.dist(one, other)
         if gap < least:
-            told = f"{gap:.2f}" if gap >= DISTANCE_MIN_M else f"{gap:.1g}"
+            apart = f"{gap:.2f}" if gap >= DISTANCE_MIN_M else f"{gap:.1g}"
             asked = f"{distance:g} m are to be kept" + (
                 f", which takes {needed(distance):g} m" if gap >= distance - SLACK_M else ""
             )
@@ -126,7 +126,7 @@ def check_separation(what: str, names: Sequence[str], places: Mapping[int, Point
                 else "ask for a larger scale"
             )
             raise ValueError(
-                f"the {what} of {names[first]} and {names[second]} are {told} m apart, and {asked}: {step}"
+                f"the {what} of {names[first]} and {names[second]} are {apart} m apart, and {asked}: {step}"
             )
 
 

@@ -143,8 +143,8 @@ class QuadrotorSimulation:
 
     def _lowest(self, low: Mask, moving: Mask, *, late: bool) -> Array:
         """Return the setpoints, with those of the `low` drones moved off the ground, or below it to land."""
-        aside = np.square(self.setpoints[:2] - self._bodies.state[:2]).sum(0)
-        lands = low & ~moving & (late | (aside < _ABOVE_M**2))
+        off = np.square(self.setpoints[:2] - self._bodies.state[:2]).sum(0)
+        lands = low & ~moving & (late | (off < _ABOVE_M**2))
         wanted = self.setpoints.copy()
         wanted[2] += self.hop_m * (low & moving) - _PRESS_M * lands
         return wanted

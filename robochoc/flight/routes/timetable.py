@@ -23,12 +23,10 @@ from itertools import islice
 import numpy as np
 from numpy.typing import NDArray
 
-from robochoc.flight.routes.motion import Motion, MotionLimits, Route, RoutePlan
-from robochoc.flight.routes.moves import Move, NoRouteError, moves_between
+from robochoc.flight.routes.motion import MotionLimits, Route, RoutePlan
+from robochoc.flight.routes.moves import Move, moves_between
 from robochoc.flight.routes.paths import Space
-from robochoc.flight.routes.spacing import Array, Flags, TooCloseError, check_spacing, closest_approach, norms
-
-__all__ = ["Motion", "MotionLimits", "NoRouteError", "RoutePlan", "TooCloseError", "plan_routes"]
+from robochoc.flight.routes.spacing import Array, Flags, check_spacing, closest_approach, norms
 
 Steps = NDArray[np.int64]
 
@@ -147,7 +145,7 @@ class _Timetable:
         self._latest = 0
         self._corners = np.empty((2, 0, 3))
         """Of the boxes around all paths: the lowest corners, and the highest."""
-        # Where somebody rests: the drone, the point, from which step, to which step.
+        # Where drones rest: the drone, the point, from which step, to which step.
         self._resting = np.arange(len(starts))
         self._places = starts.copy()
         self._from = np.zeros(len(starts), dtype=np.int64)

@@ -15,9 +15,12 @@ Closure = Callable[[Sequence[int]], int]
 
 
 def compile_expression(expression: Expression, names: Sequence[str]) -> Closure:
-    """Return `expression` as a function of the values of `names`, in their order: what `evaluate` says, but faster.
+    """Return `expression` as a function of the values of `names`, in their order. It is faster than `evaluate`.
 
-    The function raises `UndefinedValueError` where `evaluate` does. Raises `ValueError` when a name is not in `names`.
+    The function raises `UndefinedValueError` where `evaluate` does.
+
+    Raises:
+        ValueError: if a name of the expression is not in `names`.
     """
     match expression:
         case Constant(value):

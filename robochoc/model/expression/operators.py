@@ -82,9 +82,14 @@ ALIASES = {"neq": "ne", "minus": "sub", "plus": "add"}
 
 
 def evaluate(expression: Expression, environment: Mapping[str, int]) -> int:
-    """Return the value of `expression` where names have the values of `environment`; Booleans are 0 and 1.
+    """Return the value of `expression`. Booleans are 0 and 1.
 
-    Raises `UndefinedValueError` on a division by zero, a negative exponent, and a result beyond +-2**63.
+    Args:
+        expression: The expression.
+        environment: The values of its names.
+
+    Raises:
+        UndefinedValueError: for a division by zero, a negative exponent, and a result beyond +-2**63.
     """
     match expression:
         case Constant(value):

@@ -27,10 +27,18 @@ class ExpressionError(ValueError):
 
 
 def parse(text: str, names: Collection[str], wanted: Type) -> Expression:
-    """Read a functional expression over `names` that yields a `wanted` value.
+    """Read a functional expression over `names`.
 
-    Reads XCSP 2.1's functional form, and what Figure 2 writes besides: an argument list in parentheses of its own,
-    infix `+ - *`, and `minus(i-j)` (FORMAT.md, "Functional expressions"). Raises `ExpressionError`.
+    This is XCSP 2.1's functional form, and what Figure 2 writes besides: an argument list in parentheses of its own,
+    infix `+ - *`, and `minus(i-j)` (docs/reference/format.md).
+
+    Args:
+        text: The text.
+        names: The names that may occur in it.
+        wanted: The type of its value.
+
+    Raises:
+        ExpressionError: if the text is no such expression. It says where, and what to do.
     """
     if len(text) > MAX_TEXT:
         raise ExpressionError(

@@ -11,7 +11,7 @@ BOUND = 2**63
 
 
 class Type(StrEnum):
-    """What an expression yields. Names (formal parameters, variables) are integers."""
+    """The type of an expression's value. Names (formal parameters, variables) are integers."""
 
     INTEGER = "integer"
     BOOLEAN = "Boolean"

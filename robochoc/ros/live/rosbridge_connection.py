@@ -92,7 +92,7 @@ class Connection:
 
     def _opened(self, ready: threading.Event, protocol: Any) -> None:  # noqa: ANN401 - roslibpy is untyped
         self._protocol, self._transport = protocol, protocol.transport
-        # roslibpy knows of these messages, but not what to do with them, and lets nobody else register for them.
+        # roslibpy knows of these messages, but not what to do with them, and has no way to register for them.
         protocol._message_handlers["status"] = self._on_status  # noqa: SLF001
         ready.set()
 

@@ -33,7 +33,7 @@ STUCK_S = 10.0
 LINGER_S = 0.3
 """How long topics stay once all has been sent: some subscribers forget what they have not read when a topic ends."""
 _WAITING = 10_000
-"""Messages that wait to be sent before whoever publishes waits too."""
+"""Messages that wait to be sent before `publish` waits, too."""
 
 _lock = threading.Lock()
 
@@ -140,7 +140,7 @@ class RospySink(Sink):
         while (publish := self._waiting.get()) is not None and not self._problem:
             try:
                 publish()
-            except Exception as error:  # noqa: BLE001 - raised where somebody publishes or closes
+            except Exception as error:  # noqa: BLE001 - raised by `publish` or `close`
                 self._problem = shortened(on_one_line(f"{type(error).__name__}: {error}"))
             self._waiting.task_done()
 

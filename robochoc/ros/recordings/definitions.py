@@ -1,6 +1,7 @@
-"""Message definitions as text, from strangers' recordings: are their fields those that we know?
+"""Message definitions as text, from recordings of unknown origin: are their fields those that we know?
 
-Only lines are compared. A definition is never parsed into types: whoever does that runs what others have written.
+Only lines are compared. A definition is never parsed into types: a parser that makes program text of it would run what
+others have written.
 """
 
 from __future__ import annotations
@@ -9,21 +10,21 @@ import re
 from collections.abc import Mapping
 
 Field = tuple[str, str]
-"""Its type, and its name."""
+"""The type and the name of a field."""
 
-LONGEST = 1 << 15
+DEFINITION_MAX = 1 << 15
 """Characters of a definition; those known here have some 5,000."""
 
 _LINE = re.compile(r"([A-Za-z][\w/]*)((?:<=\d+)?(?:\[[<=\d]*\])?)\s+([A-Za-z]\w*)\s*(=?)", re.ASCII)
 _SECTION = re.compile(r"MSG:\s*([\w/]+)\s*", re.ASCII)
 _OWN = re.compile(r"bool|byte|char|u?int(?:8|16|32|64)|float(?:32|64)|w?string|time|duration")
 _WELL_KNOWN = {"builtin_interfaces/Time", "builtin_interfaces/Duration"}
-"""Not every writer says what these are."""
+"""Not every writer defines these."""
 
 
 def same_fields(kind: str, text: str, ours: str) -> bool:
-    """Whether `text`, which may be anything, gives `kind`, and the types of its fields, the fields that `ours` does."""
-    if len(text) > LONGEST:
+    """Return whether `text` gives `kind`, and the types of its fields, the same fields as `ours`."""
+    if len(text) > DEFINITION_MAX:
         return False
     theirs = _sections(kind, text)
     expected = _sections(kind, ours)
@@ -33,7 +34,7 @@ def same_fields(kind: str, text: str, ours: str) -> bool:
 
 
 def _sections(kind: str, text: str) -> Mapping[str, list[Field] | None]:
-    """The fields of `kind`, and of each type that is defined behind it; None where a line is no field."""
+    """Return the fields of `kind`, and of each type that is defined behind it; None where a line is no field."""
     found: dict[str, list[Field] | None] = {kind: []}
     current = kind
     for line in text.splitlines():
@@ -56,7 +57,7 @@ def _add(found: dict[str, list[Field] | None], current: str, content: str) -> No
 
 
 def _qualified(kind: str, inside: str) -> str:
-    """A field's type with its package, which may be left out for those of its own, and for a header."""
+    """Return a field's type with its package, which may be left out for those of its own, and for a header."""
     if kind == "Header":
         return "std_msgs/Header"
     if "/" in kind or _OWN.fullmatch(kind):

@@ -1,7 +1,7 @@
 """MCAP files: the container that ROS 2 records into, and that Foxglove opens (mcap.dev/spec).
 
-What is written has the profile `ros2`: messages in CDR, their definitions with them, in chunks packed by zstd. Files of
-the profile `ros1` are read too.
+Files are written with the profile `ros2`: messages in CDR, their definitions with them, in chunks compressed by zstd.
+Files with the profile `ros1` are read, too.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ from mcap.writer import MCAP0_MAGIC, CompressionType, Writer
 from robochoc.formats.diagnostics import on_one_line
 from robochoc.ros.mappings import short_kind
 from robochoc.ros.recordings.recording import (
-    BLOCK_AT_MOST,
+    BLOCK_BYTES_MAX,
     Block,
     RecordedChannel,
     Recording,
@@ -39,7 +39,7 @@ from robochoc.ros.sink import Fields, SinkError
 from robochoc.ros.source import SourceError
 
 NAMES = "robochoc:names"
-"""The metadata record that says what topics are called in the team's files."""
+"""The metadata record of the names that topics have in the team's files."""
 
 _CHUNK_BYTES = 1 << 20
 _RECORD = struct.Struct("<BQ")
@@ -48,10 +48,10 @@ _CHUNK = struct.Struct("<QQQII")
 _SIZE = struct.Struct("<Q")
 _FOOTER_SIZE = 20
 _CHANNELS_AT_MOST = 0xFFFF
-_DEFINITIONS_AT_MOST = 64
-"""Recordings define a type in one way; each costs time."""
+_DEFINITIONS_MAX = 64
+"""Recordings define a type in one way; each more costs time."""
 _ENCODINGS: dict[tuple[str, str], Version] = {("ros2msg", "cdr"): 2, ("ros1msg", "ros1"): 1}
-"""How definitions and messages may be written."""
+"""The encodings of definitions and messages."""
 
 
 T = TypeVar("T")
@@ -73,7 +73,7 @@ class McapSink(RecordingSink):
             self._writer.start("ros2")
 
     def explain(self, original: Mapping[str, str]) -> None:
-        """Keep the table in the file, and each name at its topic."""
+        """Keep the original names in the file, and each name at its topic."""
         super().explain(original)
         with self.sink_errors():
             self._writer.add_metadata(NAMES, dict(original))
@@ -104,7 +104,7 @@ class McapSink(RecordingSink):
 
 
 class _Known(NamedTuple):
-    """What is kept of a schema whose type somebody listens to: its encoding, and what is wrong with it."""
+    """A schema whose type is wanted: its encoding, and why its messages cannot be read."""
 
     kind: str
     encoding: str
@@ -112,12 +112,12 @@ class _Known(NamedTuple):
 
 
 def _from_zstd(packed: bytes, most: int) -> bytes:
-    """By a stream: what a frame says of its size is not believed."""
-    return zstandard.ZstdDecompressor(max_window_size=BLOCK_AT_MOST).stream_reader(packed).read(most)
+    """Decompress by a stream: the size in a frame is not trusted."""
+    return zstandard.ZstdDecompressor(max_window_size=BLOCK_BYTES_MAX).stream_reader(packed).read(most)
 
 
 class McapSource(Recording):
-    """Reads an MCAP file of ROS 2, or of ROS 1, or the one in a folder that ROS 2 has recorded."""
+    """Reads an MCAP file of ROS 2 or of ROS 1, or the one in a folder that ROS 2 has recorded."""
 
     packings = MappingProxyType({"": as_it_is, "lz4": from_lz4, "zstd": _from_zstd})
 
@@ -150,7 +150,7 @@ class McapSource(Recording):
         self._check_end()
 
     def _check_end(self) -> None:
-        """An MCAP file ends with a footer and the same bytes as it begins with."""
+        """Check that the file ends with a footer, and with the same bytes as it begins with."""
         size = _RECORD.size + _FOOTER_SIZE + len(MCAP0_MAGIC)
         tail = self._input.part(max(0, self._input.size - size), size)
         if not tail.startswith(_RECORD.pack(Opcode.FOOTER, _FOOTER_SIZE)) or not tail.endswith(MCAP0_MAGIC):
@@ -204,7 +204,7 @@ class McapSource(Recording):
                 _keep(self._schemas, schema.id, self._known(schema))
             else:
                 channel = ChannelRecord.read(stream)
-                _keep(self._channels, channel.id, self._heard(channel))
+                _keep(self._channels, channel.id, self._channel_of(channel))
         except (McapError, struct.error, ValueError) as error:
             what = "schema" if opcode == Opcode.SCHEMA else "channel"
             raise RecordingDamagedError(f"a {what} cannot be read: {type(error).__name__} {error}") from error
@@ -215,12 +215,12 @@ class McapSource(Recording):
             return None
         defined = kind, schema.encoding, schema.data
         if defined not in self._faults:
-            if len(self._faults) == _DEFINITIONS_AT_MOST:
-                raise RecordingDamagedError(f"it defines what is listened to in more than {_DEFINITIONS_AT_MOST} ways")
+            if len(self._faults) == _DEFINITIONS_MAX:
+                raise RecordingDamagedError(f"it defines what is listened to in more than {_DEFINITIONS_MAX} ways")
             self._faults[defined] = _fault(*defined)
         return _Known(kind, schema.encoding, self._faults[defined])
 
-    def _heard(self, channel: ChannelRecord) -> RecordedChannel | None:
+    def _channel_of(self, channel: ChannelRecord) -> RecordedChannel | None:
         schema = self._schemas.get(channel.schema_id)
         if schema is None or not self._wanted(channel.topic, schema.kind):
             return None
@@ -232,7 +232,7 @@ class McapSource(Recording):
 
 
 def _inside(place: str) -> str:
-    """The recording in the folder `place`, or `place`. Raises `SourceError`."""
+    """Return the recording in the folder `place`, or `place`. Raises `SourceError`."""
     if not place or not Path(place).is_dir():
         return place
     files = sorted(Path(place).glob("*.mcap"))
@@ -245,7 +245,7 @@ def _inside(place: str) -> str:
 
 
 def _fault(kind: str, encoding: str, text: bytes) -> str:
-    """Why messages of a definition cannot be read; empty if they can."""
+    """Return why messages of a definition cannot be read; empty if they can."""
     versions = [version for (known, _), version in _ENCODINGS.items() if known == encoding]
     if not versions:
         return f"its definition is written as {encoding[:40]!r}, and only ros2msg and ros1msg are known"
@@ -260,7 +260,7 @@ def _keep(table: dict[int, T], number: int, described: T) -> None:
 
 
 def _read(layout: str, content: bytes) -> tuple[int, ...]:
-    """The numbers that `content` begins with."""
+    """Return the numbers that `content` begins with."""
     try:
         return struct.unpack_from(layout, content)
     except struct.error:

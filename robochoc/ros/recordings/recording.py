@@ -1,7 +1,7 @@
 """Recordings as sources: what MCAP files and ROS 1 bags have in common when they are read.
 
-A recording may be anybody's. It is read twice: first all of it, so that nothing is acted upon that comes from a damaged
-file, then block by block, in the order of time. Sizes are checked before anything is allocated or unpacked.
+A recording may come from anywhere. It is read twice: first completely, so that nothing is acted upon that comes from a
+damaged file; then block by block, in the order of time. Sizes are checked before anything is allocated or decompressed.
 """
 
 from __future__ import annotations
@@ -23,28 +23,28 @@ from robochoc.ros.mappings import short_kind
 from robochoc.ros.recordings.types import FieldsError, UnknownTypeError, Version, types_of
 from robochoc.ros.source import ReceivedMessage, Source, SourceError
 
-BLOCK_AT_MOST = 1 << 26
-"""Bytes of a record, and of what a chunk unpacks to. Recorders make chunks of some megabytes."""
-WAITING_AT_MOST = 1 << 28
-"""Bytes of messages that wait for their turn. Only where blocks overlap in time do many."""
-UNPACKED_AT_MOST = 1 << 28
-"""Bytes that a file unpacks to, if that is more than `_RATIO` times its size."""
+BLOCK_BYTES_MAX = 1 << 26
+"""Bytes of a record, and of a decompressed chunk. Recorders make chunks of some megabytes."""
+WAITING_BYTES_MAX = 1 << 28
+"""Bytes of messages that wait for their turn. There are many only where blocks overlap in time."""
+UNPACKED_BYTES_MAX = 1 << 28
+"""Bytes of a whole decompressed file, if that is more than `_RATIO` times its size."""
 _RATIO = 100
 _ENTRY = 200
-"""About what a message takes in memory besides its bytes."""
+"""About the memory of a message, besides its bytes."""
 _STEP = 1 << 20
 
 
 Unpack = Callable[[bytes, int], bytes]
-"""Unpacks all that is given, or so many bytes if there are more. May raise anything."""
+"""Decompresses all that is given, up to so many bytes. May raise anything."""
 
 
 class RecordingDamagedError(Exception):
-    """The recording is not what it should be: what is wrong."""
+    """The recording is damaged. The message says what is wrong."""
 
 
 class RecordedChannel(NamedTuple):
-    """A topic that is listened to, as a recording has it; `fault` is why its messages cannot be read."""
+    """A topic that is wanted, as a recording has it. `fault` says why its messages cannot be read."""
 
     topic: str
     version: Version
@@ -52,7 +52,7 @@ class RecordedChannel(NamedTuple):
 
 
 class Block(NamedTuple):
-    """Part of a file that holds messages: where, how it is packed, and the time of the first one that is wanted."""
+    """A part of a file that holds messages: its offset, its compression, and the time of the first wanted message."""
 
     starts: int
     at: int
@@ -62,7 +62,7 @@ class Block(NamedTuple):
 
 
 class Entry(NamedTuple):
-    """A message, with what puts it in order."""
+    """A message, with what defines its order."""
 
     at_ns: int
     block: int
@@ -84,15 +84,15 @@ class Input:
         """CRC-32 of all that has been read."""
 
     def rewind(self) -> None:
-        """Begin once more."""
+        """Begin again."""
         self.at = self.sum = self._stream.seek(0)
 
     def take(self, size: int, what: str) -> bytes:
-        """The next `size` bytes."""
+        """Return the next `size` bytes."""
         self._check(size, what)
-        if size > BLOCK_AT_MOST:
+        if size > BLOCK_BYTES_MAX:
             raise RecordingDamagedError(
-                f"{what} of {size} bytes before byte {self.at}: more than {BLOCK_AT_MOST} are not read"
+                f"{what} of {size} bytes before byte {self.at}: more than {BLOCK_BYTES_MAX} are not read"
             )
         content = self._stream.read(size)
         self.at += len(content)
@@ -100,20 +100,20 @@ class Input:
         return content
 
     def skip(self, size: int, what: str) -> None:
-        """Pass over the next `size` bytes."""
+        """Skip the next `size` bytes."""
         self._check(size, what)
         for begin in range(0, size, _STEP):
             self.take(min(_STEP, size - begin), what)
 
     def part(self, at: int, size: int) -> bytes:
-        """What stands somewhere else; where to go on stays as it is."""
+        """Return a part of the file somewhere else. The position of `take` does not change."""
         self._stream.seek(at)
         content = self._stream.read(size)
         self._stream.seek(self.at)
         return content
 
     def close(self) -> None:
-        """Nothing more is wanted."""
+        """Close the file."""
         self._stream.close()
 
     def _check(self, size: int, what: str) -> None:
@@ -123,15 +123,15 @@ class Input:
             )
 
 
-_MOST_OTHERS = 1_000
-"""Topics that nobody listens to, and that are known by name."""
+_OTHERS_MAX = 1_000
+"""Topics that are not wanted, and whose names are kept."""
 
 
 class Recording(Source):
     """A file that gives its messages in the order of the times at which they were received."""
 
     packings: ClassVar[Mapping[str, Unpack]]
-    """How chunks may be packed, by the format's names."""
+    """How chunks may be decompressed, by the format's names of compressions."""
 
     live = False
 
@@ -139,24 +139,24 @@ class Recording(Source):
         super().__init__(place)
         if not place:
             raise SourceError("a recording needs the name of its file, as in mcap:run.mcap or rosbag:run.bag")
-        with self._told():
+        with self._errors_named():
             self._input = Input(Path(place))
         self._kinds: Mapping[str, str] = {}
         self._unpacked = 0
         self._entries: Iterator[Entry] = iter(())
 
     def listen(self, topics: Mapping[str, str]) -> None:
-        """Read all of the file once; then give what stands on these topics, from its beginning."""
+        """Read all of the file once. `next` then returns the messages on these topics, from the beginning."""
         self._kinds = topics
         self._unpacked = 0
-        with self._told():
+        with self._errors_named():
             self._input.rewind()
             blocks = sorted(self._blocks())
         self._entries = self._in_order(blocks)
 
     def next(self, wait_s: float) -> ReceivedMessage | None:  # noqa: ARG002 - all has been recorded
-        """The next message; None at the end."""
-        with self._told():
+        """Return the next message; None at the end."""
+        with self._errors_named():
             entry = next(self._entries, None)
             if entry is None:
                 return None
@@ -169,39 +169,40 @@ class Recording(Source):
             return ReceivedMessage(channel.topic, kind, fields, entry.at_ns)
 
     def close(self) -> None:
-        """Leave the file."""
+        """Close the file."""
         self._entries = iter(())
         self._input.close()
 
     @abstractmethod
     def _blocks(self) -> Iterable[Block]:
-        """Read all of the file, and find what holds messages that are wanted. Raises `RecordingDamagedError`."""
+        """Read all of the file, and return the blocks with wanted messages. Raises `RecordingDamagedError`."""
 
     @abstractmethod
     def _messages(self, body: bytes) -> Iterator[tuple[RecordedChannel, int, bytes]]:
-        """The messages of a block that are wanted: channel, time in nanoseconds, and content.
+        """Yield the wanted messages of a block: channel, time in nanoseconds, and content.
 
-        Raises `RecordingDamagedError`.
+        Raises:
+            RecordingDamagedError: The block is damaged.
         """
 
     def _wanted(self, topic: str, kind: str) -> bool:
-        """Whether somebody listens to messages of that type on that topic."""
+        """Return whether messages of that type on that topic are wanted."""
         wanted = topic in self._kinds and short_kind(self._kinds[topic]) == short_kind(kind)
-        if not wanted and len(self.others) < _MOST_OTHERS:
+        if not wanted and len(self.others) < _OTHERS_MAX:
             self.others[topic] = kind
         return wanted
 
     def _body(self, packed: bytes, packing: str, size: int) -> bytes:
-        """What a chunk holds, which should be `size` bytes."""
+        """Return the content of a chunk, which should be `size` bytes."""
         self._unpacked += size
-        if self._unpacked > max(UNPACKED_AT_MOST, _RATIO * self._input.size):
+        if self._unpacked > max(UNPACKED_BYTES_MAX, _RATIO * self._input.size):
             raise RecordingDamagedError(
                 f"its {self._input.size} bytes unpack to {self._unpacked} and more, which are not read"
             )
         return unpacked(packed, packing, size, self.packings)
 
     def _in_order(self, blocks: Iterable[Block]) -> Iterator[Entry]:
-        """All messages of `blocks`, which come in the order of their first ones."""
+        """Yield all messages of `blocks`, which come in the order of their first ones."""
         waiting: list[Entry] = []
         size = 0
         for number, block in enumerate(blocks):
@@ -213,7 +214,7 @@ class Recording(Source):
             for place, (channel, at_ns, content) in enumerate(self._messages(body)):
                 heapq.heappush(waiting, Entry(at_ns, block.at, place, channel, content))
                 size += _ENTRY + len(content)
-                if size > WAITING_AT_MOST:
+                if size > WAITING_BYTES_MAX:
                     raise RecordingDamagedError(
                         f"its messages are out of order: at chunk {number}, too many wait for their turn"
                     )
@@ -221,8 +222,8 @@ class Recording(Source):
             yield heapq.heappop(waiting)
 
     @contextmanager
-    def _told(self) -> Iterator[None]:
-        """Whatever is wrong with the file is told with its name."""
+    def _errors_named(self) -> Iterator[None]:
+        """Raise errors of the file as `SourceError`, with its name."""
         try:
             yield
         except (RecordingDamagedError, UnknownTypeError) as error:
@@ -232,13 +233,14 @@ class Recording(Source):
 
 
 def unpacked(packed: bytes, packing: str, size: int, packings: Mapping[str, Unpack]) -> bytes:
-    """The `size` bytes that `packed` holds; never more are unpacked than these and one.
+    """Return the `size` bytes of `packed`. No more than one byte more is decompressed.
 
-    Raises `RecordingDamagedError`.
+    Raises:
+        RecordingDamagedError: There are more bytes, or fewer, or they are no `packing`.
     """
-    if size > BLOCK_AT_MOST:
+    if size > BLOCK_BYTES_MAX:
         raise RecordingDamagedError(
-            f"a chunk says that it unpacks to {size} bytes; more than {BLOCK_AT_MOST} are not read"
+            f"a chunk says that it unpacks to {size} bytes; more than {BLOCK_BYTES_MAX} are not read"
         )
     if packing not in packings:
         raise RecordingDamagedError(
@@ -254,10 +256,10 @@ def unpacked(packed: bytes, packing: str, size: int, packings: Mapping[str, Unpa
 
 
 def as_it_is(packed: bytes, _most: int) -> bytes:
-    """For chunks that are not packed."""
+    """Return the bytes of a chunk that is not compressed."""
     return packed
 
 
 def from_lz4(packed: bytes, most: int) -> bytes:
-    """Up to `most` bytes of an LZ4 frame."""
+    """Return up to `most` bytes of an LZ4 frame."""
     return bytes(lz4.frame.LZ4FrameDecompressor().decompress(packed, max_length=most))

@@ -1,4 +1,4 @@
-"""Recorders as sinks: what MCAP files and ROS 1 bags have in common when they are written."""
+"""Recordings as sinks: what MCAP files and ROS 1 bags have in common when they are written."""
 
 from __future__ import annotations
 
@@ -15,14 +15,14 @@ from robochoc.ros.sink import Fields, Sink, SinkError
 from robochoc.system.files import PendingFile
 
 _END_OF_TIME = (1 << 32) * 10**9
-"""Nanoseconds since the epoch that ROS 1 can tell."""
+"""The first time, in nanoseconds since the epoch, that ROS 1 cannot hold."""
 
 
 class RecordingSink(Sink):
-    """Writes a file, which appears in its place when it is closed: whole, or not at all."""
+    """Writes a file. It appears in its place when it is closed: whole, or not at all."""
 
     ending: ClassVar[str]
-    """How such a sink is written on the command line."""
+    """Such a sink on the command line, as an example."""
     version: ClassVar[Version]
 
     live = False
@@ -43,27 +43,27 @@ class RecordingSink(Sink):
 
     @abstractmethod
     def finish(self) -> None:
-        """Write what stands at the end. Raises `OSError`."""
+        """Write the end of the file. Raises `OSError`."""
 
     def explain(self, original: Mapping[str, str]) -> None:
-        """Keep what topics are called in the team's files."""
+        """Keep the names that topics have in the team's files."""
         self.original = original
 
     def advertise(self, topics: Mapping[str, str]) -> None:
-        """See that all these types are known."""
+        """Check that all these types are known."""
         for topic, kind in topics.items():
             with self.sink_errors(topic):
                 types_of(self.version).definition(kind)
 
     def publish(self, topic: str, kind: str, fields: Fields, at_ns: int) -> None:
-        """Append a message, received when it is published."""
+        """Append a message. The time of its publication is also that of its reception."""
         if not 0 <= at_ns < _END_OF_TIME:
             raise SinkError(on_one_line(f"{self.place}: {topic}: a recording has no time {at_ns}"))
         with self.sink_errors(topic):
             self.write(topic, kind, fields, at_ns)
 
     def close(self) -> None:
-        """Put the file in its place. When that fails nothing is left behind."""
+        """Put the file in its place. If that fails nothing is left behind."""
         if self._open:
             self._open = False
             try:
@@ -80,7 +80,7 @@ class RecordingSink(Sink):
 
     @contextmanager
     def sink_errors(self, topic: str = "") -> Iterator[None]:
-        """Whatever is wrong is told with the file's name, and the topic's."""
+        """Raise errors as `SinkError`, with the name of the file and of the topic."""
         where = f"{self.place}: {topic}" if topic else self.place
         try:
             yield

@@ -1,4 +1,4 @@
-"""Bags of ROS 1, version 2.0 (wiki.ros.org/Bags/Format/2.0): what `rosbag play` plays.
+"""Bags of ROS 1, version 2.0 (wiki.ros.org/Bags/Format/2.0), as `rosbag play` reads them.
 
 They are written without compression, as `rosbag record` does.
 """
@@ -55,7 +55,7 @@ class RosbagSink(RecordingSink):
             self._writer.open()
 
     def write(self, topic: str, kind: str, fields: Fields, at_ns: int) -> None:
-        """Append a message. Those of a topic are numbered in their headers, as ROS 1 does."""
+        """Append a message. Headers are numbered by topic, as ROS 1 does."""
         found = self._connections.get((topic, kind)) or self._connection(topic, kind)
         self._sequence[found.id] = sequence = self._sequence.get(found.id, 0) + 1
         header = fields.get("header")
@@ -82,12 +82,12 @@ class RosbagSink(RecordingSink):
 
 
 class _Opened(NamedTuple):
-    """In the place of a path: what the library opens there is the file that has been opened already."""
+    """A path whose file is open already: the library opens it once more, and gets that file."""
 
     stream: BinaryIO
 
     def open(self, _mode: str) -> BinaryIO:
-        """The same file, for the library to close."""
+        """Return the same file, for the library to close."""
         return os.fdopen(os.dup(self.stream.fileno()), "wb")
 
 
@@ -100,11 +100,11 @@ class _Record(NamedTuple):
 
     @property
     def kind(self) -> int:
-        """Its operation code; 0 if it has none."""
+        """The operation code; 0 if there is none."""
         return self.number(b"op") if b"op" in self.header else 0
 
     def number(self, name: bytes) -> int:
-        """The number that a field holds; a time is in nanoseconds."""
+        """Return the number in a field; a time is in nanoseconds."""
         content = self.header.get(name, b"")
         layout = _LAYOUTS[name]
         if len(content) != struct.calcsize(layout):
@@ -113,7 +113,7 @@ class _Record(NamedTuple):
         return int(first) * 10**9 + int(more[0]) if more else int(first)
 
     def text(self, name: bytes) -> str:
-        """The text that a field holds; empty if there is none."""
+        """Return the text in a field; empty if there is none."""
         return self.header.get(name, b"").decode("utf-8", "replace")
 
 
@@ -147,7 +147,7 @@ class RosbagSource(Recording):
             raise RecordingDamagedError("it has less in its index than it says: it was not written to its end")
 
     def _first(self) -> dict[int, int]:
-        """How many records of some kinds the bag says that it has."""
+        """Return how many records of some kinds the bag says that it has."""
         record, size = self._header()
         if record.kind != _BAG:
             raise RecordingDamagedError("it does not begin with a bag's header")
@@ -162,7 +162,7 @@ class RosbagSource(Recording):
         return {_CHUNK: chunks, _CHUNK_INFO: chunks, _CONNECTION: record.number(b"conn_count")}
 
     def _header(self) -> tuple[_Record, int]:
-        """The next record's header, and the size of its data, which come next."""
+        """Return the next record's header, and the size of its data, which come next."""
         source = self._input
         size = self._size()
         if size > _HEADER_AT_MOST:
@@ -185,7 +185,7 @@ class RosbagSource(Recording):
         for record in _records(body):
             kind = record.kind
             if kind == _CONNECTION:
-                number, described = record.number(b"conn"), self._heard(record, body)
+                number, described = record.number(b"conn"), self._channel_of(record, body)
                 if self._channels.setdefault(number, described) != described:
                     raise RecordingDamagedError(f"connection {number} is described twice, and not the same way")
             elif kind == _MESSAGE:
@@ -200,7 +200,7 @@ class RosbagSource(Recording):
                         raise RecordingDamagedError(f"what stands on {channel.topic} cannot be read: {channel.fault}")
                     yield channel, record.number(b"time"), body[record.begin : record.end]
 
-    def _heard(self, record: _Record, body: bytes) -> RecordedChannel | None:
+    def _channel_of(self, record: _Record, body: bytes) -> RecordedChannel | None:
         topic = "/" + record.text(b"topic").lstrip("/")
         more = _Record(_fields(body[record.begin : record.end]), 0, 0)
         kind, md5 = more.text(b"type"), more.text(b"md5sum")
@@ -214,7 +214,7 @@ class RosbagSource(Recording):
 
 
 def _records(body: bytes) -> Iterator[_Record]:
-    """The records of a chunk."""
+    """Yield the records of a chunk."""
     at = 0
     while at < len(body):
         begin, end = _span(body, at)
@@ -224,7 +224,7 @@ def _records(body: bytes) -> Iterator[_Record]:
 
 
 def _span(body: bytes, at: int) -> tuple[int, int]:
-    """Where what is led by its size begins and ends."""
+    """Return where content that is preceded by its size begins and ends."""
     begin = at + _SIZE.size
     end = begin + int.from_bytes(body[at:begin], "little")
     if end > len(body) or begin > len(body):
@@ -233,7 +233,7 @@ def _span(body: bytes, at: int) -> tuple[int, int]:
 
 
 def _fields(content: bytes) -> dict[bytes, bytes]:
-    """The fields of a header: sizes, then `name=value`."""
+    """Return the fields of a header: sizes, then `name=value`."""
     found, at = {}, 0
     while at < len(content):
         begin, at = _span(content, at)

@@ -1,8 +1,8 @@
 """ROS types: from a message's fields to its bytes in ROS 1 and ROS 2, and back.
 
-The one file that knows `rosbags.typesys`. The definitions are those of ROS 1 Noetic and of ROS 2 Humble, whose types
-later ones have too, and those that installed packages bring (`mappings.py`). A definition that stands in a recording is
-compared with ours and nothing else: rosbags makes program text of definitions and runs it.
+Only this module knows `rosbags.typesys`. The definitions are those of ROS 1 Noetic and of ROS 2 Humble, whose types
+later ones have too, and those that installed packages bring (`mappings.py`). A definition in a recording is compared
+with ours and nothing else: rosbags makes program text of definitions and runs it.
 """
 
 from __future__ import annotations
@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 import operator
 import struct
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import suppress
 from functools import cache
 from numbers import Real
@@ -44,30 +44,30 @@ Make = Callable[[Any], Any]
 
 
 class UnknownTypeError(LookupError):
-    """Nobody has a definition of that ROS type, or the one that a package brings cannot be used."""
+    """There is no definition of that ROS type, or the one that a package brings cannot be used."""
 
 
 class FieldsError(ValueError):
-    """Fields that are not those of the type, or bytes that are no message of it: which, and why."""
+    """Fields that are not those of the type, or bytes that are no message of it. The message says why."""
 
 
 class Definition(NamedTuple):
-    """A type's definition, with those of its fields' types, and its MD5 sum as ROS 1 counts it."""
+    """A type's definition, with those of its fields' types, and its MD5 sum as ROS 1 computes it."""
 
     text: str
     md5: str
 
 
 class _Kind(NamedTuple):
-    """What is made of one type: its fields to the library's object, and the other way; and the object of no fields."""
+    """Conversions of one type, from fields to the library's object and back; and the object without fields."""
 
     make: Make
     fields: Make
     empty: Any
 
 
-class _DefinitionError(Exception):
-    """What is wrong with the value of a field; `path` is to the field, the last name first."""
+class _FieldError(Exception):
+    """The value of a field is wrong. `path` leads to the field, the last name first."""
 
     def __init__(self, why: str, *path: str) -> None:
         super().__init__(why)
@@ -85,7 +85,7 @@ class Types:
         self._definitions: dict[str, Definition] = {}
 
     def definition(self, kind: str) -> Definition:
-        """The definition of `kind` as recordings hold it. Raises `UnknownTypeError`."""
+        """Return the definition of `kind` as recordings hold it. Raises `UnknownTypeError`."""
         name = self._name(kind)
         if name not in self._definitions:
             text, md5 = self._store.generate_msgdef(name, ros_version=self.version)
@@ -93,25 +93,32 @@ class Types:
         return self._definitions[name]
 
     def is_the_same(self, kind: str, text: str) -> bool:
-        """Whether `text`, which may be anything, defines the fields that `kind` has. Raises `UnknownTypeError`."""
+        """Return whether `text` defines the fields that `kind` has. Raises `UnknownTypeError`."""
         return same_fields(short_kind(kind), text, self.definition(kind).text)
 
     def encode(self, kind: str, fields: Fields) -> bytes:
-        """A message's bytes: CDR in ROS 2, and as ROS 1 has it in ROS 1.
+        """Return a message's bytes: CDR in ROS 2, and ROS 1's own format.
 
-        Raises `UnknownTypeError` and `FieldsError`.
+        Raises:
+            UnknownTypeError: `kind` is unknown.
+            FieldsError: `fields` are not those of `kind`.
         """
         name = self._name(kind)
         try:
             message = self._made(kind, name).make(fields)
-        except _DefinitionError as wrong:
+        except _FieldError as wrong:
             where = ".".join(reversed(wrong.path)) or "it"
             raise FieldsError(f"{short_kind(kind)}: {where} {wrong}") from None
         store = self._store
         return bytes(store.serialize_ros1(message, name) if self.version == 1 else store.serialize_cdr(message, name))
 
     def decode(self, kind: str, content: bytes) -> dict[str, Any]:
-        """The fields of a message, whose bytes may be anything. Raises `UnknownTypeError` and `FieldsError`."""
+        """Return the fields of a message, whose bytes may be anything.
+
+        Raises:
+            UnknownTypeError: `kind` is unknown.
+            FieldsError: `content` is no `kind`.
+        """
         name = self._name(kind)
         made = self._made(kind, name)
         read = self._store.deserialize_ros1 if self.version == 1 else self._store.deserialize_cdr
@@ -121,14 +128,14 @@ class Types:
             raise FieldsError(f"{len(content)} bytes are no {short_kind(kind)}: {error}") from error
 
     def _name(self, kind: str) -> str:
-        """As the library calls it: `geometry_msgs/msg/PoseStamped`. What a package brings is learned first."""
+        """Return the library's name, `geometry_msgs/msg/PoseStamped`. A package's definition is registered first."""
         short = short_kind(kind)
         name = short.replace("/", "/msg/", 1)
         if name not in self._store.fielddefs:
             text = definition_of(kind)
             if not text:
-                told = f"ROS {self.version} has no type {kind!r} that is known here"
-                raise UnknownTypeError(f"{told}; its mapping can bring the definition (docs/guides/ros.md)")
+                problem = f"ROS {self.version} has no type {kind!r} that is known here"
+                raise UnknownTypeError(f"{problem}; its mapping can bring the definition (docs/guides/ros.md)")
             try:
                 new = get_types_from_msg(text, name)
                 self._store.register({each: what for each, what in new.items() if each not in self._store.fielddefs})
@@ -142,7 +149,7 @@ class Types:
                 self._known[kind] = self._kind(name)
             except (KeyError, RecursionError) as error:
                 raise UnknownTypeError(
-                    f"the definition of {kind!r} needs types that nobody defines: {error}"
+                    f"the definition of {kind!r} needs types that are not defined: {error}"
                 ) from error
         return self._known[kind]
 
@@ -159,7 +166,7 @@ class Types:
         def make(value: object) -> object:
             whole = _whole(value)
             if not low <= whole // _SECOND < 1 << 31:
-                raise _DefinitionError(f"must be a time in nanoseconds that ROS {self.version} has, is {value!r}")
+                raise _FieldError(f"must be a time in nanoseconds that ROS {self.version} has, is {value!r}")
             return made(whole // _SECOND, whole % _SECOND)
 
         def given(time: Any) -> int:  # noqa: ANN401 - rosbags' own type, which reads seconds as ROS 2 has them
@@ -171,29 +178,13 @@ class Types:
     def _struct(self, name: str) -> _Kind:
         made = self._store.types[name]
         parts = [(field, self._part(desc)) for field, desc in self._store.fielddefs[name][1]]
-        names = {field for field, _ in parts}
         attributes = [*getattr(made, "__dataclass_fields__", ())]  # `from` is `from_` there
         hidden = {"seq"} if name == _HEADER else {"structure_needs_at_least_one_member"}
-        shown = [
-            (field, own, part) for own, (field, part) in zip(attributes, parts, strict=False) if field not in hidden
-        ]
+        both = zip(attributes, parts, strict=False)
+        shown = [(field, own, part) for own, (field, part) in both if field not in hidden]
 
         def make(value: object) -> object:
-            if not isinstance(value, Mapping):
-                raise _DefinitionError(f"must be fields by their names, is {value!r}")
-            if not value.keys() <= names:
-                unknown = next(iter(value.keys() - names))
-                raise _DefinitionError(
-                    f"is no field of {short_kind(name)}, which has {', '.join(sorted(names))}", str(unknown)
-                )
-            values = []
-            for field, part in parts:
-                try:
-                    values.append(part.make(value[field]) if field in value else part.empty)
-                except _DefinitionError as wrong:
-                    wrong.path.append(field)
-                    raise
-            return made(*values)
+            return made(*_values_of(value, short_kind(name), parts))
 
         def fields(message: object) -> dict[str, Any]:
             return {field: part.fields(getattr(message, own)) for field, own, part in shown}
@@ -212,10 +203,10 @@ class Types:
 
         def make(values: object) -> object:
             if isinstance(values, str | bytes | Mapping) or not isinstance(values, Iterable):
-                raise _DefinitionError(f"must be a list, is {values!r}")
+                raise _FieldError(f"must be a list, is {values!r}")
             found = [*values]
             if len(found) != fixed if fixed is not None else number and len(found) > number:
-                raise _DefinitionError(
+                raise _FieldError(
                     f"must have {'' if fixed is not None else 'at most '}{number} values, has {len(found)}"
                 )
             return listed([item.make(value) for value in found])
@@ -231,8 +222,26 @@ class Types:
 
 @cache
 def types_of(version: Version) -> Types:
-    """The types of that version, made once."""
+    """Return the types of that version, made once."""
     return Types(version)
+
+
+def _values_of(value: object, kind: str, parts: Sequence[tuple[str, _Kind]]) -> list[Any]:
+    """Return the values of all fields of a `kind`. Raises `_FieldError`."""
+    if not isinstance(value, Mapping):
+        raise _FieldError(f"must be fields by their names, is {value!r}")
+    names = {field for field, _ in parts}
+    if not value.keys() <= names:
+        unknown = next(iter(value.keys() - names))
+        raise _FieldError(f"is no field of {kind}, which has {', '.join(sorted(names))}", str(unknown))
+    values = []
+    for field, part in parts:
+        try:
+            values.append(part.make(value[field]) if field in value else part.empty)
+        except _FieldError as wrong:
+            wrong.path.append(field)
+            raise
+    return values
 
 
 def _dtype(kind: str) -> str:
@@ -254,7 +263,7 @@ def _scalar(kind: str, limit: int) -> _Kind:
     def make(value: object) -> int:
         whole = _whole(value)
         if not low <= whole <= high:
-            raise _DefinitionError(f"must be a whole number from {low} to {high}, is {value!r}")
+            raise _FieldError(f"must be a whole number from {low} to {high}, is {value!r}")
         return whole
 
     return _Kind(make, as_it_is, 0)
@@ -263,17 +272,17 @@ def _scalar(kind: str, limit: int) -> _Kind:
 def _text(value: object, limit: int) -> str:
     if not isinstance(value, str) or "\0" in value or (limit and len(value) > limit):
         most = f" of at most {limit} characters" if limit else ""
-        raise _DefinitionError(f"must be text{most} without a NUL, is {value!r}")
+        raise _FieldError(f"must be text{most} without a NUL, is {value!r}")
     try:
         value.encode()
     except UnicodeEncodeError:
-        raise _DefinitionError(f"must be text that UTF-8 can hold, is {value!r}") from None
+        raise _FieldError(f"must be text that UTF-8 can hold, is {value!r}") from None
     return value
 
 
 def _truth(value: object) -> bool:
     if not isinstance(value, bool | np.bool_):
-        raise _DefinitionError(f"must be true or false, is {value!r}")
+        raise _FieldError(f"must be true or false, is {value!r}")
     return bool(value)
 
 
@@ -283,13 +292,13 @@ def _number(value: object) -> float:
     if not isinstance(value, bool) and isinstance(value, Real):
         with suppress(OverflowError):
             return float(value)
-    raise _DefinitionError(f"must be a number, is {value!r}")
+    raise _FieldError(f"must be a number, is {value!r}")
 
 
 def _single(value: object) -> float:
     number = _number(value)
     if _LARGEST_SINGLE <= abs(number) < math.inf:
-        raise _DefinitionError(f"must be a number of single precision, is {value!r}")
+        raise _FieldError(f"must be a number of single precision, is {value!r}")
     return number
 
 
@@ -297,4 +306,4 @@ def _whole(value: object) -> int:
     if not isinstance(value, bool):
         with suppress(TypeError):
             return operator.index(value)  # type: ignore[arg-type]  # that is the question
-    raise _DefinitionError(f"must be a whole number, is {value!r}")
+    raise _FieldError(f"must be a whole number, is {value!r}")

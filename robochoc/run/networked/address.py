@@ -1,4 +1,4 @@
-"""Where a master is: `HOST:PORT`, and what stands at the port after it."""
+"""The address of a master: `HOST:PORT`. Its enrolment service listens one port higher."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ _HOST = re.compile(r"[A-Za-z0-9]([A-Za-z0-9.-]*[A-Za-z0-9])?")
 
 
 class AddressError(ValueError):
-    """That is no address of a master."""
+    """A text that is no address of a master."""
 
 
 class Address(NamedTuple):
@@ -26,7 +26,7 @@ class Address(NamedTuple):
 
     @classmethod
     def parse(cls, text: str) -> Address:
-        """The place that `HOST`, `HOST:PORT` or `[IPv6]:PORT` names. Raises `AddressError`."""
+        """Return the address in `HOST`, `HOST:PORT` or `[IPv6]:PORT`. Raises `AddressError`."""
         host, port = text, ""
         if found := _BRACKETED.fullmatch(text):
             host, port = found[1], found[2] or ""
@@ -38,12 +38,12 @@ class Address(NamedTuple):
 
     @property
     def enrolment_port(self) -> int:
-        """Where tokens are redeemed."""
+        """The port where tokens are redeemed."""
         return self.port + 1
 
     @property
     def anywhere(self) -> bool:
-        """Whether it stands for all addresses of a machine, and so is the name of none."""
+        """Whether it stands for all addresses of a machine. Then robots cannot connect to it."""
         try:
             return ipaddress.ip_address(self.host).is_unspecified
         except ValueError:

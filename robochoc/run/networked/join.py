@@ -1,4 +1,4 @@
-"""A robot's side of a run: prove who it is, compile what its file says, register, search."""
+"""A robot's side of a run across machines: show its identity, compile its domain, register, search."""
 
 from __future__ import annotations
 
@@ -6,16 +6,16 @@ import time
 from dataclasses import replace
 from pathlib import Path
 
-from robochoc.authority.authority import check_name
 from robochoc.authority.enrolment import EnrolmentError, NobodyThereError, enrol, renew
 from robochoc.authority.identity import Identity, IdentityError, default_folder
+from robochoc.authority.names import check_name
 from robochoc.communication.network.robot import Ending, NetworkRobot
 from robochoc.communication.network.robot_settings import RobotSettings
 from robochoc.communication.network.transport import Transport
 from robochoc.formats import check_robot
 from robochoc.model.problem import Robot
 from robochoc.run.networked.address import Address
-from robochoc.run.registry import protocol_by_name
+from robochoc.run.registry import protocol_or_first_fit
 from robochoc.solver.compile import Compiler
 from robochoc.solver.compiled_team import CompiledRobot
 
@@ -27,10 +27,22 @@ _TRY_AGAIN_S = 0.5
 def identity_of(
     name: str, place: Address, folder: Path | None = None, token: str | None = None, patience_s: float = PATIENCE_S
 ) -> Identity:
-    """The identity of `name` in `folder`: enrolled now, if there is a `token`; renewed, if half of its life is over.
+    """Return the identity of a robot. It is enrolled now if there is a token, and renewed if half of its life is over.
 
-    With a token it waits for a master that does not listen yet, for at most `patience_s` seconds. Raises
-    `InvalidNameError`, `IdentityError`, `TokenError`, `NotTrustedError`, `EnrolmentError`, `OSError`.
+    Args:
+        name: The robot's name.
+        place: The address of the master.
+        folder: The folder of the identity (None: the default).
+        token: A token with which the robot enrols.
+        patience_s: How many seconds to wait, with a token, for a master that does not listen yet.
+
+    Raises:
+        InvalidNameError: when the name cannot be a robot's.
+        IdentityError: when the folder has no identity, or that of another robot.
+        TokenError: when the token is none.
+        NotTrustedError: when the master's Authority is not the one that the token is from.
+        EnrolmentError: when the robot is not enrolled.
+        OSError: when the identity cannot be written.
     """
     check_name(name)
     folder = folder or default_folder(name)
@@ -59,14 +71,27 @@ def _enrolled(name: str, place: Address, folder: Path, token: str, patience_s: f
 
 
 def join(robot: Robot, place: Address, identity: Identity, settings: RobotSettings, compiler: Compiler) -> Ending:
-    """Be `robot` in one run of the master at `place`. `compiler` compiles its domain.
+    """Take part as `robot` in one run of a master.
 
-    Raises `InvalidInputError` for a robot that is not valid by itself, `CannotConnectError`, and what compiling raises.
+    Args:
+        robot: The robot, as its file says.
+        place: The address of the master.
+        identity: The robot's identity.
+        settings: How the robot takes part.
+        compiler: Compiles the robot's domain.
+
+    Returns:
+        How the run ended for the robot.
+
+    Raises:
+        InvalidInputError: when the robot is not valid by itself.
+        CannotConnectError: when no master answers.
+        CompileError: when its domain cannot be compiled, and the others of `Compiler.compile`.
     """
     check_robot(robot)
     settings.stage("compiling")
     settings = replace(settings, compiled=lambda shown: compiler.compile(shown).domain)
     own = CompiledRobot(robot, settings.compiled)
     settings.stage(f"looking for the master at {place}")
-    with Transport(str(place), identity, watch=(), patience_s=settings.patience_s) as post:
-        return NetworkRobot(own, identity, post, protocol_by_name, settings).run()
+    with Transport(str(place), identity, watch=(), patience_s=settings.patience_s) as transport:
+        return NetworkRobot(own, identity, transport, protocol_or_first_fit, settings).run()

@@ -21,7 +21,7 @@ from robochoc.model.outcome import ALL_ROBOTS, Outcome, Verdict
 from robochoc.model.problem import Domain, ProblemKind, Team, Variable
 from robochoc.run.distributed import Deployment
 from robochoc.run.evaluation import CheckedAssignment, Search, is_proven
-from robochoc.run.incumbent import joined
+from robochoc.run.incumbent import merged_values
 from robochoc.run.options import Options
 from robochoc.run.withdrawal import Phase
 from robochoc.verification.checker import RefutedError
@@ -118,7 +118,7 @@ class Machines(Deployment):
         held, cost = self._master.checked(self._values)
         self._refuse_contradictions()
         if held and (phase.withdrawal or not without):
-            return CheckedAssignment(joined(self._values), cost, without, check_counts=state.thoroughness)
+            return CheckedAssignment(merged_values(self._values), cost, without, check_counts=state.thoroughness)
         if is_proven(phase, result):
             against = "; ".join(state.objections) or f"{listed(without)} has no value"
             source = f"{result.witness} says that" if result.witness else "all fell quiet, so that"
@@ -159,7 +159,7 @@ def claimed(outcome: Outcome) -> Outcome:
         case Verdict.UNKNOWN:
             by = None if outcome.bound is None else ALL_ROBOTS
         case Verdict.SOLUTION:
-            by = (outcome.witness if outcome.aside else None) if outcome.verified else ALL_ROBOTS
+            by = (outcome.witness if outcome.withdrawn_alive else None) if outcome.verified else ALL_ROBOTS
         case never:
             assert_never(never)
     return replace(outcome, claimed_by=by)

@@ -13,14 +13,14 @@
   };
 
   Sniffer.Chart = class {
-    constructor(model, view, lanes, filter, told) {
-      Object.assign(this, { model, view, lanes, filter, told });
+    constructor(model, view, lanes, filter, handlers) {
+      Object.assign(this, { model, view, lanes, filter, handlers });
       this.canvas = Sniffer.byId("drawing");
       this.tip = Sniffer.byId("tip");
       this.sideways = Sniffer.byId("sideways");
       this.shape = new Sniffer.Shape(model, view, lanes, filter);
       this.drawing = new Sniffer.Drawing(model, view, this.shape);
-      this.heads = new Sniffer.Heads(model, view, lanes, this.shape, told);
+      this.heads = new Sniffer.Heads(model, view, lanes, this.shape, handlers);
       this.minimap = new Sniffer.Minimap(model, view, this.shape, () => this.scrolled());
       this.costs = []; // of the last frames, in ms
       this._listen();
@@ -191,11 +191,11 @@
 
     _click(event) {
       const { message, step } = this.at(event);
-      if (message !== undefined) this.told.message(message);
-      else if (step !== undefined) this.told.step(step);
+      if (message !== undefined) this.handlers.message(message);
+      else if (step !== undefined) this.handlers.step(step);
       else {
         const lane = this.lanes.list[this.shape.laneAt(event.clientX - this.canvas.getBoundingClientRect().left)];
-        if (lane && lane.robots.length === 1 && !lane.others) this.told.robot(lane.robots[0]);
+        if (lane && lane.robots.length === 1 && !lane.others) this.handlers.robot(lane.robots[0]);
       }
     }
 
@@ -232,7 +232,7 @@
       return [
         Sniffer.make("strong", {}, `${Sniffer.count(m)} ${kind.name}`),
         Sniffer.make("span", {}, `${model.nameOf(sender[m])} → ${model.nameOf(receiver[m])}`),
-        this.told.words(m) ? Sniffer.make("em", {}, this.told.words(m)) : null,
+        this.handlers.words(m) ? Sniffer.make("em", {}, this.handlers.words(m)) : null,
         Sniffer.make("small", {}, `t = ${Sniffer.moment(t[m])}, ${fate}, ${Sniffer.many(bytes[m], "byte")}`),
       ];
     }

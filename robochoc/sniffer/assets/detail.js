@@ -24,18 +24,18 @@
   };
 
   /* A button that goes to a message. */
-  Sniffer.link = (model, message, told) => {
+  Sniffer.link = (model, message, handlers) => {
     const { make } = Sniffer;
     const { sender, receiver } = model.messages;
     const mark = make("i", { class: "swatch" });
     mark.style.background = Sniffer.palette.colour(model.messages.kind[message]);
-    return make("li", {}, make("button", { type: "button", class: "plain link", onclick: () => told.message(message) },
+    return make("li", {}, make("button", { type: "button", class: "plain link", onclick: () => handlers.message(message) },
       mark, make("b", {}, Sniffer.count(message)), ` ${model.kindOf(message).name} `,
       make("span", { class: "soft" }, `${model.nameOf(sender[message])} → ${model.nameOf(receiver[message])}`)));
   };
 
-  Sniffer.links = (model, messages, told, none) => {
-    const list = [...messages.slice(0, LINKS)].map((message) => Sniffer.link(model, message, told));
+  Sniffer.links = (model, messages, handlers, none) => {
+    const list = [...messages.slice(0, LINKS)].map((message) => Sniffer.link(model, message, handlers));
     if (messages.length > LINKS) list.push(Sniffer.make("li", { class: "soft" }, `and ${Sniffer.count(messages.length - LINKS)} more`));
     return list.length ? Sniffer.make("ul", { class: "links" }, ...list) : Sniffer.make("p", { class: "soft" }, none);
   };
@@ -58,8 +58,8 @@
   };
 
   Sniffer.Detail = class {
-    constructor(model, view, texts, saving, told) {
-      Object.assign(this, { model, view, texts, saving, told });
+    constructor(model, view, texts, saving, handlers) {
+      Object.assign(this, { model, view, texts, saving, handlers });
       this.element = Sniffer.byId("message");
     }
 
@@ -81,7 +81,7 @@
 
     _show(m) {
       const { make, count, moment } = Sniffer;
-      const { model, told } = this;
+      const { model, handlers } = this;
       const { sender, receiver, t, step, bytes, clock } = model.messages;
       const kind = model.kindOf(m);
       const taken = model.receivedStep[m];
@@ -89,7 +89,7 @@
       const to = model.nameOf(receiver[m]);
       const mark = make("i", { class: "swatch big" });
       mark.style.background = Sniffer.palette.colour(model.messages.kind[m]);
-      const robot = (number) => make("button", { type: "button", class: "plain robot", onclick: () => told.robot(number) }, model.nameOf(number));
+      const robot = (number) => make("button", { type: "button", class: "plain robot", onclick: () => handlers.robot(number) }, model.nameOf(number));
       this.words = make("blockquote", {}, "…");
       this.more = make("div");
       const causes = model.causesOf(m);
@@ -101,9 +101,9 @@
         this.words,
         kind.why ? make("p", { class: "soft" }, ...Sniffer.coded(kind.why)) : null,
         make("h3", {}, "Why it was said"),
-        Sniffer.links(model, causes, told, this._uncaused(sender[m], step[m])),
+        Sniffer.links(model, causes, handlers, this._uncaused(sender[m], step[m])),
         make("h3", {}, "What came of it"),
-        Sniffer.links(model, model.consequencesOf(m), told, taken !== Sniffer.NONE ? this._quietly(receiver[m], taken)
+        Sniffer.links(model, model.consequencesOf(m), handlers, taken !== Sniffer.NONE ? this._quietly(receiver[m], taken)
           : model.whole ? `${to} never took it in.` : `${to} has not taken it in yet.`),
         make("h3", {}, "When"),
         Sniffer.facts([["Said", `t = ${moment(t[m])}`], ["Taken in", fate], ["Run", Sniffer.runName(model.runOf(m) || { protocol: "?" })],
@@ -121,8 +121,8 @@
       const before = model.ordinal[step] ? model.ownSteps[robot].all[model.ordinal[step] - 1] : -1;
       const begins = before < 0 || model.steps.run[before] !== model.steps.run[step];
       const name = model.nameOf(robot);
-      return begins ? `${name} said it at its start: nothing had to be heard before.`
-        : `What ${name} had heard before is not in this journal.`;
+      return begins ? `${name} said it at its start, before any message had come.`
+        : `The messages that ${name} had taken in before are not in this journal.`;
     }
 
     /* What came of a message after which nothing was said. */

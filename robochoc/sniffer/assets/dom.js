@@ -64,14 +64,14 @@
   /* A tablist as ARIA's authoring practices describe it: arrows move, the chosen tab alone is in the tab order. */
   Sniffer.tabs = (list, chosen) => {
     const tabs = [...list.querySelectorAll("[role=tab]")];
-    const choose = (tab, told = true) => {
+    const choose = (tab, tell = true) => {
       for (const other of tabs) {
         const own = other === tab;
         other.setAttribute("aria-selected", String(own));
         other.tabIndex = own ? 0 : -1;
         Sniffer.byId(other.getAttribute("aria-controls")).hidden = !own;
       }
-      if (chosen && told) chosen(tab.getAttribute("aria-controls"));
+      if (chosen && tell) chosen(tab.getAttribute("aria-controls"));
     };
     for (const tab of tabs) tab.addEventListener("click", () => choose(tab));
     list.addEventListener("keydown", (event) => {

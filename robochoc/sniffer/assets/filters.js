@@ -16,8 +16,8 @@
         const input = make("input", { type: "search", placeholder, spellcheck: false });
         input.addEventListener("input", Sniffer.seldom(150, () => view.set({ [name]: input.value })));
         this[name] = input;
-        this[`${name}Nobody`] = make("p", { class: "nobody", role: "status", hidden: true });
-        return [make("label", {}, make("span", {}, label), input), this[`${name}Nobody`]];
+        this[`${name}Unknown`] = make("p", { class: "unknown", role: "status", hidden: true });
+        return [make("label", {}, make("span", {}, label), input), this[`${name}Unknown`]];
       };
       const time = (name, label) => {
         const input = make("input", { type: "number", step: "any", inputMode: "decimal" });
@@ -63,7 +63,7 @@
       this._types();
       for (const name of ["senders", "receivers"]) {
         if (document.activeElement !== this[name]) this[name].value = view[name];
-        this._unknown(view[name], this[`${name}Nobody`]);
+        this._unknown(view[name], this[`${name}Unknown`]);
       }
       for (const name of ["from", "to"]) if (document.activeElement !== this[name]) this[name].value = view[name] ?? "";
       if (this.run.options.length !== model.about.runs.length + 1)
@@ -75,18 +75,18 @@
       this.hits.checked = view.hitsOnly;
     }
 
-    /* That nobody has a name that was written, and whose names there are. */
+    /* No robot has a name that was written: which, and the names that exist. */
     _unknown(patterns, element) {
       const { robots } = this.model;
       const parts = patterns.split(",").map((part) => part.trim()).filter(Boolean);
       const key = `${patterns}|${robots.length}`;
       if (element.dataset.of === key) return;
       element.dataset.of = key;
-      const nobody = robots.length ? parts.find((part) => !robots.some(Sniffer.matcher(part))) : undefined;
-      element.hidden = nobody === undefined;
-      const begun = robots.filter((name) => nobody && name.toLowerCase().includes(nobody.toLowerCase()));
+      const unknown = robots.length ? parts.find((part) => !robots.some(Sniffer.matcher(part))) : undefined;
+      element.hidden = unknown === undefined;
+      const begun = robots.filter((name) => unknown && name.toLowerCase().includes(unknown.toLowerCase()));
       const some = (begun.length ? begun : robots).slice(0, 2).join(" and ");
-      element.textContent = element.hidden ? "" : `No robot is named ${nobody}; there ${robots.length > 1 ? "are" : "is"} ${some}.`;
+      element.textContent = element.hidden ? "" : `No robot is named ${unknown}; there ${robots.length > 1 ? "are" : "is"} ${some}.`;
     }
 
     /* One box a type, with its colour, dash and count; and one a performative, where that says more than the types. */

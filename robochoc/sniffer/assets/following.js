@@ -5,8 +5,8 @@
   const PAUSE_MS = 15; // between pieces, for frames to be painted
 
   Sniffer.Following = class {
-    constructor(model, source, told) {
-      Object.assign(this, { model, source, told });
+    constructor(model, source, handlers) {
+      Object.assign(this, { model, source, handlers });
       this.goal = { messages: 0, steps: 0, decisions: 0 };
       this.gone = false;
       this.trouble = "";
@@ -25,7 +25,7 @@
     /* `news`: about's numbers as they are by now. */
     async news(news) {
       const { model } = this;
-      if (news.generation !== undefined && news.generation !== model.about.generation) return this.told.anew();
+      if (news.generation !== undefined && news.generation !== model.about.generation) return this.handlers.anew();
       for (const name of ["messages", "steps", "decisions"]) this.goal[name] = Math.max(news[name] ?? 0, this.goal[name]);
       const { about } = model;
       const lists = { robots_count: "robots", kinds_count: "kinds", runs_count: "runs", notes_count: "notes" };
@@ -33,7 +33,7 @@
       for (const [count, list] of Object.entries(lists)) if (news[count] !== undefined) about[list + "_told"] = news[count];
       if (news.over !== undefined) this._stale = this._stale || news.over !== about.over;
       for (const name of ["over", "verdict", "damage", "unseen"]) if (news[name] !== undefined) about[name] = news[name];
-      this.told.changed();
+      this.handlers.changed();
       return this.pull();
     }
 
@@ -47,7 +47,7 @@
         this.trouble = trouble.message;
       } finally {
         this._pulling = false;
-        this.told.changed();
+        this.handlers.changed();
       }
     }
 
@@ -57,10 +57,10 @@
       if (this._stale || model.outgrown) {
         this._stale = false;
         const about = await source.about();
-        if (about.generation !== model.about.generation) return this.told.anew();
+        if (about.generation !== model.about.generation) return this.handlers.anew();
         for (const list of ["robots", "kinds", "runs", "notes"]) about[list + "_told"] = model.about[list + "_told"];
         model.update(about);
-        this.told.about();
+        this.handlers.about();
         for (const name of ["messages", "steps", "decisions"]) goal[name] = Math.max(about[name], goal[name]);
       }
       const upTo = (from, to) => Math.min(to, from + source.span);
@@ -81,7 +81,7 @@
       }
       const more = before[0] < model.messageCount || before[1] < model.stepCount || before[2] < model.decisionCount;
       model.whole = this.whole;
-      if (more) this.told.grown();
+      if (more) this.handlers.grown();
       return more || Boolean(this._stale);
     }
 
@@ -95,7 +95,7 @@
     _listen() {
       this.source.onNews((news) => this.news(news), (over) => {
         this.gone = !over;
-        this.told.changed();
+        this.handlers.changed();
       });
     }
   };

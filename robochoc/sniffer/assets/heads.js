@@ -2,8 +2,8 @@
 /* The boxes over the lifelines: who it is, and its value at the moment. They can be pressed, dragged, and moved by keys. */
 (() => {
   Sniffer.Heads = class {
-    constructor(model, view, lanes, shape, told) {
-      Object.assign(this, { model, view, lanes, shape, told });
+    constructor(model, view, lanes, shape, handlers) {
+      Object.assign(this, { model, view, lanes, shape, handlers });
       this.element = Sniffer.byId("heads");
       this.pool = [];
       this.element.addEventListener("pointerdown", (event) => this._grab(event));
@@ -91,7 +91,7 @@
       if (lane.group) {
         this.view.collapsed.delete(lane.group);
         this.view.touch("collapsed");
-      } else if (!lane.others) this.told.robot(lane.robots[0]);
+      } else if (!lane.others) this.handlers.robot(lane.robots[0]);
     }
 
     _key(event) {

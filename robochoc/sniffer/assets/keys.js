@@ -18,7 +18,7 @@
     ["Red cross", "it was never taken in; while the run goes on, a dotted arrow is one not taken in yet"],
     ["Pink line", "the moment chosen below; what comes later is faded"],
     ["▴ ▾", "a cause, a consequence, of the chosen message"],
-    ["Light lifelines", "who says the chosen message, and who hears it; the chosen robot's own line is bold"],
+    ["Light lifelines", "sender and receiver of the chosen message; the chosen robot's own line is bold"],
     ["⚑", "found out how the run ends; the verdict above goes to that step"],
     ["Strip on the right", "the whole run: how much is said of which type, where the window is (frame), the moment (pink), hits (yellow); press it to go there"],
     ["⊞", "one lifeline for all robots of a group; ⊟: one for each again"],

@@ -7,8 +7,8 @@
   const COLUMNS = [["#", "number"], ["Time", "time"], ["From", "from"], ["To", "to"], ["Type", "type"], ["What it says", "says"]];
 
   Sniffer.List = class {
-    constructor(model, view, filter, source, told) {
-      Object.assign(this, { model, view, filter, source, told });
+    constructor(model, view, filter, source, handlers) {
+      Object.assign(this, { model, view, filter, source, handlers });
       this.grid = Sniffer.byId("grid");
       this.table = Sniffer.byId("table");
       this.rows = [];
@@ -28,7 +28,7 @@
       grid.addEventListener("wheel", (event) => this._wheel(event), { passive: false });
       grid.addEventListener("click", (event) => {
         const row = event.target.closest(".row[data-message]");
-        if (row) this.told.message(Number(row.dataset.message));
+        if (row) this.handlers.message(Number(row.dataset.message));
       });
       new ResizeObserver(() => this._measure()).observe(grid);
     }
@@ -135,7 +135,7 @@
     _fill(row, at) {
       const { model, view } = this;
       const m = this.filter.at(at);
-      const words = this.told.words(m);
+      const words = this.handlers.words(m);
       const hit = this.marks && this.marks.has(m);
       const key = `${m}|${at}|${view.selected === m}|${words.length}|${hit}|${view.colourBy}|${Sniffer.palette.dark}`;
       if (row.dataset.shown === key) return;
@@ -164,10 +164,10 @@
     _words(first, shown) {
       const chunks = new Set();
       for (let at = 0; at < shown; at++) chunks.add(this.filter.at(first + at) >> 10);
-      const missing = [...chunks].filter((chunk) => !this.told.has(chunk, this.model.messageCount));
+      const missing = [...chunks].filter((chunk) => !this.handlers.has(chunk, this.model.messageCount));
       if (!missing.length) return;
       clearTimeout(this._asking);
-      this._asking = setTimeout(() => this.told.ask(missing.slice(0, 4)), 120); // not for each that is scrolled past
+      this._asking = setTimeout(() => this.handlers.ask(missing.slice(0, 4)), 120); // not for each that is scrolled past
     }
 
     /* Brings a row into the window: by as little as that takes where it is near, else with some of what is around it. */

@@ -22,21 +22,21 @@
       this.filter = new Sniffer.Filter(model, view, this.search);
       this.saving = new Sniffer.Saving(model, this.filter, this.texts, source);
       this.time = new Sniffer.Time(model, view);
-      const told = { message: (m) => this.message(m), step: (step) => this.time.go(step), robot: (robot) => this.robot(robot),
+      const handlers = { message: (m) => this.message(m), step: (step) => this.time.go(step), robot: (robot) => this.robot(robot),
         words: (m) => this.texts.words(m), has: (chunk) => this.texts.has(chunk), ask: (chunks) => this.texts.ask(chunks),
         begin: () => this.again() };
-      this.chart = new Sniffer.Chart(model, view, this.lanes, this.filter, told);
-      this.list = new Sniffer.List(model, view, this.filter, source, { ...told, message: (m) => {
+      this.chart = new Sniffer.Chart(model, view, this.lanes, this.filter, handlers);
+      this.list = new Sniffer.List(model, view, this.filter, source, { ...handlers, message: (m) => {
         this.message(m);
         if (this.windows.narrow()) this.windows.right(true); // there is no room for it beside the table
       } });
-      this.robots = new Sniffer.RobotList(model, view, this.lanes, told);
+      this.robots = new Sniffer.RobotList(model, view, this.lanes, handlers);
       this.filters = new Sniffer.FilterPane(model, view, this.filter);
-      this.detail = new Sniffer.Detail(model, view, this.texts, this.saving, told);
-      this.state = new Sniffer.StatePane(model, view, source, told);
+      this.detail = new Sniffer.Detail(model, view, this.texts, this.saving, handlers);
+      this.state = new Sniffer.StatePane(model, view, source, handlers);
       this.following = new Sniffer.Following(model, source, {
         grown: () => this.grown(), changed: () => this.status(), about: () => this.met(), anew: () => this.anew() });
-      this.notices = new Sniffer.Notices(model, this.following, told);
+      this.notices = new Sniffer.Notices(model, this.following, handlers);
       this.address = new Sniffer.Address(model, view, () => this.time.touched);
       this.sight = new Sniffer.Sight(this);
       this.legend = new Sniffer.Legend(model, view);

@@ -1,11 +1,11 @@
 "use strict";
-/* What is to be known about the run as a whole, told calmly above it: damage, losses, what is missing, what has ended. */
+/* What is to be known about the run as a whole, shown above it: damage, losses, what is missing, what has ended. */
 (() => {
   const SHOWN = 3; // of one kind; the others are counted
 
   Sniffer.Notices = class {
-    constructor(model, following, told) {
-      Object.assign(this, { model, following, told });
+    constructor(model, following, handlers) {
+      Object.assign(this, { model, following, handlers });
       this.element = Sniffer.byId("notices");
       this.closed = new Set();
     }
@@ -18,8 +18,8 @@
       else if (following.trouble) said.push(["trouble", `Not all could be loaded: ${following.trouble}`]);
       if (about.damage) said.push(["damage", `The journal is damaged, and ends early: ${about.damage}`]);
       if (about.over && !about.outcome && !about.damage) said.push(["broken", "The run broke off: the journal does not say how it ended. All it has is shown."]);
-      if (about.over && !about.messages) said.push(["empty", "Nobody has said anything in this run."]);
-      if (about.unseen) said.push(["unseen", `${Sniffer.many(about.unseen, "message was", "messages were")} taken in that nobody was seen to say; they have no arrow.`]);
+      if (about.over && !about.messages) said.push(["empty", "There are no messages in this run."]);
+      if (about.unseen) said.push(["unseen", `${Sniffer.many(about.unseen, "message was", "messages were")} taken in whose sending is not in the journal; they have no arrow.`]);
       if (about.replay) said.push(["replay", `What robots knew cannot be worked out again: ${about.replay}`]);
       const kept = [...(about.notes || []), ...(about.losses || []), ...(about.refusals || [])].filter((note) => !note.kind || ["lost", "refused"].includes(note.kind));
       const shown = kept.slice(0, SHOWN);
@@ -36,7 +36,7 @@
     _notice(key, text, step) {
       const { make } = Sniffer;
       return make("p", { class: `notice ${key.split(" ")[0]}` }, make("span", {}, ...Sniffer.coded(text)),
-        step === undefined ? null : make("button", { type: "button", onclick: () => this.told.step(step) }, "Show"),
+        step === undefined ? null : make("button", { type: "button", onclick: () => this.handlers.step(step) }, "Show"),
         make("button", { type: "button", class: "plain", "aria-label": `Close: ${text}`, title: "Close", onclick: () => {
           this.closed.add(key);
           this.paint();

@@ -2,8 +2,8 @@
 /* The list of robots: who has a lifeline, which groups share one, in which order. */
 (() => {
   Sniffer.RobotList = class {
-    constructor(model, view, lanes, told) {
-      Object.assign(this, { model, view, lanes, told });
+    constructor(model, view, lanes, handlers) {
+      Object.assign(this, { model, view, lanes, handlers });
       this.open = new Set(); // groups whose robots are listed
       this.wanted = "";
       this.element = Sniffer.byId("robots");
@@ -19,7 +19,7 @@
         this.paint();
       });
       this.tree = make("ul", { class: "tree" });
-      this.these = button("Only these", "A lifeline for those found, and for nobody else", () => this._only(this._found()));
+      this.these = button("Only these", "Lifelines for the robots found only", () => this._only(this._found()));
       this.neighbours = button("Only neighbours", "", () => this._neighbours());
       this.summary = make("p", { class: "soft" });
       this.group = make("button", { type: "button", onclick: () => this._group() }, "One lifeline for these");
@@ -38,7 +38,7 @@
           button("Expand groups", "One lifeline for each robot", () => this._collapse(false)),
           button("Reset", "Robots, groups and order as they were at first", () => {
             this.search.value = this.wanted = "";
-            this.told.begin();
+            this.handlers.begin();
             this.paint();
           })),
       );
@@ -147,7 +147,7 @@
       return make("li", { class: view.robot === robot ? "entry chosen" : "entry" },
         box,
         make("button", { type: "button", class: "plain name", "data-key": `name ${name}`, "aria-pressed": String(view.robot === robot),
-          onclick: () => this.told.robot(robot),
+          onclick: () => this.handlers.robot(robot),
           onkeydown: (event) => this._move(event, robot) }, name),
         make("small", {}, model.valueAt(robot, view.moment)));
     }

@@ -42,7 +42,7 @@
       };
     }
 
-    async save(m, scope, format, told) {
+    async save(m, scope, format, report) {
       const { name, every } = this.scopes(m)[scope];
       const messages = every();
       const parts = [];
@@ -55,12 +55,12 @@
         if (text.length < 1 << 20) continue;
         parts.push(text);
         text = "";
-        told(`${Sniffer.count(i + 1)} of ${Sniffer.many(messages.length, "message")}`);
+        report(`${Sniffer.count(i + 1)} of ${Sniffer.many(messages.length, "message")}`);
       }
       if (format === "json" && scope !== "message") text += messages.length ? "\n]\n" : "[]\n";
       parts.push(text);
       download(parts, "text/plain;charset=utf-8", nameOfFile(`${this.model.about.team}-${name}.${format}`));
-      told(`Saved ${Sniffer.many(messages.length, "message")}`);
+      report(`Saved ${Sniffer.many(messages.length, "message")}`);
     }
 
     panel(m) {
@@ -72,7 +72,7 @@
         make("option", { value: "shown" }, "all that is shown"));
       const news = make("span", { class: "soft", role: "status" });
       const button = (format, text) => make("button", { type: "button", onclick: () => {
-        this.save(m, scope.value, format, (told) => (news.textContent = told))
+        this.save(m, scope.value, format, (text) => (news.textContent = text))
           .catch((trouble) => (news.textContent = `This could not be saved: ${trouble.message}`));
       } }, text);
       return make("section", {},

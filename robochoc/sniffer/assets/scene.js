@@ -119,8 +119,17 @@
       }
       this.commands = null;
       this.paintSky();
+      this.label();
       this.objects.forEach((object, drone) => object.position.set(...this.targets[drone]));
       return true;
+    }
+
+    /* Labels that can be read, and do not cover each other, from wherever one looks. */
+    label() {
+      const object = (path) => this.viewer.scene_tree.find(["meshcat", ...path.split("/")]).object;
+      const names = this.drones.map((drone) => object(`${drone.path}/name`));
+      const labels = new Labels(this.viewer, names, object("axes"), () => [this.stage.offsetWidth, this.stage.offsetHeight]);
+      setInterval(() => this.stage.offsetWidth && labels.choose(), Labels.EVERY);
     }
 
     fail(sentence) {
@@ -158,12 +167,12 @@
     }
   }
 
-  /* Nobody is known yet: the scene begins with the first decision. */
+  /* No robot is known yet: the scene begins with the first decision. */
   class Waiting {
     constructor(element) {
       this.element = element;
       this.step = 0;
-      Sniffer.fill(element, Sniffer.make("p", { class: "hint" }, "Nobody has decided anything yet."));
+      Sniffer.fill(element, Sniffer.make("p", { class: "hint" }, "No robot has decided anything yet."));
     }
 
     show(step) {

@@ -7,8 +7,8 @@
   Sniffer.CHUNK = CHUNK;
 
   Sniffer.Search = class {
-    constructor(model, source, told) {
-      Object.assign(this, { model, source, told });
+    constructor(model, source, changed) {
+      Object.assign(this, { model, source, changed });
       this.clear();
     }
 
@@ -30,10 +30,10 @@
         this.clear();
         this.query = wanted;
       }
-      if (!wanted || this.running) return this.told();
+      if (!wanted || this.running) return this.changed();
       const turn = this._turn;
       this.running = true;
-      this.told();
+      this.changed();
       try {
         await this._through(turn);
       } catch (trouble) {
@@ -41,7 +41,7 @@
       }
       if (turn !== this._turn) return undefined;
       this.running = false;
-      return this.told();
+      return this.changed();
     }
 
     async _through(turn) {
@@ -58,7 +58,7 @@
         this._searched.set(chunk, details.length);
         this.looked += details.length - before;
         this._keep(found);
-        this.told(found.length > 0);
+        this.changed(found.length > 0);
       }
     }
 

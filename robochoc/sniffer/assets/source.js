@@ -73,9 +73,9 @@
       const socket = new WebSocket(address);
       let over = false;
       socket.addEventListener("message", (event) => {
-        const told = JSON.parse(event.data);
-        over = told.over;
-        news(told);
+        const state = JSON.parse(event.data);
+        over = state.over;
+        news(state);
       });
       socket.addEventListener("close", () => gone(over));
     }

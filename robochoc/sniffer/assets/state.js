@@ -8,13 +8,13 @@
 
   /* Why there are no states from this one on; empty: there may be. */
   const ending = (state) => {
-    const told = state && state.more && state.more.replay;
-    return told && told.startsWith("ends here") ? told.replace(/^ends here: */, "") : "";
+    const note = state && state.more && state.more.replay;
+    return note && note.startsWith("ends here") ? note.replace(/^ends here: */, "") : "";
   };
 
   Sniffer.StatePane = class {
-    constructor(model, view, source, told) {
-      Object.assign(this, { model, view, source, told });
+    constructor(model, view, source, handlers) {
+      Object.assign(this, { model, view, source, handlers });
       this.element = Sniffer.byId("robot");
       this._turn = 0;
     }
@@ -38,14 +38,14 @@
 
     _show(robot, own) {
       const { make, count } = Sniffer;
-      const { model, told } = this;
+      const { model, handlers } = this;
       const steps = model.ownSteps[robot];
       const step = own >= 0 ? steps.all[own] : -1;
-      const go = (to, text) => make("button", { type: "button", disabled: to < 0 || to >= steps.length, onclick: () => told.step(steps.all[to]) }, text);
+      const go = (to, text) => make("button", { type: "button", disabled: to < 0 || to >= steps.length, onclick: () => handlers.step(steps.all[to]) }, text);
       const changes = model.decided[robot].step;
       const change = Sniffer.lowerBound(changes.all, step, changes.length);
       const next = changes.all[change] === step && change < changes.length ? change + 1 : change;
-      const mind = (at, text) => make("button", { type: "button", disabled: at < 0 || at >= changes.length, onclick: () => told.step(changes.all[at]) }, text);
+      const mind = (at, text) => make("button", { type: "button", disabled: at < 0 || at >= changes.length, onclick: () => handlers.step(changes.all[at]) }, text);
       const held = this.element.contains(document.activeElement) ? document.activeElement.textContent : "";
       this.state = make("div", { class: "state" }, make("p", { class: "soft" }, "…"));
       const variables = (model.about.robots[robot] || {}).variables || [];
@@ -56,7 +56,7 @@
           : `its ${step < this.view.moment ? "last step before this moment:" : "step"} ${count(own + 1)} of ${count(steps.length)}; `
             + `step ${count(step + 1)} of all, t = ${Sniffer.moment(model.steps.t[step])}`),
         model.concluded.has(robot) ? make("p", { class: "concluded" },
-          make("button", { type: "button", class: "plain robot", onclick: () => told.step(model.concluded.get(robot).step) }, `⚑ It ${model.concluded.get(robot).text}`)) : null,
+          make("button", { type: "button", class: "plain robot", onclick: () => handlers.step(model.concluded.get(robot).step) }, `⚑ It ${model.concluded.get(robot).text}`)) : null,
         make("div", { class: "buttons" }, go(own - 1, "‹ Step"), go(own + 1, "Step ›"),
           mind(change - 1, "‹ Value"), mind(next, "Value ›")),
         this.state,
@@ -71,10 +71,10 @@
     /* What the columns tell of a step: it stands here with replay and without. */
     _doing(step) {
       const { make } = Sniffer;
-      const { model, told } = this;
+      const { model, handlers } = this;
       return [
-        make("h3", {}, "Took in"), Sniffer.links(model, model.packetOf(step), told, "nothing: this is how it began"),
-        make("h3", {}, "Said"), Sniffer.links(model, model.saidIn(step), told, "nothing"),
+        make("h3", {}, "Took in"), Sniffer.links(model, model.packetOf(step), handlers, "nothing: this is how it began"),
+        make("h3", {}, "Said"), Sniffer.links(model, model.saidIn(step), handlers, "nothing"),
         make("h3", {}, "Counters"),
         Sniffer.facts([["NCCC clock", Sniffer.count(model.steps.clock[step])], ["Constraint checks", Sniffer.count(model.steps.checks[step])]]),
       ];
@@ -114,7 +114,7 @@
       Sniffer.fill(target,
         why.length ? make("div", { class: "why" }, make("h3", {}, "Why"), make("ul", {}, ...why.slice(0, MOST).map((reason) => make("li", {}, ...Sniffer.coded(reason))))) : null,
         make("h3", {}, "Agent view"),
-        state.view.length ? Sniffer.facts(state.view.map(([who, text]) => [who, text || "–"])) : make("p", { class: "soft" }, "It knows of nobody's value."),
+        state.view.length ? Sniffer.facts(state.view.map(([who, text]) => [who, text || "–"])) : make("p", { class: "soft" }, "It knows no other robot's value yet."),
         make("h3", {}, `Domain, ${Sniffer.count(left)} of ${Sniffer.count(state.domain.length)} left`),
         list(state.domain, "none", (value) => make("li", { class: value.ruled_out_by ? "out" : "left" },
           make("b", {}, value.ruled_out_by ? make("s", {}, value.value) : value.value),

@@ -1,5 +1,5 @@
 "use strict";
-/* What a user has chosen to see. Whoever changes it says what by `set`; whoever shows it is told once, afterwards. */
+/* What a user has chosen to see. Changes are made by `set`; listeners are called once, afterwards. */
 (() => {
   const ROW = 24;
 

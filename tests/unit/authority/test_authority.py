@@ -17,9 +17,7 @@ from hypothesis import strategies as st
 from robochoc.authority.authority import (
     IN_FORCE_AT_MOST,
     Authority,
-    InvalidNameError,
     NotGrantedError,
-    UnknownNameError,
 )
 from robochoc.authority.certificates import (
     MASTER,
@@ -35,11 +33,12 @@ from robochoc.authority.certificates import (
 )
 from robochoc.authority.events import Granted, Refused
 from robochoc.authority.identity import Identity, IdentityError
-from robochoc.authority.registry import Right, Role, State
+from robochoc.authority.names import InvalidNameError, UnknownNameError
+from robochoc.authority.registry import EnrolmentState, Right, Role
 from tests.support.authorities import HOUR, START, Clock, Seen, identity_of
 
 
-def state_of(authority: Authority, name: str) -> State:
+def state_of(authority: Authority, name: str) -> EnrolmentState:
     found = {member.name: member for member in authority.members()}
     return found[name].state(authority.clock())
 
@@ -122,7 +121,7 @@ def test_a_token_expires(authority: Authority, clock: Clock, seen: Seen) -> None
     clock.now += 2 * HOUR
     with pytest.raises(NotGrantedError, match="expired"):
         authority.redeem(token.secret, signing_request(new_key(), "A"))
-    assert state_of(authority, "A") is State.EXPIRED
+    assert state_of(authority, "A") is EnrolmentState.EXPIRED
     assert len(seen.refusals) == 1
 
 
@@ -232,7 +231,7 @@ def test_revocation_takes_effect_at_once_also_in_another_process(authority: Auth
         assert each.names() == ()
         with pytest.raises(NotGrantedError, match="revoked"):
             each.renew(signing_request(robot.key, "A"), robot.certificate)
-    assert state_of(authority, "A") is State.REVOKED
+    assert state_of(authority, "A") is EnrolmentState.REVOKED
 
 
 def test_revocation_takes_an_unused_token_as_well(authority: Authority) -> None:
@@ -266,7 +265,7 @@ def test_who_is_readmitted_stays_out_until_the_token_is_shown_and_old_certificat
     authority.revoke("A")
     token = authority.enrol("A")
     assert authority.is_revoked("A")
-    assert state_of(authority, "A") is State.INVITED
+    assert state_of(authority, "A") is EnrolmentState.INVITED
     key = new_key()
     new = read_certificate(authority.redeem(token.secret, signing_request(key, "A")))
     assert not authority.is_revoked("A")
@@ -339,3 +338,15 @@ def test_master_identities_are_written_where_asked(authority: Authority, tmp_pat
     master = authority.master_identity(["127.0.0.1"], tmp_path / "elsewhere")
     assert master.folder == tmp_path / "elsewhere"
     assert Identity.load(tmp_path / "elsewhere", START).name == MASTER
+
+
+def test_revoking_an_unknown_name_lists_those_that_are_enrolled(tmp_path: Path) -> None:
+    authority = Authority.create(tmp_path / "authority")
+    with pytest.raises(UnknownNameError, match=r"\(nobody is; next: robochoc authority enrol NAME\)$"):
+        authority.revoke("Robot1.2")
+    authority.enrol_all(["Scout", "Relay", "Base"])
+    with pytest.raises(UnknownNameError, match=r"^no 'Robot1.2' is enrolled \(enrolled: Base, Relay, Scout\)$"):
+        authority.revoke("Robot1.2")
+    authority.enrol_all([f"Drone{number:02}" for number in range(20)])
+    with pytest.raises(UnknownNameError, match=r"did you mean 'Scout'\? enrolled: Base, Drone00, .* and 13 more\)$"):
+        authority.revoke("Scott")

@@ -63,7 +63,7 @@ def test_secrets_are_for_their_owner_only_where_files_have_names_from_the_start(
     def unknown(*_any: object) -> None:
         return
 
-    monkeypatch.setattr(files, "_written_unnamed", unknown)
+    monkeypatch.setattr(files, "_unnamed", unknown)
     files.write_atomically(tmp_path / "secret", b"x", 0o600)
     assert mode(tmp_path / "secret") == 0o600
     assert [path.name for path in tmp_path.iterdir()] == ["secret"]

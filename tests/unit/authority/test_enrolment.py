@@ -21,7 +21,7 @@ from robochoc.authority.enrolment_server import EnrolmentServer
 from robochoc.authority.frames import (
     Answer,
     Certified,
-    Denied,
+    EnrolmentDenied,
     FrameError,
     Introduction,
     Renew,
@@ -166,13 +166,13 @@ def test_renewal_in_another_name(desk: AuthorityService, tmp_path: Path) -> None
     desk.authority.enrol("B")
     request = signing_request(robot.key, "B")
     answer = answered(desk, framed(msgspec.msgpack.encode(Renew(request))), context)
-    assert answer == Denied("the request is in another name than the certificate")
+    assert answer == EnrolmentDenied("the request is in another name than the certificate")
     assert desk.refusal()
 
 
 def test_renewal_without_a_certificate(desk: AuthorityService) -> None:
     request = signing_request(new_key(), "A")
-    assert isinstance(answered(desk, framed(msgspec.msgpack.encode(Renew(request)))), Denied)
+    assert isinstance(answered(desk, framed(msgspec.msgpack.encode(Renew(request)))), EnrolmentDenied)
     assert "shows it" in desk.refusal()
 
 
@@ -232,7 +232,7 @@ def test_a_lost_authority_is_said_and_the_service_goes_on(desk: AuthorityService
 
 @pytest.mark.parametrize(
     "answer",
-    [Introduction(b""), Introduction(b"x" * 9000), Certified(b""), Denied("no")],
+    [Introduction(b""), Introduction(b"x" * 9000), Certified(b""), EnrolmentDenied("no")],
     ids=["empty", "long", "other", "denied"],
 )
 def test_a_lying_service_is_not_believed(tmp_path: Path, answer: Answer) -> None:

@@ -19,7 +19,7 @@ from robochoc.authority.enrolment import enrol
 from robochoc.authority.enrolment_server import EnrolmentServer
 from robochoc.authority.frames import (
     LARGEST_BYTES,
-    Denied,
+    EnrolmentDenied,
     Exchange,
     FrameError,
     Introduce,
@@ -34,7 +34,7 @@ from tests.support.clocks import waiting
 def test_oversized_requests_are_not_even_read(desk: AuthorityService) -> None:
     for size in (LARGEST_BYTES + 1, 2**31, 2**32 - 1):
         answer = answered(desk, size.to_bytes(4, "big"))
-        assert isinstance(answer, Denied)
+        assert isinstance(answer, EnrolmentDenied)
         assert "allowed" in answer.why
     assert "allowed" in desk.refusal(3)
 
@@ -59,7 +59,7 @@ DEEP = b"\x82\xa4type\xa6Redeem\xa6secret" + b"\x91" * 16000
     ],
 )
 def test_malformed_requests(desk: AuthorityService, content: bytes) -> None:
-    assert isinstance(answered(desk, framed(content)), Denied)
+    assert isinstance(answered(desk, framed(content)), EnrolmentDenied)
     assert "no question" in desk.refusal()
 
 
@@ -75,7 +75,7 @@ def test_no_bytes_make_decoding_fail_otherwise(content: bytes) -> None:
 def test_an_unknown_token(desk: AuthorityService) -> None:
     question = Redeem(b"guess", signing_request(new_key(), "A"))
     answer = answered(desk, framed(msgspec.msgpack.encode(question)))
-    assert isinstance(answer, Denied)
+    assert isinstance(answer, EnrolmentDenied)
     assert "unknown" in desk.refusal()
 
 

@@ -10,14 +10,17 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from robochoc.flight.flight import Flight, FlightConditions, FlightLog, MotorFailure, fly
+from robochoc.flight.flight import Flight, fly
 from robochoc.flight.layout import Point
+from robochoc.flight.log import FlightLog
 from robochoc.flight.mission import Goal, Mission, mission_of
 from robochoc.flight.quadrotor.airframe import GRAVITY
 from robochoc.flight.quadrotor.bounds import check_length
+from robochoc.flight.quadrotor.conditions import FlightConditions, MotorFailure
 from robochoc.flight.quadrotor.simulation import DT, QuadrotorSimulation
 from robochoc.flight.reports import Blocked, OutOfOrder
-from robochoc.flight.routes.timetable import NoRouteError, TooCloseError
+from robochoc.flight.routes.moves import NoRouteError
+from robochoc.flight.routes.spacing import TooCloseError
 from robochoc.generators.queens3d import queens3d
 from robochoc.model.outcome import Outcome, Verdict
 

@@ -9,9 +9,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from robochoc.flight.routes.motion import Motion, MotionLimits, RoutePlan
+from robochoc.flight.routes.moves import NoRouteError
 from robochoc.flight.routes.paths import Space
-from robochoc.flight.routes.spacing import Array, norms, segment_distances
-from robochoc.flight.routes.timetable import Motion, MotionLimits, NoRouteError, RoutePlan, TooCloseError, plan_routes
+from robochoc.flight.routes.spacing import Array, TooCloseError, norms, segment_distances
+from robochoc.flight.routes.timetable import plan_routes
 
 HZ = 100
 LIMITS = MotionLimits()

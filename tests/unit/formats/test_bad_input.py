@@ -44,6 +44,34 @@ def test_broken_input(case: Broken, tmp_path: Path) -> None:
         assert fitting[0].endswith(")")
 
 
+def test_what_the_schema_refuses_does_not_hide_other_mistakes(tmp_path: Path) -> None:
+    edits = [
+        ('reference="ne"', 'reference="nee"'),  # another layer's mistake
+        ('x="mul(2,V3)"', 'w="mul(2,V3)"'),
+        ('<constraint model="TKC" name="C5"', '<constraint model="TKC"'),  # its name is required: it is left out
+    ]
+    text = TEAM["Robot3.xml"]
+    for before, after in edits:
+        assert before in text
+        text = text.replace(before, after)
+    write_files(tmp_path, {**TEAM, "Robot3.xml": text})
+    with pytest.raises(InvalidInputError) as caught:
+        read_team(tmp_path)
+    assert [one.message for one in caught.value.diagnostics] == [
+        "<topic> has no attribute 'w'",
+        "unknown reference 'nee'",
+        "<constraint> lacks its attribute 'name'",
+    ]
+
+
+def test_no_mistake_follows_from_what_the_schema_refuses(tmp_path: Path) -> None:
+    text = TEAM["Robot3.xml"].replace('<variable name="V3" domain="D1"/>', '<variable name="V3"/>')
+    write_files(tmp_path, {**TEAM, "Robot3.xml": text})
+    with pytest.raises(InvalidInputError) as caught:
+        read_team(tmp_path)
+    assert [one.message for one in caught.value.diagnostics] == ["<variable> lacks its attribute 'domain'"]
+
+
 def test_every_case_has_a_name_of_its_own() -> None:
     assert len({case.name for case in CASES}) == len(CASES) >= 45
 

@@ -1,4 +1,4 @@
-"""Robots and teams as XML: FORMAT.md, and Figure 2 as it stands in the paper."""
+"""Robots and teams as XML: docs/reference/format.md, and Figure 2 as it stands in the paper."""
 
 from __future__ import annotations
 

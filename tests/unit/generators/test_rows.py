@@ -73,6 +73,6 @@ def test_the_scene_counts_drones_and_not_the_robots_that_fly_several() -> None:
     aside = ("Robot2", "Robot3", "Robot4")
     told = Outcome("four", "abt", "simulator", 0, Verdict.SOLUTION, placed, withdrawn=aside, metrics=Metrics())
     scene = scene_of(told, queens3d(4, robots="rows"))
-    assert scene.title == "four: 4 of 16 fly (not proven to be the maximum)"
+    assert scene.title == "four: 4 of 16 fly (not proven to be the best)"
     assert scene.facts[0] == ("verdict", "no solution for all 16")
     assert len(scene.drones) == 16

@@ -96,11 +96,11 @@ def test_only_what_is_new_is_told() -> None:
 
 
 def test_what_stands_beside_the_problem_comes_back() -> None:
-    team, brief = queens3d(2), RunParameters(7, {"cycles": "3"}, 12)
+    team, parameters = queens3d(2), RunParameters(7, {"cycles": "3"}, 12)
     stale = invalidated_by(team, without_robots(team, ["Robot1.1"]))
-    given = through(TeamWriter().given(team, brief, stale, fresh=["Robot2.1"], quiet=False))
+    given = through(TeamWriter().given(team, parameters, stale, fresh=["Robot2.1"], quiet=False))
     assert (run_parameters_of(given), invalidated_of(given), given.fresh, given.quiet) == (
-        brief,
+        parameters,
         stale,
         ("Robot2.1",),
         False,

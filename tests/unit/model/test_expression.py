@@ -1,4 +1,4 @@
-"""Functional expressions: FORMAT.md, "Functional expressions"; Figure 2."""
+"""Functional expressions: docs/reference/format.md, "Functional expressions"; Figure 2."""
 
 from __future__ import annotations
 

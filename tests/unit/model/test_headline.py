@@ -36,11 +36,12 @@ EPOCHS = (EpochOutcome(Verdict.SOLUTION, SIX, assignment={"V1": 1}), EpochOutcom
     ],
 )
 def test_the_headline_says_what_happened(changed: dict[str, Any], headline: str) -> None:
-    assert describe_outcome(replace(SOLVED, **changed), 16) == headline
+    assert describe_outcome(replace(SOLVED, **changed), 16, weighted=False) == headline
 
 
 def test_the_headline_counts_what_the_caller_counts() -> None:
     assert describe_outcome(SOLVED, 1) == "solution for the robot"
     assert describe_outcome(SOLVED, 2, noun="drone") == "solution for all 2 drones"
     heavy = replace(SOLVED, verdict=Verdict.OPTIMAL, withdrawn=SIX)
+    assert describe_outcome(heavy, 16) == "10 of 16 fly (proven best)"
     assert describe_outcome(heavy, 16, weighted=True) == "10 of 16 fly (proven maximum by weight)"

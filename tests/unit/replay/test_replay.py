@@ -32,6 +32,7 @@ from robochoc.protocols.abt import ABT, Nogood
 from robochoc.protocols.dynabt import DynABT
 from robochoc.replay import CannotReplayError, ReplayOptions, ReplayResult, replay
 from robochoc.run import Options, Runtime, Withdrawal
+from robochoc.run.options import ScheduleName
 from robochoc.run.registry import protocol_names
 from robochoc.run.scenario import ScenarioRun
 from robochoc.run.start_events import StartEvents
@@ -92,7 +93,8 @@ def test_what_was_recorded_is_said_again(protocol: str, numbers: range, warm: Ac
 @pytest.mark.parametrize("protocol", protocol_names()[::4])
 def test_what_was_recorded_in_processes_is_said_again(protocol: str, warm: AceProcess) -> None:
     team, options = random_run(protocol, Random(f"processes {protocol}"), 0)
-    journal = recorded(team, replace(options, runtime=Runtime.PROCESSES, delay=0), warm)
+    in_processes = replace(options, runtime=Runtime.PROCESSES, delay=0, schedule=ScheduleName.CONCURRENT, channel=None)
+    journal = recorded(team, in_processes, warm)
     assert identical(replay(journal, ReplayOptions(solver=warm)))
 
 

@@ -2,20 +2,24 @@
 
 from __future__ import annotations
 
+import doctest
 import subprocess
 import sys
 from collections.abc import Iterator
 from pathlib import Path
+from types import ModuleType
 
 import pytest
 
 import robochoc
+from robochoc import api
 from robochoc.api import protocol_called
 from robochoc.formats import InvalidInputError, write_team
+from robochoc.generators import queens3d, random_csp
 from robochoc.journal.events import AnyEvent, Concluded
 from robochoc.model.outcome import Outcome, Verdict
 from robochoc.run.networked.address import AddressError
-from robochoc.run.registry import UnknownProtocolError, offers
+from robochoc.run.registry import UnknownProtocolError, installed_protocols
 from robochoc.solver.encoding import UnsupportedError
 from tests.support.deployments import Deployment
 from tests.support.problems import team_of
@@ -57,7 +61,7 @@ def test_options_are_those_of_the_command_line() -> None:
         "afc-ng", "simulator", order="random", withdraw="fewest", seed=3, delay=5, observer=told.append
     )
     assert (outcome.verdict, outcome.protocol, outcome.seed) == (Verdict.OPTIMAL, "afc-ng", 3)
-    assert len(outcome.aside) == 6
+    assert len(outcome.withdrawn_alive) == 6
     assert any(isinstance(event, Concluded) for event in told)
     stopped = problem.solve("dsa", "simulator", settings={"cycles": 7, "variant": "C"})
     assert stopped.verdict is Verdict.UNKNOWN
@@ -120,7 +124,7 @@ def test_protocols_as_the_paper_calls_them(word: str, name: str) -> None:
 
 
 def test_every_protocol_has_a_class_that_names_it() -> None:
-    named = [(offer.name, offer.protocol.__name__) for offer in offers() if offer.protocol]
+    named = [(offer.name, offer.protocol.__name__) for offer in installed_protocols() if offer.protocol]
     words = [{name.casefold(), kind.casefold()} for name, kind in named]
     assert sum(map(len, words)) == len(set().union(*words))
 
@@ -224,3 +228,11 @@ def test_one_container_holds_several_robots(site: Deployment) -> None:
     assert verdict.startswith("solution afc-ng {'V1': ")
     assert sniffed == "Base Relay Scout"
     assert [line.split()[:2] for line in container.output.splitlines()] == [[name, "solution"] for name in tokens]
+
+
+@pytest.mark.parametrize("module", [robochoc, api, queens3d, random_csp])
+def test_examples_in_docstrings_run(module: ModuleType, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(ROOT)
+    attempted = doctest.testmod(module)
+    assert attempted.attempted > 0
+    assert attempted.failed == 0

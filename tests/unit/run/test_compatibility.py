@@ -13,7 +13,7 @@ from robochoc.model.problem import Constraint, ConstraintModel, ProblemKind, Rel
 from robochoc.run import alternatives, solve
 from robochoc.run.compatibility import refuse_options
 from robochoc.run.options import OnLoss, Options, Runtime, ScheduleName, Withdrawal
-from robochoc.run.registry import Offer, offers
+from robochoc.run.registry import InstalledProtocol, installed_protocols
 from robochoc.solver.encoding import UnsupportedError
 from robochoc.solver.exact_costs import EXACT
 from tests.support.cost_problems import with_costs
@@ -70,10 +70,10 @@ def test_whoever_is_named_takes_costs_that_tables_do_not_hold(name: str, withdra
 
 
 def test_what_both_refuse_is_told_of_by_both(monkeypatch: pytest.MonkeyPatch) -> None:
-    def only_with_tables() -> list[Offer]:
-        return [offer for offer in offers() if offer.name in {"dpop", "sfb"}]
+    def only_with_tables() -> list[InstalledProtocol]:
+        return [offer for offer in installed_protocols() if offer.name in {"dpop", "sfb"}]
 
-    monkeypatch.setattr(alternatives, "offers", only_with_tables)
+    monkeypatch.setattr(alternatives, "installed_protocols", only_with_tables)
     for name in ("dpop", "sfb"):
         assert refused(dear(EXACT), options_for(name)).endswith(
             "; no protocol that is installed does (scale the costs down)"
@@ -84,7 +84,7 @@ def test_what_both_refuse_is_told_of_by_both(monkeypatch: pytest.MonkeyPatch) ->
 @pytest.mark.parametrize("withdraw", [None, Withdrawal.MINIMUM])
 def test_whoever_is_named_in_any_refusal_takes_the_team(withdraw: Withdrawal | None, team: Team) -> None:
     sent_to: set[str] = set()
-    for offer in offers():
+    for offer in installed_protocols():
         try:
             solve(team, options_for(offer.name, withdraw))
         except UnsupportedError as refusal:
@@ -99,7 +99,7 @@ def test_where_no_protocol_does_the_judge_may() -> None:
     for kind, asked in ((ProblemKind.DISWCSP, "sfb"), (ProblemKind.DISWCSP, "abt")):
         team = replace(partly_known(3), robots=tuple(replace(one, kind=kind) for one in partly_known(3).robots))
         said = refused(team, Options(protocol=asked))
-        assert said.endswith("; no protocol does, but the central judge (--protocol central)")
+        assert said.endswith("; no protocol does, but the central solver (--protocol central)")
     assert "central" not in refused(partly_known(2**31), Options(protocol="sfb"))
 
 

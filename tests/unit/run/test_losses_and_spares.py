@@ -92,7 +92,7 @@ def test_who_comes_back_has_the_same_problem_and_the_lowest_priority(team: Team)
     (epoch,) = session.epochs
     assert epoch.team.order == ("RA", "RC", "RD", "RB")
     assert epoch.restarted == frozenset({"RB"})
-    assert "RB" in epoch.void.agents
+    assert "RB" in epoch.invalidated.agents
 
 
 def test_so_many_come_back_as_there_are_spares(team: Team) -> None:

@@ -68,7 +68,7 @@ def test_judge_and_checker_see_the_files(monkeypatch: pytest.MonkeyPatch) -> Non
         seen.append(merged)
         return CentralAnswer(Verdict.NO_SOLUTION)
 
-    monkeypatch.setattr(CentralSolver, "judge", judged)
+    monkeypatch.setattr(CentralSolver, "solve", judged)
     assert solve(team, replace(SIMULATED, order=Order.DFS, verify=True)).verified
     solve(team, replace(SIMULATED, seed=1, protocol="central"))
     assert [one is team for one in seen] == [True, True]

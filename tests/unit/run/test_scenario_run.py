@@ -106,7 +106,7 @@ def test_a_lost_robot_leaves_and_the_others_go_on() -> None:
     journey, session = journey_of(BASE), Scripted(BASE, losing("RB"))
     assert teams(travel(journey, session)) == [("RA", "RB", "RC"), ("RA", "RC")]
     assert journey.withdrawn == ["RB"]
-    assert "RB" in session.epochs[0].void.agents
+    assert "RB" in session.epochs[0].invalidated.agents
 
 
 def test_events_go_on_without_those_that_were_lost() -> None:

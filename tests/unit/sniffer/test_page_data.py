@@ -219,14 +219,14 @@ def test_the_end_is_told_as_the_report_tells_it() -> None:
     assert ended(cost=0) == "A solution."
     assert ended(verdict=Verdict.OPTIMAL, cost=7) == "The best solution, of cost 7."
     assert ended(lost=("R2",), withdrawn=("R2",)) == "A solution; lost: R2."
-    aside = ended(witness="R1", withdrawn=("R2",))
-    assert aside == "No solution for all, as R1 has ruled everything out. 2 fly; aside: R2."
+    one = "2 of 3 fly (not proven to be the best): no solution for all, as R1 has ruled everything out; withdrawn: R2."
+    assert ended(witness="R1", withdrawn=("R2",)) == one
     assert ended(verdict=Verdict.NO_SOLUTION, witness="R1") == "No solution, as R1 has ruled everything out."
     assert ended(verdict=Verdict.OPTIMAL, witness="R1", cost=7) == "The best solution, of cost 7, as R1 has concluded."
     gave_up = ended(verdict=Verdict.UNKNOWN, witness="R1", reason="R1 gave up, as its protocol has it")
     assert gave_up == "No verdict: R1 gave up, as its protocol has it."
     best = ended(verdict=Verdict.OPTIMAL, withdrawn=("R1", "R2"), lost=("R1",))
-    assert best == "No solution for all. 1 fly, no better team could; aside: R2; lost: R1."
+    assert best == "1 of 3 fly (proven best; 1 lost): no solution for all; withdrawn: R2; lost: R1."
     epochs = [EpochOutcome(verdict, ("R1",)) for verdict in (Verdict.SOLUTION, Verdict.NO_SOLUTION)]
     epochs += [EpochOutcome(Verdict.UNKNOWN, ("R1",), lost=("R2",))]
     assert ended(epochs=(epochs[0],)) == "A solution."

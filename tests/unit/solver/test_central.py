@@ -1,4 +1,4 @@
-"""The central judge: cliques, symmetries and what is exported keep all solutions, and no others."""
+"""The central solver: cliques, symmetries and what is exported keep all solutions, and no others."""
 
 from __future__ import annotations
 
@@ -135,20 +135,20 @@ def test_cliques_made_explicit_keep_the_solutions() -> None:
 )
 @pytest.mark.parametrize("robots", ["cells", "rows"])
 def test_queens_are_counted(n: int, model: str, count: int, robots: str, solver: AceProcess) -> None:
-    judgement = CentralSolver(solver=solver).judge(queens3d(n, model, robots), count=True)
+    judgement = CentralSolver(solver=solver).solve(queens3d(n, model, robots), count=True)
     assert judgement.count == count
     assert judgement.verdict is (Verdict.SOLUTION if count else Verdict.NO_SOLUTION)
 
 
 def test_the_papers_528_solutions_are_all_there(solver: AceProcess) -> None:
-    assert CentralSolver(solver=solver).judge(queens3d(11), count=True).count == 528
+    assert CentralSolver(solver=solver).solve(queens3d(11), count=True).count == 528
 
 
 @pytest.mark.slow
 @pytest.mark.timeout(900)
 @pytest.mark.parametrize("model", ["planar", "full"])
 def test_twelve_have_no_solution(model: str) -> None:
-    assert CentralSolver().judge(queens3d(12, model)).verdict is Verdict.NO_SOLUTION
+    assert CentralSolver().solve(queens3d(12, model)).verdict is Verdict.NO_SOLUTION
 
 
 def test_small_permutations_with_a_value_missing_are_solved(solver: AceProcess) -> None:
@@ -164,7 +164,7 @@ def test_small_permutations_with_a_value_missing_are_solved(solver: AceProcess) 
         differ = [Constraint("C", PREDEFINED["ne"], pair, pair) for pair in itertools.combinations(domains, 2)]
         team = complex_team(owned, domains, differ)
         count = sum(len(set(row)) == size for row in itertools.product(*domains.values()))
-        assert CentralSolver(solver=solver).judge(team, count=True).count == count
+        assert CentralSolver(solver=solver).solve(team, count=True).count == count
 
 
 def test_latin_rectangles_are_counted(solver: AceProcess) -> None:
@@ -176,7 +176,7 @@ def test_latin_rectangles_are_counted(solver: AceProcess) -> None:
         differ = [Constraint("C", PREDEFINED["ne"], pair, pair) for pair in pairs]
         domains = {cell: range(1, columns + 1) for cell in cells}
         team = complex_team({f"R{cell[1:]}": [cell] for cell in cells}, domains, differ)
-        assert CentralSolver(solver=solver).judge(team, count=True).count == count
+        assert CentralSolver(solver=solver).solve(team, count=True).count == count
 
 
 def test_parts_that_share_nothing_are_multiplied(solver: AceProcess) -> None:
@@ -184,8 +184,8 @@ def test_parts_that_share_nothing_are_multiplied(solver: AceProcess) -> None:
     owned = {f"R{number}": [f"A{number}", f"B{number}"] for number in range(30)}
     domains = {name: (1, 2, 3) for names in owned.values() for name in names}
     team = complex_team(owned, domains, [Constraint("C", differ, (a, b), (a, b)) for a, b in owned.values()])
-    assert CentralSolver(solver=solver).judge(team, count=True).count == 6**30
-    assert len(CentralSolver(solver=solver).judge(team).assignment) == 60
+    assert CentralSolver(solver=solver).solve(team, count=True).count == 6**30
+    assert len(CentralSolver(solver=solver).solve(team).assignment) == 60
 
 
 def test_when_the_time_is_over_the_judge_says_unknown() -> None:
@@ -195,8 +195,8 @@ def test_when_the_time_is_over_the_judge_says_unknown() -> None:
 
 
 def test_a_no_solution_that_the_judge_refutes_ends_the_run(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(CentralSolver, "judge", lambda *_, **__: CentralAnswer(Verdict.SOLUTION))
-    with pytest.raises(RefutedError, match="no solution, and a judge has found one"):
+    monkeypatch.setattr(CentralSolver, "solve", lambda *_, **__: CentralAnswer(Verdict.SOLUTION))
+    with pytest.raises(RefutedError, match="no solution, and the central solver has found one"):
         solve(queens3d(4), Options(runtime=Runtime.SIMULATOR, verify=True))
 
 
@@ -278,4 +278,4 @@ def test_a_search_that_broke_off_proves_nothing(monkeypatch: pytest.MonkeyPatch)
     monkeypatch.setattr(AceProcess, "_hear", lambda *_: Solved(found=0, complete=False, solutions=b""))
     for options in ({"count": True}, {"count": False}):
         with pytest.raises(SolverLostError, match="stopped before"):
-            CentralSolver(always_ace=True).judge(queens3d(7), **options)
+            CentralSolver(always_ace=True).solve(queens3d(7), **options)

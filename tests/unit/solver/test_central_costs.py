@@ -1,4 +1,4 @@
-"""The central judge on costs: the least cost, the fewest aside, and second opinions."""
+"""The central solver on costs: the least cost, the fewest aside, and second opinions."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from robochoc.model.problem import INFINITE, Constraint, Predicate, Relation, Se
 from robochoc.protocols.protocol import Protocol
 from robochoc.protocols.traits import Traits
 from robochoc.run import Options, Runtime, Withdrawal, solve
-from robochoc.run.incumbent import absent
+from robochoc.run.incumbent import robots_without_values
 from robochoc.solver.ace import AceProcess
 from robochoc.solver.ace_messages import Solved
 from robochoc.solver.central import CentralAnswer, CentralSolver
@@ -134,7 +134,7 @@ def test_counting_is_for_problems_without_costs() -> None:
 def test_an_answer_that_does_not_cost_what_the_judge_says_is_none(monkeypatch: pytest.MonkeyPatch) -> None:
     team = coloring(3, 2, 2)
     wrong = CentralAnswer(Verdict.OPTIMAL, dict.fromkeys(team.variables, 1), cost=1, bound=1)
-    monkeypatch.setattr(CentralSolver, "judge", lambda *_, **__: wrong)
+    monkeypatch.setattr(CentralSolver, "solve", lambda *_, **__: wrong)
     with pytest.raises(SolverLostError, match="costs 3, and it says 1"):
         solve(team, CENTRAL)
 
@@ -142,7 +142,7 @@ def test_an_answer_that_does_not_cost_what_the_judge_says_is_none(monkeypatch: p
 def test_a_search_that_broke_off_proves_no_optimum(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(AceProcess, "_hear", lambda *_: Solved(found=1, complete=False, solutions=b"\0" * 4 * 6))
     with pytest.raises(SolverLostError, match="stopped before"):
-        CentralSolver(always_ace=True).judge(coloring(3, 2, 2))
+        CentralSolver(always_ace=True).solve(coloring(3, 2, 2))
 
 
 # --- the fewest aside -------------------------------------------------------------------------------------------------
@@ -222,7 +222,7 @@ def test_there_is_nothing_to_count_where_robots_step_aside() -> None:
 
 
 def test_maximal_is_for_the_robots() -> None:
-    with pytest.raises(UnsupportedError, match="--withdraw fewest"):
+    with pytest.raises(UnsupportedError, match="--withdraw minimum"):
         solve(queens3d(3), replace(CENTRAL, withdraw=Withdrawal.MAXIMAL))
 
 
@@ -272,7 +272,7 @@ def test_a_least_cost_that_the_judge_finds_too_is_confirmed(monkeypatch: pytest.
 
 
 def test_a_cost_that_is_not_the_least_is_refuted(monkeypatch: pytest.MonkeyPatch) -> None:
-    with pytest.raises(RefutedError, match=r"the least cost, 3, and a judge has found one that costs 1$"):
+    with pytest.raises(RefutedError, match=r"the least cost, 3, and the central solver has found one that costs 1$"):
         claimed(Cheapest, coloring(3, 2, 2), monkeypatch)
 
 
@@ -280,7 +280,7 @@ def test_more_aside_than_need_be_is_refuted(monkeypatch: pytest.MonkeyPatch) -> 
     """Nobody could be added, and yet: without the first, all others could stay."""
     pairs = [("A", name) for name in ("B", "C", "D")]
     star = team_of(dict.fromkeys("ABCD", (1,)), [Constraint("C", PREDEFINED["ne"], pair, pair) for pair in pairs])
-    with pytest.raises(RefutedError, match=r"the least cost, 3, and a judge has found one that costs 1$"):
+    with pytest.raises(RefutedError, match=r"the least cost, 3, and the central solver has found one that costs 1$"):
         claimed(OnlyTheFirst, star, monkeypatch, withdraw=Withdrawal.MINIMUM)
     heavy = replace(star, robots=(replace(star.robots[0], weight=3), *star.robots[1:]))
     outcome = claimed(OnlyTheFirst, heavy, monkeypatch, withdraw=Withdrawal.MINIMUM)
@@ -306,7 +306,7 @@ def test_a_no_solution_of_costs_is_refuted_too(monkeypatch: pytest.MonkeyPatch) 
         def start(self) -> None:
             self.conclude(Verdict.NO_SOLUTION)
 
-    with pytest.raises(RefutedError, match="has no solution, and a judge has found one"):
+    with pytest.raises(RefutedError, match="has no solution, and the central solver has found one"):
         claimed(Never, coloring(3, 2, 2), monkeypatch)
 
 
@@ -331,4 +331,4 @@ def test_the_program_refuses_to_count_costs(tmp_path: Path) -> None:
 
 def test_absent_is_who_has_no_value() -> None:
     team = team_of({"A": (1,), "B": (1,)}, [])
-    assert absent(team, {"B": 1}) == ("RA",)
+    assert robots_without_values(team, {"B": 1}) == ("RA",)

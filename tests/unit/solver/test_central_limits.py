@@ -1,4 +1,4 @@
-"""The central judge on costs when the time is over: the best so far, and what is proven of the rest."""
+"""The central solver on costs when the time is over: the best so far, and what is proven of the rest."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from robochoc.generators.random_csp import random_csp
 from robochoc.model.outcome import Outcome, Verdict
 from robochoc.model.problem import Constraint, Relation, Semantics
 from robochoc.run import Options, solve
-from robochoc.run.incumbent import absent
+from robochoc.run.incumbent import robots_without_values
 from robochoc.solver.ace import AceProcess
 from robochoc.solver.central import CentralAnswer, CentralSolver
 from robochoc.solver.encoding import Codes, Network, Table
@@ -58,7 +58,7 @@ def test_without_an_answer_until_then_there_is_a_bound() -> None:
     differ = Constraint("D", PREDEFINED["ne"], ("A", "B"), ("A", "B"), cost=3)
     domains = {"A": (1, 2), "B": (1, 2), "C": (1, 2)}
     team = with_costs(team_of(domains, [differ, Constraint("U", unary, ("C",), ("C",))]))
-    judgement = CentralSolver(deadline=time.monotonic()).judge(team)
+    judgement = CentralSolver(deadline=time.monotonic()).solve(team)
     assert judgement == CentralAnswer(Verdict.UNKNOWN, bound=4)
 
 
@@ -92,9 +92,9 @@ def test_when_the_time_is_over_those_who_stay_so_far_are_told(warm: AceProcess) 
     team = queens3d(6)
     judgement = once(
         lambda judgement: bool(judgement.assignment),
-        lambda limit: CentralSolver(deadline=time.monotonic() + limit, solver=warm).judge(team, aside=1),
+        lambda limit: CentralSolver(deadline=time.monotonic() + limit, solver=warm).solve(team, withdrawal_cost=1),
     )
-    away = absent(team, judgement.assignment)
+    away = robots_without_values(team, judgement.assignment)
     assert judgement.verdict is Verdict.UNKNOWN
     assert judgement.cost == len(away) == 36 - len(judgement.assignment)
     assert not list(violations(team, judgement.assignment, away))

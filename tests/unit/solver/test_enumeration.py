@@ -280,7 +280,7 @@ def test_meetings_start_no_process() -> None:
         team = meetings(chance, slots=chance.choice((3, 4, 8)))
         outcome = solve(team, Options(runtime=Runtime.SIMULATOR, cache=False, verify=True))
         assert outcome.verified, outcome
-        assert CentralSolver().judge(team).verdict is outcome.verdict
+        assert CentralSolver().solve(team).verdict is outcome.verdict
         seen[outcome.verdict] += 1
     assert min(seen[Verdict.SOLUTION], seen[Verdict.NO_SOLUTION]) > 1, seen
 
@@ -290,8 +290,8 @@ def test_ace_judges_meetings_alike(batch: int, ace: AceProcess) -> None:
     chance = Random(f"meetings judged {batch}")
     for _ in range(20 if batch else 5):
         team = meetings(chance, slots=chance.choice((3, 4, 8)))
-        ours = CentralSolver().judge(team)
-        theirs = CentralSolver(solver=ace).judge(team)
+        ours = CentralSolver().solve(team)
+        theirs = CentralSolver(solver=ace).solve(team)
         assert ours.verdict is theirs.verdict
 
 

@@ -211,7 +211,7 @@ def test_withdrawn_drones_line_up_on_the_ground_outside_the_box() -> None:
     assert len(set(landings)) == 6
     assert {landing[1] for landing in landings} == {scene.axes[1].low - 2}
     assert {landing[2] for landing in landings} == {scene.ground}
-    assert scene.title == "a team: 10 of 16 fly (proven maximum)"
+    assert scene.title == "a team: 10 of 16 fly (proven best)"
 
 
 def test_the_caption_says_what_happened() -> None:

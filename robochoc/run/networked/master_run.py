@@ -1,4 +1,4 @@
-"""A whole run from the master's side: open, gather, search, let robots step aside, check, tell the outcome.
+"""A whole run from the master's side: listen, wait for the team, search, check, report the outcome.
 
 Section 5.2: "The master waits for the confirmation of creation all agents before ordering the start of the search."
 """
@@ -25,31 +25,43 @@ from robochoc.journal.events import Observer
 from robochoc.model.outcome import Outcome, Verdict
 from robochoc.model.problem import Team
 from robochoc.run.compatibility import refuse_options, refuse_settings, refuse_unfit
-from robochoc.run.defaults import MINIMISES, SATISFIES, default_protocol
+from robochoc.run.defaults import DEFAULT_COST_PROTOCOL, DEFAULT_PROTOCOL, default_protocol
 from robochoc.run.distributed import solve_distributed
 from robochoc.run.networked.address import LOOPBACK, Address
 from robochoc.run.networked.machines import Machines, claimed, listed, team_of
 from robochoc.run.options import OnLoss, Options, Runtime, Withdrawal
-from robochoc.run.registry import protocol_by_name
+from robochoc.run.registry import protocol_or_first_fit
 from robochoc.solver.encoding import UnsupportedError
 from robochoc.verification.checker import RefutedError
 
-HERE = Address(LOOPBACK)
+LOOPBACK_ADDRESS = Address(LOOPBACK)
 """Anything but loopback must be asked for."""
 
 
 @dataclass(frozen=True)
-class Plan:
+class MasterPlan:
     """What a master is to do.
 
-    `place` is where it listens, `hosts` how robots may call that place besides. `names` says who is in the team, or
-    `number` how many are; without either the team is complete when every neighbour that somebody names is there.
-    `protocol` is by default the one that suits the team. `timeout` counts from when the team is complete, `gather_s`
-    is how long that may take (seconds; None: no limit). `authority` is the folder of the Authority.
+    Attributes:
+        authority: The folder of the Authority.
+        place: The address at which it listens.
+        hosts: Other names and addresses by which robots may call its machine.
+        name: The team's name.
+        names: The robots of the team. Without these, and without a `number`, the team is complete when every neighbour
+            that a robot names has come.
+        number: How many robots the team has.
+        protocol: The protocol's name (None: the default for the team's problem).
+        settings: The protocol's settings, as text.
+        seed: The seed of protocols that draw lots.
+        withdraw: Which robots withdraw when the team has no solution (None: none).
+        gather_s: How many seconds to wait for the team (None: no limit).
+        timeout: A limit in seconds, from when the team is complete (None: no limit).
+        messages: A limit on the number of messages (None: no limit).
+        conditions: The settings of the network.
     """
 
     authority: Path
-    place: Address = HERE
+    place: Address = LOOPBACK_ADDRESS
     hosts: tuple[str, ...] = ()
     name: str = "team"
     names: tuple[str, ...] | None = None
@@ -83,15 +95,15 @@ class TeamIncompleteError(Exception):
     """The team was not complete in time."""
 
 
-class Led(NamedTuple):
-    """The outcome, and what the master knows of the team: silhouettes, without any constraint."""
+class MasterResult(NamedTuple):
+    """The outcome, and the team as far as the master knows it: without any constraint."""
 
     outcome: Outcome
     team: Team
 
 
-def lead(
-    plan: Plan,
+def run_master(
+    plan: MasterPlan,
     *,
     observer: Observer | None = None,
     watched: bool = False,
@@ -99,13 +111,27 @@ def lead(
     listening: Callable[[], None] = lambda: None,
     publication: Publication | None = None,
     concluded: Callable[[Outcome | None], None] = lambda _outcome: None,
-) -> Led:
-    """Be the master of one run. `listening` is called once robots can come.
+) -> MasterResult:
+    """Be the master of one run.
 
-    Who has the right to sniff may have what is written to `publication`, while the run lasts and until a moment after
-    `concluded` was called with its outcome (None: it broke off), which writes the last of it.
-    Raises `AuthorityError`, `HostNameError`, `RouterError`, `TeamIncompleteError`, `RobotsLostError`,
-    `UnsupportedError`, `UnknownProtocolError`, `RefutedError`.
+    Args:
+        plan: What to do.
+        observer: Gets all events of the master.
+        watched: Whether the observer gets the robots' events too.
+        progress: Gets the number of messages so far, now and then.
+        listening: Is called once robots can come.
+        publication: What is written to it is given to those who may sniff, until a moment after `concluded`.
+        concluded: Is called with the outcome (None: the run was broken off); it writes the last of the publication.
+
+    Raises:
+        AuthorityError: when the folder has no Authority.
+        HostNameError: when a host has no valid name.
+        RouterError: when the master cannot listen.
+        TeamIncompleteError: when the team is not complete in time.
+        RobotsLostError: when robots were lost, and the run is not to go on without them.
+        UnsupportedError: when the options do not go together, or with the team.
+        UnknownProtocolError: when the protocol is not installed.
+        RefutedError: when the answer does not hold.
     """
     _refuse_early(plan)
     authority = Authority.open(plan.authority)
@@ -131,7 +157,7 @@ def lead(
 
 @contextmanager
 def _enrolling(authority: Authority, identity: Identity, place: Address) -> Iterator[None]:
-    """Redeem tokens. Raises `RouterError`."""
+    """Serve robots that redeem tokens. Raises `RouterError`."""
     with ExitStack() as stack:
         try:
             stack.enter_context(EnrolmentServer(authority, identity, place.host, place.enrolment_port))
@@ -142,7 +168,9 @@ def _enrolling(authority: Authority, identity: Identity, place: Address) -> Iter
         yield
 
 
-def _run(plan: Plan, master: Master, observer: Observer | None, concluded: Callable[[Outcome | None], None]) -> Led:
+def _run(
+    plan: MasterPlan, master: Master, observer: Observer | None, concluded: Callable[[Outcome | None], None]
+) -> MasterResult:
     """Let the robots solve their problem, once the master listens, and tell them the outcome."""
     try:
         led = _solve(plan, master, observer)
@@ -156,36 +184,36 @@ def _run(plan: Plan, master: Master, observer: Observer | None, concluded: Calla
     return led
 
 
-def _solve(plan: Plan, master: Master, observer: Observer | None) -> Led:
+def _solve(plan: MasterPlan, master: Master, observer: Observer | None) -> MasterResult:
     """Wait for the team, and let it solve its problem."""
     if not master.gather(None if plan.gather_s is None else time.monotonic() + plan.gather_s):
         names = listed(sorted(master.members.awaited)) or "more robots"
         raise TeamIncompleteError(f"the team is not complete after {plan.gather_s:g} s; awaited: {names}")
     team = team_of(master, plan.name)
     name = plan.protocol or default_protocol(team.kind)
-    options, protocol = plan.options(name), protocol_by_name(name)
+    options, protocol = plan.options(name), protocol_or_first_fit(name)
     refuse_settings(name, protocol, options.settings)
     refuse_unfit(team, options, protocol.traits)
     machines = Machines(master, options, plan.name, observer)
     header = Outcome(plan.name, name, Runtime.NETWORK, plan.seed, Verdict.UNKNOWN)
     outcome = claimed(solve_distributed(machines, protocol, header))
-    return Led(outcome, machines.team_seen())
+    return MasterResult(outcome, machines.team_seen())
 
 
-def _refuse_early(plan: Plan) -> None:
+def _refuse_early(plan: MasterPlan) -> None:
     """Refuse what can be refused before any robot has come. Raises `UnsupportedError`."""
-    refuse_options(plan.options(plan.protocol or SATISFIES))
+    refuse_options(plan.options(plan.protocol or DEFAULT_PROTOCOL))
     try:
-        name = plan.protocol or SATISFIES
-        refuse_settings(name, protocol_by_name(name), plan.settings)
+        name = plan.protocol or DEFAULT_PROTOCOL
+        refuse_settings(name, protocol_or_first_fit(name), plan.settings)
     except UnsupportedError:
         if plan.protocol:
             raise
-        refuse_settings(MINIMISES, protocol_by_name(MINIMISES), plan.settings)
+        refuse_settings(DEFAULT_COST_PROTOCOL, protocol_or_first_fit(DEFAULT_COST_PROTOCOL), plan.settings)
 
 
 def _in_words(outcome: Outcome) -> str:
-    """The outcome, as robots are told it."""
-    aside = f", {len(outcome.aside)} step aside" if outcome.aside else ""
+    """Return the outcome in a few words, as robots get it."""
+    aside = f", {len(outcome.withdrawn_alive)} step aside" if outcome.withdrawn_alive else ""
     claim = f", claimed by {outcome.claimed_by}" if outcome.claimed_by else ""
     return f"{outcome.verdict}{aside}{claim}"

@@ -18,7 +18,7 @@ from robochoc.model.expression import Type, parse
 from robochoc.model.outcome import Metrics, Outcome, PseudoTreeNode, Verdict
 from robochoc.model.problem import INFINITE, Constraint, Predicate, Relation, Semantics, Team
 from robochoc.protocols.findings import Best, Findings, Trail
-from robochoc.run.incumbent import best_of, bound_of, course, tree_of
+from robochoc.run.incumbent import best_known, costs_by_cycle, lower_bound, pseudo_tree
 from robochoc.solver.compiled_team import CompiledTeam
 from robochoc.verification.objective import Objective, withdrawal_cost
 from tests.support.cost_problems import cost_of, random_complex_cost_team, random_cost_team, with_costs
@@ -91,13 +91,13 @@ def test_stepping_aside_costs_more_than_all_that_can_be_paid_without() -> None:
 
 
 def test_the_values_at_the_end_are_an_answer() -> None:
-    found = best_of(CompiledTeam(PAIR), result(own(PAIR, {"A": 2, "B": 2})))
+    found = best_known(CompiledTeam(PAIR), result(own(PAIR, {"A": 2, "B": 2})))
     assert found == ({"A": 2, "B": 2}, 7)
 
 
 def test_what_breaks_something_hard_is_none() -> None:
-    assert best_of(CompiledTeam(PAIR), result(own(PAIR, {"A": 2, "B": 1}))) is None
-    assert best_of(CompiledTeam(PAIR), result({"RA": {"A": 1}, "RB": {}})) is None
+    assert best_known(CompiledTeam(PAIR), result(own(PAIR, {"A": 2, "B": 1}))) is None
+    assert best_known(CompiledTeam(PAIR), result({"RA": {"A": 1}, "RB": {}})) is None
 
 
 def test_the_cheapest_that_a_robot_has_heard_of_is_better_than_the_values_at_the_end() -> None:
@@ -105,13 +105,13 @@ def test_the_cheapest_that_a_robot_has_heard_of_is_better_than_the_values_at_the
         "RA": Findings(best=Best(4, {"RA": (1,), "RB": (1,)})),
         "RB": Findings(best=Best(3, {"RA": (1,), "RB": (2,)})),
     }
-    found = best_of(CompiledTeam(PAIR), result(own(PAIR, {"A": 2, "B": 2}), findings))
+    found = best_known(CompiledTeam(PAIR), result(own(PAIR, {"A": 2, "B": 2}), findings))
     assert found == ({"A": 1, "B": 2}, 3)
 
 
 def test_who_steps_aside_in_the_best_has_no_values_in_it() -> None:
     findings = {"RA": Findings(best=Best(11, {"RA": (2,), "RB": (None,)}))}
-    found = best_of(CompiledTeam(PAIR), result({"RA": {}, "RB": {}}, findings), 11)
+    found = best_known(CompiledTeam(PAIR), result({"RA": {}, "RB": {}}, findings), 11)
     assert found == ({"A": 2}, 11)
 
 
@@ -120,7 +120,7 @@ def test_who_has_nothing_to_show_and_no_value_steps_aside_in_the_best() -> None:
     forbids = Relation("R", 1, Semantics.CONFLICTS, ((1,),))
     team = team_of({"A": (1,), "B": (1,)}, [Constraint("C", forbids, ("A",), ("A",))])
     findings = {"RB": Findings(best=Best(1, {"RA": (), "RB": ()}))}
-    assert best_of(CompiledTeam(team), result({"RA": {}, "RB": {}}, findings), 1) == ({"B": 1}, 1)
+    assert best_known(CompiledTeam(team), result({"RA": {}, "RB": {}}, findings), 1) == ({"B": 1}, 1)
 
 
 def test_the_best_cycle_is_found_and_unfinished_cycles_do_not_count() -> None:
@@ -129,20 +129,20 @@ def test_the_best_cycle_is_found_and_unfinished_cycles_do_not_count() -> None:
         "RB": Findings(trail=Trail([(0, 1), (1, 0), (2, 1)], 2)),  # 2, 1, 2
     }
     trails = {name: found.trail for name, found in findings.items() if found.trail}
-    assert list(course(CompiledTeam(PAIR), trails)) == [7, 4, 3]
-    found = best_of(CompiledTeam(PAIR), result(own(PAIR, {"A": 2, "B": 2}), findings))
+    assert list(costs_by_cycle(CompiledTeam(PAIR), trails)) == [7, 4, 3]
+    found = best_known(CompiledTeam(PAIR), result(own(PAIR, {"A": 2, "B": 2}), findings))
     assert found == ({"A": 1, "B": 2}, 3)
 
 
 def test_a_robot_without_a_trail_leaves_the_cycles_out() -> None:
     findings = {"RA": Findings(trail=Trail([(0, 0)], 1)), "RB": Findings()}
-    assert best_of(CompiledTeam(PAIR), result(own(PAIR, {"A": 2, "B": 2}), findings)) == ({"A": 2, "B": 2}, 7)
+    assert best_known(CompiledTeam(PAIR), result(own(PAIR, {"A": 2, "B": 2}), findings)) == ({"A": 2, "B": 2}, 7)
 
 
 def test_bounds_of_several_roots_are_summed_and_an_infinite_one_is_none() -> None:
-    assert bound_of({"A": Findings(bound=3), "B": Findings(), "C": Findings(bound=4.0)}) == 7
-    assert bound_of({"A": Findings()}) is None
-    assert bound_of({"A": Findings(bound=INFINITE)}) is None
+    assert lower_bound({"A": Findings(bound=3), "B": Findings(), "C": Findings(bound=4.0)}) == 7
+    assert lower_bound({"A": Findings()}) is None
+    assert lower_bound({"A": Findings(bound=INFINITE)}) is None
 
 
 # Improvements in journals
@@ -219,7 +219,7 @@ def test_a_tree_is_drawn_with_its_depth_and_width() -> None:
         "R10": PseudoTreeNode("R2"),
         "S": PseudoTreeNode(None),
     }
-    assert tree_of({name: Findings(place=place) for name, place in places.items()} | {"T": Findings()}) == places
+    assert pseudo_tree({name: Findings(place=place) for name, place in places.items()} | {"T": Findings()}) == places
     outcome = Outcome("team", "dpop", "simulator", 0, Verdict.OPTIMAL, tree=places)
     assert explained(outcome).splitlines() == [
         "  pseudo-tree, built by the robots: depth 2, induced width 2, 2 roots ([neighbours further up])",

@@ -170,7 +170,7 @@ def test_each_epoch_says_what_opened_it_and_what_came_of_it() -> None:
 def test_nobody_flies_where_there_never_was_a_solution() -> None:
     outcome = Outcome("t", "abt", "simulator", 0, Verdict.NO_SOLUTION, {})
     assert playback_in(page(shown(outcome)))["chapters"] == [
-        {"at": 0, "opened": "the start", "says": "no solution, nobody flies"}
+        {"at": 0, "opened": "the start", "says": "no solution, no drone flies"}
     ]
     alone = flown_scene_of(outcome, five())
     assert alone.playback is None

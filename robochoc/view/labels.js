@@ -1,15 +1,17 @@
 // Labels that can be read: none is too small, and of those that would cover each other one is shown. Names of axes come
 // first, then the drone that is followed, then the drones nearest to the viewer, then the numbers of axes.
-class Names {
+class Labels {
   static EVERY = 200; // milliseconds
   static STAYS = 0.9; // the depth of a label that is shown already counts less, so that labels do not flicker
   static ROOM = 0.85; // in which a label stands alone, in sizes of its picture
   static HEIGHT_MIN = 16; // pixels of a label's picture: its text is then 11 pixels high
   static LARGER_MAX = 2.5;
 
-  // `names` are the scene's objects in the order of the drones; `axes` is the object that holds the labels of axes.
-  constructor(viewer, names, axes) {
+  // `names` are the scene's objects in the order of the drones; `axes` is the object that holds the labels of axes;
+  // `size` gives the width and the height of the picture, in pixels.
+  constructor(viewer, names, axes, size = () => [innerWidth, innerHeight]) {
     this.viewer = viewer;
+    this.size = size;
     this.names = names;
     this.axes = axes;
     this.due = 0;
@@ -19,7 +21,7 @@ class Names {
   // Once a frame. What moves slowly needs no more than a few looks a second.
   step(now) {
     if (now < this.due) return;
-    this.due = now + Names.EVERY;
+    this.due = now + Labels.EVERY;
     this.choose();
   }
 
@@ -40,7 +42,7 @@ class Names {
     }
   }
 
-  // Where a label is in the window, half as wide and as high as its text; nothing behind the viewer.
+  // Where a label is in the picture, half as wide and as high as its text; nothing behind the viewer.
   box(label, rank) {
     const THREE = MeshCat.THREE;
     const lens = this.viewer.camera;
@@ -49,20 +51,22 @@ class Names {
     const depth = -spot.clone().applyMatrix4(lens.matrixWorldInverse).z;
     if (depth <= lens.near) return null;
     const { x, y } = spot.project(lens);
-    const half = 1 / 2 / depth / Math.tan(lens.fov * Math.PI / 360); // of a unit of length, in halves of the window's height
-    const larger = this.enlarge(label, Math.min(Math.max(Names.HEIGHT_MIN / (half * size.y * innerHeight), 1), Names.LARGER_MAX));
+    const [wide, high] = this.size();
+    const half = lens.zoom / 2 / depth / Math.tan(lens.fov * Math.PI / 360); // of a unit of length, in halves of the height
+    const larger = this.enlarge(label, Math.min(Math.max(Labels.HEIGHT_MIN / (half * size.y * high), 1), Labels.LARGER_MAX));
     const height = half * size.y;
     return {
-      label, x: x * innerWidth / innerHeight, y: y + height * (larger - 1),
-      rank: rank ?? depth * (label.visible ? Names.STAYS : 1),
-      width: Names.ROOM * half * size.x * larger, height: Names.ROOM * height * larger,
+      label, x: x * wide / high, y: y + height * (larger - 1),
+      rank: rank ?? depth * (label.visible ? Labels.STAYS : 1),
+      width: Labels.ROOM * half * size.x * larger, height: Labels.ROOM * height * larger,
     };
   }
 
   // The label's picture grows upwards: it does not cover what it names.
   enlarge(label, larger) {
     const picture = label.children.find((child) => child.isSprite);
-    if (picture && Math.abs(picture.scale.y - larger) > 0.02) {
+    if (picture && (picture.renderOrder === 0 || Math.abs(picture.scale.y - larger) > 0.02)) {
+      picture.renderOrder = 1; // trails do not cross it
       picture.scale.set(larger, larger, 1);
       picture.center.set(0.5, 0.5 / larger);
       this.viewer.set_dirty();

@@ -1,0 +1,28 @@
+"""Examples in docstrings (`>>>`) as blocks of code: Markdown takes them for quotations of quotations.
+
+An extension of griffe, which reads the docstrings for the site (https://mkdocstrings.github.io/griffe/extensions/).
+"""
+
+from __future__ import annotations
+
+import re
+from typing import Any
+
+from griffe import Extension, Object
+
+_EXAMPLE = re.compile(r"(?:^ *>>> .*\n?)(?:^ *\S.*\n?)*", re.MULTILINE)
+
+
+class Doctests(Extension):
+    """Fences the examples of every docstring."""
+
+    def on_object(self, *, obj: Object, **_: Any) -> None:  # noqa: ANN401 - griffe's
+        """Change the docstring of one object."""
+        if obj.docstring and ">>> " in obj.docstring.value:
+            obj.docstring.value = _EXAMPLE.sub(_fenced, obj.docstring.value)
+
+
+def _fenced(example: re.Match[str]) -> str:
+    lines = example[0].rstrip().splitlines()
+    indent = min(len(line) - len(line.lstrip()) for line in lines)
+    return "\n".join(["```pycon", *(line[indent:] for line in lines), "```", ""])

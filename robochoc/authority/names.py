@@ -1,0 +1,44 @@
+"""Names that the Authority enrols: which are allowed, and which are known."""
+
+from __future__ import annotations
+
+from collections.abc import Collection
+
+from robochoc.authority.certificates import LONGEST_NAME, MASTER
+from robochoc.authority.registry import Role
+from robochoc.formats.diagnostics import on_one_line, shortened, suggestion
+from robochoc.formats.names import is_name
+
+_MOST_NAMED = 10
+
+
+class InvalidNameError(ValueError):
+    """A name that no robot can have, or that is reserved."""
+
+
+class UnknownNameError(LookupError):
+    """A name that is not enrolled."""
+
+
+def describe_enrolled(name: str, members: Collection[str]) -> str:
+    """Return in words which names are enrolled, and which of them may have been meant instead of `name`."""
+    known = sorted(known for known in members if known != MASTER)
+    if not known:
+        return "nobody is; next: robochoc authority enrol NAME"
+    hint = suggestion(name, known, "names")
+    near = f"{hint} " if hint.startswith("did") else ""
+    more = len(known) - _MOST_NAMED
+    return f"{near}enrolled: {', '.join(known[:_MOST_NAMED])}" + (f" and {more} more" if more > 0 else "")
+
+
+def check_name(name: str, role: Role = Role.ROBOT) -> None:
+    """Raise `InvalidNameError` if `name` cannot take part as `role`."""
+    shown = on_one_line(shortened(name))
+    if not is_name(name):
+        raise InvalidNameError(f"'{shown}' is no robot's name: a letter, then letters, digits, '_' and '.'")
+    if len(name) > LONGEST_NAME:
+        raise InvalidNameError(f"'{shown}' is too long: a certificate names at most {LONGEST_NAME} characters")
+    if name.upper() == MASTER or role is Role.MASTER:
+        raise InvalidNameError(
+            f"the name {MASTER} is the master's own, which needs no token; choose another name, or role"
+        )

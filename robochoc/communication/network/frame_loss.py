@@ -1,0 +1,64 @@
+"""Frames that are lost for good, and which robot is lost with them: always their sender, never another.
+
+A robot whose frames to the master are lost is lost. An observer only loses its request. The loss of frames between two
+robots is reported by one of them, and may be a number that the other has made up. So it counts only once messages are
+missing, which the counters of all robots show.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Protocol
+
+from robochoc.communication.network.control_messages import LostFrames
+from robochoc.communication.network.inbox import FramesLost
+from robochoc.communication.network.members import Members
+
+TO_MASTER = "a frame to the master"
+
+
+class _Lose(Protocol):
+    def __call__(self, name: str, why: str, *, for_good: bool) -> None: ...
+
+
+class LossTracker:
+    """Lost frames in a run of `members`. `refuse` reports each (who, what, why); `lose` removes a robot."""
+
+    def __init__(self, members: Members, refuse: Callable[[str, str, str], None], lose: _Lose) -> None:
+        self._members = members
+        self._refuse = refuse
+        self._lose = lose
+        self._said: dict[str, str] = {}
+        """Reports of this search: whose frames are lost, and why."""
+
+    def begin(self) -> None:
+        """Begin a search: what robots reported in another one no longer counts."""
+        self._said.clear()
+
+    def note_at_master(self, missed: FramesLost) -> None:
+        """Note that frames to the master are lost, and with them their sender, if it takes part.
+
+        Raises `RobotsLostError`.
+        """
+        name, many = missed.sender, f"{missed.frames:,} frames"
+        why = f"{many} of it were more than it may send" if missed.dropped else f"{many} of it were lost for good"
+        self._refuse(name, TO_MASTER, why)
+        member = self._members.robots.get(name)
+        if member and member.joined:
+            self._lose(name, f"{why} on the way to the master", for_good=self._members.closed)
+
+    def note_between(self, name: str, gap: LostFrames) -> None:
+        """Note that the robot `name` reports the loss of frames to it."""
+        why = f"{gap.frames:,} frames of it to {name} were lost for good ({name} says so)"
+        self._refuse(gap.who, f"a frame to {name}", why)
+        if gap.who in self._members.robots:
+            self._said.setdefault(gap.who, why)
+
+    def explain_missing(self) -> bool:
+        """Lose the robots whose frames are lost, as protocol messages are missing; return whether there are any.
+
+        Raises `RobotsLostError`.
+        """
+        for name, why in self._said.items():
+            self._lose(name, why, for_good=True)
+        return bool(self._said)

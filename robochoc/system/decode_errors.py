@@ -1,0 +1,92 @@
+"""The errors of msgspec in plain words: JSON, TOML values and settings that it refuses."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping, Sequence
+from enum import Enum
+from types import UnionType
+from typing import Any, Literal, Union, get_args, get_origin, get_type_hints
+
+import msgspec
+
+_PLACE = re.compile(r" - at `\$\.?(?P<place>[^`]*)`$")
+_TYPES = {
+    "int": "an integer",
+    "float": "a number",
+    "str": "a text",
+    "bool": "true or false",
+    "null": "null",
+    "array": "a list",
+    "object": "an object",
+}
+"""JSON types, by the names that msgspec gives them."""
+
+_SENTENCES = (
+    (r"Invalid (?:enum )?value (?P<value>.*)", "{value} is not allowed{allowed}"),
+    (r"Expected `(?P<expected>[^`]*)`, got `(?P<got>[^`]*)`", "expected {expected}, found {got}"),
+    (r"Expected `(?P<expected>[^`]*)`(?P<rest>.*)", "expected {expected}{rest}"),
+    (r"Object missing required field `(?P<value>[^`]*)`", "the field '{value}' is missing"),
+    (r"Object contains unknown field `(?P<value>[^`]*)`", "there is no field '{value}'{allowed}"),
+    (r"JSON is malformed: (?P<value>.*)", "it is no JSON: {value}"),
+    (r"Input data was truncated", "it is no JSON: it ends too early"),
+)
+"""The messages of msgspec, and what they become."""
+
+
+def describe_decode_error(error: msgspec.MsgspecError, expected: Any) -> str:  # noqa: ANN401 - a type
+    """Return what is wrong, where, what was expected, and the allowed values if there are few.
+
+    Args:
+        error: What msgspec raised.
+        expected: The type that was to be decoded.
+    """
+    text = str(error)
+    found = _PLACE.search(text)
+    place = found["place"] if found else ""
+    text = _PLACE.sub("", text)
+    for pattern, sentence in _SENTENCES:
+        match = re.fullmatch(pattern, text)
+        if match:
+            parts = {name: part or "" for name, part in match.groupdict().items()}
+            parts |= {name: _named(parts[name]) for name in ("expected", "got") if name in parts}
+            text = sentence.format(**{"allowed": _allowed(expected, place)} | parts)
+            break
+    return f"{place}: {text}" if place else text
+
+
+def _named(types: str) -> str:
+    """Return JSON types in words: `int | null` is "an integer or null"."""
+    return " or ".join(_TYPES.get(one, one) for one in types.split(" | "))
+
+
+def _allowed(kind: Any, place: str) -> str:  # noqa: ANN401 - a type
+    """Return the values or fields that are allowed at `place`, in words; empty where they are not listed."""
+    for step in re.findall(r"\w+|\[[^]]*\]", place):
+        kind = _inside(kind, step)
+    for option in _options(kind):
+        if isinstance(option, type) and issubclass(option, Enum):
+            return _one_of([str(member.value) for member in option])
+        if get_origin(option) is Literal:
+            return _one_of([str(value) for value in get_args(option)])
+        if isinstance(option, type) and issubclass(option, msgspec.Struct):
+            return _one_of([field.encode_name for field in msgspec.structs.fields(option)])
+    return ""
+
+
+def _inside(kind: Any, step: str) -> Any:  # noqa: ANN401 - types
+    """Return the type of the field or item `step` of a value of the type `kind`. None: it is not known."""
+    for option in _options(kind):
+        if step.startswith("[") and get_args(option):
+            return get_args(option)[1 if get_origin(option) in {dict, Mapping} else 0]
+        if isinstance(option, type) and not step.startswith("["):
+            return get_type_hints(option).get(step)
+    return None
+
+
+def _options(kind: Any) -> Sequence[Any]:  # noqa: ANN401 - types
+    return get_args(kind) if get_origin(kind) in {Union, UnionType} else (kind,)
+
+
+def _one_of(values: Sequence[str]) -> str:
+    return f"; allowed: {', '.join(values)}"

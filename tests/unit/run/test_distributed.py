@@ -1,0 +1,135 @@
+"""What every distributed run decides, wherever its robots are: phases, losses, reasons. The deployment is made up."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+
+import pytest
+
+from robochoc.communication.run_result import RobotsLostError, RunResult
+from robochoc.model.outcome import Metrics, Outcome, Verdict
+from robochoc.model.problem import ProblemKind
+from robochoc.protocols.abt import ABT
+from robochoc.protocols.dsa import DSA
+from robochoc.protocols.sfb import SFB
+from robochoc.run import Options, Withdrawal
+from robochoc.run.distributed import Deployment, solve_distributed
+from robochoc.run.evaluation import CheckedAssignment, Search
+from robochoc.run.withdrawal import Phase
+
+HEADER = Outcome("team", "abt", "simulator", 0, Verdict.UNKNOWN)
+SPENT = Metrics(messages={"Ok": 2}, checks=5)
+NOTHING = RunResult(Verdict.NO_SOLUTION, "A", {}, SPENT)
+SOLVED = RunResult(Verdict.SOLUTION, None, {}, SPENT)
+BROKEN_OFF = RunResult(Verdict.UNKNOWN, None, {}, SPENT)
+
+
+class MadeUp(Deployment):
+    """Each search has the next of `results`; what is found is `found`."""
+
+    def __init__(
+        self,
+        options: Options,
+        results: Sequence[RunResult],
+        found: CheckedAssignment | None = None,
+        robots: str = "ABC",
+    ) -> None:
+        self.options = options
+        self.phases: list[Phase] = []
+        self._results = list(results)
+        self._found = found
+        self._robots = set(robots)
+        self._lost: list[str] = []
+
+    @property
+    def kind(self) -> ProblemKind:
+        return ProblemKind.DISCSP
+
+    @property
+    def lost(self) -> tuple[str, ...]:
+        return tuple(self._lost)
+
+    @property
+    def is_empty(self) -> bool:
+        return not self._robots
+
+    def withdrawal_cost(self) -> float:
+        return 10
+
+    def left_s(self) -> float | None:
+        return None
+
+    def search(self, phase: Phase) -> Search:
+        self.phases.append(phase)
+        return Search(self._results.pop(0), lambda: self._found)
+
+    def remove(self, lost: Mapping[str, str]) -> None:
+        self._lost += lost
+        self._robots -= lost.keys()
+
+
+def losing(*names: str) -> RunResult:
+    return replace(BROKEN_OFF, lost=dict.fromkeys(names, "it was hit by a meteor"))
+
+
+def test_a_solution_needs_one_phase() -> None:
+    deployment = MadeUp(Options(), [SOLVED], CheckedAssignment({"a": 1}, 0))
+    outcome = solve_distributed(deployment, ABT, HEADER)
+    assert (outcome.verdict, outcome.assignment, outcome.verified) == (Verdict.SOLUTION, {"a": 1}, True)
+    assert [phase.name for phase in deployment.phases] == ["abt"]
+
+
+@pytest.mark.parametrize(
+    ("withdraw", "second", "cost"), [(Withdrawal.MINIMUM, "sfb", 10), (Withdrawal.MAXIMAL, "first-fit", None)]
+)
+def test_without_a_solution_another_protocol_decides_who_withdraws(
+    withdraw: Withdrawal, second: str, cost: float | None
+) -> None:
+    options = Options(withdraw=withdraw, settings={"of": "abt"})
+    deployment = MadeUp(options, [NOTHING, SOLVED], CheckedAssignment({"a": 1}, 0, ("B",)))
+    outcome = solve_distributed(deployment, ABT, HEADER)
+    assert outcome.verdict is (Verdict.OPTIMAL if cost else Verdict.SOLUTION)
+    assert (outcome.withdrawn, outcome.witness, outcome.placed_by) == (("B",), "A", second)
+    assert outcome.metrics == SPENT + SPENT
+    first, then = deployment.phases
+    assert (first.parameters.settings, then.parameters.settings) == ({"of": "abt"}, {})
+    assert (first.withdrawal, then.name, then.withdrawal, then.parameters.withdrawal_cost) == (
+        False,
+        second,
+        True,
+        cost,
+    )
+
+
+def test_a_protocol_with_costs_decides_at_once() -> None:
+    options = Options(protocol="sfb", withdraw=Withdrawal.MINIMUM)
+    deployment = MadeUp(options, [SOLVED], CheckedAssignment({"a": 1}, 0, ("B",)))
+    outcome = solve_distributed(deployment, SFB, HEADER)
+    assert (outcome.verdict, outcome.withdrawn, outcome.placed_by) == (Verdict.OPTIMAL, ("B",), None)
+
+
+def test_after_a_loss_the_others_search_again_and_all_that_was_sent_counts() -> None:
+    deployment = MadeUp(Options(), [losing("B"), SOLVED], CheckedAssignment({"a": 1}, 0))
+    outcome = solve_distributed(deployment, ABT, HEADER)
+    assert (outcome.lost, outcome.withdrawn) == (("B",), ("B",))
+    assert outcome.metrics == SPENT + SPENT
+
+
+def test_all_are_lost() -> None:
+    with pytest.raises(RobotsLostError):
+        solve_distributed(MadeUp(Options(), [losing("A"), losing("B")], robots="AB"), ABT, HEADER)
+
+
+@pytest.mark.parametrize(
+    ("options", "result", "reason"),
+    [
+        (Options(messages=2), BROKEN_OFF, "so many messages have been sent (--messages 2)"),
+        (Options(timeout=1.5, messages=3), BROKEN_OFF, "the time was over (--timeout 1.5)"),
+        (Options(), replace(BROKEN_OFF, witness="C"), "C gave up, as its protocol has it"),
+        (Options(protocol="dsa"), SOLVED, "dsa has come to its end, and all that it came by breaks a hard constraint"),
+    ],
+)
+def test_why_there_is_no_verdict(options: Options, result: RunResult, reason: str) -> None:
+    outcome = solve_distributed(MadeUp(options, [result]), DSA if options.protocol == "dsa" else ABT, HEADER)
+    assert (outcome.verdict, outcome.reason) == (Verdict.UNKNOWN, reason)
