@@ -2,22 +2,30 @@
 PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
+RUN := $(VENV)/.run
 READY := $(VENV)/.ready
+PIP := $(BIN)/pip install --disable-pip-version-check
 
 .PHONY: demo demo-11 docs test test-slow fuzz lint type format bench journals clean
 
-$(READY): pyproject.toml
+$(RUN): pyproject.toml
 	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' || { echo "robochoc needs Python 3.11 or newer; say: make PYTHON=python3.12 ..."; exit 1; }
+	@echo "Installing robochoc into $(VENV): about 340 MB, a third of it Java for the solver ACE."
 	$(PYTHON) -m venv $(VENV)
-	$(BIN)/pip install --quiet --disable-pip-version-check --editable '.[dev]'
+	$(PIP) --editable .
 	@touch $@
 
-demo: $(READY)  ## 16 robots, no solution, the others fly: out/queens3d-4.html
+$(READY): $(RUN)
+	@echo "Adding the development tools to $(VENV): about 430 MB more. This takes a minute."
+	$(PIP) --quiet --editable '.[dev]'
+	@touch $@
+
+demo: $(RUN)  ## 16 robots, no solution, the others fly: out/queens3d-4.html
 	@mkdir -p out
 	$(BIN)/robochoc validate instances/
 	$(BIN)/robochoc solve instances/queens3d-4 --withdraw --html out/queens3d-4.html
 
-demo-11: $(READY)  ## the flagship: 121 robots in 121 processes, planar and full
+demo-11: $(RUN)  ## the flagship: 121 robots in 121 processes, planar and full
 	@mkdir -p out
 	@for model in planar full; do \
 		$(BIN)/robochoc generate queens3d --n 11 --model $$model -o out/queens3d-11-$$model --force && \
@@ -32,7 +40,7 @@ test-slow: $(READY)
 
 DOCS := $(VENV)/.docs
 $(DOCS): $(READY)
-	$(BIN)/pip install --quiet --disable-pip-version-check --editable '.[docs]'
+	$(PIP) --quiet --editable '.[docs]'
 	@touch $@
 
 # --strict: a broken link, anchor or reference ends the build.

@@ -12,7 +12,7 @@ import struct
 from collections.abc import Mapping
 from multiprocessing.connection import Connection
 
-from ring import OFFSETS
+from token_ring import OFFSETS
 
 _BODY = struct.Struct("!QH40s")
 _CARGO = bytes(40)

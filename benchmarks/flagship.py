@@ -1,8 +1,7 @@
-"""Part `flagship`: 3D queens, n = 11, in 121 processes; and what the robots' niceness does for it."""
+"""Part `flagship`: 3D queens, n = 11, in 121 processes."""
 
 from __future__ import annotations
 
-import sys
 import tempfile
 from collections.abc import Sequence
 from pathlib import Path
@@ -17,7 +16,6 @@ from robochoc.generators.queens3d import queens3d
 LIMIT_S = 20
 UNKNOWN = 3
 """The exit status of a run that reached its time limit."""
-WITHOUT_NICENESS = (sys.executable, str(Path(__file__).with_name("without_niceness.py")))
 
 
 class Case(NamedTuple):
@@ -26,7 +24,6 @@ class Case(NamedTuple):
     side: int
     model: str
     runtime: str
-    nice: bool = True
     runs: int = RUNS
 
 
@@ -36,8 +33,6 @@ CASES = (
     Case(11, "planar", "simulator", runs=1),
     Case(11, "full", "simulator", runs=1),
     Case(7, "full", "processes"),
-    Case(7, "full", "processes", nice=False),
-    Case(11, "full", "processes", nice=False, runs=1),
 )
 
 
@@ -50,11 +45,10 @@ def measured() -> Section:
         rows += [_row(case, _folder(scratch, case.side, case.model)) for case in CASES]
     notes = (
         "Whole commands, `robochoc solve FOLDER --json`, from fork to exit. In processes the counts depend on which "
-        "robot gets the processor when; in the simulator (schedule concurrent, seed 0) they are exact. `not nice`: "
-        "all robots have the same priority for the scheduler, instead of one that falls with their place in the "
-        f"order. Time limit {LIMIT_S} s: a case that reaches it has no verdict. Median (min..max)."
+        "robot gets the processor when; in the simulator (schedule concurrent, seed 0) they are exact. "
+        f"Time limit {LIMIT_S} s: a case that reaches it has no verdict. Median (min..max)."
     )
-    return Section("flagship", "3D queens with 121 robots, and niceness", notes, (rows,))
+    return Section("flagship", "3D queens with 121 robots", notes, (rows,))
 
 
 def _folder(scratch: str, side: int, model: str) -> Path:
@@ -62,17 +56,15 @@ def _folder(scratch: str, side: int, model: str) -> Path:
 
 
 def _row(case: Case, folder: Path) -> Row:
-    program = [ROBOCHOC] if case.nice else [*WITHOUT_NICENESS]
-    command = [*program, "solve", str(folder), "--json", "--runtime", case.runtime, "--timeout", str(LIMIT_S)]
-    runtime = case.runtime if case.nice else f"{case.runtime}, not nice"
+    command = [ROBOCHOC, "solve", str(folder), "--json", "--runtime", case.runtime, "--timeout", str(LIMIT_S)]
     samples = repeated(
-        f"queens3d n = {case.side} {case.model}, {runtime}",
+        f"queens3d n = {case.side} {case.model}, {case.runtime}",
         lambda: timed_command(command, expected=(0, UNKNOWN)),
         case.runs,
     )
     results: list[dict[str, Any]] = [sample.answer for sample in samples]
     counts = (spread((result["metrics"][what] for result in results), 0) for what in ("messages", "ncccs"))
-    return str(case.side), case.model, runtime, str(case.runs), _verdicts(results), *_times(samples), *counts
+    return str(case.side), case.model, case.runtime, str(case.runs), _verdicts(results), *_times(samples), *counts
 
 
 def _verdicts(results: Sequence[dict[str, Any]]) -> str:

@@ -22,7 +22,7 @@ from queue import SimpleQueue
 from typing import NamedTuple
 
 import zenoh
-from rally import End, LongRally, ManyBalls, Rally, ShortRally, pair, play, return_all
+from ping_pong import End, LongRally, ManyBalls, Rally, ShortRally, pair, play, return_all
 
 from robochoc.authority.admission import InMemoryAuthority
 from robochoc.authority.identity import Identity, IdentityTexts

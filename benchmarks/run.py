@@ -1,6 +1,6 @@
-"""Measure, and tell: `run.py` measures all short parts and writes RESULTS.md; `run.py PART ...` prints these only.
+"""Benchmarks. Without PART, measure all short parts and write RESULTS.md. With PART, measure these and print them.
 
-With --write, their sections in RESULTS.md are written anew. Sections of parts that were not measured stay.
+Sections of RESULTS.md whose parts are not measured stay as they are.
 """
 
 from __future__ import annotations
@@ -13,6 +13,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 import channels
+import command_time
 import dynamic
 import flagship
 import flight
@@ -21,30 +22,25 @@ import local_search
 import network
 import optimum
 import peers
-import simulated
-import small
+import simulator
 import sniffer
 import solver
-import start
 import start_up
 import sweep
 import transport
 import variants
-import whole
 from measure import RUNS
 from report import Section, machine
 
 PARTS: dict[str, Callable[[], Section]] = {
-    "whole": whole.measured,
+    "whole": command_time.measured,
     "peers": peers.measured,
     "startup": start_up.measured,
-    "start": start.measured,
     "transport": transport.measured,
     "flagship": flagship.measured,
-    "simulator": simulated.measured,
+    "simulator": simulator.measured,
     "journal": journals.measured,
     "solver": solver.measured,
-    "small": small.measured,
     "flight": flight.measured,
 }
 LONG: dict[str, Callable[[], Section]] = {
@@ -57,16 +53,23 @@ LONG: dict[str, Callable[[], Section]] = {
     "network": network.measured,
     "sniffer": sniffer.measured,
 }
-"""Parts that take longer than all others together: only when they are named."""
+"""Parts that take longer than all others together, measured only when they are named."""
 ALL = {**PARTS, **LONG}
+DECIDED = {
+    "start": "how processes are started: by fork",
+    "small": "up to which size local problems are enumerated without ACE",
+}
+"""Measurements that have decided something, and are not repeated. Their sections stay in RESULTS.md."""
 RESULTS = Path(__file__).with_name("RESULTS.md")
 
 
 def main() -> None:
     """Parse, measure, print or write."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("parts", nargs="*", metavar="PART", help=f"one of: {', '.join(ALL)}")
-    parser.add_argument("--write", action="store_true", help="write the parts' sections in RESULTS.md anew")
+    parser = argparse.ArgumentParser(
+        description=__doc__, epilog=_parts(), formatter_class=argparse.RawTextHelpFormatter
+    )
+    parser.add_argument("parts", nargs="*", metavar="PART", help="see below")
+    parser.add_argument("--write", action="store_true", help="rewrite the sections of these parts in RESULTS.md")
     options = parser.parse_args()
     chosen: list[str] = options.parts
     if strange := [part for part in chosen if part not in ALL]:
@@ -75,19 +78,36 @@ def main() -> None:
     sections = {part: str(_measured(part)) for part in chosen or PARTS}
     if options.write or not chosen:
         kept = _written()
-        every = [sections.get(part) or kept.get(part) for part in ALL]
+        every = [sections.get(part) or kept.get(part) for part in dict.fromkeys((*kept, *ALL))]
         RESULTS.write_text("\n\n".join([_head(), *filter(None, every)]) + "\n")
         print(f"{RESULTS}: written, after {time.monotonic() - began:.0f} s", file=sys.stderr)
     print("\n\n".join([_head(), *sections.values()]))
 
 
+def _parts() -> str:
+    """Return a line for each part: the first line of its module's docstring."""
+    lines = ["parts:"]
+    for names, kind in ((PARTS, ""), (LONG, " (takes long)")):
+        for name, measured in names.items():
+            words = str(sys.modules[measured.__module__].__doc__).splitlines()[0]
+            lines.append(f"  {name:12} {words.partition(': ')[2]}{kind}")
+    lines += [
+        "decided, not measured any more (see RESULTS.md):",
+        *(f"  {name:12} {what}" for name, what in DECIDED.items()),
+    ]
+    return "\n".join(lines)
+
+
 def _written() -> dict[str, str]:
-    """The sections of RESULTS.md as it is, by part."""
+    """Return the sections of RESULTS.md, in their order: by part, or by title for a part that is gone."""
     if not RESULTS.exists():
         return {}
     sections = re.split(r"^(?=## )", RESULTS.read_text(), flags=re.MULTILINE)[1:]
-    named = ((re.search(r"^Repeat: `python benchmarks/run.py (\w+)`", text, re.MULTILINE), text) for text in sections)
-    return {name[1]: text.strip() for name, text in named if name}
+    found = {}
+    for text in sections:
+        repeated = re.search(r"^Repeat: `python benchmarks/run.py (\w+)`", text, re.MULTILINE)
+        found[repeated[1] if repeated else text.partition("\n")[0]] = text.strip()
+    return found
 
 
 def _measured(part: str) -> Section:

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from crew import crew
+from complex_robots import complex_robots
 from measure import ROBOCHOC, RUNS, Sample, repeated, spread, timed_command
 from report import Row, Section
 
@@ -50,7 +50,13 @@ def measured() -> Section:
     """Time the commands, from files to exit, with a cache of their own."""
     with tempfile.TemporaryDirectory() as scratch:
         os.environ["XDG_CACHE_HOME"] = str(Path(scratch) / "cache")
-        for team in (crew(), queens3d(7), queens3d(7, robots="rows"), queens3d(11), queens3d(11, robots="rows")):
+        for team in (
+            complex_robots(),
+            queens3d(7),
+            queens3d(7, robots="rows"),
+            queens3d(11),
+            queens3d(11, robots="rows"),
+        ):
             write_team(team, Path(scratch) / team.name)
         for side in (11, 12):
             write_team(queens3d(side, "full"), Path(scratch) / f"queens3d-{side}-full")

@@ -9,7 +9,7 @@ from typing import NamedTuple
 from bare_pipes import run_bare
 from measure import RUNS, FailedError, Sample, say, spread, timed_call
 from report import Row, Section
-from ring import OFFSETS, messages, ring_protocol, ring_team
+from token_ring import OFFSETS, messages, ring_protocol, ring_team
 
 from robochoc.communication.processes.processes import ProcessesRun
 

@@ -13,7 +13,7 @@ LEVELS = 6
 SEED = 3
 
 
-def crew() -> Team:
+def complex_robots() -> Team:
     """16 robots of 5 variables in a chain; 7 private relations each, no two robots with the same."""
     chance = Random(SEED)
     levels = Domain("D", (range(1, LEVELS + 1),))
