@@ -21,7 +21,7 @@ GROUP = "robochoc.filters"
 
 
 class NotGenuineError(Exception):
-    """What has come is not what `sender` has sealed for this robot, in this context; nothing of it may be used."""
+    """The data is not what `sender` has sealed for this robot in this context. No part of it may be used."""
 
 
 class UnknownFilterError(LookupError):
@@ -29,7 +29,7 @@ class UnknownFilterError(LookupError):
 
 
 class ChannelFilter(ABC):
-    """What is done to all messages of the robot whose keys are in `ring`.
+    """A filter for all messages of the robot whose keys are in `ring`.
 
     `context` is what both sides know of a message without being told in it: run, sender, receiver and sequence number,
     as bytes that the caller makes. It is not sent along; a message moved into another context does not open.
@@ -78,14 +78,14 @@ class FilterStack(ChannelFilter):
 
 @dataclass(frozen=True)
 class FilterOffer:
-    """What a package offers as the filter `name`: the class at `place`, or why there is none."""
+    """A package's offer of the filter `name`: the class at `place`, or the reason why there is none."""
 
     name: str
     place: str
     """Module and class, as the package names them."""
     filter: type[ChannelFilter] | None
     broken: str = ""
-    """Why it cannot be used; empty when it can."""
+    """The reason why the filter cannot be used. Empty if it can."""
 
 
 def filter_offers() -> tuple[FilterOffer, ...]:
@@ -110,7 +110,7 @@ def _offer(entry: EntryPoint, namesakes: Sequence[EntryPoint]) -> FilterOffer:
 
 
 def _fault(loaded: object) -> str:
-    """Why `loaded` cannot be used as a filter; empty when it can."""
+    """Return the reason why `loaded` cannot be used as a filter. Empty if it can."""
     if not (isinstance(loaded, type) and issubclass(loaded, ChannelFilter)):
         return "is no subclass of ChannelFilter"
     if loaded.__abstractmethods__:
