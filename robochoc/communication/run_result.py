@@ -27,8 +27,10 @@ class RobotsLostError(Exception):
 
 
 class Progress(NamedTuple):
-    """The progress of a run: messages sent so far, and seconds since its start. `stage` names work that is no
-    search."""
+    """The progress of a run: messages sent so far, and seconds since its start.
+
+    `stage` names the present work if it is no search.
+    """
 
     messages: int
     elapsed_s: float
