@@ -91,7 +91,7 @@ def test_a_bag_whose_types_are_others_is_refused() -> None:
             "/a_1/waypoint", "geometry_msgs/msg/PoseStamped", msgdef=HOSTILE.decode(), md5sum="0" * 32
         )
         bag.write(found, NOW, b"")
-    with pytest.raises(SourceError, match=r"other\.bag: what stands on /a_1/waypoint cannot be read: .* MD5 sum '0000"):
+    with pytest.raises(SourceError, match=r"other\.bag: the message on /a_1/waypoint cannot be read: .* MD5 sum '0000"):
         read("other.bag")
     assert [*Path().iterdir()] == [Path("other.bag")]
 
