@@ -195,7 +195,7 @@ class Outcome:
 
     @property
     def protocols(self) -> str:
-        """The protocol that was asked for, and the one that said who steps aside, if that is another."""
+        """The protocol that was asked for, and the one that said who withdraws, if that is another."""
         return f"{self.protocol}, then {self.placed_by}" if self.placed_by else self.protocol
 
     @property

@@ -44,7 +44,7 @@ class ValueText:
 
     def told(self, robot: str, value: Sequence[int | None]) -> str:
         """Return a robot's own value in words; if all components are None, that it withdraws."""
-        return self._pairs(robot, value, "=", ", ") or ("steps aside" if value else "shows no variable")
+        return self._pairs(robot, value, "=", ", ") or ("withdraws" if value else "shows no variable")
 
     def _pairs(self, robot: str, value: Sequence[int | None], sign: str, between: str) -> str:
         names = self._interfaces.get(robot, ())
