@@ -125,11 +125,6 @@ class Trace:
         """Return the fields of a message, by name."""
         return self._contents[message]
 
-    def keep_contents(self, other: Trace, messages: Iterable[int]) -> None:
-        """Append the contents of these messages of `other`."""
-        for message in messages:
-            self._contents.append(other.content(message))
-
     def packet(self, step: int) -> list[int]:
         """Return the messages that a step received, in that order."""
         first = self.steps.packet_end[step - 1] if step else 0

@@ -136,13 +136,6 @@ def _names(flown: FlightLog, numbers: Sequence[int]) -> str:
 
 def flight_json(mission: Mission, flown: FlightLog) -> bytes:
     """The same as one line of JSON: lengths in metres, times in seconds; null for a drone that fell."""
-
-    def pair(nearest: ClosestApproach | None) -> dict[str, object] | None:
-        if nearest is None:
-            return None
-        drones = [flown.names[nearest.first], flown.names[nearest.second]]
-        return {"distance_m": nearest.distance_m, "drones": drones, "at_s": nearest.at_s}
-
     ends = flown.positions[-1] if len(flown.positions) else ()
     legs = zip(mission.legs, flown.legs, strict=True)
     told = {
@@ -152,8 +145,8 @@ def flight_json(mission: Mission, flown: FlightLog) -> bytes:
         "flight_s": float(flown.times[-1]) if len(flown.times) else 0.0,
         "wall_s": flown.wall_s,
         "distance_m": flown.distance,
-        "nearest": pair(flown.nearest),
-        "nearest_fallen": pair(flown.nearest_fallen),
+        "nearest": _approach(flown, flown.nearest),
+        "nearest_fallen": _approach(flown, flown.nearest_fallen),
         "drones": [
             {"name": name, "at": [float(part) for part in end], "error_m": float(error) if isfinite(error) else None}
             for name, end, error in zip(flown.names, ends, flown.errors_m, strict=True)
@@ -167,3 +160,10 @@ def flight_json(mission: Mission, flown: FlightLog) -> bytes:
         ],
     }
     return msgspec.json.encode(told)
+
+
+def _approach(flown: FlightLog, nearest: ClosestApproach | None) -> dict[str, object] | None:
+    if nearest is None:
+        return None
+    drones = [flown.names[nearest.first], flown.names[nearest.second]]
+    return {"distance_m": nearest.distance_m, "drones": drones, "at_s": nearest.at_s}
