@@ -98,7 +98,7 @@ def cli() -> None:
 def run() -> int:
     """Run the command line, and return the exit status that docs/reference/cli.md lists; never a traceback."""
     try:
-        status = cli.main(standalone_mode=False)
+        status = cli.main(prog_name="robochoc", standalone_mode=False)
     except click.ClickException as error:
         error.show()
         return error.exit_code

@@ -9,19 +9,17 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import cast
 
 from robochoc.authority.keyring import KeyRing
 from robochoc.formats.diagnostics import on_one_line
-from robochoc.system.entry_points import EntryPoint
-from robochoc.system.installed import all_entry_points, entry_points_named, load_entry_point, not_installed_message
+from robochoc.system.installed import entry_points_named, load_entry_point, not_installed_message
 
 GROUP = "robochoc.filters"
 
 
 class NotGenuineError(Exception):
-    """What has come is not what `sender` has sealed for this robot, in this context; nothing of it may be used."""
+    """The data is not what `sender` has sealed for this robot in this context. No part of it may be used."""
 
 
 class UnknownFilterError(LookupError):
@@ -29,7 +27,7 @@ class UnknownFilterError(LookupError):
 
 
 class ChannelFilter(ABC):
-    """What is done to all messages of the robot whose keys are in `ring`.
+    """A filter for all messages of the robot whose keys are in `ring`.
 
     `context` is what both sides know of a message without being told in it: run, sender, receiver and sequence number,
     as bytes that the caller makes. It is not sent along; a message moved into another context does not open.
@@ -76,41 +74,19 @@ class FilterStack(ChannelFilter):
         return content
 
 
-@dataclass(frozen=True)
-class FilterOffer:
-    """What a package offers as the filter `name`: the class at `place`, or why there is none."""
-
-    name: str
-    place: str
-    """Module and class, as the package names them."""
-    filter: type[ChannelFilter] | None
-    broken: str = ""
-    """Why it cannot be used; empty when it can."""
-
-
-def filter_offers() -> tuple[FilterOffer, ...]:
-    """Return all that installed packages offer, by name; what cannot be used too, with the reason."""
-    return tuple(_offer(entry, namesakes) for entry, namesakes in all_entry_points(GROUP))
-
-
 def filter_named(name: str) -> type[ChannelFilter]:
     """Return the filter called `name`. Raises `UnknownFilterError`, which names those there are."""
     found = entry_points_named(GROUP, name)
     if not found:
         raise UnknownFilterError(not_installed_message(GROUP, "filter", name))
-    offer = _offer(found[0], found)
-    if offer.filter is None:
-        raise UnknownFilterError(f"{offer.place}, installed as filter {name!r}, {offer.broken}")
-    return offer.filter
-
-
-def _offer(entry: EntryPoint, namesakes: Sequence[EntryPoint]) -> FilterOffer:
-    found = load_entry_point(entry, namesakes, _fault)
-    return FilterOffer(entry.name, entry.value, cast("type[ChannelFilter] | None", found.what), found.broken)
+    loaded = load_entry_point(found[0], found, _fault)
+    if loaded.broken:
+        raise UnknownFilterError(f"{found[0].value}, installed as filter {name!r}, {loaded.broken}")
+    return cast("type[ChannelFilter]", loaded.what)
 
 
 def _fault(loaded: object) -> str:
-    """Why `loaded` cannot be used as a filter; empty when it can."""
+    """Return the reason why `loaded` cannot be used as a filter. Empty if it can."""
     if not (isinstance(loaded, type) and issubclass(loaded, ChannelFilter)):
         return "is no subclass of ChannelFilter"
     if loaded.__abstractmethods__:

@@ -23,7 +23,6 @@ from robochoc.journal.events import Decided, Received, Sent, Settled
 SENT, RECEIVED, SETTLED, DECIDED, OTHER = range(5)
 """The kinds of entries in `_Block.kinds`."""
 NANOSECONDS = 1_000_000_000
-_DOUBLE = 8
 _LARGEST = 2**63
 
 _Index = Annotated[int, Meta(ge=0)]

@@ -90,12 +90,12 @@ class Wording(NamedTuple):
     def facts(self, robot: str, value: RobotValue) -> list[str]:
         """Return a robot's value variable by variable, such as `V1.1 = 2`; or that the robot withdraws."""
         if is_withdrawn(value):
-            return [f"{robot} steps aside"]
+            return [f"{robot} withdraws"]
         return [f"{name} = {part}" for name, part in self.parts(robot, value)]
 
     def own_value(self, value: RobotValue, otherwise: str = "I have a value") -> str:
         """Return the sender's value in its own words; `otherwise` if it shows no variable."""
-        return "I step aside" if is_withdrawn(value) else listed(self.facts(self.sender, value)) or otherwise
+        return "I withdraw" if is_withdrawn(value) else listed(self.facts(self.sender, value)) or otherwise
 
     def assigned(self, values: Iterable[tuple[str, RobotValue]]) -> str:
         """Return what robots have taken: `V1.1 = 2 and V1.3 = 1`."""
@@ -137,13 +137,13 @@ class Wording(NamedTuple):
         """Return the values that the sender may take: `V2.1 is 1, 2 or 3`."""
         names = self.interfaces.get(self.sender, ())
         flying = [value for value in values if not is_withdrawn(value)]
-        aside = ", or I step aside" if len(flying) < len(values) else ""
+        withdrawn = ", or I withdraw" if len(flying) < len(values) else ""
         if all(len(value) == 1 for value in flying):
             shown = listed([str(value[0]) for value in flying], "or")
         else:
             shown = listed([f"({', '.join(map(str, value))})" for value in flying], "or")
         called = names[0] if len(names) == 1 else f"({', '.join(names)})" if names else self.sender
-        return f"{called} is {shown or 'nothing'}{aside}"
+        return f"{called} is {shown or 'nothing'}{withdrawn}"
 
 
 def along(names: Sequence[str], things: Sequence[T]) -> list[tuple[str, T]]:

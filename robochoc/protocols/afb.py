@@ -25,7 +25,7 @@ forward bounding revisited", CP 2013, send.)
 An estimate is the least of what the own values cost with the beginning, plus h: what constraints with lower robots
 only charge at least, whatever those take. So every constraint is in one term at most: until its highest robot has its
 value in that one's h, later, once all others of the scope have theirs, in the lowest one's estimate, which pays it in
-the end. Robots look h up in the domains that all of them declare, without a word; where they may step aside it is 0.
+the end. Robots look h up in the domains that all of them declare, without a word; where they may withdraw it is 0.
 
 What the paper leaves open, or is settled otherwise here: messages are read by packets, and a robot decides once the
 inbox has been drained; constraints may be n-ary; values are tried the cheapest first; estimates are kept as long as

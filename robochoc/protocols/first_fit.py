@@ -1,9 +1,9 @@
-"""First fit: robots that cannot be placed step aside, in priority order.
+"""First fit: robots that cannot be placed withdraw, in priority order.
 
 Paper, Section 5.2: "the robots who can't belonging to the solution will be taken from the operational scene. Thus
 only robots that will satisfy all constraints will fly to take their positions." Each robot waits until all its
 parents have said where they fly, or that they do not; then it takes the first value that its constraints with the
-flying ones allow, or steps aside, and tells its children. One message an edge; nobody who stepped aside could
+flying ones allow, or withdraws, and tells its children. One message an edge; nobody who withdrew could
 still be added, as all that ruled it out flies. Which *fewest* robots must leave is an optimisation problem, and
 another protocol's.
 """
@@ -21,14 +21,14 @@ from robochoc.solver.compiled import LocalProblem
 
 
 class Placed(Message, frozen=True):
-    """Where the sender flies; None: it has stepped aside."""
+    """Where the sender flies; None: it has withdrawn."""
 
     value: Value | None
 
     def in_words(self, words: Wording) -> str:
         """Return what the sender says."""
         if self.value is None:
-            return "I step aside"
+            return "I withdraw"
         return f"I fly, with {words.own_value(self.value, 'a value')}"
 
 

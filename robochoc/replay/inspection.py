@@ -87,7 +87,7 @@ class Inspector:
         if value is not None:
             fields["value"] = self._own.told(sender, value)
         elif "value" in fields and fields["value"] is None:
-            fields["value"] = "steps aside"
+            fields["value"] = "withdraws"
         for name in VIEWS:
             if isinstance(fields.get(name), Mapping | list | tuple):
                 fields[name] = self._own.all(self._pairs(fields[name], self._part.order)) or "nobody has any value"

@@ -134,7 +134,7 @@ class Reasons:
             return "it has no value now"
         first = safely(lambda: self._is_first(index), False)
         text = self._named(index) or ""
-        if text.startswith("steps aside"):
+        if text.startswith("withdraws"):
             return f"it {text}"
         return f"it takes {text}{', the first value that nothing rules out' if first else ''}"
 

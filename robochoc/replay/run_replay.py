@@ -120,11 +120,7 @@ class RunReplay:
         packet: list[Sent] = []
         raised = ""
         try:
-            for received in step.received:
-                message, envelope = self._delivered(received)
-                packet.append(message)
-                self._take_in(host, message, envelope)
-                self._delay(host, received, events)
+            self._receive(host, step, packet, events)
             sent = self._go_on(host, step)
         except ReplayStopsError:
             raise
@@ -135,6 +131,14 @@ class RunReplay:
             self._channels.send_again(sent)
             return None
         return self._difference(step, number, packet, found or (None, None), raised)
+
+    def _receive(self, host: Host, step: RecordedStep, packet: list[Sent], events: list[AnyEvent]) -> None:
+        """Deliver the messages of a step to its robot, and add them to `packet`."""
+        for received in step.received:
+            message, envelope = self._delivered(received)
+            packet.append(message)
+            self._take_in(host, message, envelope)
+            self._delay(host, received, events)
 
     def _delivered(self, received: Received) -> tuple[Sent, Envelope]:
         """Return the message that was received. Raises `ReplayStopsError`."""

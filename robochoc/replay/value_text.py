@@ -43,8 +43,8 @@ class ValueText:
         return cut(" and ".join([*named[:MOST_NAMED], *more]))
 
     def told(self, robot: str, value: Sequence[int | None]) -> str:
-        """What a robot has told of itself; all of nothing: that it steps aside."""
-        return self._pairs(robot, value, "=", ", ") or ("steps aside" if value else "shows no variable")
+        """What a robot has told of itself; all of nothing: that it withdraws."""
+        return self._pairs(robot, value, "=", ", ") or ("withdraws" if value else "shows no variable")
 
     def _pairs(self, robot: str, value: Sequence[int | None], sign: str, between: str) -> str:
         names = self._interfaces.get(robot, ())

@@ -1,4 +1,4 @@
-"""What one robot publishes on its own machine: it knows its own decision, and not where others are."""
+"""The ROS messages of one robot on its own machine. It knows its own decision, but not where others are."""
 
 from __future__ import annotations
 
@@ -8,8 +8,8 @@ from robochoc.model.outcome import EpochOutcome, Verdict
 from robochoc.model.problem import Assignment, Robot
 
 _ANSWERED = (Verdict.SOLUTION, Verdict.OPTIMAL)
-_WITHDRAWN = ("withdr", "aside")
-"""Parts of the master's word that say that robots have withdrawn."""
+_WITHDRAWN = "withdr"
+"""Part of the master's word that says that robots have withdrawn."""
 
 
 def drones_of_robot(robot: Robot) -> tuple[Drone, ...]:
@@ -25,12 +25,12 @@ def leg_of_robot(robot: Robot, why: str, assignment: Assignment, scale: float | 
 
     Args:
         robot: The robot.
-        why: The master's word for how the run ended: `optimal, 6 step aside`.
+        why: The master's word for how the run ended: `optimal, 6 withdraw`.
         assignment: The robot's decision; empty if it has withdrawn.
         scale: Metres a unit.
     """
     verdict, _, others = why.partition(",")
-    if verdict not in _ANSWERED or not (assignment or any(part in others for part in _WITHDRAWN)):
+    if verdict not in _ANSWERED or not (assignment or _WITHDRAWN in others):
         return Leg(why, Verdict.UNKNOWN, {})
     builder = MissionBuilder([robot], assignment, scale=scale)
     known = {craft.name for craft in crafts_of(robot, assignment) if craft.cell}

@@ -117,12 +117,7 @@ def _message(whole: Expression) -> ACLMessage:
         performative = Performative(act)
     except ValueError:
         raise SymbolicExpressionError(f"{act[:40]!r} is no performative of FIPA00037", whole.at) from None
-    found = parameters(items_of(whole, (act,), "a message"), "the message")
-    for key, value in found.items():
-        if key not in _KNOWN and not key.startswith("x-"):
-            raise SymbolicExpressionError(
-                f"a message has no parameter :{key[:40]}; other ones are to begin with :X-", value.at
-            )
+    found = _parameters(whole, act)
     texts = {key: text_of(value, f":{key}") for key, value in found.items() if key in _TEXTS or key == "reply-by"}
     try:
         return ACLMessage(
@@ -145,6 +140,17 @@ def _message(whole: Expression) -> ACLMessage:
         raise
     except ValueError as error:
         raise SymbolicExpressionError(str(error), whole.at) from None
+
+
+def _parameters(whole: Expression, act: str) -> dict[str, Expression]:
+    """Return the parameters of a message by name. Raise `SymbolicExpressionError` for one that no message has."""
+    found = parameters(items_of(whole, (act,), "a message"), "the message")
+    for key, value in found.items():
+        if key not in _KNOWN and not key.startswith("x-"):
+            raise SymbolicExpressionError(
+                f"a message has no parameter :{key[:40]}; other ones are to begin with :X-", value.at
+            )
+    return found
 
 
 def _agents(expression: Expression | None, what: str) -> tuple[AgentIdentifier, ...]:

@@ -58,14 +58,7 @@ class RobotStates:
             self._playing, self._next = playing, 0
         answer = b"[]"
         while self._next <= number and not self.stopped:
-            try:
-                states = list(islice(playing.states, STATES))
-            except CannotReplayError as reason:
-                self._playing = None
-                raise BadRequestError(str(reason)) from reason
-            except BadRequestError:
-                self._playing = None
-                raise
+            states = self._next_states(playing)
             answer = msgspec.json.encode(states)
             if len(states) < STATES:
                 self._playing = None
@@ -74,6 +67,17 @@ class RobotStates:
                 self._cache.put((robot, self._next), answer)
             self._next += 1
         return answer
+
+    def _next_states(self, playing: _Playing) -> list[RobotState]:
+        """Return the states of the next chunk. Raise `BadRequestError`."""
+        try:
+            return list(islice(playing.states, STATES))
+        except CannotReplayError as reason:
+            self._playing = None
+            raise BadRequestError(str(reason)) from reason
+        except BadRequestError:
+            self._playing = None
+            raise
 
     def _states(self, file: GrowingFile, robot: str) -> Iterator[RobotState]:
         return states_of(

@@ -125,11 +125,6 @@ class Trace:
         """The fields of a message, by name."""
         return self._contents[message]
 
-    def keep_contents(self, other: Trace, messages: Iterable[int]) -> None:
-        """Hold what these messages of `other` hold, as one's own next ones."""
-        for message in messages:
-            self._contents.append(other.content(message))
-
     def packet(self, step: int) -> list[int]:
         """The messages that a step took in, in that order."""
         first = self.steps.packet_end[step - 1] if step else 0

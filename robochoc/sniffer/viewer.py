@@ -42,13 +42,7 @@ class Viewer:
             self._redirect: RedirectFile | None = None
             try:
                 self._redirect = RedirectFile(self.url) if open_browser else None
-                with signals_held():  # until it has said itself what they do: Ctrl-C reaches it, too
-                    self._process = subprocess.Popen(  # noqa: S603 - our own module
-                        [sys.executable, "-P", "-m", _PROGRAM, str(here.fileno()), str(journal)],
-                        stdin=theirs_in,
-                        stdout=theirs_out,
-                        pass_fds=(here.fileno(), journal),
-                    )
+                self._process = _started(here.fileno(), journal, theirs_in, theirs_out)
             except BaseException:
                 os.close(heard)
                 os.close(lifeline)
@@ -107,3 +101,14 @@ class Viewer:
             os.close(self._heard)
             if self._redirect:
                 self._redirect.close()
+
+
+def _started(listening: int, journal: int, theirs_in: int, theirs_out: int) -> subprocess.Popen[bytes]:
+    """Start the viewer's process with these descriptors, and return it."""
+    with signals_held():  # until it has said itself what they do: Ctrl-C reaches it, too
+        return subprocess.Popen(  # noqa: S603 - our own module
+            [sys.executable, "-P", "-m", _PROGRAM, str(listening), str(journal)],
+            stdin=theirs_in,
+            stdout=theirs_out,
+            pass_fds=(listening, journal),
+        )

@@ -116,6 +116,10 @@ class CentralSolver:
             return self._minimum(team, components_with_withdrawal(team, withdrawal_cost))
         if team.kind is ProblemKind.DISWCSP and not count:
             return self._minimum(team, weighted_components(team.variables.values(), list(team.constraints())))
+        return self._all_components(team, count=count)
+
+    def _all_components(self, team: Team, *, count: bool) -> CentralAnswer:
+        """Solve the components of a problem without costs, the smallest first, or multiply their counts."""
         with ExitStack() as processes:
             ace = self._solver or processes.enter_context(AceProcess(always=self._always_ace))
             spare = processes.enter_context(AceProcess(always=True))

@@ -285,8 +285,8 @@ def test_a_robot_publishes_its_own_decision(site: Deployment, tmp_path: Path) ->
 
 def test_what_one_robot_knows_of_its_goal() -> None:
     robot = read_team(FOUR)["Robot3.2"]
-    assert leg_of_robot(robot, "optimal, 6 step aside", {"V3.2": 4}).goals == {0: Goal((3.0, 2.0, 4.0))}
-    assert leg_of_robot(robot, "optimal, 6 step aside", {}).goals == {0: Goal((3.0, 2.0, 0.0), lands=True)}
+    assert leg_of_robot(robot, "optimal, 6 withdraw", {"V3.2": 4}).goals == {0: Goal((3.0, 2.0, 4.0))}
+    assert leg_of_robot(robot, "optimal, 6 withdraw", {}).goals == {0: Goal((3.0, 2.0, 0.0), lands=True)}
     assert leg_of_robot(robot, "solution", {"V3.2": 1}, 0.5).goals == {0: Goal((1.5, 1.0, 0.5))}
     for why, values in (("no-solution", {"V3.2": 1}), ("unknown", {"V3.2": 1}), ("solution", {})):
         assert leg_of_robot(robot, why, values).goals == {}

@@ -105,7 +105,7 @@ def test_withdrawing_leaves_a_placement_that_nobody_could_join(runtime: Runtime)
 
 
 def joinable(team: Team, outcome: Outcome) -> list[str]:
-    """By brute force: robots that stepped aside although one of their values fits those that fly."""
+    """By brute force: robots that withdrew although one of their values fits those that fly."""
     fitting = []
     for name in outcome.withdrawn:
         (variable,) = team[name].variables

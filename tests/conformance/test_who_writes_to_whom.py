@@ -73,7 +73,7 @@ def test_who_stays_within_never_writes_to_a_stranger(protocol: type[Protocol]) -
     for seed in range(4):
         for team in random_teams(seed, costs=protocol.traits.costs):
             assert strangers(team, protocol, seed) == set()
-            if protocol.traits.costs:  # the last value is to step aside
+            if protocol.traits.costs:  # the last value is to withdraw
                 assert (
                     strangers(team, protocol, seed, RunParameters(seed, withdrawal_cost=withdrawal_cost(team))) == set()
                 )

@@ -40,7 +40,7 @@ def test_sixteen_machines_find_what_sixteen_processes_do(site: Deployment) -> No
     assert (told["verdict"], told["cost"], len(told["assignment"])) == ("optimal", 0, FLYING)
     assert len(told["withdrawn"]) == len(robots) - FLYING
     assert told["verified"]
-    assert "6 step aside" in robots["Robot1.1"].output
+    assert "6 withdraw" in robots["Robot1.1"].output
     assert master.errors.count("granted to redeem a token") == master.errors.count(" is there") == len(robots)
     assert master.errors.count("\n") == 1 + 2 * len(robots)
     listed = [json.loads(line) for line in site.authority("list", "--json").splitlines()]

@@ -101,7 +101,7 @@ def cost_of(assignment: Assignment, constraints: Sequence[Constraint]) -> float:
 
 
 def minimum_withdrawal(team: Team) -> int:
-    """The least weight of robots that have to step aside so that the others have a solution, by brute force."""
+    """The least weight of robots that have to withdraw so that the others have a solution, by brute force."""
     constraints = list(team.constraints())
     own = {robot.name: {variable.name for variable in robot.variables} for robot in team.robots}
 

@@ -58,7 +58,7 @@ def random_run(protocol: str, chance: Random, number: int) -> tuple[Team, Option
 
 
 def withdrawal(protocol: str, team: Team, chance: Random) -> Withdrawal | None:
-    """Who may step aside, if anybody."""
+    """Who may withdraw, if anybody."""
     traits = protocol_named(protocol).traits
     parts = any(one.model is ConstraintModel.PKC for one in team.constraints())
     fewest = not parts and (traits.complete or not traits.costs)

@@ -28,7 +28,7 @@ def animate(saved: Path, html: Path | None, folder: Path | None, port: int, *, s
     robochoc solve instances/queens3d-4 --withdraw --json > out/result.json
     robochoc animate out/result.json --html out/page.html
     """  # noqa: D301 - \\b is how click is told to leave the lines as they are
-    from robochoc.cli.reports.scene import scene_for, serve_scene, write_page
+    from robochoc.cli.reports.scene import scene_for, show_scene
 
     if not (html or serve):
         raise click.UsageError("say where to write the page (--html FILE), or show it live (--serve)")
@@ -37,8 +37,4 @@ def animate(saved: Path, html: Path | None, folder: Path | None, port: int, *, s
     refuse_same_places({"--html": html}, {"the result": saved}, teams=[folder] if folder else [])
     outcome = saved_outcome(saved)
     team = team_of(outcome, saved, folder)
-    scene = scene_for(outcome, team)
-    if html:
-        write_page(scene, html)
-    if serve:
-        serve_scene(scene, port)
+    show_scene(scene_for(outcome, team), html, serve=serve, port=port)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -14,7 +15,8 @@ from robochoc.cli.reports.failures import LIMIT, Failure, failures_told, worst
 
 if TYPE_CHECKING:
     from robochoc.solver.cache import SolutionCache
-    from robochoc.solver.compile import Limits
+    from robochoc.solver.compile import CompileTimeoutError, Limits
+    from robochoc.solver.domain import TooManySolutionsError
 
 
 @click.command("compile")
@@ -68,7 +70,7 @@ def _compile(folder: Path, bounds: Limits, cache: SolutionCache | None, *, as_js
     from robochoc.cli.reports.compile import print_sizes, sizes_json
     from robochoc.cli.reports.progress import progress_line
     from robochoc.communication.run_result import Progress
-    from robochoc.formats import on_one_line, read_team
+    from robochoc.formats import read_team
     from robochoc.solver.compile import Compilation, Compiler, CompileTimeoutError
     from robochoc.solver.domain import TooManySolutionsError
 
@@ -89,9 +91,15 @@ def _compile(folder: Path, bounds: Limits, cache: SolutionCache | None, *, as_js
     else:
         print_sizes(team, found, time.monotonic() - began, folder)
     limited = [one for one in found if not isinstance(one, Compilation)]
-    if not limited:
-        return 0
+    if limited:
+        _print_limits(folder, limited)
+    return LIMIT if limited else 0
+
+
+def _print_limits(folder: Path, limited: Sequence[TooManySolutionsError | CompileTimeoutError]) -> None:
+    """Print the first limit that was reached, and the names of the other robots, in one line."""
+    from robochoc.formats import on_one_line
+
     first, *others = limited
     more = f" (and {len(others)} more: {', '.join(one.robot for one in others)})" if others else ""
     click.echo(on_one_line(f"{folder}: {first}{more}"), err=True)
-    return LIMIT

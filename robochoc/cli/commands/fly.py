@@ -74,18 +74,14 @@ def fly(saved: Path, folder: Path | None, html: Path | None, *, serve: bool, as_
         for line in (*published, *too_late(given["failures"], flown)):
             click.echo(line, err=True)
     if html or serve:
-        from robochoc.cli.reports.scene import scene_for, serve_scene, write_page
+        from robochoc.cli.reports.scene import scene_for, show_scene
 
-        scene = scene_for(outcome, team, mission=mission, flown=flown)
-        if html:
-            write_page(scene, html, quiet=as_json)
-        if serve:
-            serve_scene(scene)
+        show_scene(scene_for(outcome, team, mission=mission, flown=flown), html, serve=serve, quiet=as_json)
     click.get_current_context().exit(0 if as_planned(flown) else LOST)
 
 
 def _flown(saved: Path, mission: Mission, given: dict[str, Any]) -> tuple[FlightLog, list[str]]:
-    """What was flown, and what of it was published where."""
+    """Fly the mission. Return the log, and the lines on what was published where."""
     from robochoc.cli.reports.progress import stages
     from robochoc.flight.flight import fly as flight
     from robochoc.formats import on_one_line

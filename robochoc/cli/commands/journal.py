@@ -74,36 +74,40 @@ def export(
     """  # noqa: D301 - \\b is how click is told to leave the lines as they are
     from robochoc.sniffer.patterns import patterns_in
     from robochoc.sniffer.selection import NothingSelectedError, Selection
-    from robochoc.system.files import write_atomically
 
-    meant = Selection(patterns_in(robots), patterns_in(types), first, last, conversation)
+    selection = Selection(patterns_in(robots), patterns_in(types), first, last, conversation)
     refuse_same_places({"-o": output}, {"the journal": file})
     read = saved_journal(file)
     trace = _trace(read, file)
     try:
-        messages = meant.of(trace)
+        messages = selection.of(trace)
     except NothingSelectedError as nothing:
         raise click.UsageError(_one_line(str(nothing))) from nothing
     if trace.damage:
         click.echo(_one_line(f"{file}: it is not whole, this is what can be read: {trace.damage}"), err=True)
     options = {"--robots": robots, "--types": types, "--from": first, "--conversation": conversation, "-o": output}
     try:
-        pieces = _pieces(form, read, trace, meant, messages)
+        pieces = _pieces(form, read, trace, selection, messages)
     except _TooManyError as many:
         again = f"; the first of them: {_command(file, form, {**options, '--to': many.last})}" if many.last else ""
         raise Failure(USAGE, f"{many}{again}") from many
     if output is None:
         for piece in pieces:
             click.echo(piece, nl=False)
-        return
-    content = b"".join(pieces)
+    else:
+        _write(output, b"".join(pieces), count=len(messages))
+
+
+def _write(output: Path, content: bytes, *, count: int) -> None:
+    """Write an export of `count` messages to a file, and print its size."""
+    from robochoc.system.files import write_atomically
+
     try:
         write_atomically(output, content)
     except OSError as error:
         why = f"{output}: the export cannot be written: {error.strerror} (free some space, or name another file)"
         raise Failure(INVALID, _one_line(why)) from error
-    count = f"{len(messages):,} message{'s' * (len(messages) != 1)}"
-    click.echo(f"{output}: {count}, {len(content):,} bytes")
+    click.echo(f"{output}: {count:,} message{'s' * (count != 1)}, {len(content):,} bytes")
 
 
 def _pieces(form: str, read: Journal, trace: Trace, meant: Selection, messages: range | list[int]) -> Iterable[bytes]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import closing, contextmanager
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -171,7 +172,7 @@ def _plan(folder: Path | None, team: Path | None, given: dict[str, Any]) -> Mast
 
 @contextmanager
 def _publication(*, sniffable: bool) -> Iterator[Publication | None]:
-    """What those get who may sniff, in a file without a name, if they are to get anything."""
+    """Yield the publication of the journal for sniffers, in an unnamed file. None if the run is not `sniffable`."""
     if not sniffable:
         yield None
         return
@@ -200,23 +201,24 @@ def _led(plan: MasterPlan, recorder: JournalRecorder | None, publication: Public
         def listening() -> None:
             print_above(f"listening at {plan.place}; start robots with --master {_address(plan.place)}")
 
-        def concluded(outcome: Outcome | None) -> None:
-            if recorder:
-                recorder.outcome = outcome
-                recorder.close()  # before anything else goes to where it may be written
-            if publication:
-                publication.end()
-
-        watched = recorder is not None
         return run_master(
             plan,
             observer=observe,
-            watched=watched,
+            watched=recorder is not None,
             progress=progress,
             listening=listening,
             publication=publication,
-            concluded=concluded,
+            concluded=partial(_close_journal, recorder, publication),
         )
+
+
+def _close_journal(recorder: JournalRecorder | None, publication: Publication | None, outcome: Outcome | None) -> None:
+    """Write the end of the run to the journal."""
+    if recorder:
+        recorder.outcome = outcome
+        recorder.close()  # before anything else goes to where it may be written
+    if publication:
+        publication.end()
 
 
 def _tell(led: MasterResult, *, as_json: bool) -> None:
@@ -231,7 +233,7 @@ def _tell(led: MasterResult, *, as_json: bool) -> None:
 
 
 def _header(plan: MasterPlan) -> Header:
-    """What the journal says of the run."""
+    """Return the journal's header for the run."""
     from robochoc.journal.journal import Header
     from robochoc.run.defaults import DEFAULT_PROTOCOL
 

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from contextlib import ExitStack
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -19,6 +20,7 @@ from robochoc.cli.reports.failures import LIMIT, LOST, Failure
 from robochoc.cli.reports.progress import progress_line
 
 if TYPE_CHECKING:
+    from robochoc.communication.network.robot import Ending
     from robochoc.run.networked.address import Address
 
 
@@ -60,47 +62,81 @@ def robot(
     robochoc robot Robot3.1.xml --master 192.168.1.14:7447 --token-file token
     """  # noqa: D301 - \\b is how click is told to leave the lines as they are
     with network_failures_told(file):
-        from robochoc.communication.network.robot_settings import RobotSettings
-        from robochoc.communication.run_result import Progress
-        from robochoc.formats import read_robot
-        from robochoc.run.networked.join import identity_of, join
-        from robochoc.solver.cache import SolutionCache
-        from robochoc.solver.compile import Compiler
-        from robochoc.system.plain_text import on_one_line
-
-        with progress_line(file.stem) as progress, ExitStack() as stack:
-            began = _seconds()
-
-            def stage(words: str) -> None:
-                if progress:
-                    progress(Progress(0, _seconds() - began, words))
-
-            itself = read_robot(file)  # before its token is spent
-            published = stack.enter_context(robot_publisher(itself, given))
-            stage(f"looking for the master at {place}")
-            proof = identity_of(file.stem, place, identity, token, given["patience"])
-            settings = RobotSettings(given["patience"], sniffed=given["sniff"], stage=stage)
-            cache = None if given["no_cache"] else SolutionCache()
-            bounds = limits(given["local_solutions"], given["local_timeout"], always_ace=given["always_ace"])
-            with Compiler(bounds, cache) as compiler:
-                ending = join(itself, place, proof, settings, compiler)
-            if ending.failed:
-                raise Failure(LOST, f"{file.stem}: {ending.why}")
-            told = published(ending.why, ending.assignment)
-        if as_json:
-            import msgspec
-
-            result = {"robot": file.stem, "outcome": ending.why, "assignment": ending.assignment}
-            click.echo(msgspec.json.encode(result).decode())
-        else:
-            decision = ", ".join(f"{name} = {value}" for name, value in ending.assignment.items())
-            click.echo(on_one_line(f"{file.stem}: {ending.why}; {decision or 'no value'}"))
-            for line in told:
-                click.echo(line, err=True)
+        with _stages(file.stem) as show_stage:
+            ending, published = _run(file, place, (identity, token), given, show_stage)
+        _print_ending(file.stem, ending, published, as_json=as_json)
     context.exit(LIMIT if ending.why.startswith("unknown") else 0)
 
 
-def _seconds() -> float:
+@contextmanager
+def _stages(name: str) -> Iterator[Callable[[str], None]]:
+    """Yield a function that shows the stage of the run on a terminal."""
     import time
 
-    return time.monotonic()
+    from robochoc.communication.run_result import Progress
+
+    with progress_line(name) as progress:
+        began = time.monotonic()
+
+        def show_stage(stage: str) -> None:
+            if progress:
+                progress(Progress(0, time.monotonic() - began, stage))
+
+        yield show_stage
+
+
+def _run(
+    file: Path,
+    place: Address,
+    credentials: tuple[Path | None, str | None],
+    given: dict[str, Any],
+    show_stage: Callable[[str], None],
+) -> tuple[Ending, list[str]]:
+    """Run the robot of `file`, and publish its decision.
+
+    Args:
+        file: The robot's file.
+        place: The address of the master.
+        credentials: The folder of its certificate, and its token.
+        given: The other options of the command.
+        show_stage: Shows the stage of the run.
+
+    Returns:
+        How the run ended for the robot, and a line for each place where its decision was published.
+
+    Raises:
+        Failure: when the run could not be completed.
+    """
+    from robochoc.communication.network.robot_settings import RobotSettings
+    from robochoc.formats import read_robot
+    from robochoc.run.networked.join import identity_of, join
+    from robochoc.solver.cache import SolutionCache
+    from robochoc.solver.compile import Compiler
+
+    itself = read_robot(file)  # before its token is spent
+    with robot_publisher(itself, given) as publish:
+        show_stage(f"looking for the master at {place}")
+        identity = identity_of(file.stem, place, *credentials, given["patience"])
+        settings = RobotSettings(given["patience"], sniffed=given["sniff"], stage=show_stage)
+        cache = None if given["no_cache"] else SolutionCache()
+        bounds = limits(given["local_solutions"], given["local_timeout"], always_ace=given["always_ace"])
+        with Compiler(bounds, cache) as compiler:
+            ending = join(itself, place, identity, settings, compiler)
+        if ending.failed:
+            raise Failure(LOST, f"{file.stem}: {ending.why}")
+        return ending, publish(ending.why, ending.assignment)
+
+
+def _print_ending(name: str, ending: Ending, published: Sequence[str], *, as_json: bool) -> None:
+    from robochoc.system.plain_text import on_one_line
+
+    if as_json:
+        import msgspec
+
+        result = {"robot": name, "outcome": ending.why, "assignment": ending.assignment}
+        click.echo(msgspec.json.encode(result).decode())
+        return
+    decision = ", ".join(f"{variable} = {value}" for variable, value in ending.assignment.items())
+    click.echo(on_one_line(f"{name}: {ending.why}; {decision or 'no value'}"))
+    for line in published:
+        click.echo(line, err=True)

@@ -6,7 +6,7 @@ from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import click
 
@@ -45,13 +45,13 @@ from robochoc.cli.reports.live_sniffer import Watch, check_chosen, watching
 from robochoc.run.defaults import default_protocol
 
 if TYPE_CHECKING:
+    from robochoc.cli.reports.closed_loop import FlownMission
     from robochoc.journal.journal import Header, JournalRecorder
     from robochoc.model.outcome import Outcome
     from robochoc.model.problem import Team
     from robochoc.ros.closed_loop import ClosedLoop
     from robochoc.run.options import Options
     from robochoc.verification.objective import Objective
-    from robochoc.view.scene import Scene
 
 
 _SECTIONS: Sections = {
@@ -206,42 +206,59 @@ def _solve_one(folder: Path, options: Options, products: Products, wanted: Wante
 
 
 def _solved(folder: Path, options: Options, products: Products, wanted: Wanted, watch: Watch) -> int:
-    """The exit status of a run that somebody may watch."""
-    from robochoc.formats import on_one_line, read_team
+    """Solve the team in `folder`, show the outcome, and return the exit status."""
+    from robochoc.formats import on_one_line
 
     try:
         with failures_told(folder):
-            team = read_team(folder)
-            check_chosen(products.watching, team)
-            protocol = wanted.protocol or default_protocol(team.kind)
-            options = replace(options, protocol=protocol, order=order_for(team, wanted.order))
-            header = partial(_header, team, options)
-            objective = None if wanted.ros.situation else _objective(team, options)
-            with (
-                closed_loop(wanted.ros, team, options.seed) as loop,
-                recording(products.journal, header, objective, watch.begun()) as recorder,
-            ):
-                outcome = _run(team, options, recorder, loop)
-                team = loop.team if loop else team
-                _tell(team, outcome, wanted)
-                if loop and loop.mission is None:  # the run knew nothing of it
-                    loop.publish(outcome)
-                flight = flight_told(loop, wanted.ros, quiet=wanted.as_json)
+            team, outcome, loop, flight = _recorded(folder, options, products, wanted, watch)
     except Failure as failure:
         failure.show()
         return failure.exit_code
     for line in told_of(loop) if loop and not wanted.as_json else ():
         click.echo(line, err=True)
     if products.html or products.serve:
-        from robochoc.cli.reports.scene import scene_for
+        from robochoc.cli.reports.scene import scene_for, show_scene
 
         scene = scene_for(outcome, team, mission=flight.mission, flown=flight.flown)
-        _show(scene, products, quiet=wanted.as_json)
+        show_scene(scene, products.html, serve=products.serve, quiet=wanted.as_json)
     if outcome.verdict != "unknown":
         return flight.status
     if outcome.reason and wanted.as_json:
         click.echo(on_one_line(f"{folder}: {outcome.reason}"), err=True)
     return LIMIT
+
+
+class _RecordedRun(NamedTuple):
+    """A run that is over, and whose journal is written."""
+
+    team: Team
+    outcome: Outcome
+    loop: ClosedLoop | None
+    flight: FlownMission
+
+
+def _recorded(folder: Path, options: Options, products: Products, wanted: Wanted, watch: Watch) -> _RecordedRun:
+    """Solve the team in `folder`, with a journal and a closed loop where they are asked for, and print the outcome."""
+    from robochoc.formats import read_team
+
+    team = read_team(folder)
+    check_chosen(products.watching, team)
+    protocol = wanted.protocol or default_protocol(team.kind)
+    options = replace(options, protocol=protocol, order=order_for(team, wanted.order))
+    header = partial(_header, team, options)
+    objective = None if wanted.ros.situation else _objective(team, options)
+    with (
+        closed_loop(wanted.ros, team, options.seed) as loop,
+        recording(products.journal, header, objective, watch.begun()) as recorder,
+    ):
+        outcome = _run(team, options, recorder, loop)
+        team = loop.team if loop else team
+        _tell(team, outcome, wanted)
+        if loop and loop.mission is None:  # the run knew nothing of it
+            loop.publish(outcome)
+        flight = flight_told(loop, wanted.ros, quiet=wanted.as_json)
+    return _RecordedRun(team, outcome, loop, flight)
 
 
 def _run(team: Team, options: Options, recorder: JournalRecorder | None, loop: ClosedLoop | None) -> Outcome:
@@ -263,7 +280,7 @@ def _run(team: Team, options: Options, recorder: JournalRecorder | None, loop: C
 
 
 def _header(team: Team, options: Options) -> Header:
-    """What the journal says of the run."""
+    """Return the journal's header for the run."""
     from msgspec import UNSET
 
     from robochoc.journal.journal import Header
@@ -279,7 +296,7 @@ def _header(team: Team, options: Options) -> Header:
 
 
 def _objective(team: Team, options: Options) -> Callable[[], Objective] | None:
-    """What the journal weighs decisions by; None where nothing is minimised, or the problem changes."""
+    """Return the journal's objective. None where nothing is minimised, or the problem changes."""
     from robochoc.run.options import Withdrawal
     from robochoc.verification.objective import Objective, withdrawal_cost
 
@@ -302,13 +319,3 @@ def _tell(team: Team, outcome: Outcome, wanted: Wanted) -> None:
             from robochoc.cli.reports.pseudo_tree import explained
 
             click.echo(explained(outcome))
-
-
-def _show(scene: Scene, products: Products, *, quiet: bool) -> None:
-    """Write the page and serve the scene, as asked."""
-    from robochoc.cli.reports.scene import serve_scene, write_page
-
-    if products.html:
-        write_page(scene, products.html, quiet=quiet)
-    if products.serve:
-        serve_scene(scene)

@@ -12,40 +12,40 @@ if TYPE_CHECKING:
 
 Command = TypeVar("Command", bound=Callable[..., object])
 
+_LOCAL_OPTIONS = (
+    click.option(
+        "--local-solutions",
+        type=click.IntRange(1),
+        default=100_000,
+        show_default=True,
+        metavar="N",
+        help="Limit on the local solutions of one robot, and on their groups.",
+    ),
+    click.option(
+        "--local-timeout",
+        type=click.FloatRange(0, min_open=True),
+        default=60.0,
+        show_default=True,
+        metavar="SECONDS",
+        help="Time limit of ACE for one robot.",
+    ),
+    click.option(
+        "--ace",
+        "always_ace",
+        is_flag=True,
+        help="Have ACE solve small local problems too; by default they are enumerated.",
+    ),
+    click.option(
+        "--no-cache",
+        is_flag=True,
+        help="Do not use the cache of solved local problems ('robochoc cache').",
+    ),
+)
+
 
 def local_options(command: Command) -> Command:
     """`--local-solutions`, `--local-timeout`, `--ace` and `--no-cache`."""
-    for option in reversed(
-        (
-            click.option(
-                "--local-solutions",
-                type=click.IntRange(1),
-                default=100_000,
-                show_default=True,
-                metavar="N",
-                help="Limit on the local solutions of one robot, and on their groups.",
-            ),
-            click.option(
-                "--local-timeout",
-                type=click.FloatRange(0, min_open=True),
-                default=60.0,
-                show_default=True,
-                metavar="SECONDS",
-                help="Time limit of ACE for one robot.",
-            ),
-            click.option(
-                "--ace",
-                "always_ace",
-                is_flag=True,
-                help="Have ACE solve small local problems too; by default they are enumerated.",
-            ),
-            click.option(
-                "--no-cache",
-                is_flag=True,
-                help="Do not use the cache of solved local problems ('robochoc cache').",
-            ),
-        )
-    ):
+    for option in reversed(_LOCAL_OPTIONS):
         command = option(command)
     return command
 

@@ -1,4 +1,4 @@
-"""What `robochoc master`, `robot`, `sniff` and `directory` share: options, addresses and failures on the network."""
+"""Options, addresses and failures that `robochoc master`, `robot`, `sniff` and `directory` share."""
 
 from __future__ import annotations
 
@@ -68,7 +68,20 @@ def patience_option(text: str, default_s: float, name: str = "patience_s") -> Ca
 
 @contextmanager
 def network_failures_told(place: object) -> Iterator[None]:
-    """Whatever ends a run across machines becomes one line, and an exit status."""
+    """Turn each failure of a run across machines into a message of one line and an exit status."""
+    statuses = _statuses()
+    from robochoc.formats import on_one_line
+
+    with failures_told(place):
+        try:
+            yield
+        except tuple(kind for kinds in statuses.values() for kind in kinds) as error:
+            status = next(status for status, kinds in statuses.items() if isinstance(error, kinds))
+            raise Failure(status, on_one_line(str(error))) from error
+
+
+def _statuses() -> dict[int, tuple[type[Exception], ...]]:
+    """Return the exceptions of each exit status. Raise `Failure` where a package of the extra is missing."""
     try:
         from robochoc.authority.certificates import HostNameError
         from robochoc.authority.enrolment import EnrolmentError
@@ -86,17 +99,9 @@ def network_failures_told(place: object) -> Iterator[None]:
             raise
         message = f"this needs {package}, which is an extra; say: pip install 'robochoc[network]'"
         raise Failure(USAGE, message) from missing
-    from robochoc.formats import on_one_line
-
-    statuses: dict[int, tuple[type[Exception], ...]] = {
+    return {
         INVALID: (IdentityError, AuthorityError, TokenError),
         USAGE: (HostNameError, InvalidNameError, RouterError, TemplateError),
         LIMIT: (TeamIncompleteError,),
         LOST: (CannotConnectError, EnrolmentError, NoAnswerError),
     }
-    with failures_told(place):
-        try:
-            yield
-        except tuple(kind for kinds in statuses.values() for kind in kinds) as error:
-            status = next(status for status, kinds in statuses.items() if isinstance(error, kinds))
-            raise Failure(status, on_one_line(str(error))) from error

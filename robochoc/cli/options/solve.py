@@ -148,13 +148,13 @@ def _check_path(ctx: click.Context, word: str, kind: str, values: Sequence[str])
 
 
 def _names_robots(word: str) -> bool:
-    """Whether `word` can be patterns of robots' names, and not the next option, or the path of a team."""
+    """Return whether `word` can be patterns of robots' names, and not the next option or a team's path."""
     return bool(word) and not word.startswith("-") and "/" not in word and not Path(word).exists()
 
 
 @dataclass(frozen=True)
 class Products:
-    """What is made of a run besides what is printed."""
+    """The products of a run besides the printed result."""
 
     html: Path | None
     journal: Path | None
@@ -167,7 +167,7 @@ class Products:
 
 @dataclass(frozen=True)
 class Wanted:
-    """What is asked for of each team: the protocol (None: by its kind), the order, how it is told, and where."""
+    """The request for each team: the protocol (None: by the team's kind), the order, the report, and the place."""
 
     protocol: str | None
     order: str | Path
@@ -201,15 +201,25 @@ def options_of(arguments: dict[str, Any], *, environment: bool) -> Options:
         Failure: for a channel that cannot be read.
     """
     from robochoc.run.compatibility import refuse_options
-    from robochoc.run.options import OnLoss, Options, Runtime, ScheduleName, Withdrawal
     from robochoc.solver.encoding import UnsupportedError
 
     if arguments["timeout"] is not None and not arguments["timeout"] > 0:
         raise click.UsageError("--timeout takes a number of seconds")
+    options = _take_options(arguments)
+    try:
+        refuse_options(options, environment=environment)
+    except UnsupportedError as refused:
+        raise click.UsageError(str(refused)) from None
+    return options
+
+
+def _take_options(arguments: dict[str, Any]) -> Options:
+    from robochoc.run.options import OnLoss, Options, Runtime, ScheduleName, Withdrawal
+
     with failures_told("--channel"):
         channel = channel_for(arguments.pop("channel"))
     withdraw, on_loss = arguments.pop("withdraw"), arguments.pop("on_loss")
-    options = Options(
+    return Options(
         protocol=arguments["protocol"] or DEFAULT_PROTOCOL,
         order=None if arguments["order"] == GIVEN else (),  # which one, each team's robots say
         local=limits(
@@ -224,11 +234,6 @@ def options_of(arguments: dict[str, Any], *, environment: bool) -> Options:
         channel=channel,
         **{name: arguments.pop(name) for name in _SAME_NAMES},
     )
-    try:
-        refuse_options(options, environment=environment)
-    except UnsupportedError as refused:
-        raise click.UsageError(str(refused)) from None
-    return options
 
 
 def check_products(products: Products, wanted: Wanted, options: Options, *, teams: int) -> None:

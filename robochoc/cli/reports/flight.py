@@ -1,4 +1,4 @@
-"""What `robochoc fly` says of a flight: a table for people, an object for machines."""
+"""The report of `robochoc fly` on a flight: a table for people, an object for machines."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ _NAMES = 6
 
 
 def as_planned(flown: FlightLog, *, may_fall: bool = False) -> bool:
-    """Whether everybody has arrived, no two came nearer than the set distance, and nobody has fallen, or may."""
+    """Return whether all drones have arrived, kept the set distance, and none has fallen (unless `may_fall`)."""
     apart = flown.nearest is None or flown.nearest.distance_m >= flown.distance
     return apart and all(error <= ARRIVED_M or (may_fall and isnan(error)) for error in flown.errors_m)
 
@@ -32,13 +32,13 @@ def report(mission: Mission, flown: FlightLog) -> str:
 
 
 def how_it_went(flown: FlightLog) -> str:
-    """What happened, who has arrived, how near they came, and how fast it was simulated."""
+    """Return a text on the flight: events, arrivals, the smallest distance, and the speed of the simulation."""
     lines = [f"{one.at_s:6.1f} s  {_name(flown, one.drone)}: {one.what}" for one in flown.events]
     return "\n".join(f"  {line}" for line in (*lines, _arrival(flown), _apart(flown), _speed(flown)))
 
 
 def too_late(failures: Iterable[tuple[str, float]], flown: FlightLog) -> list[str]:
-    """Which of the `failures` that were asked for could not happen, as the flight was over: a line each."""
+    """Return a line for each of the requested `failures` that came after the end of the flight."""
     return [
         f"--fail {on_one_line(name)}@{at_s:g}: the flight was over after {flown.simulated_s:.1f} s"
         for name, at_s in failures
@@ -136,13 +136,6 @@ def _names(flown: FlightLog, numbers: Sequence[int]) -> str:
 
 def flight_json(mission: Mission, flown: FlightLog) -> bytes:
     """The same as one line of JSON: lengths in metres, times in seconds; null for a drone that fell."""
-
-    def pair(nearest: ClosestApproach | None) -> dict[str, object] | None:
-        if nearest is None:
-            return None
-        drones = [flown.names[nearest.first], flown.names[nearest.second]]
-        return {"distance_m": nearest.distance_m, "drones": drones, "at_s": nearest.at_s}
-
     ends = flown.positions[-1] if len(flown.positions) else ()
     legs = zip(mission.legs, flown.legs, strict=True)
     told = {
@@ -152,8 +145,8 @@ def flight_json(mission: Mission, flown: FlightLog) -> bytes:
         "flight_s": float(flown.times[-1]) if len(flown.times) else 0.0,
         "wall_s": flown.wall_s,
         "distance_m": flown.distance,
-        "nearest": pair(flown.nearest),
-        "nearest_fallen": pair(flown.nearest_fallen),
+        "nearest": _approach(flown, flown.nearest),
+        "nearest_fallen": _approach(flown, flown.nearest_fallen),
         "drones": [
             {"name": name, "at": [float(part) for part in end], "error_m": float(error) if isfinite(error) else None}
             for name, end, error in zip(flown.names, ends, flown.errors_m, strict=True)
@@ -167,3 +160,10 @@ def flight_json(mission: Mission, flown: FlightLog) -> bytes:
         ],
     }
     return msgspec.json.encode(told)
+
+
+def _approach(flown: FlightLog, nearest: ClosestApproach | None) -> dict[str, object] | None:
+    if nearest is None:
+        return None
+    drones = [flown.names[nearest.first], flown.names[nearest.second]]
+    return {"distance_m": nearest.distance_m, "drones": drones, "at_s": nearest.at_s}

@@ -44,7 +44,15 @@ def scene_for(
     )
 
 
-def write_page(scene: Scene, path: Path, *, quiet: bool = False) -> None:
+def show_scene(scene: Scene, path: Path | None, *, serve: bool, port: int = 0, quiet: bool = False) -> None:
+    """Write `scene` as a page to `path`, if there is one; then serve it, if that is asked for."""
+    if path:
+        _write_page(scene, path, quiet=quiet)
+    if serve:
+        _serve(scene, port)
+
+
+def _write_page(scene: Scene, path: Path, *, quiet: bool) -> None:
     """Write `scene` as one self-contained page, and say what to do with it."""
     from robochoc.view.page import page
 
@@ -54,7 +62,7 @@ def write_page(scene: Scene, path: Path, *, quiet: bool = False) -> None:
         click.echo(f"{path}: {len(content) / 1e6:.1f} MB; open it in a browser", err=True)
 
 
-def serve_scene(scene: Scene, port: int = 0) -> None:
+def _serve(scene: Scene, port: int) -> None:
     """Show `scene` in a browser of this machine until Ctrl-C."""
     from robochoc.view.live import serve
 

@@ -26,15 +26,15 @@ LONGEST_NAME = 255
 LARGEST_WEIGHT = 1_000_000
 """As in files."""
 LARGEST_DEAREST = 2.0**80
-"""More than the costs of any file; what it costs all robots to step aside is still a number."""
+"""More than the costs of any file; what it costs all robots to withdraw is still a number."""
 
 
 class ProfileError(ValueError):
-    """What a robot tells of itself cannot be."""
+    """The profile of a robot is invalid."""
 
 
 class Profile(msgspec.Struct, frozen=True, array_like=True):
-    """What the robot `name` tells of its file.
+    """The profile that the robot `name` declares of its file.
 
     `variables` are its interface variables with their domains. `looks_at` names, by child, the child's variables that
     this robot's parts of partially known constraints look at; `wants` are the others' variables in the constraints that

@@ -40,7 +40,7 @@ LOOPBACK_ADDRESS = Address(LOOPBACK)
 
 @dataclass(frozen=True)
 class MasterPlan:
-    """What a master is to do.
+    """The plan of a master's run.
 
     Attributes:
         authority: The folder of the Authority.
@@ -214,6 +214,6 @@ def _refuse_early(plan: MasterPlan) -> None:
 
 def _in_words(outcome: Outcome) -> str:
     """Return the outcome in a few words, as robots get it."""
-    aside = f", {len(outcome.withdrawn_alive)} step aside" if outcome.withdrawn_alive else ""
+    withdrawn = f", {len(outcome.withdrawn_alive)} withdraw" if outcome.withdrawn_alive else ""
     claim = f", claimed by {outcome.claimed_by}" if outcome.claimed_by else ""
-    return f"{outcome.verdict}{aside}{claim}"
+    return f"{outcome.verdict}{withdrawn}{claim}"

@@ -22,7 +22,7 @@ ALL_FLY = Options(protocol="abt", runtime=Runtime.SIMULATOR)
 
 @pytest.fixture(scope="module")
 def four() -> Journal:
-    """Four queens' robots search, and as few as possible step aside: two runs."""
+    """Four queens' robots search, and as few as possible withdraw: two runs."""
     journal = recorded(queens3d(4), replace(ALL_FLY, withdraw=Withdrawal.MINIMUM))
     assert replay(journal).identical
     return journal

@@ -65,7 +65,7 @@ def warm() -> Iterator[AceProcess]:
 
 @pytest.fixture(scope="module")
 def four() -> Journal:
-    """Four queens' robots search, and as few as possible step aside: two runs."""
+    """Four queens' robots search, and as few as possible withdraw: two runs."""
     return recorded(queens3d(4), FOUR)
 
 

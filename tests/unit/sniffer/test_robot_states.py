@@ -39,7 +39,7 @@ def warm() -> Iterator[AceProcess]:
 
 @pytest.fixture(scope="module")
 def three() -> Journal:
-    """As few as possible step aside: SFB says who."""
+    """As few as possible withdraw: SFB says who."""
     return recorded(queens3d(3), FEWEST)
 
 

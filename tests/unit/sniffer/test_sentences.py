@@ -189,7 +189,7 @@ def test_a_solution_that_is_found_and_who_steps_aside() -> None:
     options = Options(protocol="abt", runtime=Runtime.SIMULATOR, withdraw=Withdrawal.MAXIMAL, cache=False)
     told = words_of(PageData(Trace.of(record(queens3d(3), options))))
     assert "Robot1.1 says: I fly, with V1.1 = 1" in told["Placed"]
-    assert any(sentence.endswith("says: I step aside") for sentence in told["Placed"])
+    assert any(sentence.endswith("says: I withdraw") for sentence in told["Placed"])
 
 
 def test_a_tree_names_the_robots_on_the_branch_only() -> None:
@@ -282,12 +282,12 @@ def type_with(kind: str, content: Mapping[str, Any]) -> type[Message]:
         ("Nogood", {"lhs": {}, "value": [None, None]}, "Robot1.1 has no value left, whatever the others do"),
         ("Nogood", {"lhs": {"Robot9.9": [3]}, "value": [1, None]}, "as long as Robot9.9 = 3, V cannot be 1"),
         ("Nogood", {"lhs": {"X": [3, 4]}, "value": [1, None]}, "as long as X[1] = 3 and X[2] = 4, V cannot be 1"),
-        ("Ok", {"value": [None]}, "I step aside from now on"),
+        ("Ok", {"value": [None]}, "I withdraw from now on"),
         ("AddLink", {}, "tell me V and W from now on"),
         ("NotOk", {"assignments": [], "sc": 1}, "there is no solution"),
         ("Solved", {"solution": {"Robot1.1": [None, None], "Robot2.1": [3]}},
-         "a solution is found, and the search is over: Robot1.1 steps aside and V2.1 = 3"),
-        ("Placed", {"value": None}, "I step aside"),
+         "a solution is found, and the search is over: Robot1.1 withdraws and V2.1 = 3"),
+        ("Placed", {"value": None}, "I withdraw"),
         ("Cost", {"context": {}, "lb": math.inf, "ub": math.inf}, "my subtree has no solution"),
         ("Cost", {"context": {"Robot1.1": [[1, 2], 4]}, "lb": 3, "ub": 3.0},
          "as long as V = 1 and W = 2, my subtree costs 3"),
@@ -305,7 +305,7 @@ def type_with(kind: str, content: Mapping[str, Any]) -> type[Message]:
          "a piece of my table: 3 costs, from 3 to 9, and 1 infinite"),
         ("UTIL", {"width": 2, "costs": "//8="}, "a piece of my table: 1 cost, and 1 infinite"),
         ("VALUE", {"assignment": []}, "nobody above you has to do with your subtree: take your best value"),
-        ("Domain", {"values": [[1], [2], [None]]}, "V2.1 is 1 or 2, or I step aside"),
+        ("Domain", {"values": [[1], [2], [None]]}, "V2.1 is 1 or 2, or I withdraw"),
         ("Gain", {"broken": 2, "cost": 0}, "my move would save 2 broken constraints"),
         ("Gain", {"broken": 1, "cost": 3}, "my move would save 1 broken constraint and 3 of cost"),
         ("Gain", {"broken": 0, "cost": 0.0}, "my move would save nothing"),

@@ -149,7 +149,7 @@ def test_a_search_that_broke_off_proves_no_optimum(monkeypatch: pytest.MonkeyPat
 
 
 def least_total(team: Team) -> float:
-    """What the cheapest choice of robots that step aside costs, and the cheapest answer of the others."""
+    """What the cheapest choice of robots that withdraw costs, and the cheapest answer of the others."""
     best = INFINITE
     price = withdrawal_cost(team)
     for flying in itertools.product((True, False), repeat=len(team.robots)):
@@ -249,7 +249,7 @@ class Cheapest(Silent):
 
 
 class OnlyTheFirst(Silent):
-    """The first robot stays, all others step aside."""
+    """The first robot stays, all others withdraw."""
 
     def start(self) -> None:
         """Choose."""
