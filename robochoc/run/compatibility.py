@@ -1,4 +1,4 @@
-"""What goes together: problem, protocol, runtime and options. This is decided here, and nowhere else.
+"""The rules on which problems, protocols, runtimes and options can be combined. No other module decides this.
 
 There are three lists. Each rule has a condition, the reason, and what to do instead:
 
@@ -32,7 +32,7 @@ from robochoc.verification.objective import withdrawal_cost
 LARGEST = 2**62
 """Costs that add up to more are refused: a message holds integers of 64 bits."""
 CENTRAL_TRAITS = Traits(partially_known=True, costs=True)
-"""What the central solver can take."""
+"""The problems that the central solver supports."""
 
 
 class UnfitProtocolError(UnsupportedError):
@@ -142,14 +142,14 @@ OPTION_RULES = (
         "--spare brings robots back that died; --on-loss fail ends the run instead",
     ),
 )
-"""What is refused whatever the problem is."""
+"""Combinations of options that are refused for every problem."""
 
 ENVIRONMENT_RULES = (
     _not_while_changing("--protocol central", lambda o: o.protocol == CENTRAL),
     _not_while_changing("--withdraw", lambda o: o.withdraw is not None),
     _not_while_changing("--runtime network", lambda o: o.runtime is Runtime.NETWORK),
 )
-"""What is refused besides when an environment changes the problem."""
+"""Further combinations that are refused if an environment changes the problem."""
 
 
 def refuse_options(options: Options, *, environment: bool = False) -> None:
@@ -180,17 +180,17 @@ class Case:
 
     @property
     def has_costs(self) -> bool:
-        """Whether the problem has costs."""
+        """Return whether the problem has costs."""
         return self.team.kind is ProblemKind.DISWCSP
 
     @property
     def is_distributed(self) -> bool:
-        """Whether robots solve it together."""
+        """Return whether the robots solve the problem together, without the central solver."""
         return self.options.protocol != CENTRAL
 
     @property
     def minimum_withdrawal(self) -> bool:
-        """Whether robots are to withdraw, as few as possible."""
+        """Return whether as few robots as possible are to withdraw."""
         return self.is_distributed and self.options.withdraw is Withdrawal.MINIMUM
 
     @cached_property
@@ -199,13 +199,13 @@ class Case:
         return tuple(team_after_events(self.team, events) for events in range(len(self.team.scenario) + 1))
 
     @property
-    def unknown_kills(self) -> set[str]:
+    def unknown_kills(self) -> str:
         """Robots that are to be killed, and are in the team at no time."""
-        return {kill.robot for kill in self.options.kill}.difference(*(epoch.order for epoch in self.epochs))
+        return ", ".join(sorted({kill.robot for kill in self.options.kill}.difference(*(e.order for e in self.epochs))))
 
     @property
     def max_total(self) -> float:
-        """What all costs could add up to in any epoch."""
+        """Return the largest possible sum of all costs in any epoch."""
         return max(max_total(team, self.options) for team in self.epochs)
 
 
@@ -217,8 +217,8 @@ def scenario_refusal(team: object, option: str) -> str:
 class TeamRule(NamedTuple):
     """A case that is refused: the condition, the reason, and what to do instead.
 
-    In the reason, `{team}` and `{protocol}` stand for the names. With `other_protocol`, another one could do it; with
-    `complete`, one that proves its answers.
+    In the reason, `{team}` and `{protocol}` stand for the names, `{case}` for the case. With `other_protocol`, another
+    one could do it; with `complete`, one that proves its answers.
     """
 
     refuses: Callable[[Case], object]
@@ -237,7 +237,7 @@ TEAM_RULES = (
     _not_with_scenario("--withdraw", lambda o: o.withdraw is not None),
     _not_with_scenario("--count", lambda o: o.count),
     _not_with_scenario("--runtime network", lambda o: o.protocol != CENTRAL and o.runtime is Runtime.NETWORK),
-    TeamRule(lambda c: c.unknown_kills, "--kill names a robot that {team} does not have"),
+    TeamRule(lambda c: c.unknown_kills, "--kill names a robot that {team} does not have: {case.unknown_kills}"),
     TeamRule(
         lambda c: c.options.count and c.has_costs,
         "{team} is a DisWCSP, where every assignment that breaks nothing hard is a solution; --count is for problems"
@@ -265,7 +265,7 @@ TEAM_RULES = (
         "--withdraw minimum does",
     ),
 )
-"""What is refused of a problem, or of a protocol for it."""
+"""Problems, and protocols for a problem, that are refused."""
 
 
 def refuse_unfit(team: Team, options: Options, traits: Traits) -> None:
@@ -282,7 +282,7 @@ def refuse_unfit(team: Team, options: Options, traits: Traits) -> None:
     case = Case(team, options, traits)
     for rule in TEAM_RULES:
         if rule.refuses(case):
-            why = rule.why.format(team=team.name, protocol=options.protocol)
+            why = rule.why.format(team=team.name, protocol=options.protocol, case=case)
             why = "; ".join(filter(None, [why, rule.instead]))
             raise UnfitProtocolError(why, complete=rule.complete) if rule.other_protocol else UnsupportedError(why)
     for epoch in case.epochs:
