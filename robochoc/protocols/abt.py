@@ -16,8 +16,8 @@ Complete, asynchronous, for satisfaction. Four things the paper leaves open: con
 robot of the scope checks them, once it knows all the others); of several nogoods for a value the one with the
 highest possible lowest variable is kept (Hirayama and Yokoo 2000); messages are read by packets, and the view is
 checked once the inbox has been drained; a nogood names only the variables that matter, so of a robot with several
-it rules out all values that look alike there (neighbourhood partial interchangeability). That nobody speaks any
-more, and so a solution stands, is for the runtime to see (`communication/quiescence.py`).
+it rules out all values that look alike there (neighbourhood partial interchangeability). The runtime detects
+quiescence, and with it a solution (`communication/quiescence.py`).
 
 Of a partially known constraint (PKC) each robot holds a part that it never shows: Brito, Meisels, Meseguer, Zivan,
 "Distributed constraint satisfaction with partially known constraints", Constraints 14 (2009), ABT in a single phase.
