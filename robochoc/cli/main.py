@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from typing import NoReturn
 
 PATIENCE_S = 1.0
-"""Seconds in which further signals count as the first one (two Ctrl-C, `timeout` and a shell). Later, they force an end."""
+"""Seconds in which further signals count as the first (two Ctrl-C, `timeout` and a shell). Later ones force an end."""
 _RETRY_S = 0.01
 _STOPPING = (signal.SIGINT, signal.SIGTERM)
 

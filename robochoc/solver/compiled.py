@@ -245,7 +245,7 @@ class LocalProblem:
         return [index for index, own in enumerate(self.values) if all(own[place] == part for place, part in wanted)]
 
     def _known(self, view: Mapping[str, Value], values: int = 1) -> list[tuple[SharedConstraint, OtherValues]]:
-        """Return the constraints whose other variables are all known, with their values. Count `values` checks of each."""
+        """Return each constraint whose other variables are all known, and their values. Count `values` checks each."""
         known = [(c, others) for c in self._constraints if (others := c.other_values(view)) is not None]
         self.checks += len(known) * values
         return known

@@ -26,7 +26,7 @@ LONGEST_NAME = 255
 LARGEST_WEIGHT = 1_000_000
 """As in files."""
 LARGEST_DEAREST = 2.0**80
-"""More than the costs of any file; what it costs all robots to withdraw is still a number."""
+"""More than the costs of any file. The cost of withdrawing all robots still fits into a number."""
 
 
 class ProfileError(ValueError):
