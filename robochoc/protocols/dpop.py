@@ -55,15 +55,15 @@ from robochoc.model.outcome import Verdict
 from robochoc.protocols.dfs import TreeMessage, TreeProtocol
 from robochoc.protocols.dpop_messages import UTIL, VALUE, Dimensions, Domain, Need, Proceed
 from robochoc.protocols.dpop_tables import (
-    Arriving,
     Codes,
     Extent,
+    IncomingTable,
     Table,
     Width,
     aligned,
     bytes_of,
     is_hopeless,
-    packed,
+    packed_costs,
     project,
     width_of,
 )
@@ -119,7 +119,7 @@ class DPOP(TreeProtocol):
         self.domains: dict[str, list[Value]] = {}
         self.dimensions: dict[str, Dimensions] = {}
         self.separator: tuple[str, ...] | None = None
-        self.utils: dict[str, Arriving] = {}
+        self.utils: dict[str, IncomingTable] = {}
         self.choices: Codes | None = None
         self.optimum: int | None = None
         self._sizes: dict[str, int] = {}
@@ -244,7 +244,9 @@ class DPOP(TreeProtocol):
             raise ValueError(f"{child} was not asked for a table")
         if child not in self.utils:
             dimensions = self.dimensions[child]
-            self.utils[child] = Arriving([dimensions.separator[name] for name in self._axes[child]], dimensions.dearest)
+            self.utils[child] = IncomingTable(
+                [dimensions.separator[name] for name in self._axes[child]], dimensions.dearest
+            )
         self.utils[child].add(width, costs)
         if len(self.utils) == len(self.children) and all(table.complete for table in self.utils.values()):
             self._joined += [self._aligned(table.costs, self._axes[name]) for name, table in self.utils.items()]
@@ -266,7 +268,7 @@ class DPOP(TreeProtocol):
             self.optimum = int(costs.item())
             self._choose_optimal([])
         else:
-            for width, piece in packed(costs):
+            for width, piece in packed_costs(costs):
                 self.send(self.parent, UTIL(width, piece))
 
     # VALUE, from the root down

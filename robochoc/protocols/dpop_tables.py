@@ -102,7 +102,7 @@ def is_hopeless(costs: Codes) -> bool:
     return bool(costs.min() == _top(costs.itemsize))
 
 
-def packed(costs: Codes) -> Iterator[tuple[Width, bytes]]:
+def packed_costs(costs: Codes) -> Iterator[tuple[Width, bytes]]:
     """`costs` for the wire, in pieces: no cost takes more bytes than the dearest one needs."""
     width = width_of(_max_finite(costs))
     flat = costs.reshape(-1)
@@ -112,7 +112,7 @@ def packed(costs: Codes) -> Iterator[tuple[Width, bytes]]:
         yield width, flat[start : start + step].astype(f"<u{width}", copy=False).tobytes()
 
 
-class Arriving:
+class IncomingTable:
     """A table of this `shape`, no cost in which is above `dearest`, that comes in pieces.
 
     It takes its memory with the first piece: ask `bytes_of` before.

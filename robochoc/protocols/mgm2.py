@@ -109,7 +109,7 @@ class Go(wire.Message, frozen=True):
         return "no go: one of my neighbours is to move instead"
 
 
-class Move(NamedTuple):
+class JointMove(NamedTuple):
     """A joint move: what it saves, and with whom; the own value's place, and the partner's."""
 
     gain: LexicographicCost
@@ -202,7 +202,7 @@ class MGM2(Gainers):
         self.send(move.partner, Accept(move.place, *move.gain))
         return move.partner
 
-    def _joint(self, offerer: str, gains: Gains) -> Iterator[Move]:
+    def _joint(self, offerer: str, gains: Gains) -> Iterator[JointMove]:
         """All moves that are offered, with what they save both: to the offerer's share comes what it has no part in."""
         burdens = self.problem.lexicographic_costs(
             {name: value for name, value in self.view.items() if name != offerer}
@@ -211,7 +211,7 @@ class MGM2(Gainers):
         for own, (burden, row) in enumerate(zip(burdens, gains, strict=True)):
             broken, cost = gain(now, burden)
             for place, offered in enumerate(row):
-                yield Move((broken + offered[0], cost + offered[1]), offerer, own, place)
+                yield JointMove((broken + offered[0], cost + offered[1]), offerer, own, place)
 
     def _hear_answer(self, messages: Mapping[str, wire.Message]) -> None:
         """The offer was taken, or this robot stands alone."""

@@ -24,7 +24,7 @@ _TITLE = "<title>Sniffer</title>"
 """Of the document, until something has one."""
 
 
-def page(mode: Mode, embedded: Mapping[str, bytes] | None = None, title: str = "Sniffer") -> bytes:
+def sniffer_page(mode: Mode, embedded: Mapping[str, bytes] | None = None, title: str = "Sniffer") -> bytes:
     """The page, UTF-8. The same answers make the same page.
 
     `embedded` are the page's data by name (`columns`, `details:0`), zlib-compressed: their names are ours, what

@@ -80,10 +80,10 @@ def receive(
         if run is None:
             return STOPPED
         granted()
-        return sniffer.follow(Arriving(place, run, sink), patience_s, stopped)
+        return sniffer.follow(IncomingJournal(place, run, sink), patience_s, stopped)
 
 
-class Arriving:
+class IncomingJournal:
     """The journal of `run` of the master at `place`, as far as it is here; `sink` gets what of it is good."""
 
     def __init__(self, place: Address, run: str, sink: Callable[[bytes], object]) -> None:
@@ -151,7 +151,7 @@ class _Sniffer:
             f"the master at {self._place} does not answer {self._name}; is it enrolled with its Authority?"
         )
 
-    def follow(self, journal: Arriving, patience_s: float, stopped: Callable[[], bool]) -> Followed:
+    def follow(self, journal: IncomingJournal, patience_s: float, stopped: Callable[[], bool]) -> Followed:
         """Ask for piece after piece."""
         heard = time.monotonic()
         while not stopped():

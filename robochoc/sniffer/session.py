@@ -29,7 +29,7 @@ class NotBegunError(BadRequestError):
     """There is nothing yet, or, as another journal has taken its place, nothing any more."""
 
 
-class Session:
+class SnifferSession:
     """One journal: `source` is its path, or a descriptor of the file, which others may still write.
 
     `chosen` are names or patterns of the robots to begin with, `robots` those whose files are known beside the

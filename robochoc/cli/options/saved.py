@@ -70,7 +70,7 @@ def saved_outcome(saved: Path) -> Outcome:
     return journal.outcome
 
 
-def team_of(outcome: Outcome, saved: Path, folder: Path | None) -> Team | None:
+def saved_team(outcome: Outcome, saved: Path, folder: Path | None) -> Team | None:
     """The team in `folder`, or where teams of that name usually are; None, which is told, if it is not there.
 
     Raises `InvalidInputError`, and `Failure` for another team than that of `outcome`, which is from the file `saved`.
