@@ -17,7 +17,7 @@ _LENGTH_BYTES = 4
 
 
 class FrameError(ValueError):
-    """What came is no question, or no answer, of these."""
+    """The frame is not a valid question or answer of this protocol."""
 
 
 class _Frame(msgspec.Struct, frozen=True, tag=True, forbid_unknown_fields=True):

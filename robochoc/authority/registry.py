@@ -90,7 +90,7 @@ class EnrolledName(msgspec.Struct, frozen=True):
 
     @property
     def never_certified(self) -> bool:
-        """Whether no certificate in this name can be about."""
+        """Return whether no certificate in this name can exist."""
         return not self.certificates and not self.withdrawn
 
     def expires(self, now: float) -> float:

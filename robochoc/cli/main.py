@@ -49,9 +49,9 @@ def _open_standard_streams() -> None:
 
 
 class TerminationSignals:
-    """What SIGINT and SIGTERM do: the first one raises `KeyboardInterrupt` or `SystemExit` where the program is.
+    """The handler of SIGINT and SIGTERM: the first signal raises `KeyboardInterrupt` or `SystemExit`.
 
-    Not within an import: half of Python's modules print or swallow what is raised while they load.
+    It does not raise during an import, as many modules print or swallow exceptions while they load.
     """
 
     def __init__(self) -> None:

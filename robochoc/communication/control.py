@@ -18,7 +18,7 @@ from robochoc.solver.agent_problem import AgentProblem
 from robochoc.solver.explanation import Invalidated
 
 QUEUES_AT_ONCE = 16
-"""How many queues a robot asks for in one go. The parent holds so many descriptors more meanwhile."""
+"""The number of queues that a robot requests at once. Meanwhile, the parent holds so many descriptors more."""
 
 
 class _Control(msgspec.Struct, frozen=True, tag=True, array_like=True):
@@ -144,6 +144,6 @@ def unsealed(change: bytes) -> tuple[AgentProblem, Invalidated]:
 
 
 RobotMessage = Ready | Counters | Conclusion | Events
-"""What robots say during a search, in every runtime. How they report its end differs."""
+"""A robot's message to the runtime during a search, in every runtime. Runtimes differ in the report of the end."""
 FromRobot = RobotMessage | OpenQueues | Report | Failed
 FromParent = Begin | Pause | Change | QueuesTo | QueueFrom | Wave

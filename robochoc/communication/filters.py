@@ -19,7 +19,7 @@ GROUP = "robochoc.filters"
 
 
 class NotGenuineError(Exception):
-    """What has come is not what `sender` has sealed for this robot, in this context; nothing of it may be used."""
+    """The data is not what `sender` has sealed for this robot in this context. No part of it may be used."""
 
 
 class UnknownFilterError(LookupError):
@@ -27,7 +27,7 @@ class UnknownFilterError(LookupError):
 
 
 class ChannelFilter(ABC):
-    """What is done to all messages of the robot whose keys are in `ring`.
+    """A filter for all messages of the robot whose keys are in `ring`.
 
     `context` is what both sides know of a message without being told in it: run, sender, receiver and sequence number,
     as bytes that the caller makes. It is not sent along; a message moved into another context does not open.
@@ -86,7 +86,7 @@ def filter_named(name: str) -> type[ChannelFilter]:
 
 
 def _fault(loaded: object) -> str:
-    """Why `loaded` cannot be used as a filter; empty when it can."""
+    """Return the reason why `loaded` cannot be used as a filter. Empty if it can."""
     if not (isinstance(loaded, type) and issubclass(loaded, ChannelFilter)):
         return "is no subclass of ChannelFilter"
     if loaded.__abstractmethods__:

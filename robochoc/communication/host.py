@@ -144,7 +144,7 @@ class Host:
             self._stamps[place] += late
 
     def settle(self) -> list[Envelope]:
-        """That was the whole packet: let the protocol settle, and return what it says."""
+        """Let the protocol settle after a whole packet, and return its messages."""
         return self._step(self.protocol.settle)
 
     def metrics(self) -> Metrics:

@@ -67,7 +67,7 @@ class FourCounters:
 
     @property
     def due(self) -> bool:
-        """Whether a wave is worth its cost: all counters are known, the sums balance, and no wave is under way."""
+        """Return whether a wave is due: all counters are known, the sums balance, and no wave is under way."""
         return not self._unanswered and not self._unheard and self._total.sent == self._total.received
 
     def begin_wave(self) -> int:
@@ -79,7 +79,7 @@ class FourCounters:
 
     @property
     def waving(self) -> bool:
-        """Whether a wave is under way."""
+        """Return whether a wave is under way."""
         return bool(self._unanswered)
 
     def answer(self, robot: str, wave: int, counts: Counts) -> None:

@@ -1,4 +1,4 @@
-"""What a run asks of its surroundings: descriptors enough, cheap forks, and a moment without signals."""
+"""Resources of the operating system for a run: enough descriptors, cheap forks, and blocked signals."""
 
 from __future__ import annotations
 

@@ -128,7 +128,7 @@ class RobotLoop(ABC):
 
     @property
     def is_restless(self) -> bool:
-        """Whether the master does not know the counters yet."""
+        """Return whether the master does not know the present counters yet."""
         return self._searching and self._reported != (self._sent, self._received)
 
     def report_counters(self, wave: int) -> None:

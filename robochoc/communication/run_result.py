@@ -1,4 +1,4 @@
-"""What a runtime reports: while the run goes on, and at its end."""
+"""The reports of a runtime: its progress, and its result."""
 
 from __future__ import annotations
 
@@ -27,7 +27,10 @@ class RobotsLostError(Exception):
 
 
 class Progress(NamedTuple):
-    """How far a run has come: messages sent so far, and seconds since its start; `stage` where it is not a search."""
+    """The progress of a run: messages sent so far, and seconds since its start.
+
+    `stage` names the present work if it is no search.
+    """
 
     messages: int
     elapsed_s: float
@@ -36,7 +39,7 @@ class Progress(NamedTuple):
 
 @dataclass(frozen=True)
 class RunResult:
-    """How a run ended. `assignments` maps each robot to its variables' values (empty: it has none).
+    """The result of a run. `assignments` maps each robot to its variables' values (empty: it has none).
 
     `witness` is the robot that concluded the verdict alone; None when it follows from quiescence or a limit. `lost`
     says why, by name, robots were lost whose loss broke the search off. `findings` is what robots know of the whole.

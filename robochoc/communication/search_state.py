@@ -92,22 +92,22 @@ class SearchState:
 
     @property
     def ready(self) -> bool:
-        """Whether all robots can begin."""
+        """Return whether all robots can begin."""
         return not self._unready
 
     @property
     def broken_off(self) -> bool:
-        """Whether the search has to end without a verdict: robots were lost, or the limit on messages is reached."""
+        """Return whether the search must end without a verdict: robots were lost, or the message limit is reached."""
         return bool(self.lost) or (self.max_messages is not None and self.counters.sent >= self.max_messages)
 
     @property
     def ended(self) -> bool:
-        """Whether the search is over, with a verdict or without."""
+        """Return whether the search is over, with a verdict or without."""
         return self.verdict is not None or self.broken_off
 
     @property
     def wave_due(self) -> bool:
-        """Whether a wave could show that all is quiet, or that the limit on messages is reached."""
+        """Return whether a wave could show quiescence, or that the message limit is reached."""
         return self.counters.due or (self.max_messages is not None and not self.counters.waving)
 
     def next_wave(self, *, wanted: bool = False) -> int | None:

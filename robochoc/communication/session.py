@@ -61,7 +61,7 @@ class Session(ABC):
     @property
     @abstractmethod
     def lossless(self) -> bool:
-        """Whether no message of the search before was lost: it became quiescent, or there was none."""
+        """Return whether no message of the previous search was lost: it became quiescent, or there was none."""
 
     @abstractmethod
     def search(self, timeout: float | None = None, messages: int | None = None) -> RunResult:

@@ -42,7 +42,7 @@ from robochoc.flight.routes.timetable import plan_routes
 DISTANCE_M = 0.5
 """The default distance between drones' centres."""
 _SHARE = 0.8
-"""Where two homes or goals are nearer than `DISTANCE_M`, this share of their distance is kept."""
+"""The share of their distance that is kept between two homes or goals that are nearer than `DISTANCE_M`."""
 LIMITS = MotionLimits()
 CLEARANCE_M = 0.5
 SIGHT_M = 1.5

@@ -68,7 +68,7 @@ class Axis:
 
     @property
     def _is_even(self) -> bool:
-        """Whether each value has a cell of its own."""
+        """Return whether each value has a cell of its own."""
         return self.cells == self.last - self.first + 1
 
     @property

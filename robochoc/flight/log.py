@@ -78,5 +78,5 @@ class FlightLog:
 
     @property
     def simulated_s(self) -> float:
-        """How long the flight was, in seconds."""
+        """Return the duration of the flight in seconds."""
         return float(self.times[-1])

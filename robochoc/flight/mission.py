@@ -42,7 +42,7 @@ class Drone:
 
 @dataclass(frozen=True)
 class Goal:
-    """Where a drone is to be: in the air, or on the ground where it `lands`."""
+    """The goal of a drone: a place in the air, or on the ground if it `lands`."""
 
     at: Point
     lands: bool = False
@@ -50,7 +50,7 @@ class Goal:
 
 @dataclass(frozen=True)
 class Leg:
-    """What an epoch asks of the drones: goals by their numbers. A drone without a goal stays where it is."""
+    """The goals of the drones in an epoch, by drone number. A drone without a goal stays where it is."""
 
     opened_by: str
     verdict: Verdict

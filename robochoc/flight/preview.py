@@ -14,8 +14,8 @@ from robochoc.flight.log import FlightLog
 from robochoc.flight.mission import Mission
 
 _NO_FLIGHT = (ValueError, ArithmeticError, MemoryError)
-"""What makes a flight impossible: places too close to each other, no way between them, numbers beyond all bounds. The
-rest can still be shown."""
+"""The errors of an impossible flight: places too close to each other, no way between them, numbers beyond all bounds.
+The rest can still be shown."""
 _DRONES_MAX = 500
 """To plan the routes of more drones takes minutes."""
 _FLIGHTS_MAX = 2_000

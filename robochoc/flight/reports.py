@@ -1,4 +1,4 @@
-"""What robots report of their situation: the paper's "read the robot situation" (Section 4.2). Pure data.
+"""Robots' reports on their situation: the paper's "read the robot situation" (Section 4.2). Pure data.
 
 Places are in metres, in the mission's frame. `at_s` is the time of the report, in seconds since an epoch that all
 reports of a source share.
@@ -49,7 +49,7 @@ class Battery:
 
 @dataclass(frozen=True)
 class Pose:
-    """Where the drone is."""
+    """The position of a drone."""
 
     drone: str
     place: Point

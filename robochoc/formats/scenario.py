@@ -65,7 +65,7 @@ class _Reader:
         self._elsewhere: list[Diagnostic] = []
         """Mistakes in the files of added robots."""
         self._unread = False
-        """Whether such a file could not be read. Then its contents are not known."""
+        """True if a file of an added robot could not be read. Its contents are then not known."""
         self._missed: set[str] = set()
         """Robots, variables and constraints that could not be added."""
 

@@ -110,9 +110,9 @@ class Follower:
     """
 
     damage: str | None = None
-    """Why nothing more will be read, and where; None: nothing is wrong so far."""
+    """The first damage that was found, with its place. None: no damage so far."""
     truncated: bool = False
-    """Whether the damage is that the end is missing, and no other."""
+    """True if the only damage is that the end of the journal is missing."""
 
     def __init__(self, file: BinaryIO) -> None:
         self._source = _source(file)

@@ -43,7 +43,7 @@ class JournalRecorder:
     """
 
     outcome: Outcome | None = None
-    """How the run ended, to be set before `close`; None: not yet, or it broke off."""
+    """The outcome of the run. Set it before `close`. None: the run is not over, or it broke off."""
 
     def __init__(
         self, header: Header, objective: Callable[[], Objective] | None = None, sinks: Sequence[BlockSink] = ()

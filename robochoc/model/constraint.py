@@ -22,7 +22,7 @@ INFINITE = math.inf
 
 
 class ConstraintModel(StrEnum):
-    """How much robots know of a shared constraint (Brito and Meseguer, CP 2003).
+    """The distribution of the knowledge of shared constraints (Brito and Meseguer, CP 2003).
 
     Totally known (TKC): its holder knows all of it. Partially known (PKC): each robot knows its own part.
     """

@@ -30,9 +30,9 @@ class Message(msgspec.Struct, frozen=True, tag=True, array_like=True):
     """
 
     act: ClassVar[Act] = INFORM
-    """What the sender does by the message, in FIPA's terms."""
+    """The communicative act of the message (FIPA)."""
     backtracks: ClassVar[bool] = False
-    """Whether robots send it because they have no value left."""
+    """True if the message is a backtrack: its sender has no value left."""
 
     def in_words(self, words: Wording) -> str:  # noqa: ARG002 - for those that have words
         """Return what the sender says: `V1.1 = 1 from now on`. Empty: the message is shown by its fields."""

@@ -7,8 +7,8 @@ from enum import StrEnum
 from typing import NamedTuple
 
 RULED_OUT = "has ruled everything out"
-"""How a robot can know alone that there is no solution, in words that are true for every protocol: it has derived the
-empty nogood, tried all values, or used bounds."""
+"""The reason for which one robot can conclude `no-solution`. It covers every protocol: the robot has derived the empty
+nogood, tried all values, or used bounds."""
 
 
 class Verdict(StrEnum):
@@ -22,7 +22,7 @@ class Verdict(StrEnum):
 
 @dataclass(frozen=True)
 class Metrics:
-    """What a run took. Definitions are in `docs/reference/metrics.md`.
+    """The metrics of a run. Definitions are in `docs/reference/metrics.md`.
 
     Attributes:
         messages: The number of protocol messages sent, by type.

@@ -26,14 +26,14 @@ TOGETHER_S = 0.5
 
 
 class Feedback(ABC):
-    """Where reports of the robots' situation come from: a simulated flight, or a source of messages."""
+    """A source of reports on the robots' situation: a simulated flight, or a source of messages."""
 
     publishers: Sequence[SinkPublisher] = ()
     """Reports are published there as they come."""
     idle: Callable[[], None] = staticmethod(lambda: None)
     """Called now and then while no report comes."""
     simulated: bool = False
-    """Whether the robots are simulated here, and so do not publish their reports themselves."""
+    """True if the robots are simulated here, and so do not publish their reports themselves."""
 
     @property
     def notes(self) -> list[str]:
@@ -75,7 +75,7 @@ class ClosedLoop:
     """
 
     events: list[ScenarioEvent]
-    """What the robots' situation has changed."""
+    """The events that the robots' situation has caused."""
     publishers: list[SinkPublisher]
     """One for each sink."""
 
@@ -138,7 +138,7 @@ class ClosedLoop:
 
     @property
     def mission(self) -> Mission | None:
-        """What was asked of the drones so far; None before the first epoch is over."""
+        """Return the mission so far. None before the first epoch is over."""
         return self._builder.mission(self._team.name, self._legs) if self._builder else None
 
     @property

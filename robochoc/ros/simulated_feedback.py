@@ -89,9 +89,9 @@ class SimulatedFeedback(Feedback):
     _flight: Flight | None = None
     _leg: Leg | None = None
     _follows: bool = False
-    """Whether more of the decision is to be flown."""
+    """True if more of the decision is to be flown."""
     _calls: list[int] = field(default_factory=list)
-    """How often `Flight.fly` was called, for each decision."""
+    """The number of calls of `Flight.fly` for each decision."""
     _waiting: deque[Report] = field(default_factory=deque)
     _known: set[Report] = field(default_factory=set)
     _now_s: float = 0.0

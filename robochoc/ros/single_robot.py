@@ -1,4 +1,4 @@
-"""What one robot publishes on its own machine: it knows its own decision, and not where others are."""
+"""The ROS messages of one robot on its own machine. It knows its own decision, but not where others are."""
 
 from __future__ import annotations
 

@@ -24,7 +24,7 @@ class Sink(ABC):
     """
 
     live: bool = True
-    """Whether robots may receive what is published. A recording only keeps it."""
+    """True if robots may receive what is published. False for a recording, which only stores it."""
 
     def __init__(self, place: str) -> None:
         self.place = place

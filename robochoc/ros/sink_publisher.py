@@ -49,7 +49,7 @@ class SinkPublisher:
 
     @property
     def summary(self) -> str:
-        """What was published, in a few words: `10 waypoints, 6 landings`."""
+        """Return a short text on what was published, such as `10 waypoints, 6 landings`."""
         first = ("waypoint", "landing")
         words = [
             f"{count:,} {name}{'s' * (count != 1)}" for name, count in self._counts.items() if count or name in first

@@ -1,4 +1,4 @@
-"""What robots report, and what it means for the problem: the paper's "read the robot situation" (Section 4.2).
+"""Robots' reports and what they change in the problem: the paper's "read the robot situation" (Section 4.2).
 
 An obstacle removes values. A drone that cannot fly any more removes its robot from the team. When an obstacle is gone,
 values come back. Pure: a team and a report go in, changes of that team come out.
@@ -39,7 +39,7 @@ _HAIR = 1e-6
 
 @dataclass
 class _Seen:
-    """What a drone's poses have shown."""
+    """The state of a drone, as its poses have shown it."""
 
     flew: bool = False
     lies_since: float = 0.0
@@ -47,7 +47,7 @@ class _Seen:
 
 
 class Situation:
-    """What is known of obstacles and of the drones.
+    """The known situation of obstacles and of the drones.
 
     A drone is also out of order when its poses say so: it was seen in the air (`FLIES`), and now lies on the ground
     (`LIES`) for at least `LIES_TIMES` reports over at least `LIES_S` seconds, though its robot is in the team and so

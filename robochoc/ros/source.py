@@ -30,7 +30,7 @@ class Source(ABC):
     """
 
     live: bool = True
-    """Whether messages come as time goes by. A recording has them all: there is nothing to wait for."""
+    """True if messages arrive in real time. A recording has them all, so there is no waiting."""
 
     def __init__(self, place: str) -> None:
         self.place = place

@@ -15,10 +15,10 @@ from robochoc.ros.report_decoder import ReportDecoder
 from robochoc.ros.source import Source
 
 PATIENCE_S = 10.0
-"""How long reports of a live source are awaited after a decision, by default."""
+"""The default time to wait for reports of a live source after a decision, in seconds."""
 _NOTES_MAX = 12
 _SLICE_S = 0.2
-"""How often `idle` is called."""
+"""The interval between calls of `idle`, in seconds."""
 
 
 class SourceFeedback(Feedback):

@@ -12,7 +12,7 @@ from robochoc.ros.names import TopicNames
 
 @dataclass(frozen=True)
 class Waypoint:
-    """Where a drone is to be: the paper's `/drone3.1/waypoint3.1` (Section 4.2)."""
+    """The goal of a drone: the paper's `/drone3.1/waypoint3.1` (Section 4.2)."""
 
     drone: int
     """The drone's number in the mission."""
@@ -23,10 +23,10 @@ class Waypoint:
     at: Point
     """In metres, in `frame`."""
     lands: bool
-    """Whether the drone is to be on the ground there, as its robot takes part no more."""
+    """True if the drone is to land there, because its robot has withdrawn."""
     frame: str
     stamp: int
-    """When it was decided, in nanoseconds."""
+    """The time of the decision, in nanoseconds."""
 
 
 def waypoints(leg: Leg, drones: Sequence[Drone], names: TopicNames, frame: str, stamp: int) -> tuple[Waypoint, ...]:

@@ -1,4 +1,4 @@
-"""What else would do where a protocol does not: other protocols, or the central solver."""
+"""The alternatives to a protocol that does not support a problem: other protocols, or the central solver."""
 
 from __future__ import annotations
 

@@ -21,7 +21,7 @@ from robochoc.verification.second_opinion import total_cost
 
 
 class _Decision(NamedTuple):
-    """What the central solver has decided for one epoch, and the number of solutions, if that was asked for."""
+    """The decision of the central solver for one epoch, and the number of solutions if it was asked for."""
 
     answer: Answer
     solutions: int | None = None

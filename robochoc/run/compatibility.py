@@ -1,4 +1,4 @@
-"""What goes together: problem, protocol, runtime and options. This is decided here, and nowhere else.
+"""The rules on which problems, protocols, runtimes and options can be combined. No other module decides this.
 
 There are three lists. Each rule has a condition, the reason, and what to do instead:
 
@@ -32,7 +32,7 @@ from robochoc.verification.objective import withdrawal_cost
 LARGEST = 2**62
 """Costs that add up to more are refused: a message holds integers of 64 bits."""
 CENTRAL_TRAITS = Traits(partially_known=True, costs=True)
-"""What the central solver can take."""
+"""The problems that the central solver supports."""
 
 
 class UnfitProtocolError(UnsupportedError):
@@ -142,14 +142,14 @@ OPTION_RULES = (
         "--spare brings robots back that died; --on-loss fail ends the run instead",
     ),
 )
-"""What is refused whatever the problem is."""
+"""Combinations of options that are refused for every problem."""
 
 ENVIRONMENT_RULES = (
     _not_while_changing("--protocol central", lambda o: o.protocol == CENTRAL),
     _not_while_changing("--withdraw", lambda o: o.withdraw is not None),
     _not_while_changing("--runtime network", lambda o: o.runtime is Runtime.NETWORK),
 )
-"""What is refused besides when an environment changes the problem."""
+"""Further combinations that are refused if an environment changes the problem."""
 
 
 def refuse_options(options: Options, *, environment: bool = False) -> None:
@@ -180,17 +180,17 @@ class Case:
 
     @property
     def has_costs(self) -> bool:
-        """Whether the problem has costs."""
+        """Return whether the problem has costs."""
         return self.team.kind is ProblemKind.DISWCSP
 
     @property
     def is_distributed(self) -> bool:
-        """Whether robots solve it together."""
+        """Return whether the robots solve the problem together, without the central solver."""
         return self.options.protocol != CENTRAL
 
     @property
     def minimum_withdrawal(self) -> bool:
-        """Whether robots are to withdraw, as few as possible."""
+        """Return whether as few robots as possible are to withdraw."""
         return self.is_distributed and self.options.withdraw is Withdrawal.MINIMUM
 
     @cached_property
@@ -205,7 +205,7 @@ class Case:
 
     @property
     def max_total(self) -> float:
-        """What all costs could add up to in any epoch."""
+        """Return the largest possible sum of all costs in any epoch."""
         return max(max_total(team, self.options) for team in self.epochs)
 
 
@@ -265,7 +265,7 @@ TEAM_RULES = (
         "--withdraw minimum does",
     ),
 )
-"""What is refused of a problem, or of a protocol for it."""
+"""Problems, and protocols for a problem, that are refused."""
 
 
 def refuse_unfit(team: Team, options: Options, traits: Traits) -> None:

@@ -1,4 +1,4 @@
-"""What everything in one run on this machine shares: its time, its cache, its constraint solver, its observers."""
+"""The shared state of one run on this machine: its time, its cache, its constraint solver, its observers."""
 
 from __future__ import annotations
 

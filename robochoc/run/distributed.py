@@ -29,13 +29,13 @@ class Deployment(ABC):
 
     @property
     def compile_s(self) -> float:
-        """How many seconds were spent here on compiling the robots' domains."""
+        """Return the seconds that were spent here on the compilation of the robots' domains."""
         return 0.0
 
     @property
     @abstractmethod
     def kind(self) -> ProblemKind:
-        """Whether the team's problem has costs."""
+        """Return the kind of the team's problem: with or without costs."""
 
     @property
     @abstractmethod
@@ -45,7 +45,7 @@ class Deployment(ABC):
     @property
     @abstractmethod
     def is_empty(self) -> bool:
-        """Whether no robot is left."""
+        """Return whether no robot is left."""
 
     @abstractmethod
     def withdrawal_cost(self) -> float:
@@ -69,7 +69,7 @@ class Deployment(ABC):
 
     @property
     def unsettled(self) -> str:
-        """What kept the robots from an end when a limit was reached, as far as anybody can say."""
+        """Return what kept the robots from finishing before a limit was reached, as far as it is known."""
         return ""
 
     def solve(self, phase: Phase) -> Answer:

@@ -47,7 +47,7 @@ class Search(NamedTuple):
 
 @dataclass(frozen=True)
 class Answer:
-    """What a phase of a run comes to. Most fields are those of `model.outcome.Outcome`.
+    """The result of a phase of a run. Most fields are those of `model.outcome.Outcome`.
 
     `withdrawn` are the robots that withdrew so that the others have a solution; those that were lost are not among
     them. `ended`: the protocol has come to its end, no limit was reached.

@@ -1,4 +1,4 @@
-"""How to run: the options of `robochoc.run.solve`, and of the command line."""
+"""The options of a run, for `robochoc.run.solve` and the command line."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ CENTRAL = "central"
 
 
 class Runtime(StrEnum):
-    """Where robots live: each in its own OS process, all in one thread, or each in a process joined by a network."""
+    """The runtime: each robot in its own OS process, all in one thread, or each in a process on a network."""
 
     PROCESSES = "processes"
     SIMULATOR = "simulator"
@@ -28,14 +28,14 @@ class Runtime(StrEnum):
 
 
 class ScheduleName(StrEnum):
-    """How the simulator orders events: by time counted in checks, or any channel next."""
+    """The order in which the simulator handles events: by time counted in checks, or from any channel next."""
 
     CONCURRENT = "concurrent"
     RANDOM = "random"
 
 
 class Withdrawal(StrEnum):
-    """Which robots withdraw when the whole team has no solution.
+    """The rule that chooses the robots to withdraw when the whole team has no solution.
 
     A minimum withdrawal: as few as possible, by their weights, and proven; or those that find no place, in priority
     order.
@@ -51,7 +51,7 @@ class Withdrawal(StrEnum):
 
 
 class OnLoss(StrEnum):
-    """What the loss of a robot means: the run fails, or the robot leaves the problem and the others go on."""
+    """The consequence of the loss of a robot: the run fails, or the robot leaves and the others go on."""
 
     FAIL = "fail"
     WITHDRAW = "withdraw"
@@ -59,7 +59,7 @@ class OnLoss(StrEnum):
 
 @dataclass(frozen=True)
 class Options:
-    """How to run. What goes together is decided in `run/compatibility.py`.
+    """The options of a run. `run/compatibility.py` decides which of them can be combined.
 
     Attributes:
         protocol: The name of the protocol by which the robots solve the problem, or `CENTRAL`.
@@ -108,5 +108,5 @@ class Options:
 
     @property
     def survives_losses(self) -> bool:
-        """Whether the run goes on when a robot is lost."""
+        """Return whether the run goes on when a robot is lost."""
         return self.on_loss is OnLoss.WITHDRAW or (self.on_loss is None and self.spares > 0)

@@ -35,7 +35,7 @@ class InstalledProtocol:
     entry: EntryPoint
     protocol: type[Protocol] | None
     broken: str = ""
-    """Why it cannot be used; empty when it can."""
+    """The reason why the protocol cannot be used. Empty if it can."""
 
     @property
     def name(self) -> str:

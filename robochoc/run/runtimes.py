@@ -36,7 +36,7 @@ class CommonArguments(TypedDict):
 
 @dataclass(frozen=True)
 class SessionRequest:
-    """What a session is opened for.
+    """The arguments with which a session is opened.
 
     Attributes:
         protocol: The protocol by which the robots search.

@@ -169,7 +169,7 @@ class ScenarioRun:
 
     @property
     def is_over(self) -> bool:
-        """Whether the time is over, or all messages have been sent."""
+        """Return whether the time is over, or all messages have been sent."""
         return self._left_s() == 0 or (self._messages is not None and self._messages <= 0)
 
     def add_event(self, event: ScenarioEvent) -> None:

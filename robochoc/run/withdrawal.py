@@ -33,7 +33,7 @@ class Phase:
 
     @property
     def traits(self) -> Traits:
-        """What the protocol can do."""
+        """Return the traits of the protocol."""
         return self.protocol.traits
 
 

@@ -23,7 +23,7 @@ MAX_LEASE_S = 99 * 86_400.0
 
 
 class Reason(StrEnum):
-    """Why an agent's request is not done: the propositions of FIPA00023, and its names for them."""
+    """The reason for which an agent's request fails: a proposition of FIPA00023, by its name there."""
 
     UNAUTHORISED = "unauthorised"
     UNSUPPORTED_FUNCTION = "unsupported-function"

@@ -24,9 +24,9 @@ MAX_SUBSCRIPTIONS = 1024
 
 
 class Notice(NamedTuple):
-    """What `subscriber` is to be told about the agent called `name`: its description, or None once it has gone.
+    """A notice to `subscriber` about the agent called `name`: its description, or None if the agent has gone.
 
-    It has gone for the subscriber also when it is still there, but no longer what was asked for.
+    An agent that no longer matches the subscription counts as gone, even if it is still registered.
     """
 
     subscriber: str

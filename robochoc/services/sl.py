@@ -43,7 +43,7 @@ _COUNT = re.compile(r"[+-]?[0-9]{1,9}")
 
 
 class Function(StrEnum):
-    """What the Directory can be asked to do."""
+    """A function of the Directory that agents can request."""
 
     REGISTER = "register"
     DEREGISTER = "deregister"

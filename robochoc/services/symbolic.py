@@ -23,7 +23,7 @@ class SymbolicExpressionError(ValueError):
 
 
 class Caps(NamedTuple):
-    """What a text may have at most: characters, words and strings and lists in it, and lists within lists."""
+    """Limits on a text: its characters, its words and strings, its lists, and the depth of lists."""
 
     characters: int
     expressions: int
@@ -48,7 +48,7 @@ class String:
 
 @dataclass(frozen=True, slots=True)
 class List:
-    """What stands between two parentheses."""
+    """A list: the items between two parentheses."""
 
     items: tuple[Expression, ...]
     at: int = field(default=0, compare=False)

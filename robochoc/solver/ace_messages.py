@@ -17,7 +17,7 @@ LENGTH = struct.Struct("!Q")
 _VALUES = re.compile(rb"<values>([^<]*)</values>")
 
 Strategy = Literal["default", "static"]
-"""How ACE searches: as it does by itself (weighted degrees, restarts), or in the order of the variables."""
+"""ACE's search strategy: its default (weighted degrees, restarts), or the static order of the variables."""
 
 
 def codes_of(output: bytes, width: int) -> array[int]:

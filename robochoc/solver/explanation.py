@@ -20,7 +20,7 @@ class KeyedConstraint(NamedTuple):
 
 
 class Invalidated(NamedTuple):
-    """What a change has invalidated.
+    """The explanations that a change has invalidated.
 
     Attributes:
         keys: The keys of constraints and domains that no longer rule out what they did.

@@ -46,7 +46,7 @@ FPS = 30
 _FADE = 25
 """Frames in which a drone that withdraws turns grey."""
 _CLOSE = 0.002
-"""How far, in cells, an animated drone may be from where it was flown."""
+"""The largest distance, in cells, between an animated drone and the place where it was flown."""
 _ALIKE = math.radians(0.5)
 """By which angle, in radians, it may be turned."""
 _IN_THE_WAY = 0.9

@@ -66,7 +66,7 @@ class Playback:
     chapters: tuple[Chapter, ...] = ()
     marks: tuple[EventMark, ...] = ()
     obstacles: tuple[tuple[float, Point], ...] = ()
-    """When each obstacle was seen first, and where it is."""
+    """The time at which each obstacle was first seen, and its position."""
 
     @property
     def duration_s(self) -> float:

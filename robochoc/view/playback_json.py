@@ -1,4 +1,4 @@
-"""What the page's player needs besides meshcat's commands: JSON that may stand in HTML."""
+"""The data of the page's player, besides meshcat's commands, as JSON that is safe in HTML."""
 
 from __future__ import annotations
 

@@ -35,7 +35,7 @@ class DrawnDrone:
 
     @property
     def end(self) -> Point:
-        """Where it is to be in the end."""
+        """Return the last position."""
         return self.place or self.landing or self.home
 
 

@@ -81,7 +81,7 @@ def fly(saved: Path, folder: Path | None, html: Path | None, *, serve: bool, as_
 
 
 def _flown(saved: Path, mission: Mission, given: dict[str, Any]) -> tuple[FlightLog, list[str]]:
-    """What was flown, and what of it was published where."""
+    """Fly the mission. Return the log, and the lines on what was published where."""
     from robochoc.cli.reports.progress import stages
     from robochoc.flight.flight import fly as flight
     from robochoc.formats import on_one_line

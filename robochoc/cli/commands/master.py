@@ -172,7 +172,7 @@ def _plan(folder: Path | None, team: Path | None, given: dict[str, Any]) -> Mast
 
 @contextmanager
 def _publication(*, sniffable: bool) -> Iterator[Publication | None]:
-    """What those get who may sniff, in a file without a name, if they are to get anything."""
+    """Yield the publication of the journal for sniffers, in an unnamed file. None if the run is not `sniffable`."""
     if not sniffable:
         yield None
         return
@@ -233,7 +233,7 @@ def _tell(led: MasterResult, *, as_json: bool) -> None:
 
 
 def _header(plan: MasterPlan) -> Header:
-    """What the journal says of the run."""
+    """Return the journal's header for the run."""
     from robochoc.journal.journal import Header
     from robochoc.run.defaults import DEFAULT_PROTOCOL
 

@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
 Command = TypeVar("Command", bound=Callable[..., object])
 NAME = "Sniffer"
-"""Who sniffs if nothing else is said."""
+"""The default name of a sniffer."""
 _ONLY_THERE = {"as": "name", "identity": "identity", "journal": "copy", "no-page": "no_page"}
 _OPTIONS = (
     click.option(
@@ -56,7 +56,7 @@ def master_options(command: Command) -> Command:
 
 
 def asks_master(journal: Path | None, folder: Path | None, asked: Mapping[str, Any]) -> bool:
-    """Whether a master is to be followed, and not a `journal` looked into; `asked` holds what `master_options` give.
+    """Return whether to follow a master, and not to read a `journal`. `asked` holds the values of `master_options`.
 
     Raises `UsageError` where both are asked for, neither is, or something that does not go with it.
     """
@@ -77,7 +77,7 @@ def asks_master(journal: Path | None, folder: Path | None, asked: Mapping[str, A
 
 @dataclass(frozen=True)
 class Page:
-    """How the run is shown: the robots to begin with (names and patterns), the page's port, and in a browser or not."""
+    """The page of the run: the robots to begin with (names and patterns), its port, and whether to open a browser."""
 
     chosen: tuple[str, ...]
     port: int
@@ -108,7 +108,7 @@ def sniff_master(
 def _proof(
     place: Address, patience_s: float, *, name: str | None, token: str | None, identity: Path | None
 ) -> Identity:
-    """Whose right it is. Without a name it is the identity's."""
+    """Return the sniffer's identity. The default of `name` is the identity's name."""
     from robochoc.authority.identity import Identity
     from robochoc.run.networked.join import identity_of
 
@@ -126,11 +126,11 @@ def _received(place: Address, proof: Identity, patience_s: float, showing: _Show
 
 
 class _NotKeptError(Exception):
-    """What comes cannot be written."""
+    """The received journal cannot be written."""
 
 
 class _Showing:
-    """Where the journal goes: a file without a name, which the page's process reads, and a file of the user's."""
+    """The targets of the journal: an unnamed file, which the page's process reads, and the user's file."""
 
     def __init__(self, place: Address, page: Page | None, copy: Path | None, stack: ExitStack) -> None:
         self._place = place
@@ -183,7 +183,7 @@ class _Showing:
 
     @property
     def kept(self) -> str:
-        """How much is here, in words."""
+        """Return a text on how much of the journal was received."""
         where = f"{self._size:,} bytes of its journal are here"
         return f"{where}, in {self._copy}" if self._copy else where
 

@@ -280,7 +280,7 @@ def _run(team: Team, options: Options, recorder: JournalRecorder | None, loop: C
 
 
 def _header(team: Team, options: Options) -> Header:
-    """What the journal says of the run."""
+    """Return the journal's header for the run."""
     from msgspec import UNSET
 
     from robochoc.journal.journal import Header
@@ -296,7 +296,7 @@ def _header(team: Team, options: Options) -> Header:
 
 
 def _objective(team: Team, options: Options) -> Callable[[], Objective] | None:
-    """What the journal weighs decisions by; None where nothing is minimised, or the problem changes."""
+    """Return the journal's objective. None where nothing is minimised, or the problem changes."""
     from robochoc.run.options import Withdrawal
     from robochoc.verification.objective import Objective, withdrawal_cost
 

@@ -1,4 +1,4 @@
-"""What `robochoc master`, `robot`, `sniff` and `directory` share: options, addresses and failures on the network."""
+"""Options, addresses and failures that `robochoc master`, `robot`, `sniff` and `directory` share."""
 
 from __future__ import annotations
 
@@ -68,7 +68,7 @@ def patience_option(text: str, default_s: float, name: str = "patience_s") -> Ca
 
 @contextmanager
 def network_failures_told(place: object) -> Iterator[None]:
-    """Whatever ends a run across machines becomes one line, and an exit status."""
+    """Turn each failure of a run across machines into a message of one line and an exit status."""
     statuses = _statuses()
     from robochoc.formats import on_one_line
 

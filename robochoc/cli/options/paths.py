@@ -102,7 +102,7 @@ def refuse_same_places(
 
 
 def _named(files: Mapping[str, Path | None]) -> Iterator[Place]:
-    """Where each file is that is given, and how it is called; no devices, and nothing that is nowhere."""
+    """Yield the path and the name of each given file, which need not exist yet. Devices are left out."""
     from robochoc.system.files import resolved
 
     for what, path in files.items():

@@ -65,7 +65,7 @@ def recording(
 def shown_and_flushed(
     recorder: JournalRecorder | None, show: Callable[[Progress], None] | None
 ) -> Callable[[Progress], None] | None:
-    """What is to be told of a run's progress: `show`, and the recorder, which may have had no event for long."""
+    """Return the function that receives a run's progress. It flushes the recorder if due, and calls `show`."""
     if recorder is None:
         return show
 

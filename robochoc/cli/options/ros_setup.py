@@ -1,4 +1,4 @@
-"""What the options of ROS and flights ask for, set up: sinks, feedback, the closed loop. Errors become one line."""
+"""The setup for the options of ROS and flights: sinks, feedback, the closed loop. Errors become one line."""
 
 from __future__ import annotations
 

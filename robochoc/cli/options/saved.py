@@ -1,4 +1,4 @@
-"""What robochoc has written itself, and is given back: journals and results, and the team that they are of."""
+"""Input files that robochoc has written: journals and results, and the teams that belong to them."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ team_option = click.option(
 
 
 def saved_content(file: Path, next_step: str) -> bytes:
-    """What is in `file`. Raises `Failure`, which ends in `next_step`."""
+    """Return the content of `file`. Raises `Failure`, whose message ends in `next_step`."""
     try:
         with file.open("rb") as stream:
             content = stream.read(LARGEST_FILE + 1)
@@ -53,7 +53,7 @@ def saved_journal(file: Path) -> Journal:
 
 
 def saved_outcome(saved: Path) -> Outcome:
-    """What the file, a JSON result or a journal, tells of the end of a run. Raises `Failure`."""
+    """Return the outcome that a file, a JSON result or a journal, holds. Raises `Failure`."""
     from robochoc.formats.result import ResultError, read_result
     from robochoc.journal.journal import JournalError, is_journal, read_journal
 
@@ -86,7 +86,7 @@ def saved_team(outcome: Outcome, saved: Path, folder: Path | None) -> Team | Non
 
 
 def _is_team_of(outcome: Outcome, team: Team) -> bool:
-    """Whether all who took part, and all that they decided, are known to `team` or come with its scenario."""
+    """Return whether `team`, or its scenario, has all robots and all decided values of `outcome`."""
     from robochoc.flight.mission import all_robots
 
     robots = all_robots(team)
@@ -99,7 +99,7 @@ def _is_team_of(outcome: Outcome, team: Team) -> bool:
 
 
 def _usual_folder(outcome: Outcome) -> Path | None:
-    """Where `generate` puts teams of that name, if it is there."""
+    """Return the folder in which `generate` puts teams of that name. None: there is no such folder."""
     name = Path(outcome.team).name
     folder = Path("instances") / name
     if name not in {"", ".."} and folder.is_dir():

@@ -17,7 +17,7 @@ REST = "Other options"
 _COLUMN = 26
 """Characters. A longer option has a line of its own before its text."""
 _OBVIOUS = re.compile(r"; x>=?[01](?=\])|\s*\[(x>=?[01]|[\d.e-]+<=x<=[\d.e-]+)\]")
-"""What click says of a number's range where every reader expects it."""
+"""The parts of click's texts on number ranges that every reader expects. They are left out."""
 
 
 class SectionedCommand(click.Command):

@@ -148,13 +148,13 @@ def _check_path(ctx: click.Context, word: str, kind: str, values: Sequence[str])
 
 
 def _names_robots(word: str) -> bool:
-    """Whether `word` can be patterns of robots' names, and not the next option, or the path of a team."""
+    """Return whether `word` can be patterns of robots' names, and not the next option or a team's path."""
     return bool(word) and not word.startswith("-") and "/" not in word and not Path(word).exists()
 
 
 @dataclass(frozen=True)
 class Products:
-    """What is made of a run besides what is printed."""
+    """The products of a run besides the printed result."""
 
     html: Path | None
     journal: Path | None
@@ -167,7 +167,7 @@ class Products:
 
 @dataclass(frozen=True)
 class Wanted:
-    """What is asked for of each team: the protocol (None: by its kind), the order, how it is told, and where."""
+    """The request for each team: the protocol (None: by the team's kind), the order, the report, and the place."""
 
     protocol: str | None
     order: str | Path

@@ -1,1 +1,1 @@
-"""What commands print: tables for people, JSON for machines."""
+"""The output of commands: tables for people, JSON for machines."""

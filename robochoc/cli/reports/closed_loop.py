@@ -1,4 +1,4 @@
-"""What is told of a closed loop: what was published, what could not be heeded, and how a simulated flight went."""
+"""The report of a closed loop: what was published, what could not be used, and the simulated flight."""
 
 from __future__ import annotations
 
@@ -16,12 +16,12 @@ if TYPE_CHECKING:
 
 
 def told_of(loop: ClosedLoop) -> list[str]:
-    """What was published where, and what could not be heeded: a line each."""
+    """Return the lines on what was published where, and on reports that could not be used."""
     return [*(f"{publisher.place}: {publisher.summary}" for publisher in loop.publishers), *loop.notes]
 
 
 class FlownMission(NamedTuple):
-    """What a simulated flight has come to, if there was one."""
+    """The result of a simulated flight, if there was one."""
 
     status: int = 0
     mission: Mission | None = None
@@ -29,7 +29,7 @@ class FlownMission(NamedTuple):
 
 
 def flight_told(loop: ClosedLoop | None, ros: RosOptions, *, quiet: bool) -> FlownMission:
-    """How a simulated flight went, which is told. Whoever fell has left the team: that alone is no failure."""
+    """Report the simulated flight and return it. A drone that fell has left the team: that alone is no failure."""
     if loop is None or ros.situation != FLIGHT:
         return FlownMission()
     from robochoc.cli.reports.flight import as_planned, how_it_went, too_late
@@ -46,7 +46,7 @@ def flight_told(loop: ClosedLoop | None, ros: RosOptions, *, quiet: bool) -> Flo
 
 
 def _flown_by(loop: ClosedLoop) -> tuple[Mission, FlightLog] | None:
-    """What a simulated flight has flown; None where nothing was."""
+    """Return the mission and the log of the simulated flight. None if nothing was flown."""
     from robochoc.ros.simulated_feedback import SimulatedFeedback
 
     flown = loop.feedback.flown() if isinstance(loop.feedback, SimulatedFeedback) else None

@@ -1,4 +1,4 @@
-"""How failures become one clear message and an exit status (docs/reference/cli.md)."""
+"""Failures as one clear message and an exit status (docs/reference/cli.md)."""
 
 from __future__ import annotations
 
@@ -54,7 +54,7 @@ def worst(statuses: Iterable[int]) -> int:
 
 @contextmanager
 def failures_told(place: object) -> Iterator[None]:
-    """Whatever ends the work at `place` that is no fault of the program becomes one line, and `Failure`."""
+    """Turn each foreseen error of the work at `place` into a `Failure` with a message of one line."""
     try:
         yield
     except Exception as error:

@@ -1,4 +1,4 @@
-"""What `robochoc fly` says of a flight: a table for people, an object for machines."""
+"""The report of `robochoc fly` on a flight: a table for people, an object for machines."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ _NAMES = 6
 
 
 def as_planned(flown: FlightLog, *, may_fall: bool = False) -> bool:
-    """Whether everybody has arrived, no two came nearer than the set distance, and nobody has fallen, or may."""
+    """Return whether all drones have arrived, kept the set distance, and none has fallen (unless `may_fall`)."""
     apart = flown.nearest is None or flown.nearest.distance_m >= flown.distance
     return apart and all(error <= ARRIVED_M or (may_fall and isnan(error)) for error in flown.errors_m)
 
@@ -32,13 +32,13 @@ def flight_report(mission: Mission, flown: FlightLog) -> str:
 
 
 def how_it_went(flown: FlightLog) -> str:
-    """What happened, who has arrived, how near they came, and how fast it was simulated."""
+    """Return a text on the flight: events, arrivals, the smallest distance, and the speed of the simulation."""
     lines = [f"{one.at_s:6.1f} s  {_name(flown, one.drone)}: {one.what}" for one in flown.events]
     return "\n".join(f"  {line}" for line in (*lines, _arrival(flown), _apart(flown), _speed(flown)))
 
 
 def too_late(failures: Iterable[tuple[str, float]], flown: FlightLog) -> list[str]:
-    """Which of the `failures` that were asked for could not happen, as the flight was over: a line each."""
+    """Return a line for each of the requested `failures` that came after the end of the flight."""
     return [
         f"--fail {on_one_line(name)}@{at_s:g}: the flight was over after {flown.simulated_s:.1f} s"
         for name, at_s in failures

@@ -1,4 +1,4 @@
-"""What `robochoc journal show` says of a journal."""
+"""The report of `robochoc journal show` on a journal."""
 
 from __future__ import annotations
 

@@ -19,14 +19,14 @@ _BROWSER_S = 8.0
 
 @dataclass(frozen=True)
 class Watching:
-    """What --sniff asks for: the robots to begin with (names and patterns), and whether a browser is to be opened."""
+    """The values of --sniff: the robots to begin with (names and patterns), and whether to open a browser."""
 
     chosen: tuple[str, ...]
     open_browser: bool
 
 
 def watching(chosen: str | None, *, open_browser: bool) -> Watching | None:
-    """What --sniff and --open say. Raises `click.UsageError` for --open alone."""
+    """Return what --sniff and --open ask for. Raises `click.UsageError` for --open alone."""
     if chosen is None:
         if open_browser:
             raise click.UsageError("--open is for the page of --sniff")
@@ -67,10 +67,10 @@ class Watch:
         self._stack.close()
 
     def begun(self) -> list[Callable[[bytes], object]]:
-        """Where the journal's blocks are to be written for the viewer, which is started; nowhere without one.
+        """Start the viewer and return the functions that write the journal's blocks for it. Without a viewer: none.
 
-        That is a file without a name, which nothing outlives. The viewer's URL is told, and a browser opened where
-        that was asked for.
+        The blocks go to an unnamed file, which disappears with the program. The viewer's URL is printed, and a browser
+        is opened if requested.
         """
         if self._watching is None:
             return []
@@ -105,7 +105,7 @@ class Watch:
             click.echo("the page is gone: its process has ended", err=True)
 
     def _write(self, block: bytes) -> None:
-        """What cannot be written is missing on the page only: the run is worth more."""
+        """Write a block. If that fails, only the page lacks it: the run goes on."""
         if self._file is None or self._cut:
             return
         try:

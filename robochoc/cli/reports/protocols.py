@@ -33,9 +33,9 @@ class Row:
     traits: Traits | None
     broken: str = ""
     module: str = ""
-    """Where its docstring stands."""
+    """The module that has its docstring."""
     settings: Settings = NO_SETTINGS
-    """What can be set of it, with the defaults."""
+    """Its settings, with the defaults."""
 
 
 def rows() -> list[Row]:

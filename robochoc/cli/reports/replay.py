@@ -1,4 +1,4 @@
-"""What `robochoc replay` says: the counts, and the first difference, for people and as JSON."""
+"""The report of `robochoc replay`: the counts and the first difference, as text and as JSON."""
 
 from __future__ import annotations
 
@@ -78,7 +78,7 @@ def _counts(replayed: ReplayResult) -> dict[str, int]:
 
 
 def _shortfalls(replayed: ReplayResult) -> Iterator[str]:
-    """What could not be played, and why."""
+    """Yield a text for everything that could not be replayed, with the reason."""
     if replayed.damage:
         yield f"  the journal {'ends early' if replayed.truncated else 'was altered'}: {replayed.damage}"
     elif not replayed.ended:
@@ -133,7 +133,7 @@ def _fields(event: object) -> dict[str, object]:
 
 
 def _said(event: AnyEvent | None) -> str:
-    """What a robot did."""
+    """Return a text on what a robot did."""
     match event:
         case Sent():
             text = f"said {event.type} to {event.receiver}: {_content(event.content)}, {event.bytes:,} bytes"

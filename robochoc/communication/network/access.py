@@ -1,4 +1,4 @@
-"""Who may write to whom: zenoh's access control, default deny, bound to the name in a certificate.
+"""Access control for writing and reading: zenoh's rules, default deny, bound to the name in a certificate.
 
 The key of a frame is `rc/msg/RECEIVER/SENDER`. A robot may put on keys that end with its own name only, and read those
 that begin with it, so that nobody writes in another's name or reads another's frames. Of the keys that end with its

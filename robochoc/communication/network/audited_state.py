@@ -124,12 +124,12 @@ class AuditedSearchState(SearchState):
 
     @property
     def broken_off(self) -> bool:
-        """Whether the search has to end without a verdict: see `SearchState.broken_off`, or it is stuck."""
+        """Return whether the search must end without a verdict: see `SearchState.broken_off`, or it is stuck."""
         return bool(self.stuck) or super().broken_off
 
     @property
     def wave_due(self) -> bool:
-        """Whether a wave could show something: see `SearchState.wave_due`, or that messages are missing."""
+        """Return whether a wave is useful: see `SearchState.wave_due`, or messages are missing."""
         return super().wave_due or (bool(self._asked) and not self.counters.waving)
 
     def missing(self, now: float, patience_s: float) -> int:
@@ -153,17 +153,17 @@ class AuditedSearchState(SearchState):
 
     @property
     def by_quiescence(self) -> bool:
-        """Whether the search ended by quiescence, and not by one robot's conclusion."""
+        """Return whether the search ended by quiescence, and not by one robot's conclusion."""
         return self.counters.quiescent and self.witness is None
 
     @property
     def unchecked(self) -> bool:
-        """Whether a robot has not checked its constraints against the decision yet."""
+        """Return whether a robot has not checked its constraints against the decision yet."""
         return bool(self._present - self._checks.keys())
 
     @property
     def held(self) -> bool:
-        """Whether all robots have checked their constraints, and none is broken."""
+        """Return whether all robots have checked their constraints, and none is violated."""
         return not self.unchecked and all(check.allowed for check in self._checks.values())
 
     @property
@@ -173,7 +173,7 @@ class AuditedSearchState(SearchState):
 
     @property
     def thoroughness(self) -> CheckCounts:
-        """How many constraints were checked by one robot, and how many by more."""
+        """Return the numbers of constraints that one robot has checked, and that several have."""
         return thoroughness(self._checks)
 
     # Contradictions between robots
@@ -198,7 +198,7 @@ class AuditedSearchState(SearchState):
 
     @property
     def unfinished(self) -> str:
-        """Which robots kept the search from its end until the time was over, in words; empty if that is unknown."""
+        """Return a text on the robots that had not finished at the time limit. Empty if they are unknown."""
         names = ", ".join(self._late[:_MOST_NAMED]) + ", ..." * (len(self._late) > _MOST_NAMED)
         waited = f"{names} {'has' if len(self._late) == 1 else 'have'} not answered the master"
         doubts = [doubt.why for doubt in self.doubts_about_counts]
@@ -206,10 +206,10 @@ class AuditedSearchState(SearchState):
 
     @property
     def cost(self) -> float:
-        """What all constraints charge together, as far as they were checked."""
+        """Return the total cost of all constraints that were checked."""
         return sum(check.cost for check in self._checks.values())
 
     @property
     def assigned(self) -> Mapping[str, bool]:
-        """Whether each robot that has reported has values."""
+        """Return for each robot that has reported whether it has values."""
         return {name: account.assigned for name, account in self._accounts.items()}

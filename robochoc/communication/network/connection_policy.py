@@ -13,7 +13,7 @@ from robochoc.communication.network.quotas import OF_A_ROBOT, OF_AN_OBSERVER, Sh
 from robochoc.communication.network.router import RefusalObserver, Router
 
 Reach = Mapping[str, tuple[str, ...]]
-"""Who may take part, and to whom each may write besides the master."""
+"""The members that may take part, each with those to which it may write besides the master."""
 
 
 class ConnectionPolicy:
@@ -36,9 +36,9 @@ class ConnectionPolicy:
         self._router = Router(endpoint, identity, refused, lease_ms, scratch)
         self._ways = ways
         self.admitted: tuple[str, ...] = ()
-        """Who may connect, as the router's rules have it."""
+        """The names that may connect by the router's present rules."""
         self.sniffable = False
-        """Whether those who may sniff may have the journal of this run."""
+        """True if sniffers may have the journal of this run."""
         self._rules: tuple[dict[str, tuple[str, ...]], tuple[str, ...] | None] | None = None
 
     def open(self) -> None:
@@ -92,7 +92,7 @@ class ConnectionPolicy:
 
     @property
     def broken(self) -> bool:
-        """Whether the router's process is gone though nobody closed it."""
+        """Return whether the router's process has ended though nobody closed it."""
         return self._router.ended
 
     def close(self) -> None:

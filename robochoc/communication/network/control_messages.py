@@ -73,7 +73,7 @@ class DetailedReport(Report, frozen=True):
 
 
 class Charge(NamedTuple):
-    """What all totally known constraints over the same `variables` that `holder` holds charge together."""
+    """The total cost of `holder`'s totally known constraints over the same `variables`."""
 
     holder: str
     variables: tuple[str, ...]
@@ -82,7 +82,7 @@ class Charge(NamedTuple):
 
 
 class CheckResult(OfEpoch, frozen=True):
-    """What the robot's constraints charge for the decided values; `allowed`: none is broken.
+    """The cost of the robot's constraints for the decided values. `allowed`: none is violated.
 
     `held` is their number. Of these, `shared` are those that others may know too; `copies` are constraints of others
     that the robot knows.

@@ -1,6 +1,7 @@
-"""What the fork server does when it ends, which is when the parent has: remove the parent's temporary folder.
+"""The last action of the fork server, when its parent has ended: remove the parent's temporary folder.
 
-Imported there alone. A parent that was killed could not do it; the router does so too, but only while there is one.
+Only the fork server imports this module. A parent that was killed cannot remove the folder. The router removes it too,
+but not every run has a router.
 """
 
 from __future__ import annotations

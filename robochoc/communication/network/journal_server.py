@@ -20,7 +20,7 @@ from robochoc.communication.network.master_events import MasterEvents
 from robochoc.journal.entries import JournalError
 
 SNIFF = "sniff"
-"""What is granted or refused."""
+"""The right that is granted or refused."""
 PIECE_BYTES = 60_000
 """At most so much of the journal goes at once: what one batch of zenoh's holds, with what is around it."""
 ANSWERED_AT_MOST = 200
@@ -40,7 +40,7 @@ class Question(msgspec.Struct, frozen=True, array_like=True):
 
 
 class Piece(msgspec.Struct, frozen=True, array_like=True):
-    """What the journal of `run` holds from byte `start` on, or a part of it; `over`: it ends there, for good."""
+    """A piece of the journal of `run`, from byte `start` on. `over`: the journal ends there for good."""
 
     run: str
     start: Annotated[int, msgspec.Meta(ge=0, le=LARGEST)]
@@ -64,13 +64,13 @@ class Publication:
         """The run whose journal it is, as frames name it; the master sets it."""
         self.fresh = fresh
         self.trouble = ""
-        """Why nothing is written, and so nothing given out, any more; empty: all is well."""
+        """The reason why the journal is no longer written and published. Empty: there is none."""
         self._descriptor = descriptor
         self._size = 0
         self._over = self._closed = False
         self._asked: dict[str, list[float]] = {}
         self._behind: dict[str, float] = {}
-        """Who has not got the end yet, and when it has asked last."""
+        """The followers that have not received the end yet, with the times of their last requests."""
         self._lock = threading.Lock()
 
     def write(self, block: bytes) -> None:
@@ -95,7 +95,7 @@ class Publication:
 
     @property
     def lagging(self) -> bool:
-        """Whether somebody who follows the run has not got its end yet."""
+        """Return whether a follower of the run has not received its end yet."""
         now = time.monotonic()
         with self._lock:
             return not self._closed and any(now - asked < PRESENT_S for asked in self._behind.values())
@@ -158,7 +158,7 @@ def _question(content: bytes) -> Question:
 
 
 class JournalServer:
-    """Where the master is asked for the journal of its `run`: by frame who may have it, then for piece after piece.
+    """The master's server for the journal of its `run`. A frame checks the right to it; then pieces are requested.
 
     `publication` is None where it gives none out. `may` says who has the right now.
     """
@@ -172,7 +172,7 @@ class JournalServer:
 
     @property
     def lagging(self) -> bool:
-        """Whether somebody has not got the end of the journal yet."""
+        """Return whether a follower has not received the end of the journal yet."""
         return self.publication is not None and self.publication.lagging
 
     def welcome(self, name: str, sniff: JournalRequest) -> JournalAnswer:

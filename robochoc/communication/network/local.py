@@ -43,14 +43,14 @@ from robochoc.solver.encoding import UnsupportedError
 
 LOOPBACK = "127.0.0.1"
 FAREWELL_S = 1.0
-"""How long the end of the run is announced to robots. Those that do not confirm it, as they are stopped, are killed."""
+"""Seconds for which the end of the run is announced. Stopped robots do not confirm it and are then killed."""
 GRACE_S = 2.0
-"""How long robots that were sent home get to end by themselves."""
+"""The time that dismissed robots have to end by themselves, in seconds."""
 _ATTEMPTS = 5
 _DESCRIPTORS, _DESCRIPTORS_PER_ROBOT = 32, 2
 """Open files: of the master's session, the router's pipes and the fork server, and of each robot's process."""
 _PRELOAD = (fork_server.__name__, "__main__", "robochoc.communication.network.robot_process")
-"""What the fork server imports once for all robots; without the program's own file each of them would."""
+"""The modules that the fork server imports once for all robots, with the program's own file (`__main__`)."""
 _OURS = "robochoc."
 """Modules that are sure to be importable there."""
 

@@ -58,7 +58,7 @@ from robochoc.solver.encoding import TooLargeError, UnsupportedError
 from robochoc.system.plain_text import LONGEST_REASON, on_one_line
 
 REGISTRY_S = 0.5
-"""How often the Authority's registry is read: who has been enrolled or revoked since."""
+"""The interval at which the Authority's registry is read for new enrolments and revocations, in seconds."""
 REPORTS_S, FAREWELL_S, AGAIN_S = 10.0, 5.0, 0.5
 
 
@@ -117,7 +117,7 @@ class Master(MasterLoop):
 
     @property
     def is_private(self) -> bool:
-        """Whether robots keep their values to themselves."""
+        """Return whether robots keep their values to themselves."""
         return self._settings.private
 
     def publish(self, publication: Publication) -> None:

@@ -169,7 +169,7 @@ class Members:
 
     @property
     def complete(self) -> bool:
-        """Whether all are there now: as many as were asked for, and all that are named as neighbours."""
+        """Return whether the team is complete: all requested robots and all named neighbours are present."""
         enough = bool(self.robots) and (self.number is None or len(self.robots) >= self.number)
         return enough and not self.awaited and all(m.joined and not m.unconfirmed for m in self.robots.values())
 

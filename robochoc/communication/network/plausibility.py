@@ -40,7 +40,7 @@ _NOBODY = Exchanged(0, 0, 0)
 
 
 class Doubt(NamedTuple):
-    """What two robots say contradicts each other, in words; one of `between` has not told the truth."""
+    """A contradiction between the reports of two robots, in words. One of `between` has not told the truth."""
 
     between: tuple[str, str]
     why: str
@@ -48,7 +48,7 @@ class Doubt(NamedTuple):
 
 @dataclass(frozen=True)
 class Declarations:
-    """What the master knows of a search before it begins: how robots may end it, and what their profiles say.
+    """The master's knowledge before a search: the robots' ways to end it, and their profiles' declarations.
 
     `shown` are the robots' variables with their domains, `dearest` is the most that each one's constraints charge
     together.
@@ -63,7 +63,7 @@ NOTHING_DECLARED = Declarations()
 
 
 class FinishedSearch(NamedTuple):
-    """What the master knows of a search that is over.
+    """The master's knowledge of a finished search.
 
     `order` names its robots, `counts` holds the last counters of one of them, `duration_s` is how many seconds it
     took, `by_quiescence` whether it ended by quiescence.

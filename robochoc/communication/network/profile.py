@@ -30,11 +30,11 @@ LARGEST_DEAREST = 2.0**80
 
 
 class ProfileError(ValueError):
-    """What a robot tells of itself cannot be."""
+    """The profile of a robot is invalid."""
 
 
 class Profile(msgspec.Struct, frozen=True, array_like=True):
-    """What the robot `name` tells of its file.
+    """The profile that the robot `name` declares of its file.
 
     `variables` are its interface variables with their domains. `looks_at` names, by child, the child's variables that
     this robot's parts of partially known constraints look at; `wants` are the others' variables in the constraints that

@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 MIB = 2**20
 BURST_S = 60.0
-"""What was not used in so many seconds may be used at once: after an outage all comes together."""
+"""Seconds for which unused quota is kept. It can be used at once: after an outage, messages come together."""
 EVENTS_A_SECOND = 10_000
 """The events that a robot may report to the master, in the long run."""
 NO_LIMIT = 1e15
@@ -52,7 +52,7 @@ class Allowance:
 
 
 class Usage:
-    """What one sender has of its `share` now."""
+    """The present usage of one sender's `share`."""
 
     def __init__(self, share: Share, now: float) -> None:
         self.dropped = 0

@@ -60,14 +60,14 @@ from robochoc.solver.encoding import TooLargeError, UnsupportedError
 from robochoc.system.plain_text import LONGEST_REASON, on_one_line
 
 CHECK_S = 0.25
-"""How often a robot that waits checks whether the link is still there."""
+"""The interval at which a robot that waits checks the link, in seconds."""
 AT_ONCE = 10_000
 """So many frames at most are one packet."""
 _UNUSABLE = (FrameRefusedError, NotGenuineError, UnknownPeerError, BadMessageError)
 
 
 class Ending(NamedTuple):
-    """How the run ended for this robot.
+    """The end of the run for this robot.
 
     Attributes:
         why: The reason that the master gave, or why the robot ended by itself.

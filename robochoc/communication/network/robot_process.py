@@ -21,13 +21,13 @@ from robochoc.solver.compiled_team import CompiledRobot
 from robochoc.system.orphans import signal_when_orphaned
 
 START_S = 60.0
-"""How long robots may take to come."""
+"""The longest wait for robots to connect, in seconds."""
 _LOWEST_NICE = 19
 _PR_SET_NAME = 15
 
 
 class NetworkRobotStart(NamedTuple):
-    """What a robot's process starts with."""
+    """The arguments with which a robot's process starts."""
 
     own: CompiledRobot
     identity: IdentityTexts

@@ -1,4 +1,4 @@
-"""How a robot takes part in a run across machines, as its owner wants it."""
+"""The settings of a robot in a run across machines, as its owner chooses them."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ def _ignore(*_arguments: object) -> None:
 
 @dataclass(frozen=True)
 class RobotSettings:
-    """How a robot takes part.
+    """The settings of a robot.
 
     Attributes:
         patience_s: How long the master may be gone.

@@ -24,7 +24,7 @@ from robochoc.communication.network.framing import MASTER
 from robochoc.communication.network.transport import encoded
 
 START_S = 10.0
-"""How long the router may take to listen."""
+"""The longest wait until the router listens, in seconds."""
 _PROCESS = "robochoc.communication.network.router_process"
 _READY = "listening"
 _LOG = "warn"
@@ -110,7 +110,7 @@ class Router:
 
     @property
     def ended(self) -> bool:
-        """Whether its process is gone though nobody closed it."""
+        """Return whether its process has ended though nobody closed it."""
         return self._process is not None and self._process.poll() is not None
 
     def close(self) -> None:
@@ -187,7 +187,8 @@ class Log:
     def __init__(self, reach: Collection[str]) -> None:
         self._reach = reach
         self._names: dict[bytes, str] = {}
-        """Whose sessions there are: zenoh names a certificate's holder only where it looks a right up anew."""
+        """The name of each session. zenoh gives the name of a certificate's holder only when it looks a right up
+        anew."""
 
     def refusals(self, log: bytes) -> Iterator[Refusal]:
         """Yield what a part of the log tells of refusals; it ends with a whole line."""

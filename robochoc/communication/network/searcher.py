@@ -46,7 +46,7 @@ from robochoc.solver.explanation import KeyedConstraint, held_above
 
 @dataclass(frozen=True)
 class RobotContext:
-    """What a searcher gets from the robot's connection to the run.
+    """A searcher's interface to the robot's connection to the run.
 
     Attributes:
         say: Sends a control message to the master.

@@ -5,9 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 PATIENCE_S = 10.0
-"""How long a robot may be away."""
+"""The longest time for which a robot may be absent, in seconds."""
 LEASE_MS = 10_000
-"""How long a link may be silent. TCP survives shorter outages by itself."""
+"""The longest silence of a link, in milliseconds. TCP survives shorter outages by itself."""
 
 
 @dataclass(frozen=True)

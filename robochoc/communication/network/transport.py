@@ -28,10 +28,11 @@ from robochoc.communication.resources import require_descriptors
 
 RETRY = {"period_init_ms": 50, "period_max_ms": 500, "period_increase_factor": 1.5}
 HEARTBEAT_S = 5.0
-"""How soon a receiver learns that the last frame is missing, at the latest; that of others it sees at the next frame.
+"""The longest time in seconds until a receiver notices that the last frame is missing.
 
-Each pair that has ever spoken has its own, at about 0.2 ms of CPU: 121 robots are some 4,000 pairs. What was sent in an
-outage does not wait for it: a receiver asks for that as soon as it sees the sender again.
+Other missing frames are noticed at the next frame. Each pair that has exchanged a frame has its own heartbeat, which
+costs about 0.2 ms of CPU: 121 robots have some 4,000 pairs. Frames of an outage do not wait for the heartbeat: a
+receiver requests them as soon as it sees the sender again.
 """
 KEPT_FRAMES = 100_000
 _LATE_S = 1.0
@@ -48,7 +49,7 @@ class CannotConnectError(Exception):
 
 
 TEAM = (MASTER, ALL)
-"""Whom robots hear: the master by a subscriber of its own, and all others."""
+"""The senders to which a robot subscribes: the master, by a subscriber of its own, and all others."""
 _Subscriber = tuple[zenoh.ext.AdvancedSubscriber[None], zenoh.ext.SampleMissListener[None]]
 Answering = Callable[[str, bytes], bytes | None]
 """The answer to a question of a participant; None: there is none."""

@@ -1,4 +1,4 @@
-"""What every process of a run tells zenoh. Imports little, as the router's process starts with it, and fast."""
+"""The zenoh configuration of every process of a run. It imports little, so that the router starts fast."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from collections.abc import Mapping
 import zenoh
 
 RX_BYTES = 32 * 2**20
-"""What zenoh takes from the network at once: more than a frame, so that one that is too large is refused aloud."""
+"""The largest message that zenoh receives. It exceeds a frame's limit, so that too large a frame causes an error."""
 
 
 def config(settings: Mapping[str, object]) -> zenoh.Config:

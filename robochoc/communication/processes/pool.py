@@ -24,7 +24,7 @@ _CONTEXTS: dict[StartMethod, type[ForkContext | ForkServerContext]] = {
     "forkserver": ForkServerContext,
 }
 GRACE_S = 0.5
-"""How long processes may take to end by themselves before they are killed."""
+"""The time that processes have to end by themselves before they are killed, in seconds."""
 _FDS_PER_ROBOT = 4
 _FDS_SPARE = 128
 

@@ -1,4 +1,4 @@
-"""What the operating system says of a process: its state, whether it computes, and how it ended."""
+"""The operating system's status of a process: its state, whether it computes, and how it ended."""
 
 from __future__ import annotations
 

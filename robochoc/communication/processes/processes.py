@@ -45,7 +45,7 @@ from robochoc.solver.compiled_team import CompiledTeam
 from robochoc.solver.encoding import TooLargeError, UnsupportedError
 
 REPORTS_S = 5.0
-"""How long the parent waits for reports after the end of an epoch."""
+"""The longest wait of the parent for reports after the end of an epoch, in seconds."""
 BUSY_REPORTS_S = 60.0
 """The same for robots that compute, or wait for their turn of a busy machine, when there is a verdict."""
 LATE_REPORTS_S = 0.5

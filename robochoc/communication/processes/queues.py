@@ -20,7 +20,7 @@ LARGEST_BODY = 1 << 26
 
 
 class CorruptQueueError(Exception):
-    """What was read is no sequence of bodies, or one body is larger than `LARGEST_BODY`."""
+    """The data is not a sequence of bodies, or one body is larger than `LARGEST_BODY`."""
 
 
 def unpack(buffer: bytearray) -> Iterator[bytes]:

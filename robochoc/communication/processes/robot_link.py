@@ -44,7 +44,7 @@ class RobotLink:
 
     @property
     def hung_up(self) -> bool:
-        """Whether the other end of the control pipe is closed."""
+        """Return whether the other end of the control pipe is closed."""
         return self._reader.ended
 
     def send(self, order: FromParent, fds: Sequence[int] = ()) -> None:
@@ -77,7 +77,7 @@ class RobotLink:
 
     @property
     def is_computing(self) -> bool:
-        """Whether the process uses the processor, or waits for its turn."""
+        """Return whether the process uses the processor, or waits for its turn."""
         return is_computing(self.process.pid)
 
     def describe_end(self) -> str:

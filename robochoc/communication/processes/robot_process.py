@@ -30,7 +30,7 @@ _libc = ctypes.CDLL(None)
 
 
 class RobotStart(NamedTuple):
-    """What a robot's process starts with.
+    """The arguments with which a robot's process starts.
 
     Attributes:
         part: The robot's part of the problem.

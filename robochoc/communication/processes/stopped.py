@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 
 REPORT_AFTER_S = 5.0
-"""How long a robot is stopped before that is reported."""
+"""Seconds after which a stopped robot is reported."""
 _LONGEST_STEP_S = 1.0
 """No more is counted between two updates: this process may have been stopped as well, by the same Ctrl-Z."""
 

@@ -40,12 +40,12 @@ _RANGES = {
     "longest_timeout_ms": (0, _MOST_MS),
     "check_ns": (0, NS_PER_S),
 }
-"""What is no mistake for certain; beyond that a run would not come to its end."""
+"""The accepted range of each value. Other values are certainly mistakes, and a run might not end with them."""
 _NAME = re.compile(r"[\w.+-]{1,40}")
 
 
 class Crossing(NamedTuple):
-    """What one message needs to get across, in nanoseconds.
+    """The time that one message takes, in nanoseconds.
 
     `air`: time on the air, of all its frames and of those that were sent again; `waiting`: until it was clear that
     these were lost; `latency`: all the rest.
@@ -57,7 +57,7 @@ class Crossing(NamedTuple):
 
 
 class ChannelModel(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """How messages travel between any two robots. All draws come from the caller's chance.
+    """A model of the channel between any two robots. All random draws come from the caller's generator.
 
     `latency_ms` is the median of a log-normal distribution that begins at `minimum_ms` and has the shape `sigma` (the
     jitter): never negative, skewed, with a long tail, and two percentiles of a measurement are enough to fit it. A

@@ -78,7 +78,7 @@ class QuadrotorSimulation:
 
     @property
     def is_sampled(self) -> bool:
-        """Whether the present state has just been logged."""
+        """Return whether the present state has just been logged."""
         return self._steps % STEPS_PER_SAMPLE == 0
 
     @property

@@ -38,7 +38,7 @@ class Trajectory:
 
     @property
     def over(self) -> bool:
-        """Whether no setpoint moves any more: at the end, or because the clock has stopped."""
+        """Return whether no setpoint moves any more: the end is reached, or the clock has stopped."""
         return self._s >= self.plan.duration_s or self._slow >= STOP_S
 
     def stop(self) -> None:

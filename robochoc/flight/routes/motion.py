@@ -92,7 +92,7 @@ class _Window:
 
 
 class RoutePlan:
-    """Where all drones are from second 0 to `duration_s`. Made by `robochoc.flight.routes.timetable.plan_routes`."""
+    """The positions of all drones from second 0 to `duration_s`. `plan_routes` makes it."""
 
     def __init__(self, starts: Array, flights: Sequence[tuple[Route, float]]) -> None:
         self._starts = starts.copy()

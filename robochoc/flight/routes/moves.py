@@ -46,7 +46,7 @@ class Move:
     drone: int
     path: Array
     points: Array
-    """Where all others rest meanwhile: any other path that is clear of them is as good."""
+    """The places of all drones that rest meanwhile. Any other path that is clear of them is as good."""
 
 
 def moves_between(starts: Array, goals: Array, standing: Array, space: Space, delays: Array) -> list[Move]:
@@ -134,9 +134,9 @@ class _Direct(_Sequence):
         self._top = space.sky - space.distance
         active = [*self.away]
         self._blocked = np.zeros((self.count, len(self.points)), dtype=bool)
-        """Whether the straight way of a drone (row) is blocked by a drone at rest (column)."""
+        """Element [i, j]: the straight way of drone i is blocked by drone j, which is at rest."""
         self._would = np.zeros((self.count, self.count), dtype=bool)
-        """Whether it is blocked by a drone (column) at its goal."""
+        """Element [i, j]: the straight way of drone i would be blocked by drone j at its goal."""
         self._lengths = norms(goals - starts)
         self._blocked[active] = space.near(starts[active], goals[active], self.points)
         self._would[active] = space.near(starts[active], goals[active], goals)

@@ -36,7 +36,7 @@ _RADII = (1.0, math.sqrt(2), 2.0, 3.0)
 
 @dataclass(frozen=True)
 class Space:
-    """Where paths are: at least `distance` from points at rest, not below `ground`. The `sky` is above all points."""
+    """The space for paths: at least `distance` from points at rest, not below `ground`. `sky` is above all points."""
 
     distance: float
     ground: float

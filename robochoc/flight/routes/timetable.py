@@ -32,14 +32,14 @@ Steps = NDArray[np.int64]
 
 _STEP_S = 0.05
 _BULGE = 0.01
-"""How far two drones may deviate from even motion in a step, in distances, both together. It bounds the step."""
+"""The most that two drones together may deviate from even motion in a step, in distances. It bounds the step."""
 _CHUNK = 8
 """Steps of a move that are compared together, by the box around them."""
 _PORTION = 4096
 _PATIENCE_S = 1.0
 """A drone that would wait longer tries other lanes, and takes one if it arrives that much sooner."""
 _LANES = 4
-"""How many other lanes it tries."""
+"""The number of other lanes that a drone tries."""
 _FOREVER = 2**62
 
 

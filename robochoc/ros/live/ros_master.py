@@ -13,7 +13,7 @@ from robochoc.ros.sink import SinkError
 from robochoc.ros.source import SourceError
 
 MASTER_S = 3.0
-"""How long the master may take to answer."""
+"""The longest wait for an answer of the master, in seconds."""
 _DEFAULT_MASTER = "http://localhost:11311"
 _CALLER = "/robochoc"
 

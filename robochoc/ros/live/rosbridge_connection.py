@@ -21,13 +21,13 @@ from robochoc.formats.diagnostics import on_one_line, shortened
 PORT = 9090
 """The default port of rosbridge."""
 CONNECT_S = 5.0
-"""How long a server may take to answer."""
+"""The longest wait for a server's answer, in seconds."""
 DRAIN_S = 10.0
-"""How long it may read nothing of what is there for it."""
+"""The longest time for which the server may leave pending messages unread, in seconds."""
 CONFIRM_S = 3.0
-"""How long it may take to confirm that it has read all. One that forbids services never does."""
+"""The longest wait for the confirmation that all was read, in seconds. A server that forbids services sends none."""
 CLOSE_S = 4.0
-"""How long it may take to agree to the end; less than roslibpy would wait."""
+"""The longest wait for the closing handshake, in seconds. It is shorter than roslibpy's."""
 MESSAGE_BYTES_MAX = 256 * 1024
 """A longer message from the server ends the connection: reports are short."""
 _BUFFERED = 1_000_000

@@ -25,13 +25,13 @@ from robochoc.ros.sink import Fields, Sink, SinkError
 from robochoc.ros.source import ReceivedMessage, Source, SourceError
 
 NODE_S = 15.0
-"""How long our node, or its topics, may take to be registered."""
+"""The longest wait for the registration of our node or its topics, in seconds."""
 GATHER_S = 5.0
-"""How long subscribers that the master knows of may take to connect. Some are dead, and the master does not know."""
+"""The longest wait for subscribers that the master lists, in seconds. It may list some that no longer exist."""
 STUCK_S = 10.0
-"""How long a subscriber may read nothing of what is there for it."""
+"""The longest time for which a subscriber may leave its pending messages unread, in seconds."""
 LINGER_S = 0.3
-"""How long topics stay once all has been sent: some subscribers forget what they have not read when a topic ends."""
+"""Seconds for which topics stay after the last message. Some subscribers drop unread messages when a topic ends."""
 _WAITING = 10_000
 """Messages that wait to be sent before `publish` waits, too."""
 

@@ -131,7 +131,7 @@ class Recording(Source):
     """A file that gives its messages in the order of the times at which they were received."""
 
     packings: ClassVar[Mapping[str, Unpack]]
-    """How chunks may be decompressed, by the format's names of compressions."""
+    """The functions that decompress chunks, by the format's names of compressions."""
 
     live = False
 

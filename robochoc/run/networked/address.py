@@ -43,7 +43,7 @@ class Address(NamedTuple):
 
     @property
     def anywhere(self) -> bool:
-        """Whether it stands for all addresses of a machine. Then robots cannot connect to it."""
+        """Return whether this stands for all addresses of a machine. Robots cannot connect to such an address."""
         try:
             return ipaddress.ip_address(self.host).is_unspecified
         except ValueError:

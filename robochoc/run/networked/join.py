@@ -20,7 +20,7 @@ from robochoc.solver.compile import Compiler
 from robochoc.solver.compiled_team import CompiledRobot
 
 PATIENCE_S = 30.0
-"""How long the master may be out of reach."""
+"""The longest time for which the master may be out of reach, in seconds."""
 _TRY_AGAIN_S = 0.5
 
 

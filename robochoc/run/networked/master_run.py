@@ -40,7 +40,7 @@ LOOPBACK_ADDRESS = Address(LOOPBACK)
 
 @dataclass(frozen=True)
 class MasterPlan:
-    """What a master is to do.
+    """The plan of a master's run.
 
     Attributes:
         authority: The folder of the Authority.
