@@ -373,10 +373,10 @@ LIVE = """
 import sys
 from tests.support.flights import epochs_of_three, five, straight
 from robochoc.flight.mission import mission_of
-from robochoc.view.live import serve
+from robochoc.view.live import serve_scene
 from robochoc.view.scene import scene_of
 outcome, mission = epochs_of_three(), mission_of(epochs_of_three(), five())
-serve(scene_of(outcome, mission, straight(mission)), ready=lambda url: print(url, flush=True))
+serve_scene(scene_of(outcome, mission, straight(mission)), ready=lambda url: print(url, flush=True))
 """
 
 

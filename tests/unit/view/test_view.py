@@ -307,10 +307,10 @@ def test_meshcat_is_not_imported_before_a_scene_is_drawn() -> None:
 
 LIVE = """
 from robochoc.model.outcome import Outcome, Verdict
-from robochoc.view.live import serve
+from robochoc.view.live import serve_scene
 from tests.support.flights import scene_of
 outcome = Outcome("live team", "abt", "processes", 0, Verdict.SOLUTION, {"V1.1": 1})
-serve(scene_of(outcome), ready=lambda url: print(url, flush=True))
+serve_scene(scene_of(outcome), ready=lambda url: print(url, flush=True))
 print("left")
 """
 
