@@ -1,4 +1,4 @@
-"""Part `solver`: compiling complex robots, robots that fly a row, and the central judge."""
+"""Part `solver`: compiling complex robots, robots that fly a row, and the central solver."""
 
 from __future__ import annotations
 
@@ -70,7 +70,7 @@ def measured() -> Section:
         "a robot flies a row of the board, 40 (n = 7) and 2,680 (n = 11) local solutions each. Without --no-cache the "
         "local problems are in the cache. MiB a robot: private memory of the largest robot's process at the end."
     )
-    return Section("solver", "Complex robots and the central judge", notes, (local, judged))
+    return Section("solver", "Complex robots and the central solver", notes, (local, judged))
 
 
 def _samples(case: Case, words: Sequence[str], scratch: str) -> list[Sample]:

@@ -170,7 +170,8 @@ def command_reference(command: click.Command, path: str, depth: int) -> Iterator
 
     mkdocs-click would list the options without the groups.
     """
-    context = click.Context(command, info_name=path, max_content_width=82, terminal_width=82)
+    names = cli.context_settings.get("help_option_names")
+    context = click.Context(command, info_name=path, help_option_names=names, max_content_width=82, terminal_width=82)
     usage, options = context.make_formatter(), context.make_formatter()
     command.format_usage(context, usage)
     groups_are_pages = click.Command if isinstance(command, click.Group) else type(command)

@@ -48,7 +48,7 @@ from robochoc.solver.compiled import LocalProblem
 
 
 class Ok(Message, frozen=True):
-    """The sender's value, told to lower-priority neighbours and to those with whom it shares a PKC (`ok?`)."""
+    """The sender's value, sent to lower-priority neighbours and to robots that share a PKC with it (`ok?`)."""
 
     value: Value
 
@@ -60,7 +60,7 @@ class Ok(Message, frozen=True):
 
 
 class Nogood(Message, frozen=True):
-    """While all of `lhs` stands, the receiver cannot take `value` (`ngd`)."""
+    """A nogood: the receiver cannot take `value` while all assignments in `lhs` hold (`ngd`)."""
 
     lhs: dict[str, Value]
     value: Value
@@ -74,7 +74,7 @@ class Nogood(Message, frozen=True):
 
 
 class AddLink(Message, frozen=True):
-    """The sender, lower in the order, asks to be told the receiver's value from now on (`adl`)."""
+    """A request of a lower-priority robot to be sent the receiver's value from now on (`adl`)."""
 
     act = acts.ADD_LINK
 
@@ -86,8 +86,8 @@ class AddLink(Message, frozen=True):
 class ABT(Backtracking):
     """One agent of ABT. State: `view` (myAgentView), `store` (myNogoodStore), Gamma- and Gamma+.
 
-    Of lower robots that share a PKC, `below` holds the values they told, and `allowed` the own value under which each
-    was found to be allowed by the own parts.
+    For lower-priority robots that share a PKC, `below` holds the values they sent. `allowed` holds the own value under
+    which each of these values was last found to be allowed by the own part of the PKC.
     """
 
     messages = Ok | Nogood | AddLink
@@ -106,7 +106,7 @@ class ABT(Backtracking):
         self.allowed: dict[str, int] = {}
 
     def start(self) -> None:
-        """Choose a first value and tell it."""
+        """Choose a first value and send it."""
         self._check_agent_view()
 
     def receive(self, sender: str, message: Message) -> None:
@@ -124,7 +124,7 @@ class ABT(Backtracking):
                 assert_never(never)
 
     def settle(self) -> None:
-        """The inbox is empty: check the view, then hold what lower robots told against the own parts."""
+        """Check the view, then check the values of lower-priority robots against the own parts of PKCs."""
         if self.verdict is None:
             self._check_agent_view()
             self._refuse_below()
@@ -139,7 +139,7 @@ class ABT(Backtracking):
             self._update(sender, value)
 
     def _resolve_conflict(self, sender: str, nogood: Nogood) -> None:
-        """Accept a nogood about the present value that agrees with the view; otherwise it is obsolete."""
+        """Accept a nogood about the current value that agrees with the view; others are obsolete."""
         current = self._current()
         if current is None or contradicts(nogood.value, current):
             return
@@ -161,7 +161,7 @@ class ABT(Backtracking):
     # The search
 
     def _check_agent_view(self) -> None:
-        """Keep the value if the view allows it, else choose another, else backtrack until one is found."""
+        """Keep the value if the view allows it; otherwise choose another, or backtrack until there is one."""
         while self.verdict is None:
             if self.value is not None and self._consistent(self.value, self.view):
                 return
@@ -174,7 +174,7 @@ class ABT(Backtracking):
             return
 
     def _backtrack(self) -> None:
-        """Resolve the stored nogoods, one for each value, and tell the lowest robot among their causes."""
+        """Resolve the stored nogoods, one for each value, and send the result to its lowest-priority robot."""
         lhs = self.store.resolve()
         if not lhs:
             self.conclude(Verdict.NO_SOLUTION)
@@ -188,12 +188,12 @@ class ABT(Backtracking):
         return Nogood(lhs, value)
 
     def _learn(self, nogood: Nogood) -> None:
-        """Store a nogood that was told against all values that look alike to it."""
+        """Store a received nogood for all values that are interchangeable with respect to it."""
         for index in self.problem.interchangeable(nogood.value):
             self.store.add(index, nogood.lhs)
 
     def _refuse_below(self) -> None:
-        """Tell lower robots whose values the own parts forbid; each pair of values is looked at once (PKC)."""
+        """Send nogoods for lower robots' values that the own parts of PKCs forbid; check each pair once."""
         if self.value is None:
             return
         for child, theirs in list(self.below.items()):
@@ -218,6 +218,6 @@ class ABT(Backtracking):
         )
 
     def _check_add_link(self, nogood: Nogood) -> None:
-        """Ask robots of the left side that do not tell me their values yet to do so; meanwhile believe it."""
+        """Request links to robots of the nogood that send no values yet; assume the nogood's values for now."""
         for agent in self._believe(nogood.lhs):
             self.send(agent, AddLink())

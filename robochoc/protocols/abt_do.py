@@ -53,7 +53,7 @@ Counters = tuple[tuple[int, str], ...]
 
 
 class Ok(Message, frozen=True):
-    """The sender's value, told to lower neighbours, and how many values it has left (`ok?`)."""
+    """The sender's value and its number of remaining values, sent to lower-priority neighbours (`ok?`)."""
 
     value: Value
     left: int
@@ -66,7 +66,10 @@ class Ok(Message, frozen=True):
 
 
 class Nogood(Message, frozen=True):
-    """While all of `lhs` stands, the receiver cannot take `value`, or the sender, which has `left` values then."""
+    """A nogood: the receiver cannot take `value` while all assignments in `lhs` hold.
+
+    If the receiver changes its value, the sender has `left` values that no nogood rules out.
+    """
 
     lhs: dict[str, Value]
     value: Value
@@ -94,7 +97,7 @@ class Order(Message, frozen=True):
 
 
 class AddLink(Message, frozen=True):
-    """The sender asks to be told the receiver's value from now on, whenever the receiver is higher."""
+    """A request to be sent the receiver's value from now on, while the receiver has higher priority."""
 
     act = acts.ADD_LINK
 
@@ -115,13 +118,13 @@ class CurrentOrder(PriorityOrder):
         self.counters: Counters = ()
 
     def adopt(self, order: Order) -> None:
-        """From now on `order` holds."""
+        """Replace the current order by `order`."""
         self.names = order.names
         self.rank = {name: rank for rank, name in enumerate(order.names)}
         self.counters = order.counters
 
     def moved(self, agent: str, place: int, by: str) -> Order:
-        """A newer order, by robot `by`: `agent` moves up to `place`, and robots before it stay."""
+        """Return a newer order, made by robot `by`: `agent` moves up to `place`; robots before it stay."""
         names = [name for name in self.names if name != agent]
         names.insert(place, agent)
         kept = self.counters[:place] + ((0, ""),) * (place - len(self.counters))
@@ -130,10 +133,12 @@ class CurrentOrder(PriorityOrder):
 
 
 class ABTDORetro(Backtracking):
-    """One agent of ABT_DO-Retro. State: `view` (Agent_view), `store`, `order`; `left`: values others have left.
+    """One agent of ABT_DO-Retro. State: `view` (Agent_view), `store`, `order`, and `left`.
 
-    `higher` are those that tell this robot their values when they are higher, `tells` those it tells when lower;
-    `owed` are those that have to be told the value once the packet has been read, new or not.
+    - `left`: the numbers of remaining values that other robots sent.
+    - `higher`: robots that send this one their values while they have higher priority.
+    - `tells`: robots that this one sends its value to while they have lower priority.
+    - `owed`: robots that must be sent the value after the packet, even if it has not changed.
     """
 
     messages = Ok | Nogood | Order | AddLink
@@ -155,7 +160,7 @@ class ABTDORetro(Backtracking):
         self._checked: dict[str, Value] | None = None
 
     def start(self) -> None:
-        """Choose a first value and tell it."""
+        """Choose a first value and send it."""
         self.settle()
 
     def receive(self, sender: str, message: Message) -> None:
@@ -176,7 +181,7 @@ class ABTDORetro(Backtracking):
                 assert_never(never)
 
     def settle(self) -> None:
-        """The inbox is empty: check the view, and tell the value to whom it concerns."""
+        """Check the view, then send the value to the robots that need it."""
         if self.verdict is None:
             self._check_agent_view()
             self._tell()
@@ -184,7 +189,7 @@ class ABTDORetro(Backtracking):
     # What the messages do
 
     def _resolve_conflict(self, sender: str, nogood: Nogood) -> None:
-        """Accept a nogood about the present value that agrees with the view and the order; otherwise it is obsolete."""
+        """Accept a nogood about the current value that agrees with view and order; others are obsolete."""
         current = self._current()
         if current is not None and contradicts(nogood.value, current):
             return
@@ -198,7 +203,7 @@ class ABTDORetro(Backtracking):
         self._choose_new_order(sender, nogood)
 
     def _choose_new_order(self, sender: str, nogood: Nogood) -> None:
-        """Move the nogood's sender up, and tell all those for whom this changes anything."""
+        """Move the nogood's sender up, and send the new order to all robots whose part of it changed."""
         names = self.order.names
         place = self.order.rank[self.problem.agent] + 1
         self.left[self.problem.agent] = self._left()
@@ -212,7 +217,7 @@ class ABTDORetro(Backtracking):
                     self.send(name, order)
 
     def _adopt(self, order: Order) -> None:
-        """If `order` is newer: keep no nogood that rests on a lower robot, and nobody who is newly lower waiting."""
+        """Adopt `order` if it is newer; drop nogoods with robots that are now lower, and inform new lower robots."""
         if order.counters <= self.order.counters:
             return
         lower = set(self._lower())
@@ -229,7 +234,7 @@ class ABTDORetro(Backtracking):
     # The search
 
     def _check_agent_view(self) -> None:
-        """Keep the value if the view allows it, else choose another, else backtrack until one is found."""
+        """Keep the value if the view allows it; otherwise choose another, or backtrack until there is one."""
         while self.verdict is None:
             higher = {agent: value for agent, value in self.view.items() if self._is_higher(agent)}
             if self.value is not None and (higher == self._checked or self._consistent(self.value, higher)):
@@ -244,7 +249,7 @@ class ABTDORetro(Backtracking):
             return
 
     def _backtrack(self) -> None:
-        """Resolve the stored nogoods, one for each value, and tell the lowest robot among their causes."""
+        """Resolve the stored nogoods, one for each value, and send the result to its lowest-priority robot."""
         lhs = self.store.resolve()
         if not lhs:
             self.conclude(Verdict.NO_SOLUTION)
@@ -255,7 +260,7 @@ class ABTDORetro(Backtracking):
         self.send(culprit, Nogood(lhs, value, self._left()))
 
     def _tell(self) -> None:
-        """Tell the value to all that have to know it."""
+        """Send the value to all robots that need it."""
         current = self._current()
         if current is None:
             return  # the search is over
@@ -268,7 +273,7 @@ class ABTDORetro(Backtracking):
     # The view
 
     def _coherent(self, nogood: Nogood) -> bool:
-        """Return whether all of the left side is higher at present, and nothing else is known of it."""
+        """Return whether all robots of the left side are higher and the view does not contradict it."""
         return all(
             self._is_higher(agent)
             and (agent not in self.higher or (agent in self.view and not contradicts(value, self.view[agent])))
@@ -276,7 +281,7 @@ class ABTDORetro(Backtracking):
         )
 
     def _check_add_link(self, nogood: Nogood) -> None:
-        """Ask robots of the left side that do not tell me their values yet to do so; meanwhile believe it."""
+        """Request links to robots of the nogood that send no values yet; assume its values for now."""
         for agent in self._believe(nogood.lhs):
             self.send(agent, AddLink())
 
@@ -284,9 +289,9 @@ class ABTDORetro(Backtracking):
         return self.order.rank[agent] < self.order.rank[self.problem.agent]
 
     def _lower(self) -> list[str]:
-        """Those to be told the value at present."""
+        """Return the robots that are sent the value under the current order."""
         return [name for name in self.tells if not self._is_higher(name)]
 
     def _left(self) -> int:
-        """How many values no stored nogood rules out."""
+        """Return the number of own values that no stored nogood rules out."""
         return sum(self.store[index] is None for index in range(len(self.problem.values)))

@@ -55,7 +55,7 @@ from robochoc.solver.compiled import LocalProblem
 
 
 class Value(Message, frozen=True):
-    """The sender's value, and how often it has changed (VALUE)."""
+    """The sender's value and the number of its changes so far (VALUE)."""
 
     value: message.Value
     counter: int
@@ -68,7 +68,7 @@ class Value(Message, frozen=True):
 
 
 class Cost(Message, frozen=True):
-    """In `context` the sender's subtree costs between `lb` and `ub` (COST)."""
+    """Bounds on the cost of the sender's subtree in `context`: lower bound `lb`, upper bound `ub` (COST)."""
 
     context: Context
     lb: Number
@@ -82,7 +82,7 @@ class Cost(Message, frozen=True):
 
 
 class Threshold(Message, frozen=True):
-    """In `context` the receiver's subtree may cost so much before it tries other values (THRESHOLD)."""
+    """The cost up to which the receiver keeps its value, in `context` (THRESHOLD)."""
 
     threshold: Number
     context: dict[str, message.Value]
@@ -97,9 +97,9 @@ class Threshold(Message, frozen=True):
 
 
 class ADOPT(BoundingProtocol):
-    """One agent of ADOPT. State beside the bounds: `threshold`, and how it is split over the children, `t`.
+    """One agent of ADOPT. State besides the bounds: `threshold`, and its shares for the children, `t`.
 
-    `parent_threshold` is the last Threshold of the parent.
+    `parent_threshold` is the last Threshold that the parent sent.
     """
 
     messages = TreeMessage | Value | Cost | Threshold | Terminate
@@ -137,7 +137,7 @@ class ADOPT(BoundingProtocol):
                 assert_never(never)
 
     def act(self) -> None:
-        """Take a value, and say what is new (backTrack)."""
+        """Choose a value and send values, thresholds and costs that changed (backTrack)."""
         self._maintain_threshold_invariant()
         self._choose()
         for name in self.descendants:
@@ -161,25 +161,25 @@ class ADOPT(BoundingProtocol):
             self._maintain_child_threshold_invariant(child, index)
 
     def forget(self, child: str) -> None:
-        """What `child` has said does not hold any more; it gets a new share of the threshold."""
+        """Drop the bounds of `child`, and reset its share of the threshold."""
         super().forget(child)
         self.t[child] = [0] * len(self.problem.values)
 
     # Invariants
 
     def _maintain_threshold_invariant(self) -> None:
-        """LB <= threshold <= UB, and as the parent says if that is of the present context."""
+        """Set the threshold: LB <= threshold <= UB; the parent's if its context is the current one."""
         if self.agrees(self.parent_threshold.context):
             self.threshold = self.parent_threshold.threshold
         self.threshold = min(max(self.threshold, self.lb), self.ub)
 
     def _maintain_child_threshold_invariant(self, child: str, index: int) -> None:
-        """Lb(d, l) <= t(d, l) <= ub(d, l)."""
+        """Clamp the child's share: lb(d, l) <= t(d, l) <= ub(d, l)."""
         bounds, t = self.bounds[child], self.t[child]
         t[index] = min(max(t[index], bounds.lb[index]), bounds.ub[index])
 
     def _maintain_allocation_invariant(self) -> None:
-        """The threshold is what is paid here, and what the children may cost; tell them."""
+        """Split the threshold into the own cost and the children's shares; send the shares."""
         index = self.index
         if self.threshold == INFINITE:  # no value is worth a try in this context, and the parent will know
             return

@@ -68,11 +68,15 @@ from robochoc.solver.compiled import LocalProblem
 
 
 class AFB(Protocol):
-    """One agent of AFB. State: the strongest CPA that it knows of (`assignments`), its own `counter`, and `bound` (B).
+    """One agent of AFB. State: the strongest known CPA (`assignments`), the own `counter`, and `bound` (B).
 
-    `lower_bounds` are known while this robot holds a CPA, or has handed it on: what each beginning costs at least, with
-    the own estimate. Then `paid` is what the CPA costs, `cost` the same with the own value, and `left` are the values
-    that have not been tried, the most costly first. `solution` is the best one that this robot has heard of.
+    These are set while this robot holds a CPA or has passed it on:
+
+    - `lower_bounds`: a lower bound for each prefix of the CPA, own estimate included.
+    - `paid`: the cost of the CPA. `cost`: the same with the own value.
+    - `left`: the values not yet tried, the most costly first.
+
+    `solution` is the best solution that this robot knows.
     """
 
     messages = CPA | FBCPA | FBEstimate | NewSolution | Terminate
@@ -105,7 +109,7 @@ class AFB(Protocol):
         self._sent_estimates: dict[str, CPAEstimates] = {}
 
     def start(self) -> None:
-        """The first robot generates the CPA; the others wait."""
+        """Create the CPA, as the first robot; other robots wait."""
         if not self.problem.values:
             self.conclude(Verdict.NO_SOLUTION)
             return
@@ -133,7 +137,7 @@ class AFB(Protocol):
                 assert_never(never)
 
     def settle(self) -> None:
-        """The inbox is empty: go on with the CPA, and answer who has asked for an estimate."""
+        """Process the CPA, then answer the requests for estimates."""
         if self.over or self.verdict is not None:
             return
         came, self._came = self._came, None
@@ -145,20 +149,20 @@ class AFB(Protocol):
 
     @property
     def incumbent(self) -> Incumbent | None:
-        """The best solution."""
+        """The best solution that this robot knows."""
         if self.solution is None:
             return None
         return Incumbent(self.solution.cost, dict(zip(self.order.names, self.solution.values, strict=True)))
 
     @property
     def findings(self) -> Findings:
-        """The best solution that this robot has heard of; of the first one also what all solutions cost at least."""
+        """The best solution that this robot knows; for the first robot also a lower bound on all solutions."""
         return Findings(best=self.incumbent, bound=self._bound_of_all())
 
     # What the messages do
 
     def _receive_cpa(self, sender: str, cpa: CPA) -> None:
-        """A CPA that is not obsolete is taken up; one that comes back with the present value rules it out."""
+        """Take up a CPA that is not obsolete; a CPA that returns with the current value rules that value out."""
         self.bound = min(self.bound, cpa.bound)
         if len(cpa.assignments) > self.rank:
             if cpa.assignments[-1][1] == self.counter:
@@ -168,19 +172,19 @@ class AFB(Protocol):
             self._asked[sender] = cpa.assignments
 
     def _receive_fb_cpa(self, sender: str, assignments: list[Assignment]) -> None:
-        """Note who asks for an estimate, unless it is for a CPA that is obsolete."""
+        """Record a request for an estimate, unless its CPA is obsolete."""
         if self._update(assignments):
             self._asked[sender] = assignments
 
     def _receive_new_solution(self, solution: NewSolution) -> None:
-        """Only the last robot finds solutions, each better than the one before."""
+        """Record a solution. Only the last robot finds them, each better than the one before."""
         self.solution = solution
         self.bound = min(self.bound, solution.cost)
         if self.over:
             self._take_best()
 
     def _update(self, assignments: list[Assignment]) -> bool:
-        """Return whether a CPA is not obsolete. The strongest is kept; what was done with a weaker one is void."""
+        """Return whether a CPA is not obsolete. Keep the strongest CPA; drop the work on a weaker one."""
         common = common_length(stamp_of(assignments), stamp_of(self.assignments))
         if common == len(assignments):
             return True
@@ -193,7 +197,7 @@ class AFB(Protocol):
     # The one who holds the CPA
 
     def _take_up(self, lower_bounds: list[Cost]) -> None:
-        """The CPA is here: look at all values, unless it is known already that this is in vain."""
+        """Compute the costs of all values for the CPA, unless its bound already rules it out."""
         self.lower_bounds, self.paid, self.left = lower_bounds, lower_bounds[-1], []
         if self._backtrack_to(lower_bounds, self.estimates.totals(stamp_of(self.assignments))) is None:
             self.costs.look_up(self.assignments)
@@ -201,7 +205,7 @@ class AFB(Protocol):
             self.left = self.costs.by_decreasing_cost()
 
     def _assign_cpa(self, lower_bounds: list[Cost]) -> None:
-        """Keep the value while a better solution may come of it; or take the cheapest one left, or go back."""
+        """Keep the value while its bound is below B; otherwise take the cheapest one left, or backtrack."""
         while True:
             totals = self.estimates.totals(stamp_of(self._cpa))
             shortest = self._backtrack_to(lower_bounds, totals)
@@ -227,7 +231,7 @@ class AFB(Protocol):
         self.cost = self.paid + self.costs.last[index]
 
     def _send_cpa(self, lower_bounds: list[Cost]) -> None:
-        """The CPA goes to the next robot, copies of it to all whose estimates may change."""
+        """Send the CPA to the next robot, and copies to all robots whose estimates may change."""
         cpa = self._cpa
         stamp = stamp_of(cpa)
         self.send(self.below[0], CPA(cpa, self.bound, [*lower_bounds, self.cost]))
@@ -238,7 +242,7 @@ class AFB(Protocol):
                 self.estimates.ask(robot, stamp)
 
     def _send_new_solution(self) -> None:
-        """The CPA is complete, and better than B: all are told."""
+        """Send a complete CPA that is cheaper than B to all robots."""
         self.bound = self.cost
         self.solution = NewSolution([value for value, _ in self._cpa], self.cost)
         for robot in self.order.names[: self.rank]:
@@ -246,12 +250,12 @@ class AFB(Protocol):
         self.value = None
 
     def _backtrack_to(self, lower_bounds: list[Cost], totals: list[Cost]) -> int | None:
-        """How long the shortest beginning of the CPA is that no better solution has; None: each may have one."""
+        """Return the length of the shortest prefix of the CPA with a bound of B or more; None: there is none."""
         pairs = enumerate(zip(lower_bounds, totals, strict=False))
         return next((length for length, (cost, more) in pairs if cost + more >= self.bound), None)
 
     def _backtrack(self, length: int) -> None:
-        """No better solution begins like the CPA does up to `length`: its last robot has to take another value."""
+        """Send the CPA back to the last robot of its prefix of `length`, which has no better solution."""
         self.lower_bounds = self.value = None
         self._asked = {robot: asked for robot, asked in self._asked.items() if len(asked) < length}
         if length:
@@ -267,7 +271,7 @@ class AFB(Protocol):
     # The others, and the end
 
     def _send_fb_estimates(self) -> None:
-        """Tell those who have asked, and whose CPA is not obsolete by now."""
+        """Send estimates to all robots that requested them and whose CPA is not obsolete."""
         asked, self._asked = self._asked, {}
         for robot, assignments in asked.items():
             length = len(assignments)
@@ -284,11 +288,11 @@ class AFB(Protocol):
         self._take_best()
 
     def _take_best(self) -> None:
-        """Decide for the own value in the best solution. Its news may come after the end's."""
+        """Decide for the own value in the best solution. Its message may arrive after `Terminate`."""
         self.value = None if self.solution is None else self.problem.values.index(self.solution.values[self.rank])
 
     def _bound_of_all(self) -> Cost | None:
-        """What every solution costs at least: what it takes for a better one than B, or B. None: not known here."""
+        """Return a lower bound on every solution, at most B; None if this robot does not know one."""
         if self.rank or (self.lower_bounds is None and not self.over):
             return None
         if self.over:

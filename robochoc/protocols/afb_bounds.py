@@ -21,10 +21,10 @@ Stamp = Sequence[int]
 
 
 class CostLookup:
-    """What the own values cost with each beginning of a CPA: every constraint is looked up once for it.
+    """The costs of the own values for each prefix of a CPA. Each constraint is evaluated once per prefix.
 
-    What a CPA has in common with the last one is not looked up again. `estimates` says for each beginning, the empty
-    one first, what the cheapest own value costs with it, and with lower robots only.
+    The prefix that a CPA shares with the last one is not evaluated again. `estimates` holds, for each prefix, the empty
+    one first, the minimum cost over the own values, including h.
     """
 
     def __init__(self, problem: LocalProblem, order: PriorityOrder) -> None:
@@ -38,12 +38,12 @@ class CostLookup:
         self.estimates: list[Cost] = []
 
     def look_ahead(self) -> None:
-        """Look up what does not depend on any CPA."""
+        """Compute the bounds that do not depend on a CPA (h)."""
         self._rows = [self._problem.costs({})]
         self.estimates = [self._estimate(self._rows[0])]
 
     def look_up(self, assignments: Sequence[Assignment]) -> None:
-        """Look at all values with `assignments` of the first robots, and with each of their beginnings."""
+        """Compute the costs of all values for `assignments` of the first robots and for each prefix."""
         stamp = stamp_of(assignments)
         common = common_length(self._stamp, stamp)
         if common == len(assignments):
@@ -56,20 +56,20 @@ class CostLookup:
             self._add(self._names[length], assignments[length][0], length + 1)
 
     def shared(self, length: int) -> list[Cost]:
-        """The estimates for beginnings up to `length`, without those at the end that depend on nothing more."""
+        """Return the estimates for prefixes up to `length`, without those at the end that repeat the one before."""
         return self.estimates[: self._depths[length] + 1]
 
     @property
     def last(self) -> list[Cost]:
-        """What each own value costs with the assignments that came last."""
+        """The cost of each own value with the last assignments."""
         return self._rows[-1]
 
     def at_least(self, index: int) -> Cost:
-        """What the value at `index` costs with the assignments that came last, and with lower robots only."""
+        """Return a lower bound for the value at `index`: its cost with the last assignments, plus h."""
         return self._rows[-1][index] + self._ahead[index]
 
     def by_decreasing_cost(self) -> list[int]:
-        """All own values, those at the end first that cost `at_least` the least; of equals, the first is last."""
+        """Return all own values by decreasing `at_least`; among equals, the first value is last."""
         return sorted(range(len(self._problem.values) - 1, -1, -1), key=self.at_least, reverse=True)
 
     def _add(self, robot: str, value: Value, length: int) -> None:
@@ -89,37 +89,38 @@ class CostLookup:
 
     @cached_property
     def _ahead(self) -> list[Cost]:
-        """What each own value costs at least with lower robots only (h)."""
+        """A lower bound on each own value's cost with lower-priority robots only (h)."""
         return self._problem.lower_bounds(self._below)
 
 
 class CPAEstimates(NamedTuple):
-    """Estimates for a CPA of that time-stamp and all its beginnings, the empty one first.
+    """The estimates for the CPA with one time-stamp and all its prefixes, the empty one first.
 
-    The last one holds for all longer beginnings.
+    The last estimate holds for all longer prefixes.
     """
 
     stamp: Stamp
     estimates: Sequence[Cost]
 
     def along(self, stamp: Stamp) -> list[Cost]:
-        """What stands of it for each beginning of a CPA: nothing is said of what goes beyond what they have in common.
+        """Return the estimates that are valid for the prefixes of another CPA, given its time-stamp.
 
-        An estimate for a beginning is one for all that begin like it, if not the best one.
+        Estimates hold for the common prefix only. An estimate for a prefix is also a (weaker) one for all its
+        extensions.
         """
         known = self.estimates[: common_length(self.stamp, stamp) + 1]
         return [*known, *[known[-1]] * (len(stamp) + 1 - len(known))]
 
     def follows(self, before: CPAEstimates) -> bool:
-        """Return whether it says no more than what follows from what was told `before`."""
+        """Return whether these estimates add nothing to `before`, which were sent earlier."""
         return self.along(self.stamp) == before.along(self.stamp)
 
 
 class Estimates:
-    """What the robots below have told, each for the CPA that it was asked for.
+    """The estimates received from lower-priority robots, each with the CPA that it was requested for.
 
-    An estimate for a beginning stands as long as that is the beginning of the CPA. Robots are silent when they have
-    nothing to say that does not follow from what they have told before.
+    An estimate for a prefix is valid while the CPA has that prefix. A robot sends nothing if its estimates follow from
+    those it sent before.
     """
 
     def __init__(self) -> None:
@@ -127,24 +128,24 @@ class Estimates:
         self._received: dict[str, CPAEstimates] = {}
 
     def outdated(self, robot: str, stamp: Stamp) -> bool:
-        """Return whether `robot` may have another estimate than for the last CPA that it was asked for.
+        """Return whether `robot` may have another estimate than for the last CPA that it was sent.
 
-        On how many robots' values its estimates depend, the first one that it tells says for all CPAs.
+        The first estimates that a robot sends show on how many robots' values its estimates depend.
         """
         if robot not in self._received:
             return True
         return common_length(self._asked[robot], stamp) < len(self._received[robot].estimates) - 1
 
     def ask(self, robot: str, stamp: Stamp) -> None:
-        """`robot` is asked for its estimates for the CPA of this time-stamp."""
+        """Record that `robot` was asked for its estimates for the CPA with this time-stamp."""
         self._asked[robot] = stamp
 
     def save(self, robot: str, estimates: CPAEstimates) -> None:
-        """Keep what `robot` tells."""
+        """Store the `estimates` that `robot` sent."""
         self._received[robot] = estimates
 
     def totals(self, stamp: Stamp) -> list[Cost]:
-        """What the robots below add at least to each beginning of a CPA, the empty one first."""
+        """Return the sum of the lower robots' estimates for each prefix of a CPA, the empty one first."""
         if not self._received:
             return [0] * (len(stamp) + 1)
         return [
@@ -153,12 +154,12 @@ class Estimates:
 
 
 def stamp_of(assignments: Sequence[Assignment]) -> list[int]:
-    """The time-stamp of a CPA: the counters in it, the highest robot's first."""
+    """Return the time-stamp of a CPA: its counters, the highest-priority robot's first."""
     return [counter for _, counter in assignments]
 
 
 def common_length(left: Stamp, right: Stamp) -> int:
-    """For how many robots, from the first one on, two CPAs have the same assignments: the same counters."""
+    """Return the length of the common prefix of two CPAs, by their time-stamps."""
     for place, (one, other) in enumerate(zip(left, right, strict=False)):
         if one != other:
             return place

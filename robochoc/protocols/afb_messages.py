@@ -15,8 +15,8 @@ from robochoc.protocols.afb_bounds import Assignment, Cost
 class CPA(Message, frozen=True):
     """The current partial assignment, of the robots from the first one on (`CPA_MSG`).
 
-    With the last value the receiver's own, it comes back: no solution that begins like this costs less than `bound`,
-    which is B. On its way down, `least` says of each of its beginnings, the empty one first, what that costs at least.
+    If its last value is the receiver's own, it was sent back: no extension of it costs less than `bound` (B). On the
+    way down, `least` holds a lower bound for each of its prefixes, the empty one first.
     """
 
     assignments: list[Assignment]
@@ -38,7 +38,7 @@ class CPA(Message, frozen=True):
 
 
 class FBCPA(Message, frozen=True):
-    """A copy of the CPA down to the sender, who asks for the receiver's estimate (`FB_CPA`)."""
+    """A copy of the CPA down to the sender, which requests the receiver's estimate (`FB_CPA`)."""
 
     assignments: list[Assignment]
 
@@ -51,9 +51,9 @@ class FBCPA(Message, frozen=True):
 
 
 class FBEstimate(Message, frozen=True):
-    """What it costs at least to add a value of the sender to each beginning of the CPA (`FB_ESTIMATE`).
+    """Lower bounds on the cost of adding a value of the sender to each prefix of the CPA (`FB_ESTIMATE`).
 
-    The empty beginning is first; the last estimate holds for all longer ones. `stamp` is the CPA's time-stamp.
+    The empty prefix is first; the last estimate holds for all longer ones. `stamp` is the CPA's time-stamp.
     """
 
     stamp: Sequence[int]
@@ -85,7 +85,7 @@ class NewSolution(Message, frozen=True):
 
 
 class Terminate(Message, frozen=True):
-    """No solution is better than the best one: the search is over (`TERMINATE`)."""
+    """The end of the search: no solution is better than the best one (`TERMINATE`)."""
 
     act = acts.TERMINATE
 

@@ -43,7 +43,7 @@ Assignments = tuple[Value, ...]
 
 
 class CPA(Message, frozen=True):
-    """The current partial assignment comes to the receiver, who is to add its value; `sc` is the step counter."""
+    """The current partial assignment, to which the receiver adds its value; `sc` is the step counter."""
 
     assignments: Assignments
     sc: int
@@ -69,7 +69,7 @@ class FcCPA(Message, frozen=True):
 
 
 class NotOk(Message, frozen=True):
-    """Nobody can extend `assignments` to a solution; found at step `sc` (`Not_OK`)."""
+    """An inconsistent partial assignment: no solution extends `assignments`; found at step `sc` (`Not_OK`)."""
 
     assignments: Assignments
     sc: int
@@ -82,7 +82,10 @@ class NotOk(Message, frozen=True):
 
 
 class BacktrackCPA(Message, frozen=True):
-    """The CPA comes back: `assignments`, whose last value is the receiver's, cannot be extended (`backtrack_CPA`)."""
+    """The CPA on its way back: no solution extends `assignments` (`backtrack_CPA`).
+
+    Its last value is the receiver's.
+    """
 
     assignments: Assignments
     sc: int
@@ -96,9 +99,9 @@ class BacktrackCPA(Message, frozen=True):
 
 
 class AFC(Protocol):
-    """One agent of AFC. State: the AgentView, which is `view`, `sc` and `consistent`, and the filtered `domain`.
+    """One agent of AFC. State: the AgentView (`view`, `sc` and `consistent`), and the filtered `domain`.
 
-    While `consistent` does not hold, `view` is an assignment that cannot be extended to a solution.
+    If `consistent` is false, no solution extends `view`.
     """
 
     messages = CPA | FcCPA | NotOk | BacktrackCPA
@@ -119,7 +122,7 @@ class AFC(Protocol):
         self._held: CPA | BacktrackCPA | None = None
 
     def start(self) -> None:
-        """The first robot makes the CPA; the others wait."""
+        """Create the CPA, as the first robot; other robots wait."""
         if not self.problem.values:
             self.conclude(Verdict.NO_SOLUTION)
         elif self.rank == 0:
@@ -140,7 +143,7 @@ class AFC(Protocol):
                 assert_never(never)
 
     def settle(self) -> None:
-        """The inbox is empty: handle the CPA if it is here, and check forward otherwise."""
+        """Process the CPA if this robot holds it; otherwise check forward."""
         if self.verdict is not None:
             return
         held, self._held = self._held, None
@@ -152,7 +155,7 @@ class AFC(Protocol):
     # The one who holds the CPA
 
     def _receive_cpa(self, held: CPA | BacktrackCPA) -> None:
-        """Add a value to the CPA, unless it is known that this is in vain."""
+        """Add a value to the CPA, unless it is known to be inconsistent."""
         self.sc = max(self.sc, held.sc)
         above = held.assignments[: self.rank]
         if not self.consistent and is_prefix(self.view, above):
@@ -169,7 +172,7 @@ class AFC(Protocol):
             self._assign_cpa(self.value + 1)
 
     def _assign_cpa(self, first: int) -> None:
-        """Add the first value that is left from place `first` on, and tell all robots below."""
+        """Add the first remaining value from place `first` on, and send the CPA to all lower robots."""
         self.value = self.domain.first(first)
         if self.value is None:
             self._backtrack(self.view)
@@ -185,7 +188,7 @@ class AFC(Protocol):
             self.send(robot, FcCPA(assignments, self.sc))
 
     def _backtrack(self, inconsistent: Assignments) -> None:
-        """Send the CPA back to the last robot of an assignment that cannot be extended."""
+        """Send the CPA back to the last robot of the `inconsistent` assignment."""
         self.view, self.consistent, self.value = inconsistent, False, None
         if inconsistent:
             self.send(self.order.names[len(inconsistent) - 1], BacktrackCPA(inconsistent, self.sc))
@@ -195,7 +198,7 @@ class AFC(Protocol):
     # The others
 
     def _update_agent_view(self, assignments: Assignments, sc: int) -> None:
-        """Believe the CPA of a later step; what could not be extended before is not consistent when it goes on."""
+        """Replace the view by the CPA of a later step; it is inconsistent if it extends the known inconsistency."""
         if sc <= self.sc:
             return
         self.sc = sc
@@ -204,7 +207,7 @@ class AFC(Protocol):
             self.view, self.consistent = assignments, True
 
     def _forward_check(self) -> None:
-        """Filter the domain; if no value is left, tell all robots that may come to hold the CPA."""
+        """Filter the domain; if it is empty, send `NotOk` to all robots that may hold the CPA later."""
         self.domain.filter(self.view)
         inconsistent = self.domain.inconsistent()
         if inconsistent is None:
@@ -215,7 +218,7 @@ class AFC(Protocol):
                 self.send(robot, NotOk(inconsistent, self.sc))
 
     def _process_not_ok(self, inconsistent: Assignments, sc: int) -> None:
-        """Believe it when it is about the view, or about a CPA as late; otherwise it is obsolete."""
+        """Accept a `NotOk` about the view or about a CPA of the same or a later step; others are obsolete."""
         if self.consistent or not is_prefix(self.view, inconsistent):
             if sc < self.sc and not is_prefix(inconsistent, self.view):
                 return
@@ -228,11 +231,11 @@ class AFC(Protocol):
 
 
 class FilteredDomain:
-    """The own values and what is known of them under a partial assignment, without a check done twice.
+    """The own domain, filtered by a partial assignment, without repeated checks.
 
-    For each value that is ruled out it keeps how many robots it takes, from the first one on, to rule it out. A
-    partial assignment that begins like the last one leaves values alone that the common beginning rules out, and of
-    the others checks only constraints that reach below it.
+    For each value that is ruled out, it stores the length of the shortest prefix that rules the value out. For a new
+    partial assignment with a common prefix, values that this prefix rules out are not checked again. For the others,
+    only constraints with robots after the prefix are checked.
     """
 
     def __init__(self, problem: LocalProblem, order: PriorityOrder) -> None:
@@ -242,7 +245,7 @@ class FilteredDomain:
         self._ruled_out: list[int | None] = [None] * len(problem.values)
 
     def filter(self, assignments: Assignments) -> None:
-        """Look at the values under `assignments`."""
+        """Filter the values by `assignments`."""
         if assignments == self._assignments:
             return
         common = common_length(assignments, self._assignments)
@@ -254,21 +257,21 @@ class FilteredDomain:
                 self._ruled_out[index] = None if conflict is None else self._order.depth(conflict) + 1
 
     def first(self, place: int) -> int | None:
-        """The first value from `place` on that is left."""
+        """Return the first remaining value from `place` on; None if there is none."""
         return next((index for index in range(place, len(self._ruled_out)) if self._ruled_out[index] is None), None)
 
     def inconsistent(self) -> Assignments | None:
-        """The shortest beginning of the assignments that rules out every value; None when one is left."""
+        """Return the shortest prefix of the assignments that rules out every value; None if a value is left."""
         depths = [depth for depth in self._ruled_out if depth is not None]
         return None if len(depths) < len(self._ruled_out) else self._assignments[: max(depths, default=0)]
 
 
 def is_prefix(beginning: Assignments, assignments: Assignments) -> bool:
-    """Return whether `assignments` are `beginning` and perhaps more."""
+    """Return whether `assignments` begins with `beginning`."""
     return assignments[: len(beginning)] == beginning
 
 
 def common_length(left: Assignments, right: Assignments) -> int:
-    """For how many robots, from the first one on, two partial assignments name the same values."""
+    """Return the length of the common prefix of two partial assignments."""
     pairs = enumerate(zip(left, right, strict=False))
     return next((place for place, (one, other) in pairs if one != other), min(len(left), len(right)))

@@ -58,7 +58,7 @@ Assignment = tuple[Value, int]
 
 
 class CPA(Message, frozen=True):
-    """The current partial assignment: what all robots from the highest down to the sender have taken (`cpa`)."""
+    """The current partial assignment: the values of all robots from the highest down to the sender (`cpa`)."""
 
     assignments: list[Assignment]
 
@@ -70,7 +70,7 @@ class CPA(Message, frozen=True):
 
 
 class Nogood(Message, frozen=True):
-    """While all of `lhs` stands, the receiver cannot take `value` (`ngd`)."""
+    """A nogood: the receiver cannot take `value` while all assignments in `lhs` hold (`ngd`)."""
 
     lhs: dict[str, Value]
     value: Value
@@ -84,7 +84,7 @@ class Nogood(Message, frozen=True):
 
 
 class Solved(Message, frozen=True):
-    """A solution has been found, and the search is over (`stp`)."""
+    """The end of the search: a solution was found (`stp`)."""
 
     solution: dict[str, Value]
 
@@ -98,9 +98,10 @@ class Solved(Message, frozen=True):
 class AFCng(Protocol):
     """One agent of AFC-ng. State: `view` and its `counters` (AgentView), `store` (NogoodStore), `counter` (t_i).
 
-    `above` are the robots whose values a CPA tells, the highest first; the view knows the first few of them.
-    `successors` may take a value once this robot has one, and `cpa_receivers` are all robots that get its CPAs. For
-    each own value, `checked` is the place in the order down to which all constraints are known to hold in the view.
+    - `above`: the robots whose values a CPA contains, the highest first; `view` knows a prefix of them.
+    - `successors`: the robots that may assign a value after this one.
+    - `cpa_receivers`: all robots that are sent its CPAs.
+    - `checked`: for each own value, the place in the order up to which all constraints are known to hold in the view.
     """
 
     messages = CPA | Nogood | Solved
@@ -124,7 +125,7 @@ class AFCng(Protocol):
         self.solved = False
 
     def start(self) -> None:
-        """The first robot takes a value; who has none at all ends the search."""
+        """Assign a value, as the first robot; a robot with an empty domain ends the search."""
         self.settle()
 
     def receive(self, sender: str, message: Message) -> None:  # noqa: ARG002 - a CPA says itself who has sent it
@@ -142,20 +143,20 @@ class AFCng(Protocol):
                 assert_never(never)
 
     def settle(self) -> None:
-        """The inbox is empty: check forward, then go back or on."""
+        """Check forward, then backtrack or assign a value."""
         if not self.over:
             self._revise()
             self._check_assign()
 
     @property
     def over(self) -> bool:
-        """Whether this robot knows how the search ended, and so is silent."""
+        """Whether this robot knows the result of the search and sends no more messages."""
         return self.solved or self.verdict is not None
 
     # What the messages do
 
     def _process_cpa(self, assignments: Sequence[Assignment]) -> None:
-        """Take in a CPA that is stronger than the view: the first counter that differs is larger."""
+        """Accept a CPA that is stronger than the view: the first counter that differs is larger."""
         counters = [counter for _, counter in assignments]
         if counters <= self.counters[: len(counters)]:
             return
@@ -179,14 +180,14 @@ class AFCng(Protocol):
     # The search
 
     def _check_assign(self) -> None:
-        """No value is left: back; the CPA is here and waits for a value: on."""
+        """Backtrack if no value is left; assign a value if this robot holds the CPA without one."""
         if next(self._left(), None) is None:
             self._backtrack()
         elif self.value is None and len(self.view) == len(self.above):
             self._assign()
 
     def _assign(self) -> None:
-        """Take the first value that is left, and hand the CPA on."""
+        """Take the first remaining value and send the CPA on."""
         self.value = next(self._left())
         self.counter += 1
         self._send_cpa((self.problem.values[self.value], self.counter))
@@ -198,19 +199,19 @@ class AFCng(Protocol):
             self.send(robot, cpa)
 
     def _detect_solution(self) -> None:
-        """Once the lowest robot has a value, the CPA is a solution."""
+        """Report a solution once the lowest-priority robot has a value."""
         if not self.successors and self.value is not None:
             self._stop({**self.view, self.problem.agent: self.problem.values[self.value]})
 
     def _stop(self, solution: dict[str, Value]) -> None:
-        """Tell `solution` to all robots in it."""
+        """Send `Solved` to all robots in `solution`."""
         self.solved = True
         for robot in solution:
             if robot != self.problem.agent:
                 self.send(robot, Solved(solution))
 
     def _backtrack(self) -> None:
-        """Resolve the stored nogoods, one for each value; tell the lowest robot among their causes, and wait for it."""
+        """Resolve the stored nogoods, send the result to its lowest-priority robot, and wait for that robot."""
         lhs = self.store.resolve()
         if not lhs:
             self.conclude(Verdict.NO_SOLUTION)
@@ -222,9 +223,9 @@ class AFCng(Protocol):
         self.value = None
 
     def _revise(self) -> None:
-        """Rule out all values that the view forbids, each by the highest possible lowest robot.
+        """Store a nogood for each value that the view forbids, with the highest possible lowest robot.
 
-        Values are taken in the order of what is known of them, so that large domains are looked up at one go.
+        Values are processed by the part of the view they were checked against, so that tables are read in blocks.
         """
         depth = self._depth()
         for index in sorted(self._left(), key=self.checked.__getitem__):
@@ -238,13 +239,13 @@ class AFCng(Protocol):
                 self.checked[index] = self.order.depth(conflict)
 
     def _left(self) -> Iterator[int]:
-        """The values that no nogood rules out."""
+        """Yield the values that no nogood rules out."""
         return (index for index in range(len(self.problem.values)) if self.store[index] is None)
 
     # The view
 
     def _update_agent_view(self, values: Sequence[Value]) -> None:
-        """Know `values` of the highest robots, and nothing of the others; nogoods that rest on others go."""
+        """Replace the view by `values` of the highest robots; drop nogoods with other values."""
         old = self.view
         self.view = dict(zip(self.above, values, strict=False))
         changed = [agent for agent in self.above if old.get(agent) != self.view.get(agent)]
@@ -259,7 +260,7 @@ class AFCng(Protocol):
         return all(agent in self.view and not contradicts(value, self.view[agent]) for agent, value in lhs.items())
 
     def _depth(self) -> int:
-        """The place in the order of the first robot that the view does not know; the own one when it is complete."""
+        """Return the place in the order of the first robot that is not in the view; the own one if it is complete."""
         known = len(self.view)
         return self.order.rank[self.above[known]] if known < len(self.above) else self._rank
 

@@ -45,9 +45,9 @@ from robochoc.solver.compiled import LocalProblem
 
 
 class Accept(Message, frozen=True):
-    """The sender's whole subtree has accepted the receiver's CPA (`accept`).
+    """A message that the sender's whole subtree accepts the receiver's CPA (`accept`).
 
-    `counters` are those of the CPA, from the root down to the receiver; `subtree` are the values that go with it.
+    `counters` are those of the CPA, from the root down to the receiver; `subtree` holds the values of the subtree.
     """
 
     counters: list[int]
@@ -62,7 +62,7 @@ class Accept(Message, frozen=True):
 
 
 class AFCTree(AFCng):
-    """One agent of AFC-tree. State beside AFC-ng's: `accepts`, what each child's subtree takes with the own value."""
+    """One agent of AFC-tree. State besides AFC-ng's: `accepts`, the values of each child's subtree that accepted."""
 
     messages = CPA | Nogood | Accept | Solved
     traits = Traits(
@@ -89,7 +89,7 @@ class AFCTree(AFCng):
                 assert_never(never)
 
     def _process_accept(self, sender: str, counters: Sequence[int], subtree: Mapping[str, Value]) -> None:
-        """Keep an accept of the present CPA; others are obsolete."""
+        """Store an accept of the current CPA; others are obsolete."""
         if self.over or self.value is None or counters != [*self.counters, self.counter]:
             return
         self.accepts[sender] = subtree
@@ -100,7 +100,7 @@ class AFCTree(AFCng):
         super()._assign()
 
     def _detect_solution(self) -> None:
-        """Once all children have accepted the CPA, the subtree is done: the parent is told, or all, at the root."""
+        """Report the subtree's values to the parent, or to all as the root, once all children have accepted."""
         subtree = self._build_pa()
         if subtree is None:
             return
@@ -110,7 +110,7 @@ class AFCTree(AFCng):
             self.send(self.parent, Accept(list(self.counters), subtree))
 
     def _build_pa(self) -> dict[str, Value] | None:
-        """The values of the own subtree; None as long as a child has not accepted."""
+        """Return the values of the own subtree; None while a child has not accepted."""
         if self.value is None or len(self.accepts) < len(self.successors):
             return None
         own = {self.problem.agent: self.problem.values[self.value]}

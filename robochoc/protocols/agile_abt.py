@@ -61,7 +61,7 @@ from robochoc.solver.compiled import LocalProblem
 
 
 class Ok(Message, frozen=True):
-    """The sender's value, told to those below it (`ok?`); while `lhs` stands, `left` of its `size` values are left."""
+    """The sender's value and explanation: while `lhs` holds, it has `left` of its `size` values left (`ok?`)."""
 
     value: Value
     lhs: dict[str, Value]
@@ -77,7 +77,7 @@ class Ok(Message, frozen=True):
 
 
 class Nogood(Message, frozen=True):
-    """While all of `lhs` stands, the receiver cannot take `value` (`ngd`)."""
+    """A nogood: the receiver cannot take `value` while all assignments in `lhs` hold (`ngd`)."""
 
     lhs: dict[str, Value]
     value: Value
@@ -107,7 +107,7 @@ class Order(Message, frozen=True):
 
 
 class AddLink(Message, frozen=True):
-    """The sender asks to be told the receiver's value from now on, whenever it is below the receiver (`adl`)."""
+    """A request to be sent the receiver's value from now on, while the receiver has higher priority (`adl`)."""
 
     act = acts.ADD_LINK
 
@@ -120,8 +120,9 @@ class AgileABT(Backtracking):
     """One agent of Agile-ABT.
 
     State: `present` (o_i) and `termination` (TV_i), `view` (AgentView), `store` (NogoodStore), `explanations` (E_i),
-    and the `sizes` of the domains it has been told. `higher` tell this robot their values while they are above it,
-    and it tells its own to `listeners` while they are below; `sent_values` are the last ones that it told them.
+    and the received domain `sizes`. `higher` are robots that send this one their values while they have higher
+    priority. It sends its own value to `listeners` while they have lower priority; `sent_values` are the last values it
+    sent them.
     """
 
     messages = Ok | Nogood | Order | AddLink
@@ -145,7 +146,7 @@ class AgileABT(Backtracking):
         self.sent_values: dict[str, Value] = {}
 
     def start(self) -> None:
-        """Choose a first value and tell it."""
+        """Choose a first value and send it."""
         self._check_agent_view()
 
     def receive(self, sender: str, message: Message) -> None:
@@ -165,20 +166,20 @@ class AgileABT(Backtracking):
                 assert_never(never)
 
     def settle(self) -> None:
-        """The inbox is empty: check the view."""
+        """Check the view."""
         if self.verdict is None:
             self._check_agent_view()
 
     # What the messages do
 
     def _process_info(self, sender: str, ok: Ok) -> None:
-        """Take in a value, and the explanation that comes with it."""
+        """Store a received value and its explanation."""
         self._update(sender, ok.value)
         self.sizes[sender] = ok.size
         self.explanations[sender] = Explanation(ok.lhs, ok.left)
 
     def _resolve_conflict(self, sender: str, nogood: Nogood) -> None:
-        """Accept a nogood about the present value that agrees with the order and the view; others are obsolete."""
+        """Accept a nogood about the current value that agrees with order and view; others are obsolete."""
         last = self.sent_values.get(sender)
         if last is not None and not contradicts(nogood.value, last):
             del self.sent_values[sender]  # it has forgotten my value; if I have told it another one, that is on its way
@@ -194,7 +195,7 @@ class AgileABT(Backtracking):
         self._check_order(tuple([self.order.names[place] for place in order.places]), order.termination)
 
     def _set_link(self, sender: str) -> None:
-        """Tell the sender the value whenever it is below this robot, and now if it is."""
+        """Add the sender to the listeners, and send it the value if it has lower priority now."""
         if sender not in self.listeners:
             self.listeners.append(sender)
         self.sent_values.pop(sender, None)
@@ -202,7 +203,7 @@ class AgileABT(Backtracking):
     # The search
 
     def _check_agent_view(self) -> None:
-        """Keep the value if the view allows it, else choose another, else backtrack until one is found; tell it."""
+        """Keep the value if the view allows it; else choose another or backtrack; then send it."""
         while self.verdict is None:
             above = self._above()
             if self.value is None or not self._consistent(self.value, above):
@@ -213,7 +214,7 @@ class AgileABT(Backtracking):
             self._backtrack()
 
     def _tell(self, value: Value) -> None:
-        """Tell the value to all below that have last heard another one, or none, of this robot."""
+        """Send the value to all lower listeners that were last sent another one, or none."""
         rank = self.present.rank
         below = [
             name for name in self.listeners if rank[name] > rank[self.name] and self.sent_values.get(name) != value
@@ -226,7 +227,7 @@ class AgileABT(Backtracking):
                 self.sent_values[name] = value
 
     def _backtrack(self) -> None:
-        """Resolve the stored nogoods, one for each value, and tell a robot among their causes."""
+        """Resolve the stored nogoods, one for each value, and send the result to a robot in it."""
         conflict = self.store.resolve()
         if not conflict:
             self.conclude(Verdict.NO_SOLUTION)
@@ -238,7 +239,10 @@ class AgileABT(Backtracking):
     # The order
 
     def _choose_order(self, conflict: LeftSide) -> str:
-        """Whom to blame for `conflict`: in a smaller order if there is one, which all are told; else the lowest."""
+        """Return the robot to send `conflict` to; adopt and send a smaller order if there is one.
+
+        Without a smaller order it is the lowest-priority robot of the conflict.
+        """
         held = self._held_explanations()
         best = min(
             (self._proposed(culprit, conflict, held) for culprit in conflict),
@@ -256,12 +260,12 @@ class AgileABT(Backtracking):
         return culprit
 
     def _proposed(self, culprit: str, conflict: LeftSide, held: Explanations) -> Proposal:
-        """The order in which `culprit` is to blame; what rests on its value here will be forgotten."""
+        """Return the order in which `culprit` receives the nogood; nogoods with its value will be dropped."""
         explanations = {**held, self.name: self._own_explanation(culprit)}
         return proposed(self.present.names, culprit, _without(culprit, conflict), explanations, self.sizes)
 
     def _check_order(self, names: tuple[str, ...], termination: TerminationVector) -> None:
-        """Adopt an order if it is stronger; nogoods that are not compatible with it go."""
+        """Adopt an order if it is stronger; drop the nogoods that are not compatible with it."""
         if (termination, names) >= (self.termination, self.present.names):
             return
         before, self.store = self.store, NogoodStore(PriorityOrder(names), len(self.problem.values))
@@ -273,7 +277,7 @@ class AgileABT(Backtracking):
                 self.store.add(index, lhs)
 
     def _own_explanation(self, forgotten: str = "") -> Explanation:
-        """What is left to this robot once it has forgotten the value of the robot `forgotten`, and why."""
+        """Return the own explanation without nogoods that contain the robot `forgotten`."""
         kept = [lhs for lhs in self.store if forgotten not in lhs]
         union: dict[str, Value] = {}
         for lhs in kept:
@@ -282,7 +286,7 @@ class AgileABT(Backtracking):
         return Explanation(union, len(self.problem.values) - len(kept))
 
     def _held_explanations(self) -> dict[str, Explanation]:
-        """Those that are compatible with the order and with the view; this robot, at a dead end, has no value."""
+        """Return the explanations that agree with order and view; this robot has no value left."""
         return {
             name: one
             for name, one in self.explanations.items()
@@ -294,12 +298,12 @@ class AgileABT(Backtracking):
     # The view
 
     def _above(self) -> dict[str, Value]:
-        """What is known of those above: what constraints and nogoods of this robot may rest on."""
+        """Return the known values of higher-priority robots, on which constraint checks and nogoods may rest."""
         rank = self.present.rank
         return {name: value for name, value in self.view.items() if rank[name] < rank[self.name]}
 
     def _coherent(self, nogood: Nogood) -> bool:
-        """Return whether the whole left side is above this robot, and its robots' own values say the same."""
+        """Return whether all robots of the left side are higher and their values do not contradict it."""
         return compatible(self.present, self.name, nogood.lhs) and all(
             agent in self.view and not contradicts(value, self.view[agent])
             for agent, value in nogood.lhs.items()
@@ -307,7 +311,7 @@ class AgileABT(Backtracking):
         )
 
     def _check_add_link(self, nogood: Nogood) -> None:
-        """Ask robots of the left side that do not tell me their values yet to do so; meanwhile believe it."""
+        """Request links to robots of the nogood that send no values yet; assume its values for now."""
         for agent in self._believe(nogood.lhs):
             self.send(agent, AddLink())
 

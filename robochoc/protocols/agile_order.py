@@ -36,7 +36,7 @@ TerminationVector = tuple[int, ...]
 
 
 class Explanation(NamedTuple):
-    """The union of the left sides of a robot's nogoods, and how many of its values have none."""
+    """The union of the left sides of a robot's nogoods, and the number of its values without a nogood."""
 
     lhs: Mapping[str, Value]
     left: int
@@ -47,7 +47,7 @@ Explanations = Mapping[str, Explanation]
 
 
 class Proposal(NamedTuple):
-    """An order in which `culprit` may be told to change its value, and the order's termination vector."""
+    """An order in which `culprit` may be sent a nogood, and the order's termination vector."""
 
     culprit: str
     names: tuple[str, ...]
@@ -55,17 +55,17 @@ class Proposal(NamedTuple):
 
 
 def compatible(order: PriorityOrder, name: str, lhs: Iterable[str]) -> bool:
-    """Return whether all robots of the left side `lhs` stand above the robot `name`."""
+    """Return whether all robots of the left side `lhs` have higher priority than `name` in `order`."""
     return order.depth(lhs) < order.rank[name]
 
 
 def updated(
     explanations: Explanations, culprit: str, lhs: LeftSide, sizes: Mapping[str, int]
 ) -> dict[str, Explanation]:
-    """The explanations once `culprit` has taken a nogood with the left side `lhs` (UpdateExplanations).
+    """Return the explanations after `culprit` has received a nogood with the left side `lhs` (UpdateExplanations).
 
-    `culprit` will change its value, so explanations that rest on it go. It has one value less, and has to stand below
-    all of `lhs`.
+    `culprit` will change its value, so explanations that contain it are removed. It has one value less, and must come
+    after all robots of `lhs`.
     """
     kept = {name: one for name, one in explanations.items() if culprit not in one.lhs}
     before = kept.get(culprit) or Explanation({}, sizes.get(culprit, UNKNOWN))
@@ -75,10 +75,9 @@ def updated(
 
 
 def ordered(names: Sequence[str], explanations: Explanations, left: Mapping[str, int]) -> tuple[str, ...]:
-    """An order compatible with all `explanations`, which must not be circular (ComputeOrder).
+    """Return an order compatible with all `explanations`, which must not be circular (ComputeOrder).
 
-    Of the robots that may come next it is always the one with the fewest values left; between equals, the one that
-    comes first in `names`.
+    Among the robots that may come next, it takes the one with the fewest values left; ties go to the first in `names`.
     """
     place = {name: number for number, name in enumerate(names)}
     below: dict[str, list[str]] = {name: [] for name in names}
@@ -103,10 +102,10 @@ def ordered(names: Sequence[str], explanations: Explanations, left: Mapping[str,
 def proposed(
     names: Sequence[str], culprit: str, lhs: LeftSide, explanations: Explanations, sizes: Mapping[str, int]
 ) -> Proposal:
-    """The order for a nogood that `culprit` cannot keep its value while `lhs` stands.
+    """Return the order for a nogood: `culprit` cannot keep its value while `lhs` holds.
 
-    All `explanations` are compatible with the order `names`, so they are not circular. Nor are they once they are
-    updated: nothing rests on `culprit` any more, so to put it below `lhs` closes no circle.
+    All `explanations` are compatible with the order `names`, so they are not circular. The updated ones are not
+    circular either: no explanation contains `culprit` any more, so placing it after `lhs` closes no cycle.
     """
     after = updated(explanations, culprit, lhs, sizes)
     left = {name: after[name].left if name in after else sizes.get(name, UNKNOWN) for name in names}

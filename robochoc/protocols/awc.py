@@ -42,7 +42,7 @@ from robochoc.solver.compiled import LocalProblem
 
 
 class Ok(Message, frozen=True):
-    """The sender's value and its present priority, told to all neighbours (`ok?`)."""
+    """The sender's value and current priority, sent to all neighbours (`ok?`)."""
 
     value: Value
     priority: int
@@ -55,7 +55,7 @@ class Ok(Message, frozen=True):
 
 
 class Nogood(Message, frozen=True):
-    """These assignments, one of which is the receiver's, cannot all stand; with the priorities last heard of."""
+    """Assignments that cannot all hold, the receiver's among them, with the last known priorities."""
 
     nogood: dict[str, tuple[Value, int]]
 
@@ -72,7 +72,7 @@ class Nogood(Message, frozen=True):
 
 
 class AddLink(Message, frozen=True):
-    """A nogood has made the sender and the receiver neighbours: each tells the other its value from now on."""
+    """A new link between sender and receiver because of a nogood: each sends the other its value from now on."""
 
     act = acts.ADD_LINK
 
@@ -84,19 +84,22 @@ class AddLink(Message, frozen=True):
 
 
 class Kept(NamedTuple):
-    """A nogood as one of its robots keeps it: what the others say, and the own value that does not go with it."""
+    """A nogood as one of its robots stores it: the others' values and the own value that it rules out."""
 
     others: LeftSide
     own: Value
 
 
 def agrees(value: Value, known: Value | None) -> bool:
-    """Return whether `told` is known to be as `value` says, wherever that is not None."""
+    """Return whether `known` has the same components as `value`, where `value` has any (not None)."""
     return known is not None and all(part is None or part == other for part, other in zip(value, known, strict=True))
 
 
 class NogoodList:
-    """All nogoods received. Each waits at one assignment that does not stand, and is not looked at before it does."""
+    """All received nogoods. Each is indexed by one of its assignments that does not hold ("watched").
+
+    It is examined again only when that assignment holds.
+    """
 
     def __init__(self) -> None:
         self._known: set[frozenset[tuple[str, Value]]] = set()
@@ -107,7 +110,7 @@ class NogoodList:
         return map(dict, self._known)
 
     def add(self, agent: str, nogood: dict[str, Value]) -> None:
-        """Keep `nogood`, which names `agent`, whose list this is."""
+        """Store `nogood`, which contains `agent`, the owner of this list."""
         key = frozenset(nogood.items())
         if key not in self._known:
             self._known.add(key)
@@ -115,13 +118,13 @@ class NogoodList:
             self._awake.append(Kept(nogood, own))
 
     def update(self, agent: str, value: Value) -> None:
-        """`agent` has taken `value`: wake those that waited for it."""
+        """Re-examine the nogoods that watch the new value of `agent`."""
         waiting = self._waiting.get(agent, {})
         for part in [part for part in waiting if agrees(part, value)]:
             self._awake += waiting.pop(part)
 
     def standing(self, view: LeftSide) -> list[Kept]:
-        """Those whose others all say in `view` what the nogood says of them."""
+        """Return the nogoods whose other assignments all hold in `view`."""
         awake = []
         for kept in self._awake:
             missing = next((agent for agent, value in kept.others.items() if not agrees(value, view.get(agent))), None)
@@ -159,7 +162,7 @@ class AWC(Protocol):
         self._conflicts: dict[int, LeftSide | None] = {}
 
     def start(self) -> None:
-        """Choose a first value and tell it."""
+        """Choose a first value and send it."""
         self._check_agent_view()
 
     def receive(self, sender: str, message: Message) -> None:
@@ -177,7 +180,7 @@ class AWC(Protocol):
                 assert_never(never)
 
     def settle(self) -> None:
-        """The inbox is empty: check the view."""
+        """Check the view."""
         if self.verdict is None:
             self._check_agent_view()
 
@@ -189,7 +192,7 @@ class AWC(Protocol):
         self.nogoods.update(agent, value)
 
     def _received_nogood(self, nogood: dict[str, tuple[Value, int]]) -> None:
-        """Keep it; robots in it that are no neighbours become ones, and meanwhile it is believed about them."""
+        """Store a nogood; link to its robots that are no neighbours and assume its values for them for now."""
         for agent, (value, priority) in nogood.items():
             if agent != self.problem.agent and agent not in self.neighbours:
                 self.send(agent, AddLink())
@@ -205,7 +208,7 @@ class AWC(Protocol):
     # The search
 
     def _check_agent_view(self) -> None:
-        """Keep the value if all higher robots allow it, else take another that they allow, else backtrack."""
+        """Keep the value if all higher robots allow it; else take another that they allow, else backtrack."""
         self._look_up()
         if self.value is not None and self._reason(self.value) is None:
             return
@@ -216,7 +219,7 @@ class AWC(Protocol):
             self._backtrack()
 
     def _backtrack(self) -> None:
-        """Tell the robots that leave no value, unless they have been told before; then go above all neighbours."""
+        """Send a new nogood to the robots that rule out every value; then raise the priority above all neighbours."""
         nogood: dict[str, Value] = {}
         for index in range(len(self.problem.values)):
             for agent, value in (self._reason(index) or {}).items():
@@ -236,20 +239,20 @@ class AWC(Protocol):
         self._take(self._allowed())
 
     def _take(self, allowed: list[int]) -> None:
-        """Take the value with the fewest conflicts, the first of equals, and tell all neighbours."""
+        """Take the value with the fewest conflicts (the first of equals) and send it to all neighbours."""
         self.value = allowed[0] if len(allowed) == 1 else min(allowed, key=self._violations)
         for agent in self.neighbours:
             self.send(agent, self._ok())
 
     def _violations(self, index: int) -> int:
-        """How many constraints and nogoods the value at `index` breaks, whatever the priorities."""
+        """Return the number of constraints and nogoods that the value at `index` violates, at any priority."""
         return self.problem.violation_count(index, self.view) + len(self._standing[index])
 
     def _allowed(self) -> list[int]:
         return [index for index in range(len(self.problem.values)) if self._reason(index) is None]
 
     def _reason(self, index: int) -> LeftSide | None:
-        """What higher robots say against the value at `index`: the shortest nogood, else a broken constraint."""
+        """Return the higher robots' values that rule out `index`: the shortest nogood, or a violated constraint."""
         against = [others for others in self._standing[index] if others.keys() <= self._higher.keys()]
         if against:
             return min(against, key=len)
@@ -261,18 +264,18 @@ class AWC(Protocol):
 
     @property
     def checked_against(self) -> Mapping[str, Value]:
-        """The values of robots of higher priority."""
+        """The values of robots with higher priority."""
         return self._higher
 
     @property
     def kept_nogoods(self) -> Iterable[Mapping[str, Value]]:
-        """All nogoods received."""
+        """All received nogoods."""
         return self.nogoods
 
     # The view
 
     def _look_up(self) -> None:
-        """See who is higher now and which nogoods stand; forget the conflicts with what has changed."""
+        """Recompute the higher robots and the nogoods that hold; drop counts of conflicts that changed."""
         higher = {agent: value for agent, value in self.view.items() if self._is_higher(agent)}
         if higher != self._higher:
             self._conflicts = {

@@ -18,7 +18,7 @@ from robochoc.solver.compiled import LocalProblem
 class Backtracking(Protocol):
     """One agent with a `view` of others' values (myAgentView) and a `store` of nogoods (myNogoodStore).
 
-    `higher` are the robots that tell this one their values (Gamma-), if they are higher at present.
+    `higher` are the robots that send this one their values (Gamma-) while they have higher priority.
     """
 
     def __init__(self, problem: LocalProblem, order: PriorityOrder) -> None:
@@ -28,11 +28,11 @@ class Backtracking(Protocol):
         self.higher = set(problem.parents)
 
     def _choose_value(self, view: Mapping[str, Value]) -> int | None:
-        """The first value of the domain that no nogood rules out in `view`."""
+        """Return the first value of the domain that no nogood rules out in `view`; None if there is none."""
         return next((index for index in range(len(self.problem.values)) if self._consistent(index, view)), None)
 
     def _consistent(self, index: int, view: Mapping[str, Value]) -> bool:
-        """Return whether `view` allows the value at `index`; if a constraint does not, its nogood is stored."""
+        """Return whether `view` allows the value at `index`; store a nogood if a constraint is violated."""
         if self.store[index] is not None:
             return False
         conflict = self.problem.conflict(index, view)
@@ -42,7 +42,7 @@ class Backtracking(Protocol):
         return False
 
     def _update(self, agent: str, value: Value | None) -> None:
-        """Take in a new value of `agent` (None: unknown); nogoods that rest on another value go."""
+        """Store a new value of `agent` (None: unknown); drop nogoods that contain another value of it."""
         if value is None:
             self.view.pop(agent, None)
         else:
@@ -50,7 +50,7 @@ class Backtracking(Protocol):
         self.store.forget(agent, value)
 
     def _believe(self, lhs: Mapping[str, Value]) -> list[str]:
-        """Believe what `lhs` says of others; returns those that do not tell this robot their values yet."""
+        """Assume the values in `lhs`; return the robots that do not send this one their values yet."""
         strangers = [agent for agent in lhs if agent not in self.higher]
         self.higher.update(strangers)
         for agent, value in lhs.items():
@@ -61,5 +61,5 @@ class Backtracking(Protocol):
         return strangers
 
     def _current(self) -> Value | None:
-        """The own value as others see it."""
+        """Return the own value as others see it; None while unassigned."""
         return None if self.value is None else self.problem.values[self.value]

@@ -62,7 +62,7 @@ from robochoc.solver.compiled import LocalProblem
 
 
 class Value(Message, frozen=True):
-    """The sender's value, how often it has changed (ID), and what the receiver's subtree may cost then (TH)."""
+    """The sender's value, the number of its changes (ID), and the receiver's threshold (TH)."""
 
     value: message.Value
     counter: int
@@ -79,7 +79,7 @@ class Value(Message, frozen=True):
 
 
 class Cost(Message, frozen=True):
-    """In `context` the sender's subtree costs between `lb` and `ub`; whether its threshold is asked for (ThReq)."""
+    """Bounds `lb` and `ub` on the cost of the sender's subtree in `context`, and a threshold request (ThReq)."""
 
     context: Context
     lb: Number
@@ -95,7 +95,7 @@ class Cost(Message, frozen=True):
 
 
 class BnBADOPT(BoundingProtocol):
-    """One agent of BnB-ADOPT+. State beside the bounds: `threshold` (TH).
+    """One agent of BnB-ADOPT+. State besides the bounds: `threshold` (TH).
 
     `sent_values` are the last Values sent to each child, `sent_cost` the last Cost, without its request.
     """
@@ -142,7 +142,7 @@ class BnBADOPT(BoundingProtocol):
                 assert_never(never)
 
     def _merge(self, context: Context) -> None:
-        """What is known above has changed: the value is to be chosen anew, and TH may be too low (InitSelf)."""
+        """Merge a context; if it changed, choose the value again and reset TH (InitSelf)."""
         news, changed = self.merge(context)
         self._moved = self._moved or bool(news)
         if changed:
@@ -150,7 +150,7 @@ class BnBADOPT(BoundingProtocol):
             self.threshold_request = True
 
     def act(self) -> None:
-        """Take a value, and say what is new (Backtrack)."""
+        """Choose a value and send values and costs that changed (Backtrack)."""
         self._choose()
         for child in self.children:
             self._tell_value(child)
@@ -171,14 +171,14 @@ class BnBADOPT(BoundingProtocol):
     # What is said
 
     def _tell_value(self, child: str) -> None:
-        """Tell `child` a new value, a higher threshold, or what it has asked for."""
+        """Send `child` a new value, a higher threshold, or a threshold that it requested."""
         value, last = Value(*self.own, self._share(child)), self.sent_values.get(child)
         if last is None or last.counter < value.counter or last.threshold < value.threshold:
             self.sent_values[child] = value
             self.send(child, value)
 
     def _share(self, child: str) -> float:
-        """What of this robot's threshold is left for the subtree of `child`, if the others cost as little as can be."""
+        """Return the part of the threshold left for `child` if other children cost their lower bounds."""
         limit = min(self.threshold, self.ub)
         if limit == INFINITE:
             return INFINITE
@@ -186,7 +186,7 @@ class BnBADOPT(BoundingProtocol):
         return max(0, limit - self.delta[self.index] - others)
 
     def _tell_cost(self) -> None:
-        """Tell the parent new bounds, or bounds in a new context; and anything if the threshold is needed."""
+        """Send the parent new bounds, bounds in a new context, or a request for the threshold."""
         cost = Cost(dict(self.context), self.lb, self.ub)
         if self.parent is not None and (self.threshold_request or cost != self.sent_cost):
             self.sent_cost = cost

@@ -35,7 +35,7 @@ Number = int | float
 
 
 class Terminate(Message, frozen=True):
-    """All above the receiver have taken their last values: those in `context` (TERMINATE)."""
+    """The end of the search above the receiver: all its ancestors have taken their values in `context` (TERMINATE)."""
 
     context: Context
 
@@ -48,7 +48,7 @@ class Terminate(Message, frozen=True):
 
 
 def bounds_in_words(words: Wording, context: Context, lower: Number, upper: Number) -> str:
-    """Return what a robot says of its subtree's cost: `as long as V1.1 = 2, my subtree costs at least 3`."""
+    """Return a robot's bounds in words: `as long as V1.1 = 2, my subtree costs at least 3`."""
     if math.isinf(lower):
         costs = "has no solution"
     elif lower == upper:
@@ -61,9 +61,10 @@ def bounds_in_words(words: Wording, context: Context, lower: Number, upper: Numb
 
 
 class Bounds:
-    """On the costs of a child's subtree, for each own value, in a context.
+    """Bounds on the cost of a child's subtree, for each own value, in a context.
 
-    `scope` are those above, without this robot, on whose values the subtree depends, as far as the child has said.
+    `scope` holds the ancestors, without this robot, on whose values the subtree depends, as far as the child has sent
+    them.
     """
 
     def __init__(self, size: int, scope: Iterable[str] = ()) -> None:
@@ -73,11 +74,12 @@ class Bounds:
 
 
 class BoundingProtocol(TreeProtocol):
-    """One agent with bounds. State: `context` (CurrentContext), and for each child the `bounds` on its subtree.
+    """One agent with bounds. State: `context` (CurrentContext), and for each child its `bounds`.
 
-    `counter` says how often the own value has changed. `lower` and `upper` are LB(d) and UB(d) for each value, `lb`
-    and `ub` are LB and UB: weighed anew once the inbox has been drained, before the robot is to `act`. `last_values`:
-    all above have taken their last values; `terminated`: so has this robot.
+    - `counter`: the number of changes of the own value.
+    - `lower` and `upper`: LB(d) and UB(d) for each value. `lb` and `ub`: LB and UB. They are computed when the inbox is
+    empty, before `act`.
+    - `last_values`: all ancestors have taken their final values. `terminated`: this robot has, too.
     """
 
     def __init__(self, problem: LocalProblem, order: PriorityOrder) -> None:
@@ -97,7 +99,7 @@ class BoundingProtocol(TreeProtocol):
         self._last: dict[tuple[str, type[Message]], Message] = {}
 
     def begin(self) -> None:
-        """Nothing is known but the own charges."""
+        """Initialise the bounds with the own charges."""
         for child in self.children:
             self.bounds[child] = Bounds(len(self.problem.values))
             self.forget(child)
@@ -105,10 +107,10 @@ class BoundingProtocol(TreeProtocol):
 
     @abstractmethod
     def act(self) -> None:
-        """The bounds are up to date: take a value, and say what is new."""
+        """Choose a value and send what changed; the bounds are up to date."""
 
     def decide(self) -> None:
-        """Weigh the bounds and act; a root that finds every value too dear ends the search of all trees."""
+        """Compute the bounds and act; a root whose lower bound is infinite ends the search of all trees."""
         if self.terminated:
             return
         self._weigh()
@@ -119,20 +121,20 @@ class BoundingProtocol(TreeProtocol):
 
     @property
     def findings(self) -> Findings:
-        """The place in the tree; a root's LB is a bound on what its tree costs."""
+        """The place in the tree; for a root also LB, a lower bound on the cost of its tree."""
         root = self.placed and self.parent is None
         return msgspec.structs.replace(super().findings, bound=self.lb if root else None)
 
     def forget(self, child: str) -> None:
-        """What `child` has said does not hold any more."""
+        """Drop the bounds of `child`."""
         self.bounds[child] = Bounds(len(self.problem.values), self.bounds[child].scope)
 
     # Contexts
 
     def merge(self, context: Mapping[str, Entry]) -> tuple[list[str], bool]:
-        """Take up what is newer: whose values are news, and whether any of them was another one before.
+        """Merge newer values into the context; return the changed robots, and whether a known value changed.
 
-        Bounds that rest on such a one are forgotten.
+        Bounds whose context contains an old value are dropped.
         """
         news = [name for name, entry in context.items() if self._is_newer(name, entry)]
         other = [name for name in news if self.context.get(name, context[name])[0] != context[name][0]]
@@ -145,7 +147,7 @@ class BoundingProtocol(TreeProtocol):
         return [*fresh, *other], bool(other)
 
     def agrees(self, values: Mapping[str, message.Value]) -> bool:
-        """Return whether nobody has another value in the context (the papers' Compatible)."""
+        """Return whether `values` do not contradict the context (the papers' Compatible)."""
         return all(self.context[name][0] == value for name, value in values.items() if name in self.context)
 
     def _is_newer(self, name: str, entry: Entry) -> bool:
@@ -154,9 +156,9 @@ class BoundingProtocol(TreeProtocol):
     # Bounds
 
     def bound(self, child: str, context: Mapping[str, Entry], lb: float, ub: float) -> int | None:
-        """What a Cost says of `child`, after its context has been merged; the own value that it is said of.
+        """Store the bounds of a Cost of `child`, after its context was merged; return the own value they are for.
 
-        None: of no value, as the child did not know it yet, or its context is obsolete.
+        Return None if they are for no value: the child did not know it yet, or its context is obsolete.
         """
         values = {name: value for name, (value, _) in context.items()}
         own = values.pop(self.problem.agent, None)
@@ -170,9 +172,9 @@ class BoundingProtocol(TreeProtocol):
         return index
 
     def _weigh(self) -> None:
-        """LB(d), UB(d), LB and UB in the present context.
+        """Compute LB(d), UB(d), LB and UB in the current context.
 
-        Nothing is known of UB before all neighbours above have told their values, as delta(d) may still grow.
+        UB is infinite until the values of all neighbours above are known, as delta(d) may still grow.
         """
         if self._outdated:
             self._outdated = False
@@ -186,7 +188,7 @@ class BoundingProtocol(TreeProtocol):
         self.lb, self.ub = min(self.lower), min(self.upper)
 
     def cheapest(self, costs: Sequence[float]) -> int:
-        """The value with the least of `costs`: the present one if it is among several."""
+        """Return the value with the minimum of `costs`; the current value if it is one of several."""
         return min(range(len(costs)), key=lambda index: (costs[index], index != self.value))
 
     @property
@@ -204,28 +206,28 @@ class BoundingProtocol(TreeProtocol):
 
     @property
     def index(self) -> int:
-        """The place of the own value; there is one since `begin`."""
+        """The place of the own value in the domain; it exists after `begin`."""
         assert self.value is not None  # noqa: S101
         return self.value
 
     @property
     def own(self) -> Entry:
-        """The own value as contexts have it."""
+        """The own value as an entry of a context."""
         return self.problem.values[self.index], self.counter
 
     @property
     def may_end(self) -> bool:
-        """Whether no value above will change any more."""
+        """Whether no ancestor will change its value any more."""
         return self.parent is None or self.last_values
 
     def terminate(self) -> None:
-        """This was the last value: tell the children, and be silent."""
+        """Keep the current value for good: send `Terminate` to the children, and nothing afterwards."""
         self.terminated = True
         for child in self.children:
             self.send(child, Terminate({**self.context, self.problem.agent: self.own}))
 
     def tell(self, receiver: str, message: Message) -> None:
-        """Say what is new: not what `receiver` has been told last by a message of that type."""
+        """Send a message to `receiver` unless it is equal to the last one of its type sent there."""
         if self._last.get((receiver, type(message))) != message:
             self._last[receiver, type(message)] = message
             self.send(receiver, message)

@@ -44,7 +44,7 @@ class Value(wire.Message, frozen=True):
 
 
 class Domain(wire.Message, frozen=True):
-    """All values that the sender may take, the first thing it says; later messages name their places in it."""
+    """The sender's domain, sent first; later messages refer to places in it."""
 
     values: list[wire.Value]
 
@@ -56,7 +56,7 @@ class Domain(wire.Message, frozen=True):
 
 
 class CycleSettings(Settings, frozen=True):
-    """`cycles`: after so many of them all robots stop."""
+    """`cycles`: the number of cycles after which all robots stop."""
 
     cycles: int = 100
 
@@ -68,8 +68,8 @@ class CycleSettings(Settings, frozen=True):
 class CycleProtocol(Protocol):
     """One agent of a synchronous local search. State: `cycle`, and the own value in it.
 
-    Subclasses take a first value and speak in `begin`; then they `take` one value a cycle until the search is `over`.
-    It is up to them whom they `listen` to, and what they do then.
+    Subclasses take a first value and send it in `begin`; then they `take` one value per cycle until the search is
+    `over`. They call `listen` with the robots whose messages they need, and a function that processes these.
     """
 
     settings: CycleSettings = CycleSettings()
@@ -85,10 +85,10 @@ class CycleProtocol(Protocol):
 
     @abstractmethod
     def begin(self) -> None:
-        """The search begins, for a robot that has values and neighbours."""
+        """Begin the search, for a robot that has values and neighbours."""
 
     def start(self) -> None:
-        """Who has no value at all ends the search; who has no neighbours takes its cheapest and is done."""
+        """Start; an empty domain ends the search, a robot without neighbours takes its cheapest value."""
         if not self.problem.values:
             self.conclude(Verdict.NO_SOLUTION)
         elif not self.problem.neighbours:
@@ -100,47 +100,47 @@ class CycleProtocol(Protocol):
             self.settle()
 
     def receive(self, sender: str, message: wire.Message) -> None:
-        """Keep the message for its phase."""
+        """Store the message for its phase."""
         waiting = self._waiting[sender]
         if not waiting and sender in self._awaited:
             self._missing -= 1
         waiting.append(message)
 
     def settle(self) -> None:
-        """Go on as far as all that is waited for has come."""
+        """Run all phases whose messages have arrived."""
         while self._then and not self._missing and self.verdict is None:
             messages = {name: self._waiting[name].popleft() for name in self._awaited}
             then, self._then = self._then, None
             then(messages)
 
     def listen(self, names: Sequence[str], then: Then) -> None:
-        """Wait for a message of each robot in `names`, and `then` go on with them."""
+        """Wait for a message of each robot in `names`, then call `then` with them."""
         self._awaited, self._then = names, then
         self._missing = sum(not self._waiting[name] for name in names)
 
     def tell(self, names: Iterable[str], message: wire.Message) -> None:
-        """Say the same to several robots."""
+        """Send the same message to several robots."""
         for name in names:
             self.send(name, message)
 
     def tell_value(self, then: Then) -> None:
-        """Say the own value to all neighbours, and `then` go on with theirs."""
+        """Send the own value to all neighbours, wait for theirs, then call `then`."""
         self.tell(self.problem.neighbours, Value(self.problem.values[self.present]))
         self.listen(self.problem.neighbours, then)
 
     def take(self, index: int) -> None:
-        """The own value of the next cycle, which may be the present one."""
+        """Set the own value of the next cycle; it may be the current one."""
         self.cycle += 1
         if index != self.value:
             self.value = index
             self._trail.append((self.cycle, index))
 
     def any_value(self) -> int:
-        """A value drawn from the whole domain: where local search begins."""
+        """Return a random value of the whole domain, with which the search begins."""
         return self.any_of(range(len(self.problem.values)))
 
     def any_of(self, choices: Sequence[T]) -> T:
-        """One of several that are equally good; no lot is drawn where there is but one."""
+        """Return a random one of `choices`; with a single choice, no random number is drawn."""
         return choices[0] if len(choices) == 1 else choices[int(self.chance() * len(choices))]
 
     @property
@@ -156,7 +156,7 @@ class CycleProtocol(Protocol):
 
     @property
     def findings(self) -> Findings:
-        """All own values, cycle by cycle."""
+        """The own value in every cycle."""
         return Findings(trail=Trail(list(self._trail), self.cycle))
 
 
@@ -164,10 +164,10 @@ NO_GAIN: LexicographicCost = (0, 0)
 
 
 def gain(before: LexicographicCost, after: LexicographicCost) -> LexicographicCost:
-    """By how much `after` is less. Pairs of differences compare like what they are differences of."""
+    """Return the reduction from `before` to `after`; the pairs of differences compare lexicographically."""
     return before[0] - after[0], before[1] - after[1]
 
 
 def values_in(messages: Mapping[str, wire.Message]) -> dict[str, wire.Value]:
-    """What all have said in a phase in which everybody says a `Value`."""
+    """Return the values in the messages of a phase in which every robot sends a `Value`."""
     return {name: message.value for name, message in messages.items() if isinstance(message, Value)}

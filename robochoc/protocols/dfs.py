@@ -28,7 +28,10 @@ from robochoc.solver.compiled import LocalProblem
 
 
 class Wave(Message, frozen=True):
-    """`candidate`, who has so many neighbours, wants to be the root; back from all neighbours, it is."""
+    """An election wave of `candidate`, with its number of neighbours.
+
+    The candidate becomes the root if its wave returns from all neighbours.
+    """
 
     neighbours: int
     candidate: str
@@ -41,7 +44,7 @@ class Wave(Message, frozen=True):
 
 
 class Token(Message, frozen=True):
-    """You are the sender's child; those `visited` are in the tree already."""
+    """The token of the depth-first search: the receiver becomes the sender's child; `visited` are in the tree."""
 
     visited: list[str]
 
@@ -53,7 +56,7 @@ class Token(Message, frozen=True):
 
 
 class Back(Message, frozen=True):
-    """All below me are in the tree; these are `visited` by now."""
+    """The token on its way back: all robots below the sender are in the tree; `visited` are in the tree."""
 
     visited: list[str]
 
@@ -69,11 +72,11 @@ TreeMessage = Wave | Token | Back
 
 
 class TreeProtocol(Protocol):
-    """One agent that takes its place in a pseudo-tree first, and then speaks a protocol on it.
+    """One agent that first takes its place in a pseudo-tree, and then runs a protocol on it.
 
     `parent` (None: a root), `pseudo_parents`, `children` and `pseudo_children` are known, in priority order, from
-    `begin` on; then come `handle` for each message and `decide` for each packet. Messages that come before are kept
-    for then. Children may begin before their parents, never after.
+    `begin` on. Then `handle` is called for each message and `decide` for each packet. Messages that arrive before
+    `begin` are stored until then. Children may begin before their parents, never after.
     """
 
     def __init__(self, problem: LocalProblem, order: PriorityOrder) -> None:
@@ -89,17 +92,17 @@ class TreeProtocol(Protocol):
 
     @abstractmethod
     def begin(self) -> None:
-        """The place in the tree is known: the search may begin."""
+        """Begin the search; the place in the tree is known."""
 
     @abstractmethod
     def handle(self, sender: str, message: Message) -> None:
-        """Take in one message of the search."""
+        """Process one message of the search."""
 
     def decide(self) -> None:
-        """All waiting messages have been heard."""
+        """Decide, after all waiting messages were processed."""
 
     def start(self) -> None:
-        """Stand for election; who has no value at all ends the search."""
+        """Start the own election wave; a robot with an empty domain ends the search."""
         if not self.problem.values:
             self.conclude(Verdict.NO_SOLUTION)
         elif not self.problem.neighbours:
@@ -109,7 +112,7 @@ class TreeProtocol(Protocol):
             self._propagate(self._election.stand())
 
     def receive(self, sender: str, message: Message) -> None:
-        """Build the tree; keep what comes before its time."""
+        """Process the messages that build the tree; store messages of the search until `begin`."""
         if self.verdict is not None:
             return
         match message:
@@ -127,7 +130,7 @@ class TreeProtocol(Protocol):
                 self._early.append((sender, message))
 
     def settle(self) -> None:
-        """Nothing is decided before the place in the tree is known."""
+        """Call `decide` if the place in the tree is known."""
         if self.placed and self.verdict is None:
             self.decide()
 
@@ -151,13 +154,13 @@ class TreeProtocol(Protocol):
             self.send(receiver, wave)
 
     def _visit(self, parent: str | None, visited: Sequence[str]) -> None:
-        """The token comes for the first time: neighbours that it has visited are above."""
+        """Process the first visit of the token: neighbours that it has visited are above."""
         self.parent = parent
         self.pseudo_parents = self._sorted(name for name in self.problem.neighbours if name in {*visited} - {parent})
         self._go_on([*visited, self.problem.agent])
 
     def _go_on(self, visited: list[str]) -> None:
-        """Send the token to another neighbour, or back when all are in the tree."""
+        """Send the token to an unvisited neighbour, or back if all are in the tree."""
         left = [name for name in self.problem.neighbours if name not in visited]
         if left:
             child = max(left, key=self._election.strength)
@@ -179,9 +182,9 @@ class TreeProtocol(Protocol):
 
 
 class _Election:
-    """One agent's part in the election: the strongest `candidate` that it has heard of, and who told it first.
+    """One agent's part in the election: the strongest known `candidate`, and the neighbour its wave came from.
 
-    `_heard` are the neighbours from which that candidate's wave has come; with the last of them it goes back.
+    `_heard` are the neighbours from which that candidate's wave has arrived; after the last one, the wave is returned.
     """
 
     def __init__(self, agent: str, neighbours: Sequence[str], order: PriorityOrder) -> None:
@@ -194,15 +197,15 @@ class _Election:
         self.won = False
 
     def strength(self, name: str) -> tuple[int, int]:
-        """Who has more neighbours is stronger; of equals, who is higher in the order."""
+        """Return a key that orders candidates: more neighbours first, then higher priority."""
         return self._degrees[name], -self._order.rank[name]
 
     def stand(self) -> list[tuple[str, Wave]]:
-        """The own wave goes out."""
+        """Return the own wave for all neighbours."""
         return [(name, self._wave) for name in self._neighbours]
 
     def receive(self, sender: str, wave: Wave) -> list[tuple[str, Wave]]:
-        """What to say to a wave; a weaker candidate's one ends here."""
+        """Return the messages that answer a wave; the wave of a weaker candidate gets no answer."""
         self._degrees[wave.candidate] = wave.neighbours
         answers: list[tuple[str, Wave]] = []
         if self.strength(wave.candidate) > self.strength(self._candidate):

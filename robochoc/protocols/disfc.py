@@ -45,7 +45,7 @@ from robochoc.solver.filters import allows
 
 
 class Ok(Message, frozen=True):
-    """The sender has a new assignment, called `counter`; `allowed` is the receiver's domain filtered by it (`ok?`)."""
+    """A new assignment of the sender, named `counter`; `allowed` is the receiver's domain filtered by it (`ok?`)."""
 
     counter: int
     allowed: bytes
@@ -61,7 +61,7 @@ class Ok(Message, frozen=True):
 
 
 class Nogood(Message, frozen=True):
-    """While all assignments in `lhs` stand, the receiver's called `counter` cannot (`ngd`)."""
+    """A nogood over counters: the receiver's assignment `counter` is ruled out while all in `lhs` hold (`ngd`)."""
 
     lhs: dict[str, int]
     counter: int
@@ -78,7 +78,7 @@ class Nogood(Message, frozen=True):
 
 
 class AddLink(Message, frozen=True):
-    """The sender, lower in the order, asks to be told the receiver's assignments from now on (`adl`)."""
+    """A request of a lower-priority robot to be sent the receiver's assignments from now on (`adl`)."""
 
     act = acts.ADD_LINK
 
@@ -90,9 +90,11 @@ class AddLink(Message, frozen=True):
 class DisFC(Protocol):
     """One agent of DisFC.
 
-    State: `counter` of the own assignment; `view`, the counters of higher robots; `filters` from them; `below`,
-    counters and filters from lower robots that hold parts of PKCs towards this one, and that have yet to be refused.
-    In the store, whose left sides are made of values, a counter is a value of one part.
+    - `counter`: names the own assignment.
+    - `view`: the counters of higher-priority robots. `filters`: the filters they sent.
+    - `below`: counters and filters of lower-priority robots with parts of PKCs, not yet checked.
+
+    The nogood store has values on its left sides; a counter is stored there as a value with one component.
     """
 
     messages = Ok | Nogood | AddLink
@@ -119,7 +121,7 @@ class DisFC(Protocol):
         self.lower = list(problem.children)
 
     def start(self) -> None:
-        """Make a first assignment and tell what it leaves to others."""
+        """Make a first assignment and send the filters."""
         self._check_agent_view()
 
     def receive(self, sender: str, message: Message) -> None:
@@ -137,7 +139,7 @@ class DisFC(Protocol):
                 assert_never(never)
 
     def settle(self) -> None:
-        """The inbox is empty: check the view, then hold the own value against the filters from below."""
+        """Check the view, then check the own value against the filters of lower-priority robots."""
         if self.verdict is None:
             self._check_agent_view()
             self._refuse_below()
@@ -152,7 +154,7 @@ class DisFC(Protocol):
             self.filters[sender] = ok.allowed
 
     def _resolve_conflict(self, sender: str, nogood: Nogood) -> None:
-        """Accept a nogood about the present assignment that agrees with the view; otherwise it is obsolete."""
+        """Accept a nogood about the current assignment that agrees with the view; others are obsolete."""
         if self.value is None or nogood.counter != self.counter:
             return
         if self._coherent(nogood):
@@ -172,7 +174,7 @@ class DisFC(Protocol):
     # The search
 
     def _check_agent_view(self) -> None:
-        """Keep the value if the view allows it, else make another assignment, else backtrack until one is found."""
+        """Keep the value if the view allows it; otherwise choose another, or backtrack until there is one."""
         while self.verdict is None:
             if self.value is not None and self._consistent(self.value):
                 return
@@ -189,11 +191,11 @@ class DisFC(Protocol):
         self.send(receiver, Ok(self.counter, self.problem.filter(index, receiver)))
 
     def _choose_value(self) -> int | None:
-        """The first value of the domain that no nogood and no filter rules out."""
+        """Return the first value that no nogood and no filter rules out; None if there is none."""
         return next((index for index in range(len(self.places)) if self._consistent(index)), None)
 
     def _backtrack(self) -> None:
-        """Resolve the stored nogoods, one for each value, and tell the lowest robot among their causes."""
+        """Resolve the stored nogoods, one for each value, and send the result to its lowest-priority robot."""
         lhs = {agent: self.view[agent] for agent in self.store.resolve()}
         if not lhs:
             self.conclude(Verdict.NO_SOLUTION)
@@ -204,7 +206,7 @@ class DisFC(Protocol):
         self._update(culprit, None)
 
     def _refuse_below(self) -> None:
-        """Tell lower robots whose filters the own value is not in: their parts of PKCs forbid it."""
+        """Send nogoods to lower-priority robots whose filters do not contain the own value (PKC)."""
         if self.value is None:
             return
         for child, (counter, allowed) in list(self.below.items()):
@@ -213,7 +215,7 @@ class DisFC(Protocol):
                 del self.below[child]
 
     def _consistent(self, index: int) -> bool:
-        """Return whether the filters allow the value at `index`; if one does not, its nogood is stored."""
+        """Return whether the filters allow the value at `index`; store a nogood if one does not."""
         if self.store[index] is not None:
             return False
         for agent in sorted(self.filters, key=self.order.rank.__getitem__):
@@ -225,7 +227,7 @@ class DisFC(Protocol):
     # The view
 
     def _update(self, agent: str, counter: int | None) -> None:
-        """Take in a new assignment of `agent` (None: unknown); its filter and nogoods that rest on another go."""
+        """Store a new assignment of `agent` (None: unknown); drop its old filter and nogoods with the old one."""
         if counter is None:
             del self.view[agent]
             self.store.forget(agent)
@@ -238,7 +240,7 @@ class DisFC(Protocol):
         return all(self.view.get(agent) == counter for agent, counter in nogood.lhs.items() if agent in self.higher)
 
     def _check_add_link(self, nogood: Nogood) -> None:
-        """Ask robots of the left side that do not tell me their assignments yet to do so; meanwhile believe it."""
+        """Request links to robots of the nogood that send no assignments yet; assume its counters for now."""
         for agent, counter in nogood.lhs.items():
             if agent not in self.higher:
                 self.higher.add(agent)

@@ -83,12 +83,12 @@ T = TypeVar("T")
 
 
 class DPOPSettings(Settings, frozen=True):
-    """`memory`: the bytes that the tables of a robot may take; a run that needs more ends before it makes one."""
+    """`memory`: the bytes that the tables of a robot may take. A run that needs more ends before it makes a table."""
 
     memory: int = GIB
 
     def __post_init__(self) -> None:
-        """Raise `ValueError` for what is no number of bytes."""
+        """Raise `ValueError` unless `memory` is positive."""
         if self.memory < 1:
             raise ValueError(f"memory is a number of bytes, not {self.memory}")
 
@@ -96,9 +96,12 @@ class DPOPSettings(Settings, frozen=True):
 class DPOP(TreeProtocol):
     """One agent of DPOP.
 
-    State: `domains` of the neighbours above, `dimensions` of the children; then `separator`, and `utils`, the
-    children's tables; then `choices`, for each combination of values in the separator the cheapest own value, and
-    `optimum`, what the whole tree costs (at its root).
+    State, in the order in which it becomes known:
+
+    - `domains` of the neighbours above, and `dimensions` of the children;
+    - `separator`, and `utils`, the children's tables;
+    - `choices`: for each combination of values in the separator the cheapest own value;
+    - `optimum`: the cost of the whole tree (at its root).
     """
 
     messages = TreeMessage | Domain | Dimensions | Proceed | UTIL | VALUE
@@ -129,7 +132,7 @@ class DPOP(TreeProtocol):
         self._joined: list[Table] = []
 
     def begin(self) -> None:
-        """Those below have to know the own values."""
+        """Send the own domain to the neighbours below."""
         for name in self.descendants:
             self.send(name, Domain(list(self.problem.values)))
         self._measure()
@@ -155,13 +158,13 @@ class DPOP(TreeProtocol):
 
     @property
     def findings(self) -> Findings:
-        """The place in the tree; a root knows what its tree costs as soon as it has all tables."""
+        """The place in the tree; for a root also its tree's optimum, once it has all tables."""
         return msgspec.structs.replace(super().findings, bound=self.optimum)
 
     # How large tables will be
 
     def _measure(self) -> None:
-        """Once all above and below have said how many values there are: tell the parent, or decide, as the root."""
+        """Send the dimensions to the parent, or decide as the root, once all domains and dimensions arrived."""
         if len(self.domains) < len(self.ancestors) or len(self.dimensions) < len(self.children):
             return
         checked = self.problem.scopes(self.ancestors)
@@ -185,7 +188,7 @@ class DPOP(TreeProtocol):
             raise ValueError(f"{child} tells dimensions that cannot be")
 
     def _refuse(self, most: Need, width: int) -> None:
-        """The root knows what the tables of the whole tree need. Raises `TooLargeError`."""
+        """Raise `TooLargeError` with the largest memory need of the whole tree."""
         check_exact(self._dearest)
         if most.bytes > self.settings.memory:
             raise TooLargeError(
@@ -194,7 +197,10 @@ class DPOP(TreeProtocol):
             )
 
     def _separator_sizes(self, checked: Sequence[Scope]) -> dict[str, int]:
-        """The robots above that share a constraint with this one or somebody below, and how many values they have."""
+        """Return the separator, with each robot's domain size.
+
+        It holds the ancestors that share a constraint with this robot or one below it.
+        """
         sizes = {name: len(self.domains[name]) for scope in checked for name in scope}
         own = len(self.problem.values)
         for child in self.children:
@@ -204,13 +210,13 @@ class DPOP(TreeProtocol):
         return {name: size for name, size in sizes.items() if size > 1}
 
     def _upper_bound(self, checked: Sequence[float]) -> int:
-        """What the own constraints and charges, and those of all below, cost at most if nothing hard is broken."""
+        """Return an upper bound on the cost of this robot's subtree if no hard constraint is broken."""
         own = max((charge for charge in self.problem.charges if charge < math.inf), default=0)
         below = sum(self.dimensions[child].dearest for child in self.children)
         return min(int(own + sum(checked) + below), EXACT)
 
     def _needed(self, checked: Sequence[Scope]) -> Need:
-        """What the own tables take; in integers, which do not overflow, as long as that can be sent."""
+        """Return the memory that the own tables need; an integer while it is small enough to be sent as one."""
         own = len(self.problem.values)
         inputs = [Extent(own * math.prod(len(self.domains[name]) for name in scope), 8) for scope in checked]
         for child in self.children:
@@ -220,7 +226,7 @@ class DPOP(TreeProtocol):
         return Need(need if need < EXACT else _nearest(need), self.problem.agent)
 
     def _proceed(self, separator: Sequence[str]) -> None:
-        """All fits: make the tables of the own constraints, while those below do the same."""
+        """Make the tables of the own constraints, after the children were allowed to do the same."""
         if sorted(separator) != sorted(self._sizes) or self.separator is not None:
             raise ValueError(f"{self.problem.agent}'s separator is {', '.join(self._sizes)}; {separator} is none")
         if self._need.bytes > self.settings.memory:
@@ -239,7 +245,7 @@ class DPOP(TreeProtocol):
     # UTIL, from the leaves up
 
     def _util_message_handler(self, child: str, width: Width, costs: bytes) -> None:
-        """Keep the child's table; with the last of them the own one can be made."""
+        """Store a piece of the child's table; compute the own one when all tables are complete."""
         if child not in self._axes:
             raise ValueError(f"{child} was not asked for a table")
         if child not in self.utils:
@@ -254,11 +260,11 @@ class DPOP(TreeProtocol):
             self._compute_utils()
 
     def _aligned(self, table: Table, axes: Sequence[str]) -> Table:
-        """`table` as it is added up, with the own axis first."""
+        """Return `table` with the own axis first and the other axes in the own order."""
         return aligned(table, axes, (self.problem.agent, *(self.separator or ())))
 
     def _compute_utils(self) -> None:
-        """What all that is below costs at least, for each combination of values in the separator."""
+        """Compute the minimum cost of the subtree for each combination of values in the separator."""
         shape = [self._sizes[name] for name in self.separator or ()]
         costs, self.choices = project(shape, self.problem.charges, self._joined, width_of(self._dearest))
         self._joined.clear()
@@ -274,7 +280,7 @@ class DPOP(TreeProtocol):
     # VALUE, from the root down
 
     def _value_message_handler(self, assignment: Sequence[int]) -> None:
-        """All above have their values."""
+        """Process the values of the separator's robots."""
         separator = self.separator or ()
         if len(assignment) != len(separator) or not all(
             0 <= index < self._sizes[name] for name, index in zip(separator, assignment, strict=True)
@@ -283,7 +289,7 @@ class DPOP(TreeProtocol):
         self._choose_optimal(assignment)
 
     def _choose_optimal(self, assignment: Sequence[int]) -> None:
-        """Take the cheapest value, and tell the children what their separators have."""
+        """Take the cheapest value, and send the children the values of their separators."""
         if self.choices is None:
             raise ValueError(f"{self.problem.agent} has a value already, or no table yet")
         self.value = int(self.choices[tuple(assignment)])
@@ -296,14 +302,18 @@ class DPOP(TreeProtocol):
 
 
 def _keep(sender: str, item: T, received: dict[str, T], speakers: Sequence[str]) -> None:
-    """What one of `speakers` says once; raises `ValueError` for anybody else, and for more."""
+    """Store the one message that each of `speakers` sends.
+
+    Raises:
+        ValueError: if `sender` is none of them, or has sent one before.
+    """
     if sender not in speakers or sender in received:
         raise ValueError(f"{sender} had nothing to say of this, or has said it already")
     received[sender] = item
 
 
 def _nearest(number: int) -> float:
-    """The float that is nearest, for numbers of any size."""
+    """Return the nearest float, for integers of any size."""
     try:
         return float(number)
     except OverflowError:
@@ -311,7 +321,7 @@ def _nearest(number: int) -> float:
 
 
 def _bytes_text(size: float) -> str:
-    """So many bytes, in words."""
+    """Return a number of bytes in words."""
     if size == math.inf:
         return "more than 10^308 bytes"
     return f"{size:,} bytes" if size < EXACT else f"{size:.1e} bytes"

@@ -20,14 +20,14 @@ Cost = Annotated[int, msgspec.Meta(ge=0, le=EXACT)]
 
 
 class Need(msgspec.Struct, frozen=True, array_like=True, order=True):
-    """At most so many `bytes` are in arrays of `robot` at a time; from 2^53 on, the float that is nearest."""
+    """A memory need: the peak number of `bytes` in arrays of `robot`; the nearest float from 2^53 on."""
 
     bytes: int | float
     robot: str
 
 
 class Domain(Message, frozen=True):
-    """The sender's values: for those below it, who check constraints with it."""
+    """The sender's domain, for the robots below that share a constraint with it."""
 
     values: list[Value]
 
@@ -39,9 +39,9 @@ class Domain(Message, frozen=True):
 
 
 class Dimensions(Message, frozen=True):
-    """The sender's separator, with the number of each robot's values; no cost in its table is above `dearest`.
+    """The sender's separator with its domain sizes; `dearest` is an upper bound on the costs in its table.
 
-    `induced_width` is the size of the largest separator among the sender and all below, `most` the largest need.
+    `induced_width` is the size of the largest separator in the sender's subtree, `most` the largest memory need there.
     """
 
     separator: dict[str, Size]
@@ -63,7 +63,10 @@ class Dimensions(Message, frozen=True):
 
 
 class Proceed(Message, frozen=True):
-    """All tables of the tree fit: make yours. These are its axes: the receiver's separator, the nearest robot first."""
+    """Permission to make tables, as the tree's tables fit in memory; with the axes of the receiver's table.
+
+    The axes are the receiver's separator, the nearest robot first.
+    """
 
     separator: list[str]
 
@@ -78,7 +81,7 @@ class Proceed(Message, frozen=True):
 class UTIL(Message, frozen=True):
     """A piece of the sender's table, in the order of its cells; its first axis is the nearest robot's.
 
-    `costs` are unsigned integers of `width` bytes, little-endian; the largest of all stands for `inf`.
+    `costs` are unsigned integers of `width` bytes, little-endian; the largest number stands for `inf`.
     """
 
     width: Width
@@ -92,7 +95,7 @@ class UTIL(Message, frozen=True):
 
 
 class VALUE(Message, frozen=True):
-    """The places of the values that the robots of the receiver's separator take, in the order of its axes."""
+    """The places of the values of the robots in the receiver's separator, in the order of its axes."""
 
     assignment: list[int]
 

@@ -35,28 +35,32 @@ _WIDTHS: tuple[Width, ...] = (1, 2, 4, 8)
 
 
 class Projection(NamedTuple):
-    """The least cost for each combination of the others' values, and the own value that it takes (the first)."""
+    """The minimum cost for each combination of the others' values, and the first own value that attains it."""
 
     costs: Codes
     choices: Codes
 
 
 class Extent(NamedTuple):
-    """A table of so many cells, in which a cost takes `width` bytes."""
+    """The size of a table: its number of cells, and `width`, the bytes of a cost."""
 
     cells: int
     width: int
 
 
 def width_of(dearest: int) -> Width:
-    """The bytes that a cost takes in a table where none is larger, short of `inf`."""
+    """Return the bytes of a cost in a table whose largest finite cost is `dearest`."""
     return next(width for width in _WIDTHS if dearest < _top(width))
 
 
 def bytes_of(shape: Sequence[int], own: int, width: int, inputs: Sequence[Extent]) -> int:
-    """The most that all arrays hold at any moment while a table is made and sent. Nothing is allocated.
+    """Return the peak size of all arrays while a table is made and sent. Nothing is allocated.
 
-    `shape` is that of the table, `own` the number of own values, `inputs` are the tables that are joined.
+    Args:
+        shape: The table's shape.
+        own: The number of own values.
+        width: The bytes of a cost in it.
+        inputs: The tables that are joined.
     """
     cells = math.prod(shape)
     block = own * math.prod(shape[_stepped(shape, own) :])
@@ -66,9 +70,9 @@ def bytes_of(shape: Sequence[int], own: int, width: int, inputs: Sequence[Extent
 
 
 def aligned(table: Table, axes: Sequence[str], onto: Sequence[str]) -> Table:
-    """A view of `table` with an axis for each robot in `onto`: of length 1 where it says nothing of that robot.
+    """Return a view of `table` with an axis for each robot in `onto`; of length 1 if the table has no such axis.
 
-    `axes` are the robots that it has axes for; those that are not in `onto` have one value.
+    `axes` are the robots of the table's axes; those that are not in `onto` have a single value.
     """
     kept = [name for name in axes if name in onto]
     table = table[tuple([slice(None) if name in onto else 0 for name in axes])]
@@ -77,10 +81,10 @@ def aligned(table: Table, axes: Sequence[str], onto: Sequence[str]) -> Table:
 
 
 def project(shape: Sequence[int], charges: Sequence[float], tables: Sequence[Table], width: Width) -> Projection:
-    """Add up `charges`, of the own values, and `tables`; then take the least over the own values.
+    """Add up `charges`, of the own values, and `tables`; then minimise over the own values.
 
-    `tables` have the own axis first, then the axes of `shape` (see `aligned`). The join, which is larger than the
-    result by the own axis, is never there as a whole, but block by block. Small tables are added up first.
+    `tables` have the own axis first, then the axes of `shape` (see `aligned`). The join is larger than the result by
+    the own axis. It is never in memory as a whole, but is made block by block. Small tables are added up first.
     """
     costs = np.full(shape, _top(width), f"<u{width}")
     choices = np.zeros(shape, _choice(len(charges)))
@@ -98,12 +102,12 @@ def project(shape: Sequence[int], charges: Sequence[float], tables: Sequence[Tab
 
 
 def is_hopeless(costs: Codes) -> bool:
-    """Return whether all of them are `inf`."""
+    """Return whether all costs are `inf`."""
     return bool(costs.min() == _top(costs.itemsize))
 
 
 def packed_costs(costs: Codes) -> Iterator[tuple[Width, bytes]]:
-    """`costs` for the wire, in pieces: no cost takes more bytes than the dearest one needs."""
+    """Yield `costs` in pieces for the wire, with as few bytes per cost as the largest one needs."""
     width = width_of(_max_finite(costs))
     flat = costs.reshape(-1)
     step = PIECE // width
@@ -113,9 +117,9 @@ def packed_costs(costs: Codes) -> Iterator[tuple[Width, bytes]]:
 
 
 class IncomingTable:
-    """A table of this `shape`, no cost in which is above `dearest`, that comes in pieces.
+    """A table of this `shape` that arrives in pieces; `dearest` is an upper bound on its finite costs.
 
-    It takes its memory with the first piece: ask `bytes_of` before.
+    Memory is allocated with the first piece; check `bytes_of` before.
     """
 
     def __init__(self, shape: Sequence[int], dearest: int) -> None:
@@ -126,18 +130,18 @@ class IncomingTable:
 
     @property
     def complete(self) -> bool:
-        """Whether all of it is there."""
+        """Whether the whole table has arrived."""
         return not self._left
 
     @property
     def costs(self) -> Codes:
-        """What has come. Raises `ValueError` before the first piece."""
+        """The costs that have arrived. Raises `ValueError` before the first piece."""
         if self._costs is None:
             raise ValueError("no piece of the table has come")
         return self._costs
 
     def add(self, width: Width, piece: bytes) -> None:
-        """Take in the next piece. Raises `ValueError` for bytes that are none."""
+        """Append the next piece. Raises `ValueError` for bytes that do not fit."""
         if width > width_of(self._dearest) or (self._costs is not None and width != self._costs.itemsize):
             raise ValueError(f"{width} bytes a cost are not what the table has")
         if len(piece) % width or not 0 < len(piece) // width <= self._left:
@@ -153,7 +157,7 @@ class IncomingTable:
 
 
 def _block(table: Table, place: Sequence[int]) -> Array:
-    """What `table` says at this place on the first axes after the own one, as costs that can be added."""
+    """Return the block of `table` at this place on the first axes after the own one, as floats."""
     steps = [index if length > 1 else 0 for index, length in zip(place, table.shape[1:], strict=False)]
     index: tuple[slice | int, ...] = (slice(None), *steps)
     block = table[index]
@@ -164,14 +168,14 @@ def _block(table: Table, place: Sequence[int]) -> Array:
 
 
 def _max_finite(costs: Codes) -> int:
-    """The largest that is finite; 0 if there is none."""
+    """Return the largest finite cost; 0 if there is none."""
     flat = costs.reshape(-1)
     blocks = (flat[start : start + BLOCK] for start in range(0, flat.size, BLOCK))
     return int(max((block.max(where=block < _top(costs.itemsize), initial=0) for block in blocks), default=0))
 
 
 def _stepped(shape: Sequence[int], own: int) -> int:
-    """How many of the first axes are gone through place by place, so that what remains makes a block."""
+    """Return the number of leading axes to iterate over, so that the remaining ones form a block."""
     split, cells, most = len(shape), own, BLOCK * LONGEST
     while split and cells * shape[split - 1] <= most:
         split -= 1
@@ -189,7 +193,7 @@ def _top(width: int) -> int:
 
 
 def piece_in_words(costs: bytes, width: Width) -> str:
-    """Return what is in a piece of a table: `a piece of my table: 16 costs, from 17 to 24`.
+    """Return a piece of a table in words: `a piece of my table: 16 costs, from 17 to 24`.
 
     Raises:
         ValueError: if the bytes are not whole cells.

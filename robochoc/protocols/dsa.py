@@ -40,7 +40,7 @@ from robochoc.protocols.traits import ENDS_WITH_PROOF, Traits
 
 
 class DSASettings(CycleSettings, frozen=True):
-    """`variant`: A, B or C. `probability` (p): with which a robot moves. `cycles`: after so many all robots stop."""
+    """`variant`: A, B or C. `probability` (p): the probability of a move. `cycles`: the number of cycles."""
 
     variant: Literal["A", "B", "C"] = "B"
     probability: float = 0.7
@@ -52,7 +52,7 @@ class DSASettings(CycleSettings, frozen=True):
 
 
 class DSA(CycleProtocol):
-    """One agent of DSA. A cycle has one phase: all tell their values."""
+    """One agent of DSA. A cycle has one phase: all robots send their values."""
 
     messages = Value
     settings: DSASettings = DSASettings()
@@ -68,12 +68,12 @@ class DSA(CycleProtocol):
     )
 
     def begin(self) -> None:
-        """Take any value."""
+        """Take a random value."""
         self.take(self.any_value())
         self.tell_value(self._choose)
 
     def _choose(self, messages: Mapping[str, Message]) -> None:
-        """All neighbours' values are known: move, or stay."""
+        """Move or stay, with all neighbours' values known."""
         burdens = self.problem.lexicographic_costs(values_in(messages))
         now, least = burdens[self.present], min(burdens)
         index = self.present
@@ -86,5 +86,5 @@ class DSA(CycleProtocol):
             self.tell_value(self._choose)
 
     def _moves_sideways(self, conflict: bool) -> bool:  # noqa: FBT001 - the variants' only question
-        """Return whether a robot that gains nothing may move all the same."""
+        """Return whether the variant allows a move that gains nothing."""
         return self.settings.variant == "C" or (self.settings.variant == "B" and conflict)

@@ -35,13 +35,13 @@ from robochoc.solver.explanation import Invalidated, domain_key
 
 
 class Nogood(abt.Nogood, frozen=True):
-    """While all of `lhs` and all that is named in `because` stands, the receiver cannot take `value`."""
+    """A nogood: the receiver cannot take `value` while all in `lhs` and all constraints in `because` hold."""
 
     because: list[str]
 
 
 class DynABT(ABT, DynamicProtocol):
-    """One agent of DynABT. Beside ABT's state: `proof`, the explanation of the empty nogood it has derived."""
+    """One agent of DynABT. State besides ABT's: `proof`, the explanation of a derived empty nogood."""
 
     messages = Ok | Nogood | AddLink
     traits = Traits(
@@ -59,12 +59,12 @@ class DynABT(ABT, DynamicProtocol):
         """Lower robots that have never been told the own value."""
 
     def start(self) -> None:
-        """Choose a first value and tell it."""
+        """Choose a first value and send it."""
         self.untold = []
         super().start()
 
     def change(self, problem: LocalProblem, order: PriorityOrder, invalidated: Invalidated) -> None:
-        """The propagation phase: keep what still stands."""
+        """Adapt the state to the changed problem: the propagation phase."""
         for agent in invalidated.agents:
             self._update(agent, None)
         self.store.drop(invalidated.keys)
@@ -81,7 +81,7 @@ class DynABT(ABT, DynamicProtocol):
         self.problem, self.order = problem, order
 
     def resume(self, *, lossless: bool) -> None:
-        """Tell what the others may have missed, and check the view."""
+        """Send what other robots may have missed, and check the view."""
         if not lossless:
             for agent in sorted(self.higher.difference(self.problem.parents), key=self.order.rank.__getitem__):
                 self.send(agent, AddLink())
@@ -94,7 +94,7 @@ class DynABT(ABT, DynamicProtocol):
         self.untold = []
 
     def _adjust_nogoods(self, problem: LocalProblem, order: PriorityOrder, invalidated: Invalidated) -> None:
-        """The store and the value, in the places that values have in the changed domain."""
+        """Move the nogoods and the value to their places in the changed domain."""
         old, self.store = self.store, NogoodStore(order, len(problem.values))
         known = {} if problem.agent in invalidated.agents else {value: i for i, value in enumerate(self.problem.values)}
         for index, value in enumerate(problem.values):

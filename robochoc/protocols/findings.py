@@ -14,16 +14,16 @@ from robochoc.model.outcome import PseudoTreeNode
 
 
 class Incumbent(msgspec.Struct, frozen=True):
-    """The cheapest assignment of all robots that this one has heard of, and its `cost`."""
+    """The cheapest assignment of all robots that one robot knows, and its `cost`."""
 
     cost: float
     values: dict[str, Value]
 
 
 class Trail(msgspec.Struct, frozen=True):
-    """The values that a robot has had in each cycle of a synchronous protocol: entries (cycle, place of the value).
+    """The values of a robot in each cycle of a synchronous protocol: entries (cycle, place of the value).
 
-    There is an entry where the value changes; between two it stays. All of it up to `cycle` is final.
+    There is an entry for each change of the value. All cycles up to `cycle` are final.
     """
 
     entries: list[tuple[int, int]]
@@ -31,9 +31,10 @@ class Trail(msgspec.Struct, frozen=True):
 
 
 class Findings(msgspec.Struct, frozen=True):
-    """What one robot knows of the whole; None where it, or its protocol, knows nothing of the kind.
+    """A robot's knowledge of the whole search; None for what it, or its protocol, does not know.
 
-    `bound`: no assignment of the robots that it speaks for (a root: of its tree; the first robot: of all) costs less.
+    `bound` is a lower bound on the cost of every assignment of the robots that it is for (a root: its tree; the first
+    robot: all robots).
     """
 
     best: Incumbent | None = None

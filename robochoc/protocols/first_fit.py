@@ -21,7 +21,7 @@ from robochoc.solver.compiled import LocalProblem
 
 
 class Placed(Message, frozen=True):
-    """Where the sender flies; None: it has withdrawn."""
+    """The sender's value; None if it has withdrawn."""
 
     value: Value | None
 
@@ -33,7 +33,7 @@ class Placed(Message, frozen=True):
 
 
 class FirstFit(Protocol):
-    """One robot. `view` holds the values of the parents that fly, `awaited` the parents not yet heard."""
+    """One robot. `view` holds the values of the parents that fly, `awaited` the parents without a message yet."""
 
     messages = Placed
     traits = Traits(concludes=(), paper="paper, Section 5.2", complete=False, writes_to_non_neighbours=False)
@@ -44,18 +44,18 @@ class FirstFit(Protocol):
         self.awaited = set(problem.parents)
 
     def start(self) -> None:
-        """Robots without parents decide at once."""
+        """Decide at once if there are no parents."""
         self.settle()
 
     def receive(self, sender: str, message: Message) -> None:
-        """Note what a parent has decided."""
+        """Store a parent's decision."""
         value = cast("Placed", message).value
         self.awaited.discard(sender)
         if value is not None:
             self.view[sender] = value
 
     def settle(self) -> None:
-        """With the last parent heard, decide and tell: each robot does so exactly once."""
+        """Decide and send the decision once all parents have decided; each robot does so exactly once."""
         if self.awaited:
             return
         places = range(len(self.problem.values))

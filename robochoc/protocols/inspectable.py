@@ -14,7 +14,7 @@ from robochoc.model.message import Value
 
 
 class Inspectable:
-    """Base of `Protocol`: members with which its state is shown. All are optional."""
+    """The base of `Protocol`: optional members that show its state."""
 
     numbered_values: ClassVar[bool] = False
     """Whether robots never see others' values, but numbers of assignments; `view` holds these numbers then."""
@@ -26,13 +26,13 @@ class Inspectable:
 
     @property
     def kept_nogoods(self) -> Iterable[Mapping[str, Value]]:
-        """The nogoods kept besides a `NogoodStore`: assignments that cannot all hold, the own one among them."""
+        """The nogoods outside a `NogoodStore`: assignments that cannot all hold, the own one included."""
         return ()
 
     def value_notes(self, index: int) -> Mapping[str, float]:  # noqa: ARG002 - for those that have notes
-        """Return what this robot notes on its value at `index`, by name: `{"LB": 3, "UB": 7}`."""
+        """Return this robot's notes on its value at `index`, by name: `{"LB": 3, "UB": 7}`."""
         return {}
 
     def tried(self, index: int) -> bool:  # noqa: ARG002 - as above
-        """Return whether the value at `index` has been tried in vain since the view is as it is."""
+        """Return whether the value at `index` has been tried without success for the current view."""
         return False

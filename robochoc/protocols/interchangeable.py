@@ -16,24 +16,24 @@ T = TypeVar("T", bound=Hashable)
 
 
 def grouped(items: Iterable[T]) -> tuple[list[T], list[Run]]:
-    """The distinct ones of `items`, in the order of their first places, and the runs."""
+    """Return the distinct `items`, in the order of their first places, and the runs."""
     places: dict[T, int] = {}
     numbers = [places.setdefault(item, len(places)) for item in items]
     return list(places), [(place, len(list(same))) for place, same in groupby(numbers)]
 
 
 def expanded(distinct: Sequence[T], runs: Sequence[Run]) -> list[T]:
-    """The list that `grouped` was given. Only for runs that are `fits`."""
+    """Return the list that was passed to `grouped`. The runs must pass `fits`."""
     return [distinct[place] for place, count in runs for _ in range(count)]
 
 
 def fits(kinds: int, runs: Sequence[Run], robots: int) -> bool:
-    """Return whether `runs` of so many kinds tell of so many robots."""
+    """Return whether `runs` over `kinds` distinct items describe exactly so many robots."""
     return sum(count for _, count in runs) == robots and all(0 <= at < kinds and count > 0 for at, count in runs)
 
 
 def cut_off(runs: Iterable[Run], robots: int) -> list[Run]:
-    """Return `runs` as far as they tell of no more than so many robots."""
+    """Return `runs`, cut off after so many robots."""
     cut: list[Run] = []
     for place, count in runs:
         taken = max(0, min(count, robots))

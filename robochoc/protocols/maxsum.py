@@ -56,7 +56,10 @@ from robochoc.solver.compiled import LocalProblem
 
 
 class R(wire.Message, frozen=True):
-    """What each value of the receiver costs by each of the sender's functions that it is in."""
+    """Messages from functions to a variable, a row for each of the sender's functions with the receiver in it.
+
+    A row holds the minimum cost of the function for each of the receiver's values.
+    """
 
     rows: list[Row]
 
@@ -70,7 +73,10 @@ class R(wire.Message, frozen=True):
 
 
 class Q(wire.Message, frozen=True):
-    """What each value of the sender costs by all but one function: for each of the receiver's, in the order of R."""
+    """Messages from a variable to functions, a row for each of the receiver's functions, in the order of R.
+
+    A row holds the cost of each of the sender's values by all its other functions.
+    """
 
     rows: list[Row]
 
@@ -88,7 +94,7 @@ def _rows_in_words(rows: Sequence[Row]) -> str:
 
 
 class MaxSumSettings(CycleSettings, frozen=True):
-    """`damping`: the share of the last Q in a new one. `preference`: of a value, at most. `cycles`: how many."""
+    """`damping`: the weight of the last Q. `preference`: the maximum for a value. `cycles`: the number of cycles."""
 
     damping: float = 0.5
     preference: float = 0.01
@@ -104,8 +110,8 @@ class MaxSumSettings(CycleSettings, frozen=True):
 class MaxSum(CycleProtocol):
     """One agent of Max-Sum: its variable, and the functions of which it is the lowest robot.
 
-    Those `above` hear R from this robot and say Q to it, those `below` say R and hear Q. `factors` are the own
-    functions, `edges` the last Q to each function: to the own ones first, then those of each robot below.
+    Robots in `above` receive R from this robot and send Q to it; robots in `below` send R and receive Q. `factors` are
+    the own functions. `edges` holds the last Q to each function: the own ones first, then those of each robot below.
     """
 
     messages = Domain | R | Q
@@ -131,7 +137,7 @@ class MaxSum(CycleProtocol):
         self._own: list[Row] = []
 
     def begin(self) -> None:
-        """Take the value that is best by itself, and tell all values to those who hold the own functions."""
+        """Take the value with the lowest own charge, and send the domain to the holders of the own functions."""
         preference = self.settings.preference
         self.preferred = [cost + preference * self.chance() for cost in self.problem.costs({})]
         self.take(_cheapest(self.preferred))
@@ -139,7 +145,7 @@ class MaxSum(CycleProtocol):
         self.listen(self.above, self._build)
 
     def _build(self, messages: Mapping[str, wire.Message]) -> None:
-        """The domains of all in the own functions are known. All Q are 0 at first."""
+        """Make the own functions from the received domains. All Q are 0 at first."""
         domains = {name: message.values for name, message in messages.items() if isinstance(message, Domain)}
         self.factors = Factor.joined(self.problem.tables(domains))
         self.edges = [[0.0] * len(self.preferred) for _ in self.factors]
@@ -147,11 +153,11 @@ class MaxSum(CycleProtocol):
         self._tell_r(zeros)
 
     def _hear_q(self, messages: Mapping[str, wire.Message]) -> None:
-        """All Q have come."""
+        """Process all Q of the cycle."""
         self._tell_r({name: told.rows for name, told in messages.items() if isinstance(told, Q)})
 
     def _tell_r(self, messages: Mapping[str, Sequence[Row]]) -> None:
-        """What the own functions say to their variables; to the own one without a message."""
+        """Send R from the own functions to their variables; the own variable needs no message."""
         rows = {name: iter(told) for name, told in messages.items()}
         said: dict[str, list[Row]] = {name: [] for name in self.above}
         self._own = []
@@ -165,7 +171,7 @@ class MaxSum(CycleProtocol):
         self.listen(self.below, self._decide)
 
     def _decide(self, messages: Mapping[str, wire.Message]) -> None:
-        """All R have come: take the value that costs least, and say Q."""
+        """Take the value with the lowest cost by all R, and send Q."""
         told = {name: said.rows for name, said in messages.items() if isinstance(said, R)}
         rows = [*self._own, *(row for rows in told.values() for row in rows)]
         z = self._z(rows)
@@ -183,14 +189,14 @@ class MaxSum(CycleProtocol):
         self.listen(self.above, self._hear_q)
 
     def _z(self, rows: Sequence[Row]) -> Row:
-        """What each value costs by the preferences and all of `rows`."""
+        """Return the cost of each value: its preference and the sum of all `rows` (Z)."""
         z = self.preferred
         for row in rows:
             z = list(map(add, z, row))  # not `sum`, which rounds as the version of Python has it
         return z
 
     def _q(self, rows: Sequence[Row], z: Row) -> list[Row]:
-        """What each value costs by all but one of `rows`, for each of them."""
+        """Return, for each of `rows`, the cost of each value without that row (Q)."""
         if INFINITE in z:
             fresh = [self._z([*rows[:place], *rows[place + 1 :]]) for place in range(len(rows))]
         else:
@@ -212,5 +218,5 @@ class MaxSum(CycleProtocol):
 
 
 def _cheapest(row: Row) -> int:
-    """The place of the least entry, the first of several."""
+    """Return the place of the minimum, the first of several."""
     return row.index(min(row))

@@ -17,7 +17,7 @@ SMALL = 400
 
 
 class Factor:
-    """What some constraints over the same robots charge together: over `agents`, and the robot that holds them."""
+    """A function node: the sum of all constraints over the same robots (`agents` and the one that holds it)."""
 
     def __init__(self, agents: Sequence[str], charges: Array) -> None:
         self.agents = agents
@@ -27,7 +27,7 @@ class Factor:
 
     @classmethod
     def joined(cls, tables: Iterable[CostTable]) -> list[Self]:
-        """One for all of `tables` that are over the same robots; those over nobody else are none."""
+        """Return one function for each set of robots in `tables`; tables of a single robot are left out."""
         sums: dict[tuple[str, ...], Array] = {}
         for table in tables:
             if table.agents:
@@ -36,14 +36,14 @@ class Factor:
         return [cls(agents, charges) for agents, charges in sums.items()]
 
     def r(self, told: Sequence[Row]) -> list[Row]:
-        """What each robot's values cost at best, by what all others have `told`; in the order of the axes."""
+        """Return the minimum cost of each robot's values, given the others' Q in `told`; in the order of the axes."""
         if self._lines:
             (other, own), (lines, columns) = told, self._lines
             return [[min(map(add, line, own)) for line in lines], [min(map(add, line, other)) for line in columns]]
         return [self._least(place, told) for place in range(len(told))]
 
     def _least(self, place: int, told: Sequence[Row]) -> Row:
-        """The least of all entries for each value on the axis at `place`."""
+        """Return the minimum cost for each value on the axis at `place`."""
         import numpy as np  # noqa: PLC0415 - for large tables only
 
         axes = tuple([axis for axis in range(len(told)) if axis != place])

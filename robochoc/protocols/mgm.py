@@ -39,13 +39,13 @@ from robochoc.solver.compiled import LexicographicCost, LocalProblem
 
 
 def saving_in_words(broken: int, cost: float) -> str:
-    """Return what a move saves: `1 broken constraint and 3 of cost`, or `nothing`."""
+    """Return the gain of a move in words: `1 broken constraint and 3 of cost`, or `nothing`."""
     saved = [counted(broken, "broken constraint")] if broken else []
     return listed([*saved, f"{cost_text(cost)} of cost"] if cost else saved) or "nothing"
 
 
 class Gain(wire.Message, frozen=True):
-    """What the sender's move would save: broken hard constraints, and costs (`gain`)."""
+    """The gain of the sender's best move: broken hard constraints, and costs (`gain`)."""
 
     broken: int
     cost: int | float
@@ -58,9 +58,9 @@ class Gain(wire.Message, frozen=True):
 
 
 class Gainers(CycleProtocol):
-    """What MGM and MGM-2 have in common: cycles begin with values, and gains decide who of neighbours moves.
+    """The common base of MGM and MGM-2: a cycle begins with values, and gains decide which neighbour moves.
 
-    `target` is the value that this robot would move to, and `gain` what that would save.
+    `target` is the value of this robot's best move, and `gain` the gain of that move.
     """
 
     def __init__(self, problem: LocalProblem, order: PriorityOrder) -> None:
@@ -69,7 +69,7 @@ class Gainers(CycleProtocol):
         self.gain: LexicographicCost = NO_GAIN
 
     def best_unilateral(self, view: Mapping[str, wire.Value]) -> None:
-        """The best move of this robot alone, which may be to stay (BestUnilateralGain)."""
+        """Find the best move of this robot alone, which may be to stay (BestUnilateralGain)."""
         burdens = self.problem.lexicographic_costs(view)
         least = min(burdens)
         self.gain = gain(burdens[self.present], least)
@@ -78,7 +78,7 @@ class Gainers(CycleProtocol):
             self.target = self.any_of([place for place, burden in enumerate(burdens) if burden == least])
 
     def wins(self, gains: Mapping[str, wire.Message]) -> bool:
-        """Return whether this robot gains, and more than all in `gains`; of equals, who comes first in the order."""
+        """Return whether the own gain is positive and the largest; ties go to the first robot in the order."""
         rank = self.order.rank
         return self.gain > NO_GAIN and all(
             (self.gain, rank[name]) > ((told.broken, told.cost), rank[self.problem.agent])
@@ -88,7 +88,7 @@ class Gainers(CycleProtocol):
 
 
 class MGM(Gainers):
-    """One agent of MGM. A cycle has two phases: all tell their values, then their gains."""
+    """One agent of MGM. A cycle has two phases: all robots send their values, then their gains."""
 
     messages = Value | Gain
     traits = Traits(
@@ -103,18 +103,18 @@ class MGM(Gainers):
     )
 
     def begin(self) -> None:
-        """Take any value."""
+        """Take a random value."""
         self.take(self.any_value())
         self.tell_value(self._weigh)
 
     def _weigh(self, messages: Mapping[str, wire.Message]) -> None:
-        """All neighbours' values are known: say what the best own move would save."""
+        """Send the gain of the best own move, with all neighbours' values known."""
         self.best_unilateral(values_in(messages))
         self.tell(self.problem.neighbours, Gain(*self.gain))
         self.listen(self.problem.neighbours, self._move)
 
     def _move(self, messages: Mapping[str, wire.Message]) -> None:
-        """All neighbours' gains are known: move, or let others."""
+        """Move if the own gain is the largest, with all neighbours' gains known."""
         self.take(self.target if self.wins(messages) else self.present)
         if not self.over:
             self.tell_value(self._weigh)

@@ -50,9 +50,9 @@ Gains = list[list[tuple[int, int | float]]]
 
 
 class Offer(wire.Message, frozen=True):
-    """What it would save the sender: a row for each of the receiver's values, and in it a pair for each of its own.
+    """An offer of a joint move: a row for each of the receiver's values, with a gain for each of the sender's.
 
-    Broken hard constraints, and costs. None: no offer (`offer`).
+    A gain is a pair: broken hard constraints, and costs. None: no offer (`offer`).
     """
 
     gains: Gains | None
@@ -71,7 +71,7 @@ class Offer(wire.Message, frozen=True):
 
 
 class Accept(wire.Message, frozen=True):
-    """The receiver is to take its value at `place`, which would save so much in all (`accept`)."""
+    """The acceptance of an offer: the receiver's value at `place`, and the total gain (`accept`)."""
 
     place: int
     broken: int
@@ -86,7 +86,7 @@ class Accept(wire.Message, frozen=True):
 
 
 class Reject(wire.Message, frozen=True):
-    """Your offer is not taken (`reject`)."""
+    """The rejection of an offer (`reject`)."""
 
     act = Act(Performative.REJECT_PROPOSAL, "the offer that was proposed is not taken")
 
@@ -96,7 +96,10 @@ class Reject(wire.Message, frozen=True):
 
 
 class Go(wire.Message, frozen=True):
-    """Whether the sender, who is committed to the receiver, gains most among its neighbours (`go`, `no go`)."""
+    """A committed robot's word on the joint move: whether its gain is the largest among its neighbours.
+
+    The paper's messages are `go` and `no go`.
+    """
 
     go: bool
 
@@ -110,7 +113,7 @@ class Go(wire.Message, frozen=True):
 
 
 class JointMove(NamedTuple):
-    """A joint move: what it saves, and with whom; the own value's place, and the partner's."""
+    """A joint move: its gain, the partner, and the places of both values."""
 
     gain: LexicographicCost
     partner: str
@@ -119,7 +122,7 @@ class JointMove(NamedTuple):
 
 
 class MGM2Settings(CycleSettings, frozen=True):
-    """`threshold` (q): the probability of being an offerer. `cycles`: after so many all robots stop."""
+    """`threshold` (q): the probability of being an offerer. `cycles`: the number of cycles."""
 
     threshold: float = 0.5
 
@@ -153,18 +156,18 @@ class MGM2(Gainers):
         self._wins = False
 
     def begin(self) -> None:
-        """Take any value; tell all of them."""
+        """Take a random value and send the domain."""
         self.take(self.any_value())
         self.tell(self.problem.neighbours, Domain(list(self.problem.values)))
         self.listen(self.problem.neighbours, self._meet)
 
     def _meet(self, messages: Mapping[str, wire.Message]) -> None:
-        """All neighbours' domains are known: the first cycle begins."""
+        """Begin the first cycle, with all neighbours' domains known."""
         self.domains = {name: message.values for name, message in messages.items() if isinstance(message, Domain)}
         self.tell_value(self._offer)
 
     def _offer(self, messages: Mapping[str, wire.Message]) -> None:
-        """All neighbours' values are known: be an offerer, or not."""
+        """Become an offerer or not, with all neighbours' values known."""
         self.view = values_in(messages)
         self.partner = None
         if self.chance() < self.settings.threshold:
@@ -175,13 +178,13 @@ class MGM2(Gainers):
         self.listen(self.problem.neighbours, self._answer)
 
     def _gains(self, partner: str) -> Gains:
-        """What would be saved if the partner took each of its values, and this robot each of its own."""
+        """Return the gain for each of the partner's values and each own value."""
         rows = [self.problem.lexicographic_costs({**self.view, partner: value}) for value in self.domains[partner]]
         now = rows[self.domains[partner].index(self.view[partner])][self.present]
         return [[gain(now, burden) for burden in row] for row in rows]
 
     def _answer(self, messages: Mapping[str, wire.Message]) -> None:
-        """All offers have come: an offerer takes none; others take the best, if it saves anything."""
+        """Answer all offers: an offerer rejects them; other robots accept the best if it gains anything."""
         offers = {name: told.gains for name, told in messages.items() if isinstance(told, Offer) and told.gains}
         if self.partner is not None:
             self.tell(offers, Reject())
@@ -192,7 +195,7 @@ class MGM2(Gainers):
             self._tell_gain()
 
     def _commit(self, offers: Mapping[str, Gains]) -> str | None:
-        """Accept the best of all offers, if what it saves in all is anything; whose it is."""
+        """Accept the best offer if its total gain is positive; return its sender."""
         moves = [move for name, gains in offers.items() for move in self._joint(name, gains)]
         self.gain = max((move.gain for move in moves), default=NO_GAIN)
         if self.gain <= NO_GAIN:
@@ -203,7 +206,10 @@ class MGM2(Gainers):
         return move.partner
 
     def _joint(self, offerer: str, gains: Gains) -> Iterator[JointMove]:
-        """All moves that are offered, with what they save both: to the offerer's share comes what it has no part in."""
+        """Yield all offered moves with the total gain of both robots.
+
+        To the offerer's gain it adds the gain on constraints that the offerer has no part in.
+        """
         burdens = self.problem.lexicographic_costs(
             {name: value for name, value in self.view.items() if name != offerer}
         )
@@ -214,7 +220,7 @@ class MGM2(Gainers):
                 yield JointMove((broken + offered[0], cost + offered[1]), offerer, own, place)
 
     def _hear_answer(self, messages: Mapping[str, wire.Message]) -> None:
-        """The offer was taken, or this robot stands alone."""
+        """Commit to the partner if it accepted the offer; otherwise use the best own move."""
         (answer,) = messages.values()
         if isinstance(answer, Accept):
             self.target, self.gain = answer.place, (answer.broken, answer.cost)
@@ -229,7 +235,7 @@ class MGM2(Gainers):
         self.listen(self.problem.neighbours, self._decide)
 
     def _decide(self, messages: Mapping[str, wire.Message]) -> None:
-        """All neighbours' gains are known: move alone, or tell the partner whether to move together."""
+        """Move alone, or send the partner `Go`, with all neighbours' gains known."""
         wins = self.wins({name: told for name, told in messages.items() if name != self.partner})
         if self.partner is None:
             self._end_cycle(move=wins)
@@ -239,7 +245,7 @@ class MGM2(Gainers):
             self.listen((self.partner,), self._go)
 
     def _go(self, messages: Mapping[str, wire.Message]) -> None:
-        """Both move, or neither."""
+        """Make the joint move if both robots allow it."""
         (told,) = messages.values()
         self._end_cycle(move=self._wins and isinstance(told, Go) and told.go)
 

@@ -23,12 +23,12 @@ NOTHING: Explanation = frozenset()
 
 
 def contradicts(value: Value, other: Value) -> bool:
-    """Return whether two pictures of one robot's value cannot both be true: they differ where both say something."""
+    """Return whether two views of one robot's value differ in a component that both contain."""
     return any(part != told for part, told in zip(value, other, strict=True) if part is not None and told is not None)
 
 
 def joined(value: Value | None, other: Value) -> Value:
-    """What two pictures of one robot's value, which do not contradict each other, say together."""
+    """Return the union of two views of one robot's value, which do not contradict each other."""
     if value is None:
         return other
     return tuple([told if part is None else part for part, told in zip(value, other, strict=True)])
@@ -37,8 +37,8 @@ def joined(value: Value | None, other: Value) -> Value:
 class NogoodStore:
     """The left sides of the nogoods that rule out own values, by the value's place in the domain.
 
-    Beside each stands its explanation: keys of the constraints and domains it was derived from (empty where the
-    protocol keeps none).
+    Each has an explanation: the keys of the constraints and domains it was derived from (empty if the protocol keeps
+    none).
     """
 
     def __init__(self, order: PriorityOrder, size: int) -> None:
@@ -53,18 +53,18 @@ class NogoodStore:
         return (lhs for lhs in self._by_value if lhs is not None)
 
     def because(self, index: int) -> Explanation:
-        """The explanation of the nogood against the value at `index`."""
+        """Return the explanation of the nogood against the value at `index`."""
         return self._because[index]
 
     def add(self, index: int, lhs: LeftSide, because: Explanation = NOTHING) -> None:
-        """Store `lhs` against the value at `index`, unless the nogood that is there already is better."""
+        """Store `lhs` against the value at `index`, unless a better nogood is stored there."""
         present = self._by_value[index]
         if present is None or self._better(lhs, present):
             self._by_value[index] = lhs
             self._because[index] = because
 
     def forget(self, agent: str, value: Value | None = None) -> None:
-        """Drop every nogood that rests on another value of `agent` than `value` (None: on any)."""
+        """Drop all nogoods that contain another value of `agent` than `value` (None: any value)."""
         stale = {
             id(lhs) for lhs in self._distinct() if agent in lhs and (value is None or contradicts(lhs[agent], value))
         }
@@ -72,13 +72,13 @@ class NogoodStore:
             self._by_value = [None if id(lhs) in stale else lhs for lhs in self._by_value]
 
     def drop(self, keys: Explanation) -> None:
-        """Drop every nogood that was derived from anything in `keys`."""
+        """Drop all nogoods that were derived from anything in `keys`."""
         for index, because in enumerate(self._because):
             if not keys.isdisjoint(because):
                 self._by_value[index] = None
 
     def resolve(self) -> dict[str, Value]:
-        """The union of all left sides: what rules out the whole domain when every value has a nogood."""
+        """Return the union of all left sides: the resolvent, if every value has a nogood."""
         union: dict[str, Value] = {}
         for lhs in self._distinct():
             for agent, value in lhs.items():
@@ -86,13 +86,13 @@ class NogoodStore:
         return union
 
     def explanation(self) -> Explanation:
-        """The union of all explanations: what `resolve` was derived from, but for the domain."""
+        """Return the union of all explanations, without the own domain."""
         return NOTHING.union(*self._because)
 
     def _distinct(self) -> Iterable[LeftSide]:
-        """Each left side once, in the order of the values: many values often share one."""
+        """Yield each left side once, in the order of the values: many values often share one."""
         return {id(lhs): lhs for lhs in self}.values()
 
     def _better(self, left: LeftSide, right: LeftSide) -> bool:
-        """Highest possible lowest variable (Hirayama and Yokoo 2000); between equals, the shorter one."""
+        """Return whether `left` has the higher lowest variable (Hirayama and Yokoo 2000), or is shorter."""
         return (self._order.depth(left), len(left)) < (self._order.depth(right), len(right))

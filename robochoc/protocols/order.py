@@ -6,7 +6,7 @@ from collections.abc import Iterable, Mapping, Sequence
 
 
 class PriorityOrder:
-    """Names of all robots, the highest priority first. Static, and the same for every robot of a run.
+    """The names of all robots, the highest priority first. Static, and the same for every robot of a run.
 
     `tree` is the pseudo-tree that the order induces; None unless the protocol asked for it (`Traits.tree`).
     """
@@ -17,20 +17,21 @@ class PriorityOrder:
         self.tree = None if links is None else PseudoTree.induced(self.names, links)
 
     def lowest(self, names: Iterable[str]) -> str:
-        """The lowest-priority robot of `names`. Raises `ValueError` when there is none."""
+        """Return the lowest-priority robot of `names`. Raises `ValueError` if `names` is empty."""
         return max(names, key=self.rank.__getitem__)
 
     def depth(self, names: Iterable[str]) -> int:
-        """How far down the lowest robot of `names` stands; -1 when there is none."""
+        """Return the place of the lowest-priority robot of `names`; -1 if `names` is empty."""
         return max((self.rank[name] for name in names), default=-1)
 
 
 class PseudoTree:
-    """A forest in which robots that share a constraint stand one above the other.
+    """A forest in which robots that share a constraint are on one branch.
 
-    It is the one that a total order induces (the elimination tree; Dechter, "Constraint Processing", 2003, Section
-    4.5): a robot's tree parent is the lowest robot above it that it, or somebody below it in the tree, has to agree
-    with. Priority decreases from the roots to the leaves. `parents` maps each robot to its tree parent (None: a root).
+    It is the tree that a total order induces (the elimination tree; Dechter, "Constraint Processing", 2003, Section
+    4.5). A robot's tree parent is the lowest robot above it that shares a constraint with it or with a robot below it
+    in the tree. Priority decreases from the roots to the leaves. `parents` maps each robot to its tree parent (None: a
+    root).
     """
 
     def __init__(self, order: Sequence[str], parents: Mapping[str, str | None]) -> None:
@@ -43,7 +44,7 @@ class PseudoTree:
 
     @classmethod
     def induced(cls, order: Sequence[str], links: Mapping[str, Iterable[str]]) -> PseudoTree:
-        """The tree induced by `order`, where `links` maps each robot to those above it that it has to agree with."""
+        """Return the tree that `order` induces; `links` maps each robot to its neighbours of higher priority."""
         rank = {name: place for place, name in enumerate(order)}
         above = {name: set(links[name]) for name in order}
         parents: dict[str, str | None] = {}
@@ -56,11 +57,11 @@ class PseudoTree:
 
     @property
     def roots(self) -> list[str]:
-        """One for each part of the team that has nothing to do with the others."""
+        """The roots: one for each connected component."""
         return [name for name, parent in self.parents.items() if parent is None]
 
     def ancestors(self, name: str) -> list[str]:
-        """Those above `name`, from its parent to its root."""
+        """Return the robots above `name`, from its parent to its root."""
         above = []
         parent = self.parents[name]
         while parent is not None:
@@ -69,7 +70,7 @@ class PseudoTree:
         return above
 
     def descendants(self, name: str) -> list[str]:
-        """All those below `name`, each after its tree parent."""
+        """Return the robots below `name`, each after its tree parent."""
         below = list(self.children[name])
         for child in below:
             below.extend(self.children[child])

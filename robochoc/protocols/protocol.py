@@ -24,10 +24,10 @@ from robochoc.solver.explanation import Invalidated
 
 
 class Settings(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """What can be set of a protocol (`--set NAME=VALUE`): fields of simple types, each with its default.
+    """The base of a protocol's settings (`--set NAME=VALUE`): fields of simple types, each with its default.
 
-    A subclass's docstring says what they mean; `robochoc protocols NAME` shows it. `__post_init__` raises
-    `ValueError` where a value will not do.
+    A subclass's docstring explains its fields; `robochoc protocols NAME` shows it. `__post_init__` raises `ValueError`
+    for values that are not allowed.
     """
 
 
@@ -35,10 +35,10 @@ NO_SETTINGS = Settings()
 
 
 class Said(tuple[str, Message]):  # noqa: SLOT001 - no subclass of tuple can have slots with anything in them
-    """The receiver and the message, of what was said.
+    """An entry of the outbox: the receiver and the message.
 
-    `checks` is how many constraint checks the speaker had done by then: from it the host makes the clock that the
-    message carries, which is the speaker's when it says it (Meisels et al. 2002), not when its step is over.
+    `checks` is the number of constraint checks that the sender had done when it sent the message. The host computes the
+    message's clock from it: the sender's clock at sending (Meisels et al. 2002), not at the end of its step.
     """
 
     checks: int = 0
@@ -47,8 +47,8 @@ class Said(tuple[str, Message]):  # noqa: SLOT001 - no subclass of tuple can hav
 class Protocol(Inspectable, ABC):
     """One robot's side of a protocol.
 
-    Subclasses declare `messages`, the union of the message types that they receive, and their `traits`: what they
-    are and what they can take. Their module's docstring is what `robochoc protocols NAME` shows.
+    Subclasses declare `messages`, the union of the message types that they receive, and their `traits`: properties and
+    capabilities. The docstring of their module is shown by `robochoc protocols NAME`.
     """
 
     messages: ClassVar[Any]
@@ -70,23 +70,27 @@ class Protocol(Inspectable, ABC):
 
     @abstractmethod
     def start(self) -> None:
-        """The search begins; called once, before any message."""
+        """Begin the search; called once, before any message."""
 
     @abstractmethod
     def receive(self, sender: str, message: Message) -> None:
-        """Take in one message."""
+        """Process one message."""
 
     def settle(self) -> None:
-        """The inbox has been drained: the time to look at the whole view and to decide."""
+        """Decide on the whole view; called when the inbox has been drained."""
 
     def send(self, receiver: str, message: Message) -> None:
-        """Say `message` to `receiver`; checks that are done later are not on its clock."""
+        """Send `message` to `receiver`; its clock does not include later checks."""
         said = Said((receiver, message))
         said.checks = self.problem.checks
         self.outbox.append(said)
 
     def conclude(self, verdict: Verdict) -> None:
-        """End the search of the whole team with `verdict`, one of those in `traits.concludes`; else `ValueError`."""
+        """End the search of the whole team with `verdict`.
+
+        Raises:
+            ValueError: if `verdict` is not one of `traits.concludes`.
+        """
         fault = self.traits.fault_of_conclusion(verdict)
         if fault:
             raise ValueError(fault)
@@ -99,29 +103,34 @@ class Protocol(Inspectable, ABC):
 
     @property
     def incumbent(self) -> Incumbent | None:
-        """The cheapest assignment of all robots that this one has heard of, or has found; None: of none so far."""
+        """The cheapest assignment of all robots that this robot knows or has found; None if there is none."""
         return None
 
     @property
     def findings(self) -> Findings:
-        """What this robot knows of the whole besides its own value. May be asked at any time."""
+        """This robot's knowledge of the whole search besides its own value. May be read at any time."""
         return NOTHING
 
 
 class DynamicProtocol(Protocol):
-    """A protocol that goes on when the problem changes, with what still stands of what it has found out.
+    """A protocol that continues when the problem changes, with the results that are still valid.
 
-    Between two epochs the host calls `change`, and once all robots have changed, `resume`. Other protocols are begun
-    anew on the changed problem.
+    Between two epochs the host calls `change`, and once all robots have changed, `resume`. Other protocols start again
+    on the changed problem.
     """
 
     @abstractmethod
     def change(self, problem: LocalProblem, order: PriorityOrder, invalidated: Invalidated) -> None:
-        """Take in the changed problem, and drop what rests on anything `invalidated`. No robot searches: send nothing.
+        """Adopt the changed problem, and drop all that depends on anything `invalidated`. Send nothing.
 
-        A verdict that stands in spite of the changes is kept, and ends the epoch at once.
+        No robot searches meanwhile. A verdict that is still valid after the changes is kept, and ends the epoch at
+        once.
         """
 
     @abstractmethod
     def resume(self, *, lossless: bool) -> None:
-        """Go on with the search; before any message. `quiet`: no message of the epoch before was lost."""
+        """Continue the search; called before any message.
+
+        Args:
+            lossless: No message of the epoch before was lost.
+        """

@@ -15,12 +15,12 @@ _TWO = 2
 
 
 def unmet_requirement(robot: Robot, traits: Traits, owners: Mapping[str, str]) -> str:
-    """Return what `robot` has that a protocol with these `traits` does not support; empty if there is nothing.
+    """Return a feature of `robot` that a protocol with these `traits` does not support; empty if there is none.
 
     Args:
-        robot: the robot with its constraints.
-        traits: what the protocol can do.
-        owners: the names of the robots that own the variables, by the variables' names.
+        robot: The robot with its constraints.
+        traits: The protocol's capabilities.
+        owners: The names of the robots that own the variables, by the variables' names.
     """
     held_for_children = (constraint for child in robot.children for constraint in child.constraints)
     for constraint in (*robot.shared, *held_for_children):

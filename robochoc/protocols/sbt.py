@@ -41,7 +41,7 @@ class CPA(Message, frozen=True):
 
 
 class Backtrack(Message, frozen=True):
-    """Nobody below has a value left that goes with the receiver's: it has to take its next one."""
+    """A request to take the next value: no robot below has a value that agrees with the receiver's."""
 
     act = acts.REJECT_VALUE
     backtracks = True
@@ -52,7 +52,7 @@ class Backtrack(Message, frozen=True):
 
 
 class SBT(Protocol):
-    """One agent of synchronous backtracking. State: `cpa`, as it came last, and the value that was added to it."""
+    """One agent of synchronous backtracking. State: the last `cpa`, and the value that was added to it."""
 
     messages = CPA | Backtrack
     traits = Traits(
@@ -70,7 +70,7 @@ class SBT(Protocol):
         self._view: dict[str, Value] = {}
 
     def start(self) -> None:
-        """The first robot makes the CPA; the others wait for it."""
+        """Create the CPA, as the first robot; other robots wait for it."""
         if not self.problem.values:
             self.conclude(Verdict.NO_SOLUTION)
         elif self.rank == 0:
@@ -91,7 +91,7 @@ class SBT(Protocol):
                 assert_never(never)
 
     def _assign(self, first: int) -> None:
-        """Add the first value from place `first` on that agrees with the CPA, and send it on; none: send it back."""
+        """Add the first value from place `first` on that agrees with the CPA, and send it on; else backtrack."""
         candidates = range(first, len(self.problem.values))
         self.value = next((index for index in candidates if self.problem.conflict(index, self._view) is None), None)
         if self.value is None:
@@ -102,7 +102,7 @@ class SBT(Protocol):
             self.send(self.order.names[self.rank + 1], CPA((*self.cpa, self.problem.values[self.value])))
 
     def _backtrack(self) -> None:
-        """The domain is exhausted: back to the robot before, of which the first has none."""
+        """Send the CPA back to the robot before; the first robot ends the search."""
         if self.rank == 0:
             self.conclude(Verdict.NO_SOLUTION)
         else:

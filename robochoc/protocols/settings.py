@@ -15,7 +15,7 @@ class SettingsError(ValueError):
 
 
 def settings_of(protocol: type[Protocol], given: Mapping[str, str]) -> Settings:
-    """Return the settings of `protocol`: its defaults, and those that are `given` instead. Raises `SettingsError`."""
+    """Return the settings of `protocol`: the `given` ones, and defaults for the others. Raises `SettingsError`."""
     known = type(protocol.settings)
     names = [field.name for field in msgspec.structs.fields(known)]
     for name in given:

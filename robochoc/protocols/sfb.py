@@ -66,16 +66,17 @@ LARGEST = 4 * MIB
 
 
 class SFBSettings(Settings, frozen=True):
-    """How much is extended and sent at once.
+    """Limits on the CPAs that are extended and sent at once.
 
-    `batch`: how many CPAs are extended at once, at most. `window`: how many messages of them each robot may have under
-    way, sent and not yet explored. `memory`: bytes that the CPAs in all these messages of all robots may take together.
+    `batch`: the maximum number of CPAs that are extended at once. `window`: the maximum number of CPA messages of each
+    robot that are sent and not yet explored. `memory`: the bytes that the CPAs in all these messages of all robots may
+    take together.
 
-    Each message has the same share, memory / (robots * window) and 4 MiB at most, unless it holds a single CPA. That
-    is certain: what does not fit is not extended yet, or waits with the robot that has extended it (no more than a
-    share, or what comes of a single CPA). With less memory there are more messages, and the verdict is the same. How
-    much is sent in all is not bounded: as much as the search has to visit. Nor are the first waves: their messages grow
-    with the number of different domains and charges, and with how often robots next to each other differ in them.
+    Each message has the same share of the memory: memory / (robots * window), 4 MiB at most. Only a message with a
+    single CPA may take more. CPAs that do not fit are not extended yet, or wait at the robot that has extended them (at
+    most one share, or the extensions of a single CPA). With less memory there are more messages, and the verdict is the
+    same. The total traffic is not bounded: it is as large as the search. The first waves are not bounded either: their
+    messages grow with the number of different domains and charges.
     """
 
     batch: int = 4096
@@ -88,9 +89,9 @@ class SFBSettings(Settings, frozen=True):
 
 
 class Batch:
-    """What came in one message: `rows` are still to be extended; `ready` is extended, and waits to be sent.
+    """The content of one message: `rows` are still to be extended; `ready` is extended, and waits to be sent.
 
-    Of the others, `sent` messages are under way.
+    `sent` is the number of its messages that are not yet explored.
     """
 
     def __init__(self, rows: Rows) -> None:
@@ -100,21 +101,21 @@ class Batch:
 
     @property
     def left(self) -> bool:
-        """Whether there is anything to be sent yet."""
+        """Whether something is still to be sent."""
         return bool(len(self.rows) or len(self.ready))
 
     @property
     def bound(self) -> int | None:
-        """The lowest bound of what is to be sent yet."""
+        """The minimum lower bound of the rows still to be sent; None if there are none."""
         return min((int(rows[:, BOUND].min()) for rows in (self.rows, self.ready) if len(rows)), default=None)
 
     def take(self, count: int, upper_bound: int) -> Rows:
-        """Of the next `count` rows those that may still cost less than `upper_bound`."""
+        """Remove the next `count` rows and return those with a lower bound below `upper_bound`."""
         rows, self.rows = self.rows[:count], self.rows[count:]
         return rows[rows[:, BOUND] < upper_bound]
 
     def part(self, count: int, upper_bound: int) -> Rows:
-        """The next `count` rows that are ready and may still cost less than `upper_bound`; the others go on waiting."""
+        """Return the next `count` ready rows with a lower bound below `upper_bound`; the others keep waiting."""
         rows = self.ready[self.ready[:, BOUND] < upper_bound]
         self.ready = rows[count:]
         return rows[:count]
@@ -123,10 +124,10 @@ class Batch:
 class SFB(Protocol):
     """One agent. State: the `batches` that it is to explore, the oldest first, and the `best` solution.
 
-    `upper_bound` is what that costs; `under_way` are, for each message of CPAs to the next robot that has not been
-    answered, the batch that it is of, and its lowest bound. `width` CPAs are extended next; `first_sent`: the first
-    CPA has gone, alone. `bounds` is what this
-    robot adds to CPAs: there once it knows everybody's values, and of use once it knows the `ceiling`.
+    - `upper_bound`: the cost of the best solution.
+    - `under_way`: for each unanswered message to the next robot, its batch and its minimum lower bound.
+    - `width`: the number of CPAs to extend next. `first_sent`: the first CPA was sent, alone.
+    - `bounds`: the costs that this robot adds to CPAs; set once it knows all values, complete with the `ceiling`.
     """
 
     bounds: ForwardBounds
@@ -156,7 +157,7 @@ class SFB(Protocol):
         self.first_sent = False
 
     def start(self) -> None:
-        """The first robot tells its values; who has none at all ends the search."""
+        """Send the own values, as the first robot; a robot with an empty domain ends the search."""
         if not self.problem.values:
             self.conclude(Verdict.NO_SOLUTION)
         elif self.previous is None:
@@ -164,7 +165,7 @@ class SFB(Protocol):
             self.settle()
 
     def receive(self, sender: str, message: Message) -> None:
-        """Dispatch on the message's type. Raises `ValueError` for what no robot says here and now."""
+        """Dispatch on the message's type. Raises `ValueError` for a message that is not possible at this point."""
         if self.verdict is not None:
             return
         if not self._expects(sender, message):
@@ -209,11 +210,11 @@ class SFB(Protocol):
 
     @property
     def _priced(self) -> bool:
-        """Whether everybody's values are known, and constraints with them priced."""
+        """Whether all robots' values are known, and the constraints with them evaluated."""
         return hasattr(self, "bounds")
 
     def settle(self) -> None:
-        """Extend what is there, as long as messages may be sent; say what has been explored."""
+        """Extend CPAs while messages may be sent; report explored batches."""
         while self.batches and self.verdict is None:
             batch = next((batch for batch in self.batches if batch.left), None)
             if not self.batches[0].left and not self.batches[0].sent:
@@ -234,7 +235,7 @@ class SFB(Protocol):
             self.send(self.next, Above.of(self.domains))
 
     def _tell_above(self, below: Sequence[tuple[Domain, Charges]], most: int) -> None:
-        """Know everybody's values, and price the constraints; the first robot begins."""
+        """Store all robots' values and evaluate the constraints; the first robot begins the search."""
         own = self.problem.values, tuple(map(_whole, self.problem.costs({})))
         self.domains += [domain for domain, _ in below]
         self.bounds = ForwardBounds(self.problem, self.order, self.domains)
@@ -253,14 +254,14 @@ class SFB(Protocol):
     # The search
 
     def _process_cpas(self, cpas: CPAs) -> None:
-        """Take in what is to be explored, and how cheap it has to be."""
+        """Store the received CPAs and their upper bound."""
         if not self.ceiling:
             self._count_up_to(cpas.ceiling)
         self.upper_bound = min(self.upper_bound, cpas.least)
         self.batches.append(Batch(self.bounds.read(cpas.rows, cpas.count)))
 
     def _extend(self, batch: Batch) -> None:
-        """Add the own values to the next few CPAs, if none are ready, and send what may become a cheaper solution."""
+        """Extend the next CPAs if none are ready, and send those that may lead to a cheaper solution."""
         if self.next is None:
             self._complete(batch.take(len(batch.rows), self.upper_bound))
             return
@@ -282,14 +283,14 @@ class SFB(Protocol):
         return min(LARGEST, self.settings.memory // (len(self.order.names) * self.settings.window))
 
     def _complete(self, rows: Rows) -> None:
-        """The last robot's part: the cheapest of all that these become is a solution, if it is cheap enough."""
+        """Complete the CPAs, as the last robot; the cheapest one is a solution if it costs less than the best."""
         if len(rows):
             cost, places = self.bounds.completed(rows)
             if cost < self.upper_bound:
                 self._process_solution(Solution(cost, places))
 
     def _process_solution(self, solution: Solution) -> None:
-        """Hold the own value of a solution that is cheaper than all before, and tell it to those above."""
+        """Store the own value of a cheaper solution, and send it on to the robots above."""
         self.best = solution
         self.upper_bound = solution.cost
         self.value = solution.places[self.bounds.rank]
@@ -297,7 +298,7 @@ class SFB(Protocol):
             self.send(self.previous, solution)
 
     def _explored(self) -> None:
-        """The oldest batch is done with: back. The first robot's only one: all is done."""
+        """Report the oldest batch as explored; for the first robot, the search is over."""
         if self.previous is not None:
             self.send(self.previous, Explored())
         elif self.best is None:
@@ -307,7 +308,7 @@ class SFB(Protocol):
 
     @property
     def incumbent(self) -> Incumbent | None:
-        """The best solution that has come by here."""
+        """The best solution that this robot knows."""
         if self.best is None:
             return None
         chosen = zip(self.order.names, self.domains, self.best.places, strict=True)
@@ -315,7 +316,7 @@ class SFB(Protocol):
 
     @property
     def findings(self) -> Findings:
-        """The best solution that has come by here; the first robot's least bound of all that is not explored."""
+        """The best known solution; for the first robot also the minimum lower bound of all that is unexplored."""
         if not self.ceiling:
             return NOTHING
         bound = None
@@ -326,7 +327,7 @@ class SFB(Protocol):
 
 
 def _whole(cost: float) -> float:
-    """`cost` as it travels: integers take fewer bytes."""
+    """Return `cost` as an integer if it is finite: integers take fewer bytes in a message."""
     return cost if cost == math.inf else int(cost)
 
 

@@ -31,9 +31,9 @@ _SIZES = ("<u1", "<u2", "<u4", "<i8")
 
 
 class _NAry(NamedTuple):
-    """What a constraint with robots above, too, adds to the vector in `columns`, that of its lowest robot.
+    """The costs that an n-ary constraint adds to `columns`, the vector of its lowest robot.
 
-    `table` has an axis for the value of each robot in `ranks`, all above, one for the own value, and the vector's.
+    `table` has an axis for the value of each robot in `ranks` (all above), one for the own value, and the vector's.
     """
 
     ranks: tuple[int, ...]
@@ -42,10 +42,11 @@ class _NAry(NamedTuple):
 
 
 class ForwardBounds:
-    """What the robot of `problem` adds to partial assignments of those above it; `domains` are all robots' values.
+    """The costs that the robot of `problem` adds to partial assignments; `domains` are all robots' values.
 
-    It prices the constraints of which it is the last but one: the vector is that of the last. So each constraint is
-    priced once, as soon as one robot only has to choose. `most` is the most that all of these come to.
+    It evaluates the constraints of which it is the last robot but one, into the vector of the last one. So each
+    constraint is evaluated once, as soon as only one of its robots has no value. `most` is an upper bound on the sum of
+    their costs.
     """
 
     def __init__(self, problem: LocalProblem, order: PriorityOrder, domains: Sequence[Sequence[Value]]) -> None:
@@ -71,7 +72,7 @@ class ForwardBounds:
                     self._n_ary.append(_NAry(tuple(order.rank[one] for one in agents[:-1]), columns, table))
 
     def count_up_to(self, ceiling: int) -> None:
-        """From now on, costs are counted up to `ceiling`."""
+        """Set the `ceiling`, to which all costs are cut from now on."""
         self.ceiling = ceiling
         largest = max(2 * ceiling, self._largest)
         self._type = np.dtype(next(size for size in _SIZES if largest <= np.iinfo(size).max))
@@ -79,15 +80,16 @@ class ForwardBounds:
         self._n_ary = [one._replace(table=self._cut(one.table)) for one in self._n_ary]
 
     def nothing(self, charges: Sequence[Sequence[float]]) -> Rows:
-        """The partial assignment of no robot, where all robots' values are charged as `charges` has it."""
+        """Return the empty partial assignment, with `charges` of all robots' values."""
         bound = sum(min(charged) for charged in charges)
         row = [bound, 0, *(charge for charged in charges for charge in charged)]
         return self._cut(np.array([row], np.float64))
 
     def read(self, content: bytes, count: int) -> Rows:
-        """The `count` partial assignments, of all robots above, in `content`: what `tobytes` made of them there.
+        """Return the `count` partial assignments in `content`, which the robot above made with `tobytes`.
 
-        Raises `ValueError` when they are no such thing.
+        Raises:
+            ValueError: if `content` is not of that form.
         """
         columns = self._first + self._own + int(self._starts[-1])
         if count < 1 or len(content) != count * columns * self._type.itemsize:
@@ -99,13 +101,13 @@ class ForwardBounds:
 
     @property
     def width(self) -> int:
-        """How many bytes an extended partial assignment takes."""
+        """The bytes of an extended partial assignment."""
         return (self._first + 1 + int(self._starts[-1])) * self._type.itemsize
 
     def extended(self, rows: Rows, upper_bound: int) -> Rows:
-        """All partial assignments that `rows` and an own value make and that may cost less than `upper_bound`.
+        """Return all extensions of `rows` by an own value with a lower bound below `upper_bound`.
 
-        The lowest bounds first; where they are the same, those which leave others the most.
+        They are sorted by lower bound; ties go to those that leave the other robots the most values.
         """
         own = rows[:, self._first : self._first + self._own]
         before = rows[:, BOUND].astype(np.int64) - own.min(axis=1)  # the bound, without this robot's part
@@ -124,13 +126,13 @@ class ForwardBounds:
         return extended
 
     def completed(self, rows: Rows) -> tuple[int, list[int]]:
-        """The cheapest assignment that `rows`, of all robots but this one, and an own value make; and its cost."""
+        """Return the cost and the values of the cheapest extension of `rows`, of all robots but this one."""
         costs = rows[:, COST, None].astype(np.int64) + rows[:, self._first :]
         row, value = divmod(int(costs.argmin()), self._own)
         return int(costs[row, value]), [*rows[row, VALUES : self._first].tolist(), value]
 
     def _vectors(self, rows: Rows, row: NDArray[np.intp], value: NDArray[np.intp]) -> Rows:
-        """What the robots below would have to pay, once each of the rows at `row` has the own `value`."""
+        """Return the vectors of the robots below after each of the rows at `row` is extended by `value`."""
         vectors = rows[row, self._first + self._own :]
         vectors += self._prices[value]
         np.minimum(vectors, self.ceiling, out=vectors)
@@ -141,7 +143,7 @@ class ForwardBounds:
         return vectors
 
     def _cheapest(self, vectors: Rows) -> Rows:
-        """The least of each robot's vector."""
+        """Return the minimum of each robot's vector."""
         if len(set(self._sizes)) > 1:
             return np.minimum.reduceat(vectors, self._starts[:-1], axis=1)
         blocks = vectors.reshape(len(vectors), len(self._sizes), self._sizes[0])
@@ -155,10 +157,10 @@ class ForwardBounds:
 
     @property
     def _first(self) -> int:
-        """The column after the values of those above: the own value's, or the own vector's first."""
+        """The column after the values of the robots above: the own value's, or the own vector's first."""
         return VALUES + self.rank
 
 
 def max_finite(charges: Sequence[float]) -> int:
-    """The most of `charges` that is not infinite."""
+    """Return the largest finite charge."""
     return int(max((charge for charge in charges if charge < math.inf), default=0))

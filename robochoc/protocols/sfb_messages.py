@@ -16,7 +16,7 @@ Charges = tuple[float, ...]
 
 
 class Above(Message, frozen=True):
-    """The values of all robots above the receiver: `domains` are the distinct ones, `runs` say who has which."""
+    """The domains of all robots above the receiver: distinct `domains`, and the `runs` of robots that have each."""
 
     domains: list[Domain]
     runs: list[Run]
@@ -25,7 +25,7 @@ class Above(Message, frozen=True):
 
     @classmethod
     def of(cls, domains: Iterable[Domain]) -> Self:
-        """Tell of robots with these `domains`, in priority order."""
+        """Return the message for robots with these `domains`, in priority order."""
         return cls(*grouped(domains))
 
     def in_words(self, words: Wording) -> str:
@@ -35,9 +35,9 @@ class Above(Message, frozen=True):
 
 
 class Below(Message, frozen=True):
-    """The values of all robots below the receiver, and what each of them is charged for each; `runs` say who has which.
+    """The domains and charges of all robots below the receiver; `runs` map robots to the distinct ones.
 
-    `most` is the most that these charges, and the constraints whose lowest two robots are below, can come to.
+    `most` is an upper bound on the sum of these charges and of the constraints whose lowest two robots are below.
     """
 
     domains: list[Domain]
@@ -49,13 +49,13 @@ class Below(Message, frozen=True):
 
     @classmethod
     def of(cls, robots: Iterable[tuple[Domain, Charges]], most: int) -> Self:
-        """Tell of robots with these domains and charges, in priority order."""
+        """Return the message for robots with these domains and charges, in priority order."""
         kinds, runs = grouped(robots)
         return cls([domain for domain, _ in kinds], [charges for _, charges in kinds], runs, most)
 
     @property
     def robots(self) -> list[tuple[Domain, Charges]]:
-        """Each robot's domain and charges."""
+        """The domain and charges of each robot."""
         return expanded(list(zip(self.domains, self.charges, strict=True)), self.runs)
 
     def in_words(self, words: Wording) -> str:
@@ -69,9 +69,10 @@ class Below(Message, frozen=True):
 
 
 class CPAs(Message, frozen=True):
-    """`count` partial assignments of all robots above the receiver (see `sfb_bounds`) that may cost below `least`.
+    """A number (`count`) of partial assignments of all robots above the receiver (see `sfb_bounds`).
 
-    `least` is what the cheapest known solution costs, or the `ceiling`, which no cost reaches.
+    Their lower bounds are below `least`: the cost of the best known solution, or the `ceiling`, an upper bound on all
+    costs.
     """
 
     count: int
@@ -88,7 +89,7 @@ class CPAs(Message, frozen=True):
 
 
 class Explored(Message, frozen=True):
-    """Nothing is left of the oldest `CPAs` that I have had from you and have not yet answered."""
+    """The end of the exploration of the oldest unanswered `CPAs` from the receiver."""
 
     act = Act(Performative.INFORM, "what was proposed with `CPAs` has been seen to the end")
 
@@ -98,7 +99,7 @@ class Explored(Message, frozen=True):
 
 
 class Solution(Message, frozen=True):
-    """A solution that costs less than all before, as the place of each robot's value in its domain."""
+    """A solution cheaper than all before, as the place of each robot's value in its domain."""
 
     cost: int
     places: list[int]

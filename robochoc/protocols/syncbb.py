@@ -43,14 +43,14 @@ Cost = int | float
 
 
 class BestPath(msgspec.Struct, frozen=True, array_like=True):
-    """The best path so far: all robots' values in priority order, and what they cost (the bound; `inf`: none yet)."""
+    """The best path so far: all robots' values in priority order, and its cost (the bound; `inf`: none yet)."""
 
     bound: Cost
     values: tuple[Value, ...] = ()
 
 
 class Path(Message, frozen=True):
-    """What all robots before the receiver have taken, in priority order, and what each of them pays for it."""
+    """The values of all robots before the receiver, in priority order, with the cost that each of them pays."""
 
     assignments: list[tuple[Value, Cost]]
     best: BestPath
@@ -66,7 +66,7 @@ class Path(Message, frozen=True):
 
 
 class Backtrack(Message, frozen=True):
-    """All that the robots below can make of the receiver's value costs at least as much as the best path."""
+    """A request to take the next value: every path with the receiver's value costs at least the bound."""
 
     best: BestPath
 
@@ -82,7 +82,7 @@ class Backtrack(Message, frozen=True):
 
 
 class Terminate(Message, frozen=True):
-    """Nothing is cheaper than the best path: the search is over."""
+    """The end of the search: no path is cheaper than the best one."""
 
     best: BestPath
 
@@ -97,9 +97,9 @@ class Terminate(Message, frozen=True):
 
 
 class SyncBB(Protocol):
-    """One agent of SyncBB. State: the `path` as it came last and what it costs (`paid`), and the `best` path.
+    """One agent of SyncBB. State: the last `path` and its cost (`paid`), and the `best` path.
 
-    `over`: this robot knows that the best path is proven.
+    `over`: this robot knows that the best path is optimal.
     """
 
     messages = Path | Backtrack | Terminate
@@ -122,7 +122,7 @@ class SyncBB(Protocol):
         self._view: dict[str, Value] = {}
 
     def start(self) -> None:
-        """The first robot makes the path; the others wait for it."""
+        """Create the path, as the first robot; other robots wait for it."""
         if not self.problem.values:
             self.conclude(Verdict.NO_SOLUTION)
         elif self.rank == 0:
@@ -160,11 +160,11 @@ class SyncBB(Protocol):
 
     @property
     def findings(self) -> Findings:
-        """The best path; of the first robot also what every path costs that is still to come."""
+        """The best path; for the first robot also a lower bound on all paths."""
         return Findings(best=self.incumbent, bound=self._lower_bound if self.rank == 0 else None)
 
     def _extend(self, first: int) -> None:
-        """Add the first value from place `first` on with which the path is cheaper than the best one; none: back."""
+        """Add the first value from place `first` on with a path cheaper than the best; otherwise backtrack."""
         for index in range(first, len(self.problem.values)):
             if self.paid >= self.best.bound:
                 break
@@ -179,7 +179,7 @@ class SyncBB(Protocol):
         self._backtrack()
 
     def _backtrack(self) -> None:
-        """The domain is exhausted: back to the robot before, of which the first has none."""
+        """Send the path back to the robot before; the first robot ends the search."""
         self.value = None
         if self.rank > 0:
             self.send(self.order.names[self.rank - 1], Backtrack(self.best))
@@ -191,13 +191,13 @@ class SyncBB(Protocol):
             self.conclude(Verdict.NO_SOLUTION)
 
     def _take_best(self) -> None:
-        """The search is over: decide for the own value in the best path."""
+        """Decide for the own value in the best path, at the end of the search."""
         self.over = True
         self.value = self.problem.values.index(self.best.values[self.rank])
 
     @property
     def _lower_bound(self) -> Cost | None:
-        """What every path costs at least, as the first robot can tell; None: it has not begun."""
+        """A lower bound on every path, known to the first robot; None before it begins."""
         if self.over:
             return self.best.bound
         if self.value is None:

@@ -16,10 +16,10 @@ UNDECLARED = (Verdict.SOLUTION, Verdict.NO_SOLUTION, Verdict.UNKNOWN)
 
 @dataclass(frozen=True)
 class Traits:
-    """What a protocol's class declares of itself as `traits`. A run refuses what is not declared.
+    """The declared properties of a protocol (`traits` of its class). A run refuses what is not declared.
 
     Attributes:
-        paper: Who published the protocol, and when.
+        paper: The authors and the year of publication.
         complete: It ends on every problem, with a solution or a proof that there is none.
         synchronous: One robot acts at a time.
         costs: It minimises costs (a DisWCSP).
@@ -34,8 +34,8 @@ class Traits:
         concludes: The verdicts with which one robot alone may end the search. Other verdicts are refused.
         tables: It computes with tables of floats, and refuses costs that could add up to 2^53 or more
             (`solver/exact_costs.py`).
-        privacy: What neighbours do not learn.
-        use_when: When to choose it, in a few words, for `robochoc protocols`.
+        privacy: The information that neighbours do not get.
+        use_when: A short recommendation, for `robochoc protocols`.
     """
 
     paper: str = ""
@@ -54,9 +54,9 @@ class Traits:
     use_when: str = ""
 
     def fault_of_conclusion(self, verdict: str) -> str:
-        """Return why no robot of this protocol ends the search with `verdict`; empty if one may.
+        """Return why no robot of this protocol may end the search with `verdict`; empty if one may.
 
-        One rule for the protocol's own code, for the parent of processes, and for the master across machines.
+        The protocol's own code, the parent of processes, and the master across machines use this one rule.
         """
         if verdict in self.concludes:
             return ""

@@ -30,7 +30,7 @@ _encode = msgspec.msgpack.Encoder().encode
 
 
 class MessageDecoder:
-    """The messages of one protocol, made again from their recorded fields."""
+    """Rebuilds the messages of one protocol from their recorded fields."""
 
     def __init__(self, protocol: type[Protocol]) -> None:
         union = protocol.messages
@@ -44,7 +44,7 @@ class MessageDecoder:
         return self._decoder.decode(content)
 
     def content(self, sent: Sent) -> bytes | None:
-        """Return the content of the message as it travelled; None if it cannot be made of what was recorded."""
+        """Return the content of the message as it was sent; None if the record is not sufficient."""
         if sent.type not in self._tags:
             return None
         fields = [self._tags[sent.type], *sent.content.values()]
@@ -58,7 +58,7 @@ class MessageDecoder:
         return None
 
     def same(self, recorded: Sent, replayed: Sent) -> bool:
-        """Return whether a message has the fields that were `recorded`, in either form of journal."""
+        """Return whether a replayed message has the `recorded` fields, in either form of journal."""
         if recorded.type != replayed.type or list(recorded.content) != list(replayed.content):
             return False
         fields, again = list(recorded.content.values()), list(replayed.content.values())
@@ -79,14 +79,14 @@ class MessageDecoder:
         return _encode(self._decoder.decode(_encode(fields)))
 
     def _through_json(self, fields: list[Any]) -> bytes:
-        """JSON makes text of bytes, and of keys that are none."""
+        """Return the fields after a round trip through JSON, which turns bytes and keys into text."""
         return _encode(msgspec.convert(fields, self._union, str_keys=True))
 
 
 class RecordedChannels:
     """The messages of one run, or epoch, by channel.
 
-    `events` are the run's. A message that was sent again is delivered rather than the recorded one.
+    `events` are the run's. A message that was sent again in the replay is delivered instead of the recorded one.
     """
 
     def __init__(self, events: Iterable[AnyEvent], decoder: MessageDecoder) -> None:
@@ -109,7 +109,7 @@ class RecordedChannels:
                 self._again.setdefault(edge, deque()).append(envelope.content)
 
     def can_deliver(self, packet: Sequence[Received]) -> bool:
-        """Return whether `packet` has nothing to wait for: all of it can be made, or never will be."""
+        """Return whether each message of `packet` is either available or will never be."""
         wanted = Counter((received.sender, received.receiver) for received in packet)
         for edge, count in wanted.items():
             here = len(self._again.get(edge, ()))
@@ -120,7 +120,7 @@ class RecordedChannels:
         return True
 
     def deliver(self, received: Received) -> tuple[Sent | None, Envelope | None]:
-        """Return a received message as it was recorded, and as it is delivered again; None: it is lost."""
+        """Return a received message as recorded, and its envelope for the replay; None: it is lost."""
         edge = (received.sender, received.receiver)
         recorded = self._recorded.get(edge)
         if not recorded:

@@ -34,7 +34,7 @@ _COUNTED_BEFORE = _COUNTED[:-1]
 
 
 class Contradiction(msgspec.Struct, frozen=True, kw_only=True):
-    """A claim of the journal, `recorded`, and what follows from its steps, `replayed`."""
+    """A claim of the journal (`recorded`) that differs from the replay's result (`replayed`)."""
 
     what: str
     recorded: object
@@ -43,14 +43,14 @@ class Contradiction(msgspec.Struct, frozen=True, kw_only=True):
 
 @dataclass(frozen=True)
 class ReplayedRun:
-    """A run that was played to its end, and the answer that follows; None: the journal does not say enough."""
+    """A replayed run with its answer; None: the journal does not hold enough for one."""
 
     run: RecordedRun
     answer: EpochOutcome | Outcome | None
 
 
 def with_answer(run: RecordedRun, robots: RebuiltRobots, outcome: Outcome | None) -> ReplayedRun:
-    """Return a run that its robots have just played, with its answer."""
+    """Return a run that its robots have just replayed, with its answer."""
     return ReplayedRun(run, _answer(run, robots, outcome) if outcome else None)
 
 
@@ -83,7 +83,10 @@ def contradicted_claims(journal: Journal, runs: Sequence[ReplayedRun], *, whole:
 
 
 def _beginning(header: Header, runs: Sequence[RecordedRun], placed_by: str | None) -> Iterator[Contradiction]:
-    """The header, against what the robots were given. Where one alone had no solution, the search is left out."""
+    """Yield contradictions between the header and the parameters that the robots were given.
+
+    The first run is one of `placed_by` if a robot had no solution by itself, and the search was therefore left out.
+    """
     first = next((run.began.protocol for run in runs if run.began), "")
     found = protocol_by_class(first, [header.protocol])  # a class that is installed by no name may be played, too
     if found is not None and found[0] not in (header.protocol, placed_by):
@@ -118,7 +121,7 @@ def _differing(whose: str, recorded: object, replayed: object, names: Sequence[s
 
 
 def _answer(run: RecordedRun, robots: RebuiltRobots, outcome: Outcome) -> EpochOutcome | Outcome | None:
-    """Return the answer of `run` as an orchestrator would; None: the journal does not say enough."""
+    """Return the answer of `run`, computed as an orchestrator does; None: the journal does not hold enough."""
     given = run.given
     if given is None or given.why or len(robots.hosts) < len(robots.compiled.team.robots):
         return None
@@ -152,7 +155,7 @@ def _places(run: RecordedRun, outcome: Outcome) -> bool:
 
 
 def _verdict(events: Sequence[AnyEvent], concluded: set[str]) -> Verdict:
-    """Return what a robot has concluded; or a solution, if every message was taken in."""
+    """Return the verdict that a robot has concluded; else a solution, if all messages were received."""
     if len(concluded) == 1:
         return Verdict(concluded.pop())
     under_way = sum(isinstance(event, Sent) - isinstance(event, Received) for event in events)

@@ -14,17 +14,17 @@ from robochoc.replay.steps import RecordedStep, RobotEvent
 
 
 class Difference(msgspec.Struct, frozen=True, kw_only=True):
-    """The first event that was not the same.
+    """The first event that differs between journal and replay.
 
     Attributes:
         run: The number of the run or epoch, from 0 on.
         protocol: The name of the protocol's class.
-        robot: The robot whose event it is.
+        robot: The robot of the event.
         step: The number of the robot's step, over the whole journal, from 0 on.
-        packet: The messages that the step took in; none: it is the robot's start.
+        packet: The messages that the step received; none: it is the robot's start.
         recorded: The event in the journal; None: the journal has no more events of this step.
         replayed: The event in the replay; None: the replay has no more.
-        raised: What the protocol raised, with its place in the code; empty: nothing.
+        raised: The exception that the protocol raised, with its place in the code; empty: none.
     """
 
     run: int
@@ -59,7 +59,7 @@ class StepComparison:
     def first_difference(
         self, step: RecordedStep, replayed: Sequence[AnyEvent], *, raised: bool
     ) -> tuple[RobotEvent | None, AnyEvent | None] | None:
-        """Return the first pair of events that are not the same; None: all are.
+        """Return the first pair of events that differ; None: all are equal.
 
         Args:
             step: The recorded step.
@@ -90,7 +90,7 @@ class StepComparison:
 
 
 def _place_in_first_version(event: AnyEvent) -> int:
-    """Return where an event stood in its step in the first version of journals: decisions came before messages."""
+    """Return a sort key: in the first version of journals, decisions came before messages."""
     match event:
         case Received():
             return 0

@@ -37,7 +37,7 @@ _KNOWN = {"problem", "order", "outbox", "value", "verdict", "chance", "settings"
 
 
 class Inspector:
-    """Looks at one robot, which knows `part` of the problem."""
+    """Describes the state of one robot, which knows `part` of the problem."""
 
     def __init__(self, part: AgentProblem) -> None:
         self._part = part
@@ -49,7 +49,7 @@ class Inspector:
         self._told: dict[str, Value] = {}
 
     def hear(self, sender: str, message: Message) -> None:
-        """The robot has taken this in: what others have said is all that is known of them, where no view is kept."""
+        """Record a message that the robot received, for protocols that keep no view."""
         self._heard[sender] = message
         value = as_value(getattr(message, "value", None))
         width = len(self._part.interfaces.get(sender, ()))
@@ -57,7 +57,7 @@ class Inspector:
             self._told[sender] = value
 
     def view(self, protocol: Protocol) -> list[tuple[str, str]]:
-        """Who is known to have which value, or has said what last."""
+        """Return the known values of other robots, or else the last message of each."""
         others = self._others(protocol)
         known = self._known(protocol)
         if protocol.numbered_values:
@@ -72,12 +72,12 @@ class Inspector:
         return [*shown, ("", f"and {more:,} more")] if more else shown
 
     def _rank(self, robot: str) -> tuple[int, object]:
-        """In the priority order; those who are not in it come last."""
+        """Return a sort key: robots in priority order, then names that are not in it."""
         rank = self._ranks.get(robot)
         return (0, rank) if rank is not None else (1, natural_key(robot))
 
     def said(self, sender: str, message: Message, receiver: str = "") -> str:
-        """What `sender` has said, to this robot if to no other `receiver`."""
+        """Return a message in words; the receiver is this robot unless another `receiver` is given."""
         fields = {name: getattr(message, name) for name in message.__struct_fields__}
         value, lhs = as_value(fields.get("value")), fields.get("lhs")
         if value is not None and isinstance(lhs, Mapping):
@@ -95,7 +95,7 @@ class Inspector:
         return cut(", ".join(text if name == "value" else f"{name}: {text}" for name, text in told.items()))
 
     def domain(self, protocol: Protocol) -> list[tuple[str, str | None]]:
-        """Each own value, and what rules it out (None: nothing that is known)."""
+        """Return each own value, with what rules it out (None: nothing known)."""
         count = len(protocol.problem.values)
         places = list(range(min(count, MOST_VALUES)))
         if protocol.value is not None and protocol.value >= len(places):
@@ -105,7 +105,7 @@ class Inspector:
         return [*shown, (f"and {more:,} more", None)] if more else shown
 
     def own_value(self, protocol: Protocol, index: int) -> str:
-        """The value at `index`, with what it costs where anything does."""
+        """Return the value at `index` in words, with its cost if any value has one."""
         text = self._own.told(self.agent, protocol.problem.values[index])
         notes = protocol.value_notes(index)
         if notes:
@@ -116,12 +116,12 @@ class Inspector:
         return text
 
     def against(self, protocol: Protocol, index: int) -> str | None:
-        """What rules the value at `index` out, as far as the robot knows (None: nothing)."""
+        """Return what rules the value at `index` out, as far as the robot knows (None: nothing)."""
         found = self.ruling(protocol, index)
         return None if found is None else found[0]
 
     def ruling(self, protocol: Protocol, index: int) -> tuple[str, Collection[str]] | None:
-        """The same, with the robots whose values do so."""
+        """Return what rules the value at `index` out, with the robots whose values it involves."""
         store = vars(protocol).get("store")
         if isinstance(store, NogoodStore):
             lhs = store[index]
@@ -133,7 +133,7 @@ class Inspector:
         return ("a try: nobody below could go on with it", ()) if protocol.tried(index) else None
 
     def nogoods(self, protocol: Protocol) -> list[str]:
-        """The nogoods that are kept: while V1.1 = 2: V2.1 != 3."""
+        """Return the stored nogoods in words: while V1.1 = 2: V2.1 != 3."""
         found = [
             f"while {lhs}: {against}" if lhs else f"{against}, whatever the others take"
             for lhs, against in islice(self._nogoods(protocol), MOST_NOGOODS + 1)
@@ -141,7 +141,7 @@ class Inspector:
         return [*found[:MOST_NOGOODS], "and more"] if len(found) > MOST_NOGOODS else found
 
     def more(self, protocol: Protocol) -> dict[str, str]:
-        """Everything else that the protocol keeps; of ours what is not only for itself, and not empty."""
+        """Return all other attributes of the protocol; for built-in protocols public and not empty ones only."""
         ours = type(protocol).__module__.startswith("robochoc.")
         skipped = {*_KNOWN, safely(lambda: self._view_in(protocol), "")}
         told: dict[str, str] = {}
@@ -159,28 +159,28 @@ class Inspector:
     # What is known of others
 
     def _others(self, protocol: Protocol) -> ValueText:
-        """How others' values are said: some protocols never tell them, but number them."""
+        """Return the words for others' values: some protocols (DisFC) send numbers of assignments instead."""
         return NumberedValueText(self._part.interfaces) if protocol.numbered_values else self._own
 
     def _view_in(self, protocol: Protocol) -> str:
-        """The attribute that holds what is known of others' values; empty where there is none."""
+        """Return the name of the attribute that holds others' values; empty if there is none."""
         return next((name for name in VIEWS if isinstance(vars(protocol).get(name), Mapping | list | tuple)), "")
 
     def _known(self, protocol: Protocol) -> dict[str, Value] | None:
-        """The values of others that the protocol believes in; None where it keeps none of the kind."""
+        """Return the values of others that the protocol stores; None if it stores none."""
         name = self._view_in(protocol)
         if not name:
             return None
         return self._pairs(vars(protocol)[name], protocol.order.names)
 
     def _pairs(self, kept: Mapping[str, object] | Sequence[object], order: Sequence[str]) -> dict[str, Value]:
-        """The values in `kept`, which are by name, or those of the first robots in `order`."""
+        """Return the values in `kept`, by name; a sequence holds those of the first robots in `order`."""
         pairs = kept.items() if isinstance(kept, Mapping) else zip(order, kept, strict=False)
         found = {who: value for who, thing in pairs if (value := _value_in(thing)) is not None}
         return {who: value for who, value in found.items() if who in self._part.interfaces}
 
     def _seen(self, protocol: Protocol) -> dict[str, Value]:
-        """Return the values that own values are checked against; where none are kept, what others have said."""
+        """Return the values that own values are checked against; without a view, those in others' messages."""
         known = protocol.checked_against
         if known is None:
             known = self._known(protocol)
@@ -208,7 +208,7 @@ class Inspector:
 
 
 def safely(look: Callable[[], Any], otherwise: Any) -> Any:  # noqa: ANN401 - whatever is looked at
-    """What `look` finds; `otherwise`, if the protocol is not what it seemed to be: a user's may keep anything."""
+    """Return the result of `look`, or `otherwise` if it raises: a user's protocol may hold any attributes."""
     try:
         return look()
     except Exception:  # noqa: BLE001 - see above
@@ -216,7 +216,7 @@ def safely(look: Callable[[], Any], otherwise: Any) -> Any:  # noqa: ANN401 - wh
 
 
 def _value_in(thing: object) -> Value | None:
-    """A value, alone or with what it costs, or how often it has changed."""
+    """Return a value, without the cost or counter that may accompany it."""
     value = as_value(thing)
     if value is None and isinstance(thing, Sequence) and thing and not isinstance(thing, str | bytes):
         value = as_value(thing[0])

@@ -28,7 +28,7 @@ _CONCLUDED = {
 
 
 class _DeadEnd(NamedTuple):
-    """A moment without a value left: what had ruled out each, and what was said then, to whom."""
+    """A moment without a remaining value: what ruled out each value, and the message sent then."""
 
     ruled_out: list[str]
     kind: str
@@ -43,7 +43,7 @@ class _DeadEnd(NamedTuple):
 
 
 class Reasons:
-    """Looks at a robot before a step, in it, whenever the robot speaks, and after it."""
+    """Explains a robot's changes: inspects it before a step, at each message it sends, and after the step."""
 
     def __init__(self, look: Inspector, protocol: Protocol) -> None:
         self._look = look
@@ -53,7 +53,7 @@ class Reasons:
         self._dead_ends: list[_DeadEnd] = []
 
     def listen(self, receiver: str, message: Message) -> None:
-        """The robot says `message`: where that is because no value is left, what rules each out is known now only."""
+        """Record a message that the robot sends; at a dead end, also what rules out each value just then."""
         kind = type(message).__name__
         if not message.backtracks:
             return
@@ -67,7 +67,7 @@ class Reasons:
             self._dead_ends.append(_DeadEnd(ruled_out, kind, said, [receiver]))
 
     def told(self, heard: Sequence[tuple[Sent, Message]], step: RecordedStep) -> list[str]:
-        """Why the value is another one now, after `heard` was taken in, or the search over; empty: neither is so."""
+        """Return why the value has changed, or the search was concluded, after `heard`; empty: neither has."""
         concluded = [event.verdict for event in step.done if isinstance(event, Concluded)]
         if self._protocol.value == self._value and not concluded:
             return []
@@ -89,7 +89,7 @@ class Reasons:
         return store if isinstance(store, NogoodStore) else None
 
     def _ruled_out(self) -> list[str]:
-        """What rules out each value, those together that are ruled out by the same."""
+        """Return what rules out each value; values with the same reason are grouped."""
         count = len(self._protocol.problem.values)
         by_reason: dict[str, list[str]] = {}
         for index in range(min(count, MOST_VALUES)):
@@ -103,7 +103,7 @@ class Reasons:
         return [*shown, f"and {rest:,} more values"] if cut and rest else shown
 
     def _against_the_old(self, heard: Sequence[tuple[Sent, Message]]) -> list[str]:
-        """What rules out the value that it had, and who has said so; nothing where that is not known."""
+        """Return what rules out the previous value, and which robot's message did; empty if unknown."""
         protocol, old = self._protocol, self._value
         if old is None or self._text is None or old >= len(protocol.problem.values):
             return []
@@ -128,7 +128,7 @@ class Reasons:
     # What has come of it
 
     def _now(self) -> str:
-        """What can be said of the new value."""
+        """Return a sentence on the new value."""
         index = self._protocol.value
         if index is None:
             return "it has no value now"
@@ -139,7 +139,7 @@ class Reasons:
         return f"it takes {text}{', the first value that nothing rules out' if first else ''}"
 
     def _is_first(self, index: int) -> bool:
-        """Return whether all values before are ruled out; where values have costs, that says nothing."""
+        """Return whether all earlier values are ruled out; false if values have costs."""
         protocol, store = self._protocol, self._store()
         if protocol.traits.costs:
             return False
@@ -151,7 +151,7 @@ class Reasons:
         return all(against[:-1]) and not against[-1]
 
     def _hopeless(self) -> bool:
-        """Return whether all own values are ruled out, whatever others take."""
+        """Return whether all own values are ruled out, for any values of other robots."""
         store = self._store()
         if store is None:
             return False
@@ -170,13 +170,13 @@ def _by(reason: str) -> str:
 
 
 def _last(heard: Sequence[tuple[Sent, Message]]) -> list[tuple[Sent, Message]]:
-    """Of what each robot has told of itself in one packet the last, and all nogoods."""
+    """Return each robot's last message about itself in one packet, and all nogoods."""
     latest = {sent.sender: place for place, (sent, message) in enumerate(heard) if not hasattr(message, "lhs")}
     return [pair for place, pair in enumerate(heard) if hasattr(pair[1], "lhs") or latest[pair[0].sender] == place]
 
 
 def _together(values: Sequence[str]) -> str:
-    """Values, each by its name, and that they were."""
+    """Return values in words, joined, with `was` or `were`."""
     if len(values) == 1:
         return f"{values[0]} was"
     more = len(values) - MOST_TOGETHER
@@ -185,7 +185,7 @@ def _together(values: Sequence[str]) -> str:
 
 
 def _is_about(message: Message, sender: str, robots: Collection[str], own: Sequence[int | None]) -> bool:
-    """Return whether `message` is of what rules the value `own` out, that of `robots`."""
+    """Return whether `message` is about the values of `robots`, which rule out the value `own`."""
     lhs = getattr(message, "lhs", None)
     if lhs is None:
         return sender in robots

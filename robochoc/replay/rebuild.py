@@ -44,7 +44,7 @@ _UNCOMPILED = (
 
 
 class CannotReplayError(Exception):
-    """The run cannot be played again; says why, and what would help. `broken`: it is the journal's fault."""
+    """A run that cannot be replayed: why, and what would help. `broken`: the journal is damaged."""
 
     def __init__(self, why: str, *, broken: bool = False) -> None:
         super().__init__(why)
@@ -52,12 +52,12 @@ class CannotReplayError(Exception):
 
 
 class ReplayOptions(NamedTuple):
-    """What a replay may use besides the journal.
+    """Inputs of a replay besides the journal.
 
     Attributes:
-        team: The team in files, for runs whose journals do not say what robots were given.
-        protocols: Protocols by their classes' names, to be used rather than the installed ones.
-        settings: The settings of the protocol, where the journal does not have them.
+        team: The team in files, for journals that do not record what robots were given.
+        protocols: Protocols by their classes' names, to be used instead of the installed ones.
+        settings: The settings of the protocol, if the journal does not record them.
         limits: Limits for robots whose private constraints need a solver (`solver/compile.py`).
         cache: Their cached solutions.
         solver: The solver's process.
@@ -77,9 +77,9 @@ class RebuiltRobots(NamedTuple):
     Attributes:
         protocol: Their protocol.
         hosts: Their hosts, by name.
-        parts: What each robot knows of the problem.
+        parts: Each robot's part of the problem.
         lossless: No message of the epoch before was lost.
-        continuing: Robots that go on with what they found out in the epoch before.
+        continuing: Robots that continue with their results of the epoch before.
         compiled: The team that they were made of.
     """
 
@@ -92,7 +92,7 @@ class RebuiltRobots(NamedTuple):
 
 
 class Rebuilder:
-    """Makes the robots of one run after the other; robots that go on from one epoch to the next are the same objects.
+    """Makes the robots of one run after the other; robots that continue into an epoch are the same objects.
 
     `only` names the robots to be made; None: all.
     """
@@ -126,7 +126,7 @@ class Rebuilder:
         return RebuiltRobots(protocol, self._hosts, parts, lossless, continuing, epoch.compiled)
 
     def _protocol(self, run: RecordedRun) -> type[Protocol]:
-        """Return the class that the run names; in a master's journal the header names it."""
+        """Return the class that the run names; a master's journal names it in the header."""
         asked = self._header.protocol if self._header else None
         if run.began is None:
             return self._named(asked or "")
@@ -187,13 +187,13 @@ class Rebuilder:
         return team
 
     def _left(self, team: Team) -> Team:
-        """Return `team` without the robots that were lost before. On a network the others show what they did show."""
+        """Return `team` without the robots lost before. Across machines, interfaces of the others stay."""
         left = without_robots(team, [name for name in self._lost if name in team])
         on_network = self._header is not None and self._header.runtime == "network"
         return keep_interfaces(left, team) if on_network else left
 
     def _compiled(self, team: Team) -> CompiledTeam:
-        """Return `team` with those compiled who play; what did not change is not compiled again."""
+        """Return `team` with the participating robots compiled; unchanged parts are reused."""
         options = self._options
 
         def compile_robot(robot: Robot) -> CompiledDomain:
@@ -207,7 +207,7 @@ class Rebuilder:
 
 
 def _host(protocol: type[Protocol], part: AgentProblem, before: Host | None, epoch: Epoch) -> Host:
-    """Return the host that was there before, if it goes on, or a new one. Raises `CannotReplayError`."""
+    """Return the host of the epoch before, if it continues, or a new one. Raises `CannotReplayError`."""
     name = part.robot.name
     try:
         if before is None or name in epoch.restarted:

@@ -27,7 +27,7 @@ PROGRESS_EVERY = 256
 
 
 class StoppedRobot(msgspec.Struct, frozen=True, kw_only=True):
-    """A robot that could be followed up to its step number `step` of run number `run` only, and why."""
+    """A robot that could be followed only up to step `step` of run `run`, and the reason."""
 
     run: int
     robot: str
@@ -40,17 +40,17 @@ class ReplayResult:
     """The result of a replay.
 
     Attributes:
-        runs: Runs and epochs that were begun.
-        robots: Robots in them.
-        steps: Steps that were played and found the same.
-        messages: Messages sent in them.
-        unfinished: Steps of which the journal holds a part only; they were compared as far as they go.
+        runs: The number of runs and epochs that were begun.
+        robots: The number of robots in them.
+        steps: The number of steps that were replayed and found equal.
+        messages: The number of messages sent in them.
+        unfinished: The number of steps that are only in part in the journal; that part was compared.
         difference: The first difference; None: there is none.
         stopped: Robots that could not be followed to the end.
         damage: Why the journal ends early; None: it does not.
-        ended: The journal says how the run has ended.
+        ended: The journal holds the end of the run.
         contradictions: Claims of header and outcome that do not follow from the steps.
-        truncated: Of a damaged journal only the end is missing; it was not altered.
+        truncated: The journal is damaged at its end only; it was not altered.
     """
 
     runs: int
@@ -67,7 +67,7 @@ class ReplayResult:
 
     @property
     def identical(self) -> bool:
-        """Whether something was played, and all of it was the same."""
+        """Whether something was replayed, and all of it was equal."""
         return self.steps > 0 and not self.differs
 
     @property
@@ -79,10 +79,15 @@ class ReplayResult:
 def replay(
     journal: Journal, options: ReplayOptions | None = None, *, progress: Callable[[Progress], None] | None = None
 ) -> ReplayResult:
-    """Play a journal again, up to the first difference.
+    """Replay a journal up to the first difference.
+
+    Args:
+        journal: The journal.
+        options: Inputs besides the journal.
+        progress: Is called with the progress.
 
     Raises:
-        CannotReplayError: when the robots cannot be made again.
+        CannotReplayError: if the robots cannot be rebuilt.
     """
     return _JournalReplay(journal, options or ReplayOptions(), progress).result()
 

@@ -27,12 +27,16 @@ class Choice(msgspec.Struct, frozen=True):
 
 
 class RobotState(msgspec.Struct, frozen=True, kw_only=True):
-    """What a robot knows after its step number `step`, counted from 0 over the whole journal; all of it to be shown.
+    """A robot's state after its step number `step`, counted from 0 over the whole journal; texts for display.
 
-    `value` are its variables' values (empty: none), `view` says of others what it knows, as pairs (robot, words),
-    `domain` tells each own value with what rules it out, `nogoods` are those that are kept, `more` whatever else the
-    protocol keeps, by name, and `why` says why the value is another one than before, or why the robot has concluded the
-    search (empty: neither).
+    Attributes:
+        step: The number of the step.
+        value: The values of the robot's variables; empty: none.
+        view: The known state of other robots, as pairs (robot, words).
+        domain: Each own value, with what rules it out.
+        nogoods: The stored nogoods.
+        more: Everything else that the protocol stores, by name.
+        why: Why the value has changed, or why the robot has concluded the search; empty: neither.
     """
 
     step: int
@@ -53,12 +57,21 @@ def states_of(
     since: int = 0,
     everything: Callable[[], Iterable[AnyEvent]] | None = None,
 ) -> Iterator[RobotState]:
-    """The states of `robot` after its own steps, from step number `since` on; a step that is there in part has none.
+    """Yield the states of `robot` after its own steps; partial steps have none.
 
-    `journal` may be events alone, sorted as in one; then `header` is its header, if there is any. They may be those
-    of `robot` and to it, where `everything` gives those of all robots when they turn out to be needed. Raises
-    `CannotReplayError` where there is nothing to play by, and where it turns out that the protocol is not the one that
-    was recorded. Where the journal does not tell what the robot was told next, the last state says so in `more`.
+    If the journal does not hold the next messages to the robot, the last state says so in `more`.
+
+    Args:
+        journal: A journal, or events sorted as in one. Events of `robot` and messages to it are sufficient if
+            `everything` is given.
+        robot: The robot's name.
+        options: Inputs besides the journal.
+        header: The journal's header, if `journal` is only events.
+        since: The number of the first step to yield a state for.
+        everything: Returns the events of all robots; called if they turn out to be needed.
+
+    Raises:
+        CannotReplayError: if there is nothing to replay, or the installed protocol is not the recorded one.
     """
     if isinstance(journal, Journal):
         header, events = journal.header, journal.events
@@ -78,11 +91,11 @@ def states_of(
 
 
 class _UnsaidError(Exception):
-    """What the robot was told can only be made again by those who had said it."""
+    """A message to the robot that only a replay of its sender can rebuild."""
 
 
 class _Player:
-    """Plays the robot's steps, and looks at it after each; `alone`, or with all others."""
+    """Replays the robot's steps, and inspects it after each; `alone`, or with all other robots."""
 
     def __init__(self, header: Header | None, robot: str, options: ReplayOptions, *, alone: bool) -> None:
         self._rebuilder = Rebuilder(header, options, {robot} if alone else None)
@@ -117,7 +130,7 @@ class _Player:
                     yield state
 
     def _played(self, replay: RunReplay, inspector: Inspector, step: RecordedStep, since: int) -> RobotState | None:
-        """What the robot knows after `step`; None where the step is another's, is not whole, or is not asked for."""
+        """Return the state after `step`; None if the step is another robot's, partial, or before `since`."""
         if step.robot != self._robot:
             replay.play(step, 0)
             return None
@@ -144,7 +157,7 @@ class _Player:
         )
 
     def _last(self, step: RecordedStep, why: str, since: int) -> RobotState | None:
-        """Instead of the state that nobody knows: that there is none, and why."""
+        """Return a last state without content, which says why the states end."""
         if step.robot != self._robot:
             return None
         self._step += 1

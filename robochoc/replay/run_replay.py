@@ -26,13 +26,13 @@ Listener = Callable[[str, Message], None]
 
 
 class NoEndError(Exception):
-    """A protocol has sent so many messages in one step that it may never end."""
+    """A step in which the protocol has sent so many messages that it may never end."""
 
 
 class ReplayStopsError(Exception):
-    """The robot cannot be followed any further.
+    """A robot that cannot be followed any further.
 
-    `unsaid`: a message to it cannot be made from the journal alone, but by its sender when that is replayed too.
+    `unsaid`: a message to it cannot be rebuilt from the journal, but by replaying its sender.
     """
 
     def __init__(self, why: str, *, unsaid: bool = False) -> None:
@@ -41,7 +41,7 @@ class ReplayStopsError(Exception):
 
 
 class _Outbox(list[tuple[str, Message]]):
-    """An outbox of limited size: most protocols that never end send messages on the way."""
+    """An outbox of limited size, as most protocols that never end send messages endlessly."""
 
     def __init__(self, most: int, listener: Listener) -> None:
         super().__init__()
@@ -49,7 +49,7 @@ class _Outbox(list[tuple[str, Message]]):
         self._listener = listener
 
     def append(self, said: tuple[str, Message]) -> None:
-        """Add one message. Raises `NoEndError` when there are too many."""
+        """Add one message. Raises `NoEndError` if there are too many."""
         if len(self) >= self._most:
             raise NoEndError(f"{len(self):,} messages in one step, and no end of it")
         super().append(said)
@@ -57,7 +57,7 @@ class _Outbox(list[tuple[str, Message]]):
 
 
 class RunReplay:
-    """A replay of one run: `robots` go through its steps again."""
+    """A replay of one run: `robots` repeat its steps."""
 
     def __init__(self, run: RecordedRun, robots: RebuiltRobots, header: Header | None) -> None:
         self.run = run
@@ -73,7 +73,7 @@ class RunReplay:
     def steps(self) -> Iterator[RecordedStep]:
         """Yield the steps in their order; each must be played before the next.
 
-        Across machines clocks differ, so that a message may seem to be received before it was sent. The step waits.
+        Across machines clocks differ, so a message may seem to be received before it was sent. Such a step is delayed.
         """
         waiting: dict[str, deque[RecordedStep]] = {}
         for step in steps_of(self.run.events):
@@ -86,7 +86,7 @@ class RunReplay:
             yield from steps
 
     def _now_possible(self, waiting: dict[str, deque[RecordedStep]]) -> Iterator[RecordedStep]:
-        """Yield the steps that need not wait any longer; one that is played may let another go on."""
+        """Yield the delayed steps that can be played now; each may enable another one."""
         moved = True
         while moved:
             moved = False
@@ -98,7 +98,7 @@ class RunReplay:
                     del waiting[name]
 
     def play(self, step: RecordedStep, number: int, listener: Listener = lambda *_: None) -> Difference | None:
-        """Play a step, and return the first difference; None: it is the same as recorded.
+        """Play a step, and return the first difference; None: it is equal to the record.
 
         Args:
             step: The step.
@@ -106,7 +106,7 @@ class RunReplay:
             listener: Called for each message that the protocol sends.
 
         Raises:
-            ReplayStopsError: when the robot is not there, or a message that it took in cannot be had.
+            ReplayStopsError: if the robot, or a message that it received, is not available.
         """
         host = self.robots.hosts.get(step.robot)
         if host is None:
@@ -155,7 +155,7 @@ class RunReplay:
         self.taken_in.append((message, self._decoder.message(envelope.content)))
 
     def _delay(self, host: Host, received: Received, events: list[AnyEvent]) -> None:
-        """Move the clock on by a message that was under way for longer: only the recorded clock shows it."""
+        """Advance the clock by the delay of a message: only the recorded clock shows it."""
         if self._simulated and received.clock > host.clock and events and isinstance(events[-1], Received):
             host.catch_up(received.clock)
             events[-1] = msgspec.structs.replace(events[-1], clock=received.clock)

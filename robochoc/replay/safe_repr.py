@@ -32,7 +32,7 @@ def safe_repr(thing: object) -> str:
 
 
 class _Repr(reprlib.Repr):
-    """Shows objects by their fields, subclasses of collections as collections, and large bytes by their size."""
+    """A `repr` that shows objects by their fields, subclasses as collections, and large bytes by their size."""
 
     def __init__(self) -> None:
         super().__init__()

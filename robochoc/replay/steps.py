@@ -28,7 +28,7 @@ RobotEvent = Received | Heard | Decided | Concluded | Sent | Settled
 
 
 class RecordedRun(NamedTuple):
-    """A run, or an epoch of it, counted from 0; a journal of a master's has no `Began`, and no `Given`, of it."""
+    """A run, or an epoch of it, counted from 0; in a master's journal it has no `Began` and no `Given`."""
 
     number: int
     began: Began | None
@@ -37,7 +37,7 @@ class RecordedRun(NamedTuple):
 
 
 class RecordedStep(NamedTuple):
-    """One step of one robot: what it took in, what it did then, and whether all of that is there."""
+    """One step of one robot: the messages received, the events after that, and whether it is complete."""
 
     robot: str
     received: Sequence[Received]
@@ -46,7 +46,7 @@ class RecordedStep(NamedTuple):
 
 
 def runs_of(events: Iterable[AnyEvent]) -> Iterator[RecordedRun]:
-    """The runs, one after the other; those in which no robot has been given, or has done, anything are left out."""
+    """Yield the runs in their order; omit those in which no robot was given, or did, anything."""
     number = 0
     run = RecordedRun(0, None, None, [])
     for event in events:
@@ -64,12 +64,12 @@ def runs_of(events: Iterable[AnyEvent]) -> Iterator[RecordedRun]:
 
 
 def _is_one(run: RecordedRun) -> bool:
-    """Return whether anybody has, or could have, done anything in it."""
+    """Return whether a robot was given, or did, anything in the run."""
     return run.given is not None or any(actor(event) is not None for event in run.events)
 
 
 def steps_of(events: Iterable[AnyEvent]) -> Iterator[RecordedStep]:
-    """The steps of one run in the order of their ends; then those that have none."""
+    """Yield the steps of one run in the order of their ends; then those without an end."""
     open_still: dict[str, list[RobotEvent]] = {}
     for event in events:
         robot = actor(event)

@@ -14,36 +14,36 @@ MOST_NAMED = 12
 
 
 def cut(text: str, longest: int = LONGEST) -> str:
-    """`text`, short enough to be shown."""
+    """Return `text`, shortened to at most `longest` characters."""
     return text if len(text) <= longest else f"{text[: longest - 3]}..."
 
 
 class ValueText:
-    """Speaks of robots' values. `interfaces` are the variables that each shows to its neighbours."""
+    """Formats robots' values. `interfaces` are the variables that each robot shows to its neighbours."""
 
     def __init__(self, interfaces: Interfaces) -> None:
         self._interfaces = interfaces
 
     def value(self, robot: str, value: Sequence[int | None]) -> str:
-        """What `value` says of the variables of `robot`: V1.1 = 2, V1.2 = 1."""
+        """Return `value` of `robot` in words: V1.1 = 2, V1.2 = 1."""
         return self._pairs(robot, value, "=", ", ") or f"{robot}: any value"
 
     def against(self, robot: str, value: Sequence[int | None]) -> str:
-        """That `robot` cannot have `value`: V1.1 != 2."""
+        """Return in words that `robot` cannot have `value`: V1.1 != 2."""
         known = [part for part in value if part is not None]
         if len(known) == 1:
             return self._pairs(robot, value, "!=", "")
         return f"not {self._pairs(robot, value, '=', ', ')}" if known else f"{robot} cannot take part"
 
     def all(self, values: Mapping[str, Sequence[int | None]] | Iterable[tuple[str, Sequence[int | None]]]) -> str:
-        """What several robots' values are together: V1.1 = 2 and V2.1 = 3; empty where nothing is said."""
+        """Return several robots' values in words: V1.1 = 2 and V2.1 = 3; empty if there are none."""
         pairs = list(values.items() if isinstance(values, Mapping) else values)
         named = [self._pairs(robot, value, "=", " and ") or f"any value of {robot}" for robot, value in pairs]
         more = [f"{len(named) - MOST_NAMED:,} more"] if len(named) > MOST_NAMED else []
         return cut(" and ".join([*named[:MOST_NAMED], *more]))
 
     def told(self, robot: str, value: Sequence[int | None]) -> str:
-        """What a robot has told of itself; all of nothing: that it withdraws."""
+        """Return a robot's own value in words; if all components are None, that it withdraws."""
         return self._pairs(robot, value, "=", ", ") or ("withdraws" if value else "shows no variable")
 
     def _pairs(self, robot: str, value: Sequence[int | None], sign: str, between: str) -> str:
@@ -60,12 +60,12 @@ def is_value(thing: object) -> bool:
 
 
 def as_value(thing: object) -> Value | None:
-    """`thing` as a robot's value, if it can be one."""
+    """Return `thing` as a robot's value; None if it is not one."""
     return thing if is_value(thing) else None  # type: ignore[return-value]  # it has been looked at
 
 
 class NumberedValueText(ValueText):
-    """Speaks of robots that do not tell their values, but number what they have assigned (DisFC)."""
+    """Formats the assignments of robots that send numbers instead of values (DisFC)."""
 
     def _pairs(self, robot: str, value: Sequence[int | None], sign: str, between: str) -> str:  # noqa: ARG002
         return between.join(f"assignment {number} of {robot}" for number in value if number is not None)

@@ -199,9 +199,9 @@ class Case:
         return tuple(team_after_events(self.team, events) for events in range(len(self.team.scenario) + 1))
 
     @property
-    def unknown_kills(self) -> set[str]:
+    def unknown_kills(self) -> str:
         """Robots that are to be killed, and are in the team at no time."""
-        return {kill.robot for kill in self.options.kill}.difference(*(epoch.order for epoch in self.epochs))
+        return ", ".join(sorted({kill.robot for kill in self.options.kill}.difference(*(e.order for e in self.epochs))))
 
     @property
     def max_total(self) -> float:
@@ -217,8 +217,8 @@ def scenario_refusal(team: object, option: str) -> str:
 class TeamRule(NamedTuple):
     """A case that is refused: the condition, the reason, and what to do instead.
 
-    In the reason, `{team}` and `{protocol}` stand for the names. With `other_protocol`, another one could do it; with
-    `complete`, one that proves its answers.
+    In the reason, `{team}` and `{protocol}` stand for the names, `{case}` for the case. With `other_protocol`, another
+    one could do it; with `complete`, one that proves its answers.
     """
 
     refuses: Callable[[Case], object]
@@ -237,7 +237,7 @@ TEAM_RULES = (
     _not_with_scenario("--withdraw", lambda o: o.withdraw is not None),
     _not_with_scenario("--count", lambda o: o.count),
     _not_with_scenario("--runtime network", lambda o: o.protocol != CENTRAL and o.runtime is Runtime.NETWORK),
-    TeamRule(lambda c: c.unknown_kills, "--kill names a robot that {team} does not have"),
+    TeamRule(lambda c: c.unknown_kills, "--kill names a robot that {team} does not have: {case.unknown_kills}"),
     TeamRule(
         lambda c: c.options.count and c.has_costs,
         "{team} is a DisWCSP, where every assignment that breaks nothing hard is a solution; --count is for problems"
@@ -282,7 +282,7 @@ def refuse_unfit(team: Team, options: Options, traits: Traits) -> None:
     case = Case(team, options, traits)
     for rule in TEAM_RULES:
         if rule.refuses(case):
-            why = rule.why.format(team=team.name, protocol=options.protocol)
+            why = rule.why.format(team=team.name, protocol=options.protocol, case=case)
             why = "; ".join(filter(None, [why, rule.instead]))
             raise UnfitProtocolError(why, complete=rule.complete) if rule.other_protocol else UnsupportedError(why)
     for epoch in case.epochs:

@@ -38,7 +38,7 @@ _USER_DEFINED = re.compile(r"x-[a-z0-9_.-]{1,64}")
 
 
 class ACLError(ValueError):
-    """A text or message that cannot be used; `at` is the character it is about, None: it is not about its form."""
+    """A text or message that cannot be used; `at` is the position of the error; None: it has no position."""
 
     def __init__(self, message: str, at: int | None = None) -> None:
         super().__init__(message if at is None else f"character {at}: {message}")
@@ -46,10 +46,13 @@ class ACLError(ValueError):
 
 
 class ACLMessage(msgspec.Struct, frozen=True):
-    """The thirteen parameters of FIPA00061, under its names, and `user`, the user-defined ones; None: not given.
+    """The thirteen parameters of FIPA00061, under its names, and user-defined ones (`user`); None: not given.
 
-    `reply_by` is a DateTime of FIPA00008, `20260131T120000000Z`, or with a `+` the time from now. Names in `user`
-    begin with `x-` and have small letters. Raises `ValueError` where either is not so.
+    `reply_by` is a DateTime of FIPA00008: `20260131T120000000Z`, or with a `+` the time from now. Names in `user` begin
+    with `x-` and are in lower case.
+
+    Raises:
+        ValueError: if `reply_by` or a name in `user` does not have this form.
     """
 
     performative: Performative
@@ -82,7 +85,7 @@ _KNOWN = {"sender", "receiver", "reply-to", *_TEXTS, "reply-by"}
 
 
 def text(message: ACLMessage) -> str:
-    """The message as FIPA00070 writes it, on one line but for what is in strings; what is not given is left out."""
+    """Return the message in the form of FIPA00070, on one line except within strings; omit missing parameters."""
     items: list[Expression] = []
     if message.sender is not None:
         items += [Word(":sender"), expression_of(message.sender)]
@@ -101,9 +104,12 @@ def text(message: ACLMessage) -> str:
 
 
 def parse(message: str) -> ACLMessage:
-    """The message that a text in the form of FIPA00070 is.
+    """Return the message of a text in the form of FIPA00070.
 
-    Values that may be any expression there are to be words or strings here. Raises `ACLError`, whatever is wrong.
+    Where FIPA00070 allows any expression as a value, only words and strings are accepted.
+
+    Raises:
+        ACLError: if the text has any other form.
     """
     try:
         return _message(read(message, CAPS))

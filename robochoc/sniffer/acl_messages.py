@@ -37,7 +37,7 @@ class AclMessages:
         self._conversations: dict[int, Conversation | None] = {}
 
     def acl_of(self, message: int) -> ACLMessage:
-        """One message. It answers another where the step that said it took in one message of the receiver's only."""
+        """Return one message in FIPA ACL; it is a reply if its step received a single message of its receiver."""
         trace, of = self._trace, self._trace.messages
         answered = [cause for cause in trace.causes(message) if of.sender[cause] == of.receiver[message]]
         reply_to = of.sequence[answered[0]] if len(answered) == 1 else None
@@ -52,17 +52,17 @@ class AclMessages:
         return self._made_up(message, reply_to)
 
     def plain(self, message: int) -> dict[str, Any]:
-        """The fields of a message as JSON can hold them."""
+        """Return the fields of a message in a form that JSON supports."""
         return {name: plain(value) for name, value in self._trace.content(message).items()}
 
     def fields(self, acl: ACLMessage) -> dict[str, str]:
-        """The parameters of `acl` that are given, under their names in FIPA00070, as text."""
+        """Return the given parameters of `acl` as text, by their names in FIPA00070."""
         shown = {name.replace("_", "-"): _text(getattr(acl, name)) for name in _FIELDS}
         shown.update({f"X-{name[2:]}": value for name, value in acl.user})
         return {name: value for name, value in shown.items() if value}
 
     def _envelope(self, message: int) -> Envelope | None:
-        """The message as it travelled; None where its protocol is not there, or does not know it."""
+        """Return the message's envelope; None if its protocol is not installed, or has no such message."""
         trace, of = self._trace, self._trace.messages
         kind = self._protocols.type_of(message)
         if kind is None:
@@ -84,7 +84,7 @@ class AclMessages:
         return self._conversations[run]
 
     def _made_up(self, message: int, reply_to: int | None) -> ACLMessage:
-        """The message without its protocol's help."""
+        """Return the message, made without its protocol."""
         trace, of = self._trace, self._trace.messages
         sender, receiver = trace.robots[of.sender[message]], trace.robots[of.receiver[message]]
         kind, number = trace.kinds[of.kind[message]], of.run[message]
@@ -106,7 +106,7 @@ class AclMessages:
 
 
 def plain(value: object, depth: int = 32) -> Any:  # noqa: ANN401 - any JSON
-    """`value` in the words of JSON that `sniffer/conversation.py` has for it."""
+    """Return `value` in the JSON form of `sniffer/conversation.py`."""
     match value:
         case None | bool() | int() | str():
             found: Any = value
@@ -126,9 +126,9 @@ def plain(value: object, depth: int = 32) -> Any:  # noqa: ANN401 - any JSON
 
 
 def _packings(kind: type[Message], content: Mapping[str, Any]) -> Iterator[bytes]:
-    """The bytes that a message of these fields may have been: as they stand, and as their types would have them.
+    """Yield possible msgpack bytes of a message: of its fields as recorded, and converted to their types.
 
-    Journals that are JSON have bytes in base64, and tell no number 1 from 1.0.
+    JSON journals hold bytes in base64, and do not distinguish 1 from 1.0.
     """
     try:
         said = [kind.__struct_config__.tag, *(content[name] for name in kind.__struct_fields__)]

@@ -7,7 +7,7 @@ from collections.abc import Hashable
 
 
 class Cache:
-    """The answers that were asked for last, of `most` bytes together."""
+    """The most recently used answers, limited to `most` bytes together."""
 
     def __init__(self, most: int) -> None:
         self._most = most
@@ -15,14 +15,14 @@ class Cache:
         self._answers: OrderedDict[Hashable, bytes] = OrderedDict()
 
     def get(self, key: Hashable) -> bytes | None:
-        """The answer, if it is kept."""
+        """Return the answer; None if it is not cached."""
         if key not in self._answers:
             return None
         self._answers.move_to_end(key)
         return self._answers[key]
 
     def put(self, key: Hashable, answer: bytes) -> bytes:
-        """Keep `answer`, unless it takes all the room; and return it."""
+        """Store `answer`, unless it is larger than the cache; return it."""
         self._held -= len(self._answers.pop(key, b""))
         if len(answer) < self._most:
             self._answers[key] = answer

@@ -14,22 +14,22 @@ Column: TypeAlias = "array[float] | array[int]"
 
 
 def floats() -> array[float]:
-    """An empty column of numbers of 8 bytes."""
+    """Return an empty column of floats of 8 bytes."""
     return array("d")
 
 
 def longs() -> array[int]:
-    """An empty column of unsigned integers of 4 bytes."""
+    """Return an empty column of unsigned integers of 4 bytes."""
     return array("I")
 
 
 def shorts() -> array[int]:
-    """An empty column of unsigned integers of 2 bytes."""
+    """Return an empty column of unsigned integers of 2 bytes."""
     return array("H")
 
 
 def packed_columns(parts: Iterable[Column]) -> bytes:
-    """The columns one after the other, little-endian."""
+    """Return the columns as bytes, one after the other, little-endian."""
     return b"".join(map(_little_endian, parts))
 
 

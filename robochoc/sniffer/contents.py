@@ -11,7 +11,7 @@ from robochoc.sniffer.columns import longs
 
 
 class Contents:
-    """What messages hold, by their numbers. Rows of a page of 4 MiB, so that none is ever copied as others come."""
+    """The contents of messages, by their numbers. Rows are stored in pages of 4 MiB, so growing copies nothing."""
 
     _LARGEST = 1 << 22
 
@@ -23,7 +23,7 @@ class Contents:
         self._decode = msgspec.msgpack.Decoder().decode
 
     def append(self, content: dict[str, Any]) -> None:
-        """The content of the next message."""
+        """Append the content of the next message."""
         packed = self._packed(content)
         page = self._pages[-1]
         if len(page) + len(packed) > self._LARGEST and page:

@@ -37,13 +37,14 @@ _MARKS = {"base64", "float", "map"}
 
 
 class _InexpressibleError(Exception):
-    """JSON has no words for a value."""
+    """A value that has no JSON form."""
 
 
 class Conversation:
-    """One run of the protocol that is called `name`, among robots of `platform` (`host:port/robochoc`).
+    """One run of the protocol `name`, among robots of `platform` (`host:port/robochoc`).
 
-    Raises `ValueError` where `platform` will not do.
+    Raises:
+        ValueError: if `platform` has another form.
     """
 
     def __init__(self, protocol: type[Protocol], name: str, platform: str, conversation_id: str) -> None:
@@ -55,9 +56,12 @@ class Conversation:
         self._fields = _fields_of(protocol)
 
     def acl_of(self, envelope: Envelope, sequence: int, reply_to: int | None = None) -> ACLMessage:
-        """The ACL message of `envelope`, the sender's message number `sequence`.
+        """Return the ACL message of `envelope`, the sender's message number `sequence`.
 
-        It answers the receiver's number `reply_to`. Raises `ACLError` where the content is no message of the protocol.
+        It is a reply to the receiver's message number `reply_to`, if that is given.
+
+        Raises:
+            ACLError: if the content is no message of the protocol.
         """
         message = self._decoded(envelope.content)
         said = _json_of(envelope.content, self._fields)
@@ -78,9 +82,10 @@ class Conversation:
         )
 
     def envelope_of(self, acl: ACLMessage) -> tuple[Envelope, Message]:
-        """The envelope that `acl` was made of, and the message in it, checked by the protocol's own decoder.
+        """Return the envelope and the message of `acl`, checked by the protocol's own decoder.
 
-        Raises `ACLError` for a message that is not of this conversation, or that no robot would send.
+        Raises:
+            ACLError: if the message is not of this conversation, or is no message of the protocol.
         """
         for what, found, expected in (
             ("ontology", acl.ontology, ONTOLOGY),
@@ -128,7 +133,7 @@ class Conversation:
 
 
 def _fields_of(protocol: type[Protocol]) -> dict[str, tuple[str, ...]]:
-    """The names of the fields of each type of message, by its name on the wire; of those that travel as arrays."""
+    """Return the field names of each message type that is encoded as an array, by the type's tag."""
     return {
         kind.__struct_config__.tag: tuple(field.name for field in msgspec.structs.fields(kind))
         for kind in get_args(protocol.messages) or (protocol.messages,)
@@ -137,7 +142,7 @@ def _fields_of(protocol: type[Protocol]) -> dict[str, tuple[str, ...]]:
 
 
 def _json_of(content: bytes, fields: Mapping[str, Sequence[str]]) -> str | None:
-    """`content` as JSON; None where that would not be the same again, or too long."""
+    """Return `content` as JSON; None if that would lose information or be too long."""
     try:
         kind, *values = msgspec.msgpack.decode(content)
         said = [kind, {name: _plain(value, 0) for name, value in zip(fields[kind], values, strict=True)}]
@@ -148,7 +153,7 @@ def _json_of(content: bytes, fields: Mapping[str, Sequence[str]]) -> str | None:
 
 
 def _content_of(text: str, fields: Mapping[str, Sequence[str]]) -> bytes:
-    """The msgpack of a content in JSON. Raises `ACLError`."""
+    """Return the msgpack bytes of a content in JSON. Raises `ACLError`."""
     if len(text) > MAX_JSON:
         raise ACLError(f"a content of {len(text)} characters is too long: at most {MAX_JSON} as JSON")
     try:
@@ -161,7 +166,7 @@ def _content_of(text: str, fields: Mapping[str, Sequence[str]]) -> bytes:
 
 
 def _names(kind: str, given: Collection[str], fields: Mapping[str, Sequence[str]]) -> Sequence[str]:
-    """The fields of `kind` in their order. Raises `ACLError` unless it is those that are `given`."""
+    """Return the fields of `kind` in their order. Raises `ACLError` if `given` are other fields."""
     if kind not in fields:
         raise ACLError(f"there is no message {_shown(kind)}, only {', '.join(fields)}")
     names = fields[kind]
@@ -171,7 +176,7 @@ def _names(kind: str, given: Collection[str], fields: Mapping[str, Sequence[str]
 
 
 def _plain(value: object, depth: int) -> object:
-    """`value`, as msgpack has it, in the words of JSON. Raises `_InexpressibleError`."""
+    """Return `value`, decoded from msgpack, in JSON form. Raises `_InexpressibleError`."""
     match value:
         case None | bool() | int() | str():
             return value
@@ -190,7 +195,7 @@ def _plain(value: object, depth: int) -> object:
 
 
 def _raw(value: Any, depth: int) -> Any:  # noqa: ANN401 - any JSON
-    """What `_plain` was given. Raises `ValueError` and others where it was given nothing."""
+    """Return the value that `_plain` was given. Raises `ValueError` and others for any other input."""
     if depth > _DEPTH:
         raise ValueError(f"lists within lists deeper than {_DEPTH}")
     if isinstance(value, list):
@@ -214,11 +219,11 @@ def _is_mark(members: Mapping[Any, object]) -> bool:
 
 
 def _key(value: object) -> object:
-    """JSON's lists cannot be keys; msgpack decodes those that were as tuples."""
+    """Return a key for a msgpack map: lists cannot be keys, so they become tuples."""
     return tuple(map(_key, value)) if isinstance(value, list) else value
 
 
 def _shown(found: object) -> str:
-    """As much of a foreign word as belongs in a message."""
+    """Return a short form of foreign input for an error message."""
     shown = repr(found)
     return shown if len(shown) <= 80 else f"{shown[:80]}..."  # noqa: PLR2004 - a line's worth

@@ -20,10 +20,9 @@ _LEVEL = 6
 
 
 def embedded_answers(data: PageData, journal: Journal | None = None, *, most_states: int = 20_000) -> dict[str, bytes]:
-    """The answers about the whole trace of `data`; with its `journal` also what robots knew.
+    """Return the answers about the whole trace of `data`; with its `journal` also robots' states.
 
-    That is played again, for as many robots, in the order of their names, as have no more than `most_states` steps
-    together.
+    States are computed by replay, for robots in the order of their names, until they have `most_states` steps together.
     """
     return {name: zlib.compress(answer, _LEVEL) for name, answer in _answers(data, journal, most_states)}
 

@@ -12,15 +12,18 @@ from robochoc.sniffer.trace import Trace
 
 
 def excerpt_of(journal: Journal, trace: Trace, messages: Sequence[int]) -> Journal:
-    """`journal`, whose trace is `trace`, with no other messages than `messages`, sent and taken in.
+    """Return `journal`, whose trace is `trace`, reduced to `messages`: other sends and receipts are left out.
 
-    All that is no message is there.
+    All other events are kept.
     """
     return replace(journal, events=tuple(_meant(journal.events, trace, set(messages))))
 
 
 def _meant(events: Sequence[AnyEvent], trace: Trace, messages: set[int]) -> Iterator[AnyEvent]:
-    """A sender's messages in a run have ascending numbers; whom they reach takes them in, in that order."""
+    """Yield the events without other messages.
+
+    A sender's messages in a run have ascending numbers, and each receiver receives them in that order.
+    """
     of = trace.messages
     spoken: dict[tuple[int, str], list[int]] = defaultdict(list)
     for message, (run, sender) in enumerate(zip(of.run, of.sender, strict=True)):

@@ -30,17 +30,17 @@ _encode = msgspec.json.encode
 
 
 class TooMuchToDrawError(ValueError):
-    """More messages than a diagram can have."""
+    """A selection with more messages than a diagram can have."""
 
 
 def acl_texts(data: PageData, messages: Sequence[int]) -> Iterator[bytes]:
-    """The messages in FIPA ACL as text (FIPA00070), one after the other, each on a line of its own."""
+    """Yield the messages in FIPA ACL as text (FIPA00070), each on a line of its own."""
     for message in messages:
         yield f"{text(data.acl_messages.acl_of(message))}\n".encode()
 
 
 def table(data: PageData, messages: Sequence[int]) -> Iterator[bytes]:
-    """The messages as CSV, a row each, after the headings."""
+    """Yield the messages as CSV: a header, then a row for each."""
     yield _row(HEADINGS)
     trace, of, steps = data.trace, data.trace.messages, data.trace.steps
     for message in messages:
@@ -75,9 +75,10 @@ def _row(cells: Sequence[object]) -> bytes:
 
 
 def mermaid(data: PageData, messages: Sequence[int]) -> bytes:
-    """The messages as a sequence diagram of mermaid, with notes where robots decide; Markdown pages can hold it.
+    """Return the messages as a mermaid sequence diagram, with notes for decisions; Markdown pages can hold it.
 
-    Raises `TooMuchToDrawError`.
+    Raises:
+        TooMuchToDrawError: if there are too many messages.
     """
     if len(messages) > MOST_ARROWS:
         raise TooMuchToDrawError(f"{len(messages):,} messages are too many for a diagram: at most {MOST_ARROWS}")
@@ -104,7 +105,7 @@ def mermaid(data: PageData, messages: Sequence[int]) -> bytes:
 
 
 def drawable(data: PageData, messages: Sequence[int]) -> Sequence[int]:
-    """So many of the first of `messages` that a diagram can hold them."""
+    """Return the first of `messages`, as many as a diagram can hold."""
     part = messages[:MOST_ARROWS]
     while part:
         try:
@@ -117,7 +118,7 @@ def drawable(data: PageData, messages: Sequence[int]) -> Sequence[int]:
 
 
 def _notes(trace: Trace, messages: Sequence[int]) -> list[tuple[int, dict[str, int]]]:
-    """The decisions between the first message and the last one."""
+    """Return the decisions between the first message and the last one."""
     if not messages:
         return []
     first, last = trace.messages.step[messages[0]], trace.messages.step[messages[-1]]
@@ -135,7 +136,7 @@ def _note(trace: Trace, step: int, assignment: dict[str, int], drawn: set[int]) 
 
 
 def _label(words: str) -> str:
-    """`words` as mermaid takes them for words: what means something to it stands as its number."""
+    """Return `words` with mermaid's special characters escaped by their numbers."""
     shown = printable(words)
     if len(shown) > _LONGEST_LABEL:
         shown = f"{shown[: _LONGEST_LABEL - 1]}…"

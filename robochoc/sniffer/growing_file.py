@@ -12,11 +12,11 @@ _HEAD_BYTES = 256
 
 
 class NoFileError(OSError):
-    """It is a pipe, a device, or a folder: what has been read of it could not be read again."""
+    """A pipe, device or folder: it cannot be read again."""
 
 
 def open_to_read(path: Path) -> int:
-    """Return a descriptor of the file at `path`, for reading. A FIFO is not waited for. Raises `OSError`."""
+    """Return a descriptor of the file at `path`, for reading; do not wait for a FIFO. Raises `OSError`."""
     descriptor = os.open(path, os.O_RDONLY | os.O_NONBLOCK)
     try:
         _check_file(descriptor)
@@ -32,9 +32,9 @@ def _check_file(descriptor: int) -> None:
 
 
 class GrowingFile(io.RawIOBase):
-    """Reads the file `descriptor` from its start up to `end`, which whoever reads moves on.
+    """Reads the file `descriptor` from its start up to `end`, which the caller moves on.
 
-    The place is its own: who writes through the same open file, as a parent does, is not disturbed.
+    It keeps a position of its own, so a writer with the same open file, such as a parent process, is not disturbed.
     """
 
     def __init__(self, descriptor: int) -> None:
@@ -45,42 +45,42 @@ class GrowingFile(io.RawIOBase):
 
     @property
     def size(self) -> int:
-        """How long the file is by now."""
+        """The present length of the file."""
         return os.fstat(self._descriptor).st_size
 
     @property
     def head(self) -> bytes:
-        """Its first bytes, by which a journal is known."""
+        """The file's first bytes, which identify a journal."""
         return os.pread(self._descriptor, _HEAD_BYTES, 0)
 
     def widen(self, most: int) -> bool:
-        """Let up to `most` more bytes be read, as far as they are there; whether there were any."""
+        """Move `end` on by up to `most` bytes that exist; return whether there were any."""
         before, self.end = self.end, min(self.size, self.end + most)
         return self.end > before
 
     def again(self) -> GrowingFile:
-        """The same file from its start."""
+        """Return a reader of the same file, from its start."""
         return GrowingFile(self._descriptor)
 
     def readable(self) -> bool:
-        """It is."""
+        """Return True."""
         return True
 
     def seekable(self) -> bool:
-        """It is."""
+        """Return True."""
         return True
 
     def tell(self) -> int:
-        """The place from which is read next."""
+        """Return the current position."""
         return self.place
 
     def seek(self, offset: int, whence: int = os.SEEK_SET) -> int:
-        """Read next from `offset`, counted from the start, the place, or `end`."""
+        """Set the position to `offset`, relative to the start, the position, or `end`; return it."""
         self.place = max(0, offset + {os.SEEK_SET: 0, os.SEEK_CUR: self.place, os.SEEK_END: self.end}[whence])
         return self.place
 
     def readinto(self, buffer: Any) -> int:  # noqa: ANN401 - whatever holds bytes
-        """Read into `buffer`; 0 at `end`."""
+        """Read into `buffer`; return the number of bytes, 0 at `end`."""
         content = os.pread(self._descriptor, min(len(buffer), max(0, self.end - self.place)), self.place)
         buffer[: len(content)] = content
         self.place += len(content)

@@ -38,10 +38,10 @@ _FORSAKEN_S = 30.0
 
 
 class LiveTrace:
-    """Follows the journal in `file`, in pieces: whoever calls `advance` decides when.
+    """Follows the journal in `file`, one piece per call of `advance`.
 
-    `trace` is what there is by now: None before the first block. `loaded` is the part of the file that has been
-    taken in, 0 to 1.
+    `trace` is the trace so far: None before the first block. `loaded` is the part of the file that has been read, from
+    0 to 1.
     """
 
     def __init__(self, file: GrowingFile, age_s: Callable[[], float] = lambda: 0.0) -> None:
@@ -53,7 +53,7 @@ class LiveTrace:
         self.restart(file)
 
     def restart(self, file: GrowingFile) -> None:
-        """Begin anew, with the journal in `file`: the next generation."""
+        """Start again with the journal in `file`: the next generation."""
         self._file = file
         self._follower = Follower(BufferedReader(file))
         self._head = file.head
@@ -67,12 +67,12 @@ class LiveTrace:
 
     @property
     def loaded(self) -> float:
-        """How much of what is in the file has been taken in, 0 to 1."""
+        """The part of the present file that has been read, from 0 to 1."""
         return self._file.end / max(1, self._file.size)
 
     @property
     def settled(self) -> bool:
-        """Whether all is read, the end too, and in order."""
+        """Whether the whole journal has been read, its end included, and sorted."""
         return self._done
 
     @property
@@ -81,11 +81,11 @@ class LiveTrace:
 
     @property
     def presentable(self) -> bool:
-        """Whether there is something to be shown. A small journal is put in order first, which does not take long."""
+        """Whether there is something to show. A small journal is sorted first, which does not take long."""
         return self.trace is not None and (self._done or self._waits or self._worked_s > _AT_ONCE_S)
 
     def advance(self) -> bool:
-        """Do a bit of work; False when there was none. Raises `JournalError`, and `TraceTooLargeError`."""
+        """Do a piece of work; return False if there was none. Raises `JournalError` and `TraceTooLargeError`."""
         began = time.monotonic()
         done = self._advance()
         self._worked_s += time.monotonic() - began
@@ -115,7 +115,7 @@ class LiveTrace:
         return False
 
     def _read(self) -> bool:
-        """Take in a few entries, which may be few bytes; whether there was anything to do."""
+        """Read a few entries; return whether there was anything to do."""
         if self.trace is None and not _may_begin(self._file.head):
             raise JournalError("it does not begin as a journal does")
         lines = self._follower.read(_EVENTS_AT_ONCE)
@@ -154,7 +154,7 @@ class LiveTrace:
             self._done = True
 
     def _in_order(self, header: Header) -> Iterator[None]:
-        """Make the trace anew, of events in the order of their times; in pieces."""
+        """Make the trace again from the events sorted by time; yield after each piece."""
         trace = Trace(header, self._generation + 1)
         for events in events_by_time(self._file):
             trace.add(events)
@@ -165,12 +165,12 @@ class LiveTrace:
 
 
 def _may_begin(head: bytes) -> bool:
-    """Return whether a journal begins so, or may once more of it is there."""
+    """Return whether a journal begins with `head`, or may do so with more bytes."""
     return is_journal(head) or any(form.startswith(head) for form in (MAGIC, TEXT))
 
 
 def next_entries(follower: Follower, file: GrowingFile, end: int) -> list[JournalEntry]:
-    """The next few entries before `end`, by the `follower` that reads `file`; none: there are no more."""
+    """Return the next few entries before `end`, from the `follower` that reads `file`; none at the end."""
     lines = follower.read(_EVENTS_AT_ONCE)
     while not lines and file.end < end and file.widen(min(PIECE_BYTES, end - file.end)):
         lines = follower.read(_EVENTS_AT_ONCE)
@@ -178,10 +178,10 @@ def next_entries(follower: Follower, file: GrowingFile, end: int) -> list[Journa
 
 
 def events_by_time(file: GrowingFile) -> Iterator[list[AnyEvent]]:
-    """The events in the file of `file`, up to its present end: each run's in the order of their times, in pieces.
+    """Yield the events of `file`, up to its present end, in pieces: each run's sorted by time.
 
-    Some pieces are empty: there was work to do. Events of equal times stay in their order. A run's are put aside in a
-    file without a name until the run is over, and only their times and places are kept.
+    Some pieces are empty: they stand for work done. Events of equal times keep their order. A run's events are stored
+    in an unnamed temporary file until the run is over; only their times and places stay in memory.
     """
     here = file.again()
     follower = Follower(BufferedReader(here))
@@ -202,7 +202,7 @@ def events_by_time(file: GrowingFile) -> Iterator[list[AnyEvent]]:
 
 
 class _Aside:
-    """Events of one run, packed, in a file without a name."""
+    """The packed events of one run, in an unnamed temporary file."""
 
     def __init__(self) -> None:
         self._times = array("d")
@@ -219,7 +219,7 @@ class _Aside:
         self._ends.append(self._ends[-1] + self._file.write(self._encode(event)))
 
     def sorted(self) -> Iterator[list[AnyEvent]]:
-        """In the order of their times, in pieces; then the file is gone."""
+        """Yield the events sorted by time, in pieces; then delete the file."""
         import numpy as np  # noqa: PLC0415 - not before there is something to sort
 
         with self._file as file:

@@ -25,11 +25,15 @@ _TITLE = "<title>Sniffer</title>"
 
 
 def sniffer_page(mode: Mode, embedded: Mapping[str, bytes] | None = None, title: str = "Sniffer") -> bytes:
-    """The page, UTF-8. The same answers make the same page.
+    """Return the page, in UTF-8. The same answers make the same page.
 
-    `embedded` are the page's data by name (`columns`, `details:0`), zlib-compressed: their names are ours, what
-    they hold is strangers'. `title` is plain text, of anybody's. Meshcat's viewer, a megabyte, is left out of an
-    embedded page without a `scene`.
+    Args:
+        mode: Served by a server, or embedded: one file with all data.
+        embedded: The page's data by name (`columns`, `details:0`), zlib-compressed. The names are trusted, the data is
+            not.
+        title: The title, as untrusted plain text.
+
+    An embedded page without a `scene` leaves out Meshcat's viewer, a megabyte.
     """
     answers = embedded or {}
     connections = "'self'" if mode == "served" else "'none'"
@@ -52,7 +56,7 @@ def _script(script: str) -> str:
 
 
 def _block(name: str, content: bytes) -> str:
-    """An answer of `PageData` as a script that no browser runs."""
+    """Return an answer of `PageData` as a script element of a type that browsers do not run."""
     text = base64.b64encode(content).decode()
     return f'<script id="feed:{escape(name)}" type="application/octet-stream">{text}</script>'
 

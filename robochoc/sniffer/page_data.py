@@ -47,18 +47,18 @@ _encode = msgspec.json.Encoder(enc_hook=str).encode
 
 
 class BadRequestError(ValueError):
-    """There is no such answer."""
+    """A request that has no answer."""
 
 
 def message_columns(trace: Trace, first: int, end: int) -> bytes:
-    """The messages from `first` to before `end`."""
+    """Return the columns of the messages from `first` to before `end`."""
     of = trace.messages
     columns = (of.t, of.clock, of.step, of.bytes, of.sender, of.receiver, of.kind, of.run)
     return packed_columns(column[first:end] for column in columns)
 
 
 def step_columns(trace: Trace, first: int, end: int) -> bytes:
-    """The steps from `first` to before `end`, and what they took in."""
+    """Return the columns of the steps from `first` to before `end`, with the messages they received."""
     of = trace.steps
     packets = trace.packets[_end_before(of.packet_end, first) : _end_before(of.packet_end, end)]
     columns = (of.t[first:end], of.clock[first:end], of.checks[first:end], of.packet_end[first:end], packets)
@@ -70,9 +70,9 @@ def _end_before(ends: Sequence[int], step: int) -> int:
 
 
 class PageData:
-    """The answers about one trace. `live`: more may come.
+    """The answers about one trace. `live`: the trace may still grow.
 
-    `chosen` are names, or patterns of names (`patterns.py`), of the robots to begin with; none: all.
+    `chosen` are names, or patterns of names (`patterns.py`), of the robots to show at first; none: all.
     """
 
     def __init__(self, trace: Trace, *, live: bool = False, chosen: Sequence[str] = ()) -> None:
@@ -84,7 +84,7 @@ class PageData:
         self.acl_messages = AclMessages(trace, self.protocols)
 
     def about(self) -> bytes:
-        """What was run, who took part, and how far it is."""
+        """Return what was run, the robots, and the progress, as JSON."""
         trace, header = self.trace, self.trace.header
         order = None if header.order is msgspec.UNSET else header.order
         return _encode(
@@ -110,7 +110,10 @@ class PageData:
         )
 
     def news(self) -> dict[str, Any]:
-        """What of `about` changes as a run goes on, in numbers and words; who counts others asks for `about` anew."""
+        """Return the parts of `about` that change during a run, as numbers and words.
+
+        A page whose counts differ requests `about` again.
+        """
         trace = self.trace
         return {
             "generation": trace.generation,
@@ -128,7 +131,7 @@ class PageData:
         }
 
     def cannot_replay(self) -> str:
-        """Why there are no states of robots to be had; empty where there are."""
+        """Return why robots' states are not available; empty if they are."""
         if not self.trace.runs:
             return "no run has begun"
         for run in self.trace.runs:
@@ -137,22 +140,22 @@ class PageData:
         return ""
 
     def columns(self, first: int, end: int) -> bytes:
-        """Messages. Raises `BadRequestError`, as the others do."""
+        """Return the columns of messages. Raises `BadRequestError`, as the other methods do."""
         _check(first, end, len(self.trace.messages.t))
         return message_columns(self.trace, first, end)
 
     def steps(self, first: int, end: int) -> bytes:
-        """Steps, and what they took in."""
+        """Return the columns of steps, with the messages they received."""
         _check(first, end, len(self.trace.steps.t))
         return step_columns(self.trace, first, end)
 
     def decisions(self, first: int, end: int) -> bytes:
-        """Who decided what."""
+        """Return the decisions."""
         _check(first, end, len(self.trace.decisions))
         return _encode(self.trace.decisions[first:end])
 
     def details(self, chunk: int) -> bytes:
-        """What the messages of a chunk hold."""
+        """Return the contents of the messages of a chunk."""
         first = chunk * DETAILS
         count = len(self.trace.messages.t)
         if chunk < 0 or first >= max(count, 1):
@@ -160,7 +163,7 @@ class PageData:
         return _encode([self.detail(message) for message in range(first, min(first + DETAILS, count))])
 
     def detail(self, message: int) -> dict[str, Any]:
-        """What one message holds: its fields, in words, and as FIPA ACL."""
+        """Return the content of one message: its fields, in words, and as FIPA ACL."""
         acl = self.acl_messages.acl_of(message)
         return {
             "content": self.acl_messages.plain(message),
@@ -170,7 +173,7 @@ class PageData:
         }
 
     def words(self, message: int) -> str:
-        """Return what one message says, in words."""
+        """Return one message in words."""
         trace, of = self.trace, self.trace.messages
         run = of.run[message]
         words = self.names.wording(run, trace.robots[of.sender[message]], trace.robots[of.receiver[message]])
@@ -201,7 +204,7 @@ def _run(run: RunRecord) -> dict[str, Any]:
 
 
 def _told(notes: Sequence[Note]) -> list[Note]:
-    """The last ones, in their order. What costs less each time must not crowd out losses and refusals."""
+    """Return the last notes, in their order; incumbents must not displace losses and refusals."""
     often = [place for place, note in enumerate(notes) if note.kind in _OFTEN]
     seldom = [place for place, note in enumerate(notes) if note.kind not in _OFTEN]
     return [notes[place] for place in sorted([*often[-MOST_NOTES:], *seldom[-MOST_NOTES:]])]
@@ -212,7 +215,7 @@ def _note_of(note: Note) -> dict[str, Any]:
 
 
 def verdict_of(trace: Trace) -> str:
-    """How the run ended, in words; of several epochs, how each did."""
+    """Return the result of the run in words; for several epochs, the result of each."""
     outcome = trace.outcome
     if outcome is None:
         return "The run broke off before an outcome." if trace.over else "The run goes on."
@@ -247,14 +250,14 @@ def _said(verdict: Verdict) -> str:
 
 
 def _by(outcome: Outcome) -> str:
-    """Who could tell alone; who gave up is named in the reason."""
+    """Return in words which robot concluded alone; a robot that gave up is named in the reason."""
     if outcome.witness is None or outcome.verdict is Verdict.UNKNOWN:
         return ""
     return f", as {outcome.ruled_out if outcome.verdict is Verdict.NO_SOLUTION else f'{outcome.witness} has concluded'}"
 
 
 def _epochs(epochs: Sequence[EpochOutcome]) -> str:
-    """How many there were, and how each of the first ones ended."""
+    """Return in words the number of epochs, and the results of the first ones."""
     ends = [f"{_cut(epoch.lost, 3)} lost" if epoch.lost else _said(epoch.verdict) for epoch in epochs[:MOST_EPOCHS]]
     more = len(epochs) - len(ends)
     return f"{len(epochs):,} epochs: {', '.join(ends)}{f' and {more:,} more' if more else ''}."

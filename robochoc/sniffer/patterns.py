@@ -10,24 +10,27 @@ from collections.abc import Iterable, Sequence
 
 
 def patterns_in(text: str) -> tuple[str, ...]:
-    """The names and patterns in `text`, which are separated by commas."""
+    """Return the names and patterns in `text`, which are separated by commas."""
     return tuple(part for part in (part.strip() for part in text.split(",")) if part)
 
 
 def matching(names: Iterable[str], patterns: Sequence[str]) -> list[str]:
-    """Those of `names` that one of `patterns` fits, in their order."""
+    """Return those of `names` that match one of `patterns`, in their order."""
     wholes = [_expression(pattern) for pattern in patterns]
     return [name for name in names if any(whole.fullmatch(name) for whole in wholes)]
 
 
 def unmatched(names: Iterable[str], patterns: Sequence[str]) -> list[str]:
-    """Those of `patterns` that fit none of `names`."""
+    """Return those of `patterns` that match none of `names`."""
     known = list(names)
     return [pattern for pattern in patterns if not matching(known, (pattern,))]
 
 
 def _expression(pattern: str) -> re.Pattern[str]:
-    """Each part between two `*` is where it fits first, for good: so no time is lost on names that nearly fit."""
+    """Return a regular expression in which each part between two `*` matches its first place only.
+
+    Without backtracking, names that nearly match take no more time.
+    """
     first, *rest = ("".join("." if sign == "?" else re.escape(sign) for sign in part) for part in pattern.split("*"))
     if not rest:
         return re.compile(first, re.DOTALL)

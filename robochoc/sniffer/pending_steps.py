@@ -8,7 +8,10 @@ from robochoc.journal.events import Sent
 
 
 class PendingChannel:
-    """From one robot to another, in one run: what was said and not yet taken in; `owed` was taken in unseen."""
+    """The sent and not yet received messages from one robot to another, in one run.
+
+    `owed` counts received messages whose sending has not been seen.
+    """
 
     __slots__ = ("owed", "under_way")
 
@@ -18,7 +21,7 @@ class PendingChannel:
 
 
 class PendingStep:
-    """A step that has not ended, or waits for what it took in."""
+    """A step that has not ended, or waits for the sending of messages that it received."""
 
     __slots__ = ("checks", "clock", "decided", "notes", "packet", "received", "said", "t")
 
@@ -32,7 +35,7 @@ class PendingStep:
         self.clock = self.checks = 0
 
     def taken_in(self) -> bool:
-        """Return whether all that the step took in is known; what is goes to its packet."""
+        """Return whether all received messages are known; move the known ones to the step's packet."""
         while self.received:
             if not self.received[0].under_way:
                 return False

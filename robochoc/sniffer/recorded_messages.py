@@ -32,7 +32,7 @@ _LISTS = (CollectionType, TupleType, StructType)
 
 
 class RunProtocols:
-    """The protocols of the runs of `trace`, as far as they are installed."""
+    """The installed protocols of the runs of `trace`."""
 
     def __init__(self, trace: Trace) -> None:
         self._trace = trace
@@ -123,7 +123,7 @@ def _is_number(declared: Type) -> bool:
 
 
 def _items(declared: Type, count: int) -> Sequence[Type]:
-    """Return the declared types of the items of a list of so many."""
+    """Return the declared types of the `count` items of a list."""
     match declared:
         case UnionType(types):
             return _items(next((kind for kind in types if isinstance(kind, _LISTS)), AnyType()), count)

@@ -29,7 +29,7 @@ _NUMBER_BITS = 32
 
 
 class WholeBlocks(BlockReader):
-    """Passes on of a journal's bytes, as they come, what has become whole blocks, each of which follows the last."""
+    """Collects a journal's bytes and passes on whole blocks; each must follow the last."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -37,7 +37,7 @@ class WholeBlocks(BlockReader):
         self._passed = 0
 
     def take(self, content: bytes) -> bytes:
-        """What is whole with `content`, and was not passed on yet. Raises `JournalError` and `JournalDamagedError`."""
+        """Return the new whole blocks after adding `content`. Raises `JournalError` and `JournalDamagedError`."""
         self._held += content
         self.feed(content)
         while self.next() is not None:
@@ -50,7 +50,7 @@ class WholeBlocks(BlockReader):
 
 
 class Followed(NamedTuple):
-    """How it ended: the run did and all is here (`over`), or there is no more to be had, because of `why`."""
+    """The end of following a journal: the run is `over` and complete, or the rest is not available (`why`)."""
 
     over: bool
     why: str
@@ -68,11 +68,21 @@ def receive(
     stopped: Callable[[], bool] = lambda: False,
     granted: Callable[[], None] = lambda: None,
 ) -> Followed:
-    """Give the run's journal to `sink`, whole blocks in their order, until the run or the master ends.
+    """Pass the run's journal to `sink` in whole blocks, until the run or the master ends.
 
-    Each block's checksum, which includes that of the block before it, is checked before it is passed on. `granted`
-    is called when the master has agreed, `stopped` asked now and then whether to stop. Raises `CannotConnectError` and,
-    when the master does not agree, `NoAnswerError`.
+    Each block's checksum includes that of the block before, and is verified before the block is passed on.
+
+    Args:
+        place: The master's address.
+        identity: The key pair to connect with.
+        sink: Receives the blocks.
+        patience_s: The time to wait for an answer, in seconds.
+        stopped: Is called regularly; the function returns when it returns True.
+        granted: Is called when the master has accepted the connection.
+
+    Raises:
+        CannotConnectError: if there is no connection.
+        NoAnswerError: if the master does not accept.
     """
     with Transport(str(place), identity, watch=(), patience_s=patience_s) as transport:
         sniffer = _Sniffer(place, transport)
@@ -84,7 +94,7 @@ def receive(
 
 
 class IncomingJournal:
-    """The journal of `run` of the master at `place`, as far as it is here; `sink` gets what of it is good."""
+    """The part of the journal of `run` received from the master at `place`; `sink` gets its valid blocks."""
 
     def __init__(self, place: Address, run: str, sink: Callable[[bytes], object]) -> None:
         self._place = place
@@ -97,11 +107,11 @@ class IncomingJournal:
 
     @property
     def question(self) -> bytes:
-        """What to ask for next."""
+        """The next request."""
         return question(self._run, self._start)
 
     def take(self, content: bytes) -> Followed | None:
-        """Take in an answer; how it ended, if it did."""
+        """Process an answer; return the end of the journal if it was reached."""
         try:
             piece = piece_in(content)
             if piece.run != self._run:
@@ -122,7 +132,7 @@ class IncomingJournal:
 
 
 class _Sniffer:
-    """One who asks the master at `place`, by its `transport`."""
+    """A client of the master at `place`, connected by `transport`."""
 
     def __init__(self, place: Address, transport: Transport) -> None:
         self._place = place
@@ -132,7 +142,7 @@ class _Sniffer:
         self._number = secrets.randbits(_NUMBER_BITS)
 
     def admitted(self, patience_s: float, stopped: Callable[[], bool]) -> str | None:
-        """The run that may be followed; None: stopped. Raises `NoAnswerError` where it may not, or nobody says so."""
+        """Return the run to follow; None: stopped. Raises `NoAnswerError` on a refusal or no answer."""
         until, asked = time.monotonic() + patience_s, 0.0
         while time.monotonic() < until and not stopped():
             if time.monotonic() - asked > ASK_AGAIN_S:
@@ -152,7 +162,7 @@ class _Sniffer:
         )
 
     def follow(self, journal: IncomingJournal, patience_s: float, stopped: Callable[[], bool]) -> Followed:
-        """Ask for piece after piece."""
+        """Request piece after piece of the journal."""
         heard = time.monotonic()
         while not stopped():
             content = self._transport.ask(journal_key(self._name), journal.question, PIECE_S)
@@ -175,7 +185,7 @@ class _Sniffer:
         self._transport.send(MASTER, self._framing.write(MASTER, JournalRequest(self._number)))
 
     def _refused(self) -> Followed | None:
-        """Ask by frame why there is no answer; None: there is no reason, or nobody says it."""
+        """Request a reason for the missing answer; None: there is none, or no answer."""
         self._ask()
         answer = self._answer(PIECE_S)
         if answer is None or not answer.why:
@@ -185,7 +195,7 @@ class _Sniffer:
         )
 
     def _answer(self, patience_s: float) -> JournalAnswer | None:
-        """What the master says next, within `patience_s`."""
+        """Return the master's next answer; None if there is none within `patience_s`."""
         until = time.monotonic() + patience_s
         while (left := until - time.monotonic()) > 0:
             try:

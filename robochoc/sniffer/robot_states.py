@@ -35,7 +35,7 @@ class _Playing(NamedTuple):
 
 
 class RobotStates:
-    """Plays the robot again that was asked about last, and keeps what it has shown."""
+    """Replays the robot of the last request, and keeps its states."""
 
     def __init__(self) -> None:
         self._cache = Cache(_KEPT_BYTES)
@@ -44,10 +44,13 @@ class RobotStates:
         self.stopped = False
 
     def chunk(self, file: GrowingFile, robot: str, number: int, *, final: bool) -> bytes:
-        """The states after the steps of chunk `number`, as JSON; `[]` past the last one. Raises `BadRequestError`.
+        """Return the states after the steps of chunk `number`, as JSON; `[]` past the last one.
 
-        `file` is not touched; the file is read up to its present end. What is kept is what is `final`: in mid-run
-        something may be missing yet of what a robot was told.
+        The reader `file` is not moved; the file is read up to its present end. Only `final` states are kept: during a
+        run, messages to the robot may still be missing.
+
+        Raises:
+            BadRequestError: if the robot cannot be replayed.
         """
         kept = self._cache.get((robot, number))
         if kept is not None:
@@ -88,7 +91,7 @@ class RobotStates:
         )
 
     def _events(self, file: GrowingFile, robot: str | None = None) -> Iterator[AnyEvent]:
-        """What concerns `robot`, or all that robots do, each run's in the order of their times."""
+        """Yield the events of `robot`, or of all robots, each run's sorted by time."""
         whose = robot or "all robots together"
         here = file.again()
         follower = Follower(BufferedReader(here))

@@ -34,13 +34,13 @@ Move = tuple[int, int, float, float, float]
 
 
 def whole_scene(trace: Trace) -> bytes:
-    """The scene of a trace to which nothing will be added, by the robots' files that it holds; JSON."""
+    """Return the scene of a complete trace as JSON, from the robots' files in the trace."""
     stage = TraceScene(trace, robots_given(trace))
     return msgspec.json.encode(stage.answer() if stage else None)
 
 
 def robots_given(trace: Trace) -> dict[str, Robot]:
-    """The robots, by what they were given in the run that began last; those whose file makes sense."""
+    """Return the robots given in the last run, without those whose file is invalid."""
     robots = {}
     for name, file in (trace.runs[-1].files if trace.runs else {}).items():
         with suppress(InvalidInputError, UnicodeEncodeError):
@@ -49,9 +49,9 @@ def robots_given(trace: Trace) -> dict[str, Robot]:
 
 
 class TraceScene:
-    """The drones of one trace. `robots` are those whose files are known; of others only what they decide is.
+    """The drones of one trace. `robots` are those with known files; for others, only decisions are known.
 
-    The box holds all places that known robots might take, and those that others have taken by now.
+    The box contains all possible places of known robots, and the places that others have taken so far.
     """
 
     def __init__(self, trace: Trace, robots: Mapping[str, Robot]) -> None:
@@ -69,11 +69,11 @@ class TraceScene:
         self._names = [craft.name for craft in crafts]
 
     def __bool__(self) -> bool:
-        """Return whether there is anything to see."""
+        """Return whether there is anything to show."""
         return bool(self._owners)
 
     def answer(self, first: int = 0) -> dict[str, Any]:
-        """What the page draws, with the moves of the decisions from the `first` on; JSON."""
+        """Return what the page draws, with the moves of the decisions from `first` on; JSON-compatible."""
         upto = len(self._trace.decisions)
         if first > upto:
             raise BadRequestError(f"there are {upto} decisions")
@@ -91,7 +91,7 @@ class TraceScene:
         }
 
     def moves(self, first: int, end: int) -> Iterator[Move]:
-        """Where drones go by the decisions from `first` up to, without, `end`."""
+        """Yield the moves of the drones for the decisions from `first` to before `end`."""
         trace = self._trace
         opened = [run.step for run in trace.runs[1:] if run.epoch is None]
         before = trace.decisions[first - 1][0] if first else -1
@@ -116,7 +116,7 @@ class TraceScene:
         return [craft_of_variable(variable, values) for variable in self._trace.variables.get(name, ())]
 
     def _places(self, name: str, values: Assignment) -> Iterator[tuple[int, Point]]:
-        """Where the drones of a robot are, by its decision."""
+        """Yield the places of a robot's drones for its decision."""
         numbers = self._drones.get(name)
         if not numbers:
             return
@@ -133,7 +133,7 @@ class TraceScene:
                 yield number, (rows.at(craft.cell[0]), columns.at(craft.cell[1]), levels.at(craft.level))
 
     def _others(self) -> Iterator[Craft]:
-        """Where drones might be, or have been."""
+        """Yield the possible and past places of drones."""
         seen: set[Craft] = set()
         for robot in self._robots.values():
             if robot is not None:

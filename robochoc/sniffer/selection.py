@@ -10,15 +10,15 @@ from robochoc.sniffer.trace import Trace
 
 
 class NothingSelectedError(ValueError):
-    """A part of the selection fits nothing in the journal; says which, and what there is."""
+    """A part of a selection that matches nothing in the journal; the message lists what there is."""
 
 
 @dataclass(frozen=True)
 class Selection:
-    """`robots` and `kinds` are names or patterns; a message is meant if both its robots are, and its type is.
+    """A selection of messages: both robots must match `robots`, and the type must match `kinds`.
 
-    `first` and `last` are numbers of messages, from 0 on, both meant; `run` is the number of a run, from 1 on: the
-    conversation. What is empty, or None, lets everything pass.
+    `robots` and `kinds` are names or patterns. `first` and `last` are numbers of messages, from 0 on, both included.
+    `run` is the number of a run, from 1 on: the conversation. Empty or None parts do not restrict the selection.
     """
 
     robots: Sequence[str] = ()
@@ -29,11 +29,11 @@ class Selection:
 
     @property
     def whole(self) -> bool:
-        """Whether everything is meant."""
+        """Whether everything is selected."""
         return self == Selection()
 
     def of(self, trace: Trace) -> range | list[int]:
-        """The numbers of the messages that are meant, in order. Raises `NothingSelectedError`."""
+        """Return the numbers of the selected messages, in order. Raises `NothingSelectedError`."""
         count = len(trace.messages.t)
         numbers = range(min(self.first, count), count if self.last is None else min(self.last + 1, count))
         if count and not numbers:

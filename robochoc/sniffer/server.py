@@ -42,7 +42,10 @@ def serve_sniffer(
 ) -> None:
     """Serve `session` to browsers of this machine, until interrupted (Ctrl-C); then return.
 
-    Port 0 is any free one. `ready` is told the URL once it can be opened. Raises `OSError` when the port is taken.
+    Port 0 selects any free port. `ready` is called with the URL once it can be opened.
+
+    Raises:
+        OSError: if the port is taken.
     """
     with suppress(KeyboardInterrupt):
         asyncio.run(_serve(session, port, ready, open_browser=open_browser))
@@ -64,7 +67,7 @@ async def _serve(
 class Server:
     """Serves the journal of `session` on the socket `listener`, below `/token/`.
 
-    `seen` is told when the first page has connected. The journal is not read before anybody asks.
+    `seen` is called when the first page has connected. The journal is not read before the first request.
     """
 
     def __init__(
@@ -97,7 +100,7 @@ class Server:
     # What handlers ask
 
     async def read(self, answer: Callable[[], R]) -> R:
-        """What `answer` says, in the thread that knows the trace, once there is one."""
+        """Run `answer` in the thread that owns the trace, once there is one; return its result."""
         self.connected()
         loop = asyncio.get_running_loop()
         while self.trouble is None:
@@ -110,16 +113,16 @@ class Server:
         raise BadRequestError(self.trouble)
 
     async def look_into(self, answer: Callable[[], R]) -> R:
-        """What `answer` says, in the thread that takes its time."""
+        """Run `answer` in the thread for slow requests; return its result."""
         return await asyncio.get_running_loop().run_in_executor(self._states_thread, answer)
 
     async def change(self, since: int) -> None:
-        """Wait until there is something newer than version `since`."""
+        """Wait until there is a version newer than `since`."""
         while self.version == since:
             await self._changed.wait()
 
     def connected(self) -> None:
-        """A page is there."""
+        """Record that a page has connected."""
         if not self._wanted.is_set():
             self._wanted.set()
             self._seen()
@@ -163,7 +166,7 @@ class Server:
 
 
 class _Known(SecretHandler):
-    """Answers those who know the token, and no page of another site."""
+    """Accepts requests with the right token, and refuses pages of other sites."""
 
     def initialize(self, server: Server) -> None:
         self.server = server
@@ -171,7 +174,7 @@ class _Known(SecretHandler):
 
 
 class _Answer(_Known):
-    """One answer to the page."""
+    """Sends one answer to the page."""
 
     async def get(self, _token: str, what: str) -> None:
         try:
@@ -219,7 +222,7 @@ class _Answer(_Known):
 
 
 class _Journal(_Known):
-    """The journal's file as it stands."""
+    """Sends the journal's file in its present state."""
 
     def head(self, _token: str) -> None:
         self._describe()
@@ -244,7 +247,7 @@ class _Journal(_Known):
 
 
 class _News(SecretSocket):
-    """Tells a page how much there is; what comes while it is told is put into the next news."""
+    """Sends a page the progress; changes during sending go into the next message."""
 
     def initialize(self, server: Server) -> None:
         self.server = server

@@ -26,14 +26,17 @@ _KEPT_BYTES = 1 << 26
 
 
 class NotBegunError(BadRequestError):
-    """There is nothing yet, or, as another journal has taken its place, nothing any more."""
+    """A session without a trace: the journal has no header yet, or another journal has replaced it."""
 
 
 class SnifferSession:
-    """One journal: `source` is its path, or a descriptor of the file, which others may still write.
+    """One journal: `source` is its path, or a descriptor of the file, which may still be written.
 
-    `chosen` are names or patterns of the robots to begin with, `robots` those whose files are known beside the
-    journal. Raises `OSError` when it cannot be read. But for `states`, all is to be asked in one thread.
+    `chosen` are names or patterns of the robots to show at first, `robots` those whose files are known besides the
+    journal. All methods except `states` must be called in one thread.
+
+    Raises:
+        OSError: if the file cannot be read.
     """
 
     def __init__(
@@ -55,11 +58,11 @@ class SnifferSession:
 
     @property
     def begun(self) -> bool:
-        """Whether there is something to be shown."""
+        """Whether there is something to show."""
         return self._live_trace.presentable
 
     def advance(self) -> bool:
-        """Read on a bit; False when there was nothing. Raises `JournalError`, `TraceTooLargeError`, `OSError`."""
+        """Read a piece; return False if there was none. Raises `JournalError`, `TraceTooLargeError`, `OSError`."""
         return self._live_trace.advance() or self._replaced()
 
     def begin(self) -> None:
@@ -68,7 +71,7 @@ class SnifferSession:
             pass
 
     def _replaced(self) -> bool:
-        """Return whether another file has taken the place of the journal; it is the journal then."""
+        """Return whether another file has replaced the journal; if so, open it."""
         if self._path is None:
             return False
         try:
@@ -89,16 +92,16 @@ class SnifferSession:
         os.close(self._descriptor)
 
     def finish(self) -> None:
-        """Nothing more will be written to the file."""
+        """Record that the file is complete."""
         self._written = True
 
     def stop(self) -> None:
-        """Whatever takes long is to end soon."""
+        """Stop long computations soon."""
         if self._robot_states:
             self._robot_states.stopped = True
 
     def _age_s(self) -> float:
-        """Since when nobody has written to the file; 0 where somebody is known to."""
+        """Return the seconds since the file was last written; 0 if it is known to have a writer."""
         if self._written:
             return math.inf
         return 0.0 if self._live else time.time() - os.fstat(self._descriptor).st_mtime
@@ -120,15 +123,15 @@ class SnifferSession:
         return trace
 
     def about(self) -> bytes:
-        """What was run, and how far it is; JSON."""
+        """Return what was run, and the progress, as JSON."""
         return self._answers.about()
 
     def news(self) -> dict[str, Any]:
-        """How far it is: the page's news, and how much of the file has been read, 0 to 1."""
+        """Return the progress: the page's news, and the part of the file that has been read, from 0 to 1."""
         return {**self._answers.news(), "loaded": round(self._live_trace.loaded, 3)}
 
     def rows(self, what: str, first: int, end: int) -> bytes:
-        """Messages (`columns`), `steps` or `decisions`. Raises `BadRequestError`."""
+        """Return messages (`columns`), `steps` or `decisions`. Raises `BadRequestError`."""
         match what:
             case "columns":
                 return self._answers.columns(first, end)
@@ -138,7 +141,7 @@ class SnifferSession:
                 return self._answers.decisions(first, end)
 
     def details(self, chunk: int) -> bytes:
-        """What the messages of a chunk hold; JSON. Raises `BadRequestError`."""
+        """Return the contents of the messages of a chunk as JSON. Raises `BadRequestError`."""
         trace = self._trace
         key = (trace.generation, chunk)
         answer = self._details.get(key)
@@ -149,14 +152,14 @@ class SnifferSession:
         return answer
 
     def robot(self, number: int) -> str:
-        """The name of a robot. Raises `BadRequestError`."""
+        """Return the name of a robot. Raises `BadRequestError`."""
         robots = self._trace.robots
         if number >= len(robots):
             raise BadRequestError(f"there is no robot {number}, only {len(robots)}")
         return robots[number]
 
     def states(self, robot: str, chunk: int) -> bytes:
-        """What a robot knew after its steps of a chunk; JSON. Takes its time. Raises `BadRequestError`."""
+        """Return the robot's states after its steps of a chunk as JSON. This is slow. Raises `BadRequestError`."""
         from robochoc.sniffer.robot_states import RobotStates  # noqa: PLC0415 - the page comes first
 
         self._robot_states = self._robot_states or RobotStates()
@@ -165,9 +168,9 @@ class SnifferSession:
     # The scene
 
     def scene(self, first: int = 0) -> bytes:
-        """The drones, and their moves by the decisions from the `first` on; JSON.
+        """Return the drones, and their moves for the decisions from `first` on, as JSON.
 
-        `null`: there is nothing to see, nor will there be.
+        It is `null` if there is nothing to show, now or later.
         """
         from robochoc.sniffer.scene import TraceScene, robots_given  # noqa: PLC0415 - as above
 
@@ -184,16 +187,16 @@ class SnifferSession:
 
     @property
     def size(self) -> int:
-        """How long the file is by now."""
+        """The present length of the file."""
         return self._file.size
 
     @property
     def file_name(self) -> str:
-        """What a copy of it may be called."""
+        """The file name for a copy of the journal."""
         trace = self._live_trace.trace
         name = self._path.name if self._path else f"{trace.header.team if trace else 'run'}.journal"
         return "".join(sign if sign.isascii() and (sign.isalnum() or sign in "._-") else "_" for sign in name)[:100]
 
     def bytes_at(self, place: int, most: int) -> bytes:
-        """A piece of the file."""
+        """Return up to `most` bytes of the file from `place` on."""
         return os.pread(self._descriptor, most, place)

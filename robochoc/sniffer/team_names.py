@@ -22,7 +22,7 @@ class _RunNames(NamedTuple):
 
 
 class _Seen(Mapping[str, tuple[str, ...]]):
-    """The variables that robots were seen to decide, as they are by now."""
+    """The decided variables of robots, as far as the journal has been read."""
 
     def __init__(self, variables: Mapping[str, Mapping[str, None]]) -> None:
         self._variables = variables
@@ -38,10 +38,10 @@ class _Seen(Mapping[str, tuple[str, ...]]):
 
 
 class TeamNames:
-    """What is known of the robots in each run of `trace`.
+    """The known names of the robots and their variables in each run of `trace`.
 
-    It comes from the files that the robots were given. Where a journal has none, the variables that a robot was seen
-    to decide are taken for those that its messages are about: true of robots without private variables.
+    They come from the files that the robots were given. If a journal has none, the variables that a robot decided are
+    assumed to be those in its messages. This is right for robots without private variables.
     """
 
     def __init__(self, trace: Trace, protocols: RunProtocols) -> None:
@@ -52,7 +52,7 @@ class TeamNames:
         self._known: dict[int, _RunNames] = {}
 
     def variables(self, robot: str) -> list[str]:
-        """All variables of a robot that are known of."""
+        """Return all known variables of a robot."""
         for number in reversed(range(len(self._trace.runs))):
             team = self._team(number)
             if team is not None and robot in team:
@@ -88,7 +88,7 @@ class TeamNames:
         return self._known[number]
 
     def _team(self, number: int) -> Team | None:
-        """The team of a run; each says only which robots are other ones than in the run before."""
+        """Return the team of a run; each run only records the robots that changed."""
         runs = self._trace.runs
         while len(self._teams) <= number:
             given = runs[len(self._teams)].given

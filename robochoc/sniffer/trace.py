@@ -44,13 +44,13 @@ MOST_COUNTED = 1 << 53
 
 
 class TraceTooLargeError(ValueError):
-    """More robots, types of messages, or runs than a trace can tell apart."""
+    """A journal with more robots, types of messages, or runs than a trace can number."""
 
 
 class Trace:
-    """All that was seen of the runs of one journal. Columns, lists and numbers only grow.
+    """The events of all runs of one journal. Columns, lists and numbers only grow.
 
-    `generation` tells traces apart whose numbers mean other things: a trace that was made anew has the next one.
+    `generation` distinguishes traces with different numbering: a trace that was made again has the next one.
     """
 
     def __init__(self, header: Header, generation: int = 0) -> None:
@@ -82,14 +82,14 @@ class Trace:
 
     @classmethod
     def of(cls, journal: Journal, generation: int = 0) -> Self:
-        """The trace of a whole journal. Raises `TraceTooLargeError`."""
+        """Return the trace of a whole journal. Raises `TraceTooLargeError`."""
         trace = cls(journal.header, generation)
         trace.add(journal.events)
         trace.end(journal.outcome, journal.damage)
         return trace
 
     def add(self, events: Iterable[AnyEvent]) -> None:
-        """Go on with `events`, each robot's in its own order. Raises `TraceTooLargeError`."""
+        """Add `events`, each robot's in its own order. Raises `TraceTooLargeError`."""
         for event in events:
             match event:
                 case Sent():
@@ -103,7 +103,7 @@ class Trace:
                     self._add_rare(event)
 
     def flush(self) -> None:
-        """Wait no longer: what was taken in and not seen to be sent counts as unseen."""
+        """Stop waiting: received messages whose sending was not seen are counted as unseen."""
         waiting = [(queue[0].t, robot) for robot, queue in self._waiting.items()]
         heapq.heapify(waiting)
         while waiting:
@@ -117,34 +117,34 @@ class Trace:
                 heapq.heappush(waiting, (queue[0].t, robot))
 
     def end(self, outcome: Outcome | None = None, damage: str | None = None) -> None:
-        """No more events will come."""
+        """End the trace: there are no more events."""
         self._close()
         self.over, self.outcome, self.damage = True, outcome, damage
 
     def content(self, message: int) -> dict[str, Any]:
-        """The fields of a message, by name."""
+        """Return the fields of a message, by name."""
         return self._contents[message]
 
     def packet(self, step: int) -> list[int]:
-        """The messages that a step took in, in that order."""
+        """Return the messages that a step received, in that order."""
         first = self.steps.packet_end[step - 1] if step else 0
         return list(self.packets[first : self.steps.packet_end[step]])
 
     def said(self, step: int) -> range:
-        """The messages that were said in a step."""
+        """Return the messages that were sent in a step."""
         return range(self.steps.said_end[step - 1] if step else 0, self.steps.said_end[step])
 
     def causes(self, message: int) -> list[int]:
-        """The messages that were taken in by the step that said this one; none: it was said at the start."""
+        """Return the messages received by the step that sent this one; none: it was sent at the start."""
         return self.packet(self.messages.step[message])
 
     def consequences(self, message: int) -> range:
-        """The messages that were said in the step that took this one in."""
+        """Return the messages that were sent in the step that received this one."""
         taken = self.messages.taken[message]
         return range(0) if taken == NOT_YET else self.said(taken)
 
     def number_of(self, robot: str) -> int:
-        """The number of a robot, which has a new one if it was not seen before. Raises `TraceTooLargeError`."""
+        """Return the number of a robot; assign one if it is new. Raises `TraceTooLargeError`."""
         return _number(robot, self._number_of_robot, self.robots)
 
     # Runs
@@ -157,7 +157,7 @@ class Trace:
         self._said: dict[str, int] = {}
 
     def _close(self) -> None:
-        """The run is over: what waits has nothing to wait for, and steps that were not seen to end have ended."""
+        """End the run: stop waiting, and end the steps without a recorded end."""
         for robot, step in list(self._open.items()):
             step.checks = self._checks.get(robot, 0)
             self._ready(robot, step)
@@ -180,7 +180,7 @@ class Trace:
         )
 
     def _give(self, given: Given) -> None:
-        """Take down what the robots of this run are given, and number them in their order."""
+        """Record what the robots of this run were given, and number them in their order."""
         if not self.runs:
             self._new_run(Began(t=given.t, protocol=self.header.protocol))
         known = self.runs[-2].files if len(self.runs) > 1 else {}
@@ -241,7 +241,7 @@ class Trace:
         self._ready(robot, step)
 
     def _ready(self, robot: str, step: PendingStep) -> None:
-        """The step has ended: write it down, or let it wait for its turn, or for what it took in."""
+        """Write down an ended step, or store it until the messages it received have been sent."""
         self._open.pop(robot, None)
         queue = self._waiting.get(robot)
         if queue is not None:
@@ -254,7 +254,7 @@ class Trace:
             self._waiting[robot] = deque([step])
 
     def _go_on(self, robots: Iterable[str]) -> None:
-        """Write down what waits no longer: steps of `robots`, and of those that these steps speak to."""
+        """Write down steps that need not wait any longer: of `robots`, and of receivers of their messages."""
         ready = list(robots)
         while ready:
             robot = ready.pop()
@@ -267,13 +267,13 @@ class Trace:
                 del self._waiting[robot]
 
     def _give_up(self, step: PendingStep) -> None:
-        """What `step` still waits for counts as unseen."""
+        """Count the messages that `step` still waits for as unseen."""
         while not step.taken_in():
             step.received.popleft().owed += 1
             self.unseen += 1
 
     def _write(self, robot: str, step: PendingStep) -> None:
-        """The step becomes a row, and so does each of its messages."""
+        """Write the step as a row, and each of its messages as a row."""
         steps, number = self.steps, len(self.steps.t)
         run = len(self.runs) - 1
         for message in step.packet:
@@ -329,5 +329,5 @@ def _number(name: str, numbers: dict[str, int], names: list[str]) -> int:
 
 
 def _counted(number: int) -> int:
-    """A count, as floating point holds it: nobody counts as far as a journal could say."""
+    """Return a count, limited to what a float holds exactly; a journal may contain any number."""
     return min(max(number, 0), MOST_COUNTED)

@@ -11,9 +11,9 @@ from robochoc.journal.events import AnyEvent, Given, Granted, Improved, Lost, Re
 
 
 class RunRecord(msgspec.Struct, frozen=True):
-    """One run, or epoch: its first message and step, and what its robots were given; None: nothing says so.
+    """One run, or epoch: its first message and step, and what its robots were given (None: unknown).
 
-    `files` are their XML files by name, also those that had been given before.
+    `files` are their XML files by name, also those given in earlier runs.
     """
 
     number: int
@@ -27,9 +27,9 @@ class RunRecord(msgspec.Struct, frozen=True):
 
 
 class Note(msgspec.Struct, frozen=True):
-    """Something beside messages and decisions: `step` is the number of the step in which `robot` did it.
+    """An event other than messages and decisions: `step` is the number of the step in which `robot` did it.
 
-    Of what no robot did in a step, as losses and refusals, it is the number of the step that comes next.
+    For events outside of steps, such as losses and refusals, it is the number of the next step.
     """
 
     t: float
@@ -42,8 +42,8 @@ class Note(msgspec.Struct, frozen=True):
 class Messages(NamedTuple):
     """The columns of the messages; see `columns.py` for their kinds.
 
-    `taken` is the step in which each was taken in, or `NOT_YET`: it changes. `sequence` counts, from 1 on, what its
-    sender has said in the run.
+    `taken` is the step that received the message, or `NOT_YET`; it changes. `sequence` numbers the messages of each
+    sender in a run, from 1 on.
     """
 
     t: Any
@@ -59,7 +59,7 @@ class Messages(NamedTuple):
 
 
 class Steps(NamedTuple):
-    """The columns of the steps; `packet_end` and `said_end` count the messages taken in, and said, up to its end."""
+    """The columns of the steps; `packet_end` and `said_end` count messages received and sent up to its end."""
 
     t: Any
     clock: Any
@@ -71,7 +71,7 @@ class Steps(NamedTuple):
 
 
 def note_of(event: AnyEvent, step: int) -> Note | None:
-    """What is to be noted of an event in which no robot speaks; None: nothing."""
+    """Return a note for an event that is no message; None: the event needs no note."""
     match event:
         case Improved():
             return Note(event.t, step, "improved", "", f"the cheapest so far costs {event.cost}")

@@ -29,8 +29,11 @@ _PROGRAM = "robochoc.sniffer.viewer_process"
 class Viewer:
     """The viewer of the journal in the file `journal` (a descriptor, open for reading).
 
-    `chosen` are names or patterns of robots to begin with, `port` 0 is any free one; with `open_browser` it has the
-    user's browser show the page. Raises `OSError` when the port is taken, or no process can be had.
+    `chosen` are names or patterns of robots to show at first. Port 0 selects any free port. With `open_browser`, the
+    page is opened in the user's browser.
+
+    Raises:
+        OSError: if the port is taken, or the process cannot be started.
     """
 
     def __init__(self, journal: int, chosen: Sequence[str] = (), port: int = 0, *, open_browser: bool = False) -> None:
@@ -66,7 +69,7 @@ class Viewer:
         self.close()
 
     def wait_until_seen(self, most_s: float) -> bool:
-        """Wait until a page has connected; False after `most_s` seconds without one."""
+        """Wait until a page has connected; return False after `most_s` seconds without one."""
         ready, _, _ = select.select([self._heard], [], [], most_s)
         seen = bool(ready and os.read(self._heard, 1))
         if seen and self._redirect:
@@ -74,21 +77,21 @@ class Viewer:
         return seen
 
     def finish(self) -> None:
-        """Tell it that nothing more will be written."""
+        """Report that the journal is complete."""
         with suppress(BrokenPipeError):
             os.write(self._lifeline, b".")
 
     @property
     def is_gone(self) -> bool:
-        """Whether its process has ended by itself."""
+        """Whether the viewer's process has ended by itself."""
         return self._process.poll() is not None
 
     def wait(self) -> None:
-        """Wait until it is gone."""
+        """Wait until the process has ended."""
         self._process.wait()
 
     def close(self) -> None:
-        """End it."""
+        """End the process."""
         os.close(self._lifeline)
         try:
             self._process.wait(_PATIENCE_S)

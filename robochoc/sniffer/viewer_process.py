@@ -24,13 +24,13 @@ from robochoc.system.orphans import signal_when_orphaned
 
 
 class _Parent(NamedTuple):
-    """Descriptors: what is heard from the parent, and where it is told something."""
+    """The descriptors of the pipes from and to the parent."""
 
     heard: int
     told: int
 
     def line(self) -> bytes:
-        """The first line, and no byte more; nothing from a parent that is gone."""
+        """Return the first line, and no further byte; empty if the parent has ended."""
         line = b""
         while not line.endswith(b"\n"):
             sign = os.read(self.heard, 1)
@@ -40,13 +40,13 @@ class _Parent(NamedTuple):
         return line
 
     def tell(self) -> None:
-        """Say that a page has connected."""
+        """Report that a page has connected."""
         with suppress(OSError):
             os.write(self.told, b".")
 
 
 def main() -> None:
-    """Serve until the parent is gone."""
+    """Serve until the parent ends."""
     signal_when_orphaned(signal.SIGKILL)
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C reaches the whole process group, and is left to the parent
     signal.signal(signal.SIGTERM, signal.SIG_DFL)
@@ -92,7 +92,7 @@ async def _serve(
 
 
 def _parent() -> _Parent:
-    """The pipes from and to the parent, out of the way of a browser that is started."""
+    """Return the pipes from and to the parent, moved so that a started browser does not inherit them."""
     parent = _Parent(os.dup(0), os.dup(1))
     with open(os.devnull, "rb") as nothing:  # noqa: PTH123 - the name is no path of ours
         os.dup2(nothing.fileno(), 0)

@@ -63,10 +63,11 @@ def print_protocols(found: Sequence[Row], *, long: bool = False) -> None:
 
 
 def protocol_text(row: Row) -> str:
-    """Return the protocol's traits, its place, its parameters and its docstring."""
+    """Return the protocol's traits, its place, its parameters and its docstring without the examples."""
     head = f"{row.name}: {_in_a_line(row.traits)}" if row.traits else row.name
     place = f"{row.place}, from the package {row.package}"
-    return f"{head}\n{place}\n{_settings(row)}\n{_docstring(row) or 'Its module has no docstring.'}"
+    about = _docstring(row).partition("\n>>> ")[0].rstrip()
+    return f"{head}\n{place}\n{_settings(row)}\n{about or 'Its module has no docstring.'}"
 
 
 def _settings(row: Row) -> str:
@@ -89,7 +90,7 @@ def _in_a_line(traits: Traits) -> str:
         *(["goes on when the problem changes"] if traits.dynamic else []),
         *([f"use when: {traits.use_when}"] if traits.use_when else []),
         *([f"keeps private: {traits.privacy}"] if traits.privacy else []),
-        *([traits.paper] if traits.paper else []),
+        *([f"paper: {traits.paper}"] if traits.paper else []),
     ]
     return "; ".join(words)
 
