@@ -29,8 +29,8 @@ class EnrolmentToken:
     fingerprint: bytes
 
     @classmethod
-    def new(cls, fingerprint: bytes) -> EnrolmentToken:
-        """Return a token with a secret that nobody can guess (160 bits)."""
+    def new(cls, fingerprint: bytes) -> Token:
+        """Return a token with a random secret of 160 bits."""
         return cls(secrets.token_bytes(SECRET_BYTES), fingerprint)
 
     @classmethod

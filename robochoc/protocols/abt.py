@@ -1,29 +1,39 @@
-"""Asynchronous Backtracking.
+"""Asynchronous Backtracking (ABT).
 
-Yokoo, Durfee, Ishida, Kuwabara: "Distributed constraint satisfaction for formalizing distributed problem
-solving", ICDCS 1992; here the ABT kernel with links added during search of Bessiere, Maestre, Brito, Meseguer:
-"Asynchronous backtracking without adding links: a new member in the ABT family", AIJ 161 (2005), Figure 1, whose
-names the methods bear:
+Complete search for satisfaction, in which all robots act at the same time. A robot sends its value to lower-priority
+neighbours. A robot without a value left sends a nogood to the lowest-priority robot that caused it.
+
+- **When to use**: no costs. It is the default for such problems.
+- **Guarantees**: complete; it terminates with a solution or with a proof that there is none. Space is polynomial: one
+  nogood for each value.
+- **Parameters**: none.
+- **References**: Yokoo, Durfee, Ishida, Kuwabara: "Distributed constraint satisfaction for formalizing distributed
+  problem solving", ICDCS 1992. This is the ABT kernel with links added during search of Bessiere, Maestre, Brito,
+  Meseguer: "Asynchronous backtracking without adding links: a new member in the ABT family", AIJ 161 (2005), Figure 1.
+
+The methods have the names of its procedures:
 
     CheckAgentView   `_check_agent_view`     ProcessInfo      `_process_info`
     ChooseValue      `_choose_value`         ResolveConflict  `_resolve_conflict`
     Backtrack        `_backtrack`            SetLink          `_set_link`
     CheckAddLink     `_check_add_link`       Update           `_update`
 
-`_choose_value` and `_update` are in `backtracking.py`, as ABT's relatives with other orders have them too.
+`_choose_value` and `_update` are in `backtracking.py`, as they are shared with ABT's variants.
 
-Complete, asynchronous, for satisfaction. Four things the paper leaves open: constraints may be n-ary (the lowest
-robot of the scope checks them, once it knows all the others); of several nogoods for a value the one with the
-highest possible lowest variable is kept (Hirayama and Yokoo 2000); messages are read by packets, and the view is
-checked once the inbox has been drained; a nogood names only the variables that matter, so of a robot with several
-it rules out all values that look alike there (neighbourhood partial interchangeability). That nobody speaks any
-more, and so a solution stands, is for the runtime to see (`communication/quiescence.py`).
+Choices that the paper leaves open:
 
-Of a partially known constraint (PKC) each robot holds a part that it never shows: Brito, Meisels, Meseguer, Zivan,
-"Distributed constraint satisfaction with partially known constraints", Constraints 14 (2009), ABT in a single phase.
-The lower robot tells its value up as well, and the higher one refuses, by a nogood, the pairs that its own part
-forbids (`_refuse_below`). Such a value is forgotten once it is refused, as that of a culprit is: another one, or the
-same again, is sure to come. Without a PKC nothing changes.
+- Constraints may be n-ary. The lowest-priority robot of the scope checks them, once it knows the values of all others.
+- Of several nogoods for a value, the one with the highest possible lowest variable is kept (Hirayama and Yokoo 2000).
+- Messages are read in packets; the view is checked when the inbox has been drained.
+- A nogood contains only the variables that matter. So it rules out all values of a robot that are interchangeable in
+  these variables (neighbourhood partial interchangeability).
+- The runtime detects quiescence, and so a solution (`communication/quiescence.py`).
+
+Partially known constraints (PKC): each robot holds a part of the constraint that it never shows. This is ABT in a
+single phase of Brito, Meisels, Meseguer, Zivan: "Distributed constraint satisfaction with partially known constraints",
+Constraints 14 (2009). The lower-priority robot also sends its value up; the higher one sends a nogood against pairs
+that its own part forbids (`_refuse_below`). It then forgets that value, as a new `ok?` is sure to follow. Without a PKC
+nothing changes.
 
 >>> from robochoc.generators.queens3d import queens3d
 >>> from robochoc.run import Options, Runtime, solve

@@ -1,37 +1,56 @@
 """Asynchronous Backtracking with Dynamic Ordering, retroactive (ABT_DO-Retro).
 
-Zivan, Meisels: "Dynamic ordering for asynchronous backtracking on DisCSPs", Constraints 11 (2006); Zivan, Zazone,
-Meisels: "Min-domain retroactive ordering for asynchronous backtracking", Constraints 14 (2009). ABT, whose names the
-methods bear (see `abt.py`), under an order of the robots that changes during search:
+ABT (see `abt.py`) with an order of the robots that changes during search.
+
+- **When to use**: no costs, and no good static order is known.
+- **Guarantees**: complete; it terminates with a solution or with a proof that there is none. Space is polynomial.
+- **Parameters**: none.
+- **References**: Zivan, Meisels: "Dynamic ordering for asynchronous backtracking on DisCSPs", Constraints 11 (2006);
+  Zivan, Zazone, Meisels: "Min-domain retroactive ordering for asynchronous backtracking", Constraints 14 (2009).
+
+The methods have the names of ABT's procedures, and these:
 
     Current_order   `order`      choose_new_order   `_choose_new_order`      received (order, ...)   `_adopt`
 
-Complete, asynchronous, for satisfaction, in polynomial space. Whoever accepts a nogood makes a new order: the sender
-moves up (the nogood-triggered heuristic), to right below the receiver, and from there past the receiver itself and
-others for as long as they have more values left than the sender (min-domain), but never past a robot that the nogood
-rests on: at the highest to right behind the second-last robot of the nogood, or to the top if there is none.
+The order: a robot that accepts a nogood makes a new order, in which the nogood's sender moves up to right below the
+receiver (the nogood-triggered heuristic). It moves on past the receiver and other robots while these have more values
+left than the sender (min-domain), but never past a robot of the nogood. So it stops at the latest right behind the
+second-last robot of the nogood, or at the top if there is none.
 
-Orders bear counters, compared lexicographically, the larger newer. The counter of place i counts how often robots
-from i on were reordered while those before i stayed; a new order raises one and drops those after it. It is told to
-all from that place on; to those before it nothing has changed. Who adopts an order drops the nogoods that rest on
-robots now lower, and tells its value to neighbours newly lower.
+Orders have counters, which are compared lexicographically; the larger order is newer. The counter of place i is the
+number of times that robots from i on were reordered while those before i stayed. A new order increments one counter and
+resets those after it. It is sent to all robots from that place on; for robots before it nothing has changed. A robot
+that adopts an order drops the nogoods with robots that are now lower, and sends its value to neighbours that are newly
+lower.
 
-Why it ends: suppose the robots before place i have come to rest, with their values and counters, and all have heard
-of it (so for i = 0). Counter i then rises only when a lower robot accepts a nogood that rests on them alone. That one
-stays stored: what it rests on stands and stays above, and only a nogood that rests on robots as high may take its
-place. So its value is not taken again, and counter i rises finitely often. Then it is settled who stands at place i,
-and its value changes finitely often for the same reason; and so on downwards. Why it is right: when nobody speaks any
-more, each robot knows who is higher in the newest order, and the values of those of them that it has to know, as who
-has forgotten or never heard one is told it again; so no constraint is broken that any robot answers for.
+Termination: suppose the robots before place i have settled, with their values and counters, and all robots know it
+(true for i = 0). Counter i then rises only when a lower robot accepts a nogood with these robots alone. That nogood
+stays stored, as its left side holds and stays higher, and only a nogood with robots as high may replace it. So its
+value is not taken again, and counter i rises finitely often. Then the robot at place i is fixed, and its value changes
+finitely often for the same reason; and so on downwards.
 
-What the papers leave open, or may have otherwise: the receiver makes the order for the place that the sender moves
-to, as it keeps the nogood that the move rests on (so the moved robot does not have to keep it); as two may raise one
-counter at a time, each counter also names who raised it last, which makes every order unique. Values left are those
-without a stored nogood; a robot whose number is not known is not passed. A nogood that is not of the receiver's
-present order is answered with `ok?`, not passed on: a newer order is under way to one of the two. As in ABT,
-constraints may be n-ary (the lowest of the scope at present checks them, so all of it have to know them), messages
-are read by packets, and a nogood names only the variables that matter. That a solution stands is for the runtime to
-see.
+Correctness: at quiescence each robot knows the robots above it in the newest order, and those of their values that it
+needs, as a robot that forgot or never received a value is sent it again. So no constraint is violated.
+
+Choices that the papers leave open, and differences:
+
+- The receiver makes the order for the place that the sender moves to, and stores the nogood. So the moved robot need
+  not store it.
+- Two robots may increment one counter at a time, so each counter also names the robot that did it last. Every order is
+  unique.
+- Remaining values are those without a stored nogood. A robot whose number of remaining values is unknown is not
+  passed.
+- A nogood that does not fit the receiver's order is answered with `ok?`, not passed on: one of the two robots will
+  receive a newer order.
+- As in ABT, constraints may be n-ary (the robot of the scope that is lowest at present checks them, so all must know
+  them), messages are read in packets, nogoods contain only the variables that matter, and the runtime detects the
+  solution.
+
+>>> from robochoc.generators.queens3d import queens3d
+>>> from robochoc.run import Options, Runtime, solve
+>>> outcome = solve(queens3d(4), Options(protocol="abt-do-retro", runtime=Runtime.SIMULATOR))
+>>> outcome.verdict.value
+'no-solution'
 """
 
 from __future__ import annotations

@@ -1,32 +1,42 @@
 """Asynchronous Distributed Optimization (ADOPT).
 
-Modi, Shen, Tambe, Yokoo: "Adopt: asynchronous distributed constraint optimization with quality guarantees",
-Artificial Intelligence 161(1-2), 2005, Section 3, whose names the methods bear:
+Complete search for minimum cost on a pseudo-tree, best-first. Each robot takes the value with the least lower bound, by
+the costs that its children report, and changes it as soon as its lower bound is above the threshold. So it leaves
+values that it may return to; the threshold, split among the children, lets them rebuild earlier solutions quickly. The
+root ends with LB = UB.
+
+- **When to use**: to compare with BnB-ADOPT+, which needs fewer messages.
+- **Guarantees**: complete; it terminates with an optimum, or with a proof that there is no solution. The number of
+  messages is exponential, memory is linear in values and children.
+- **Parameters**: none.
+- **References**: Modi, Shen, Tambe, Yokoo: "Adopt: asynchronous distributed constraint optimization with quality
+  guarantees", Artificial Intelligence 161(1-2), 2005, Section 3.
+
+The methods have the names of its procedures:
 
     initialize     `begin`                 maintainThresholdInvariant        `_maintain_threshold_invariant`
     when received  `handle`                maintainChildThresholdInvariant   `_maintain_child_threshold_invariant`
     backTrack      `decide`, `act`         maintainAllocationInvariant       `_maintain_allocation_invariant`
 
-Complete, for minimisation. On a pseudo-tree each robot takes the value that looks cheapest by what its children say of
-their subtrees, and changes it as soon as its lower bound is above the threshold: best-first search. So it leaves
-values that it comes back to later; the threshold, split among the children, lets them find again what they had found.
-The root ends with LB = UB. Messages and memory: exponentially many, and linear in values and children.
+Choices that the paper leaves open, and differences:
 
-What the paper leaves open, or is settled otherwise here: the robots build the tree themselves (`dfs`), and each of
-several unconnected parts has its own; one decision is taken for all waiting messages; constraints may be n-ary (the
-lowest robot of the scope in the tree pays, once it knows all others), and hard (LB may become infinite; a root then
-ends the search); UB is infinite until a value of every neighbour above is known.
+- The robots build the pseudo-tree themselves (`dfs`); each connected component has its own.
+- One decision is made for all waiting messages.
+- Constraints may be n-ary (the robot of the scope that is lowest in the tree pays, once it knows all others) and hard
+  (LB may become infinite; then a root ends the search).
+- UB is infinite until the values of all neighbours above are known.
+- A value in a context has a counter, as in BnB-ADOPT (`bnb_adopt`); the larger one wins, from any sender. Without it,
+  late costs would restore obsolete values of robots further up.
+- No message is repeated (Gutierrez, Meseguer: "Saving redundant messages in ADOPT-based algorithms", DCR workshop
+  2010). The paper's robots repeat messages; under a slow schedule these would accumulate without end. Therefore a
+  robot stores the last threshold, which is valid whenever its context is, and keeps the better of two bounds in one
+  context.
+- The context of a threshold contains only the values that the child's subtree depends on.
 
-A value in a context has a counter, as in BnB-ADOPT (`bnb_adopt`), and the larger one wins, whoever tells. Without it,
-late costs bring back obsolete values of robots further up. Then nothing need be told twice (Gutierrez, Meseguer:
-"Saving redundant messages in ADOPT-based algorithms", DCR workshop 2010): where a schedule hands over messages more
-slowly than the paper's robots repeat them, they would pile up without end. For this a robot remembers the last
-threshold, which holds as soon as and whenever its context does, and keeps the better of two bounds in one context.
-The context of a threshold is what the child's subtree depends on, so what changes elsewhere is no news.
-
-When nobody speaks all have terminated. Otherwise there is a highest robot that has not: its threshold is below UB.
-All contexts agree, so all robots have their parents' bounds and thresholds; and with LB(d) <= threshold < UB(d) for
-its value d, some child has t < ub. That is a threshold below UB again, and so on, down to a leaf, where LB = UB.
+Termination: at quiescence all robots have terminated. Otherwise there is a highest robot that has not: its threshold is
+below UB. All contexts agree, so all robots have their parents' bounds and thresholds. With LB(d) <= threshold < UB(d)
+for its value d, some child has t < ub. That is a threshold below UB again, and so on, down to a leaf, where LB = UB: a
+contradiction.
 
 >>> from robochoc.communication.simulator.schedule import Concurrent
 >>> from robochoc.communication.simulator.simulator import Simulation

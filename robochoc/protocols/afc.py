@@ -1,27 +1,43 @@
-"""Asynchronous Forward Checking.
+"""Asynchronous Forward Checking (AFC).
 
-Meisels, Zivan: "Asynchronous forward-checking for DisCSPs", Constraints 12(1), 2007, with a static order. The methods
-bear the names of its procedures:
+Complete search for satisfaction with one current partial assignment (CPA), which goes from robot to robot in priority
+order. A robot that adds a value sends copies to all lower robots, which filter their domains at the same time. A robot
+whose domain becomes empty sends `Not_OK` to the others; the holder of the CPA then sends it back to the last robot of
+the inconsistent part.
+
+- **When to use**: to compare with AFC-ng, which needs fewer messages.
+- **Guarantees**: complete; it terminates with a solution or with a proof that there is none. Only forward checking is
+  asynchronous.
+- **Parameters**: none.
+- **Reference**: Meisels, Zivan: "Asynchronous forward-checking for DisCSPs", Constraints 12(1), 2007, with a static
+  order.
+
+The methods have the names of its procedures:
 
     receive_CPA    `_receive_cpa`      forward_check      `_forward_check`
     assign_CPA     `_assign_cpa`       process_Not_OK     `_process_not_ok`
     backtrack      `_backtrack`        update_AgentView   `_update_agent_view`
 
-One current partial assignment (CPA) goes from robot to robot in priority order. Whoever adds a value to it tells all
-robots below, and these filter their domains at the same time. One that has no value left tells the rest; whoever
-holds the CPA then sends it back to the robot whose value was the last that did harm.
+Correctness under delays: there is one CPA, and its step counter (SC) grows with every value that is added; it travels
+back with the CPA. So no robot knows a later step than the CPA that reaches it, each step has a new CPA, and a CPA that
+contradicts a later one never returns. The statement of a `NotOk` stays true, however late it arrives.
 
-Why delays do no harm: there is one CPA, and its step counter (SC) grows with every value that is added and travels
-back with it. So nobody has heard of a later step than the CPA that reaches it, every step's CPA is a new one, and
-what contradicts a later one never comes back. What a `NotOk` says stays true for ever, however late it arrives.
+Choices that the paper leaves open:
 
-Complete, asynchronous in forward checking only, for satisfaction. Seven things the paper leaves open: constraints may
-be n-ary (the lowest robot of the scope checks them, once the CPA names all the others); messages are read by packets:
-views are updated message by message, and the domain is filtered, or the CPA handled, once the inbox has been drained;
-`NotOk` goes to all robots that have no value in the inconsistent assignment which it names; of two inconsistent
-assignments that are known, one the beginning of the other, the shorter one is kept; filtering is incremental, and
-what a new CPA has in common with the last one is not checked again; a robot whose domain is empty from the start
-says so at once; the last robot concludes that a solution stands, since all others still hold what the CPA names.
+- Constraints may be n-ary. The lowest-priority robot of the scope checks them, once the CPA contains all others.
+- Messages are read in packets. The view is updated with each message; the domain is filtered, or the CPA handled, when
+  the inbox has been drained.
+- `NotOk` goes to all robots without a value in its inconsistent assignment.
+- If one known inconsistent assignment is a prefix of another, the shorter one is kept.
+- Filtering is incremental: a prefix that a new CPA shares with the last one is not checked again.
+- A robot with an empty domain reports it at once.
+- The last robot concludes with a solution, as all others still hold the values in the CPA.
+
+>>> from robochoc.generators.queens3d import queens3d
+>>> from robochoc.run import Options, Runtime, solve
+>>> outcome = solve(queens3d(4), Options(protocol="afc", runtime=Runtime.SIMULATOR))
+>>> outcome.verdict.value, outcome.witness
+('no-solution', 'Robot1.1')
 """
 
 from __future__ import annotations

@@ -1,28 +1,44 @@
-"""Asynchronous Weak-Commitment search.
+"""Asynchronous Weak-Commitment search (AWC).
 
-Yokoo: "Asynchronous weak-commitment search for solving distributed constraint satisfaction problems", CP 1995;
-Yokoo, Durfee, Ishida, Kuwabara: "The distributed constraint satisfaction problem: formalization and algorithms",
-IEEE TKDE 10(5), 1998, Section 5, whose names the methods bear:
+Complete search for satisfaction with priorities that change. A robot obeys robots of higher priority, and takes the
+value with the fewest conflicts with the others. At a dead end it sends the nogood to all robots in it and raises its
+priority above all its neighbours'. So a bad choice above is undone without an exhaustive search below. Priorities
+change only with a new nogood.
+
+- **When to use**: to compare. ABT with the max-degree order is faster here.
+- **Guarantees**: complete; it terminates with a solution or with a proof that there is none. **All nogoods are kept,
+  which termination requires; space is exponential.**
+- **Parameters**: none.
+- **References**: Yokoo: "Asynchronous weak-commitment search for solving distributed constraint satisfaction
+  problems", CP 1995; Yokoo, Durfee, Ishida, Kuwabara: "The distributed constraint satisfaction problem: formalization
+  and algorithms", IEEE TKDE 10(5), 1998, Section 5.
+
+The methods have the names of its procedures:
 
     check_agent_view   `_check_agent_view`     received (ok?, ...)      `_received_ok`
     backtrack          `_backtrack`            received (nogood, ...)   `_received_nogood`
 
-Complete, asynchronous, for satisfaction. A robot keeps to what robots of higher priority say, and takes the value
-with the fewest conflicts with the others. At a dead end it tells the nogood to all robots in it and raises its
-priority above all its neighbours', so that a bad choice above is left without an exhaustive search below. Priority
-changes only with a new nogood. **All nogoods are kept, so that search ends; the space is exponential.**
+Termination and correctness: there are finitely many nogoods, and each robot sends each only once. So priorities stop
+changing at some point, and then values settle from the highest priority downwards. Suppose a robot is at a dead end at
+quiescence. It has sent its nogood before, so all robots in the nogood know it and each other's values. The lowest of
+them is then at a dead end itself, at a higher priority. The highest such robot would have derived the empty nogood.
 
-Why it ends, and right: there are finitely many nogoods, and each robot says each only once, so from some moment on
-no priority changes, and then values settle from the highest priority downwards. When nobody speaks any more, whoever
-is at a dead end has said its nogood before; all robots in it know it and each other's values, so the lowest of them
-is at a dead end itself, higher up; of those the highest would have found the empty nogood.
+Choices that the papers leave open:
 
-What the papers leave open: constraints and nogoods may be over many robots; the lowest at present answers for them,
-so all of a scope have to know the constraint and each other's values. A nogood is new if this robot has never sent
-it. The conflicts to be minimised are broken constraints (each look counts as a check) and nogoods that stand (not
-counted); of equals the first in the domain is taken. Against each value the shortest nogood that stands goes into the
-new nogood, or else the first broken constraint. Of robots with several variables, a nogood names only those that
-matter. Messages are read by packets. That nobody speaks any more, and so a solution stands, is for the runtime to see.
+- Constraints and nogoods may contain many robots. The robot that is lowest at present checks them, so all robots of a
+  scope must know the constraint and each other's values.
+- A nogood is new if this robot has never sent it.
+- Conflicts to minimise are violated constraints (each evaluation counts as a check) and nogoods that hold (not
+  counted). Ties go to the first value of the domain.
+- For each value, the shortest nogood that holds goes into the new nogood, or else the first violated constraint.
+- A nogood contains only those variables of a robot that matter.
+- Messages are read in packets. The runtime detects quiescence, and so a solution.
+
+>>> from robochoc.generators.queens3d import queens3d
+>>> from robochoc.run import Options, Runtime, solve
+>>> outcome = solve(queens3d(3), Options(protocol="awc", runtime=Runtime.SIMULATOR))
+>>> outcome.verdict.value
+'no-solution'
 """
 
 from __future__ import annotations

@@ -1,38 +1,44 @@
 """Branch-and-Bound ADOPT (BnB-ADOPT+).
 
-Yeoh, Felner, Koenig: "BnB-ADOPT: an asynchronous branch-and-bound DCOP algorithm", JAIR 38, 2010, Section 4, whose
-names the methods bear; which messages need not be sent: Gutierrez, Meseguer: "Saving redundant messages in
-BnB-ADOPT", AAAI 2010:
+Complete search for minimum cost on a pseudo-tree: ADOPT's messages and bounds, with depth-first branch and bound
+instead of best-first search. A robot keeps its value until LB(d) reaches the cost of the best known complete solution
+(UB), or its threshold (TH). It sends far fewer messages than ADOPT, as it does not return to the same values again and
+again.
+
+- **When to use**: costs, a sparse graph, little memory.
+- **Guarantees**: complete; it terminates with an optimum, or with a proof that there is no solution.
+- **Parameters**: none.
+- **References**: Yeoh, Felner, Koenig: "BnB-ADOPT: an asynchronous branch-and-bound DCOP algorithm", JAIR 38, 2010,
+  Section 4; for redundant messages: Gutierrez, Meseguer: "Saving redundant messages in BnB-ADOPT", AAAI 2010.
+
+The methods have the names of the procedures:
 
     Start          `begin`                 InitSelf        `_merge`, `_choose`
     When Received  `handle`                InitChild       `forget` (in `bounding`, as the next ones)
     Backtrack      `decide`, `act`         PriorityMerge   `merge`
                                            Compatible      `agrees`
 
-Complete, for minimisation: ADOPT's messages and bounds, but depth-first branch and bound where ADOPT goes
-best-first. A robot keeps its value until the bound LB(d) shows that it is no better than the best complete solution
-known (UB), or than its parent has use for (TH). It sends a small part of ADOPT's messages, as it does not leave and
-take up the same values time and again.
+Choices that the papers leave open, and differences:
 
-What the papers leave open, or is settled otherwise here: constraints may be n-ary, and there may be several trees
-(see `adopt`, also for hard constraints and for what is known of neighbours above); heuristic values h are 0. A
-context grows as values come to be known, there is no initial value that all know; a value that was not known before
-does not void the threshold. Own values are weighed once an inbox has been drained, also for InitSelf. The ID grows
-when the value changes. SCP of a child are those that its contexts have named.
+- Constraints may be n-ary, and there may be several trees (see `adopt`, also for hard constraints and unknown values
+  of neighbours above). Heuristic values h are 0.
+- A context grows as values become known; there is no initial value that all robots know. A value that was unknown
+  before does not invalidate the threshold.
+- Bounds are computed when the inbox has been drained, also for InitSelf. The ID grows when the value changes. SCP of a
+  child contains the robots that its contexts have named.
+- A value is repeated only to a child that requests its threshold after InitSelf dropped it (ThReq). A lower threshold
+  alone is not sent. A higher one is, even with the same value: otherwise the child would wait for its parent, and its
+  parent for the child.
+- When UB <= LB, the robot takes the value with the least UB, as another one with the same LB may cost more.
+- Terminate contains the final values above. The search of the subtree continues with these, without a threshold, until
+  UB <= LB there, too: since the parent's bounds were computed, the robot may have taken other values in other
+  contexts. Before it sends Terminate, a robot sends its final value to all neighbours below, as robots further down
+  may need it.
 
-A robot says the same again only to a child that asks for its threshold, as InitSelf has dropped it (ThReq). A lower
-threshold alone is not worth a message. A higher one is, though the value is the same: if the child stayed below the
-old one, it would wait for its parent, and its parent for it.
-
-When UB <= LB the value is the one with the least UB, as another with the same LB may cost more. Terminate carries the
-last values above: the search of the subtree goes on with these, without threshold, until UB <= LB there, too; the
-parent's bounds were right when it ended, but the robot may have taken other values since, in other contexts. Before
-it, the last value has gone to all neighbours below, as those further down may need it for just that.
-
-When nobody speaks all have terminated. Otherwise there is a highest robot that has not; its TH is infinite, and
-UB > LB. All contexts agree, so LB(d) < UB for its value d, and for some child lb < ub and lb < TH of the child. By
-what the child has said last, LB < UB there, and LB < TH; so LB(d) < min(TH, UB) for its value d, and so on, down to a
-leaf, where LB = UB.
+Termination: at quiescence all robots have terminated. Otherwise there is a highest robot that has not; its TH is
+infinite, and UB > LB. All contexts agree, so LB(d) < UB for its value d, and for some child lb < ub and lb < TH of the
+child. By the child's last message, LB < UB there, and LB < TH; so LB(d) < min(TH, UB) for its value d, and so on, down
+to a leaf, where LB = UB: a contradiction.
 
 >>> from robochoc.communication.simulator.schedule import Concurrent
 >>> from robochoc.communication.simulator.simulator import Simulation

@@ -1,25 +1,35 @@
 """The Distributed Stochastic Algorithm (DSA), variants A, B and C.
 
-Fitzpatrick, Meertens: "An experimental assessment of a stochastic, anytime, decentralized, soft colourer for sparse
-graphs", SAGA 2001; Zhang, Wang, Xing, Wittenburg: "Distributed stochastic search and distributed breakout: properties,
-comparison and applications to constraint optimization problems in sensor networks", AIJ 161, 2005, Section 3. Its
-Algorithm 1, line by line:
+Local search in cycles. In each cycle a robot looks for its best value against its neighbours' values of the cycle
+before, and takes it with a probability, so that not all neighbours move at once. The gain is the cost that a move
+saves. Variant A moves only if it gains. B also moves if it gains nothing and is in conflict. C also moves if it gains
+nothing at all.
+
+- **When to use**: costs, a large team: good answers fast.
+- **Guarantees**: incomplete; it stops after `cycles` cycles, without a proof of optimality. The result is the best
+  cycle (anytime). A robot with an empty domain proves that there is no solution.
+- **Parameters (`--set`)**: `variant` (A, B or C; default B), `probability` (p; default 0.7), `cycles` (default 100). B
+  was the best of the three on colouring problems (Zhang and others): sideways moves leave plateaus, and it settles
+  where there is no conflict.
+- **References**: Fitzpatrick, Meertens: "An experimental assessment of a stochastic, anytime, decentralized, soft
+  colourer for sparse graphs", SAGA 2001; Zhang, Wang, Xing, Wittenburg: "Distributed stochastic search and distributed
+  breakout: properties, comparison and applications to constraint optimization problems in sensor networks", AIJ 161,
+  2005, Section 3.
+
+Its Algorithm 1, line by line:
 
     randomly choose a value                                        `begin`
     while no termination condition is met: send the value, if      `tell_value`
       it is new, collect neighbours' new values
     select and assign the next value (Table 1)                     `_choose`
 
-Incomplete, synchronous, anytime, for costs. In each cycle a robot looks for the value that is best against what its
-neighbours had in the cycle before, and takes it with a probability, so that not all neighbours move at once. Let the
-gain be what it would save. Variant A moves only if it gains; B also if it gains nothing and is in conflict; C also if
-it gains nothing at all. B is the default: of the three Zhang and others found it the best on colouring problems, as
-sideways moves take it out of plateaus, and it comes to rest where there is no conflict.
+Choices that the paper leaves open, and differences:
 
-What the paper leaves open, or is settled otherwise here: the value is told in each cycle, also if it is the old one,
-for how else would neighbours know that the cycle is over; a robot is in conflict when a shared constraint is broken
-or charges anything; constraints may be n-ary, and each robot of a scope weighs what the constraint charges for
-itself; fewer broken hard constraints are always better; of several best values one is drawn by lot.
+- The value is sent in each cycle, even if it has not changed, so that neighbours know that the cycle is over.
+- A robot is in conflict when a shared constraint is violated or charges any cost.
+- Constraints may be n-ary; each robot of a scope counts the whole cost of the constraint.
+- Fewer violated hard constraints are always better.
+- One of several best values is chosen at random.
 
 >>> from robochoc.communication.simulator.schedule import Concurrent
 >>> from robochoc.communication.simulator.simulator import Simulation

@@ -1,21 +1,36 @@
-"""Dynamic Asynchronous Backtracking.
+"""Dynamic Asynchronous Backtracking (DynABT).
 
-Omomowo, Arana, Ahriz: "DynABT: dynamic asynchronous backtracking for dynamic DisCSPs", AIMSA 2008; on nogood
-justifications for dynamic problems: Schiex and Verfaillie, "Nogood recording for static and dynamic constraint
-satisfaction problems", IJAIT 3 (1994). For when a robot is "lost if hit by a meteor" (paper, Section 3.1).
+ABT (see `abt.py`) that continues when the problem changes. Its nogoods have an *explanation*, `because`: the
+constraints, and the domains, that they were derived from. A direct conflict is explained by its constraint. A resolvent
+is explained by the union of the explanations that it resolves, and by the own domain.
 
-ABT (`protocols/abt.py`) whose nogoods carry an *explanation*, `because`: the constraints they were derived from, and
-the domains whose values they were derived from. A direct conflict is explained by its constraint, a resolvent by the
-union of what it resolves and by the own domain, which has no other values. When the problem changes:
+- **When to use**: the problem changes during the run, for example when a robot is "lost if hit by a meteor" (paper,
+  Section 3.1).
+- **Guarantees**: complete; each epoch terminates with a solution or with a proof that there is none.
+- **Parameters**: none.
+- **References**: Omomowo, Arana, Ahriz: "DynABT: dynamic asynchronous backtracking for dynamic DisCSPs", AIMSA 2008;
+  on nogood justifications for dynamic problems: Schiex and Verfaillie, "Nogood recording for static and dynamic
+  constraint satisfaction problems", IJAIT 3 (1994).
 
-    removeConstraint   nogoods explained by a constraint that is gone are dropped; so is a no-solution
-    addConstraint      a link to the new lower end is made, and the value is told there
-    adjustNogood       values that are gone take their nogoods along; a domain that grew voids its resolvents
+On a change of the problem, the paper's procedures do this (`change`, `_adjust_nogoods`):
 
-The changes are propagated by the runtime, to all robots before any goes on; the paper has the robots tell each other.
-Messages under way when a search was broken off, or had concluded, are lost: so links are asked for once more and
-values told once more before the search goes on. After a search that came to rest nothing was lost, and only what is
-new is told.
+    removeConstraint   drop nogoods explained by a removed constraint; also a proof of no solution
+    addConstraint      link to the new lower-priority robot, and send it the value
+    adjustNogood       drop nogoods of removed values; a domain that grew invalidates its resolvents
+
+Choices that the paper leaves open, and differences:
+
+- The runtime propagates the changes to all robots before any robot continues. In the paper the robots send them to
+  each other.
+- Messages under way are lost if a search was interrupted or had concluded. Then links are requested again and values
+  sent again before the search continues. If the search had reached quiescence, nothing was lost, and only new values
+  are sent.
+
+>>> from robochoc.generators.queens3d import queens3d
+>>> from robochoc.run import Options, Runtime, solve
+>>> outcome = solve(queens3d(4), Options(protocol="dynabt", runtime=Runtime.SIMULATOR))
+>>> outcome.verdict.value, outcome.witness
+('no-solution', 'Robot1.1')
 """
 
 from __future__ import annotations

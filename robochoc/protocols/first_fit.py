@@ -1,11 +1,22 @@
 """First fit: robots that cannot be placed withdraw, in priority order.
 
-Paper, Section 5.2: "the robots who can't belonging to the solution will be taken from the operational scene. Thus
-only robots that will satisfy all constraints will fly to take their positions." Each robot waits until all its
-parents have said where they fly, or that they do not; then it takes the first value that its constraints with the
-flying ones allow, or withdraws, and tells its children. One message an edge; nobody who withdrew could
-still be added, as all that ruled it out flies. Which *fewest* robots must leave is an optimisation problem, and
-another protocol's.
+Each robot waits for the decisions of its parents (neighbours of higher priority). Then it takes the first value that
+its constraints with the flying parents allow, or withdraws, and sends its decision to its children.
+
+- **When to use**: some robots may withdraw, and any set of them will do. The minimum number of withdrawals is an
+  optimisation problem for a protocol with costs.
+- **Guarantees**: it terminates after one message for each edge. The set of withdrawn robots is minimal by inclusion:
+  no robot could be added, as all that ruled it out fly. It is not a minimum.
+- **Parameters**: none.
+- **Reference**: paper, Section 5.2: "the robots who can't belonging to the solution will be taken from the operational
+  scene. Thus only robots that will satisfy all constraints will fly to take their positions."
+
+>>> from robochoc.communication.simulator.schedule import Concurrent
+>>> from robochoc.communication.simulator.simulator import Simulation
+>>> from robochoc.generators.queens3d import queens3d
+>>> result = Simulation(queens3d(4), FirstFit, Concurrent(seed=0)).run()
+>>> sum(bool(values) for values in result.assignments.values()), result.metrics.messages  # of 16 robots
+(9, {'Placed': 76})
 """
 
 from __future__ import annotations

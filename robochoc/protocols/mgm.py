@@ -1,21 +1,29 @@
 """Maximum Gain Message (MGM).
 
-Maheswaran, Pearce, Tambe: "Distributed algorithms for DCOP: a graphical-game-based approach", PDCS 2004, Section 3;
-Pearce, "Local optimization in cooperative agent networks", PhD thesis, 2007. A modification of distributed breakout
-(Yokoo, Hirayama 1996) that has no weights. The paper's procedure (Algorithm MGM, `allNeighbors`, `currentContext`):
+Local search in cycles: distributed breakout (Yokoo, Hirayama 1996) without weights. All robots send their values, then
+the gain of their best move. Among neighbours only the one with the largest gain moves. So a move saves the team what it
+saves the robot.
+
+- **When to use**: as DSA, if the cost must never rise. It ends in a local optimum.
+- **Guarantees**: incomplete; it stops after `cycles` cycles, without a proof of optimality. The cost never rises from
+  one cycle to the next (anytime). A robot with an empty domain proves that there is no solution.
+- **Parameters (`--set`)**: `cycles` (default 100).
+- **References**: Maheswaran, Pearce, Tambe: "Distributed algorithms for DCOP: a graphical-game-based approach", PDCS
+  2004, Section 3; Pearce, "Local optimization in cooperative agent networks", PhD thesis, 2007.
+
+The paper's procedure (Algorithm MGM, `allNeighbors`, `currentContext`):
 
     SendValueMessage, GetValueMessages   `tell_value`, `_weigh`
     BestUnilateralGain                   `_weigh`
     SendGainMessage, GetGainMessages     `_weigh`, `_move`
     if gain > max(neighbours' gains)     `_move`
 
-Incomplete, synchronous, anytime, for costs. All robots tell their values, then by how much each would gain if it alone
-moved; of neighbours only the one that gains most moves. So what a move saves its robot it saves the team: the cost
-never rises from one cycle to the next, and who cannot gain any more stays: a local optimum.
+Choices that the paper leaves open:
 
-What the paper leaves open: the first value is drawn by lot, and so is one of several best values; of neighbours that
-gain the same the one that comes first in the priority order moves; constraints may be n-ary, as all robots of a scope
-are neighbours; a gain is a pair, of broken hard constraints first, so the search also works on plain DisCSPs.
+- The first value is chosen at random, and so is one of several best values.
+- If neighbours have the same gain, the first one in the priority order moves.
+- Constraints may be n-ary, as all robots of a scope are neighbours.
+- A gain is a pair, violated hard constraints first. So the search also works on plain DisCSPs.
 
 >>> from robochoc.communication.simulator.schedule import Concurrent
 >>> from robochoc.communication.simulator.simulator import Simulation

@@ -1,17 +1,32 @@
-"""Synchronous Backtracking.
+"""Synchronous Backtracking (SBT).
 
-Yokoo, Durfee, Ishida, Kuwabara: "The distributed constraint satisfaction problem: formalization and algorithms",
-IEEE TKDE 10(5), 1998, Section on synchronous backtracking (first in ICDCS 1992); as a baseline also in Zivan,
-Meisels: "Synchronous vs asynchronous search on DisCSPs", EUMAS 2003.
+Chronological backtracking, distributed. One current partial assignment (CPA) goes from robot to robot in priority
+order. Its holder adds the first own value that agrees with it and sends it on; without such a value, it sends the CPA
+back. One robot acts at a time, so no message is ever obsolete.
 
-Chronological backtracking, distributed: one current partial assignment (CPA) goes from robot to robot in priority
-order. Who holds it adds the first own value that agrees with it and sends it on; who has none left sends it back.
-One robot acts at a time, so no message is ever obsolete.
+- **When to use**: as a simple baseline without costs.
+- **Guarantees**: complete; it terminates with a solution or with a proof that there is none. Space is linear.
+- **Parameters**: none.
+- **References**: Yokoo, Durfee, Ishida, Kuwabara: "The distributed constraint satisfaction problem: formalization and
+  algorithms", IEEE TKDE 10(5), 1998, Section on synchronous backtracking (first in ICDCS 1992); as a baseline also in
+  Zivan, Meisels: "Synchronous vs asynchronous search on DisCSPs", EUMAS 2003.
 
-Complete, synchronous, for satisfaction. Four things are left open: constraints may be n-ary (the lowest robot of the
-scope checks them, when it holds the CPA); the way back carries no assignments, for the robot before still has its
-own; a robot whose domain is empty from the start says so at once; the last robot concludes that a solution stands,
-since all others still hold the values that the CPA names.
+The methods:
+
+    add a value, send the CPA on   `_assign`     send the CPA back   `_backtrack`
+
+Choices that the papers leave open:
+
+- Constraints may be n-ary. The lowest-priority robot of the scope checks them, when it holds the CPA.
+- `Backtrack` contains no assignments, as the robot before still has its own.
+- A robot with an empty domain reports it at once.
+- The last robot concludes with a solution, as all others still hold the values in the CPA.
+
+>>> from robochoc.generators.queens3d import queens3d
+>>> from robochoc.run import Options, Runtime, solve
+>>> outcome = solve(queens3d(4), Options(protocol="sbt", runtime=Runtime.SIMULATOR))
+>>> outcome.verdict.value, outcome.witness
+('no-solution', 'Robot1.1')
 """
 
 from __future__ import annotations

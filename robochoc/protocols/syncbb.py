@@ -1,18 +1,29 @@
 """Synchronous Branch and Bound (SyncBB).
 
-Hirayama, Yokoo: "Distributed partial constraint satisfaction problem", CP 1997.
+Branch and bound, distributed. One path, the values of the robots so far and the cost of each, goes from robot to robot
+in priority order. Its holder adds the first own value with which it costs less than the bound n, the cost of the best
+path so far, and sends it on; without such a value, it sends the path back. A path that reaches the last robot is the
+new best one. One robot acts at a time, so no message is ever obsolete.
 
-Branch and bound, distributed: one path, the values of the robots so far with what each of them costs, goes from robot
-to robot in priority order. Who holds it adds the first own value with which it costs less than the bound n, the cost
-of the best path so far, and sends it on; who has none left sends it back. The last robot's path is the new best one.
-Once the first robot has no value left, the best path is proven. One robot acts at a time, so nothing is ever obsolete.
+- **When to use**: as a simple baseline with costs.
+- **Guarantees**: complete; it terminates with an optimum, or with a proof that there is no solution. The best path is
+  optimal once the first robot has no value left. Space is linear.
+- **Parameters**: none.
+- **Reference**: Hirayama, Yokoo: "Distributed partial constraint satisfaction problem", CP 1997. The paper's cost is
+  the largest number of constraints that one robot violates; here it is the sum of all costs.
 
-Complete, synchronous, for minimisation. The paper's cost is the largest number of constraints that one robot breaks,
-here it is the sum of all costs. What is left open: constraints may be n-ary (the lowest robot of the scope pays them,
-when it holds the path); the way back carries no values but those of the best path, for the robot before still has
-its own; the last robot looks on for a cheaper value before it sends the path back; a path that costs as much as a new
-bound goes back without a look at the values that are left; a robot whose domain is empty from the start says so at
-once; the first robot tells the others what the best path was, and who hears of it takes the value in it.
+The methods:
+
+    extend the path   `_extend`     backtrack   `_backtrack`
+
+Choices that the paper leaves open:
+
+- Constraints may be n-ary. The lowest-priority robot of the scope pays them, when it holds the path.
+- `Backtrack` contains no values but those of the best path, as the robot before still has its own.
+- The last robot looks for further, cheaper values before it sends the path back.
+- A path that costs as much as a new bound goes back at once.
+- A robot with an empty domain reports it at once.
+- The first robot sends the best path to the others at the end, and each takes its value in it.
 
 >>> from robochoc.communication.simulator.schedule import Concurrent
 >>> from robochoc.communication.simulator.simulator import Simulation

@@ -180,7 +180,7 @@ def test_json_is_an_object_a_line() -> None:
     assert found["central"]["distributed"] is False
     assert "doc" not in found["abt"]
     (one,) = objects(run("abt", "--json")).values()
-    assert str(one["doc"]).startswith("Asynchronous Backtracking.\n\nYokoo")
+    assert str(one["doc"]).startswith("Asynchronous Backtracking (ABT).\n\nComplete")
 
 
 def test_a_protocol_is_explained_by_its_docstring() -> None:
