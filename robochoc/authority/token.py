@@ -29,7 +29,7 @@ class EnrolmentToken:
     fingerprint: bytes
 
     @classmethod
-    def new(cls, fingerprint: bytes) -> Token:
+    def new(cls, fingerprint: bytes) -> EnrolmentToken:
         """Return a token with a random secret of 160 bits."""
         return cls(secrets.token_bytes(SECRET_BYTES), fingerprint)
 

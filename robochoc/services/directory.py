@@ -55,7 +55,7 @@ class Directory:
 
     def register(self, description: AgentDescription, now: float, *, requester: str) -> None:
         """Register the description of `requester` until its lease ends."""
-        check(description)
+        check_description(description)
         _authorise(description.name, requester)
         self._lapse(now)
         if description.name in self._registered:
