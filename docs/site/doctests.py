@@ -1,4 +1,6 @@
-"""Examples in docstrings (`>>>`) as blocks of code: Markdown takes them for quotations of quotations.
+"""Docstrings as the site needs them: examples (`>>>`) as blocks of code, protocols without their first line.
+
+Markdown takes examples for quotations of quotations. The first line of a protocol's module is its page's heading.
 
 An extension of griffe, which reads the docstrings for the site (https://mkdocstrings.github.io/griffe/extensions/).
 """
@@ -14,12 +16,14 @@ _EXAMPLE = re.compile(r"(?:^ *>>> .*\n?)(?:^ *\S.*\n?)*", re.MULTILINE)
 
 
 class Doctests(Extension):
-    """Fences the examples of every docstring."""
+    """Fences the examples of every docstring, and leaves out what is a heading already."""
 
     def on_object(self, *, obj: Object, **_: Any) -> None:  # noqa: ANN401 - griffe's
         """Change the docstring of one object."""
         if obj.docstring and ">>> " in obj.docstring.value:
             obj.docstring.value = _EXAMPLE.sub(_fenced, obj.docstring.value)
+        if obj.docstring and obj.is_module and obj.path.startswith("robochoc.protocols."):
+            obj.docstring.value = obj.docstring.value.partition("\n\n")[2]
 
 
 def _fenced(example: re.Match[str]) -> str:

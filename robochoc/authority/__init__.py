@@ -1,1 +1,1 @@
-"""The Authority unit: who may take part, how they prove who they are, and what each of them may do."""
+"""The Authority unit: enrolment, identities (certificates), and the rights of each name."""

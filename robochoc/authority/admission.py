@@ -47,7 +47,7 @@ class InMemoryAuthority:
         return self._identity(name, None)
 
     def master_identity(self, hosts: tuple[str, ...]) -> Identity:
-        """Return a new identity of the master, who is reached at `hosts`."""
+        """Return a new identity of the master, which is reached at `hosts`."""
         return self._identity(MASTER, hosts)
 
     def names(

@@ -53,7 +53,7 @@ from robochoc.system.files import write_atomically
 TOKEN_LIFETIME = timedelta(hours=24)
 CERTIFICATE_LIFETIME = timedelta(hours=24)
 IN_FORCE_AT_MOST = 16
-"""So many certificates of one name may be in force: who asks for more is out of order, or hostile."""
+"""The largest number of certificates in force for one name. A robot that requests more is faulty or hostile."""
 _KEY, _CERTIFICATE, _MASTER = "ca.key", "ca.pem", "master"
 _OTHERS = 0o077
 
@@ -274,7 +274,7 @@ class Authority:
             members[name] = EnrolledName(name, member.role, None, (), withdrawn, revoked=True).since(self.clock())
 
     def is_revoked(self, who: str | int) -> bool:
-        """Return whether the name, or the certificate with the serial number, `who` is refused.
+        """Return whether the name or the certificate's serial number `who` is refused.
 
         It is when it was revoked, and when this Authority does not know it: what is not granted is denied.
         """
@@ -297,7 +297,7 @@ class Authority:
         )
 
     def members(self) -> tuple[EnrolledName, ...]:
-        """Return all that were ever enrolled, sorted by name."""
+        """Return all names that were ever enrolled, sorted."""
         return tuple(member for _, member in sorted(self._registry.members().items()))
 
     def report(self, event: AuthorityEvent) -> None:

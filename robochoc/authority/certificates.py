@@ -24,7 +24,7 @@ from robochoc.formats.diagnostics import on_one_line, shortened
 MASTER = "MASTER"
 """The master's name. No robot may have it, in whatever capitals: host names know no capitals."""
 SKEW = timedelta(minutes=5)
-"""So much may the clocks of two machines differ."""
+"""The tolerated difference between the clocks of two machines."""
 CA_LIFETIME = timedelta(days=3650)
 LONGEST_NAME = 64
 """Characters of a common name (RFC 5280, ub-common-name)."""

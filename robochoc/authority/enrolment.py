@@ -46,7 +46,7 @@ from robochoc.formats.diagnostics import on_one_line
 from robochoc.system.files import write_atomically
 
 PATIENCE_S = 30.0
-"""So long may a question take, with the time that the service lets it wait."""
+"""The longest time for a question, with its wait at the service, in seconds."""
 
 
 class EnrolmentError(Exception):
@@ -54,7 +54,7 @@ class EnrolmentError(Exception):
 
 
 class NobodyThereError(EnrolmentError):
-    """Nobody listens at that address (yet). Nothing was sent, so the same token can be tried again."""
+    """There is no service at that address (yet). Nothing was sent, so the same token can be tried again."""
 
 
 class NotTrustedError(EnrolmentError):
@@ -115,7 +115,7 @@ def _introduced(place: tuple[str, int], token: Token, patience_s: float) -> x509
 
 
 def _believing(ca: x509.Certificate) -> ssl.SSLContext:
-    """TLS with nobody but the master whom `ca` has certified."""
+    """Return a TLS context that accepts only the master certified by `ca`."""
     context = ssl.SSLContext(ssl.PROTOCOL_TLS_CLIENT)  # verifies the certificate, and its name
     context.minimum_version = ssl.TLSVersion.TLSv1_3
     context.hostname_checks_common_name = False

@@ -37,9 +37,9 @@ from robochoc.authority.identity import Identity
 from robochoc.authority.registry import AuthorityError
 
 CONNECTIONS = 32
-"""So many are served at once; others wait to be accepted."""
+"""The number of connections served at once. Others wait to be accepted."""
 PATIENCE_S = 10.0
-"""So long may a connection take, from its first byte to its last."""
+"""The longest duration of a connection, in seconds."""
 _BACKLOG = 256
 
 
@@ -113,7 +113,7 @@ class EnrolmentServer:
                 self._admit()
 
     def _admit(self) -> None:
-        """Accept a connection, and leave it to a thread; whatever it is, it does no harm to the others."""
+        """Accept a connection and serve it in a thread. Its failure does not affect the others."""
         try:
             raw, peer = self._listener.accept()
             origin = f"{peer[0]}:{peer[1]}"

@@ -131,7 +131,7 @@ def save(folder: Path, key: ec.EllipticCurvePrivateKey, certificate: Certificate
 
 
 def private_folder(folder: Path) -> None:
-    """Make `folder`, which nobody else may look into; an empty one that is there is closed to others.
+    """Create `folder` with access for its owner only. An existing empty one is restricted likewise.
 
     Raises `OSError`, also for a folder with something in it that is open to others: it serves another purpose.
     """

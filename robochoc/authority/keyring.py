@@ -156,7 +156,7 @@ class KeyRing:
         return HKDF(hashes.SHA256(), _SECRET_BYTES, salt=None, info=agreed).derive(secret)
 
     def next_number(self) -> int:
-        """Return a number that this key ring has not given before, whoever asks: what nonces are made of.
+        """Return a number that this key ring has not given before, for nonces.
 
         Raises `RuntimeError` in a forked child, whose numbers its parent gives as well.
         """
@@ -169,5 +169,5 @@ class KeyRing:
 
 
 def bound(*parts: bytes) -> bytes:
-    """`parts` as one string from which each can be told: no two lists of parts give the same."""
+    """Return an injective encoding of `parts`: two different lists never give the same string."""
     return b"".join(len(part).to_bytes(8, "big") + part for part in parts)

@@ -66,7 +66,7 @@ class Issued(msgspec.Struct, frozen=True):
 
 
 class EnrolledName(msgspec.Struct, frozen=True):
-    """All that the Authority knows of one name. Certificates that have expired are forgotten."""
+    """The Authority's record of one name. Expired certificates are forgotten."""
 
     name: str
     role: Role
@@ -142,7 +142,7 @@ class Registry:
 
     @contextmanager
     def change(self) -> Iterator[dict[str, EnrolledName]]:
-        """Yield the entries for a change that nobody else can disturb.
+        """Yield the entries for an exclusive change.
 
         They are written at the end, unless that raises.
         """

@@ -30,7 +30,7 @@ class Token:
 
     @classmethod
     def new(cls, fingerprint: bytes) -> Token:
-        """Return a token with a secret that nobody can guess (160 bits)."""
+        """Return a token with a random secret of 160 bits."""
         return cls(secrets.token_bytes(SECRET_BYTES), fingerprint)
 
     @classmethod

@@ -18,7 +18,7 @@ from robochoc.solver.agent_problem import AgentProblem
 from robochoc.solver.explanation import Invalidated
 
 QUEUES_AT_ONCE = 16
-"""The number of queues that a robot requests at once. Meanwhile, the parent holds so many descriptors more."""
+"""The number of queues that a robot requests at once. Meanwhile, the parent holds as many more descriptors."""
 
 
 class _Control(msgspec.Struct, frozen=True, tag=True, array_like=True):

@@ -120,7 +120,7 @@ class Host:
         try:
             message: Message = self._decoder.decode(envelope.content)
         except (msgspec.MsgspecError, RecursionError, UnicodeDecodeError) as error:
-            raise BadMessageError(f"{envelope.sender} sent {self.name} what is no message: {error}") from error
+            raise BadMessageError(f"{envelope.sender} sent {self.name} an invalid message: {error}") from error
         self.clock = max(self.clock, envelope.clock)
         self.protocol.receive(envelope.sender, message)
         self._tick()
@@ -137,7 +137,7 @@ class Host:
             )
 
     def catch_up(self, clock: int) -> None:
-        """Set the clock: by so much later was that of the message taken in last, and all that was said to it."""
+        """Advance the clock of the message taken in last, and of the answers to it, by this amount."""
         late = clock - self.clock
         self.clock = clock
         for place in range(self._answers, len(self._stamps)):
@@ -201,7 +201,7 @@ class Host:
         self.clock = before + self._checks
 
     def _time(self, checks: int) -> float:
-        """Return the time when so many checks were done."""
+        """Return the time at which this number of checks was done."""
         return self._now() if self._then is None else self._then(checks)
 
     @property

@@ -1,4 +1,4 @@
-"""The master's loop of one search, whatever carries the messages: processes' pipes, or the network.
+"""The master's loop of one search, for every transport: processes' pipes, or the network.
 
 The master waits until all robots are ready, orders the start, asks for counters until they show quiescence, and ends
 the search. What it decides is in `SearchState`; how it reads and sends control messages is the runtime's.

@@ -40,7 +40,7 @@ def require_descriptors(free: int) -> None:
 
 
 def own_memory() -> int:
-    """Bytes that this process shares with no other; 0 where the system does not tell."""
+    """Return the bytes that this process shares with no other. 0 where the system does not report them."""
     try:
         lines = Path("/proc/self/smaps_rollup").read_text().splitlines()
     except OSError:

@@ -1,4 +1,4 @@
-"""A robot's part in a search, whatever carries the messages: queues between processes, or the network.
+"""A robot's part in a search, for every transport: queues between processes, or the network.
 
 It stands between the host, which drives the protocol, and a runtime, which moves bytes. It confirms that the robot is
 ready, hands packets of messages to the host, counts, reports to the master, and is silent once the search is over.
@@ -16,7 +16,7 @@ from robochoc.journal.events import AnyEvent, Sent
 from robochoc.model.message import Envelope
 
 IDLE_S = 0.002
-"""A robot that has received nothing for so many seconds reports its counters.
+"""Seconds without a message after which a robot reports its counters.
 
 It says when to ask, never what is true.
 """
@@ -32,7 +32,7 @@ class RobotLoop(ABC):
     """
 
     bundle_bytes: int
-    """A bundle of events is closed once its messages have so many bytes together."""
+    """The size at which a bundle of events is closed: bytes of all its messages."""
 
     def __init__(self, epoch: int, *, observed: bool) -> None:
         self.epoch = epoch
@@ -137,7 +137,7 @@ class RobotLoop(ABC):
         self._say(Counters(self.epoch, wave, *self._reported))
 
     def report_idle(self) -> None:
-        """Tell the master all that it does not know yet, as there is nothing else to do."""
+        """Send the master all reports that are due, as the robot is idle."""
         self.report_events()
         self.report_counters(0)
 

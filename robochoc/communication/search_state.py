@@ -1,4 +1,4 @@
-"""The state of one search as its master sees it, whatever carries the messages. Pure.
+"""The state of one search as its master sees it, independent of the transport. Pure.
 
 It knows which robots are ready, their counters, who was lost, which verdict the search has, and what robots report.
 The runtimes of processes and of the network use the same state; the network's also distrusts what robots say

@@ -65,7 +65,7 @@ class Session(ABC):
 
     @abstractmethod
     def search(self, timeout: float | None = None, messages: int | None = None) -> RunResult:
-        """Search until there is a verdict, for at most `timeout` seconds or (about) so many `messages`.
+        """Search until there is a verdict, for at most `timeout` seconds or (about) `messages` messages.
 
         When a limit comes first the verdict is `unknown`. The metrics are those of this search. Robots begin only
         when all are there, as the paper's master orders the start. Raises `RobotsLostError` where robots can be lost.
@@ -77,7 +77,7 @@ class Session(ABC):
 
     @abstractmethod
     def close(self) -> None:
-        """Release all that the session uses."""
+        """Release all resources of the session."""
 
     def run(self, timeout: float | None = None) -> RunResult:
         """Search once, then close the session."""

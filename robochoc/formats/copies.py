@@ -55,7 +55,7 @@ def _grouped(constraints: Iterable[Constraint]) -> dict[tuple[str, ...], list[Co
 
 
 def _written(group: Iterable[Constraint]) -> Counter[Hashable]:
-    """Return what the constraints say, whatever they and their definitions are called."""
+    """Return the content of the constraints, independent of their names and their definitions' names."""
     written: Counter[Hashable] = Counter()
     for constraint in group:
         definition = constraint.definition

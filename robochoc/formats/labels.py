@@ -1,4 +1,4 @@
-"""Names that tell a robot's domains and definitions apart: in Python each is an object, in a file there is its name."""
+"""Distinct names for a robot's domains and definitions: objects in Python, names in a file."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ _Named = TypeVar("_Named", Domain, Relation | Predicate)
 
 
 def _names(things: Iterable[_Named], predefined: Mapping[str, _Named] = {}) -> dict[_Named, str] | None:
-    """Return names that tell `things` apart, for those whose own do not; None where all own names do."""
+    """Return distinct names for the `things` whose own names are ambiguous. None where all own names are distinct."""
     first: dict[str, _Named] = dict(predefined)
     names: dict[_Named, str] = {}
     for thing in things:

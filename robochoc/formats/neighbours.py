@@ -1,4 +1,4 @@
-"""Check who is in a team and who is whose parent: what two robots state of each other.
+"""Check the members of a team and their parents: the statements of two robots about each other.
 
 docs/reference/format.md, "The team".
 """

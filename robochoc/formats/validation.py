@@ -251,7 +251,7 @@ def _robots(team: Team, event: ScenarioEvent = _NOTHING) -> dict[str, Robot]:
 
 
 def _of_the_change(robots: Mapping[str, Robot], change: Change, place: Location) -> Iterator[Diagnostic]:
-    """Yield what is wrong with a change whatever else the team is like."""
+    """Yield mistakes of a change that do not depend on the rest of the team."""
     try:
         match change:
             case AddAgent(robot):

@@ -135,7 +135,7 @@ def _bytes(path: Path) -> bytes:
     descriptor = os.open(path, os.O_RDONLY | getattr(os, "O_NONBLOCK", 0))
     if not stat.S_ISREG(os.fstat(descriptor).st_mode):
         os.close(descriptor)
-        raise _invalid(path, 0, "is not a regular file", "what is called .xml here must be an XML file: move it away")
+        raise _invalid(path, 0, "is not a regular file", "every .xml here must be an XML file: move it away")
     with os.fdopen(descriptor, "rb") as file:
         return file.read(MAX_BYTES + 1)
 

@@ -120,7 +120,7 @@ class Settled(Event, frozen=True):
 
 
 class Concluded(Event, frozen=True):
-    """A robot alone could tell how the search ends."""
+    """A robot alone concluded the verdict of the search."""
 
     robot: str
     verdict: str

@@ -89,15 +89,15 @@ class TeamReader:
     def team(self, given: Given) -> Team:
         """Return the team, in its order. Raises `GivenProblemError`."""
         if given.why:
-            raise GivenProblemError(f"what the robots were given could not be written: {given.why}")
+            raise GivenProblemError(f"the robots' problems could not be written: {given.why}")
         for name, content in given.robots.items():
             try:
                 self._robots[name] = robot_in(content.encode(), name)
             except (InvalidInputError, UnicodeEncodeError) as invalid:
-                raise GivenProblemError(f"what {name} was given cannot be read: {invalid}") from invalid
+                raise GivenProblemError(f"the problem of {name} cannot be read: {invalid}") from invalid
         missing = [name for name in given.order if name not in self._robots]
         if missing:
-            raise GivenProblemError(f"nothing says what {missing[0]} was given")
+            raise GivenProblemError(f"the problem of {missing[0]} is missing")
         empty = set(given.empty)
         robots = tuple(_as_given(self._robots[name], given.shown.get(name, ()), empty) for name in given.order)
         team = Team(self._name, robots)

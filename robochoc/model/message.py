@@ -40,7 +40,7 @@ class Message(msgspec.Struct, frozen=True, tag=True, array_like=True):
 
 
 class Envelope(NamedTuple):
-    """One message on its way: who, to whom, its encoded content, and the sender's NCCC clock."""
+    """One message in transit: sender, receiver, encoded content, and the sender's NCCC clock."""
 
     sender: str
     receiver: str

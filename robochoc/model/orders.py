@@ -287,7 +287,7 @@ class _Reordering:
         return [*(name for name in before if name in now), *sorted(now - before.keys(), key=self._rank.__getitem__)]
 
     def _told(self, robot: Robot, child: Child) -> Child:
-        """Return `child`, with the variables of `robot` that it is told from now on."""
+        """Return `child`, with the variables of `robot` that it receives from now on."""
         needs_now = self._needed[child.name].get(robot.name, set())
         needed_before = self._needed_before[child.name].get(robot.name, set())
         kept = [name for name in child.variables if name in needs_now or name not in needed_before]

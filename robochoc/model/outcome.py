@@ -113,7 +113,7 @@ ALL_ROBOTS = "all robots"
 
 
 class CheckCounts(NamedTuple):
-    """Across machines: how many constraints were checked, and by whom.
+    """Across machines: the numbers of checked constraints, by the robots that checked them.
 
     Attributes:
         by_both: Checked by the robot that holds the constraint, and by another one.
@@ -183,7 +183,7 @@ class Outcome:
 
     @property
     def ruled_out(self) -> str | None:
-        """Return who claims that there is no solution, in words. Across machines nobody can check the claim."""
+        """Return a text on the robot that claims `no-solution`. Across machines the claim cannot be checked."""
         if self.witness is None or self.claimed_by is None:
             return self.witness and f"{self.witness} {RULED_OUT}"
         return f"{self.witness} claims it; nobody could check"

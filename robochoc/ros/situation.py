@@ -188,7 +188,7 @@ class Situation:
 
 
 def _may_reach(craft: Craft, home: Point | None, place: Point) -> bool:
-    """Return whether what is fixed of a craft's place, whatever is decided, lies near `place`."""
+    """Return whether the fixed coordinates of a craft's place lie near `place`."""
     topic = craft.topic
     across: list[float | None] = [None, None]
     if topic and topic.x is not None and topic.y is not None:

@@ -291,7 +291,7 @@ def refuse_unfit(team: Team, options: Options, traits: Traits) -> None:
 
 
 def _takers(case: Case) -> Iterator[tuple[str, Traits]]:
-    """Yield all that must be able to take the constraints: the protocol, and what takes over from it."""
+    """Yield all protocols that must support the constraints: the protocol, and those that take over from it."""
     options, traits = case.options, case.traits
     if not (case.minimum_withdrawal and case.has_costs):  # then soft constraints are left to what takes over
         yield options.protocol, traits

@@ -20,7 +20,7 @@ from robochoc.run.withdrawal import Phase, first_phase, second_phase
 
 
 class Deployment(ABC):
-    """A team of robots that can be told to search, on this machine or on several.
+    """A team of robots that searches on command, on this machine or on several.
 
     `options` say how to run.
     """

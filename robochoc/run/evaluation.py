@@ -35,7 +35,7 @@ class CheckedAssignment(NamedTuple):
 
 
 Check = Callable[[], CheckedAssignment | None]
-"""Returns what a search has found, once it was checked; None if all that it has found breaks a hard constraint."""
+"""Returns the checked result of a search. None if the result breaks a hard constraint."""
 
 
 class Search(NamedTuple):

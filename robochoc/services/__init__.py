@@ -1,1 +1,1 @@
-"""The Services Management unit: the Directory Facilitator, who knows which robot offers what."""
+"""The Services Management unit: the Directory Facilitator, which knows each robot's services."""

@@ -17,9 +17,9 @@ MAX_PROPERTIES = 1024
 MAX_CHARACTERS = 1024
 """Of any one name or value."""
 MAX_SIZE = 1 << 16
-"""Characters of all that is in one description together."""
+"""The largest total number of characters in one description."""
 MAX_LEASE_S = 99 * 86_400.0
-"""As FIPA's relative times cannot say more days without months, whose length nobody knows."""
+"""The longest lease. FIPA's relative times express more days only in months, which have no fixed length."""
 
 
 class Reason(StrEnum):
@@ -51,7 +51,7 @@ class RequestRefusedError(Exception):
 
 
 class ServiceDescription(msgspec.Struct, frozen=True):
-    """One service of an agent. In a template whatever is empty is not asked for."""
+    """One service of an agent. Empty fields of a template match everything."""
 
     name: str = ""
     type: str = ""
@@ -64,7 +64,7 @@ class ServiceDescription(msgspec.Struct, frozen=True):
 
 
 class AgentDescription(msgspec.Struct, frozen=True):
-    """An agent, by the name of its AID, and its services. In a template whatever is empty is not asked for.
+    """An agent, by the name of its AID, and its services. Empty fields of a template match everything.
 
     `lease_s` is for how many seconds it is to be known, None: until it leaves.
     """

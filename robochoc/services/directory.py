@@ -1,4 +1,4 @@
-"""The Directory Facilitator of FIPA00023: who is there, and who offers what.
+"""The Directory Facilitator of FIPA00023: the registered agents and their services.
 
 Pure: times are given, in seconds on any clock that does not go back. Every agent speaks for itself only; who asks
 (`requester`) is for the host to prove. Beside FIPA's functions a registration can be renewed without being told again.
@@ -54,7 +54,7 @@ class Directory:
         return len(self._registered)
 
     def register(self, description: AgentDescription, now: float, *, requester: str) -> None:
-        """From now on `requester`, who describes itself, can be found, for as long as its lease lasts."""
+        """Register the description of `requester` until its lease ends."""
         check(description)
         _authorise(description.name, requester)
         self._lapse(now)
@@ -81,7 +81,7 @@ class Directory:
         self._registered[name] = _Registration(description, _end(description, now))
 
     def deregister(self, name: str, *, requester: str) -> None:
-        """`name`, who asks for it, can no longer be found."""
+        """Deregister `name` on its own request."""
         if not name:
             raise RequestRefusedError(Reason.MISSING_PARAMETER, "df-agent-description", "name")
         _authorise(name, requester)
@@ -100,7 +100,7 @@ class Directory:
         return found if max_results is None or max_results < 0 else found[:max_results]
 
     def expire(self, now: float) -> tuple[str, ...]:
-        """Remove those whose lease has ended; the names of all to whom that happened since `expire` was last called."""
+        """Remove agents whose lease has ended. Return the names of all removed since the last call of `expire`."""
         self._lapse(now)
         names = tuple(self._lapsed)
         self._lapsed.clear()

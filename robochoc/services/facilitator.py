@@ -62,7 +62,7 @@ def subscribe(directory: Directory, requester: str, content: str, now: float) ->
 
 
 def notification(df: AgentIdentifier, notice: Notice) -> str:
-    """Return the content of the INFORM that tells a subscriber of `notice`: what a search for that agent finds now."""
+    """Return the content of the INFORM on `notice` to a subscriber: the result of a search for that agent now."""
     searched = described(AgentDescription(notice.name))
     action = listed("action", expression_of(df), listed(Function.SEARCH, searched))
     found = [] if notice.description is None else [described(notice.description)]

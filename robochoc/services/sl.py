@@ -52,7 +52,7 @@ class Function(StrEnum):
 
 
 class Action(NamedTuple):
-    """Somebody is to do something: `whole` is the `(action ...)`, `function` its name, `arguments` what follows it."""
+    """A requested action: `whole` is the `(action ...)`, `function` its name, `arguments` what follows it."""
 
     whole: Expression
     actor: AgentIdentifier
@@ -101,7 +101,7 @@ def descriptions_in(content: str) -> tuple[AgentDescription, ...]:
 
 
 def searched_in(content: str) -> AgentDescription:
-    """Return what the search was for whose result `content` tells.
+    """Return the search expression of the result `content`.
 
     Raises `SymbolicExpressionError`, and `RequestRefusedError`.
     """
@@ -112,7 +112,7 @@ def searched_in(content: str) -> AgentDescription:
 
 
 def content_of(*expressions: Expression) -> str:
-    """Return the content of a message: SL puts all that it says between parentheses."""
+    """Return the content of a message: SL puts its expressions between parentheses."""
     return written(List(expressions))
 
 

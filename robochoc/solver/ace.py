@@ -1,4 +1,4 @@
-"""ACE, in a process of its own: tasks go out, solutions come back, and whatever dies is noticed.
+"""ACE in a process of its own. It receives tasks and returns solutions. The death of a process is noticed.
 
 ACE (https://github.com/xcsp3team/ace, bundled with pycsp3) is a Java program. One process with one warm JVM serves
 all tasks of a run; it is started by the first that is not small. What runs there is `solver/ace_process.py`; what is

@@ -51,7 +51,7 @@ class SolutionCache:
         return FORMAT, _solver_version()
 
     def key(self, network: Network) -> str:
-        """Return the name of `network`: equal for equal networks, whatever robot or team they belong to."""
+        """Return the name of `network`: equal for equal networks of any robot or team."""
         return _digest(msgspec.msgpack.encode((self._versions, network))).hex()
 
     def get(self, network: Network) -> tuple[Codes, ...] | None:

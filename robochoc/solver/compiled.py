@@ -282,7 +282,7 @@ def _summed(size: int, rows: Sequence[Sequence[float]]) -> list[float]:
 
 
 def _lexicographic_cost(prices: Sequence[float]) -> LexicographicCost:
-    """Return what `prices` come to."""
+    """Return the total of `prices`."""
     return prices.count(INFINITE), sum([price for price in prices if price < INFINITE])
 
 

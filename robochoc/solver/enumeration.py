@@ -189,7 +189,7 @@ class _Search:
         return self._propagates(domains, left, shrunk) and self._bound(domains, costs) < least
 
     def _bound(self, domains: Sequence[int], costs: Codes) -> int:
-        """Return what the variables at `costs` come to at least."""
+        """Return a lower bound on the cost of the variables at `costs`."""
         return sum([self._code[place][domains[place] & -domains[place]] for place in costs])
 
     def _next(self, domains: Sequence[int]) -> tuple[int, bool]:

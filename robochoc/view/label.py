@@ -1,4 +1,4 @@
-"""Labels of the scene, as pictures: SVG, which the browser draws in its own fonts, whatever the script."""
+"""Labels of the scene as SVG pictures. The browser draws them in its own fonts, in any script."""
 
 from __future__ import annotations
 

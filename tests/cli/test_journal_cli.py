@@ -259,7 +259,7 @@ def test_a_page_holds_the_whole_run_and_shows_some_robots_at_first(file: Path) -
     assert (told["messages"], told["chosen"]) == (len(trace_of(file).messages.t), ["Robot1.*"])
     refused = journal("export", file, "--format", "html", "--types", "Nogood")
     assert refused.exit_code == USAGE
-    assert "a page holds the whole run; choose in it" in refused.output
+    assert "a page holds the whole run; filter on the page" in refused.output
 
 
 def test_a_page_that_no_browser_could_open_is_refused(file: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -225,7 +225,7 @@ def test_an_invalid_team_has_no_page(tmp_path: Path) -> None:
         (["{teams}", "--sniff"], "for one team; 2 were found"),
         (["{teams}/short", "--sniff", "--serve"], "both stay until Ctrl-C"),
         (["{teams}/short", "--open"], "--open is for the page of --sniff"),
-        (["{teams}/short", "--sniff", "--protocol", "central", "--count"], "nothing for"),
+        (["{teams}/short", "--sniff", "--protocol", "central", "--count"], "--count gives only a number"),
     ],
 )
 def test_what_does_not_go_together_is_wrong_usage(teams: Path, tmp_path: Path, words: list[str], said: str) -> None:

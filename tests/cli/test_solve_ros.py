@@ -198,7 +198,7 @@ def test_a_team_without_topics_has_nothing_to_publish(tmp_path: Path) -> None:
         (("--situation", "flight", "--withdraw"), "--withdraw is for problems that do not change"),
         (("--situation", "flight", "--runtime", "network"), "--runtime network is for problems that do not change"),
         (("--situation", "flight", "--protocol", "central"), "--protocol central is for problems that do not change"),
-        (("--ros", "mcap:a.mcap", "--count", "--protocol", "central"), "--count gives a number"),
+        (("--ros", "mcap:a.mcap", "--count", "--protocol", "central"), "--count gives only a number"),
         (("--obstacle", "1,1,1"), "--obstacle is for the simulated flight"),
         (("--fail", "Fin"), "--fail is for the simulated flight"),
         (("--wind", "1,1,1", "--situation", "mcap:a"), "--wind is for the simulated flight"),

@@ -162,7 +162,7 @@ def test_ctrl_c_ends_it_and_a_master_that_is_not_sniffable_says_so(site: Deploym
 @pytest.mark.parametrize(
     ("words", "told"),
     [
-        ([], "say what to look into"),
+        ([], "give a JOURNAL"),
         (["{file}", "--master", "127.0.0.1"], "drop one"),
         (["{file}", "--as", "Eye"], "--as goes with --master"),
         (["{file}", "--no-page"], "--no-page goes with --master"),

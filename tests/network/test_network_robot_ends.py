@@ -120,15 +120,15 @@ def copies(sender: str, *records: SharedRecord, number: int = 1) -> FrameArrived
         ([copies("RC", copy(body="ne(X,"))], "the predicate 'p'"),
         ([copies("RC", copy(body="(" * 9000))], "the predicate 'p'"),
         ([copies("RC", copy(scope=("B", "B", "C")))], "3 arguments where 2"),
-        ([copies("RC", copy(scope=("B", "Z")))], "RC holds 'C' over what it cannot"),
-        ([copies("RC", copy(scope=("A", "C")))], "RC holds 'C' over what it cannot"),
-        ([copies("RC", copy(scope=("A", "B")))], "RC holds 'C' over what it cannot"),
-        ([copies("RA", copy(scope=("A", "B"))), copies("RC", copy())], "RA holds 'C' over what it cannot"),
+        ([copies("RC", copy(scope=("B", "Z")))], "RC holds 'C' over variables that it cannot"),
+        ([copies("RC", copy(scope=("A", "C")))], "RC holds 'C' over variables that it cannot"),
+        ([copies("RC", copy(scope=("A", "B")))], "RC holds 'C' over variables that it cannot"),
+        ([copies("RA", copy(scope=("A", "B"))), copies("RC", copy())], "RA holds 'C' over variables that it cannot"),
     ],
 )
 def test_copies_that_cannot_be_are_told(told: list[FrameArrived], why: str) -> None:
     _, failed = failing(task(AWC), *told, protocol=AWC)
-    assert failed.why.startswith("RB was told what cannot be: ")
+    assert failed.why.startswith("RB received invalid data: ")
     assert why in failed.why
     assert failed.unsupported
 

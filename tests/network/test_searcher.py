@@ -176,7 +176,7 @@ def test_what_is_no_message_is_bad() -> None:
     one = searcher(Around().context())
     one.prepare()
     one.begin(0)
-    with pytest.raises(BadMessageError, match="RA sent RB what is no message"):
+    with pytest.raises(BadMessageError, match="RA sent RB an invalid message"):
         one.take_in([Envelope("RA", "RB", b"\x93", 0)])
 
 

@@ -54,7 +54,7 @@ FIRST, SECOND, *_ = (robot.name for robot in TEAM.robots)
         (Leaves, FIRST, r"its process ended with status 7"),
         (HangsUp, FIRST, r"its process cannot be reached any more"),
         (AsksForStranger, FIRST, r"it wanted to talk to 'Robot9.9', which is no robot of the team"),
-        (TalksNonsense, SECOND, rf"BadMessageError: {FIRST} sent {SECOND} what is no message"),
+        (TalksNonsense, SECOND, rf"BadMessageError: {FIRST} sent {SECOND} an invalid message"),
     ],
 )
 def test_a_robot_that_fails_is_named(protocol: type[Protocol], lost: str, why: str) -> None:

@@ -155,7 +155,7 @@ def _page(read: Journal, trace: Trace, meant: Selection) -> bytes:
     from robochoc.sniffer.selection import Selection
 
     if meant != replace(Selection(), robots=meant.robots):
-        raise click.UsageError("a page holds the whole run; choose in it (--robots says whom it shows at first)")
+        raise click.UsageError("a page holds the whole run; filter on the page (--robots: those shown first)")
     count = len(trace.messages.t)
     if count > MOST_IN_PAGE:
         raise Failure(

@@ -1,4 +1,4 @@
-"""`robochoc master`: the one who registers robots, orders the start, and collects the result (Figure 3)."""
+"""`robochoc master`: it registers robots, starts the search, and collects the result (Figure 3)."""
 
 from __future__ import annotations
 
@@ -96,7 +96,7 @@ _SECTIONS: Sections = {
 @click.option(
     "--sniffable",
     is_flag=True,
-    help="Let those who may sniff follow the run ('robochoc sniff --master').",
+    help="Let observers with the right to sniff follow the run ('robochoc sniff --master').",
 )
 @click.pass_context
 def master(
@@ -120,7 +120,7 @@ def master(
     robochoc master --listen 192.168.1.14:7447 --robots 16
     """  # noqa: D301 - \\b is how click is told to leave the lines as they are
     if given["number"] and team:
-        raise click.UsageError("--robots and --team both say who is expected; drop one")
+        raise click.UsageError("--robots and --team both define the team; drop one")
     if team and (team / "scenario.xml").exists():
         from robochoc.run.compatibility import scenario_refusal
 
@@ -185,7 +185,7 @@ def _publication(*, sniffable: bool) -> Iterator[Publication | None]:
 
 
 def _led(plan: MasterPlan, recorder: JournalRecorder | None, publication: Publication | None) -> MasterResult:
-    """The run, with whatever watches it."""
+    """Open the run with its observers."""
     from robochoc.run.networked.master_run import run_master
 
     if recorder and publication:
@@ -241,7 +241,7 @@ def _header(plan: MasterPlan) -> Header:
 
 
 def _tell_event(event: AnyEvent) -> None:
-    """One line for what whoever runs a master wants to know at once."""
+    """Print one line for each event that the master's operator needs at once."""
     from robochoc.formats import on_one_line
     from robochoc.journal.events import Granted, Lost, Refused, Registered
 

@@ -62,16 +62,16 @@ def asks_master(journal: Path | None, folder: Path | None, asked: Mapping[str, A
     """
     if asked["place"] is None:
         if journal is None:
-            raise click.UsageError("say what to look into: a JOURNAL, or the run of --master HOST:PORT")
+            raise click.UsageError("give a JOURNAL, or --master HOST:PORT to follow a run")
         useless = [f"--{option}" for option, name in _ONLY_THERE.items() if asked[name]]
         if useless:
             raise click.UsageError(f"{useless[0]} goes with --master")
     elif journal is not None:
-        raise click.UsageError("a JOURNAL and --master are two things to look into; drop one (--journal FILE keeps)")
+        raise click.UsageError("a JOURNAL and --master exclude each other; drop one (--journal FILE saves a run)")
     elif folder is not None:
-        raise click.UsageError("--team goes with a JOURNAL: nobody shows its file to a sniffer")
+        raise click.UsageError("--team goes with a JOURNAL: a sniffer never sees the robots' files")
     elif asked["no_page"] and asked["copy"] is None:
-        raise click.UsageError("--no-page goes with --journal FILE: otherwise nothing would come of it")
+        raise click.UsageError("--no-page goes with --journal FILE: otherwise there is no output")
     return asked["place"] is not None
 
 
@@ -178,7 +178,7 @@ class _Showing:
                 sink(blocks)
         except OSError as error:
             what = f"{self._copy}: " if self._copy else ""
-            raise _NotKeptError(f"{what}what the master sends cannot be kept: {error.strerror}") from error
+            raise _NotKeptError(f"{what}the journal of the run cannot be written: {error.strerror}") from error
         self._size += len(blocks)
 
     @property

@@ -262,7 +262,7 @@ def _recorded(folder: Path, options: Options, products: Products, wanted: Wanted
 
 
 def _run(team: Team, options: Options, recorder: JournalRecorder | None, loop: ClosedLoop | None) -> Outcome:
-    """Run with whatever watches, a journal, a line on the terminal, and where decisions go."""
+    """Run with the requested observers: the page, a journal, the progress line, and the ROS sinks."""
     from robochoc.cli.reports.progress import progress_line, waiting
     from robochoc.run.options import CENTRAL
     from robochoc.run.orchestrator import solve as run

@@ -95,7 +95,7 @@ kill_option = click.option(
     type=KillType(),
     multiple=True,
     metavar="ROBOT@SECONDS",
-    help="Kill the robot's process so many seconds after the search began, to show a loss. Repeatable.",
+    help="Kill the robot's process this many seconds after the search began. Repeatable.",
 )
 filter_option = click.option(
     "--filter",
@@ -239,10 +239,10 @@ def _take_options(arguments: dict[str, Any]) -> Options:
 def check_products(products: Products, wanted: Wanted, options: Options, *, teams: int) -> None:
     """Raise `click.UsageError` for products that nothing comes of, or that are for one team."""
     if wanted.explain and wanted.as_json:
-        raise click.UsageError("--explain is for people; the JSON result has the tree without it")
+        raise click.UsageError("--explain goes without --json: the JSON result always has the tree")
     if options.count and (products or wanted.ros):
         nothing = "--ros" if wanted.ros else "--html, --journal, --serve or --sniff"
-        raise click.UsageError(f"--count gives a number: there is nothing for {nothing}")
+        raise click.UsageError(f"--count gives only a number: drop {nothing}")
     if products.serve and products.watching:
         raise click.UsageError("--serve and --sniff both stay until Ctrl-C; the page of --sniff shows the scene, too")
     if wanted.ros and teams > 1:

@@ -36,7 +36,7 @@ def journal_key(name: str) -> str:
 
 
 def name_in(key: str) -> str:
-    """Return the sender in a frame's key, whose life a token is, or who asks for the journal."""
+    """Return the name in the key of a frame (its sender), of a liveliness token, or of a request for the journal."""
     return key.rpartition("/")[2]
 
 

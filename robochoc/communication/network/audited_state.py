@@ -29,7 +29,7 @@ from robochoc.model.outcome import CheckCounts
 
 _ASKED_ENOUGH = 2
 _MOST_NAMED = 3
-"""So many doubts are described."""
+"""The largest number of doubts that are described."""
 
 
 class AuditedSearchState(SearchState):

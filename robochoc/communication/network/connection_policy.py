@@ -1,4 +1,4 @@
-"""The connection policy: who may connect now, and write to whom. It follows the Authority's registry."""
+"""The connection policy: the members that may connect, and their receivers. It follows the Authority's registry."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ Reach = Mapping[str, tuple[str, ...]]
 
 
 class ConnectionPolicy:
-    """The router at `endpoint`, with rules that follow `admission`. Whoever opens it closes it.
+    """The router at `endpoint`, with rules that follow `admission`. Its opener closes it.
 
     `ways` are the team's, if it is known before anybody comes: then the router need not be opened anew for it.
     """
@@ -42,16 +42,16 @@ class ConnectionPolicy:
         self._rules: tuple[dict[str, tuple[str, ...]], tuple[str, ...] | None] | None = None
 
     def open(self) -> None:
-        """Admit all that the Authority has certified, or invited; they may write to the master, and by the ways."""
+        """Admit all names that the Authority has certified or invited. They may write to the master and by the ways."""
         self.follow()
 
     def open_ways(self, ways: Reach) -> None:
-        """From now on robots may write to those that `ways` names for them."""
+        """Let robots write to the members that `ways` names for them."""
         self._ways = ways
         self.follow()
 
     def follow(self) -> None:
-        """Let in who was enrolled since, and keep out who was revoked. Raises `RouterError`.
+        """Admit newly enrolled names, and exclude revoked ones. Raises `RouterError`.
 
         There are rules for those who were invited, too: nobody has a certificate in their names, and the router need
         not be opened anew when they get theirs.
@@ -75,7 +75,7 @@ class ConnectionPolicy:
         return self._admission.is_revoked(name)
 
     def admits(self, name: str) -> bool:
-        """Return whether `name` has a certificate in force now, whatever the router knows yet."""
+        """Return whether `name` has a certificate in force now, even if the router does not know it yet."""
         return name in self._admission.names()
 
     def is_robot(self, name: str) -> bool:
@@ -92,7 +92,7 @@ class ConnectionPolicy:
 
     @property
     def broken(self) -> bool:
-        """Return whether the router's process has ended though nobody closed it."""
+        """Return whether the router's process has ended without `close`."""
         return self._router.ended
 
     def close(self) -> None:

@@ -96,7 +96,7 @@ class CheckResult(OfEpoch, frozen=True):
 
 
 class Objection(_Message, frozen=True):
-    """Reports that the robot has refused `what` of `who`."""
+    """A report that the robot has refused `what` of `who`."""
 
     who: str
     what: str
@@ -104,7 +104,7 @@ class Objection(_Message, frozen=True):
 
 
 class LostFrames(_Message, frozen=True):
-    """Reports that so many `frames` of `who` to the robot are lost for good."""
+    """A report that this number of `frames` from `who` to the robot are lost for good."""
 
     who: str
     frames: Annotated[int, msgspec.Meta(ge=1, le=2**53)]

@@ -24,7 +24,7 @@ class FrameArrived(NamedTuple):
 
 
 class FramesLost(NamedTuple):
-    """So many `frames` of `sender` are lost for good, or it has made it look so: zenoh believes its numbers.
+    """The number of `frames` of `sender` that are lost for good. A hostile sender can fake losses by its numbers.
 
     `dropped`: they were more than its share, and were dropped here.
     """
@@ -42,7 +42,7 @@ class PresenceChanged(NamedTuple):
 
 
 class WakeUp(NamedTuple):
-    """Somebody in this process has something new to look at."""
+    """A wake-up from this process: there is something new."""
 
 
 Item = FrameArrived | FramesLost | PresenceChanged | WakeUp

@@ -22,11 +22,11 @@ from robochoc.journal.entries import JournalError
 SNIFF = "sniff"
 """The right that is granted or refused."""
 PIECE_BYTES = 60_000
-"""At most so much of the journal goes at once: what one batch of zenoh's holds, with what is around it."""
+"""The largest piece of the journal: with its framing it fits into one batch of zenoh."""
 ANSWERED_AT_MOST = 200
 """Questions of one follower in a second; those beyond are not answered, and it asks again."""
 PRESENT_S = 2.0
-"""A follower that has not asked for so many seconds is not waited for at the end of the run."""
+"""Seconds after its last request for which a follower is waited for at the end of the run."""
 LARGEST = 2**53
 """Bytes: no journal is as long."""
 _LARGEST_QUESTION = 200
@@ -49,7 +49,7 @@ class Piece(msgspec.Struct, frozen=True, array_like=True):
 
 
 class NotAnsweredError(Exception):
-    """A question that gets no answer; the message says why, for the master's observer. Empty: nobody need know."""
+    """A question without an answer. The message is the reason, for the master's observer. Empty: not reported."""
 
 
 class Publication:

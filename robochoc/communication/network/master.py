@@ -206,7 +206,7 @@ class Master(MasterLoop):
         return state.held, state.cost
 
     def leave(self, why: str, *, failed: bool = False, farewell_s: float = FAREWELL_S) -> None:
-        """Tell all that the run is over, until they confirm it: some may have joined, or come back, just now."""
+        """Announce the end of the run until all robots confirm it: some may have joined, or come back, just now."""
         leave, until = Leave(why, failed), time.monotonic() + farewell_s
         staying = partial(self.members.staying, FAREWELL_S, besides=self.state.lost)
         with suppress(RobotsLostError, UnsupportedError):
@@ -217,7 +217,7 @@ class Master(MasterLoop):
             self._serve_until(lambda: not self._journal_server.lagging, time.monotonic() + FAREWELL_S)
 
     def lose(self, name: str, why: str) -> None:
-        """Note that the robot's process has ended, as somebody else has seen. May be called from any thread."""
+        """Note that the robot's process has ended, as the caller has seen. May be called from any thread."""
         self._dead[name] = why
         self._connection.wake()
 
@@ -270,7 +270,7 @@ class Master(MasterLoop):
         self._connection.follow_registry()
 
     def _detect_end(self, now: float) -> None:
-        """See `MasterLoop._detect_end`. The search also ends when messages are missing that nobody has lost."""
+        """See `MasterLoop._detect_end`. The search also ends when messages are missing without a reported loss."""
         missing = self.state.missing(now, self._settings.patience_s)
         if missing and not self._frame_loss.explain_missing():
             self.state.stuck = f"{missing:,} messages between robots were lost for good"

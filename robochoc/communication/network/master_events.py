@@ -60,7 +60,7 @@ class MasterEvents:
                 self.refuse(name, f"tell of {type(event).__name__}", "it is not about itself")
 
     def doubted(self, doubts: Sequence[Doubt]) -> str:
-        """Report pairs of robots of which one has not told the truth; return that in words, after a semicolon."""
+        """Report pairs of robots with contradictory reports. Return a text on them, after a semicolon."""
         for doubt in doubts:
             for name in doubt.between:
                 self.refuse(name, "its counts of messages", doubt.why)

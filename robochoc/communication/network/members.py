@@ -27,7 +27,7 @@ from robochoc.solver.agent_problem import RunParameters
 
 
 def reach(profiles: Mapping[str, Profile], *, writes_to_non_neighbours: bool) -> dict[str, tuple[str, ...]]:
-    """Return to whom each robot of a team may write besides the master. See `Members.reach`."""
+    """Return the receivers of each robot of a team besides the master. See `Members.reach`."""
     if writes_to_non_neighbours:
         return dict.fromkeys(profiles, (ALL,))
     met = possible_neighbours(profiles)
@@ -112,7 +112,7 @@ class Members:
         self._known: frozenset[tuple[str, str]] = frozenset()
         self._acquainted: dict[str, tuple[str, ...]] = {}
         self._over: set[str] = set()
-        """Incarnations that have ended. In one that goes on after all, frames are numbered as nobody expects."""
+        """Incarnations that have ended. If one goes on after all, its frames have unexpected numbers."""
 
     @property
     def profiles(self) -> dict[str, Profile]:
@@ -196,7 +196,7 @@ class Members:
         return {name: variables for name, variables in unseen.items() if variables}
 
     def show(self, name: str, variables: Mapping[str, Ranges]) -> str:
-        """Take in what the robot `name` answers when it is asked for all that is `unseen`; returns what is wrong."""
+        """Take in the answer of the robot `name` on the `unseen` variables. Return what is wrong with it."""
         member = self.robots[name]
         wanted = self.unseen().get(name, ())
         owners = self._owners()
@@ -273,7 +273,7 @@ class Members:
         return tuple(in_priority_order(self.profiles))
 
     def reach(self, *, writes_to_non_neighbours: bool) -> dict[str, tuple[str, ...]]:
-        """Return to whom each robot may write: to all, if the protocol writes to non-neighbours."""
+        """Return the receivers of each robot: all others, if the protocol writes to non-neighbours."""
         return reach(self.profiles, writes_to_non_neighbours=writes_to_non_neighbours)
 
     def tasks(self, epoch: int, protocol: str, traits: Traits, parameters: RunParameters) -> dict[str, Task]:

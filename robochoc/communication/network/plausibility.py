@@ -27,7 +27,7 @@ from robochoc.protocols.traits import Traits
 
 LARGEST_COUNT = 2**53
 CHECKS_PER_S = 10**12
-"""So many constraints nobody checks in a second, not even by tables that were made before."""
+"""More constraint checks a second than any robot can do, even with tables that were made before."""
 LARGEST_MEMORY = 2**50
 MOST_KINDS = 100
 """Of messages: a protocol has fewer."""
@@ -79,7 +79,7 @@ class FinishedSearch(NamedTuple):
 
 
 def fault_of_counters(counts: Counts, before: Counts | None) -> str:
-    """Return why a robot cannot have counted `counts`, having told `before`; empty if it can."""
+    """Return why a robot that reported `before` cannot have counted `counts`. Empty if it can."""
     if min(counts) < 0 or max(counts) > LARGEST_COUNT:
         return f"it has counted {counts.sent:,} messages sent and {counts.received:,} taken in, which cannot be"
     if before is not None and (counts.sent < before.sent or counts.received < before.received):
@@ -163,7 +163,7 @@ def _fault_of_metrics(account: DetailedReport, duration_s: float) -> str:
 
 
 def fault_of_findings(findings: Findings, order: Collection[str]) -> str:
-    """Return why nobody among the robots in `order` can know `findings` of the whole; empty if one can."""
+    """Return why no robot in `order` can know `findings` of the whole. Empty if one can."""
     names: list[str] = []
     if findings.place is not None:
         names += [*filter(None, [findings.place.parent]), *findings.place.pseudo_parents]
@@ -277,7 +277,7 @@ def doubts_about_checks(checks: Mapping[str, CheckResult]) -> Iterator[Doubt]:
 
 
 def objections(checks: Mapping[str, CheckResult]) -> Iterator[str]:
-    """Yield, in words, which constraints are broken, by who says so."""
+    """Yield texts on the violated constraints, by the robots that report them."""
     for name, check in checks.items():
         broken = [shortened(" ".join(one.variables)) for one in check.shared if one.price == INFINITE]
         if broken:

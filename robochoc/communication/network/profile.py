@@ -120,7 +120,7 @@ def visible_robot(profile: Profile, also: Mapping[str, Ranges]) -> Robot:
     if strangers:  # the master would have them show what is none of its business
         raise ProfileError(f"it looks at variables of {min(strangers)[:LONGEST_NAME]}, which is no child of it")
     if not (0 <= profile.max_cost <= LARGEST_DEAREST and 1 <= profile.weight <= LARGEST_WEIGHT):
-        raise ProfileError(f"costs of {profile.max_cost:g} and a weight of {profile.weight} cannot be")
+        raise ProfileError(f"costs of {profile.max_cost:g} or a weight of {profile.weight} are out of range")
     shown = {**profile.variables, **also}
     return Robot(
         name=profile.name,
@@ -157,7 +157,7 @@ def contradictions(profiles: Mapping[str, Profile]) -> Iterator[str]:
 
 
 def missing(profiles: Mapping[str, Profile]) -> set[str]:
-    """Neighbours that somebody names and that have not come."""
+    """Return the named neighbours that have not joined."""
     return {name for profile in profiles.values() for name in profile.neighbours} - profiles.keys()
 
 

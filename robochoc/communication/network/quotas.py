@@ -33,7 +33,7 @@ OF_AN_OBSERVER = Share(1_000, 16 * MIB, 50, MIB)
 
 
 class Allowance:
-    """So much `a_second`, of which what was not used in the last `BURST_S` seconds is left. Times are monotonic."""
+    """A rate `a_second`. Unused amounts of the last `BURST_S` seconds remain available. Times are monotonic."""
 
     def __init__(self, a_second: float, now: float) -> None:
         self._a_second = a_second
@@ -92,5 +92,5 @@ class Backlog:
         return self._usage.setdefault(sender, Usage(self._share, 0.0)).takes(size, 0.0)
 
     def clear(self) -> None:
-        """Forget all that is kept."""
+        """Forget all usage."""
         self._usage.clear()

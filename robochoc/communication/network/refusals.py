@@ -12,9 +12,9 @@ from collections.abc import Callable
 from robochoc.system.plain_text import on_one_line
 
 KINDS = 50
-"""So many kinds of refusals of one and the same are distinguished."""
+"""The largest number of kinds of refusals that are distinguished for one member."""
 WHO = 1000
-"""So many who are refused are distinguished."""
+"""The largest number of refused members that are distinguished."""
 LONGEST = 200
 """Characters. What is refused may be of any length."""
 _OTHERS = "others"
@@ -22,7 +22,7 @@ _ELSE = ("other things", "see what was refused before")
 
 
 class Refusals:
-    """Counts refusals, and calls `report` (who, what, why) for those that are reported. Threads may share it."""
+    """A counter of refusals. It calls `report` (who, what, why) for those that are reported. Thread-safe."""
 
     def __init__(self, report: Callable[[str, str, str], None]) -> None:
         self._report = report

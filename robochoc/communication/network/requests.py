@@ -15,7 +15,7 @@ from robochoc.communication.network.journal_server import JournalServer
 
 
 class Requests:
-    """Answers requests, so many a second of each: `send` sends answers, and `refuse` reports refusals."""
+    """Answers requests, up to a rate for each member: `send` sends answers, and `refuse` reports refusals."""
 
     def __init__(
         self,

@@ -62,7 +62,7 @@ from robochoc.system.plain_text import LONGEST_REASON, on_one_line
 CHECK_S = 0.25
 """The interval at which a robot that waits checks the link, in seconds."""
 AT_ONCE = 10_000
-"""So many frames at most are one packet."""
+"""The largest number of frames in one packet."""
 _UNUSABLE = (FrameRefusedError, NotGenuineError, UnknownPeerError, BadMessageError)
 
 
@@ -108,10 +108,10 @@ class NetworkRobot:
         self._registration = Registration(own.robot.name, transport, settings.patience_s, self._register)
         self._searcher: Searcher | None = None
         self._ahead: list[tuple[str, Opened]] = []
-        """Frames of an epoch that the master has not told this robot of yet."""
+        """Frames of an epoch that the master has not announced to this robot yet."""
         self._kept = Backlog()
         self._lost_frames: set[tuple[int, str]] = set()
-        """In which search the loss of whose frames was reported: nobody floods the master through this robot."""
+        """The search in which the loss of a sender's frames was last reported. This limits reports to the master."""
         self._refusals = Refusals(lambda who, what, why: self._say(Objection(who, what, why)))
 
     def run(self) -> Ending:
@@ -137,7 +137,7 @@ class NetworkRobot:
     # The loop
 
     def _items(self) -> list[Item]:
-        """Return all that has come; nothing when nothing has for a while."""
+        """Return all frames that have arrived. Empty if none has arrived for a while."""
         restless = self._searcher is not None and self._searcher.is_restless
         items = []
         with suppress(Empty):

@@ -1,4 +1,4 @@
-"""A robot's process of `--runtime network`: all that the fork server imports, so without the master."""
+"""A robot's process of `--runtime network`. The fork server imports this module, so it does without the master."""
 
 from __future__ import annotations
 

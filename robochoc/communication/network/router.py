@@ -1,4 +1,4 @@
-"""The router: the one process that all connect to. It checks certificates and who may write to whom.
+"""The router: the one process that all connect to. It checks certificates and the rights to write.
 
 It is a process of its own (`router_process.py`) that holds no frames but those under way. zenoh's access control
 cannot be changed while it runs: to register or revoke somebody, the router is closed and opened anew with other rules,
@@ -110,7 +110,7 @@ class Router:
 
     @property
     def ended(self) -> bool:
-        """Return whether its process has ended though nobody closed it."""
+        """Return whether its process has ended without `close`."""
         return self._process is not None and self._process.poll() is not None
 
     def close(self) -> None:
@@ -145,7 +145,7 @@ class Router:
         }
 
     def _wait_until_ready(self, output: IO[bytes]) -> bytes:
-        """Return what it has said until it was ready: who waits at the door comes in before that."""
+        """Return the router's output until it was ready. Waiting peers connect before that."""
         said: list[bytes] = []
         watch = threading.Timer(START_S, self._give_up)
         watch.start()
@@ -191,7 +191,7 @@ class Log:
         anew."""
 
     def refusals(self, log: bytes) -> Iterator[Refusal]:
-        """Yield what a part of the log tells of refusals; it ends with a whole line."""
+        """Yield the refusals in a part of the log, which ends with a whole line."""
         plain = _COLOURS.sub(b"", log)
         for name in _ACCEPTED.findall(plain):
             who = name.decode(errors="replace")

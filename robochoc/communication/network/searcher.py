@@ -93,7 +93,9 @@ class Searcher(RobotLoop):
         self._received_from: Counter[str] = Counter()
         self._clocks: dict[str, int] = {}
         if task.interfaces.get(self._robot.name) != self._robot.interface:  # others would misread its values
-            raise UnsupportedError(f"{self._robot.name} was told what cannot be: that it shows other variables")
+            raise UnsupportedError(
+                f"{self._robot.name} received invalid data: other interface variables than in its file"
+            )
 
     @property
     def name(self) -> str:
@@ -137,9 +139,7 @@ class Searcher(RobotLoop):
         try:
             self._copies[sender] = msgspec.msgpack.decode(content, type=tuple[SharedRecord, ...])
         except (msgspec.MsgspecError, RecursionError, UnicodeDecodeError) as bad:
-            raise UnsupportedError(
-                f"{self._robot.name} was told what cannot be: {sender}'s constraints: {bad}"
-            ) from None
+            raise UnsupportedError(f"{self._robot.name} received invalid data: {sender}'s constraints: {bad}") from None
         self._get_ready()
 
     def _get_ready(self) -> None:
@@ -156,7 +156,7 @@ class Searcher(RobotLoop):
             known = {sender: [self._known(sender, one) for one in records] for sender, records in self._copies.items()}
             domains = {name: domain_of(name, ranges) for name, ranges in task.domains.items()}
         except (SharedConstraintError, ProfileError) as bad:
-            raise UnsupportedError(f"{self._robot.name} was told what cannot be: {bad}") from None
+            raise UnsupportedError(f"{self._robot.name} received invalid data: {bad}") from None
         self._learnt = {sender: [one.constraint for one in theirs] for sender, theirs in known.items()}
         copies = _sorted([one for theirs in known.values() for one in theirs], task.order)
         parameters = RunParameters(task.seed, task.settings, task.aside)
@@ -175,7 +175,7 @@ class Searcher(RobotLoop):
             or not variables <= self._task.domains.keys()
             or not (variables & mine and variables & theirs)
         ):
-            raise SharedConstraintError(f"{sender} holds {known.constraint.name!r} over what it cannot")
+            raise SharedConstraintError(f"{sender} holds {known.constraint.name!r} over variables that it cannot")
         return known
 
     # Messages
@@ -201,7 +201,7 @@ class Searcher(RobotLoop):
         return super().admit(envelope)
 
     def take_in(self, packet: Sequence[Envelope]) -> None:
-        """See `RobotLoop.take_in`. Who has sent what is counted, for the master compares it."""
+        """See `RobotLoop.take_in`. Messages are counted by sender, as the master compares the counts."""
         if self._host and self._searching:
             for envelope in packet:
                 self._received_from[envelope.sender] += 1

@@ -1,4 +1,4 @@
-"""The transport of one participant by zenoh: it carries frames both ways, and knows who is there.
+"""The transport of one participant by zenoh: it carries frames both ways, and knows the present members.
 
 Frames travel by zenoh's advanced publishers and subscribers, which number what they carry, keep it, and ask again for
 what an outage has swallowed; plain ones lose messages silently. Nothing but this file and the router's imports
@@ -37,7 +37,7 @@ receiver requests them as soon as it sees the sender again.
 KEPT_FRAMES = 100_000
 _LATE_S = 1.0
 _FIRST_ATTEMPT_S, _LONGEST_ATTEMPT_S = 2.0, 10.0
-"""So long are attempts to connect; a busy router may take its time for a handshake."""
+"""The duration of attempts to connect, in seconds. A busy router may need long for a handshake."""
 
 
 DESCRIPTORS = 24
@@ -87,7 +87,7 @@ class Transport:
         ]
 
     def hear(self, senders: Iterable[str]) -> None:
-        """From now on take the frames of `senders`, too; what they have written before comes soon.
+        """Subscribe to the frames of `senders`, too. Their earlier frames arrive soon.
 
         Each has a subscriber of its own, for zenoh believes what a packet says of its source and number. In one for
         all, a sender can use the source of another, whose frames then count as old ones, or as missing. It is dear:
@@ -117,7 +117,7 @@ class Transport:
         return next(map(str, self._session.info.routers_zid()), "")
 
     def answer(self, key: str, answered: Answering) -> None:
-        """From now on answer questions on `key`, in a thread of zenoh's."""
+        """Start to answer questions on `key`, in a thread of zenoh's."""
 
         def reply(query: zenoh.Query) -> None:
             content = answered(name_in(str(query.key_expr)), query.payload.to_bytes() if query.payload else b"")

@@ -44,7 +44,7 @@ class ProcessPool:
         self._selector.register(self._ends.fileno(), selectors.EVENT_READ)
 
     def make_room(self, robots: int) -> None:
-        """Raise the limit on open files as so many robots need it."""
+        """Raise the limit on open files as this number of robots needs it."""
         allow_descriptors(robots * _FDS_PER_ROBOT + _FDS_SPARE)
 
     def start(self, start: RobotStart) -> None:

@@ -31,7 +31,7 @@ class Schedule(ABC):
 
     @abstractmethod
     def clear(self) -> None:
-        """Lose all that is under way; all clocks begin again."""
+        """Drop all messages under way, and reset all clocks."""
 
     def done(self, robot: str, clock: int, checks: int) -> None:  # noqa: B027 - not every schedule has to know
         """`robot` has finished with its packet (or its start), all it said being put: its NCCC clock stands at `clock`.
@@ -40,7 +40,7 @@ class Schedule(ABC):
         """
 
     def time(self, checks: int) -> float:  # noqa: ARG002 - not every schedule has to know
-        """Return the time of events, so many checks after a robot has begun with its packet."""
+        """Return the time of an event, this number of checks after a robot began with its packet."""
         return float(self.now)
 
     @property
@@ -82,7 +82,7 @@ class Concurrent(Schedule):
             self._note(envelope.receiver)
 
     def get(self) -> Sequence[Envelope]:
-        """Return all that has reached the robot that gets to its inbox first."""
+        """Return all messages in the inbox of the robot that reads its inbox next."""
         while self._agenda:
             due, _, robot = heapq.heappop(self._agenda)
             inbox = self._inboxes[robot]
@@ -99,7 +99,7 @@ class Concurrent(Schedule):
         return ()
 
     def clear(self) -> None:
-        """Lose all that is under way; nobody is busy."""
+        """Drop all messages under way. No robot is busy afterwards."""
         for state in (self._busy_until, self._inboxes, self._last_arrival, self._agenda):
             state.clear()
         self.now = 0
@@ -152,7 +152,7 @@ class RandomChannels(Schedule):
         return packet
 
     def clear(self) -> None:
-        """Lose all that is under way."""
+        """Drop all messages under way."""
         self._channels.clear()
         self._waiting.clear()
 

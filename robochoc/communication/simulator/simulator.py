@@ -139,7 +139,7 @@ class Simulation(Session):
         self._note_verdict(host)
 
     def _time(self, checks: int) -> float:
-        """Return the time when the robot that is at work had done so many checks."""
+        """Return the time at which the working robot had done this number of checks."""
         return self._schedule.time(checks - self._checks)
 
     def _note_verdict(self, host: Host) -> None:

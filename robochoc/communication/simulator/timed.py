@@ -18,7 +18,7 @@ from robochoc.communication.simulator.schedule import Schedule
 from robochoc.model.message import Envelope
 
 _SEND, _WAKE = 0, 1
-"""Kinds of events. At the same time, all that is ready is sent before any robot looks at its inbox."""
+"""Kinds of events. At equal times, ready messages are sent before any robot reads its inbox."""
 
 
 class Timed(Schedule):
@@ -49,11 +49,11 @@ class Timed(Schedule):
         return self._end_ns / NS_PER_S
 
     def put(self, envelope: Envelope, checks: int = 0) -> None:
-        """Keep `envelope` until all that its sender says is known; it is ready when it was said."""
+        """Keep `envelope` until all messages of its sender are known. Its time is the time of sending."""
         self._said.append((self.now + checks * self._channel.check_ns, envelope))
 
     def done(self, robot: str, clock: int, checks: int) -> None:  # noqa: ARG002 - time is not the NCCC clock
-        """Note that the robot has done so many checks since it began, and is free again."""
+        """Note that the robot has done this number of checks since it began, and is free again."""
         free = self.now + checks * self._channel.check_ns
         self._end_ns = max(self._end_ns, free)
         self._busy_until[robot] = free
@@ -65,7 +65,7 @@ class Timed(Schedule):
             self._wake(robot)
 
     def get(self) -> Sequence[Envelope]:
-        """Return all that has reached the robot that gets to its inbox first."""
+        """Return all messages in the inbox of the robot that reads its inbox next."""
         while self._agenda:
             due, _, _, _, what = heapq.heappop(self._agenda)
             if isinstance(what, Envelope):
@@ -85,7 +85,7 @@ class Timed(Schedule):
         return ()
 
     def clear(self) -> None:
-        """Lose all that is under way; nobody is busy, and time begins again."""
+        """Drop all messages under way, and reset the time. No robot is busy afterwards."""
         states = (self._busy_until, self._free_at, self._inboxes, self._last_arrival)
         for state in states:
             state.clear()
@@ -94,7 +94,7 @@ class Timed(Schedule):
         self.now = self._end_ns = 0
 
     def time(self, checks: int) -> float:
-        """Simulated seconds, so many checks after what is going on has begun."""
+        """Return the simulated time in seconds, this number of checks after the present work began."""
         return (self.now + checks * self._channel.check_ns) / NS_PER_S
 
     def _transmit(self, ready: int, envelope: Envelope) -> None:

@@ -1,4 +1,4 @@
-"""Expressions as Python functions, for whoever checks a constraint a million times.
+"""Expressions as Python functions, for fast repeated checks of a constraint.
 
 It shares nothing with `operators`: that both agree is tested, and so each vouches for the other.
 """

@@ -185,7 +185,7 @@ class McapSource(Recording):
                 channel = self._channels.get(number)
                 if channel is not None:
                     if channel.fault:
-                        raise RecordingDamagedError(f"what stands on {channel.topic} cannot be read: {channel.fault}")
+                        raise RecordingDamagedError(f"the message on {channel.topic} cannot be read: {channel.fault}")
                     yield channel, time, body[at + _MESSAGE.size : at + size]
                 elif number not in self._channels:
                     raise RecordingDamagedError(
@@ -196,7 +196,7 @@ class McapSource(Recording):
             at += size
 
     def _describe(self, opcode: int, content: bytes) -> None:
-        """Keep what is needed of a schema or a channel: whatever they say, no more than a few names."""
+        """Store the few names that are needed of a schema or a channel."""
         stream = ReadDataStream(BytesIO(content))
         try:
             if opcode == Opcode.SCHEMA:
@@ -216,7 +216,7 @@ class McapSource(Recording):
         defined = kind, schema.encoding, schema.data
         if defined not in self._faults:
             if len(self._faults) == _DEFINITIONS_MAX:
-                raise RecordingDamagedError(f"it defines what is listened to in more than {_DEFINITIONS_MAX} ways")
+                raise RecordingDamagedError(f"it has more than {_DEFINITIONS_MAX} definitions of its message types")
             self._faults[defined] = _fault(*defined)
         return _Known(kind, schema.encoding, self._faults[defined])
 

@@ -197,7 +197,7 @@ class RosbagSource(Recording):
                 channel = self._channels[number]
                 if channel is not None:
                     if channel.fault:
-                        raise RecordingDamagedError(f"what stands on {channel.topic} cannot be read: {channel.fault}")
+                        raise RecordingDamagedError(f"the message on {channel.topic} cannot be read: {channel.fault}")
                     yield channel, record.number(b"time"), body[record.begin : record.end]
 
     def _channel_of(self, record: _Record, body: bytes) -> RecordedChannel | None:

@@ -129,11 +129,11 @@ class Machines(Deployment):
         """Return the reported values. Raises `RobotsLostError` for a robot that has values and does not report them."""
         for name, assigned in self._master.state.assigned.items():
             if assigned and not assignments[name]:
-                raise RobotsLostError({name: "it has reported that it has values, and none of them"})
+                raise RobotsLostError({name: "it has reported that it has values, but not which"})
         return dict(assignments)
 
     def _refuse_contradictions(self) -> None:
-        """Raise `RefutedError` if robots contradict each other: nobody can say which of them lies."""
+        """Raise `RefutedError` if robots contradict each other. It is unknown which of them lies."""
         doubts = "; ".join(doubt.why for doubt in self._master.state.doubts_about_verdict)
         if doubts:
             raise RefutedError(f"{self._name} has no answer that can be believed: {doubts}")

@@ -95,7 +95,7 @@ def test_messages_and_bytes_are_counted_by_type() -> None:
 
 @pytest.mark.parametrize("content", [b"", b"\x00", encode(Placed((1,))), encode(Ok((1,)))[:-1], b"\x92\xa2Ok\x91\xa1x"])
 def test_what_is_no_message_of_the_protocol_is_refused(content: bytes) -> None:
-    with pytest.raises(BadMessageError, match="RA sent RB what is no message"):
+    with pytest.raises(BadMessageError, match="RA sent RB an invalid message"):
         host("RB").handle([Envelope("RA", "RB", content, 0)])
 
 

@@ -130,10 +130,10 @@ def test_one_that_can_be_written_after_it_is_told_whole() -> None:
 @pytest.mark.parametrize(
     ("change", "says"),
     [
-        ({"order": ("Robot1.1", "Robot9.9")}, "nothing says what Robot9.9 was given"),
+        ({"order": ("Robot1.1", "Robot9.9")}, "the problem of Robot9.9 is missing"),
         ({"order": ("Robot1.1", "Robot1.1")}, "twice in the order"),
         ({"order": ("Robot1.1",)}, "Robot1.1 was given something on Robot"),
-        ({"robots": {"Robot1.1": "<instance/>"}}, "what Robot1.1 was given cannot be read: Robot1.1.xml"),
+        ({"robots": {"Robot1.1": "<instance/>"}}, "the problem of Robot1.1 cannot be read: Robot1.1.xml"),
         ({"robots": {"../Robot1.1": "<instance/>"}}, "cannot be a robot's name"),
         ({"robots": {"Robot1.1": '<!DOCTYPE a [<!ENTITY b "c">]><a>&b;</a>'}}, "a DOCTYPE is not accepted"),
     ],
