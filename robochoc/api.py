@@ -234,11 +234,11 @@ class AgentsContainer:
         return self._join()
 
     def _lead(self, observer: Observer | None, plan: Mapping[str, Any]) -> Outcome:
-        from robochoc.authority.authority import default_folder  # noqa: PLC0415 - an extra
+        from robochoc.authority.authority import default_authority_folder  # noqa: PLC0415 - an extra
         from robochoc.run.networked.master_run import LOOPBACK_ADDRESS, MasterPlan, run_master  # noqa: PLC0415 - the same
 
         protocol = protocol_called(self._type.removeprefix(_MASTER))
-        folder = self._authority or default_folder()
+        folder = self._authority or default_authority_folder()
         watched = any(sniff for _, sniff in self._agents.values())
         asked = MasterPlan(folder, self._listen or LOOPBACK_ADDRESS, protocol=protocol, **plan)
         return run_master(asked, observer=observer, watched=watched).outcome

@@ -99,12 +99,12 @@ def browser() -> Iterator[Any]:
 @pytest.fixture(scope="module")
 def server(without_the_scenes_viewer: None, tmp_path_factory: pytest.TempPathFactory) -> Iterator[SnifferServer]:
     """A page of the journal `sniffer_pages.WHOLE`."""
-    from robochoc.sniffer.session import Session  # noqa: PLC0415 - see above
+    from robochoc.sniffer.session import SnifferSession  # noqa: PLC0415 - see above
     from tests.support.sniffer_pages import WHOLE  # noqa: PLC0415 - see above
     from tests.support.sniffer_server import sniffer_server  # noqa: PLC0415 - see above
 
     del without_the_scenes_viewer  # it only has to be there before the page is made
     file = tmp_path_factory.mktemp("sniffed") / "run.journal"
     file.write_bytes(WHOLE)
-    with sniffer_server(Session(file)) as running:
+    with sniffer_server(SnifferSession(file)) as running:
         yield running

@@ -34,7 +34,7 @@ from robochoc.authority.certificates import (
 )
 from robochoc.authority.events import AuthorityEvent, AuthorityObserver, Granted, Refused, unobserved
 from robochoc.authority.identity import Identity, private_folder, save
-from robochoc.authority.names import InvalidNameError, UnknownNameError, check_name, describe_enrolled
+from robochoc.authority.names import InvalidNameError, UnknownNameError, check_member_name, describe_enrolled
 from robochoc.authority.registry import (
     PRIVATE,
     AuthorityError,
@@ -46,7 +46,7 @@ from robochoc.authority.registry import (
     Role,
     locked,
 )
-from robochoc.authority.token import Token, digest
+from robochoc.authority.token import EnrolmentToken, digest
 from robochoc.formats.diagnostics import on_one_line, shortened
 from robochoc.system.files import write_atomically
 
@@ -152,7 +152,7 @@ class Authority:
 
     def enrol(
         self, name: str, role: Role = Role.ROBOT, ttl: timedelta = TOKEN_LIFETIME, may: Iterable[Right] = ()
-    ) -> Token:
+    ) -> EnrolmentToken:
         """Return a token for `name`, which works once, within `ttl`. See `enrol_all`."""
         return self.enrol_all([name], role, ttl, may)[name]
 
@@ -162,7 +162,7 @@ class Authority:
         role: Role = Role.ROBOT,
         ttl: timedelta = TOKEN_LIFETIME,
         may: Iterable[Right] = (),
-    ) -> dict[str, Token]:
+    ) -> dict[str, EnrolmentToken]:
         """Return a token for each of `names`, or for none of them. Raises `InvalidNameError`.
 
         A name that is enrolled gets a new token as well; when that is redeemed, its certificates so far are revoked:
@@ -172,8 +172,8 @@ class Authority:
         rights = tuple(sorted(set(may)))
         names = list(names)
         for name in names:
-            check_name(name, role)
-        tokens = {name: Token.new(fingerprint(self.certificate)) for name in names}
+            check_member_name(name, role)
+        tokens = {name: EnrolmentToken.new(fingerprint(self.certificate)) for name in names}
         with self._registry.change() as members:
             for name, token in tokens.items():
                 invitation = Invitation(digest(token.secret), self.clock() + ttl.total_seconds())
@@ -348,7 +348,7 @@ def _invited(members: Mapping[str, EnrolledName], known: str, name: str, now: fl
     raise NotGrantedError("the token is unknown here, or a newer one has replaced it")
 
 
-def default_folder() -> Path:
+def default_authority_folder() -> Path:
     """Return the Authority's default folder, in the user's data folder."""
     from platformdirs import user_data_path  # noqa: PLC0415 - only who is given no folder needs it
 

@@ -41,7 +41,7 @@ from robochoc.authority.frames import (
     Renew,
 )
 from robochoc.authority.identity import CERTIFICATE, Identity, private_folder, save
-from robochoc.authority.token import Token
+from robochoc.authority.token import EnrolmentToken
 from robochoc.formats.diagnostics import on_one_line
 from robochoc.system.files import write_atomically
 
@@ -62,14 +62,14 @@ class NotTrustedError(EnrolmentError):
 
 
 def enrol(
-    host: str, port: int, token: Token | str, folder: Path | str, name: str, patience_s: float = PATIENCE_S
+    host: str, port: int, token: EnrolmentToken | str, folder: Path | str, name: str, patience_s: float = PATIENCE_S
 ) -> Identity:
     """Make a key in `folder`, and have the Authority at `host` and `port` certify that it is the key of `name`.
 
     An identity in `folder` is replaced when the Authority has said yes. Raises `TokenError`, `NotTrustedError`,
     `NobodyThereError`, `EnrolmentError` (refused), `OSError` (the folder).
     """
-    token = token if isinstance(token, Token) else Token.parse(token)
+    token = token if isinstance(token, EnrolmentToken) else EnrolmentToken.parse(token)
     folder = Path(folder)
     private_folder(folder)
     place = (host, port)
@@ -95,7 +95,7 @@ def renew(identity: Identity, host: str, port: int, patience_s: float = PATIENCE
     return Identity.load(identity.folder)
 
 
-def _introduced(place: tuple[str, int], token: Token, patience_s: float) -> x509.Certificate:
+def _introduced(place: tuple[str, int], token: EnrolmentToken, patience_s: float) -> x509.Certificate:
     """Return the certificate of the Authority of `token`, as the server at `place` shows it."""
     context = ssl.SSLContext(ssl.PROTOCOL_TLS_CLIENT)
     context.minimum_version = ssl.TLSVersion.TLSv1_3

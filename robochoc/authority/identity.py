@@ -144,7 +144,7 @@ def private_folder(folder: Path) -> None:
     folder.chmod(0o700)
 
 
-def default_folder(name: str) -> Path:
+def default_identity_folder(name: str) -> Path:
     """Return the folder where the identity of `name` is kept by default: in the user's data folder."""
     from platformdirs import user_data_path  # noqa: PLC0415 - only who is given no folder needs it
 

@@ -31,7 +31,7 @@ def describe_enrolled(name: str, members: Collection[str]) -> str:
     return f"{near}enrolled: {', '.join(known[:_MOST_NAMED])}" + (f" and {more} more" if more > 0 else "")
 
 
-def check_name(name: str, role: Role = Role.ROBOT) -> None:
+def check_member_name(name: str, role: Role = Role.ROBOT) -> None:
     """Raise `InvalidNameError` if `name` cannot take part as `role`."""
     shown = on_one_line(shortened(name))
     if not is_name(name):

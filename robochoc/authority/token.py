@@ -22,19 +22,19 @@ class TokenError(ValueError):
 
 
 @dataclass(frozen=True, repr=False)
-class Token:
+class EnrolmentToken:
     """A secret that works once, and the SHA-256 fingerprint of the certificate of the Authority that knows it."""
 
     secret: bytes
     fingerprint: bytes
 
     @classmethod
-    def new(cls, fingerprint: bytes) -> Token:
+    def new(cls, fingerprint: bytes) -> EnrolmentToken:
         """Return a token with a random secret of 160 bits."""
         return cls(secrets.token_bytes(SECRET_BYTES), fingerprint)
 
     @classmethod
-    def parse(cls, text: str) -> Token:
+    def parse(cls, text: str) -> EnrolmentToken:
         """Return the token that `text` stands for; blanks around it and capitals do no harm. Raises `TokenError`."""
         secret, dot, fingerprint = text.strip().partition(".")
         try:

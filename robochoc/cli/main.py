@@ -25,7 +25,7 @@ _STOPPING = (signal.SIGINT, signal.SIGTERM)
 def main() -> NoReturn:
     """Run the command line, and leave with its exit status."""
     _open_standard_streams()
-    ending = Ending()
+    ending = TerminationSignals()
     try:
         ending.listen()
         from robochoc.cli.group import run
@@ -48,7 +48,7 @@ def _open_standard_streams() -> None:
             setattr(sys, name, os.fdopen(descriptor, "w" if descriptor else "r"))
 
 
-class Ending:
+class TerminationSignals:
     """The handler of SIGINT and SIGTERM: the first signal raises `KeyboardInterrupt` or `SystemExit`.
 
     It does not raise during an import, as many modules print or swallow exceptions while they load.

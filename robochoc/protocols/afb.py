@@ -1,39 +1,46 @@
 """Asynchronous Forward Bounding (AFB), with backjumping (AFB-BJ).
 
-Gershman, Meisels, Zivan: "Asynchronous forward bounding for distributed COPs", JAIR 34, 2009. Methods bear the
-names of its procedures, or of what it calls the messages that they handle:
+Complete search for minimum cost with a current partial assignment (CPA), which goes from robot to robot in priority
+order. Copies of it go to all lower robots, which answer with an estimate: a lower bound on the cost of adding their own
+values. The sender does not wait. Once the CPA and the estimates cost as much as the best solution (B), it takes its
+next value, wherever the CPA is by then. So several CPAs may be under way. Each value carries its robot's counter of
+assignments (together the time-stamp). The first counter that differs tells which CPA is stronger; the others are
+obsolete.
+
+- **When to use**: costs, a dense graph, little memory.
+- **Guarantees**: complete; it terminates with an optimum, or with a proof that there is no solution.
+- **Parameters**: none.
+- **Reference**: Gershman, Meisels, Zivan: "Asynchronous forward bounding for distributed COPs", JAIR 34, 2009.
+
+The methods have the names of its procedures, or of the messages that they handle:
 
     assign_CPA    `_assign_cpa`       CPA_MSG        `_receive_cpa`
     backtrack     `_backtrack`        FB_CPA         `_receive_fb_cpa`, `_send_fb_estimates`
     backtrackTo   `_backtrack_to`     FB_ESTIMATE    `Estimates.save`
                                       NEW_SOLUTION   `_receive_new_solution`
 
-Complete, for minimisation. A current partial assignment (CPA) goes from robot to robot in priority order, and its
-copies to all robots below: these tell the sender what it will cost at least to add their own values. The sender waits
-for nobody; once the CPA and the estimates cost as much as the best solution (B), it takes its next value, wherever
-the CPA is by then. So several CPAs may be under way. Each value carries its robot's counter of assignments (together
-the time-stamp), and the first counter that differs tells which CPA is stronger; the others are obsolete.
+Backjumping: if no value is cheap enough, a prefix of the CPA may already be the cause. So a robot sends an estimate for
+each prefix, and a CPA carries a lower bound for each of its prefixes (`least`): the costs of its own robots, and the
+estimates of all robots after the prefix that the CPA has passed. With the estimates of lower robots, that is a lower
+bound for the whole team. The CPA goes back to the last robot of the shortest prefix whose bound is not below B, as no
+solution with that prefix is better. (The paper's bound has no estimates of the robots in between. Wahbi, Ezzahir,
+Bessiere: "Asynchronous forward bounding revisited", CP 2013, also send one bound for each prefix.)
 
-Backjumping: where no value is cheap enough, a beginning of the CPA may be to blame already. So a robot tells its
-estimate for each beginning, and a CPA has with it what each of its beginnings costs at least (`least`): what its own
-robots pay, and the estimates of all robots after them that the CPA has come through. With the estimates of those
-below, that is a bound for the whole team. The CPA goes back to the last robot of the shortest beginning whose bound is
-not below B: no solution that begins like this is better, whatever anybody below takes. (The paper's bound has no
-estimates of the robots in between. One bound for each beginning is also what Wahbi, Ezzahir, Bessiere: "Asynchronous
-forward bounding revisited", CP 2013, send.)
+An estimate is the minimum over the own values of the cost with the prefix plus h, a lower bound on constraints with
+lower robots only. So each constraint is in at most one term: in its highest robot's h until that robot has a value;
+later, once all others of the scope have values, in the estimate of the lowest robot, which pays it in the end. h is
+computed from the declared domains, without messages; for robots that may withdraw it is 0.
 
-An estimate is the least of what the own values cost with the beginning, plus h: what constraints with lower robots
-only charge at least, whatever those take. So every constraint is in one term at most: until its highest robot has its
-value in that one's h, later, once all others of the scope have theirs, in the lowest one's estimate, which pays it in
-the end. Robots look h up in the domains that all of them declare, without a word; where they may withdraw it is 0.
+Choices that the paper leaves open, and differences:
 
-What the paper leaves open, or is settled otherwise here: messages are read by packets, and a robot decides once the
-inbox has been drained; constraints may be n-ary; values are tried the cheapest first; estimates are kept as long as
-the beginning stands that they are for; robots are asked only when their estimates may have changed, and who has
-nothing new to say is silent; the next robot answers to the CPA itself; a robot looks at its bound also when B has
-changed, and when the CPA comes; every CPA tells B, so that nobody thinks that there is no solution while the news of
-one is under way; whoever finds that nothing is better, with any beginning, tells all to be silent; a robot whose
-domain is empty says so when the search begins.
+- Messages are read in packets; a robot decides when the inbox has been drained.
+- Constraints may be n-ary. Values are tried by increasing cost.
+- Estimates are kept as long as their prefix is valid. Robots are asked only when their estimates may have changed, and
+  answer only with new ones. The next robot's answer is about the CPA itself.
+- A robot also checks its bound when B has changed, and when the CPA arrives.
+- Every CPA carries B, so that no robot concludes that there is no solution while the message about one is under way.
+- A robot that finds that no prefix allows a better solution ends the search (`Terminate`).
+- A robot with an empty domain reports it at the start.
 
 >>> from robochoc.communication.simulator.schedule import Concurrent
 >>> from robochoc.communication.simulator.simulator import Simulation

@@ -1,8 +1,18 @@
 """Nogood-based Asynchronous Forward Checking (AFC-ng).
 
-Ezzahir, Bessiere, Wahbi, Benelallam, Bouyakhf: "Asynchronous inter-level forward-checking for DisCSPs", CP 2009;
-Wahbi, Ezzahir, Bessiere, Bouyakhf: "Nogood-based asynchronous forward checking algorithms", Constraints 18(3),
-2013, Section 3, whose names the methods bear:
+Complete search for satisfaction. A current partial assignment (CPA) grows along the priority order, and its copies let
+lower robots check forward. A robot without a value left sends a nogood to the lowest-priority robot among the causes,
+wherever the CPA is. So several robots may backtrack at once; of the CPAs that follow, the strongest wins.
+
+- **When to use**: no costs, a hard problem: few messages and checks.
+- **Guarantees**: complete; it terminates with a solution or with a proof that there is none. Space is polynomial: one
+  nogood for each value.
+- **Parameters**: none.
+- **References**: Ezzahir, Bessiere, Wahbi, Benelallam, Bouyakhf: "Asynchronous inter-level forward-checking for
+  DisCSPs", CP 2009; Wahbi, Ezzahir, Bessiere, Bouyakhf: "Nogood-based asynchronous forward checking algorithms",
+  Constraints 18(3), 2013, Section 3.
+
+The methods have the names of its procedures:
 
     Assign          `_assign`              Revise       `_revise`
     SendCPA         `_send_cpa`            Backtrack    `_backtrack`
@@ -10,24 +20,22 @@ Wahbi, Ezzahir, Bessiere, Bouyakhf: "Nogood-based asynchronous forward checking 
     ProcessNogood   `_process_nogood`      CheckAssign  `_check_assign`
     UpdateAgentView `_update_agent_view`
 
-Complete, for satisfaction. A current partial assignment (CPA) grows along the priority order; its copies let lower
-robots check forward. A robot without values left tells the lowest robot among the causes, whoever holds the CPA, so
-several may backtrack at once; of the CPAs that follow, the strongest wins.
+Choices that the paper leaves open, and differences:
 
-In the paper a CPA goes to all lower robots, here to the next one and to those that share a constraint with its
-sender. That is enough: no other robot can check anything by it; whatever it says of higher robots is in later CPAs
-too, which are weighed by all counters; and the next robot, who alone may go on, misses none. It spares more than
-half of all messages where constraints are few.
+- In the paper a CPA goes to all lower robots. Here it goes to the next one and to those that share a constraint with
+  its sender, which saves more than half of all messages where constraints are few. This is sufficient: no other robot
+  can check anything with it; its values of higher robots are also in later CPAs, which are compared by all counters;
+  and the next robot, the only one that may continue, receives every CPA.
+- Messages are read in packets; the view is revised when the inbox has been drained, so weak CPAs in a packet cost no
+  checks.
+- A CPA with exactly the counters of the view is not stronger: a late copy would erase later assignments.
+- A value with a nogood is not checked again, nor is a constraint whose robots are all above the first changed value.
+- Constraints may be n-ary, and a nogood contains only the variables that matter (see `abt`).
+- A robot with an empty domain reports it at the start.
 
-What the paper leaves open, or is settled otherwise here: messages are read by packets, and the view is revised once
-the inbox has been drained, so weak CPAs in a packet cost no checks; a CPA with the very counters of the view is not
-stronger (a late copy would erase what was assigned since); a value that has a nogood is not checked again, nor is a
-constraint with robots that all stand above the first one whose value has changed; constraints may be n-ary, and a
-nogood names only the variables that matter (see `abt`); a robot whose domain is empty says so when the search begins.
-
-The last robot's CPA is a solution, and all robots hold its values when it is found: the first leaves its value only
-for a nogood without a left side, which no value of a solution can get; the second only for that or a new CPA of the
-first, and so on. `Solved` tells them that they may be silent.
+Correctness: the last robot's CPA is a solution, and all robots hold its values at that moment. The first robot changes
+its value only for a nogood without a left side, which no value of a solution can get; the second one only for that or a
+new CPA of the first, and so on. `Solved` ends the search.
 
 >>> from robochoc.communication.simulator.schedule import Concurrent
 >>> from robochoc.communication.simulator.simulator import Simulation

@@ -1,26 +1,34 @@
 """Asynchronous Forward Checking Tree (AFC-tree): AFC-ng on a pseudo-tree.
 
-Wahbi, Ezzahir, Bessiere, Bouyakhf: "Nogood-based asynchronous forward checking algorithms", Constraints 18(3),
-2013, Section 4. What it has beyond AFC-ng (`afc_ng`) bears the paper's names:
+Complete search for satisfaction. A CPA holds the values along one branch, from the root to its sender. It goes to the
+sender's tree children and to lower robots that share a constraint with it. All tree children may then continue at the
+same time, each in its own subtree. Nogoods contain ancestors only, as all robots of a constraint are on one branch.
+`Accept` goes up when a whole subtree has accepted a CPA. A root with the accepts of all children knows a solution of
+its component, and sends it to all robots there.
+
+- **When to use**: as AFC-ng, on sparse graphs: branches are searched at the same time.
+- **Guarantees**: complete; it terminates with a solution or with a proof that there is none. Space is polynomial.
+- **Parameters**: none.
+- **Reference**: Wahbi, Ezzahir, Bessiere, Bouyakhf: "Nogood-based asynchronous forward checking algorithms",
+  Constraints 18(3), 2013, Section 4.
+
+The methods beyond AFC-ng (`afc_ng`) have the names of its procedures:
 
     ProcessAccept `_process_accept`     SolutionDetection `_detect_solution`     BuildPA `_build_pa`
 
-Complete, for satisfaction. A CPA holds the values along one branch, from the root to its sender, and goes to the
-sender's tree children and to those below that share a constraint with it. All tree children may then go on, each in
-its own subtree. Nogoods name ancestors only, as a constraint's robots all stand on the branch of the lowest of them.
-`Accept` goes up once a whole subtree has accepted a CPA; a root with the accepts of all its children knows a solution
-of its part of the team, and tells it.
+Choices that the paper leaves open, besides those in `afc_ng`:
 
-What the paper leaves open, beside what `afc_ng` names: the pseudo-tree is the one induced by the priority order;
-there is one root for each unconnected part, which is searched alone, so that one without a solution ends the search,
-and all are solved when nobody speaks any more; an accept names the CPA by its counters.
+- The pseudo-tree is the one induced by the priority order.
+- Each connected component has its own root and is searched separately. A component without a solution ends the search;
+  all are solved at quiescence.
+- An accept identifies the CPA by its counters.
 
-The values are right without accepts too. When nobody speaks, each root has a value. Let all ancestors of a robot
-have values, each chosen for the present ones above it. The CPA of its parent then holds the highest counters there
-are, so the robot has taken it in. If it had no value left, it has told an ancestor; no value above has changed since,
-so that ancestor was at the value of the nogood, with a compatible view, and has taken another: a contradiction. So
-the robot has a value, chosen for the present ones above it. Accepts are kept as they tell a root that its part
-is solved, and cost a message a robot at the least.
+Correctness does not depend on accepts. At quiescence each root has a value. Suppose all ancestors of a robot have
+values, each chosen for the current ones above it. The CPA of its parent then holds the highest counters, so the robot
+has accepted it. Without a value left, it would have sent a nogood to an ancestor. No value above has changed since, so
+that ancestor had the nogood's value and a compatible view, and has taken another value: a contradiction. So the robot
+has a value, chosen for the current ones above it. Accepts are kept because they tell a root that its component is
+solved; they cost at least one message for each robot.
 
 >>> from robochoc.communication.simulator.schedule import Concurrent
 >>> from robochoc.communication.simulator.simulator import Simulation

@@ -1,32 +1,44 @@
-"""Agile Asynchronous Backtracking.
+"""Agile Asynchronous Backtracking (Agile-ABT).
 
-Bessiere, Bouyakhf, Mechqrane, Wahbi: "Agile asynchronous backtracking for distributed constraint satisfaction
-problems", ICTAI 2011. ABT whose order changes at dead ends, without limits to who may move. Built on the paper's
-ideas (explanations, termination vectors, orders that only become stronger), with the names of ABT (`abt.py`); what
-differs in detail stands below. UpdateExplanations and ComputeOrder are in `agile_order.py`.
+ABT with an order that changes at dead ends, without limits on which robot may move. An Ok carries the sender's
+explanation with the value: the robots that its nogoods depend on, and its number of remaining values. A robot without a
+value left may send the nogood to any robot of the conflict. For each of them it computes an order that is compatible
+with all explanations it holds, extended by the new nogood, with few remaining values first. If the least termination
+vector of these orders is smaller than that of the current order, the robot adopts that order and sends it to all.
+Otherwise it keeps its order and sends the nogood to the lowest-priority robot. A robot that receives an order adopts it
+if it is stronger: its vector is smaller, or equal and its names come first.
 
-Complete, asynchronous, for satisfaction. An Ok brings the sender's explanation with the value: on whose values its
-nogoods rest, and how many values are left to it. A robot without values left may blame any robot of the conflict.
-For each it computes an order that is compatible with all explanations it holds, extended by the new nogood, with
-few values left first. If the least of their termination vectors is smaller than that of the present order, the
-robot adopts that order and sends it to all; otherwise it keeps its order and blames the lowest robot. Whoever gets
-an order adopts it if it is stronger: its vector is smaller, or equal and its names come first.
+- **When to use**: no costs, and no good static order is known. Messages are large.
+- **Guarantees**: complete; it terminates with a solution or with a proof that there is none. Space is polynomial.
+- **Parameters**: none.
+- **Reference**: Bessiere, Bouyakhf, Mechqrane, Wahbi: "Agile asynchronous backtracking for distributed constraint
+  satisfaction problems", ICTAI 2011.
 
-Why it ends: each order that a robot makes or adopts is stronger than the one before, and there are finitely many,
-since values left are between 0 and the domain's size, or unknown. So changes of order cease, however rough the
-numbers in the vectors are, and all robots hold the strongest order ever made, since each went to all. From then on
-it is ABT. Why it is right: nogoods follow from the constraints in any order, so the empty one proves that there is
-no solution. When nobody speaks any more, all orders are equal; each robot's value agrees with what it knows of those
-above it; and it knows all that it has to, by `sent_values`: each robot remembers what it last told to whom,
-and speaks to those below it that have heard something else, or that have forgotten it to send a nogood.
+It follows the paper's ideas (explanations, termination vectors, orders that only become stronger), with these methods:
 
-What the paper leaves open, or what is done otherwise here: constraints may be n-ary (the robot of the scope that stands
-lowest at present checks them); an order travels in messages of its own only, not with each Ok and Nogood, so a
-nogood that comes before its order is dropped as obsolete, and its sender told the value again if it is below; a
-value is dated by its place in its channel, not by a counter; robots whose domain's size nobody has told count as
-having `UNKNOWN` values left, more than any other; values are checked one by one until one fits, so "left" counts
-those without a nogood so far; messages are read by packets. As in `abt.py`, of several nogoods for a value the one
-with the highest possible lowest variable is kept, and a nogood names only the variables that matter.
+    UpdateExplanations   `agile_order.updated`     choose an order   `_choose_order`
+    ComputeOrder         `agile_order.ordered`     adopt an order    `_check_order`
+
+Termination: each order that a robot makes or adopts is stronger than the one before, and there are finitely many, since
+numbers of remaining values are between 0 and the domain's size, or unknown. So changes of order cease, however inexact
+the numbers are. All robots then hold the strongest order ever made, since each order was sent to all. From then on the
+protocol is ABT.
+
+Correctness: nogoods follow from the constraints in any order, so the empty one proves that there is no solution. At
+quiescence all orders are equal, and each robot's value agrees with its view of higher robots. The view is complete:
+each robot stores the last value it sent to each robot (`sent_values`), and sends its value to lower robots that have
+another one, or that dropped it when they sent a nogood.
+
+Choices that the paper leaves open, and differences:
+
+- Constraints may be n-ary. The robot of the scope that is lowest at present checks them.
+- An order is sent only in messages of its own, not with each Ok and Nogood. A nogood that arrives before its order is
+  dropped as obsolete, and its sender is sent the value again if it is lower.
+- A value is dated by its place in its channel, not by a counter.
+- A robot whose domain size is unknown counts as having `UNKNOWN` values left, more than any other.
+- Values are checked one by one until one fits, so remaining values are those without a nogood so far.
+- Messages are read in packets. As in `abt.py`, of several nogoods for a value the one with the highest possible lowest
+  variable is kept, and a nogood contains only the variables that matter.
 
 >>> from robochoc.communication.simulator.schedule import Concurrent
 >>> from robochoc.communication.simulator.simulator import Simulation

@@ -1,24 +1,34 @@
-"""Distributed Forward Checking.
+"""Distributed Forward Checking (DisFC).
 
-Brito and Meseguer: "Distributed forward checking", CP 2003; with partially known constraints: Brito, Meisels,
-Meseguer, Zivan: "Distributed constraint satisfaction with partially known constraints", Constraints 14 (2009).
+ABT (`protocols/abt.py`) in which no value is ever sent. A robot names its assignment by a counter, which grows with
+each new assignment. Instead of its value it sends each lower neighbour the receiver's domain filtered by it:
+`Ok(counter, allowed)`. The receiver takes values that all filters allow; a value that a filter removes is ruled out by
+the sender's counter. Nogoods are over counters: a robot accepts a nogood about its current counter and the counters in
+its view. A filter is a bitmap over the receiver's declared domain (`solver/filters.py`), so messages contain only
+places in that domain.
 
-It is ABT (`protocols/abt.py`, whose names the methods bear) in which no value is ever sent. A robot names its
-assignment by a counter, which grows with each new assignment, and sends each lower neighbour, instead of its value,
-the receiver's domain filtered by it: `Ok(counter, allowed)`. The receiver takes values that all filters allow;
-what a filter takes away, the sender's counter justifies. Nogoods are over counters: a robot accepts one that is about
-its present counter and the counters it knows. A filter is a bitmap over the receiver's declared domain
-(`solver/filters.py`), so nothing but places in that domain is said.
+- **When to use**: values are private, or constraints are (PKC). Constraints over two robots only.
+- **Guarantees**: complete; it terminates with a solution or with a proof that there is none. Space is polynomial.
+- **Parameters**: none.
+- **References**: Brito and Meseguer: "Distributed forward checking", CP 2003; with partially known constraints: Brito,
+  Meisels, Meseguer, Zivan: "Distributed constraint satisfaction with partially known constraints", Constraints 14
+  (2009).
 
-A totally known constraint (TKC) is in the filter that its higher robot sends down. Of a partially known one (PKC)
-each robot holds a part, and both send filters, in a single phase: down for the higher robot's part, up for the lower
-one's. A higher robot whose value is not in a filter from below says so by a nogood against that assignment.
+The methods have the names of ABT's procedures, with these for filters:
 
-Complete, asynchronous, for satisfaction, constraints over two robots. What the paper leaves open is decided as in
-ABT: packets, the best nogood of several. Besides: a counter names an assignment and not a value, so that nobody sees
-that a value has come back; an assignment that is kept keeps its counter; whom no constraint links to the sender,
-and who asked for a link, gets a filter that allows everything; a robot of several variables is filtered over all
-values that its interface variables could have together.
+    check the filters   `_consistent`     refuse filters from below (PKC)   `_refuse_below`
+
+A totally known constraint (TKC) is in the filter that its higher robot sends down. Of a partially known one (PKC) each
+robot holds a part, and both send filters, in a single phase: down for the higher robot's part, up for the lower one's.
+A higher robot whose value is not in a filter from below sends a nogood against that assignment.
+
+Choices that the paper leaves open:
+
+- Packets, and the choice among several nogoods, are as in ABT.
+- A counter names an assignment and not a value, so a repeated value is not visible. An assignment that is kept keeps
+  its counter.
+- A robot that requested a link, but shares no constraint with the sender, gets a filter that allows everything.
+- A robot with several variables is filtered over all combinations of values of its interface variables.
 
 >>> from robochoc.communication.simulator.schedule import Concurrent
 >>> from robochoc.communication.simulator.simulator import Simulation

@@ -1,38 +1,42 @@
 """Distributed Pseudo-tree Optimization Procedure (DPOP).
 
-Petcu, Faltings: "A scalable method for multiagent constraint optimization", IJCAI 2005, Algorithm 1, whose names the
-methods bear:
+Dynamic programming on a pseudo-tree, for minimum cost. From the leaves up, each robot sends its parent a table (UTIL):
+the minimum cost of its subtree for every combination of values of its separator, the higher robots that matter to the
+subtree. It adds up its own constraints and its children's tables, and minimises over its own values. From the root
+down, each robot takes the value that was cheapest (VALUE).
+
+- **When to use**: costs, and a pseudo-tree with a small induced width. The number of messages is linear, but a table
+  has as many dimensions as the separator has robots.
+- **Guarantees**: complete; it terminates with an optimum, or with a proof that there is no solution. A run that needs
+  more memory than allowed ends before any table is made.
+- **Parameters (`--set`)**: `memory`, the bytes that the tables of a robot may take (default 1 GiB).
+- **Reference**: Petcu, Faltings: "A scalable method for multiagent constraint optimization", IJCAI 2005, Algorithm 1.
+
+The methods have the names of its procedures:
 
     Phase 1 (pseudo-tree)   `dfs.TreeProtocol`          Compute_utils           `_compute_utils`
     UTIL_Message_handler    `_util_message_handler`     Choose_optimal          `_choose_optimal`
     VALUE_Message_handler   `_value_message_handler`
 
-Complete, for minimisation: dynamic programming on a pseudo-tree. From the leaves up, each robot tells its parent what
-all below cost at least, for every combination of values of the robots above that matter to them (its separator): it
-adds up its own constraints and its children's tables, and takes the least over its own values (UTIL). From the root
-down each takes the value that was cheapest (VALUE). So few messages are needed, whatever the costs are, but a table
-has as many dimensions as the separator has robots. For problems whose pseudo-trees are narrow, or nearly trees.
+Memory is known before tables are made; in the paper, tables are made at once. Each robot sends its domain to robots
+below (`Domain`). It sends its parent its separator, an upper bound on its costs, and the largest memory need below
+(`Dimensions`). The root ends the run if that is more than `memory`. Otherwise it lets all continue, and each robot
+sends its children the order of their tables' axes (`Proceed`): the nearest robot first, so no table is ever transposed.
+This adds two messages for each robot except the roots, and one for each edge. A robot with one value has no axis.
 
-The paper has every table made as it comes. Here sizes are known before: each robot tells those below which values it
-has (`Domain`), and its parent its separator, an upper bound on its costs, and who below needs most memory
-(`Dimensions`). The root ends the run if that is more than the setting `memory`; or it lets all go on, and they tell
-each other in which order a table's axes stand (`Proceed`): the nearest robot first, so no table is ever turned around.
-These are two messages more for each robot but the roots, and one for each edge. A robot with one value has no axis.
+Choices that the paper leaves open, and differences:
 
-What else the paper leaves open, or is settled otherwise here: costs are minimised, and `inf` where something hard is
-broken; a robot whose whole table is `inf` says so and ends the search. A separator has only robots that share a
-constraint with somebody below: neighbours without one take no room. The join is made block by block, and never there
-as a whole; beside the table it is kept which own value is cheapest (a byte or two for each cell), so the children's
-tables, larger by an axis, can go at once. VALUE tells a child the places of the values in its separator, in that
-order. A table has as few bytes for a cost as it needs, and travels in pieces of up to 16 MiB. Of equal values the
-first is taken.
-
-A constraint is checked by the lowest robot of its scope, once for each combination that it can tell apart, when its
-table is made. Adding tables up, and looking for what is least, are no constraint checks.
-
-Costs are integers, added up in float64. Where they could come to 2^53 or more, the run ends: they would not be exact.
-The limit is each robot's own, on arrays: what a runtime holds of a message under way does not count, nor do the prices
-that a local problem remembers.
+- Costs are minimised; `inf` stands for a violated hard constraint. A robot whose whole table is `inf` ends the search.
+- A separator contains only robots that share a constraint with the subtree.
+- The join is made block by block and is never in memory as a whole. Besides the table, the cheapest own value of each
+  cell is stored (one or two bytes), so the children's tables, larger by an axis, can be freed.
+- VALUE contains the places of the values in the child's separator, in that order.
+- A table has as few bytes per cost as it needs, and is sent in pieces of up to 16 MiB. Ties go to the first value.
+- A constraint is checked by the lowest robot of its scope, once for each distinguishable combination, when its table
+  is made. Additions and minimisations are no constraint checks.
+- Costs are integers, added in float64. If they could reach 2^53, they would not be exact, and the run ends.
+- The memory limit holds for each robot's arrays. It does not include messages under way in a runtime, nor costs that a
+  local problem caches.
 
 >>> from robochoc.communication.simulator.schedule import Concurrent
 >>> from robochoc.communication.simulator.simulator import Simulation
@@ -55,15 +59,15 @@ from robochoc.model.outcome import Verdict
 from robochoc.protocols.dfs import TreeMessage, TreeProtocol
 from robochoc.protocols.dpop_messages import UTIL, VALUE, Dimensions, Domain, Need, Proceed
 from robochoc.protocols.dpop_tables import (
-    Arriving,
     Codes,
     Extent,
+    IncomingTable,
     Table,
     Width,
     aligned,
     bytes_of,
     is_hopeless,
-    packed,
+    packed_costs,
     project,
     width_of,
 )
@@ -122,7 +126,7 @@ class DPOP(TreeProtocol):
         self.domains: dict[str, list[Value]] = {}
         self.dimensions: dict[str, Dimensions] = {}
         self.separator: tuple[str, ...] | None = None
-        self.utils: dict[str, Arriving] = {}
+        self.utils: dict[str, IncomingTable] = {}
         self.choices: Codes | None = None
         self.optimum: int | None = None
         self._sizes: dict[str, int] = {}
@@ -250,7 +254,9 @@ class DPOP(TreeProtocol):
             raise ValueError(f"{child} was not asked for a table")
         if child not in self.utils:
             dimensions = self.dimensions[child]
-            self.utils[child] = Arriving([dimensions.separator[name] for name in self._axes[child]], dimensions.dearest)
+            self.utils[child] = IncomingTable(
+                [dimensions.separator[name] for name in self._axes[child]], dimensions.dearest
+            )
         self.utils[child].add(width, costs)
         if len(self.utils) == len(self.children) and all(table.complete for table in self.utils.values()):
             self._joined += [self._aligned(table.costs, self._axes[name]) for name, table in self.utils.items()]
@@ -272,7 +278,7 @@ class DPOP(TreeProtocol):
             self.optimum = int(costs.item())
             self._choose_optimal([])
         else:
-            for width, piece in packed(costs):
+            for width, piece in packed_costs(costs):
                 self.send(self.parent, UTIL(width, piece))
 
     # VALUE, from the root down

@@ -106,7 +106,7 @@ def is_hopeless(costs: Codes) -> bool:
     return bool(costs.min() == _top(costs.itemsize))
 
 
-def packed(costs: Codes) -> Iterator[tuple[Width, bytes]]:
+def packed_costs(costs: Codes) -> Iterator[tuple[Width, bytes]]:
     """Yield `costs` in pieces for the wire, with as few bytes per cost as the largest one needs."""
     width = width_of(_max_finite(costs))
     flat = costs.reshape(-1)
@@ -116,7 +116,7 @@ def packed(costs: Codes) -> Iterator[tuple[Width, bytes]]:
         yield width, flat[start : start + step].astype(f"<u{width}", copy=False).tobytes()
 
 
-class Arriving:
+class IncomingTable:
     """A table of this `shape` that arrives in pieces; `dearest` is an upper bound on its finite costs.
 
     Memory is allocated with the first piece; check `bytes_of` before.

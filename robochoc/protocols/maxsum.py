@@ -1,34 +1,41 @@
 """Max-Sum.
 
-Farinelli, Rogers, Petcu, Jennings: "Decentralised coordination of low-power embedded devices using the max-sum
-algorithm", AAMAS 2008, Section 4, whose equations the methods bear:
+Local message passing on the factor graph; here it minimises costs, so it is a min-sum. Each robot's variable is a node,
+and so is each function: the sum of all constraints over the same robots. R, from function to variable, is the minimum
+cost of each value by that function, given the other variables' messages. Q, from variable to function, is the cost of
+each value by all other functions. A robot takes the value with the lowest sum.
+
+- **When to use**: costs, a large team, a graph with few cycles.
+- **Guarantees**: incomplete; it stops after `cycles` cycles. On a graph without cycles the result is optimal;
+  elsewhere it is an estimate that need not converge. The result is the best cycle (anytime). A robot all of whose
+  values cost `inf` proves that there is no solution.
+- **Parameters (`--set`)**: `damping` (the weight of the last Q in a new one; default 0.5), `preference` (the maximum
+  random charge of a value; default 0.01), `cycles` (default 100).
+- **References**: Farinelli, Rogers, Petcu, Jennings: "Decentralised coordination of low-power embedded devices using
+  the max-sum algorithm", AAMAS 2008, Section 4; for damping: Cohen, Galiki, Zivan: "Governing convergence of Max-sum
+  on DCOPs through damping and splitting", AIJ 279, 2020.
+
+The methods have the names of the first paper's equations:
 
     Q, from variable to function (1)   `_q`
-    R, from function to variable (2)   `Function.r`
+    R, from function to variable (2)   `Factor.r`
     Z, and the value (3)               `_z`, `_decide`
-    preferences gamma                  `preferences`
+    preferences gamma                  `preferred`
 
-Damping: Cohen, Galiki, Zivan: "Governing convergence of Max-sum on DCOPs through damping and splitting", AIJ 279, 2020.
+A function is held by the lowest-priority robot of its scope, the only one that knows the constraint. Messages between
+nodes of one robot are not sent. In a cycle all functions send R, then all variables send Q. All that one robot sends
+another in a phase is one message, with a row for each function that contains both. First, robots send their domains to
+the holders of their functions.
 
-Incomplete, synchronous, anytime, for costs (so it is the minimum of sums). Robots pass messages on the factor graph:
-each robot's variable is a node, and so is what constraints over the same robots charge together, a function. R says
-what each value of a variable costs at best by a function, by what the other variables in it told; Q says what each
-value costs by all other functions. A robot takes the value that costs least by all. On a graph without cycles that is
-an optimum, elsewhere an estimate that often is good, and need not settle.
+Ties: if values are interchangeable, such as colours, all their costs would stay equal. So each value of each robot has
+a small random charge, its preference (the paper's gamma).
 
-A function lives with the lowest robot of its scope, who alone knows the constraint; messages between nodes of one robot
-are not sent. In a cycle all functions say R, then all variables Q. What one robot has to say to another goes in one
-message: a row for each function that both are in. First of all, robots tell their domains to those who hold their
-functions.
+Choices that the paper leaves open, and differences:
 
-Ties: where values are alike, as colours are, all estimates would stay the same. So each value of each robot has a
-preference, a charge too small to matter otherwise, drawn by lot: the paper's gamma.
-
-What the paper leaves open, or is settled otherwise here: Q is damped; it is normalised so that its smallest entry is 0
-(the paper: so that they sum to 0), as entries may be infinite: a value that breaks a hard constraint whatever others do
-costs `inf`, and nothing is ever subtracted from that. It stays out, for what makes it so is never taken back; a robot
-all of whose values are out has proven that there is no solution. Constraints may be n-ary, up to a size of their
-tables.
+- Q is damped.
+- Q is normalised to a minimum of 0 (in the paper: to a sum of 0), as entries may be infinite: a value that violates a
+  hard constraint whatever others do costs `inf`. Nothing is subtracted from `inf`, so such a value stays ruled out.
+- Constraints may be n-ary, up to a maximum size of their tables.
 
 >>> from robochoc.communication.simulator.schedule import Concurrent
 >>> from robochoc.communication.simulator.simulator import Simulation

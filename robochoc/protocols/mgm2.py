@@ -1,7 +1,20 @@
 """Coordinated Maximum Gain Message (MGM-2).
 
-Maheswaran, Pearce, Tambe: "Distributed algorithms for DCOP: a graphical-game-based approach", PDCS 2004, Section 3
-(SCA-2 and MGM-2); Pearce, "Local optimization in cooperative agent networks", PhD thesis, 2007. The phases of a cycle:
+MGM in which two neighbours may also move together. In each cycle a robot is an offerer with probability `threshold`
+(the paper's q). An offerer sends one random neighbour an offer: its gain for each pair of their values. The receiver
+adds its gain on constraints that the offerer has no part in, so shared constraints count once. It accepts the best
+offer if its total gain is positive; then both robots are committed to the joint move. As in MGM, the robot with the
+largest gain among its neighbours moves. A committed pair moves if both have the largest gain, each among its neighbours
+without the partner.
+
+- **When to use**: as MGM, for better answers with more messages.
+- **Guarantees**: incomplete; it stops after `cycles` cycles, without a proof of optimality. The cost never rises from
+  one cycle to the next (anytime). A robot with an empty domain proves that there is no solution.
+- **Parameters (`--set`)**: `threshold` (q; default 0.5), `cycles` (default 100).
+- **References**: Maheswaran, Pearce, Tambe: "Distributed algorithms for DCOP: a graphical-game-based approach", PDCS
+  2004, Section 3 (SCA-2 and MGM-2); Pearce, "Local optimization in cooperative agent networks", PhD thesis, 2007.
+
+The phases of a cycle:
 
     value messages                              `tell_value`, `_offer`
     offers (offerers), to one neighbour each    `_offer`, `_answer`
@@ -9,19 +22,13 @@ Maheswaran, Pearce, Tambe: "Distributed algorithms for DCOP: a graphical-game-ba
     gain messages                               `_tell_gain`, `_decide`
     go, no go (of two that are committed)       `_decide`, `_go`
 
-Incomplete, synchronous, anytime, for costs. MGM in which two neighbours may also move together. In each cycle a robot
-is an offerer with probability `threshold` (the paper's q), and makes one of its neighbours, drawn by lot, an offer:
-what each pair of their values would save it. A receiver adds what constraints that the offerer has no part in would
-save, so those that both have part in count once. It accepts the best of all offers if that saves anything; then both
-are committed, and their gain is the pair's. As in MGM, who gains most among its neighbours moves; of a pair both have
-to, each among its neighbours other than the partner. The cost never rises from one cycle to the next.
+Choices that the paper leaves open, and differences:
 
-What the paper leaves open, or is settled otherwise here: an offer names all pairs of values, also those by which the
-offerer alone does not gain. Left out, as in the paper, moves are missed that save the team something though each of
-the two saves less than nothing while what they share is laid at its own door; with them, who comes to rest is at a
-2-optimum. Robots that are no offerers, or have no offer for a neighbour, say so, for how else would it know that all
-offers have come. Values, the first ones and those that are equally good, and equal gains are settled as in `mgm`;
-constraints may be n-ary.
+- An offer contains all pairs of values, also those with which the offerer alone does not gain. Without them, as in the
+  paper, some moves that save the team costs are missed. With them, a team in which no robot or pair can gain is at a
+  2-optimum.
+- A robot that is no offerer, or has no offer for a neighbour, says so, as its neighbours wait for all offers.
+- First values, equally good values and equal gains are treated as in `mgm`. Constraints may be n-ary.
 
 >>> from robochoc.communication.simulator.schedule import Concurrent
 >>> from robochoc.communication.simulator.simulator import Simulation
@@ -112,7 +119,7 @@ class Go(wire.Message, frozen=True):
         return "no go: one of my neighbours is to move instead"
 
 
-class Move(NamedTuple):
+class JointMove(NamedTuple):
     """A joint move: its gain, the partner, and the places of both values."""
 
     gain: LexicographicCost
@@ -205,7 +212,7 @@ class MGM2(Gainers):
         self.send(move.partner, Accept(move.place, *move.gain))
         return move.partner
 
-    def _joint(self, offerer: str, gains: Gains) -> Iterator[Move]:
+    def _joint(self, offerer: str, gains: Gains) -> Iterator[JointMove]:
         """Yield all offered moves with the total gain of both robots.
 
         To the offerer's gain it adds the gain on constraints that the offerer has no part in.
@@ -217,7 +224,7 @@ class MGM2(Gainers):
         for own, (burden, row) in enumerate(zip(burdens, gains, strict=True)):
             broken, cost = gain(now, burden)
             for place, offered in enumerate(row):
-                yield Move((broken + offered[0], cost + offered[1]), offerer, own, place)
+                yield JointMove((broken + offered[0], cost + offered[1]), offerer, own, place)
 
     def _hear_answer(self, messages: Mapping[str, wire.Message]) -> None:
         """Commit to the partner if it accepted the offer; otherwise use the best own move."""

@@ -1,34 +1,38 @@
-"""Synchronous forward bounding, many partial assignments at a time.
+"""Synchronous Forward Bounding (SFB), with many partial assignments at a time.
 
-Branch and bound with a current partial assignment (CPA) that goes from robot to robot in priority order is Hirayama,
-Yokoo: "Distributed partial constraint satisfaction problem", CP 1997 (SyncBB). That robots which have no value yet
-bound from below what they will have to pay, and so let the holder give up early, is Gershman, Meisels, Zivan:
-"Asynchronous forward bounding for distributed COPs", JAIR 34, 2009, whose names the methods bear:
+Complete branch and bound for minimum cost. A current partial assignment (CPA) goes from robot to robot in priority
+order, as in SyncBB. Robots without a value are bounded from below, as in AFB. Here the CPA itself carries, for each of
+these robots, the cost of each of its values so far, as in partial forward checking. A robot that takes a value adds the
+costs of the constraints that it shares with them; all robots of a scope know it. So the holder alone knows the bound,
+and prunes before it sends: no estimates are requested.
+
+- **When to use**: costs; it is the default for such problems. It needs few messages.
+- **Guarantees**: complete; it terminates with an optimum, or with a proof that there is no solution. Memory is bounded
+  (`memory`).
+- **Parameters (`--set`)**: `batch` (default 4096), `window` (default 1), `memory` (default 64 MiB); see `SFBSettings`.
+- **References**: Hirayama, Yokoo: "Distributed partial constraint satisfaction problem", CP 1997 (SyncBB); Gershman,
+  Meisels, Zivan: "Asynchronous forward bounding for distributed COPs", JAIR 34, 2009 (AFB); partial forward checking:
+  Freuder, Wallace: "Partial constraint satisfaction", AIJ 58, 1992; Larrosa, Meseguer, Schiex: "Maintaining reversible
+  DAC for Max-CSP", AIJ 107, 1999.
+
+The methods and messages correspond to AFB's procedures:
 
     assign_CPA   `_extend`       backtrack      `_explored`
     CPA_MSG      `CPAs`          NEW_SOLUTION   `Solution`
 
-There, copies of the CPA go to those robots, and their estimates come back. Here the CPA itself carries for each of
-them what each of its values would cost by now, as partial forward checking does in one machine (Freuder, Wallace:
-"Partial constraint satisfaction", AIJ 58, 1992; Larrosa, Meseguer, Schiex: "Maintaining reversible DAC for Max-CSP",
-AIJ 107, 1999). Whoever takes a value adds the prices of the constraints that it shares with them; all robots of a
-scope know it. So the holder alone knows the bound, and prunes before it sends: no estimate is asked for.
+Batches are an addition of this project: one message carries many CPAs, all of the same robots. The first ones go alone,
+straight down to a first solution. Then each robot extends twice as many at a time as the time before, up to `batch` and
+`memory`, the lowest bounds first. The search stays depth first, by batches. One robot acts at a time. With `window` at
+2 or more, robots extend the next CPAs while lower robots work on the last ones, an idea of concurrent search (Zivan,
+Meisels: "Concurrent search for distributed CSPs", AIJ 170, 2006). On two cores it gained nothing.
 
-That a message carries many CPAs, all of the same robots, is ours. The first ones go alone, straight down to a first
-solution; then each robot extends twice as many at a time as the time before, up to `batch` and to what may be under way
-(`memory`), the lowest bounds first. The search stays depth first, by bundles: proofs by branch and bound hardly mind,
-as most of what they visit has to be visited in any order, and hundreds of nodes cost one message. One robot acts at a
-time; with the setting `window` at 2 or more, robots extend the next CPAs while those below are busy with the last ones,
-an idea of concurrent search (Zivan, Meisels: "Concurrent search for distributed CSPs", AIJ 170, 2006). On two cores it
-gained nothing.
+The course of a search: first, two waves tell all robots each other's domains. One goes down the order; one comes back
+up, with the charges of the values and an upper bound on all costs. The last robot turns CPAs into solutions. A solution
+that is cheaper than all before goes up the order, and every robot stores its value in it; CPAs carry its cost down.
+When the first robot has nothing left to extend, the last solution is optimal, or there is none.
 
-Complete, for minimisation. First two waves tell all robots each other's values: down the order, and back up, with
-what the values are charged and the most that costs can come to. The last robot turns CPAs into solutions. Each that
-is cheaper than all before is told from robot to robot up the order, and everybody holds its value; CPAs tell those
-below what it costs. When the first robot has nothing left to extend, the last solution is optimal, or there is none.
-
-Constraints may be n-ary: the last but one robot of a scope adds what the last one will pay. Prices are looked up in
-tables that are made before the search (see `LocalProblem.tables`), so all constraint checks are done by then.
+Constraints may be n-ary: the last but one robot of a scope adds the costs that the last one will pay. Costs are read
+from tables that are made before the search (see `LocalProblem.tables`), so all constraint checks are done by then.
 
 >>> from robochoc.communication.simulator.schedule import Concurrent
 >>> from robochoc.communication.simulator.simulator import Simulation

@@ -20,7 +20,7 @@ from robochoc.journal.journal import Header, Journal, metrics_of
 from robochoc.model.outcome import EpochOutcome, Outcome, Verdict
 from robochoc.replay.rebuild import RebuiltRobots
 from robochoc.replay.steps import RecordedRun
-from robochoc.run.evaluation import Search, check_with_files, evaluate
+from robochoc.run.evaluation import Search, check_with_files, evaluate_search
 from robochoc.run.options import CENTRAL
 from robochoc.run.registry import protocol_by_class
 from robochoc.run.withdrawal import Phase
@@ -54,7 +54,7 @@ def with_answer(run: RecordedRun, robots: RebuiltRobots, outcome: Outcome | None
     return ReplayedRun(run, _answer(run, robots, outcome) if outcome else None)
 
 
-def contradictions(journal: Journal, runs: Sequence[ReplayedRun], *, whole: bool) -> Iterator[Contradiction]:
+def contradicted_claims(journal: Journal, runs: Sequence[ReplayedRun], *, whole: bool) -> Iterator[Contradiction]:
     """Yield the claims of the journal that do not follow from its steps.
 
     Args:
@@ -139,7 +139,7 @@ def _answer(run: RecordedRun, robots: RebuiltRobots, outcome: Outcome) -> EpochO
     phase = Phase("", robots.protocol, RunParameters(withdrawal_cost=given.aside), withdrawal)
     check = partial(check_with_files, phase, result, team, robots.compiled)
     try:
-        answer = evaluate(phase, Search(result, check), team.kind)
+        answer = evaluate_search(phase, Search(result, check), team.kind)
     except (RefutedError, TooManySolutionsError):
         return EpochOutcome(Verdict.UNKNOWN, team.order)
     if not withdrawal:

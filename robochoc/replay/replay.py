@@ -16,7 +16,7 @@ import msgspec
 from robochoc.communication.run_result import Progress
 from robochoc.journal.events import Sent
 from robochoc.journal.journal import Journal
-from robochoc.replay.claims import Contradiction, ReplayedRun, contradictions, with_answer
+from robochoc.replay.claims import Contradiction, ReplayedRun, contradicted_claims, with_answer
 from robochoc.replay.comparison import Difference
 from robochoc.replay.rebuild import Rebuilder, ReplayOptions
 from robochoc.replay.run_replay import ReplayStopsError, RunReplay
@@ -112,7 +112,7 @@ class _JournalReplay:
         found: Iterable[Contradiction] = ()
         if difference is None:
             whole = not (self._stopped or self._unfinished or self._journal.damage)
-            found = contradictions(self._journal, self._played, whole=whole)
+            found = contradicted_claims(self._journal, self._played, whole=whole)
         return ReplayResult(
             runs=self._runs,
             robots=len(self._counts),

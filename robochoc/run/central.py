@@ -10,7 +10,7 @@ from robochoc.model.change import describe_change, team_after_events
 from robochoc.model.outcome import Metrics, Outcome, Verdict
 from robochoc.model.problem import ProblemKind, Team
 from robochoc.run.context import RunContext
-from robochoc.run.evaluation import Answer, check
+from robochoc.run.evaluation import Answer, check_assignment
 from robochoc.run.incumbent import robots_without_values
 from robochoc.run.options import CENTRAL, Options, Withdrawal
 from robochoc.solver.central import CentralAnswer, CentralSolver
@@ -73,7 +73,7 @@ def _decide(solver: CentralSolver, team: Team, options: Options) -> _Decision:
     else:
         answer = _answer(solver, team, options)
     if answer.verified:
-        check(team, answer.assignment, answer.withdrawn, maximal=answer.verdict is not Verdict.UNKNOWN)
+        check_assignment(team, answer.assignment, answer.withdrawn, maximal=answer.verdict is not Verdict.UNKNOWN)
     return _Decision(replace(answer, metrics=Metrics(wall_s=time.monotonic() - began)), solutions)
 
 

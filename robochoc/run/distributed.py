@@ -14,7 +14,7 @@ from robochoc.communication.run_result import RobotsLostError, RunResult
 from robochoc.model.outcome import Metrics, Outcome, Verdict
 from robochoc.model.problem import ProblemKind
 from robochoc.protocols.protocol import Protocol
-from robochoc.run.evaluation import Answer, Search, evaluate
+from robochoc.run.evaluation import Answer, Search, evaluate_search
 from robochoc.run.options import Options
 from robochoc.run.withdrawal import Phase, first_phase, second_phase
 
@@ -85,7 +85,7 @@ class Deployment(ABC):
 
     def evaluated(self, phase: Phase, search: Search) -> Answer:
         """Return the answer of `search`, confirmed by the central solver if that is asked for."""
-        answer = evaluate(phase, search, self.kind)
+        answer = evaluate_search(phase, search, self.kind)
         if answer.verdict is Verdict.NO_SOLUTION:
             sure = self.confirm(phase, answer)
             return replace(answer, verified=sure, confirmed=sure)

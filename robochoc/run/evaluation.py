@@ -1,7 +1,7 @@
 """The answer of a search: its verdict, and its assignment once that was checked.
 
-`evaluate` is the same wherever the robots are; how an assignment is checked is given to it. On this machine the files
-are at hand: `check_with_files`. Across machines the robots check (`run/networked/machines.py`).
+`evaluate_search` is the same wherever the robots are; how an assignment is checked is given to it. On this machine the
+files are at hand: `check_with_files`. Across machines the robots check (`run/networked/machines.py`).
 """
 
 from __future__ import annotations
@@ -116,7 +116,7 @@ class Answer:
         )
 
 
-def evaluate(phase: Phase, search: Search, kind: ProblemKind) -> Answer:
+def evaluate_search(phase: Phase, search: Search, kind: ProblemKind) -> Answer:
     """Return the answer of a `search` in `phase`, for a problem of this `kind`.
 
     A protocol that minimises costs has an assignment whenever it is asked. Whether that is proven depends on the
@@ -176,12 +176,14 @@ def check_with_files(phase: Phase, result: RunResult, team: Team, compiled: Comp
             return None
         assignment = best.assignment
     withdrawn = robots_without_values(team, assignment) if phase.withdrawal else ()
-    check(team, assignment, withdrawn, maximal=proven)
+    check_assignment(team, assignment, withdrawn, maximal=proven)
     in_order = {name: assignment[name] for name in team.variables if name in assignment}
     return CheckedAssignment(in_order, assignment_cost(team, assignment), withdrawn)
 
 
-def check(team: Team, assignment: Mapping[str, int], withdrawn: Sequence[str] = (), *, maximal: bool = True) -> None:
+def check_assignment(
+    team: Team, assignment: Mapping[str, int], withdrawn: Sequence[str] = (), *, maximal: bool = True
+) -> None:
     """Check an assignment against every constraint of every file.
 
     Args:

@@ -91,7 +91,7 @@ def matches(template: AgentDescription, description: AgentDescription) -> bool:
     )
 
 
-def check(description: AgentDescription) -> None:
+def check_description(description: AgentDescription) -> None:
     """Raises `RequestRefusedError` where a registration lacks a name, or anything is more than the Directory takes."""
     what = "df-agent-description"
     if not description.name:

@@ -14,8 +14,8 @@ from robochoc.services.descriptions import (
     AgentDescription,
     Reason,
     RequestRefusedError,
-    check,
     check_bounds,
+    check_description,
     matches,
 )
 
@@ -55,7 +55,7 @@ class Directory:
 
     def register(self, description: AgentDescription, now: float, *, requester: str) -> None:
         """Register the description of `requester` until its lease ends."""
-        check(description)
+        check_description(description)
         _authorise(description.name, requester)
         self._lapse(now)
         if description.name in self._registered:
@@ -67,7 +67,7 @@ class Directory:
 
     def modify(self, description: AgentDescription, now: float, *, requester: str) -> None:
         """Replace the description of `requester` by `description`; its lease begins again."""
-        check(description)
+        check_description(description)
         _authorise(description.name, requester)
         self._lapse(now)
         self._known(description.name)

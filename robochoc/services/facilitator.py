@@ -22,7 +22,7 @@ from robochoc.services.sl import (
     description_of,
     max_results_of,
 )
-from robochoc.services.symbolic import Expression, String, SymbolicExpressionError, Word, listed, name
+from robochoc.services.symbolic import Expression, String, SymbolicExpressionError, Word, list_of, name
 
 
 def handle(directory: Directory, requester: str, content: str, now: float) -> tuple[Performative, str]:
@@ -38,7 +38,7 @@ def handle(directory: Directory, requester: str, content: str, now: float) -> tu
             performative = Performative.FAILURE if refused.reason in FAILURES else Performative.REFUSE
             return performative, content_of(action.whole, _proposition(refused.reason, refused.about))
     except SymbolicExpressionError as bad:
-        return Performative.NOT_UNDERSTOOD, content_of(listed("unsupported-value", String(f"{bad} (at {bad.at})")))
+        return Performative.NOT_UNDERSTOOD, content_of(list_of("unsupported-value", String(f"{bad} (at {bad.at})")))
     return Performative.INFORM, content_of(answer)
 
 
@@ -57,16 +57,16 @@ def subscribe(directory: Directory, requester: str, content: str, now: float) ->
         except RequestRefusedError as refused:
             return Performative.REFUSE, content_of(action.whole, _proposition(refused.reason, refused.about))
     except SymbolicExpressionError as bad:
-        return Performative.NOT_UNDERSTOOD, content_of(listed("unsupported-value", String(f"{bad} (at {bad.at})")))
+        return Performative.NOT_UNDERSTOOD, content_of(list_of("unsupported-value", String(f"{bad} (at {bad.at})")))
     return Performative.AGREE, content_of(action.whole, Word("true"))
 
 
 def notification(df: AgentIdentifier, notice: Notice) -> str:
     """Return the content of the INFORM on `notice` to a subscriber: the result of a search for that agent now."""
     searched = described(AgentDescription(notice.name))
-    action = listed("action", expression_of(df), listed(Function.SEARCH, searched))
+    action = list_of("action", expression_of(df), list_of(Function.SEARCH, searched))
     found = [] if notice.description is None else [described(notice.description)]
-    return content_of(listed("result", action, listed("set", *found)))
+    return content_of(list_of("result", action, list_of("set", *found)))
 
 
 def _answer(directory: Directory, requester: str, action: Action, now: float) -> Expression:
@@ -82,10 +82,10 @@ def _answer(directory: Directory, requester: str, action: Action, now: float) ->
             directory.deregister(_only(action).name, requester=requester)
         case Function.SEARCH:
             found = _search(directory, action, now)
-            return listed("result", action.whole, listed("set", *map(described, found)))
+            return list_of("result", action.whole, list_of("set", *map(described, found)))
         case other:
             raise RequestRefusedError(Reason.UNSUPPORTED_FUNCTION, other[:40])
-    return listed("done", action.whole)
+    return list_of("done", action.whole)
 
 
 def _search(directory: Directory, action: Action, now: float) -> Sequence[AgentDescription]:
@@ -110,4 +110,4 @@ def _arguments(action: Action, at_most: int) -> tuple[Expression, ...]:
 
 def _proposition(reason: Reason, about: Sequence[str]) -> Expression:
     """Return the proposition `reason` in SL0; one without arguments is the bare word."""
-    return listed(reason, *map(name, about)) if about else Word(reason)
+    return list_of(reason, *map(name, about)) if about else Word(reason)

@@ -10,7 +10,7 @@ from robochoc.services.symbolic import (
     SymbolicExpressionError,
     Word,
     items_of,
-    listed,
+    list_of,
     name,
     parameters,
     text_of,
@@ -55,10 +55,10 @@ def expression_of(identifier: AgentIdentifier) -> List:
     """`(agent-identifier :name ... :addresses (sequence ...) :resolvers (sequence ...))`, without what is empty."""
     items: list[Expression] = [Word(":name"), name(identifier.name)]
     if identifier.addresses:
-        items += [Word(":addresses"), listed("sequence", *map(name, identifier.addresses))]
+        items += [Word(":addresses"), list_of("sequence", *map(name, identifier.addresses))]
     if identifier.resolvers:
-        items += [Word(":resolvers"), listed("sequence", *map(expression_of, identifier.resolvers))]
-    return listed("agent-identifier", *items)
+        items += [Word(":resolvers"), list_of("sequence", *map(expression_of, identifier.resolvers))]
+    return list_of("agent-identifier", *items)
 
 
 def identifier_of(expression: Expression) -> AgentIdentifier:

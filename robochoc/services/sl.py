@@ -23,7 +23,7 @@ from robochoc.services.symbolic import (
     Word,
     head_of,
     items_of,
-    listed,
+    list_of,
     name,
     parameters,
     read,
@@ -72,8 +72,8 @@ def request(
     arguments: list[Expression] = [described(description)]
     if function is Function.SEARCH:
         constraints = () if max_results is None else (Word(":max-results"), Word(str(max_results)))
-        arguments.append(listed("search-constraints", *constraints))
-    return content_of(listed("action", expression_of(df), listed(function, *arguments)))
+        arguments.append(list_of("search-constraints", *constraints))
+    return content_of(list_of("action", expression_of(df), list_of(function, *arguments)))
 
 
 def action_in(content: str) -> Action:
@@ -125,7 +125,7 @@ def described(description: AgentDescription) -> List:
     items += _names_text(description)
     if description.lease_s is not None:
         items += [Word(":lease-time"), Word(_lease_text(description.lease_s))]
-    return listed(_AGENT, *items)
+    return list_of(_AGENT, *items)
 
 
 def description_of(expression: Expression) -> AgentDescription:
@@ -179,9 +179,12 @@ def _service_text(service: ServiceDescription) -> List:
     items += _names_text(service)
     items += _set(
         "properties",
-        (listed(_PROPERTY, Word(":name"), name(key), Word(":value"), name(value)) for key, value in service.properties),
+        (
+            list_of(_PROPERTY, Word(":name"), name(key), Word(":value"), name(value))
+            for key, value in service.properties
+        ),
     )
-    return listed(_SERVICE, *items)
+    return list_of(_SERVICE, *items)
 
 
 def _service_of(expression: Expression) -> ServiceDescription:
@@ -237,7 +240,7 @@ def _names_text(description: AgentDescription | ServiceDescription) -> list[Expr
 def _set(key: str, members: Iterable[Expression]) -> list[Expression]:
     """`:key (set ...)`; nothing for an empty one."""
     items = tuple(members)
-    return [Word(f":{key}"), listed("set", *items)] if items else []
+    return [Word(f":{key}"), list_of("set", *items)] if items else []
 
 
 def _lease_text(lease_s: float) -> str:

@@ -120,7 +120,7 @@ def name(text: str) -> Word | String:
     return Word(text) if _SAFE_NAME.fullmatch(text) else String(text)
 
 
-def listed(head: str, *items: Expression) -> List:
+def list_of(head: str, *items: Expression) -> List:
     """Return the list that begins with the word `head`."""
     return List((Word(head), *items))
 

@@ -22,7 +22,7 @@ from robochoc.services.symbolic import (
     Word,
     head_of,
     items_of,
-    listed,
+    list_of,
     name,
     parameters,
     read,
@@ -91,7 +91,7 @@ def text(message: ACLMessage) -> str:
         items += [Word(":sender"), expression_of(message.sender)]
     for key, agents in (("receiver", message.receiver), ("reply-to", message.reply_to)):
         if agents:
-            items += [Word(f":{key}"), listed("set", *map(expression_of, agents))]
+            items += [Word(f":{key}"), list_of("set", *map(expression_of, agents))]
     for key in _TEXTS:
         value: str | None = getattr(message, key.replace("-", "_"))
         if value is not None:
@@ -100,7 +100,7 @@ def text(message: ACLMessage) -> str:
         items += [Word(":reply-by"), Word(message.reply_by)]
     for key, value in message.user:
         items += [Word(f":X-{key[2:]}"), name(value)]
-    return written(listed(message.performative.upper(), *items))
+    return written(list_of(message.performative.upper(), *items))
 
 
 def parse(message: str) -> ACLMessage:

@@ -28,7 +28,7 @@ def shorts() -> array[int]:
     return array("H")
 
 
-def packed(parts: Iterable[Column]) -> bytes:
+def packed_columns(parts: Iterable[Column]) -> bytes:
     """Return the columns as bytes, one after the other, little-endian."""
     return b"".join(map(_little_endian, parts))
 

@@ -24,7 +24,7 @@ _TITLE = "<title>Sniffer</title>"
 """Of the document, until something has one."""
 
 
-def page(mode: Mode, embedded: Mapping[str, bytes] | None = None, title: str = "Sniffer") -> bytes:
+def sniffer_page(mode: Mode, embedded: Mapping[str, bytes] | None = None, title: str = "Sniffer") -> bytes:
     """Return the page, in UTF-8. The same answers make the same page.
 
     Args:

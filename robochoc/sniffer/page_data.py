@@ -22,7 +22,7 @@ from robochoc.model.outcome import EpochOutcome, Outcome, Verdict
 from robochoc.model.priorities import natural_key
 from robochoc.sniffer.acl import text
 from robochoc.sniffer.acl_messages import AclMessages
-from robochoc.sniffer.columns import packed
+from robochoc.sniffer.columns import packed_columns
 from robochoc.sniffer.recorded_messages import RunProtocols
 from robochoc.sniffer.sentences import sentence
 from robochoc.sniffer.team_names import TeamNames
@@ -54,7 +54,7 @@ def message_columns(trace: Trace, first: int, end: int) -> bytes:
     """Return the columns of the messages from `first` to before `end`."""
     of = trace.messages
     columns = (of.t, of.clock, of.step, of.bytes, of.sender, of.receiver, of.kind, of.run)
-    return packed(column[first:end] for column in columns)
+    return packed_columns(column[first:end] for column in columns)
 
 
 def step_columns(trace: Trace, first: int, end: int) -> bytes:
@@ -62,7 +62,7 @@ def step_columns(trace: Trace, first: int, end: int) -> bytes:
     of = trace.steps
     packets = trace.packets[_end_before(of.packet_end, first) : _end_before(of.packet_end, end)]
     columns = (of.t[first:end], of.clock[first:end], of.checks[first:end], of.packet_end[first:end], packets)
-    return packed((*columns, of.robot[first:end], of.run[first:end]))
+    return packed_columns((*columns, of.robot[first:end], of.run[first:end]))
 
 
 def _end_before(ends: Sequence[int], step: int) -> int:

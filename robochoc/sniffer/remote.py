@@ -90,10 +90,10 @@ def receive(
         if run is None:
             return STOPPED
         granted()
-        return sniffer.follow(Arriving(place, run, sink), patience_s, stopped)
+        return sniffer.follow(IncomingJournal(place, run, sink), patience_s, stopped)
 
 
-class Arriving:
+class IncomingJournal:
     """The part of the journal of `run` received from the master at `place`; `sink` gets its valid blocks."""
 
     def __init__(self, place: Address, run: str, sink: Callable[[bytes], object]) -> None:
@@ -161,7 +161,7 @@ class _Sniffer:
             f"the master at {self._place} does not answer {self._name}; is it enrolled with its Authority?"
         )
 
-    def follow(self, journal: Arriving, patience_s: float, stopped: Callable[[], bool]) -> Followed:
+    def follow(self, journal: IncomingJournal, patience_s: float, stopped: Callable[[], bool]) -> Followed:
         """Request piece after piece of the journal."""
         heard = time.monotonic()
         while not stopped():

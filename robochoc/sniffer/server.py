@@ -18,9 +18,9 @@ import msgspec
 from tornado.web import Application
 from tornado.websocket import WebSocketClosedError
 
-from robochoc.sniffer.page import page
+from robochoc.sniffer.page import sniffer_page
 from robochoc.sniffer.page_data import BadRequestError
-from robochoc.sniffer.session import NotBegunError, Session
+from robochoc.sniffer.session import NotBegunError, SnifferSession
 from robochoc.view.address import loopback_socket, secret_path, url_of
 from robochoc.view.loopback import SecretHandler, SecretPage, SecretSocket, application, in_browser, served
 
@@ -37,8 +37,8 @@ _HEAD_PATIENCE_S = 20.0
 R = TypeVar("R")
 
 
-def serve(
-    session: Session, *, port: int = 0, open_browser: bool = False, ready: Callable[[str], None] | None = None
+def serve_sniffer(
+    session: SnifferSession, *, port: int = 0, open_browser: bool = False, ready: Callable[[str], None] | None = None
 ) -> None:
     """Serve `session` to browsers of this machine, until interrupted (Ctrl-C); then return.
 
@@ -51,7 +51,9 @@ def serve(
         asyncio.run(_serve(session, port, ready, open_browser=open_browser))
 
 
-async def _serve(session: Session, port: int, ready: Callable[[str], None] | None, *, open_browser: bool) -> None:
+async def _serve(
+    session: SnifferSession, port: int, ready: Callable[[str], None] | None, *, open_browser: bool
+) -> None:
     with loopback_socket(port) as here:
         token = secret_path()
         url = url_of(here, f"{token}/")
@@ -68,7 +70,9 @@ class Server:
     `seen` is called when the first page has connected. The journal is not read before the first request.
     """
 
-    def __init__(self, session: Session, listener: socket, token: str, seen: Callable[[], None] = lambda: None) -> None:
+    def __init__(
+        self, session: SnifferSession, listener: socket, token: str, seen: Callable[[], None] = lambda: None
+    ) -> None:
         self.session = session
         self.token = token
         self._listener = listener
@@ -149,7 +153,7 @@ class Server:
 
     def _application(self) -> Application:
         known = {"server": self}
-        whole = {"secret": self.token, "page": page("served")}
+        whole = {"secret": self.token, "page": sniffer_page("served")}
         return application(
             [
                 (r"/([^/]*)/", SecretPage, whole),

@@ -29,7 +29,7 @@ class NotBegunError(BadRequestError):
     """A session without a trace: the journal has no header yet, or another journal has replaced it."""
 
 
-class Session:
+class SnifferSession:
     """One journal: `source` is its path, or a descriptor of the file, which may still be written.
 
     `chosen` are names or patterns of the robots to show at first, `robots` those whose files are known besides the

@@ -72,9 +72,9 @@ async def _serve(
     listening: socket.socket, journal: int, settings: dict[str, list[str]], parent: _Parent, *, over: bool
 ) -> None:
     from robochoc.sniffer.server import Server  # noqa: PLC0415 - when somebody looks
-    from robochoc.sniffer.session import Session  # noqa: PLC0415
+    from robochoc.sniffer.session import SnifferSession  # noqa: PLC0415
 
-    session = Session(journal, live=True, chosen=settings["chosen"])
+    session = SnifferSession(journal, live=True, chosen=settings["chosen"])
     if over:
         session.finish()
     serving = asyncio.create_task(Server(session, listening, str(settings["token"]), parent.tell).serve())

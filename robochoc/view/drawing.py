@@ -17,7 +17,7 @@ from robochoc.view.label import label
 from robochoc.view.meshcat_commands import MeshcatCommands, Track
 from robochoc.view.palette import GREY, RED, Colour, colours
 from robochoc.view.playback import DroneState, Playback
-from robochoc.view.quadrotor import HUB, Shape, box, disc, joined, quadrotor
+from robochoc.view.quadrotor import HUB, Shape, box, disc, joined_shapes, quadrotor
 from robochoc.view.scene import DrawnDrone, Scene
 
 _Corners = npt.NDArray[np.float64]
@@ -153,7 +153,7 @@ def _draw_ground(meshcat: MeshcatCommands, scene: Scene, extent: _Corners) -> No
     if scene.drones:
         paint = row_colours(scene.drones)
         pads = [disc(drone.home, 0.36, colour) for drone, colour in zip(scene.drones, paint, strict=True)]
-        meshcat.mesh("ground/pads", joined(pads), _WHITE, opacity=0.45)
+        meshcat.mesh("ground/pads", joined_shapes(pads), _WHITE, opacity=0.45)
         meshcat.place("ground/pads", (0, 0, -0.01))
 
 

@@ -19,7 +19,7 @@ from robochoc.view.page import live_page
 from robochoc.view.scene import Scene
 
 
-def serve(
+def serve_scene(
     scene: Scene, *, port: int = 0, open_browser: bool = False, ready: Callable[[str], None] | None = None
 ) -> None:
     """Show `scene` to every browser of this machine that asks, until interrupted (Ctrl-C); then return.

@@ -23,7 +23,7 @@ _PLAYER = ("labels.js", "trails.js", "camera.js", "player.js", "timeline.js", "p
 """The player's parts. In this order they are one script."""
 
 
-def page(scene: Scene) -> bytes:
+def scene_page(scene: Scene) -> bytes:
     """Return the page, UTF-8.
 
     It plays by itself once, needs no server and no network, and is the same for equal scenes.

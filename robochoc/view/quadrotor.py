@@ -37,7 +37,7 @@ def quadrotor() -> Shape:
     parts = [_body(), _bar((-_REACH, -_REACH), (_REACH, _REACH)), _bar((-_REACH, _REACH), (_REACH, -_REACH))]
     parts += [_rotor(x, y) for x, y in corners]
     parts += [_skid(side) for side in (-0.11, 0.11)]
-    whole = joined(parts)
+    whole = joined_shapes(parts)
     return whole._replace(vertices=whole.vertices - np.array(HUB))
 
 
@@ -58,7 +58,7 @@ def box(centre: tuple[float, float, float], size: float) -> Shape:
     return _painted(corners, faces, 1)
 
 
-def joined(parts: list[Shape]) -> Shape:
+def joined_shapes(parts: list[Shape]) -> Shape:
     """Return several shapes as one."""
     before = np.cumsum([0, *(len(part.vertices) for part in parts)])
     return Shape(
@@ -116,7 +116,7 @@ def _rotor(x: float, y: float) -> Shape:
     guard = _painted(ring, _band(sides), _ROTOR)
     blade = np.array([[-0.13, -0.012, height], [0.13, -0.03, height], [0.13, 0.012, height], [-0.13, 0.03, height]])
     blades = _painted(blade, np.array([[0, 1, 2], [0, 2, 3]]), _DARK)
-    whole = joined([guard, blades])
+    whole = joined_shapes([guard, blades])
     return whole._replace(vertices=whole.vertices + np.array([x, y, 0]))
 
 
@@ -128,4 +128,4 @@ def _skid(side: float) -> Shape:
         for x in (-0.1, 0.1)
     ]
     triangle = np.array([[0, 1, 2]])
-    return joined([_painted(runner, _band(3), _DARK), *(_painted(leg, triangle, _DARK) for leg in legs)])
+    return joined_shapes([_painted(runner, _band(3), _DARK), *(_painted(leg, triangle, _DARK) for leg in legs)])

@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 
 from robochoc.journal.journal import lines_of
-from robochoc.sniffer.session import Session
+from robochoc.sniffer.session import SnifferSession
 from tests.support.sniffer_pages import (
     ALL,
     CONTRAST,
@@ -199,7 +199,7 @@ def test_a_live_page_waits_for_robots_and_knows_when_nobody_saw_the_end(tab: Pag
     file = tmp_path / "run.journal"
     file.write_bytes(b"")
     server: SnifferServer
-    with sniffer_server(Session(file, live=True)) as server:
+    with sniffer_server(SnifferSession(file, live=True)) as server:
         page = tab.context.new_page()
         page.goto(server.url)
         text_is(page, "#nothing", "Waiting for the robots")

@@ -14,8 +14,8 @@ from PIL import Image
 
 from robochoc.journal.journal import lines_of
 from robochoc.sniffer.embedded import embedded_answers
-from robochoc.sniffer.page import page as page_of
-from robochoc.sniffer.session import Session
+from robochoc.sniffer.page import sniffer_page as page_of
+from robochoc.sniffer.session import SnifferSession
 from tests.support.sniffer_pages import (
     ALL,
     CONTRAST,
@@ -46,7 +46,7 @@ def test_a_run_is_followed_until_somebody_looks_elsewhere(browser: Any, tmp_path
     file = tmp_path / "run.journal"
     place = 600
     file.write_bytes(b"".join(lines[:place]))
-    with sniffer_server(Session(file, live=True)) as server, file.open("ab") as writing:
+    with sniffer_server(SnifferSession(file, live=True)) as server, file.open("ab") as writing:
 
         def more(end: int) -> None:
             nonlocal place
@@ -73,7 +73,7 @@ def test_a_server_that_ends_is_told_and_what_is_seen_stays(browser: Any, tmp_pat
     file = tmp_path / "run.journal"
     file.write_bytes(b"".join(list(lines_of(JOURNAL))[:600]))
     with ExitStack() as ends:
-        server = ends.enter_context(sniffer_server(Session(file, live=True)))
+        server = ends.enter_context(sniffer_server(SnifferSession(file, live=True)))
         count = server.json("about")["messages"]
         with shown(browser, server.url, f"{count} messages") as page:
             ends.close()
@@ -85,12 +85,12 @@ def test_a_server_that_ends_is_told_and_what_is_seen_stays(browser: Any, tmp_pat
 def test_damage_and_an_empty_journal_are_told(browser: Any, tmp_path: Path) -> None:  # noqa: ANN401
     file = tmp_path / "run.journal"
     file.write_bytes(b"".join(list(lines_of(JOURNAL))[:300]) + b"nonsense\n")
-    with sniffer_server(Session(file)) as server:
+    with sniffer_server(SnifferSession(file)) as server:
         until(lambda: server.json("about")["damage"], "no damage")
         with shown(browser, server.url, f"{server.json('about')['messages']} messages") as page:
             assert "The journal is damaged" in page.inner_text("#notices")
     file.write_bytes(journal_of([], OUTCOME))
-    with sniffer_server(Session(file)) as server, shown(browser, server.url, "0 messages") as page:
+    with sniffer_server(SnifferSession(file)) as server, shown(browser, server.url, "0 messages") as page:
         until(lambda: "There are no messages" in page.inner_text("#notices"), "an empty page without a notice")
 
 
@@ -104,7 +104,7 @@ def test_names_of_strangers_are_text(browser: Any, tmp_path: Path) -> None:  # n
     file = tmp_path / "run.journal"
     kept = [json.dumps(line, separators=(",", ":")) + "\n" for line in lines if line["event"] != "Given"]
     file.write_text("".join(kept))
-    with sniffer_server(Session(file)) as server, shown(browser, server.url) as page:
+    with sniffer_server(SnifferSession(file)) as server, shown(browser, server.url) as page:
         names = [one["name"] for one in server.json("about")["robots"]]
         page.evaluate(f"Sniffer.page.robot({names.index(HOSTILE)})")
         choose(page, 0)

@@ -18,7 +18,7 @@ from PIL import Image
 
 from robochoc.flight.log import FlightLog
 from robochoc.flight.mission import mission_of
-from robochoc.view.page import page
+from robochoc.view.page import scene_page
 from robochoc.view.scene import Scene, scene_of
 from tests.support.browser_pages import watched_page
 from tests.support.flights import LEG_S, epochs_of_three, five, straight
@@ -42,7 +42,7 @@ def scene(**how: Any) -> Scene:  # noqa: ANN401 - `straight`'s
 @pytest.fixture(scope="module")
 def file(tmp_path_factory: pytest.TempPathFactory) -> Path:
     html = tmp_path_factory.mktemp("flown") / "page.html"
-    html.write_bytes(page(scene(falls={1: 3.0}, obstacles=((2.0, 1.0, 5.0),))))
+    html.write_bytes(scene_page(scene(falls={1: 3.0}, obstacles=((2.0, 1.0, 5.0),))))
     return html
 
 
@@ -298,7 +298,7 @@ def small(browser: Any, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Pa
     first, second, third = playback.chapters
     playback = replace(playback, chapters=(first, second, replace(third, begins_s=second.begins_s)))
     html = tmp_path_factory.mktemp("small") / "page.html"
-    html.write_bytes(page(replace(whole, playback=playback)))
+    html.write_bytes(scene_page(replace(whole, playback=playback)))
     screen = {"width": 360, "height": 640}
     with opened(browser, html.as_uri(), viewport=screen, color_scheme="dark", reduced_motion="reduce") as shown:
         yield shown
@@ -359,7 +359,7 @@ def test_a_narrow_dark_page_has_room_for_all(small: Page) -> None:
 def test_without_a_flight_there_is_nothing_to_play(browser: Any, tmp_path: Path) -> None:  # noqa: ANN401 - Playwright's
     bare = Scene("a team: a solution", (("flight", "none"),), scene().drones, scene().axes)
     html = tmp_path / "page.html"
-    html.write_bytes(page(bare))
+    html.write_bytes(scene_page(bare))
     with opened(browser, html.as_uri()) as shown:
         assert shown.locator("#play").is_hidden()
         assert shown.locator("#time").is_hidden()
@@ -373,10 +373,10 @@ LIVE = """
 import sys
 from tests.support.flights import epochs_of_three, five, straight
 from robochoc.flight.mission import mission_of
-from robochoc.view.live import serve
+from robochoc.view.live import serve_scene
 from robochoc.view.scene import scene_of
 outcome, mission = epochs_of_three(), mission_of(epochs_of_three(), five())
-serve(scene_of(outcome, mission, straight(mission)), ready=lambda url: print(url, flush=True))
+serve_scene(scene_of(outcome, mission, straight(mission)), ready=lambda url: print(url, flush=True))
 """
 
 

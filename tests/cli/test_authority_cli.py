@@ -13,7 +13,7 @@ from click.testing import CliRunner, Result
 
 from robochoc.authority.authority import Authority
 from robochoc.authority.certificates import fingerprint, new_key, signing_request
-from robochoc.authority.token import Token
+from robochoc.authority.token import EnrolmentToken
 from robochoc.cli.group import cli
 from tests.support.program import ROOT
 
@@ -62,7 +62,7 @@ def test_tokens_that_are_printed_work(folder: Path) -> None:
     lines = dict(line.split(" ") for line in result.stdout.splitlines())
     assert list(lines) == ["Robot1.1", "Robot1.2"]
     for name, text in lines.items():
-        token = Token.parse(text)
+        token = EnrolmentToken.parse(text)
         assert token.fingerprint == fingerprint(authority.certificate)
         authority.redeem(token.secret, signing_request(new_key(), name))
     assert states(folder) == {"Robot1.1": "in force", "Robot1.2": "in force"}
@@ -79,7 +79,7 @@ def test_a_whole_team_by_its_files_names(folder: Path, tmp_path: Path) -> None:
         ("Robot2", "robot", 24),
         ("Robot10", "robot", 24),
     ]
-    Token.parse(rows[0]["token"])
+    EnrolmentToken.parse(rows[0]["token"])
     assert set(states(folder)) == {"Robot2", "Robot10"}
 
 

@@ -40,11 +40,11 @@ from robochoc.communication.network.framing import MASTER, FrameRefusedError, Fr
 from robochoc.communication.network.profile import (
     Profile,
     ProfileError,
-    contradictions,
     domain_of,
     in_priority_order,
     missing,
     possible_neighbours,
+    profile_contradictions,
     profile_of,
     visible_robot,
 )
@@ -208,7 +208,7 @@ def _introduce(profile: Profile) -> bool:
         return False
     others = {one.name: profile_of(one) for one in _teams()[0].robots}
     profiles = {**others, profile.name: profile}
-    wrong = list(contradictions(profiles))
+    wrong = list(profile_contradictions(profiles))
     missing(profiles)
     possible_neighbours(profiles)
     if not wrong:

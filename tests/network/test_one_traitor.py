@@ -9,7 +9,7 @@ from typing import Any
 import msgspec
 import pytest
 
-from robochoc.cli.reports.outcome import report
+from robochoc.cli.reports.outcome import outcome_report
 from robochoc.communication.control import Conclusion, Counters, Ready
 from robochoc.communication.network.audited_state import AuditedSearchState
 from robochoc.communication.network.control_messages import Charge, DetailedReport, Exchanged
@@ -194,7 +194,7 @@ SAID = Outcome("t", "abt", "network", 0, Verdict.NO_SOLUTION, witness="RB")
 def test_on_whose_word_a_verdict_rests(found: dict[str, Any], claimed_by: str | None, words: str) -> None:
     outcome = claimed(replace(SAID, **found))
     assert outcome.claimed_by == claimed_by
-    assert report(CHAIN, outcome).splitlines()[0] == words
+    assert outcome_report(CHAIN, outcome).splitlines()[0] == words
     told = msgspec.json.decode(result_json(outcome))
     assert told.get("claimed_by") == claimed_by
     assert told.get("checked") == (outcome.checked and outcome.checked._asdict())
@@ -204,7 +204,7 @@ def test_on_whose_word_a_verdict_rests(found: dict[str, Any], claimed_by: str | 
 
 def test_on_this_machine_a_witness_is_no_more_than_that() -> None:
     outcome = replace(SAID, runtime="simulator")
-    assert report(CHAIN, outcome).startswith("t: no solution (RB has ruled everything out)\n")
+    assert outcome_report(CHAIN, outcome).startswith("t: no solution (RB has ruled everything out)\n")
     assert "claimed_by" not in msgspec.json.decode(result_json(outcome))
 
 

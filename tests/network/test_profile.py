@@ -22,10 +22,10 @@ from robochoc.communication.network.profile import (
     Profile,
     ProfileError,
     among,
-    contradictions,
     domain_of,
     missing,
     possible_neighbours,
+    profile_contradictions,
     profile_of,
     ranges_of,
     visible_robot,
@@ -149,7 +149,7 @@ def test_profiles_travel_and_agree(team: Team) -> None:
     for name, profile in profiles.items():
         assert msgspec.msgpack.decode(msgspec.msgpack.encode(profile), type=Profile) == profile
         assert missing({name: profile}) == set(profile.neighbours)
-    assert not list(contradictions(profiles))
+    assert not list(profile_contradictions(profiles))
     assert not missing(profiles)
 
 
@@ -264,8 +264,8 @@ def two(**news: object) -> dict[str, Profile]:
 
 
 def test_profiles_that_agree_do_not_contradict() -> None:
-    assert not list(contradictions(two()))
-    assert not list(contradictions({}))
+    assert not list(profile_contradictions(two()))
+    assert not list(profile_contradictions({}))
 
 
 @pytest.mark.parametrize(
@@ -279,13 +279,13 @@ def test_profiles_that_agree_do_not_contradict() -> None:
     ids=["variable", "no parent", "both above", "kinds"],
 )
 def test_contradictions_are_named(profiles: dict[str, Profile], why: str) -> None:
-    assert why in list(contradictions(profiles))
+    assert why in list(profile_contradictions(profiles))
 
 
 def test_a_parent_that_knows_no_child_contradicts() -> None:
     profiles = two()
     profiles["A"] = msgspec.structs.replace(profiles["A"], children=())
-    assert list(contradictions(profiles)) == ["B calls A its parent, which does not list it as a child"]
+    assert list(profile_contradictions(profiles)) == ["B calls A its parent, which does not list it as a child"]
 
 
 def test_parents_in_a_circle_contradict() -> None:
@@ -293,7 +293,7 @@ def test_parents_in_a_circle_contradict() -> None:
         name: Profile(name, ProblemKind.DISCSP, (above,), (below,), {}, {}, 1, 0, ())
         for above, name, below in (("C", "A", "B"), ("A", "B", "C"), ("B", "C", "A"))
     }
-    (why,) = contradictions(around)
+    (why,) = profile_contradictions(around)
     assert why.startswith("the parents form a cycle: ")
     assert set(why.partition(": ")[2].split(" -> ")) == {"A", "B", "C"}
 
@@ -301,5 +301,5 @@ def test_parents_in_a_circle_contradict() -> None:
 def test_only_robots_that_are_there_are_held_against_each_other() -> None:
     profiles = two()
     del profiles["A"]
-    assert not list(contradictions(profiles))
+    assert not list(profile_contradictions(profiles))
     assert missing(profiles) == {"A"}

@@ -17,7 +17,16 @@ from robochoc.journal.events import AnyEvent, Sent
 from robochoc.model.expression import Type, parse
 from robochoc.model.problem import Constraint, Predicate, Team
 from robochoc.protocols import dpop_tables
-from robochoc.protocols.dpop_tables import Arriving, Extent, Table, aligned, bytes_of, is_hopeless, packed, project
+from robochoc.protocols.dpop_tables import (
+    Extent,
+    IncomingTable,
+    Table,
+    aligned,
+    bytes_of,
+    is_hopeless,
+    packed_costs,
+    project,
+)
 from robochoc.protocols.dpop_tables import width_of as width_for
 from robochoc.run import Options, Runtime, solve
 from tests.support.cost_problems import with_costs
@@ -91,8 +100,8 @@ def test_a_table_comes_as_it_went(
     costs = np.full((5, 7), 2**64 - 1, "<u8")
     costs[1:4, 2:] = np.arange(15).reshape(3, 5) % (dearest + 1)
     costs[0, 3] = dearest
-    arriving = Arriving((5, 7), 2**50)
-    for told, costs_told in packed(costs):
+    arriving = IncomingTable((5, 7), 2**50)
+    for told, costs_told in packed_costs(costs):
         assert told == width
         assert len(costs_told) <= piece
         assert not arriving.complete
@@ -102,7 +111,7 @@ def test_a_table_comes_as_it_went(
 
 
 def test_pieces_that_do_not_fit_are_refused_before_any_memory_is_taken() -> None:
-    arriving = Arriving((1000, 1000), 300)
+    arriving = IncomingTable((1000, 1000), 300)
     for width, piece in ((2, bytes(3)), (1, b""), (1, bytes(1_000_001)), (4, bytes(4)), (2, b"\x2d\x01")):
         with pytest.raises(ValueError, match=r"no piece|are not what|more than the most"):
             arriving.add(width, piece)  # type: ignore[arg-type]
@@ -131,7 +140,7 @@ def test_arrays_never_hold_more_than_was_told_before(seed: int) -> None:
         tracemalloc.reset_peak()
         costs, choices = project(shape, [0.0] * own, tables, width)
         tables.clear()
-        pieces = list(packed(costs))
+        pieces = list(packed_costs(costs))
         peak = tracemalloc.get_traced_memory()[1]
     finally:
         tracemalloc.stop()

@@ -17,9 +17,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from robochoc.ros.live import rosbridge_connection
-from robochoc.ros.live.inbox import Inbox
+from robochoc.ros.live.inbox import RosInbox
 from robochoc.ros.live.rosbridge import RosbridgeSink, RosbridgeSource
-from robochoc.ros.live.rosbridge_connection import Address
+from robochoc.ros.live.rosbridge_connection import RosbridgeAddress
 from robochoc.ros.live.rosbridge_json import MalformedMessageError, incoming, outgoing
 from robochoc.ros.sink import SinkError
 from robochoc.ros.source import ReceivedMessage, SourceError
@@ -266,7 +266,7 @@ def test_a_program_whose_server_dies_ends_in_silence(tmp_path: Path) -> None:
     ],
 )
 def test_places(place: str, url: str) -> None:
-    assert Address.of(place).url == url
+    assert RosbridgeAddress.of(place).url == url
 
 
 @pytest.mark.parametrize(
@@ -317,7 +317,7 @@ def test_what_we_send_we_understand(stamp: int, fields: dict[str, object]) -> No
 
 
 def test_a_loud_topic_does_not_push_out_others() -> None:
-    inbox = Inbox(per_topic=10, weight=1000)
+    inbox = RosInbox(per_topic=10, weight=1000)
     inbox.put(ReceivedMessage("/blocked", "a", {}, 0))
     for number in range(100):
         inbox.put(ReceivedMessage("/battery", "b", {}, number))

@@ -19,7 +19,7 @@ from robochoc.model.outcome import Outcome
 from robochoc.run import solve
 from robochoc.run.options import Options, Runtime, Withdrawal
 from robochoc.sniffer.server import Server
-from robochoc.sniffer.session import Session
+from robochoc.sniffer.session import SnifferSession
 from robochoc.view.address import loopback_socket, url_of
 
 TOKEN = "a-path-that-nobody-guesses"  # noqa: S105 - it is for tests
@@ -47,7 +47,7 @@ def journal_of(events: list[AnyEvent], outcome: Outcome | None, of: Header | Non
 class SnifferServer:
     """A server that runs in a thread of its own. `get` asks it for an answer."""
 
-    def __init__(self, session: Session) -> None:
+    def __init__(self, session: SnifferSession) -> None:
         self._ready = threading.Event()
         self._session = session
         self.loop = asyncio.new_event_loop()
@@ -104,6 +104,6 @@ class SnifferServer:
 
 
 @contextmanager
-def sniffer_server(session: Session) -> Iterator[SnifferServer]:
+def sniffer_server(session: SnifferSession) -> Iterator[SnifferServer]:
     with SnifferServer(session) as server:
         yield server

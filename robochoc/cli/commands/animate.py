@@ -8,7 +8,7 @@ import click
 
 from robochoc.cli.options.pages import html_option, serve_option
 from robochoc.cli.options.paths import InputPath, refuse_same_places
-from robochoc.cli.options.saved import saved_outcome, team_of, team_option
+from robochoc.cli.options.saved import saved_outcome, saved_team, team_option
 from robochoc.cli.reports.failures import invalid_input_fails
 
 
@@ -36,5 +36,5 @@ def animate(saved: Path, html: Path | None, folder: Path | None, port: int, *, s
         raise click.UsageError("--port is for --serve")
     refuse_same_places({"--html": html}, {"the result": saved}, teams=[folder] if folder else [])
     outcome = saved_outcome(saved)
-    team = team_of(outcome, saved, folder)
+    team = saved_team(outcome, saved, folder)
     show_scene(scene_for(outcome, team), html, serve=serve, port=port)

@@ -46,9 +46,9 @@ def authority() -> None:
 def init(folder: Path | None) -> None:
     """Create an Authority: a key and a certificate for ten years."""
     with _failures_told():
-        from robochoc.authority.authority import Authority, default_folder
+        from robochoc.authority.authority import Authority, default_authority_folder
 
-        made = Authority.create(folder or default_folder())
+        made = Authority.create(folder or default_authority_folder())
         until = made.certificate.not_valid_after_utc
         click.echo(f"{made.folder}: a new Authority, until {until:%Y-%m-%d}; next: robochoc authority enrol NAME")
 
@@ -158,9 +158,9 @@ def revoke(name: str, folder: Path | None) -> None:
 
 @contextmanager
 def _opened(folder: Path | None) -> Iterator[Authority]:
-    from robochoc.authority.authority import Authority, default_folder
+    from robochoc.authority.authority import Authority, default_authority_folder
 
-    yield Authority.open(folder or default_folder())
+    yield Authority.open(folder or default_authority_folder())
 
 
 @contextmanager

@@ -16,7 +16,7 @@ from robochoc.cli.options.ros import (
     ros_options,
 )
 from robochoc.cli.options.ros_setup import conditions_of, open_sinks, ros_errors_fail, sink_places
-from robochoc.cli.options.saved import saved_outcome, team_of, team_option
+from robochoc.cli.options.saved import saved_outcome, saved_team, team_option
 from robochoc.cli.options.sections import COMMON, SectionedCommand, Sections
 from robochoc.cli.reports.failures import INVALID, LOST, Failure, invalid_input_fails
 
@@ -53,7 +53,7 @@ def fly(saved: Path, folder: Path | None, html: Path | None, *, serve: bool, as_
     robochoc solve instances/queens3d-4 --withdraw --json > out/result.json
     robochoc fly out/result.json --html out/flight.html --wind 3
     """  # noqa: D301 - \\b is how click is told to leave the lines as they are
-    from robochoc.cli.reports.flight import as_planned, flight_json, report, too_late
+    from robochoc.cli.reports.flight import as_planned, flight_json, flight_report, too_late
 
     refuse_same_places(
         {"--html": html},
@@ -62,14 +62,14 @@ def fly(saved: Path, folder: Path | None, html: Path | None, *, serve: bool, as_
         more_outputs=sink_places(given["sinks"]),
     )
     outcome = saved_outcome(saved)
-    team = team_of(outcome, saved, folder)
+    team = saved_team(outcome, saved, folder)
     if given["sinks"] and team is None:
         raise click.UsageError("--ros publishes on the topics that robots' files name: give their folder with --team")
     from robochoc.flight.mission import mission_of
 
     mission = mission_of(outcome, team, given["scale"])
     flown, published = _flown(saved, mission, given)
-    click.echo(flight_json(mission, flown) if as_json else report(mission, flown))
+    click.echo(flight_json(mission, flown) if as_json else flight_report(mission, flown))
     if not as_json:
         for line in (*published, *too_late(given["failures"], flown)):
             click.echo(line, err=True)

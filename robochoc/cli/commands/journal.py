@@ -34,9 +34,9 @@ def journal() -> None:
 @click.argument("file", type=InputPath(), metavar="FILE")
 def show(file: Path) -> None:
     """Summarise a journal: run, robots, messages by type, outcome, and whether the file is complete."""
-    from robochoc.cli.reports.journal import report
+    from robochoc.cli.reports.journal import journal_report
 
-    for line in report(_trace(saved_journal(file), file)):
+    for line in journal_report(_trace(saved_journal(file), file)):
         click.echo(line)
 
 
@@ -164,13 +164,13 @@ def _page(read: Journal, trace: Trace, meant: Selection) -> bytes:
             " (look at them with 'robochoc sniff', or export another format)",
         )
     from robochoc.sniffer.embedded import embedded_answers
-    from robochoc.sniffer.page import page
+    from robochoc.sniffer.page import sniffer_page
     from robochoc.sniffer.page_data import PageData
     from robochoc.sniffer.scene import whole_scene
 
     data = PageData(trace, chosen=meant.robots)
     answers = {**embedded_answers(data, read), "scene": zlib.compress(whole_scene(trace))}
-    return page("embedded", answers, title=f"{read.header.protocol} on {read.header.team}")
+    return sniffer_page("embedded", answers, title=f"{read.header.protocol} on {read.header.team}")
 
 
 def _trace(read: Journal, file: Path) -> Trace:

@@ -140,7 +140,7 @@ def master(
 
 
 def _plan(folder: Path | None, team: Path | None, given: dict[str, Any]) -> MasterPlan:
-    from robochoc.authority.authority import default_folder
+    from robochoc.authority.authority import default_authority_folder
     from robochoc.communication.filters import UnknownFilterError, filter_named
     from robochoc.communication.network.settings import NetworkSettings
     from robochoc.formats import robot_names
@@ -160,7 +160,7 @@ def _plan(folder: Path | None, team: Path | None, given: dict[str, Any]) -> Mast
     )
     withdraw = given.pop("withdraw")
     return MasterPlan(
-        authority=folder or default_folder(),
+        authority=folder or default_authority_folder(),
         conditions=conditions,
         settings=protocol_settings(given.pop("settings_given")),
         withdraw=Withdrawal(withdraw) if withdraw else None,
@@ -227,9 +227,9 @@ def _tell(led: MasterResult, *, as_json: bool) -> None:
 
         click.echo(result_json(led.outcome))
     else:
-        from robochoc.cli.reports.outcome import report
+        from robochoc.cli.reports.outcome import outcome_report
 
-        click.echo(report(led.team, led.outcome))
+        click.echo(outcome_report(led.team, led.outcome))
 
 
 def _header(plan: MasterPlan) -> Header:

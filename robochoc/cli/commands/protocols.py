@@ -26,7 +26,7 @@ def protocols(name: str | None, *, as_json: bool, long: bool) -> None:
     dynamic       continues when the problem changes (--long)
     privacy       what neighbours do not learn (--long)
     """  # noqa: D301 - \\b is how click is told to leave the lines as they are
-    from robochoc.cli.reports.protocols import Row, explained, print_protocols, protocols_json, rows
+    from robochoc.cli.reports.protocols import Row, print_protocols, protocol_text, protocols_json, rows
     from robochoc.formats import on_one_line
 
     found = rows()
@@ -44,4 +44,4 @@ def protocols(name: str | None, *, as_json: bool, long: bool) -> None:
     elif row.broken:
         raise Failure(USAGE, on_one_line(f"{row.name}: {row.place} (package {row.package}) {row.broken}"))
     else:
-        click.echo(explained(row))
+        click.echo(protocol_text(row))

@@ -69,13 +69,13 @@ def replay(
     with failures_told(journal):
         replayed = _replayed(journal, recorded, options)
     if as_json:
-        from robochoc.cli.reports.replay import result_json
+        from robochoc.cli.reports.replay import replay_json
 
-        click.echo(result_json(recorded, replayed))
+        click.echo(replay_json(recorded, replayed))
     else:
-        from robochoc.cli.reports.replay import report
+        from robochoc.cli.reports.replay import replay_report
 
-        click.echo(report(recorded, replayed))
+        click.echo(replay_report(recorded, replayed))
     if replayed.differs:
         return LOST
     return 0 if replayed.identical and not _altered(recorded) else INVALID

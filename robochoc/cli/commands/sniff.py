@@ -14,7 +14,7 @@ from robochoc.cli.options.sections import COMMON, SectionedCommand, Sections
 from robochoc.cli.reports.failures import INVALID, USAGE, Failure, invalid_input_fails
 
 if TYPE_CHECKING:
-    from robochoc.sniffer.session import Session
+    from robochoc.sniffer.session import SnifferSession
 
 
 _SECTIONS: Sections = {
@@ -72,11 +72,11 @@ def sniff(
         from robochoc.sniffer.patterns import patterns_in
 
         context.exit(sniff_master(Page(tuple(patterns_in(chosen)), port, open_browser), **asked))
-    from robochoc.sniffer.server import serve
+    from robochoc.sniffer.server import serve_sniffer
 
     session = _session(journal, chosen, folder)
     try:
-        serve(
+        serve_sniffer(
             session,
             port=port,
             open_browser=open_browser,
@@ -86,17 +86,17 @@ def sniff(
         raise Failure(USAGE, f"port {port}: {error.strerror} (choose another, or none)") from error
 
 
-def _session(journal: Path, chosen: str, folder: Path | None) -> Session:
+def _session(journal: Path, chosen: str, folder: Path | None) -> SnifferSession:
     """Return a session on the opened journal. Its first piece is read, so that an invalid file fails at once."""
     from robochoc.formats import on_one_line, read_team
     from robochoc.journal.journal import JournalError
     from robochoc.sniffer.patterns import patterns_in
-    from robochoc.sniffer.session import Session
+    from robochoc.sniffer.session import SnifferSession
     from robochoc.sniffer.trace import TraceTooLargeError
 
     robots = {robot.name: robot for robot in read_team(folder).robots} if folder else {}
     try:
-        session = Session(journal, chosen=patterns_in(chosen), robots=robots)
+        session = SnifferSession(journal, chosen=patterns_in(chosen), robots=robots)
         session.begin()
     except (JournalError, TraceTooLargeError) as wrong:
         raise Failure(INVALID, on_one_line(f"{journal}: {wrong} ({JOURNAL_STEP})")) from wrong

@@ -312,10 +312,10 @@ def _tell(team: Team, outcome: Outcome, wanted: Wanted) -> None:
 
         click.echo(result_json(outcome))
     else:
-        from robochoc.cli.reports.outcome import report
+        from robochoc.cli.reports.outcome import outcome_report
 
-        click.echo(report(team, outcome))
+        click.echo(outcome_report(team, outcome))
         if wanted.explain:
-            from robochoc.cli.reports.pseudo_tree import explained
+            from robochoc.cli.reports.pseudo_tree import tree_text
 
-            click.echo(explained(outcome))
+            click.echo(tree_text(outcome))

@@ -42,7 +42,7 @@ def saved_content(file: Path, next_step: str) -> bytes:
 
 
 def saved_journal(file: Path) -> Journal:
-    """Return the journal in `file`. Raises `Failure`."""
+    """The journal in `file`. Raises `Failure`."""
     from robochoc.journal.journal import JournalError, read_journal
 
     content = saved_content(file, JOURNAL_STEP)
@@ -70,7 +70,7 @@ def saved_outcome(saved: Path) -> Outcome:
     return journal.outcome
 
 
-def team_of(outcome: Outcome, saved: Path, folder: Path | None) -> Team | None:
+def saved_team(outcome: Outcome, saved: Path, folder: Path | None) -> Team | None:
     """Return the team in `folder`, or in the default folder of its name. None if it does not exist.
 
     Raises `InvalidInputError`, and `Failure` for another team than that of `outcome`, which is from the file `saved`.

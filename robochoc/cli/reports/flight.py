@@ -24,7 +24,7 @@ def as_planned(flown: FlightLog, *, may_fall: bool = False) -> bool:
     return apart and all(error <= ARRIVED_M or (may_fall and isnan(error)) for error in flown.errors_m)
 
 
-def report(mission: Mission, flown: FlightLog) -> str:
+def flight_report(mission: Mission, flown: FlightLog) -> str:
     """Leg by leg what was flown, then how it went."""
     return "\n".join(
         [f"{on_one_line(mission.team)}: {_verdict(mission, flown)}", *_legs(mission, flown), how_it_went(flown)]

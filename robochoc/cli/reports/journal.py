@@ -17,7 +17,7 @@ _MOST_ROBOTS = 12
 _WIDTH = 10
 
 
-def report(trace: Trace) -> Iterator[str]:
+def journal_report(trace: Trace) -> Iterator[str]:
     """Lines of text; names in it are strangers', so none breaks its line."""
     for heading, told in _facts(trace):
         yield on_one_line(f"{heading:<{_WIDTH}} {told}")

@@ -20,7 +20,7 @@ _LARGE = 1 << 16
 _CELL = re.compile(r"[A-Za-z_]+([0-9]+)[._]([0-9]+)")
 
 
-def report(team: Team, outcome: Outcome) -> str:
+def outcome_report(team: Team, outcome: Outcome) -> str:
     """Return a few lines: what happened and why, the values, the withdrawn and lost robots, and the metrics."""
     lines = [f"{on_one_line(outcome.team)}: {_verdict(team, outcome)}", *_epochs(outcome)]
     team = team_after_events(team, outcome.events)

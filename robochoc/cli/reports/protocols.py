@@ -62,7 +62,7 @@ def print_protocols(found: Sequence[Row], *, long: bool = False) -> None:
         click.echo("next: robochoc protocols NAME explains one; --long shows papers, privacy and more")
 
 
-def explained(row: Row) -> str:
+def protocol_text(row: Row) -> str:
     """Return the protocol's traits, its place, its parameters and its docstring without the examples."""
     head = f"{row.name}: {_in_a_line(row.traits)}" if row.traits else row.name
     place = f"{row.place}, from the package {row.package}"

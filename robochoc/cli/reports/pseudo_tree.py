@@ -9,7 +9,7 @@ from robochoc.model.outcome import Outcome, PseudoTreeNode
 from robochoc.model.priorities import natural_key
 
 
-def explained(outcome: Outcome) -> str:
+def tree_text(outcome: Outcome) -> str:
     """Return the tree, one robot per line, with its depth and its induced width; or that there is none."""
     nodes = outcome.tree
     if not nodes:

@@ -25,7 +25,7 @@ MOST = 20
 """The largest number of messages of a packet that are shown, and of robots that could not be followed."""
 
 
-def report(journal: Journal, replayed: ReplayResult) -> str:
+def replay_report(journal: Journal, replayed: ReplayResult) -> str:
     """For people: a few lines, and the first difference if there is one."""
     header = journal.header
     lines = [f"{header.team}: {header.protocol}, runtime {header.runtime}, seed {header.seed}"]
@@ -47,7 +47,7 @@ def report(journal: Journal, replayed: ReplayResult) -> str:
     return "\n".join(on_one_line(line) for line in lines)
 
 
-def result_json(journal: Journal, replayed: ReplayResult) -> str:
+def replay_json(journal: Journal, replayed: ReplayResult) -> str:
     """The same as one JSON object."""
     header = journal.header
     told: dict[str, object] = {

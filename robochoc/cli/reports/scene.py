@@ -54,9 +54,9 @@ def show_scene(scene: Scene, path: Path | None, *, serve: bool, port: int = 0, q
 
 def _write_page(scene: Scene, path: Path, *, quiet: bool) -> None:
     """Write `scene` as one self-contained page, and say what to do with it."""
-    from robochoc.view.page import page
+    from robochoc.view.page import scene_page
 
-    content = page(scene)
+    content = scene_page(scene)
     write_atomically(path, content)
     if not quiet:
         click.echo(f"{path}: {len(content) / 1e6:.1f} MB; open it in a browser", err=True)
@@ -64,9 +64,9 @@ def _write_page(scene: Scene, path: Path, *, quiet: bool) -> None:
 
 def _serve(scene: Scene, port: int) -> None:
     """Show `scene` in a browser of this machine until Ctrl-C."""
-    from robochoc.view.live import serve
+    from robochoc.view.live import serve_scene
 
-    serve(
+    serve_scene(
         scene,
         port=port,
         ready=lambda url: click.echo(f"{url} shows the scene on this machine; Ctrl-C ends it", err=True),

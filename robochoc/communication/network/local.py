@@ -26,7 +26,7 @@ from robochoc.communication.network import fork_server
 from robochoc.communication.network.master import Master
 from robochoc.communication.network.members import Members, reach
 from robochoc.communication.network.profile import profile_of
-from robochoc.communication.network.robot_process import START_S, RobotStart, robot_process
+from robochoc.communication.network.robot_process import START_S, NetworkRobotStart, network_robot_process
 from robochoc.communication.network.router import RouterError
 from robochoc.communication.network.settings import NetworkSettings
 from robochoc.communication.processes.process_status import describe_end
@@ -190,8 +190,8 @@ class LocalNetwork(Session):
             name = own.robot.name
             texts = self._authority.identity(name).texts
             limits = (self._settings.patience_s, self._settings.lease_ms)
-            given = RobotStart(own, texts, self._master.endpoint, self._protocol, *limits)
-            process = self._context.Process(target=robot_process, name=name, args=(given,), daemon=True)
+            given = NetworkRobotStart(own, texts, self._master.endpoint, self._protocol, *limits)
+            process = self._context.Process(target=network_robot_process, name=name, args=(given,), daemon=True)
             with signals_held():  # half begun, it would wait for the rest for ever, and the end of the program for it
                 process.start()
                 self._processes[name] = process

@@ -14,10 +14,10 @@ from robochoc.communication.network.profile import (
     Profile,
     ProfileError,
     Ranges,
-    contradictions,
     in_priority_order,
     missing,
     possible_neighbours,
+    profile_contradictions,
     ranges_of,
     visible_robot,
 )
@@ -160,7 +160,7 @@ class Members:
         except ProfileError as bad:
             return str(bad)
         others = {name: other for name, other in self.profiles.items() if name != sender}
-        return next(contradictions({**others, sender: profile}), "")
+        return next(profile_contradictions({**others, sender: profile}), "")
 
     @property
     def awaited(self) -> set[str]:

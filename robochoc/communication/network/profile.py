@@ -133,7 +133,7 @@ def visible_robot(profile: Profile, also: Mapping[str, Ranges]) -> Robot:
     )
 
 
-def contradictions(profiles: Mapping[str, Profile]) -> Iterator[str]:
+def profile_contradictions(profiles: Mapping[str, Profile]) -> Iterator[str]:
     """Yield contradictions between profiles of one team: neighbours that disagree, variables with two owners."""
     owner: dict[str, str] = {}
     for profile in profiles.values():

@@ -26,7 +26,7 @@ _LOWEST_NICE = 19
 _PR_SET_NAME = 15
 
 
-class RobotStart(NamedTuple):
+class NetworkRobotStart(NamedTuple):
     """The arguments with which a robot's process starts."""
 
     own: CompiledRobot
@@ -37,7 +37,7 @@ class RobotStart(NamedTuple):
     lease_ms: int
 
 
-def robot_process(given: RobotStart) -> None:
+def network_robot_process(given: NetworkRobotStart) -> None:
     """Run one robot in this process. Ctrl-C reaches the whole process group, and is left to the parent."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     signal.signal(signal.SIGTERM, signal.SIG_DFL)

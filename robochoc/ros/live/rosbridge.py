@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from functools import partial
 from typing import Any
 
-from robochoc.ros.live.inbox import Inbox
+from robochoc.ros.live.inbox import RosInbox
 from robochoc.ros.live.rosbridge_connection import Connection
 from robochoc.ros.live.rosbridge_json import MalformedMessageError, incoming, outgoing
 from robochoc.ros.sink import Fields, Sink, SinkError
@@ -72,7 +72,7 @@ class RosbridgeSource(Source):
 
     def __init__(self, place: str) -> None:
         super().__init__(place)
-        self._inbox = Inbox()
+        self._inbox = RosInbox()
         self._connection = Connection(place, SourceError)
         self._connection.on_over = self._inbox.wake
 

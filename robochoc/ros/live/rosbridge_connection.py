@@ -35,7 +35,7 @@ _BUFFERED = 1_000_000
 _START = "start it there: `roslaunch rosbridge_server rosbridge_websocket.launch`, or `ros2 launch` the .xml in ROS 2"
 
 
-class Address(NamedTuple):
+class RosbridgeAddress(NamedTuple):
     """The address of a rosbridge."""
 
     host: str
@@ -44,7 +44,7 @@ class Address(NamedTuple):
     path: str = ""
 
     @classmethod
-    def of(cls, place: str) -> Address:
+    def of(cls, place: str) -> RosbridgeAddress:
         """Return the address that `place` names. Raises `ValueError`."""
         wanted = f"expected rosbridge://HOST:PORT, as in rosbridge://localhost:{PORT}, or rosbridge:wss://HOST:PORT"
         try:
@@ -69,7 +69,7 @@ class Connection:
     def __init__(self, place: str, failed: type[Exception]) -> None:
         self._failed = failed
         try:
-            address = Address.of(place)
+            address = RosbridgeAddress.of(place)
         except ValueError as error:
             raise failed(str(error)) from error
         self.url = address.url
@@ -176,7 +176,7 @@ class Connection:
             self.over.wait(CLOSE_S)
 
 
-def _reach(address: Address, failed: type[Exception]) -> None:
+def _reach(address: RosbridgeAddress, failed: type[Exception]) -> None:
     """Raise `failed` if nothing listens at `address`, with the reason. roslibpy would not give it."""
     try:
         socket.create_connection((address.host, address.port), CONNECT_S).close()

@@ -18,7 +18,7 @@ from functools import partial
 from typing import Any
 
 from robochoc.formats.diagnostics import on_one_line, shortened
-from robochoc.ros.live.inbox import Inbox
+from robochoc.ros.live.inbox import RosInbox
 from robochoc.ros.live.ros_master import Failed, RosMaster
 from robochoc.ros.live.rospy_messages import fields_of, filled, message_class, weight_of
 from robochoc.ros.sink import Fields, Sink, SinkError
@@ -200,7 +200,7 @@ class RospySource(Source):
         self._rospy = _node(place, SourceError)
         self._master = RosMaster(SourceError)
         self._asked = time.monotonic()
-        self._inbox = Inbox()
+        self._inbox = RosInbox()
         self._subscribers: list[Any] = []
 
     def listen(self, topics: Mapping[str, str]) -> None:

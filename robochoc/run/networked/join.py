@@ -7,8 +7,8 @@ from dataclasses import replace
 from pathlib import Path
 
 from robochoc.authority.enrolment import EnrolmentError, NobodyThereError, enrol, renew
-from robochoc.authority.identity import Identity, IdentityError, default_folder
-from robochoc.authority.names import check_name
+from robochoc.authority.identity import Identity, IdentityError, default_identity_folder
+from robochoc.authority.names import check_member_name
 from robochoc.communication.network.robot import Ending, NetworkRobot
 from robochoc.communication.network.robot_settings import RobotSettings
 from robochoc.communication.network.transport import Transport
@@ -44,8 +44,8 @@ def identity_of(
         EnrolmentError: when the robot is not enrolled.
         OSError: when the identity cannot be written.
     """
-    check_name(name)
-    folder = folder or default_folder(name)
+    check_member_name(name)
+    folder = folder or default_identity_folder(name)
     if token:
         return _enrolled(name, place, folder, token, patience_s)
     identity = Identity.load(folder)

@@ -52,7 +52,7 @@ class Machines(Deployment):
     @property
     def kind(self) -> ProblemKind:
         """See `Deployment.kind`."""
-        return team_of(self._master, self._name).kind
+        return registered_team(self._master, self._name).kind
 
     @property
     def lost(self) -> tuple[str, ...]:
@@ -94,7 +94,7 @@ class Machines(Deployment):
     def team_seen(self) -> Team:
         """Return the team as the outcome shows it: with variables that only their robots knew before."""
         robots = []
-        for robot in team_of(self._master, self._name).robots:
+        for robot in registered_team(self._master, self._name).robots:
             known = {variable.name for variable in robot.variables}
             others = [(name, value) for name, value in self._values.get(robot.name, {}).items() if name not in known]
             shown = tuple(Variable(name, Domain(name, (range(value, value + 1),))) for name, value in others)
@@ -120,7 +120,7 @@ class Machines(Deployment):
         if held and (phase.withdrawal or not without):
             return CheckedAssignment(merged_values(self._values), cost, without, check_counts=state.thoroughness)
         if is_proven(phase, result):
-            against = "; ".join(state.objections) or f"{listed(without)} has no value"
+            against = "; ".join(state.objections) or f"{first_names(without)} has no value"
             source = f"{result.witness} says that" if result.witness else "all fell quiet, so that"
             raise RefutedError(f"{source} {phase.name} has a solution for {self._name}, but {against}")
         return None
@@ -139,7 +139,7 @@ class Machines(Deployment):
             raise RefutedError(f"{self._name} has no answer that can be believed: {doubts}")
 
 
-def team_of(master: Master, name: str) -> Team:
+def registered_team(master: Master, name: str) -> Team:
     """Return the team that has registered with `master`, as far as the master sees it."""
     members = master.members
     return Team(name, tuple(members.robots[robot].robot for robot in members.order))
@@ -165,6 +165,6 @@ def claimed(outcome: Outcome) -> Outcome:
     return replace(outcome, claimed_by=by)
 
 
-def listed(names: Sequence[str]) -> str:
+def first_names(names: Sequence[str]) -> str:
     """Return a few of `names`, and how many others there are."""
     return ", ".join(names[:_NAMED]) + f" and {len(names) - _NAMED} others" * (len(names) > _NAMED)

@@ -28,7 +28,7 @@ from robochoc.run.compatibility import refuse_options, refuse_settings, refuse_u
 from robochoc.run.defaults import DEFAULT_COST_PROTOCOL, DEFAULT_PROTOCOL, default_protocol
 from robochoc.run.distributed import solve_distributed
 from robochoc.run.networked.address import LOOPBACK, Address
-from robochoc.run.networked.machines import Machines, claimed, listed, team_of
+from robochoc.run.networked.machines import Machines, claimed, first_names, registered_team
 from robochoc.run.options import OnLoss, Options, Runtime, Withdrawal
 from robochoc.run.registry import protocol_or_first_fit
 from robochoc.solver.encoding import UnsupportedError
@@ -187,9 +187,9 @@ def _run(
 def _solve(plan: MasterPlan, master: Master, observer: Observer | None) -> MasterResult:
     """Wait for the team, and let it solve its problem."""
     if not master.gather(None if plan.gather_s is None else time.monotonic() + plan.gather_s):
-        names = listed(sorted(master.members.awaited)) or "more robots"
+        names = first_names(sorted(master.members.awaited)) or "more robots"
         raise TeamIncompleteError(f"the team is not complete after {plan.gather_s:g} s; awaited: {names}")
-    team = team_of(master, plan.name)
+    team = registered_team(master, plan.name)
     name = plan.protocol or default_protocol(team.kind)
     options, protocol = plan.options(name), protocol_or_first_fit(name)
     refuse_settings(name, protocol, options.settings)

@@ -23,7 +23,7 @@ from robochoc.authority.certificates import (
 )
 from robochoc.authority.identity import Identity, IdentityError, save
 from robochoc.authority.registry import AuthorityError
-from robochoc.authority.token import Token, TokenError
+from robochoc.authority.token import EnrolmentToken, TokenError
 from robochoc.system import files
 from tests.support.authorities import HOUR, START, Clock, Seen, identity_of
 from tests.support.program import ROOT
@@ -173,8 +173,8 @@ def test_only_one_of_many_redeems_a_token(tmp_path: Path) -> None:
 
 def test_tokens_survive_being_copied_by_people(authority: Authority) -> None:
     token = authority.enrol("A")
-    assert Token.parse(f"  {token}\n") == token
-    assert Token.parse(str(token).upper()) == token
+    assert EnrolmentToken.parse(f"  {token}\n") == token
+    assert EnrolmentToken.parse(str(token).upper()) == token
     assert token.fingerprint == fingerprint(authority.certificate)
     assert str(token).partition(".")[0] not in repr(token)
 
@@ -182,13 +182,13 @@ def test_tokens_survive_being_copied_by_people(authority: Authority) -> None:
 @given(st.text(string.printable, max_size=120))
 def test_no_text_makes_reading_a_token_fail_otherwise(text: str) -> None:
     with pytest.raises(TokenError, match="copy all"):
-        Token.parse(text)
+        EnrolmentToken.parse(text)
 
 
 @given(st.integers(0, 83))
 def test_a_part_of_a_token_is_none(length: int) -> None:
     with pytest.raises(TokenError):
-        Token.parse(str(Token(bytes(20), bytes(32)))[:length])
+        EnrolmentToken.parse(str(EnrolmentToken(bytes(20), bytes(32)))[:length])
 
 
 def test_an_identity_is_what_was_written(authority: Authority, tmp_path: Path) -> None:

@@ -27,7 +27,7 @@ from robochoc.authority.frames import (
     Renew,
 )
 from robochoc.authority.identity import Identity, save
-from robochoc.authority.token import Token, TokenError
+from robochoc.authority.token import EnrolmentToken, TokenError
 from tests.support.authorities import HOUR
 from tests.support.authority_service import SOON_S, AuthorityService, answered, drip, framed, trusting
 from tests.support.clocks import waiting
@@ -123,7 +123,7 @@ def test_nobody_there(tmp_path: Path) -> None:
     with socket.create_server(("127.0.0.1", 0)) as free:
         port = free.getsockname()[1]
     with pytest.raises(EnrolmentError, match="robochoc master"):
-        enrol("127.0.0.1", port, Token.new(bytes(32)), tmp_path / "a", "A")
+        enrol("127.0.0.1", port, EnrolmentToken.new(bytes(32)), tmp_path / "a", "A")
 
 
 def silent(connection: socket.socket) -> None:
@@ -146,7 +146,14 @@ def test_a_service_that_takes_for_ever_is_left(behaviour: Callable[[socket.socke
         server = threading.Thread(target=serve)
         server.start()
         with waiting(SOON_S), pytest.raises(EnrolmentError):
-            enrol("127.0.0.1", listener.getsockname()[1], Token.new(bytes(32)), tmp_path / "a", "A", patience_s=0.3)
+            enrol(
+                "127.0.0.1",
+                listener.getsockname()[1],
+                EnrolmentToken.new(bytes(32)),
+                tmp_path / "a",
+                "A",
+                patience_s=0.3,
+            )
         server.join()
 
 
@@ -243,7 +250,7 @@ def test_a_lying_service_is_not_believed(tmp_path: Path, answer: Answer) -> None
 
     desk.server._answer = lie  # type: ignore[assignment, method-assign]  # noqa: SLF001 - a service that lies
     with desk.server, pytest.raises(NotTrustedError):
-        enrol(*desk.place, Token.new(bytes(32)), tmp_path / "a", "A")
+        enrol(*desk.place, EnrolmentToken.new(bytes(32)), tmp_path / "a", "A")
 
 
 @pytest.mark.parametrize("kind", ["another key", "another name", "rubbish", "introduction"])

@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import pytest
 
-from robochoc.cli.reports.outcome import report
+from robochoc.cli.reports.outcome import outcome_report
 from robochoc.formats.result import read_result, result_json
 from robochoc.generators.queens3d import queens3d
 from robochoc.journal.events import AnyEvent, Sent
@@ -37,6 +37,6 @@ def test_of_two_runs_the_larger_counts() -> None:
 def test_a_large_one_is_told_of() -> None:
     team = queens3d(2)
     outcome = solve(team, Options(protocol="abt", cache=False))
-    assert "largest" not in report(team, outcome)
+    assert "largest" not in outcome_report(team, outcome)
     large = replace(outcome, metrics=replace(outcome.metrics, largest=1_588_746))
-    assert "bytes (the largest message 1,588,746), " in report(team, large)
+    assert "bytes (the largest message 1,588,746), " in outcome_report(team, large)

@@ -9,8 +9,8 @@ from typing import Any
 
 import pytest
 
-from robochoc.cli.reports.outcome import report
-from robochoc.cli.reports.pseudo_tree import explained
+from robochoc.cli.reports.outcome import outcome_report
+from robochoc.cli.reports.pseudo_tree import tree_text
 from robochoc.communication.run_result import RunResult
 from robochoc.journal.events import AnyEvent, Decided, Heard, Improved
 from robochoc.journal.journal import improvements
@@ -180,7 +180,7 @@ def aside(verdict: Verdict, *weights: int, **known: Any) -> str:  # noqa: ANN401
     hard = team_of({"A": (1,), "B": (1,)}, [])
     robots = tuple(replace(robot, weight=weight) for robot, weight in zip(hard.robots, weights, strict=True))
     outcome = Outcome("t", "sfb", "simulator", 0, verdict, {"A": 1}, 0, ("RB",), verified=True, **known)
-    return report(replace(hard, robots=robots), outcome)
+    return outcome_report(replace(hard, robots=robots), outcome)
 
 
 def test_weights_are_told_where_they_are_not_all_one() -> None:
@@ -195,7 +195,7 @@ def test_a_limit_is_told_with_the_best_so_far_and_the_bound() -> None:
     told = aside(Verdict.UNKNOWN, 1, 3, reason="the time was over", bound=2)
     assert "unknown: the time was over; in the best answer so far 1 withdraws (weight 3) (lower bound 2)" in told
     outcome = Outcome("t", "afb", "simulator", 0, Verdict.UNKNOWN, {"A": 1, "B": 2}, 2**60 + 1, reason="so", bound=3)
-    assert f"so; the best so far costs {2**60 + 1:,}, and lower bound 3" in report(PAIR, outcome)
+    assert f"so; the best so far costs {2**60 + 1:,}, and lower bound 3" in outcome_report(PAIR, outcome)
 
 
 def test_who_placed_the_robots_is_told_where_that_was_not_asked_for() -> None:
@@ -205,7 +205,7 @@ def test_who_placed_the_robots_is_told_where_that_was_not_asked_for() -> None:
 
 def test_what_is_not_proven_says_so() -> None:
     outcome = Outcome("t", "dsa", "simulator", 0, Verdict.SOLUTION, {"A": 1, "B": 2}, 3, verified=True)
-    assert "solution for all 2 robots, cost 3 (not proven to be the minimum), checked" in report(PAIR, outcome)
+    assert "solution for all 2 robots, cost 3 (not proven to be the minimum), checked" in outcome_report(PAIR, outcome)
 
 
 # Trees, explained
@@ -221,7 +221,7 @@ def test_a_tree_is_drawn_with_its_depth_and_width() -> None:
     }
     assert pseudo_tree({name: Findings(place=place) for name, place in places.items()} | {"T": Findings()}) == places
     outcome = Outcome("team", "dpop", "simulator", 0, Verdict.OPTIMAL, tree=places)
-    assert explained(outcome).splitlines() == [
+    assert tree_text(outcome).splitlines() == [
         "  pseudo-tree, built by the robots: depth 2, induced width 2, 2 roots ([neighbours further up])",
         "    R1",
         "    └── R2",
@@ -232,4 +232,4 @@ def test_a_tree_is_drawn_with_its_depth_and_width() -> None:
 
 
 def test_who_builds_no_tree_says_so() -> None:
-    assert explained(Outcome("team", "abt", "simulator", 0, Verdict.SOLUTION)) == "  abt builds no pseudo-tree"
+    assert tree_text(Outcome("team", "abt", "simulator", 0, Verdict.SOLUTION)) == "  abt builds no pseudo-tree"

@@ -19,7 +19,7 @@ from robochoc.journal.journal import Journal, read_journal
 from robochoc.model.expression import Name
 from robochoc.model.outcome import Outcome, Verdict
 from robochoc.model.problem import Domain, Robot, Topic, Variable
-from robochoc.sniffer.page import page
+from robochoc.sniffer.page import sniffer_page
 from robochoc.sniffer.scene import TraceScene, whole_scene
 from robochoc.sniffer.trace import Trace
 from tests.support.program import ROOT
@@ -40,7 +40,7 @@ def scripts_of(html: str) -> list[str]:
 @pytest.mark.parametrize("mode", ["served", "embedded"])
 def test_only_its_own_scripts_run_and_nothing_is_loaded(mode: str) -> None:
     answers = {"about": zlib.compress(b"{}"), "scene": zlib.compress(b"null")}
-    html = page("served" if mode == "served" else "embedded", None if mode == "served" else answers).decode()
+    html = sniffer_page("served" if mode == "served" else "embedded", None if mode == "served" else answers).decode()
     policy = policy_of(html)
     hashes = [
         f"'sha256-{base64.b64encode(hashlib.sha256(one.encode()).digest()).decode()}'" for one in scripts_of(html)
@@ -54,12 +54,12 @@ def test_only_its_own_scripts_run_and_nothing_is_loaded(mode: str) -> None:
 
 
 def test_the_policy_stands_before_any_script() -> None:
-    html = page("served").decode()
+    html = sniffer_page("served").decode()
     assert 0 < html.index("Content-Security-Policy") < html.index("<script")
 
 
 def test_the_model_comes_first_and_whatever_begins_last() -> None:
-    scripts = scripts_of(page("embedded", {}).decode())
+    scripts = scripts_of(sniffer_page("embedded", {}).decode())
     assert "window.Sniffer = {}" in scripts[0]
     names = [path.name for path in (ROOT / "robochoc/sniffer/assets").glob("*.js")]
     assert len(scripts) == len(names)
@@ -67,7 +67,7 @@ def test_the_model_comes_first_and_whatever_begins_last() -> None:
 
 
 def test_titles_and_answers_of_strangers_stay_text() -> None:
-    html = page("embedded", {"about": zlib.compress(HOSTILE.encode())}, title=HOSTILE).decode()
+    html = sniffer_page("embedded", {"about": zlib.compress(HOSTILE.encode())}, title=HOSTILE).decode()
     assert HOSTILE not in html
     assert html.count("<title>") == 1
     (packed,) = re.findall(r'<script id="feed:about" type="application/octet-stream">([^<]*)</script>', html)
@@ -76,7 +76,7 @@ def test_titles_and_answers_of_strangers_stay_text() -> None:
 
 def test_the_same_answers_make_the_same_page() -> None:
     answers = {"about": b"1", "columns": b"2"}
-    assert page("embedded", answers) == page("embedded", dict(answers))
+    assert sniffer_page("embedded", answers) == sniffer_page("embedded", dict(answers))
 
 
 def test_assets_are_in_the_wheel(tmp_path: Path) -> None:

@@ -14,7 +14,7 @@ from robochoc.communication.network.journal_server import PIECE_BYTES, Piece
 from robochoc.journal.blocks import BEGINNING, PREAMBLE, JournalDamagedError, frame_block
 from robochoc.journal.entries import JournalError
 from robochoc.run.networked.address import Address
-from robochoc.sniffer.remote import Arriving, Followed, WholeBlocks
+from robochoc.sniffer.remote import Followed, IncomingJournal, WholeBlocks
 
 RUN = "run"
 
@@ -41,7 +41,7 @@ class Kept:
 
     def __init__(self) -> None:
         self.content = b""
-        self.journal = Arriving(Address("master"), RUN, self._keep)
+        self.journal = IncomingJournal(Address("master"), RUN, self._keep)
 
     def _keep(self, whole: bytes) -> None:
         self.content += whole

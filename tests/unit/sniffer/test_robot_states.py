@@ -21,7 +21,7 @@ from robochoc.run.options import Options, Runtime, Withdrawal
 from robochoc.run.registry import protocol_named, protocol_names
 from robochoc.sniffer.embedded import embedded_answers
 from robochoc.sniffer.page_data import STATES, PageData
-from robochoc.sniffer.session import Session
+from robochoc.sniffer.session import SnifferSession
 from robochoc.sniffer.trace import Trace
 from robochoc.solver.ace import AceProcess
 from tests.support.replays import random_run, recorded
@@ -57,7 +57,7 @@ def written(journal: Journal, path: Path, *, text: bool) -> Path:
 
 def served(path: Path) -> dict[str, list[dict[str, Any]]]:
     """What the server answers about every robot."""
-    session = Session(path)
+    session = SnifferSession(path)
     while session.advance():
         pass
     try:

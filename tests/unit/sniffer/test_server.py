@@ -24,7 +24,7 @@ from robochoc.model.outcome import Outcome
 from robochoc.run.options import Runtime
 from robochoc.sniffer import live_trace, server
 from robochoc.sniffer.page_data import message_columns, step_columns
-from robochoc.sniffer.session import Session
+from robochoc.sniffer.session import SnifferSession
 from robochoc.sniffer.trace import Trace
 from tests.support.faults import wait_until
 from tests.support.sniffer_server import TOKEN, SnifferServer, header, journal_of, run_events, sniffer_server
@@ -49,7 +49,7 @@ def file(tmp_path: Path) -> Path:
 
 @pytest.fixture
 def page(file: Path) -> Iterator[SnifferServer]:
-    with sniffer_server(Session(file, chosen=("Robot1.*",))) as running:
+    with sniffer_server(SnifferSession(file, chosen=("Robot1.*",))) as running:
         yield running
 
 
@@ -70,7 +70,7 @@ def test_every_answer_is_the_journals(page: SnifferServer, file: Path) -> None:
 def test_the_text_form_is_served_too(tmp_path: Path) -> None:
     path = tmp_path / "run.jsonl"
     path.write_bytes(b"".join(lines_of(read_journal(WHOLE))))
-    with sniffer_server(Session(path)) as page:
+    with sniffer_server(SnifferSession(path)) as page:
         assert page.get("columns?from=0&to=50") == message_columns(TRACE, 0, 50)
 
 
@@ -190,7 +190,7 @@ def test_a_page_hears_of_a_file_that_grows(tmp_path: Path) -> None:
     path = tmp_path / "run.journal"
     pieces = blocks(EVENTS, OUTCOME, 4)
     path.write_bytes(pieces[0])
-    with sniffer_server(Session(path)) as page:
+    with sniffer_server(SnifferSession(path)) as page:
         socket = connected(page)
         wait_until(lambda: page.seen == 1, "the page was not seen")
         with path.open("ab") as writing:
@@ -222,7 +222,7 @@ def test_bundles_out_of_order_are_put_in_order_at_the_end(tmp_path: Path, monkey
     monkeypatch.setattr(live_trace, "_EVENTS_AT_ONCE", 50)
     path = tmp_path / "run.journal"
     path.write_bytes(content)
-    session = Session(path)
+    session = SnifferSession(path)
     over = []
     while session.advance():
         over.append(session.begun and session.news()["over"])
@@ -235,7 +235,7 @@ def test_bundles_out_of_order_are_put_in_order_at_the_end(tmp_path: Path, monkey
 
 
 def test_a_file_that_is_replaced_is_another_generation(file: Path, tmp_path: Path) -> None:
-    with sniffer_server(Session(file)) as page:
+    with sniffer_server(SnifferSession(file)) as page:
         assert page.json("about")["generation"] == 0
         other = tmp_path / "other"
         other.write_bytes(journal_of(EVENTS, OUTCOME, header(team="another")))
@@ -247,7 +247,7 @@ def test_a_file_that_is_replaced_is_another_generation(file: Path, tmp_path: Pat
 @pytest.mark.parametrize("times", [0.2, 1.5])
 def test_a_file_that_is_written_anew_is_another_generation(file: Path, times: float) -> None:
     """Also where there is more of it than there was."""
-    with sniffer_server(Session(file)) as page:
+    with sniffer_server(SnifferSession(file)) as page:
         assert page.json("about")["generation"] == 0
         some = EVENTS[: int(len(EVENTS) * times)] + EVENTS[: int(len(EVENTS) * max(0, times - 1))]
         file.write_bytes(journal_of(some, None, header(team="another")))
@@ -257,17 +257,17 @@ def test_a_file_that_is_written_anew_is_another_generation(file: Path, times: fl
 
 def test_a_journal_without_an_end_is_over_when_nobody_writes(file: Path) -> None:
     file.write_bytes(journal_of(EVENTS, None))
-    with sniffer_server(Session(file)) as page:
+    with sniffer_server(SnifferSession(file)) as page:
         assert not page.json("about")["over"]
     os.utime(file, (0, 0))
-    with sniffer_server(Session(file)) as page:
+    with sniffer_server(SnifferSession(file)) as page:
         wait_until(lambda: page.json("about")["over"], "it goes on for ever")
 
 
 def test_damage_is_told_and_what_is_before_it_shown(file: Path) -> None:
     lines = [*lines_of(read_journal(WHOLE))]
     file.write_bytes(b"".join(lines[:300]) + b"nonsense\n" + b"".join(lines[300:]))
-    with sniffer_server(Session(file)) as page:
+    with sniffer_server(SnifferSession(file)) as page:
         about = page.json("about")
     assert "301" in about["damage"]
     assert 0 < about["messages"] < len(TRACE.messages.t)
@@ -276,7 +276,7 @@ def test_damage_is_told_and_what_is_before_it_shown(file: Path) -> None:
 def test_a_file_that_turns_out_to_be_none_is_told(tmp_path: Path) -> None:
     path = tmp_path / "empty"
     path.write_bytes(b"")
-    with sniffer_server(Session(path)) as page:
+    with sniffer_server(SnifferSession(path)) as page:
         path.write_bytes(b"what is this?\n")
         assert page.refusal("about")[0] == 400
 
@@ -291,7 +291,7 @@ def test_numbers_that_no_machine_holds_are_told(tmp_path: Path) -> None:
     path = tmp_path / "run.jsonl"
     path.write_bytes(b"".join([beginning, *said]))
     os.utime(path, (0, 0))
-    with sniffer_server(Session(path)) as page:
+    with sniffer_server(SnifferSession(path)) as page:
         wait_until(lambda: page.refusal("about")[0] == 400, "nothing is said")
 
 
@@ -320,6 +320,6 @@ def test_a_page_that_does_not_listen_makes_nothing_wait_or_grow(
 def test_the_download_is_the_file_as_it_stood(tmp_path: Path) -> None:
     path = tmp_path / 'a "strange" näme.journal'
     path.write_bytes(WHOLE)
-    with sniffer_server(Session(path)) as page, page.ask("journal") as answer:
+    with sniffer_server(SnifferSession(path)) as page, page.ask("journal") as answer:
         assert answer.headers["Content-Disposition"] == 'attachment; filename="a__strange__n_me.journal"'
         assert read_journal(answer.read()) == read_journal(io.BytesIO(WHOLE).read())

@@ -26,7 +26,7 @@ from robochoc.formats import write_team
 from robochoc.formats.result import result_json
 from robochoc.model.outcome import Outcome, Verdict
 from robochoc.view.keyframes import angle, attitude_keys, position_keys, slerp
-from robochoc.view.page import page
+from robochoc.view.page import scene_page
 from robochoc.view.palette import GREY, RED, web
 from robochoc.view.playback import DroneState
 from robochoc.view.scene import Scene, scene_of
@@ -121,7 +121,7 @@ def test_the_page_plays_what_was_flown() -> None:
     scene = shown()
     playback = scene.playback
     assert playback
-    tracks = tracks_of(page(scene))
+    tracks = tracks_of(scene_page(scene))
     frames = FPS * playback.times
     for number, drone in enumerate(scene.drones):
         path = f"{number + 1} {drone.name}"
@@ -158,7 +158,7 @@ def test_vast_numbers_are_flown_as_they_are_drawn() -> None:
 
 
 def test_each_epoch_says_what_opened_it_and_what_came_of_it() -> None:
-    playback = playback_in(page(shown()))
+    playback = playback_in(scene_page(shown()))
     assert playback["chapters"] == [
         {"at": 0, "opened": "the start", "says": "solution, 4 fly"},
         {"at": LEG_S, "opened": "-R5.1", "says": "no solution, 3 hover on"},
@@ -169,7 +169,7 @@ def test_each_epoch_says_what_opened_it_and_what_came_of_it() -> None:
 
 def test_nobody_flies_where_there_never_was_a_solution() -> None:
     outcome = Outcome("t", "abt", "simulator", 0, Verdict.NO_SOLUTION, {})
-    assert playback_in(page(shown(outcome)))["chapters"] == [
+    assert playback_in(scene_page(shown(outcome)))["chapters"] == [
         {"at": 0, "opened": "the start", "says": "no solution, no drone flies"}
     ]
     alone = flown_scene_of(outcome, five())
@@ -185,7 +185,7 @@ def test_who_leaves_turns_grey_when_it_leaves() -> None:
     gone = scene.drones[4]
     assert gone.landing
     assert gone.place is None
-    html = page(scene)
+    html = scene_page(scene)
     colours = tracks_of(html)["5 R5.1/body/<object>.material.color"]
     assert [frame for frame, _ in colours] == [0, FPS * LEG_S, FPS * LEG_S + 25]
     assert colours[-1][1] == pytest.approx(GREY)
@@ -201,7 +201,7 @@ def test_who_comes_back_has_its_colour_again() -> None:
     scene = scene_of(outcome, mission, straight(mission))
     assert scene.playback
     assert [*scene.playback.states[4]] == [(LEG_S, DroneState.WITHDRAWN), (2 * LEG_S, DroneState.FLIES)]
-    colours = tracks_of(page(scene))["5 R5.1/body/<object>.material.color"]
+    colours = tracks_of(scene_page(scene))["5 R5.1/body/<object>.material.color"]
     assert colours[-1][1] == pytest.approx(colours[0][1])
 
 
@@ -220,7 +220,7 @@ def test_who_falls_turns_red_and_stays_where_it_lies() -> None:
     scene = shown(falls={1: 3.0})
     assert scene.playback
     assert scene.playback.states[1] == ((3.0, DroneState.FALLEN),)
-    html = page(scene)
+    html = scene_page(scene)
     assert playback_in(html)["marks"] == [{"at": 3.0, "drone": 1, "says": "motor 2 stopped"}]
     tracks = tracks_of(html)
     assert tracks["2 R2.1/body/<object>.material.color"][-1][1] == pytest.approx(RED, abs=1e-6)
@@ -248,7 +248,7 @@ def test_who_has_fallen_does_not_turn_grey_later() -> None:
 
 def test_obstacles_are_boxes_in_their_cells() -> None:
     scene = shown(obstacles=((2.0, 3.0, 4.0), (1.0, 1.0, 1.0)))
-    drawn = {command["path"]: command for command in commands_of(page(scene)) if command["type"] == "set_object"}
+    drawn = {command["path"]: command for command in commands_of(scene_page(scene)) if command["type"] == "set_object"}
     (body,) = (drawn[path] for path in drawn if path.endswith("obstacles/1/body"))
     corners = np.frombuffer(body["object"]["geometries"][0]["data"]["attributes"]["position"]["array"].data, "<f4")
     assert corners.reshape(-1, 3).mean(axis=0) == pytest.approx([2, 3, 4])
@@ -259,7 +259,7 @@ def test_obstacles_are_boxes_in_their_cells() -> None:
 def test_obstacles_appear_when_they_are_seen() -> None:
     mission = mission_of(epochs_of_three(), five())
     flight = straight(mission, obstacles=((2.0, 3.0, 4.0), (1.0, 1.0, 1.0)))
-    html = page(scene_of(epochs_of_three(), mission, replace(flight, seen_s=(0.0, 1.5))))
+    html = scene_page(scene_of(epochs_of_three(), mission, replace(flight, seen_s=(0.0, 1.5))))
     (animation,) = (command for command in commands_of(html) if command["type"] == "set_animation")
     appearing = {
         clip["path"]: track["keys"]
@@ -278,7 +278,7 @@ def test_what_happened_is_told_in_its_order() -> None:
     mission = mission_of(outcome)
     seen = (FlightEvent(4.0, 0, "second"), FlightEvent(1.0, 2, "first"))
     scene = scene_of(outcome, mission, replace(straight(mission), events=seen))
-    assert [mark["says"] for mark in playback_in(page(scene))["marks"]] == ["first", "second"]
+    assert [mark["says"] for mark in playback_in(scene_page(scene))["marks"]] == ["first", "second"]
 
 
 def test_the_caption_tells_of_the_flight() -> None:
@@ -300,7 +300,7 @@ def test_drones_that_cannot_fly_are_where_they_would_be(error: Exception, monkey
     scene = flown_scene_of(epochs_of_three(), five())
     assert scene.playback is None
     assert ("flight", f"none: {str(error) or 'FloatingPointError'}") in scene.facts
-    commands = commands_of(page(scene))
+    commands = commands_of(scene_page(scene))
     assert not any(command["type"] == "set_animation" for command in commands)
     placed = {
         command["path"]: np.frombuffer(command["matrix"].data, "<f4").reshape(4, 4)[3, :3]
@@ -324,7 +324,7 @@ def test_a_flight_whose_legs_are_others_still_plays() -> None:
     outcome = epochs_of_three()
     mission = mission_of(outcome)
     flown = straight(mission)
-    html = page(scene_of(outcome, mission, replace(flown, legs=flown.legs[:1])))
+    html = scene_page(scene_of(outcome, mission, replace(flown, legs=flown.legs[:1])))
     assert len(playback_in(html)["chapters"]) == 1
 
 
@@ -335,7 +335,7 @@ def test_hostile_names_and_words_stay_text() -> None:
     outcome = Outcome(HOSTILE, HOSTILE, "processes", 0, Verdict.SOLUTION, {HOSTILE: 1, "__proto__": 2, "\ud800": 3})
     mission = mission_of(outcome)
     seen = (FlightEvent(1.0, 0, HOSTILE),)
-    html = page(scene_of(outcome, mission, replace(straight(mission), events=seen)))
+    html = scene_page(scene_of(outcome, mission, replace(straight(mission), events=seen)))
     assert b"<img" not in html
     assert html.count(b"</script>") == 4
     playback = playback_in(html)
@@ -344,7 +344,7 @@ def test_hostile_names_and_words_stay_text() -> None:
 
 
 def test_equal_flights_make_equal_pages() -> None:
-    assert page(shown(falls={1: 3.0})) == page(shown(falls={1: 3.0}))
+    assert scene_page(shown(falls={1: 3.0})) == scene_page(shown(falls={1: 3.0}))
 
 
 @pytest.mark.parametrize(("n", "most"), [(4, 1_200_000), (11, 2_500_000)])
@@ -352,7 +352,7 @@ def test_pages_of_large_teams_are_small_and_soon_made(n: int, most: int) -> None
     places = {f"V{i}.{j}": (3 * i + 5 * j) % n + 1 for i in range(1, n + 1) for j in range(1, n + 1)}
     scene = flown_scene_of(Outcome("t", "abt", "simulator", 0, Verdict.SOLUTION, places))
     with working(3):
-        html = page(scene)
+        html = scene_page(scene)
     assert len(html) < most
     assert len(tracks_of(html)) >= n * n
 

@@ -26,8 +26,8 @@ from robochoc.flight.layout import Point
 from robochoc.model.expression import Apply, Constant, Expression, Name
 from robochoc.model.outcome import Metrics, Outcome, Verdict
 from robochoc.model.problem import Domain, Robot, Team, Topic, Variable
-from robochoc.view.live import serve
-from robochoc.view.page import page
+from robochoc.view.live import serve_scene
+from robochoc.view.page import scene_page
 from robochoc.view.scene import DrawnDrone, Scene
 from tests.support.flights import scene_of, straight
 
@@ -184,13 +184,13 @@ def test_nobody_flies_without_a_solution() -> None:
     scene = scene_of(outcome({}, Verdict.NO_SOLUTION), team)
     assert "no solution" in scene.title
     assert [(drone.place, drone.landing, drone.home[2]) for drone in scene.drones] == [(None, None, scene.ground)] * 2
-    assert not any(command["type"] == "set_animation" for command in commands_of(page(scene)))
+    assert not any(command["type"] == "set_animation" for command in commands_of(scene_page(scene)))
 
 
 def test_an_outcome_without_any_robot_is_a_page_too() -> None:
     scene = scene_of(outcome({}, Verdict.UNKNOWN))
     assert scene.drones == ()
-    assert commands_of(page(scene))
+    assert commands_of(scene_page(scene))
 
 
 def test_no_two_drones_coincide() -> None:
@@ -232,24 +232,24 @@ def test_the_caption_says_what_happened() -> None:
 
 
 def test_the_legend_says_what_colours_mean() -> None:
-    html = page(four()).decode()
+    html = scene_page(four()).decode()
     (found,) = re.findall(r'<ul id="legend"[^>]*>(.*?)</ul>', html)
     assert re.findall(r"</i>([^<]*)<", found) == ["row 1", "row 2", "row 3", "row 4", "withdrawn"]
 
 
 def test_many_rows_are_one_ramp_in_the_legend() -> None:
-    html = page(scene_of(outcome({f"V{row}.1": 1 for row in range(1, 21)}))).decode()
+    html = scene_page(scene_of(outcome({f"V{row}.1": 1 for row in range(1, 21)}))).decode()
     (found,) = re.findall(r'<ul id="legend"[^>]*>(.*?)</ul>', html)
     assert re.findall(r"</i>([^<]*)<", found) == ["row 1 to 20"]
 
 
 def test_drones_that_look_alike_need_no_legend() -> None:
-    assert b'<ul id="legend"' not in page(scene_of(outcome({"V1.1": 1, "V1.2": 2})))
+    assert b'<ul id="legend"' not in scene_page(scene_of(outcome({"V1.1": 1, "V1.2": 2})))
 
 
 def test_key_frames_begin_at_home_and_end_at_the_place() -> None:
     scene = four()
-    tracks = tracks_of(page(scene))
+    tracks = tracks_of(scene_page(scene))
     for number, drone in enumerate(scene.drones, 1):
         keys = tracks[f"/meshcat/drones/{number} {drone.name}"]
         assert keys[0][0] == 0
@@ -263,7 +263,7 @@ def test_key_frames_begin_at_home_and_end_at_the_place() -> None:
 def test_every_drone_bears_its_name() -> None:
     pictures = {
         command["path"]: base64.b64decode(command["object"]["images"][0]["url"].partition(",")[2]).decode()
-        for command in commands_of(page(four()))
+        for command in commands_of(scene_page(four()))
         if command["path"].endswith("/name") and command["type"] == "set_object"
     }
     for number, drone in enumerate(four().drones, 1):
@@ -271,7 +271,7 @@ def test_every_drone_bears_its_name() -> None:
 
 
 def test_the_page_loads_nothing() -> None:
-    html = page(four()).decode()
+    html = scene_page(four()).decode()
     assert not re.search(r"""(?:src|href)\s*=\s*["']?(?!data:)[\w/]""", html.split("<script>")[0])
     assert not re.search(r"""(?:@import|url\()""", html.split("<script>")[0])
     assert set(re.findall(r"https?://[^\"'` )\\]+", html)) == {"http://www.w3.org/1999/xhtml"}  # names a namespace
@@ -280,7 +280,7 @@ def test_the_page_loads_nothing() -> None:
 
 def test_hostile_names_stay_text() -> None:
     scene = scene_of(Outcome(HOSTILE, HOSTILE, "processes", 0, Verdict.SOLUTION, {HOSTILE: 1, "constructor": 2}))
-    html = page(scene)
+    html = scene_page(scene)
     assert b"<img" not in html
     assert html.count(b"</script>") == 4
     assert {command["path"].count("/") for command in commands_of(html) if "/drones/" in command["path"]} <= {3, 4}
@@ -289,13 +289,13 @@ def test_hostile_names_stay_text() -> None:
 
 @pytest.mark.parametrize("name", ["\x00\x1b[31m", "\ud800", "$title ${x} {y} %s", "x" * 500, "机器人1.1", ""])
 def test_no_name_breaks_the_page(name: str) -> None:
-    html = page(scene_of(Outcome(name, name, "processes", 0, Verdict.SOLUTION, {name: 1})))
+    html = scene_page(scene_of(Outcome(name, name, "processes", 0, Verdict.SOLUTION, {name: 1})))
     assert b"\x00" not in html
     assert commands_of(html)
 
 
 def test_equal_scenes_make_equal_pages() -> None:
-    assert page(four()) == page(four())
+    assert scene_page(four()) == scene_page(four())
 
 
 def test_meshcat_is_not_imported_before_a_scene_is_drawn() -> None:
@@ -307,10 +307,10 @@ def test_meshcat_is_not_imported_before_a_scene_is_drawn() -> None:
 
 LIVE = """
 from robochoc.model.outcome import Outcome, Verdict
-from robochoc.view.live import serve
+from robochoc.view.live import serve_scene
 from tests.support.flights import scene_of
 outcome = Outcome("live team", "abt", "processes", 0, Verdict.SOLUTION, {"V1.1": 1})
-serve(scene_of(outcome), ready=lambda url: print(url, flush=True))
+serve_scene(scene_of(outcome), ready=lambda url: print(url, flush=True))
 print("left")
 """
 
@@ -411,4 +411,4 @@ def test_a_port_in_use_is_an_error_that_says_so() -> None:
     with socket.create_server(("127.0.0.1", 0)) as taken:
         port = taken.getsockname()[1]
         with pytest.raises(OSError, match=f"Address already in use .*'127.0.0.1', {port}"):
-            serve(four(), port=port)
+            serve_scene(four(), port=port)
