@@ -111,7 +111,7 @@ class NetworkRobot:
         """Frames of an epoch that the master has not announced to this robot yet."""
         self._kept = Backlog()
         self._lost_frames: set[tuple[int, str]] = set()
-        """The search in which the loss of a sender's frames was last reported. This limits reports to the master."""
+        """Epochs and senders whose frame losses were reported. Each pair is reported once."""
         self._refusals = Refusals(lambda who, what, why: self._say(Objection(who, what, why)))
 
     def run(self) -> Ending:
