@@ -195,7 +195,7 @@ class EnrolmentServer:
             self._free.release()
 
     def _refuse(self, origin: str, why: str) -> None:
-        """Report it, but for what comes of our own hanging up."""
+        """Report the error, unless it follows from our own closing of the connection."""
         with self._lock:
             if self._closing:
                 return

@@ -1,4 +1,4 @@
-"""Events of the Authority: what it has granted, and every refusal, with its reason."""
+"""Events of the Authority: grants, and refusals with their reasons."""
 
 from __future__ import annotations
 

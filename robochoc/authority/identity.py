@@ -83,7 +83,7 @@ class Identity:
 
     @property
     def texts(self) -> IdentityTexts:
-        """All of it as PEM: for zenoh, and for processes that this one starts."""
+        """Return the whole identity as PEM: for zenoh, and for processes that this one starts."""
         return IdentityTexts(key_pem(self.key), pem(self.certificate), pem(self.ca))
 
     @property
@@ -121,7 +121,7 @@ class Identity:
 
 
 def save(folder: Path, key: ec.EllipticCurvePrivateKey, certificate: Certificate, ca: Certificate) -> None:
-    """Write an identity; the certificate comes last, so that what is not complete is seen to be so."""
+    """Write an identity. The certificate comes last, so that an incomplete identity is recognised."""
     private_folder(folder)
     for name in (CERTIFICATE, CA, KEY):
         (folder / name).unlink(missing_ok=True)

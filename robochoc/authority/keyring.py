@@ -91,7 +91,7 @@ class KeyRing:
         self.card = msgspec.structs.replace(unsigned, signature=signature)
 
     def admit(self, card: KeyCard, now: float) -> None:
-        """Accept `card` from now on (Unix time `now`), instead of an older one of that robot.
+        """Accept `card` at the Unix time `now`. It replaces an older one of that robot.
 
         Raises `KeyCardError`: when the Authority has not issued its certificate, or that is not valid now or names
         somebody else, the signature is wrong, or the card is from another run.

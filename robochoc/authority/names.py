@@ -1,4 +1,4 @@
-"""Names that the Authority enrols: which are allowed, and which are known."""
+"""Names that the Authority enrols: the allowed and the known ones."""
 
 from __future__ import annotations
 

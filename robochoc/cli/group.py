@@ -106,7 +106,7 @@ def run() -> int:
         click.echo("robochoc: interrupted", err=True)
         return INTERRUPTED
     except SystemExit as leaving:
-        # Whoever read our output has gone: click answers that with the status of invalid input.
+        # The reader of our output has gone: click would exit with the status of invalid input.
         if leaving.code == 1:
             return UNREAD
         raise

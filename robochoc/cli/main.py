@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from typing import NoReturn
 
 PATIENCE_S = 1.0
-"""So long after the first signal others mean the same one (two Ctrl-C, `timeout` and a shell); later, force."""
+"""Seconds in which further signals count as the first (two Ctrl-C, `timeout` and a shell). Later ones force an end."""
 _RETRY_S = 0.01
 _STOPPING = (signal.SIGINT, signal.SIGTERM)
 
@@ -59,7 +59,7 @@ class TerminationSignals:
         self._since: float | None = None
 
     def listen(self) -> None:
-        """From now on signals end the program; those that the caller has it ignore (`nohup`, `&`) stay ignored."""
+        """Install the handlers. Signals that the caller makes the program ignore (`nohup`, `&`) stay ignored."""
         signal.signal(signal.SIGALRM, self._again)
         sys.unraisablehook = self._swallowed
         for signum in _STOPPING:
@@ -67,7 +67,7 @@ class TerminationSignals:
                 signal.signal(signum, self._hear)
 
     def ignore(self) -> None:
-        """All is done, and nothing is left to undo."""
+        """Ignore further signals: the work is done."""
         signal.setitimer(signal.ITIMER_REAL, 0)
         for signum in (*_STOPPING, signal.SIGALRM):
             signal.signal(signum, signal.SIG_IGN)

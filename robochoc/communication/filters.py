@@ -1,4 +1,4 @@
-"""Channel filters: what is done to a message's content between the robot that says it and the one that hears it.
+"""Channel filters: they transform the content of a message between its sender and its receiver.
 
 A filter comes from an installed package, under the entry point group `robochoc.filters`, as protocols do. Several can
 be stacked: they seal in their order, and open in the reverse one. Two come with robochoc: `signed` and `sealed`. What

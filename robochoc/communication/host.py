@@ -152,7 +152,7 @@ class Host:
         return Metrics(dict(self.sent), self.bytes, self.clock, self.checks, largest=self.largest)
 
     def _equip(self, parameters: RunParameters) -> None:
-        """Give the protocol what it cannot have of itself: what was set, and chance."""
+        """Give the protocol its settings and its random generator."""
         protocol = self.protocol
         if parameters.settings:
             protocol.settings = settings_of(type(protocol), parameters.settings)
@@ -193,7 +193,7 @@ class Host:
         return Envelope(self.name, receiver, content, clock)
 
     def _tick(self) -> None:
-        """Each check done since the last look moves the clock by one; what was said meanwhile is stamped with it."""
+        """Advance the clock by one for each new check, and stamp the messages of this time with it."""
         before = self.clock - self._checks
         self._answers = len(self._stamps)
         self._stamps += [before + said.checks for said in self._outbox[self._answers :]]

@@ -1,4 +1,4 @@
-"""Robots whose processes are killed at set times, so that a loss can be shown whenever it is wanted."""
+"""Robots whose processes are killed at set times, to demonstrate losses."""
 
 from __future__ import annotations
 

@@ -34,7 +34,7 @@ class MasterLoop(ABC):
 
     @abstractmethod
     def _serve(self, patience_s: float, deadline: float | None) -> None:
-        """Handle what has come, after waiting for it for at most `patience_s` seconds.
+        """Handle arrived messages, after a wait of at most `patience_s` seconds.
 
         Raises:
             RobotsLostError: when a robot is lost whose loss ends the run.

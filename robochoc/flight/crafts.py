@@ -49,7 +49,7 @@ def row_and_column(name: str) -> Cell | None:
 
 
 def craft_of_variable(variable: str, values: Assignment) -> Craft:
-    """Return the craft of `variable`, where nothing else is known of its robot."""
+    """Return the craft of `variable`, if nothing else is known of its robot."""
     return _craft(variable, [variable], None, values)
 
 
@@ -71,7 +71,7 @@ def crafts_of(robot: Robot, values: Assignment) -> list[Craft]:
 
 
 def possible_crafts(robot: Robot) -> Iterator[Craft]:
-    """Yield the crafts of `robot` for all that it might decide; none if there are too many decisions."""
+    """Yield the crafts of `robot` for all possible decisions. None if there are too many."""
     if 0 < prod(len(own.domain) for own in robot.variables) <= _DECISIONS_MAX:
         names = [own.name for own in robot.variables]
         for decided in product(*(own.domain for own in robot.variables)):

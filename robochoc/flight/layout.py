@@ -17,7 +17,7 @@ Point = tuple[float, float, float]
 _GAP = 2
 """Cells from the box to the first line of drones beside it."""
 _TALL = 6
-"""A box of up to so many levels is not scaled, even for a single drone."""
+"""The largest number of levels of a box that is not scaled, even for a single drone."""
 _LEVELS = range(4, 13)
 """Minimum and maximum of levels in a box whose levels are scaled."""
 _TICKS = 15

@@ -55,7 +55,7 @@ class DiagnosticCollector:
         self._found: list[Diagnostic] = []
 
     def add(self, line: int, message: str, hint: str) -> None:
-        """Note a mistake. Raises `InvalidInputError` when there are so many that reading on is of no use."""
+        """Note a mistake. Raises `InvalidInputError` when the limit on mistakes is reached."""
         if len(self._found) == MAX_PER_FILE:
             self._found.append(Diagnostic(self.file, line, "and more mistakes from here on", "mend those above first"))
             raise InvalidInputError(self._found)

@@ -163,7 +163,7 @@ def _between(members: TeamMembers) -> Iterator[Diagnostic]:
 
 
 def _of_the_whole(team: Team) -> list[Diagnostic]:
-    """Return what leaves nothing else to be asked: no robots, or objects that are none."""
+    """Return the mistakes that prevent further checks: no robots, or objects of other types."""
     given: object = team
     place = Location("the team")
     found = list(_of_the_shape(replace(given, robots=()) if isinstance(given, Team) else given, Team, place))
@@ -215,7 +215,7 @@ def _mistakes(team: Team) -> list[Diagnostic]:
 
 
 def _of_the_scenario(team: Team) -> Iterator[Diagnostic]:
-    """Yield the first event that cannot be, with all that is wrong with it: what comes after would follow from it."""
+    """Yield all mistakes of the first invalid event. Later ones might only follow from it."""
     now = replace(team, scenario=()) if team.scenario else team
     for number, event in enumerate(team.scenario, start=1):
         place = Location(f"event {number} of the scenario")

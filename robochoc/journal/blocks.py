@@ -29,11 +29,11 @@ PREAMBLE = _PREAMBLE.pack(MAGIC, FORMAT, 0)
 
 
 class JournalDamagedError(Exception):
-    """From here on nothing can be read; says where, and why."""
+    """The journal is unreadable from this place on. The message has the place and the reason."""
 
 
 class JournalTruncatedError(JournalDamagedError):
-    """Only the end is missing: all that is there is as it was written."""
+    """Only the end is missing. The rest is undamaged."""
 
 
 def _digest(before: bytes, packed: bytes, size: int) -> bytes:
@@ -70,7 +70,7 @@ class BlockReader:
 
     @property
     def rest(self) -> str:
-        """Return what is wrong if no more bytes come; empty: nothing."""
+        """Return the damage if no more bytes follow. Empty: none."""
         return f"byte {self._place:,}: it ends within a block" if self._buffer or not self._before else ""
 
     @property

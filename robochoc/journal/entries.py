@@ -16,7 +16,7 @@ READ = (STAMPED_LATE, VERSION)
 
 
 class JournalError(ValueError):
-    """The file is no journal, or one of another version, or nothing of it can be read."""
+    """The file is not a journal, has another version, or is unreadable from the start."""
 
 
 class Header(Event, frozen=True, kw_only=True, tag="Journal"):

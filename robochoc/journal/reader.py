@@ -154,7 +154,7 @@ class Follower:
 
     @property
     def is_over(self) -> bool:
-        """Return whether the journal says how the run ended: nothing will follow."""
+        """Return whether the journal is complete: it holds the outcome of the run."""
         return self._over
 
     def _next(self) -> Sequence[JournalEntry] | None:
@@ -234,7 +234,7 @@ class _Form(Protocol):
         """Return the next entries; None: they are not whole yet. Raises `JournalError`, `JournalDamagedError`."""
 
     def rest(self) -> Sequence[JournalEntry]:
-        """Return the entries that are whole if nothing follows. Raises `JournalError`, `JournalDamagedError`."""
+        """Return the entries that are complete without further bytes. Raises `JournalError`, `JournalDamagedError`."""
 
     @property
     def place(self) -> str:

@@ -28,7 +28,7 @@ from robochoc.verification.objective import Objective
 MOST_IN_A_BLOCK = 8192
 """Entries; with four times as many ABT's messages are packed 5 to 12 % better, but a crash takes more with it."""
 SPAN_S = 0.25
-"""After so long, at the next event, a block is closed: so much of a run that is killed is missing."""
+"""Seconds after which the next event closes a block. A killed run loses at most the events of this time."""
 
 BlockSink = Callable[[bytes], object]
 """Takes one whole block after the other; the first time the beginning of the file, too. It may raise `OSError`."""
@@ -71,7 +71,7 @@ class JournalRecorder:
                 self._close_block()
 
     def flush_if_due(self) -> None:
-        """Close the block if it has been open for long. To be called now and then while nothing happens."""
+        """Close the block if it has been open for long. Call this from time to time while no event occurs."""
         if self._pending and time.monotonic() >= self._due:
             self.flush()
 
@@ -95,7 +95,7 @@ class JournalRecorder:
 
     @property
     def is_empty(self) -> bool:
-        """Return whether nothing was recorded. Then nothing is written: the old file is still there."""
+        """Return whether no event was recorded. Then no file is written, and an old file stays."""
         return self._number == 0 and len(self._pending) <= 1
 
     def content(self) -> bytes:

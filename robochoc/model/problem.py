@@ -109,7 +109,7 @@ class Child:
 
 @dataclass(frozen=True)
 class Robot:
-    """One agent: the contents of its own file, which is all that it knows.
+    """One agent: the contents of its own file, its only knowledge.
 
     Attributes:
         name: Its name, unique in the team.

@@ -22,7 +22,7 @@ from robochoc.ros.sink_publisher import SinkPublisher
 from robochoc.ros.situation import BATTERY, Situation
 
 TOGETHER_S = 0.5
-"""Reports within so many seconds of one that changes the problem belong to the same event."""
+"""Reports within this number of seconds after one that changes the problem belong to the same event."""
 
 
 class Feedback(ABC):
@@ -133,7 +133,7 @@ class ClosedLoop:
 
     @property
     def team(self) -> Team:
-        """The team with a scenario of all that was to happen, and all that robots have reported."""
+        """Return the team with a scenario of all planned events, and all events from robots' reports."""
         return replace(self._team, scenario=(*self._team.scenario, *self.events))
 
     @property
@@ -165,7 +165,7 @@ class ClosedLoop:
     # The situation
 
     def _coming(self, team: Team) -> Team:
-        """Return `team` after all that is already known to come."""
+        """Return `team` after all events that are already known."""
         for event in self.team.scenario[self._happened :]:
             team, _ = apply_possible_changes(team, event.changes)
         return team

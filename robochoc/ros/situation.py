@@ -23,7 +23,7 @@ from robochoc.model.problem import AddValue, Change, Domain, RemoveAgent, Remove
 BATTERY = 0.2
 """The default charge below which a drone is out of order."""
 WITHIN = 0.5
-"""An obstacle blocks places within so many units."""
+"""The distance, in units, within which an obstacle blocks places."""
 VALUES_MAX = 10_000
 """The values of a larger domain are not tried one by one."""
 OBSTACLES_MAX = 10_000
@@ -33,7 +33,7 @@ NOTES_MAX = 20
 FLIES, LIES = 0.5, 0.25
 """A drone this many units above its home flies; one lower than the second number lies on the ground."""
 LIES_S, LIES_TIMES = 1.0, 3
-"""A drone that has flown and is seen on the ground so often, over so many seconds, is out of order."""
+"""A drone that has flown is out of order after this number of reports on the ground, over this number of seconds."""
 _HAIR = 1e-6
 
 

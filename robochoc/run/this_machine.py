@@ -94,7 +94,7 @@ class ThisMachine(Deployment):
         """See `Deployment.search`."""
         team = self._scenario.ordered_team()
         if phase.takes_over and phase.traits.costs and self.options.order is None:
-            team = with_dom_deg_order(team)  # to be fast: nobody has asked for another order
+            team = with_dom_deg_order(team)  # faster, and no other order was requested
         epoch = Epoch(self._compiler.compile(team, every=True), parameters=phase.parameters)
         self._start_events.report(phase.protocol, EpochStart(epoch))
         with self._session(phase, epoch.compiled) as session:

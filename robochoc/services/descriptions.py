@@ -38,7 +38,7 @@ class Reason(StrEnum):
 
 
 FAILURES = frozenset({Reason.ALREADY_REGISTERED, Reason.NOT_REGISTERED, Reason.INTERNAL_ERROR})
-"""Reasons that show only when a request is carried out; it is refused for any other."""
+"""Reasons that are found only during a request. Any other reason refuses it beforehand."""
 
 
 class RequestRefusedError(Exception):

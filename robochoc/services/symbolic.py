@@ -60,7 +60,7 @@ _SPACE = re.compile(r"[\x00-\x20]*")
 _WORD = re.compile(r'[^\x00-\x20()"]+')
 _SIZE = re.compile(r'#([0-9]{1,9})"')
 _STRING = re.compile(r'"([^"\\]*+(?:\\.[^"\\]*+)*+)"', re.DOTALL)
-"""Possessive, so that it neither goes back nor takes memory for each escape."""
+"""Possessive quantifiers: the match neither backtracks nor uses memory for each escape."""
 _SAFE_NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_.:@/+*!?<>=-]*")
 _SHOWN = 40
 

@@ -55,7 +55,7 @@ from robochoc.solver.query import Query, SolvedBy, SolverAnswer
 CHUNK = 1 << 20
 LAST_WORDS_S = 1.0
 TASKS = 400
-"""After so many the process is replaced: ACE keeps parts of every problem that it has seen."""
+"""The number of tasks after which the process is replaced: ACE keeps parts of every problem in memory."""
 
 
 class AceProcess:
@@ -207,7 +207,7 @@ class AceProcess:
         return word.xml
 
     def close(self) -> None:
-        """End the process, and leave nothing behind."""
+        """End the process and remove its files."""
         if self._process is not None:
             self._process.kill()
             self._process.wait()

@@ -57,17 +57,17 @@ JVM_OPTIONS = (
     "--enable-native-access=ALL-UNNAMED",
 )
 ACE_OPTIONS = ("-s=all", "-xc=false", "-npc", "-v=-1", "-omv=false", "-riv=false")
-"""No colours, nothing but the answer, and every variable with its value."""
+"""No colours, only the answer, and every variable with its value."""
 # The last two: among variables that it has set aside, the heuristic for a given order fails an assertion.
 STRATEGIES: dict[Strategy, tuple[str, ...]] = {
     "default": (),
     "static": ("-varh=Lexico", "-r_c=2000000000", "-ng=NO", "-pal=2", "-dsp=false", "-dss=0"),
 }
 HEAD_USES = 40
-"""After so many models another `Head` is made: it never forgets one, and memory runs out."""
+"""The number of models after which a new `Head` is made. A `Head` keeps every model in memory."""
 MOST = 2**63 - 1
 MINIMISE = ("-os=DECREASING",)
-"""As ACE does by itself; that it is said gives these models a `Head` of their own."""
+"""ACE's default. Stated explicitly, it gives these models a `Head` of their own."""
 
 
 def main() -> None:
@@ -95,7 +95,7 @@ def main() -> None:
 
 
 def _end_with_the_parent(lifeline: int, folder: Path) -> None:
-    """End when the parent has gone: ACE may be in the midst of a search, which nothing interrupts."""
+    """End when the parent has ended. A search of ACE cannot be interrupted otherwise."""
     os.read(lifeline, 1)
     shutil.rmtree(folder, ignore_errors=True)
     os._exit(1)

@@ -40,7 +40,7 @@ DEFAULT_PARAMETERS = RunParameters()
 
 
 class AgentProblem(NamedTuple):
-    """The problem that one agent is given: all that its robot knows when the search begins.
+    """The problem of one agent: the knowledge of its robot when the search begins.
 
     Attributes:
         own: The robot itself, with its compiled domain.

@@ -31,11 +31,11 @@ MAX_CLIQUE_ROWS = 20_000
 TABLE_PATIENCE_S = 20.0
 """The maximum time for all tables of cliques together."""
 MAX_ORBITS = 20_000
-"""Up to so many solutions up to symmetry are listed to count all. If there are more, ACE counts."""
+"""The largest number of solutions, up to symmetry, that are listed to count all. If there are more, ACE counts."""
 MANY_ROWS = 100_000
-"""For a team whose tables have so many rows ACE is started at once, while the first task is still made ready."""
+"""The number of table rows from which ACE is started at once, while the first task is still prepared."""
 HEDGE_S = 5.0
-"""After so long without an answer the other strategy is tried beside."""
+"""Seconds without an answer after which the other strategy is tried in parallel."""
 _TICK_S = 0.2
 NO_SOLUTIONS = SolverAnswer(0, complete=True, solutions=())
 

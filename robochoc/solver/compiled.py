@@ -33,7 +33,7 @@ LexicographicCost = tuple[int, float]
 constraint weighs more than any cost, and differences are never `inf - inf`."""
 
 MIN_TABLE_VALUES = 64
-"""From so many values on, conflicts are looked up for all of them at once, in numpy."""
+"""The number of values from which conflicts are looked up for all of them at once, in numpy."""
 
 MAX_BOUNDED_ROWS = 65_536
 """A constraint with more combinations of values than this is not searched for the least that it charges."""
@@ -133,7 +133,7 @@ class LocalProblem:
         return None
 
     def filter(self, index: int, receiver: str) -> bytes:
-        """Return which values of `receiver` go with `values[index]`, by all that this robot has to check towards it.
+        """Return the values of `receiver` that are consistent with `values[index]` in this robot's constraints.
 
         That is, towards a child, what is totally known (where all robots of a scope know it) and the own parts;
         towards a parent the own parts; for other robots all values. Every pair that a constraint can tell apart
@@ -245,7 +245,7 @@ class LocalProblem:
         return [index for index, own in enumerate(self.values) if all(own[place] == part for place, part in wanted)]
 
     def _known(self, view: Mapping[str, Value], values: int = 1) -> list[tuple[SharedConstraint, OtherValues]]:
-        """Return the constraints whose other variables are all known, and what they see: for so many own `values`."""
+        """Return each constraint whose other variables are all known, and their values. Count `values` checks each."""
         known = [(c, others) for c in self._constraints if (others := c.other_values(view)) is not None]
         self.checks += len(known) * values
         return known

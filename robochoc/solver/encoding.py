@@ -20,7 +20,7 @@ MAX_TUPLES = 4_000_000
 """The maximum number of tuples of values that a constraint is tried on."""
 
 MAX_ALLOWED_ROWS = 100_000
-"""A constraint on so many combinations of values is a table of allowed tuples, however few it forbids."""
+"""The largest number of combinations of values for which a constraint is always a table of allowed tuples."""
 
 Codes = tuple[int, ...]
 

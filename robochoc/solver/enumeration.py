@@ -23,9 +23,9 @@ STEPS_BEFORE_ACE = 1_500_000
 """The further steps of all tasks together before ACE is started: about as long as its start takes."""
 
 ROWS_A_STEP = 256
-"""A step looks at one value in a table of so many rows; in a longer table, or a wider domain, that takes more."""
+"""The table rows that one step covers, for one value. Longer tables and wider domains take more steps."""
 PLACES_A_STEP = 4
-"""At every node a step copies what is left of so many domains and tables. That bounds the memory, too."""
+"""The number of domains and tables that one step copies at every node. This bounds the memory, too."""
 
 
 class OutOfStepsError(Exception):
@@ -40,7 +40,7 @@ class Budget:
         self.used = 0
 
     def spend(self, steps: int) -> None:
-        """Use `steps` more. Raises `OutOfStepsError` when there are not so many left; none are left then."""
+        """Use `steps` more. Raises `OutOfStepsError` if fewer are left; then none are left."""
         self.used += steps
         if self.used > self.steps:
             self.used = self.steps

@@ -16,7 +16,7 @@ from dataclasses import replace
 from robochoc.solver.encoding import MAX_ALLOWED_ROWS, Codes, Network, Table
 
 LARGEST_PERMUTATION = 5
-"""Up to so many variables that all differ and need all values are a table (120 rows); ACE does so up to 4."""
+"""The largest allDifferent over as many values that becomes a table (120 rows). ACE does so up to 4 variables."""
 
 
 def propagate(network: Network) -> Network:

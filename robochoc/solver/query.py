@@ -48,7 +48,7 @@ class Query:
 
     @property
     def trivial(self) -> bool:
-        """Return whether nothing has to be asked: no variable depends on another any more."""
+        """Return whether no query is needed: no variable depends on another any more."""
         return not self.places
 
     @classmethod

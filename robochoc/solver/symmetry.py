@@ -80,7 +80,7 @@ def break_symmetries(network: Network, group: Sequence[Symmetry]) -> Network:
 
 
 def orbits(solutions: Sequence[Codes], group: Sequence[Symmetry], network: Network) -> set[Codes]:
-    """Return `solutions` and all that `group` makes of them."""
+    """Return `solutions` and all their images under `group`."""
     highest = _highest(network)
     return {image for one in solutions for image in (one, *(g.applied(one, highest) for g in group))}
 

@@ -165,7 +165,7 @@ def components_with_withdrawal(team: Team, withdrawal_cost: int) -> list[Weighte
 
 
 def _unless_absent(table: Table, domains: Sequence[Codes], absent: int) -> Table:
-    """Return `table`, which says nothing where one of its variables has the code `absent`."""
+    """Return `table` without effect on tuples in which a variable has the code `absent`."""
     if not table.allowed:
         return table
     return replace(table, rows=(*table.rows, *_absences([domains[place] for place in table.scope], absent)))

@@ -74,7 +74,7 @@ def directory(
 
 
 def _tell(answer: str, *, sl: bool, as_json: bool) -> None:
-    """One answer, line by line; of one who has gone the name is all that is left."""
+    """Print one answer line by line. For an agent that has gone, only its name is left."""
     import msgspec
 
     from robochoc.run.networked.directory_query import agents_in, subject_of

@@ -87,7 +87,7 @@ def sniff(
 
 
 def _session(journal: Path, chosen: str, folder: Path | None) -> SnifferSession:
-    """The journal, opened; its first piece is read, for what is none to be told at once."""
+    """Return a session on the opened journal. Its first piece is read, so that an invalid file fails at once."""
     from robochoc.formats import on_one_line, read_team
     from robochoc.journal.journal import JournalError
     from robochoc.sniffer.patterns import patterns_in

@@ -198,7 +198,7 @@ def solve(
 
 
 def _solve_one(folder: Path, options: Options, products: Products, wanted: Wanted) -> int:
-    """Solve the team in `folder`, tell the outcome, and return the exit status, once nobody watches any more."""
+    """Solve the team in `folder`, print the outcome, and return the exit status after all pages are closed."""
     with Watch(products.watching) as watch:
         status = _solved(folder, options, products, wanted, watch)
         watch.stay()

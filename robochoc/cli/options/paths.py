@@ -106,7 +106,7 @@ def _named(files: Mapping[str, Path | None]) -> Iterator[Place]:
     from robochoc.system.files import resolved
 
     for what, path in files.items():
-        with suppress(OSError):  # whoever reads or writes it says what is wrong
+        with suppress(OSError):  # its reader or writer reports the error
             if path and (path.is_file() or not path.exists()):
                 yield resolved(path), f"{what} {path}"
 

@@ -71,7 +71,7 @@ def saved_outcome(saved: Path) -> Outcome:
 
 
 def saved_team(outcome: Outcome, saved: Path, folder: Path | None) -> Team | None:
-    """The team in `folder`, or where teams of that name usually are; None, which is told, if it is not there.
+    """Return the team in `folder`, or in the default folder of its name. None if it does not exist.
 
     Raises `InvalidInputError`, and `Failure` for another team than that of `outcome`, which is from the file `saved`.
     """

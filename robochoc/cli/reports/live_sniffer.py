@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from robochoc.sniffer.viewer import Viewer
 
 _BROWSER_S = 8.0
-"""So long a run waits for the page that --open has asked for."""
+"""The longest wait of a run for the page that --open requested, in seconds."""
 
 
 @dataclass(frozen=True)

@@ -21,7 +21,7 @@ _ERASE = "\r\x1b[K"
 
 
 def waiting(show: Callable[[Progress], None]) -> Callable[[], None]:
-    """Return a function that shows the time that passes while the robots have nothing to report."""
+    """Return a function that shows the elapsed time while the robots have nothing to report."""
     from robochoc.communication.run_result import Progress
 
     began = time.monotonic()

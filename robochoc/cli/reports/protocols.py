@@ -39,7 +39,7 @@ class Row:
 
 
 def rows() -> list[Row]:
-    """Return all that `robochoc solve --protocol` accepts, and what is broken, with the reason."""
+    """Return all protocols that `robochoc solve --protocol` accepts, and the broken ones with the reason."""
     return [*map(_row, installed_protocols()), _central_solver()]
 
 

@@ -22,7 +22,7 @@ from robochoc.replay import Contradiction, Difference, ReplayResult
 LONGEST = 400
 """Characters of one message's content."""
 MOST = 20
-"""So many messages of a packet are shown, and so many robots that could not be followed."""
+"""The largest number of messages of a packet that are shown, and of robots that could not be followed."""
 
 
 def replay_report(journal: Journal, replayed: ReplayResult) -> str:

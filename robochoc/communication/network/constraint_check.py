@@ -43,7 +43,7 @@ def check_constraints(
 
 
 def _charges(holder: str, constraints: Iterable[Constraint], values: Mapping[str, int]) -> Iterator[Charge]:
-    """Yield, by scope, what those `constraints` of `holder` charge whose variables all have `values`."""
+    """Yield, by scope, the costs of the `constraints` of `holder` whose variables all have `values`."""
     groups: dict[tuple[str, ...], list[Constraint]] = {}
     for one in constraints:
         if values.keys() >= set(one.variables):

@@ -60,7 +60,7 @@ class DirectoryFacilitator:
             self._directory.deregister(self._aid(name), requester=self._aid(name))
 
     def expire(self) -> None:
-        """Forget those whose lease has ended."""
+        """Remove agents whose lease has ended."""
         self._directory.expire(time.time())
 
     def count(self, requester: str) -> None:

@@ -1,4 +1,4 @@
-"""Frames that are lost for good, and which robot is lost with them: always their sender, never another.
+"""Frames that are lost for good. Their sender is then lost, never another robot.
 
 A robot whose frames to the master are lost is lost. An observer only loses its request. The loss of frames between two
 robots is reported by one of them, and may be a number that the other has made up. So it counts only once messages are

@@ -117,5 +117,5 @@ class Inbox:
 
 
 def _size(item: FrameArrived | FramesLost) -> int:
-    """Bytes. That frames are missing counts as a frame, an empty one: who makes it look so may do it without end."""
+    """Bytes. A report of missing frames counts as an empty frame, as a hostile sender may cause any number of them."""
     return len(item.content) if isinstance(item, FrameArrived) else 0

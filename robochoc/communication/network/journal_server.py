@@ -24,7 +24,7 @@ SNIFF = "sniff"
 PIECE_BYTES = 60_000
 """The largest piece of the journal: with its framing it fits into one batch of zenoh."""
 ANSWERED_AT_MOST = 200
-"""Questions of one follower in a second; those beyond are not answered, and it asks again."""
+"""The largest number of answers to one follower in a second. It repeats questions without an answer."""
 PRESENT_S = 2.0
 """Seconds after its last request for which a follower is waited for at the end of the run."""
 LARGEST = 2**53

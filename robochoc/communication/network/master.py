@@ -260,7 +260,7 @@ class Master(MasterLoop):
             self._follow_registry()
 
     def _follow_registry(self) -> None:
-        """Let in robots that were enrolled since, and exclude revoked ones; that needs a router with other rules."""
+        """Admit newly enrolled robots, and exclude revoked ones. Both need a router with other rules."""
         for name in self._policy.revoked(self.members.robots):
             if name not in self.state.lost:
                 self.events.refuse(name, "take part", "its certificate was revoked")

@@ -1,4 +1,4 @@
-"""Plausibility of what robots report: which one lies, or which of two. Pure.
+"""Plausibility of robots' reports: finds a robot that lies, or two of which one lies. Pure.
 
 The master has seen no file. It knows what robots have declared (profiles), what each protocol's robots may conclude
 (traits), and that whatever one robot says it has sent another, that one has had, or will not have had. So a lie is held

@@ -26,7 +26,7 @@ LONGEST_NAME = 255
 LARGEST_WEIGHT = 1_000_000
 """As in files."""
 LARGEST_DEAREST = 2.0**80
-"""More than the costs of any file; what it costs all robots to withdraw is still a number."""
+"""More than the costs of any file. The cost of withdrawing all robots still fits into a number."""
 
 
 class ProfileError(ValueError):
@@ -117,7 +117,7 @@ def visible_robot(profile: Profile, also: Mapping[str, Ranges]) -> Robot:
     if len({profile.name, *profile.neighbours}) <= len(profile.neighbours):
         raise ProfileError("it names itself, or a neighbour twice")
     strangers = profile.looks_at.keys() - set(profile.children)
-    if strangers:  # the master would have them show what is none of its business
+    if strangers:  # the master would make them show variables to a robot that is not their neighbour
         raise ProfileError(f"it looks at variables of {min(strangers)[:LONGEST_NAME]}, which is no child of it")
     if not (0 <= profile.max_cost <= LARGEST_DEAREST and 1 <= profile.weight <= LARGEST_WEIGHT):
         raise ProfileError(f"costs of {profile.max_cost:g} or a weight of {profile.weight} are out of range")

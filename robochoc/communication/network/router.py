@@ -29,7 +29,7 @@ _PROCESS = "robochoc.communication.network.router_process"
 _READY = "listening"
 _LOG = "warn"
 _LOG_OF_REFUSALS = "warn,zenoh::net::routing::interceptor=trace,zenoh_link_tls=debug"
-"""With what is allowed as well, several lines for each frame: that costs more than the frames themselves."""
+"""With allowed actions as well, the log has several lines for each frame, which cost more than the frames."""
 _CHUNK = 65536
 _DENIED = re.compile(
     rb"(?:CertCommonName\([^)]*\)\S*\+|Using cached result: )([0-9a-f]+) is unauthorized to ([A-Za-z/ ]+?)"

@@ -98,7 +98,7 @@ class Transport:
                 self._subscribers[sender] = self._subscribed(sender)
 
     def send(self, receiver: str, content: bytes) -> None:
-        """Put a frame on its way. While the link is down it waits here; afterwards it is sent, or asked for."""
+        """Send a frame. While the link is down, it waits here. Afterwards it is sent, or requested by the receiver."""
         publisher = self._publishers.get(receiver)
         if publisher is None:
             publisher = self._publishers[receiver] = zenoh.ext.declare_advanced_publisher(

@@ -85,7 +85,7 @@ class ChannelModel(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fie
     check_ns: int = 1000
 
     def __post_init__(self) -> None:
-        """Refuse what is out of its range (so is what is no number), and fields that contradict each other."""
+        """Refuse values out of range, values that are not numbers, and fields that contradict each other."""
         if not _NAME.fullmatch(self.name):
             raise ValueError("name: expected up to 40 letters, digits and '.+-_'; write a line such as name = \"mesh\"")
         for field, (least, most) in _RANGES.items():

@@ -120,5 +120,5 @@ class Timed(Schedule):
         self._note(self._wakes(robot), _WAKE, self._chance.random(), robot)
 
     def _note(self, due: int, kind: int, lot: float, what: Envelope | str) -> None:
-        """Into the agenda. Robots that are ready at the same time draw lots; what one says keeps its order."""
+        """Add to the agenda. Robots that are ready at the same time draw lots. Each one's messages keep their order."""
         heapq.heappush(self._agenda, (due, kind, lot, next(self._count), what))

@@ -7,7 +7,7 @@ import numpy as np
 from robochoc.flight.quadrotor.airframe import Array
 
 _STEPS = 8
-"""Free points are searched for in so many steps of half a distance, in each direction."""
+"""The number of steps, of half a distance each, in which free points are searched for in each direction."""
 
 
 def nearest_two(points: Array) -> float:

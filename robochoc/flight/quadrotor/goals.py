@@ -18,8 +18,8 @@ from robochoc.flight.quadrotor.rigid_bodies import Mask
 from robochoc.flight.routes.spacing import SLACK_M
 
 MARGIN_M = 0.1
-"""Routes keep so much more than the distance. Tracking errors take 1 cm of it in calm air, and 6 cm where a drone takes
-off into a wind of 5 m/s (`tests/unit/flight/test_rigid_bodies.py`). Two drones may use it up towards each other.
+"""The margin that routes keep beyond the distance. Tracking errors take 1 cm of it in calm air, and 6 cm where a drone
+takes off into a wind of 5 m/s (`tests/unit/flight/test_rigid_bodies.py`). Two drones may use it up towards each other.
 """
 _ALL_BUT = 0.999
 """Of the distance between starts or goals: rounding must not make a route impossible."""

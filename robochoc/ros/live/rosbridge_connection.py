@@ -114,7 +114,7 @@ class Connection:
             raise self._failed(f"the rosbridge at {self.url} has closed the connection; see its log, and start again")
 
     def drain(self) -> None:
-        """Wait until all that was sent has left. Raises `failed` if the server reads nothing, or is gone."""
+        """Wait until all messages have left. Raises `failed` if the server reads nothing, or is gone."""
         left, since = self._buffered(), time.monotonic()
         while left:
             self.check()
@@ -145,7 +145,7 @@ class Connection:
             raise self._failed(f"the connection to the rosbridge at {self.url} is stuck; start again") from None
 
     def confirm(self) -> bool:
-        """Wait until the server has handled all that was sent; return whether it says so.
+        """Wait until the server has handled all messages. Return whether it confirms that.
 
         A server that closes forgets what it has read and not handled yet. It handles requests in their order, and
         answers any call of a service, even of one that does not exist.

@@ -36,7 +36,7 @@ _STEP = 1 << 20
 
 
 Unpack = Callable[[bytes, int], bytes]
-"""Decompresses all that is given, up to so many bytes. May raise anything."""
+"""Decompresses its input, up to a number of bytes. May raise anything."""
 
 
 class RecordingDamagedError(Exception):
