@@ -17,7 +17,7 @@ Assignment = tuple[Value, int]
 """A robot's value, and the counter that says how many it has taken so far."""
 
 Stamp = Sequence[int]
-"""The time-stamp of a CPA: its robots' counters. Nobody counts twice the same, so it tells the assignments, too."""
+"""The time-stamp of a CPA: its robots' counters. Counters are never reused, so it identifies the assignments."""
 
 
 class CostLookup:

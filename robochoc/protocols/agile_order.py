@@ -29,7 +29,7 @@ from robochoc.protocols.nogood import LeftSide
 from robochoc.protocols.order import PriorityOrder
 
 UNKNOWN = 2**31 - 1
-"""What is left to a robot that has never said how many values it has."""
+"""The number of remaining values of a robot whose domain size is unknown."""
 
 TerminationVector = tuple[int, ...]
 """TV: how many values are left to the first robot of an order, to the second, and so on."""

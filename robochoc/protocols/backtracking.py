@@ -1,4 +1,4 @@
-"""What ABT has in common with its relatives that change the order: the view, and the nogoods that rest on it.
+"""The common base of ABT and its variants with other orders: the view, and the nogoods that depend on it.
 
 Of the kernel (Bessiere, Maestre, Brito, Meseguer, AIJ 161, 2005, Figure 1) `Update` and `ChooseValue`
 are here; what a protocol says, to whom, and when, is in its own file.

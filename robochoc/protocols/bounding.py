@@ -1,4 +1,4 @@
-"""What ADOPT and BnB-ADOPT share: contexts, and for each own value the bounds on what it costs.
+"""The common base of ADOPT and BnB-ADOPT: contexts, and bounds on the cost of each own value.
 
 Names and formulas are those of both papers (`adopt`, `bnb_adopt`). In the present context the subtree of child l costs
 between `lb(d, l)` and `ub(d, l)` if this robot takes value d; with what is paid here, delta(d), that makes LB(d) and

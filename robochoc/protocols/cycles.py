@@ -1,12 +1,12 @@
-"""Synchronous local search: what its protocols have in common.
+"""The common base of synchronous local search protocols.
 
-All robots go through cycles, and a cycle through phases. In each phase a robot says one message to those who wait for
-one, then waits for one of each of those that it listens to itself, and goes on when it has them all. So messages need
-no number: from one robot to another they arrive in the order of their phases. One that comes before its phase, from a
-neighbour that is ahead, is kept until then.
+All robots go through cycles, and each cycle has phases. In each phase a robot sends one message to each robot that
+waits for one, then waits for one from each robot that it listens to, and continues when it has all of them. Messages
+need no number, as they arrive in the order of their phases from each robot. A message from a neighbour that is ahead is
+stored until its phase.
 
-Whatever the delays, the course of the search is the same. Nobody sees how good it is as a whole, so each robot keeps
-the values that it has had (`Trail`), and whoever collects them finds the cheapest cycle.
+The course of the search does not depend on delays. No robot knows the total cost, so each robot records its values
+(`Trail`); the collected trails give the cheapest cycle.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ from robochoc.solver.compiled import LexicographicCost, LocalProblem
 T = TypeVar("T")
 
 Then = Callable[[Mapping[str, wire.Message]], None]
-"""What to do with one message of each robot that was listened to, in the order of their names as they were given."""
+"""A function of one message of each robot passed to `listen`, in the order of these robots."""
 
 
 class Value(wire.Message, frozen=True):

@@ -1,15 +1,15 @@
 """Pseudo-trees that the robots build themselves: leader election, then a distributed depth-first search.
 
-Each part of the team that constraints connect elects the robot with the most neighbours, by waves that the strongest
-candidate's one survives (the echo algorithm with extinction; Tel, "Introduction to Distributed Algorithms", 2nd
-edition, 2000, Section 7.2). From there a token visits all robots depth first (Cheung, "Graph traversal techniques and
-the maximum flow problem in distributed computation", IEEE TSE 9(4), 1983); it carries the names of those visited, so
-it never asks in vain: Awerbuch 1985 has other means for that. Of its unvisited neighbours a robot sends it to the one
-with the most neighbours itself. Ties go to who is higher in the priority order.
+Each connected component elects the robot with the most neighbours: waves of all candidates spread, and only the
+strongest candidate's wave survives (the echo algorithm with extinction; Tel, "Introduction to Distributed Algorithms",
+2nd edition, 2000, Section 7.2). From there a token visits all robots depth first (Cheung, "Graph traversal techniques
+and the maximum flow problem in distributed computation", IEEE TSE 9(4), 1983). It carries the names of the visited
+robots, so it is never sent to one of them (Awerbuch 1985 avoids that by other means). A robot sends it to its unvisited
+neighbour with the most neighbours. Ties go to the robot of higher priority.
 
-Neighbours then stand one above the other, as in every depth-first search of an undirected graph; so do all robots of
-an n-ary constraint, as they are all neighbours. What it takes: 2 messages a robot for the token, and for the election
-at least 2 an edge.
+Neighbours are then on one branch, as in every depth-first search of an undirected graph. So are all robots of an n-ary
+constraint, as they are all neighbours. The cost: 2 messages for each robot for the token, and at least 2 for each edge
+for the election.
 """
 
 from __future__ import annotations
@@ -68,7 +68,7 @@ class Back(Message, frozen=True):
 
 
 TreeMessage = Wave | Token | Back
-"""What every `TreeProtocol` receives besides its own messages."""
+"""The messages that every `TreeProtocol` receives besides its own."""
 
 
 class TreeProtocol(Protocol):

@@ -1,8 +1,7 @@
-"""What a robot can say of the search besides its own value: for who collects the result, and for nobody else's moves.
+"""A robot's knowledge of the search besides its own value: for the collected result only, not for other robots.
 
-A protocol that minimises may be asked before it is done. What it knows by then is of different kinds, and each
-protocol tells what it has: the cheapest assignment so far, a lower bound, its place in the pseudo-tree that the
-robots have built, or the values that it has had, cycle by cycle.
+A protocol that minimises may be asked before it ends. Each protocol reports what it has: the cheapest assignment so
+far, a lower bound, its place in the pseudo-tree that the robots have built, or its values in each cycle.
 """
 
 from __future__ import annotations

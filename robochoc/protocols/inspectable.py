@@ -1,4 +1,4 @@
-"""What a replay asks of a protocol besides its attributes: whatever is special about how its state is to be shown.
+"""Optional members of a protocol that control how a replay shows its state.
 
 A replay shows a robot's state after each of its steps (`replay/inspection.py`). It finds agent views, nogood stores,
 contexts and partial assignments by themselves. A protocol overrides these members only where that is not enough.

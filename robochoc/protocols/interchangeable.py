@@ -1,4 +1,4 @@
-"""What many robots have, told once for all that have the same: for `sfb`, whose first waves tell of all robots.
+"""Run-length encoding of lists with an item for each robot: for the first waves of `sfb`.
 
 Teams often have few kinds of robots. So a list with an item for each robot travels as its distinct items, and runs:
 which item it is, and for how many robots in succession. Alike robots take a few bytes then, however many they are.

@@ -1,8 +1,9 @@
-"""What every protocol is: a state machine that is told messages and says messages.
+"""The interface of protocols: a state machine that receives and sends messages.
 
-A host (see `communication/host.py`) drives it: `start` once, then for each packet of waiting messages `receive`
-one by one and `settle` when the inbox has been drained. What it says collects in `outbox`, which the host
-empties. A protocol never asks the time, draws a lot, or knows whether it runs in a simulator or on a robot.
+A host (see `communication/host.py`) drives it: it calls `start` once, then for each packet of waiting messages
+`receive` for each message, and `settle` when the inbox has been drained. Sent messages collect in `outbox`, which the
+host empties. A protocol never reads the time or draws random numbers by itself, and does not know whether it runs in a
+simulator or on a robot.
 """
 
 from __future__ import annotations

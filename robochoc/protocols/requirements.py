@@ -1,7 +1,7 @@
-"""What a problem requires of a protocol: whether the constraints of a robot are such that it can take them.
+"""Requirements of a problem on a protocol: the kinds of constraints that a robot has.
 
-A run asks for all robots before it begins (`run/compatibility.py`). Across machines nobody else sees a robot's
-constraints, so every robot asks for itself; that is why this stands here, where both can ask.
+A run checks all robots before it begins (`run/compatibility.py`). Across machines only the robot itself knows its
+constraints, so each robot checks itself. This module is where both can import it.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""What a protocol is and what it can take: its row in `robochoc protocols`."""
+"""Properties and capabilities of a protocol: its row in `robochoc protocols`."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ ENDS_WITH_PROOF = (Verdict.NO_SOLUTION,)
 ENDS_WITH_EITHER = (Verdict.SOLUTION, Verdict.NO_SOLUTION)
 """One robot sees either end of the search, such as the last that a token comes to."""
 UNDECLARED = (Verdict.SOLUTION, Verdict.NO_SOLUTION, Verdict.UNKNOWN)
-"""What a protocol may conclude that does not say. Never `optimal`: a run says that, of a `solution` that it proves."""
+"""The default of `concludes`. It never contains `optimal`: a run reports that for a `solution` with a proof."""
 
 
 @dataclass(frozen=True)

@@ -1,4 +1,4 @@
-"""Playing a recorded run again: the same protocol objects, the same packets, and what comes of them."""
+"""Replay of a recorded run: the same protocol objects with the same packets, and the results compared."""
 
 from robochoc.replay.claims import Contradiction
 from robochoc.replay.comparison import Difference

@@ -94,7 +94,7 @@ class RecordedChannels:
         self._recorded: dict[Edge, deque[Sent]] = {}
         self._again: dict[Edge, deque[bytes]] = {}
         self._ahead: dict[Edge, int] = {}
-        """How many messages of a channel were delivered before they were sent again."""
+        """The number of messages of a channel that were delivered before they were sent again."""
         for event in events:
             if isinstance(event, Sent):
                 self._recorded.setdefault((event.sender, event.receiver), deque()).append(event)

@@ -1,4 +1,4 @@
-"""Claims of a journal beside its steps: the header and the outcome, compared with what follows from the steps.
+"""Claims of a journal besides its steps (header and outcome), compared with the results of the steps.
 
 All steps may be the same while the header, or the outcome, is another run's. Metrics are counted anew from the steps
 that were played. Verdict and values are those that the protocol objects have in the end.

@@ -1,4 +1,4 @@
-"""What a robot knows at one moment, in words. Inspecting changes nothing, and no check is counted for it.
+"""A robot's state at one moment, in words. Inspection changes nothing, and its checks are not counted.
 
 Agent views, nogood stores, partial assignments and contexts are found by the names and types of the protocol's
 attributes. A protocol says itself what else is special about its state (`protocols/inspectable.py`). All other

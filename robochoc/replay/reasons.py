@@ -1,4 +1,4 @@
-"""Why a robot has changed its mind in a step, or has ended the search: in words, each a line to be shown."""
+"""Reasons for a robot's new value, or for its end of the search: in words, a line for each reason."""
 
 from __future__ import annotations
 

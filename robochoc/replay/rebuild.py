@@ -1,4 +1,4 @@
-"""The robots of each recorded run, made again of what they were given then."""
+"""The robots of each recorded run, rebuilt from the parameters they were given."""
 
 from __future__ import annotations
 

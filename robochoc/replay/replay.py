@@ -1,4 +1,4 @@
-"""Replay: the protocol objects of a recorded run, driven through its packets once more.
+"""Replay: the protocol objects of a recorded run process its packets again.
 
 A protocol is a pure state machine. With the same packets it has to send the same messages again. If it does not, the
 protocol has changed, or the journal was altered. Everything that robots report is compared but the time: what they took

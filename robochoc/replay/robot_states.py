@@ -1,4 +1,4 @@
-"""What a robot knows after each of its own steps, and why it has changed its mind.
+"""A robot's state after each of its own steps, and the reasons for a new value.
 
 The robot is played again, by what its journal says that it was told; nobody else has to be, but where a journal's
 text form has lost what a message said.

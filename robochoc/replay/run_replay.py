@@ -1,4 +1,4 @@
-"""One recorded run, driven through its packets once more."""
+"""The replay of one recorded run with its packets."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A `repr` of anything that a protocol keeps: bounded in length, depth and size, and it never raises."""
+"""A `repr` of any attribute of a protocol: bounded in length, depth and size. It never raises."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ MAX_ENTRIES = 12
 MAX_LENGTH = 200
 """Characters."""
 _CONTEXT = (LocalProblem, PriorityOrder, AgentProblem)
-"""What many objects refer to, and what is no state of theirs."""
+"""Types of shared objects, which are no state of the object that refers to them."""
 
 
 def safe_repr(thing: object) -> str:

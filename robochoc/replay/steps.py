@@ -24,7 +24,7 @@ from robochoc.journal.events import (
 )
 
 RobotEvent = Received | Heard | Decided | Concluded | Sent | Settled
-"""What a robot tells of itself, in its own order."""
+"""The events of a robot, in its own order."""
 
 
 class RecordedRun(NamedTuple):

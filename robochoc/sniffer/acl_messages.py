@@ -1,4 +1,4 @@
-"""The messages of a trace as messages of FIPA ACL, as far as can be said of them afterwards.
+"""The messages of a trace in FIPA ACL, as far as the recorded fields allow.
 
 Where the protocol is installed they are those of `sniffer/conversation.py`; where it is not, or is another
 than it was, they are made of what the journal holds.

@@ -1,4 +1,4 @@
-"""Answers that took some work, kept as long as there is room."""
+"""A cache of limited size for answers that are slow to compute."""
 
 from __future__ import annotations
 

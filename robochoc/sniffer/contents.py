@@ -1,4 +1,4 @@
-"""The contents of a trace's messages, packed: a million of them take as much memory as they take on their way."""
+"""The contents of a trace's messages, packed: a million of them take as much memory as in transit."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A run as a conversation of FIPA agents: each envelope has its ACL message, which tells everything it holds.
+"""A run as a conversation of FIPA agents: each envelope has an ACL message with all its content.
 
 The content is JSON, an array of the message's type and its fields by name: `["Ok",{"value":[3]}]`. What JSON has no
 words for stands in an object of one member: `{"base64":"..."}` are bytes, `{"float":"inf"}` is a number, and

@@ -1,4 +1,4 @@
-"""All answers of a page at once, compressed: for a page that has no server to ask.
+"""All answers of a page at once, compressed: for a page without a server.
 
 By name: `about`, `columns`, `steps`, `decisions`, `details:CHUNK`, `states:ROBOT:CHUNK`; each is zlib's.
 """

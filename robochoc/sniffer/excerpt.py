@@ -1,4 +1,4 @@
-"""A part of a journal as a journal: without the messages that are not meant."""
+"""An excerpt of a journal, as a journal with the selected messages only."""
 
 from __future__ import annotations
 

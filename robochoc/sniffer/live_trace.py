@@ -29,7 +29,7 @@ from robochoc.sniffer.trace import Trace
 PIECE_BYTES = 1 << 16
 """Of a journal, read in one go: a fraction of a second's work."""
 TEXT = b'{"event":"Journal"'
-"""How a journal in its text form begins; the other one begins with `MAGIC`."""
+"""The beginning of a journal in its text form; the other form begins with `MAGIC`."""
 _AT_ONCE_S = 0.5
 """So much work may be done before anything is shown."""
 _EVENTS_AT_ONCE = 5_000

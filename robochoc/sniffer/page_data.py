@@ -1,4 +1,4 @@
-"""What a page is told of a trace, answer by answer: as JSON, or as columns of numbers (little-endian).
+"""The answers to a page about a trace: JSON, or columns of numbers (little-endian).
 
     about       JSON: what was run, who took part, how many messages there are, how it ended
     columns     messages: t, clock (8 bytes, floating point), step, bytes (4), sender, receiver, kind, run (2)

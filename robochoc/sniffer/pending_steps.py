@@ -1,4 +1,4 @@
-"""Steps that have not ended, or wait for what they took in; and the channels that this comes by."""
+"""Steps that have not ended or wait for received messages, and the channels of these messages."""
 
 from __future__ import annotations
 

@@ -22,9 +22,9 @@ from robochoc.run.networked.address import Address
 from robochoc.run.networked.directory_query import ANSWER_S, ASK_AGAIN_S, NoAnswerError
 
 LOOK_S = 0.1
-"""How often it is asked for what is new."""
+"""The interval between requests for new blocks."""
 PIECE_S = 1.0
-"""How long an answer may take; whatever does not come is asked for again."""
+"""The time limit of an answer, after which the request is repeated."""
 _NUMBER_BITS = 32
 
 

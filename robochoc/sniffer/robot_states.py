@@ -1,4 +1,4 @@
-"""What robots knew after each of their steps, in chunks, from the journal's file.
+"""Robots' states after each of their steps, in chunks, from the journal's file.
 
 A robot is played again with what it was told. Its events are read from the file when somebody asks, those of the
 other robots only where the robot cannot be played without them.
@@ -30,7 +30,7 @@ _KEPT_BYTES = 1 << 26
 class _Playing(NamedTuple):
     robot: str
     size: int
-    """How long the file was."""
+    """The length of the file at that time."""
     states: Iterator[RobotState]
 
 

@@ -1,4 +1,4 @@
-"""Which messages of a trace are meant: by robots, types, numbers, conversation. All parts have to agree."""
+"""A selection of messages of a trace by robots, types, numbers, and conversation. All parts must match."""
 
 from __future__ import annotations
 

@@ -25,7 +25,7 @@ from robochoc.view.address import loopback_socket, secret_path, url_of
 from robochoc.view.loopback import SecretHandler, SecretPage, SecretSocket, application, in_browser, served
 
 POLL_S = 0.1
-"""How often a file is looked at that had nothing new."""
+"""The interval between looks at a file that had nothing new."""
 NEWS_S = 0.2
 """Between two news to the same page, at least."""
 _PIECE = 1 << 16

@@ -1,4 +1,4 @@
-"""What the server serves: one journal's file, the trace of what is in it by now, and the answers about it."""
+"""The data of the server: one journal's file, its trace so far, and the answers about it."""
 
 from __future__ import annotations
 

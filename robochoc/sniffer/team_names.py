@@ -1,4 +1,4 @@
-"""What a journal tells of its team, for the words: the order of the robots, and the names of their variables."""
+"""Names for messages in words, from a journal: the order of the robots, and the names of their variables."""
 
 from __future__ import annotations
 

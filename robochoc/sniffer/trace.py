@@ -72,9 +72,9 @@ class Trace:
         self.outcome: Outcome | None = None
         self.damage: str | None = None
         self.unseen = 0
-        """Messages that were taken in, and that nobody was seen to send."""
+        """The number of received messages whose sending was not seen."""
         self.outdated = False
-        """Whether somebody was seen to send what had been given up as unseen: made anew, it would be better."""
+        """Whether the sending of a message counted as unseen was seen later: a trace made again would be better."""
         self._contents = Contents()
         self._number_of_robot: dict[str, int] = {}
         self._number_of_kind: dict[str, int] = {}

@@ -1,4 +1,4 @@
-"""What a trace is made of: runs, notes, and the columns of messages and steps."""
+"""The parts of a trace: runs, notes, and the columns of messages and steps."""
 
 from __future__ import annotations
 

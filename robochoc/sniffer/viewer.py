@@ -1,4 +1,4 @@
-"""A viewer: a process of its own that serves the page of a run to come, so that whoever looks never slows the robots.
+"""A viewer: a separate process that serves the page of a run, so that viewing never slows the robots.
 
 It is started before the robots, with the journal's file and the socket at which browsers will ask; the URL stands
 before it has even begun. Robots and viewer share nothing but the file, which the viewer reads when a page is there. It

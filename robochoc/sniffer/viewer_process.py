@@ -1,4 +1,4 @@
-"""What a viewer's process runs: `python -m robochoc.sniffer.viewer_process SOCKET JOURNAL` (descriptors).
+"""The main program of a viewer's process: `python -m robochoc.sniffer.viewer_process SOCKET JOURNAL` (descriptors).
 
 The first line of standard input says what else there is to know, a byte after it that nothing more will be written,
 and its end is the end of the parent. A byte on standard output says that a page has connected. Until the first browser
