@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import signal
 import threading
 from collections.abc import Iterator
 from pathlib import Path
@@ -23,6 +24,11 @@ if TYPE_CHECKING:
 # How long an example takes says something of the machine, and nothing of what is tested.
 settings.register_profile("robochoc", deadline=None)
 settings.load_profile("robochoc")
+
+# A shell script starts what it puts in the background (`make test &`) with SIGINT ignored. Every program that a test
+# starts would inherit that.
+if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
+    signal.signal(signal.SIGINT, signal.default_int_handler)
 
 
 @pytest.fixture

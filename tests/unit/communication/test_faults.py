@@ -199,11 +199,11 @@ def test_a_signal_that_python_swallows_is_raised_again(tmp_path: Path) -> None:
     """Python drops what is raised within the callback of a weak reference, and prints it."""
     program = """
 import signal, sys, time, weakref
-from robochoc.cli.main import Ending
+from robochoc.cli.main import TerminationSignals
 
 class Thing: pass
 
-Ending().listen()
+TerminationSignals().listen()
 thing = Thing()
 callback = weakref.ref(thing, lambda _: signal.raise_signal(signal.SIGINT))
 del thing
