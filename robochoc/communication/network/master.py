@@ -210,6 +210,8 @@ class Master(MasterLoop):
         leave, until = Leave(why, failed), time.monotonic() + farewell_s
         staying = partial(self.members.staying, FAREWELL_S, besides=self.state.lost)
         with suppress(RobotsLostError, UnsupportedError):
+            # A run may be over before the directory was looked at again.
+            self._notify_subscribers()
             self._send_all(leave)
             while staying() and not over(until):
                 self._serve_until(lambda: not staying(), time.monotonic() + AGAIN_S)
@@ -255,9 +257,13 @@ class Master(MasterLoop):
             self._registry_read = now
             self._registrar.welcome_again()
             self._facilitator.expire()
-            for subscriber, answer in self._facilitator.notices():
-                self._send(subscriber, answer)
+            self._notify_subscribers()
             self._follow_registry()
+
+    def _notify_subscribers(self) -> None:
+        """Send the directory's notices about robots that have come, gone or changed."""
+        for subscriber, answer in self._facilitator.notices():
+            self._send(subscriber, answer)
 
     def _follow_registry(self) -> None:
         """Admit newly enrolled robots, and exclude revoked ones. Both need a router with other rules."""
