@@ -74,6 +74,15 @@ def test_refusals_are_what_was_intercepted_coming_in() -> None:
     assert list(refusals(LOG)) == TOLD
 
 
+@given(first=st.lists(st.booleans(), min_size=2 * len(LINES), max_size=2 * len(LINES)))
+def test_the_lines_of_two_threads_come_mixed(first: list[bool]) -> None:
+    """What another thread writes between the two lines of a refusal takes nothing away from it."""
+    one, other = list(LINES), [line.replace("ThreadId(07)", "ThreadId(08)") for line in LINES]
+    mixed = [(one if (ours and one) or not other else other).pop(0) for ours in first]
+    told = list(refusals("".join(f"{line}\n" for line in mixed).encode()))
+    assert sorted(told) == sorted(TOLD * 2)
+
+
 @pytest.mark.parametrize("line", range(len(LINES)))
 def test_a_line_alone_says_no_more_than_it_can(line: int) -> None:
     told = list(refusals(f"{LINES[line]}\n".encode()))

@@ -31,11 +31,14 @@ _LOG = "warn"
 _LOG_OF_REFUSALS = "warn,zenoh::net::routing::interceptor=trace,zenoh_link_tls=debug"
 """With allowed actions as well, the log has several lines for each frame, which cost more than the frames."""
 _CHUNK = 65536
-_DENIED = re.compile(
-    rb"(?:CertCommonName\([^)]*\)\S*\+|Using cached result: )([0-9a-f]+) is unauthorized to ([A-Za-z/ ]+?)"
-    rb" \(ingress\) on (\S+)[^\n]*\n[^\n]*interceptor: Msg intercepted!"
+_DECISION = re.compile(
+    rb"ThreadId\((\d+)\) zenoh::net::routing::interceptor(?:"
+    rb"::access_control: [^\n]*?(?:CertCommonName\([^)\n]*\)\S*\+|Using cached result: )([0-9a-f]+) is unauthorized to "
+    rb"([A-Za-z/ ]+?) \((in|e)gress\) on (\S+)|: (Msg intercepted!))"
 )
-_TELLING = re.compile(rb"unauthorized|zenoh_link_tls")
+"""The two lines of a refusal: what a session may not do, and that this is why a message was stopped. Other threads of
+the router may write between them."""
+_TELLING = re.compile(rb"unauthorized|intercepted|zenoh_link_tls")
 _KNOWN = re.compile(rb"CertCommonName\(([^)]*)\)\S*\+([0-9a-f]+) is unauthorized")
 _ACCEPTED = re.compile(rb"zenoh_link_tls::unicast: Accepted TLS connection [^\n]*Common Name: ([^\n]*)\.\n")
 _TLS = re.compile(rb"WARN [^\n]*zenoh_link_tls::unicast: ([^\n]*)")
@@ -52,6 +55,7 @@ _MEANINGS = {
 }
 """The meanings of zenoh's texts for refused connections; the first that fits counts."""
 _KEPT_SESSIONS = 10_000
+_KEPT_THREADS = 100
 _COLOURS = re.compile(rb"\x1b\[[0-9;]*m")
 
 
@@ -172,9 +176,6 @@ class Router:
         while chunk := cast("io.BufferedReader", output).read1(_CHUNK):
             text = rest + chunk
             whole = text.rfind(b"\n") + 1
-            last = text.rfind(b"\n", 0, max(0, whole - 1)) + 1
-            if b"unauthorized" in text[last:whole]:  # what becomes of it stands in the next line
-                whole = last
             if self._refused and _TELLING.search(text, 0, whole):
                 for refusal in log.refusals(text[:whole]):
                     self._refused(refusal)
@@ -189,6 +190,8 @@ class Log:
         self._names: dict[bytes, str] = {}
         """The name of each session. zenoh gives the name of a certificate's holder only when it looks a right up
         anew."""
+        self._denied: dict[bytes, tuple[bytes, bytes, bytes] | None] = {}
+        """The action, with its session and key, that each thread has found not allowed last (None: going out)."""
 
     def refusals(self, log: bytes) -> Iterator[Refusal]:
         """Yield the refusals in a part of the log, which ends with a whole line."""
@@ -200,12 +203,20 @@ class Log:
         if len(self._names) > _KEPT_SESSIONS:
             self._names.clear()
         self._names.update((session, name.decode(errors="replace")) for name, session in _KNOWN.findall(plain))
-        for session, what, where in _DENIED.findall(plain):
-            if session in self._names:
-                action = f"{what.decode().lower()} {where.decode(errors='replace')}"
-                yield Refusal(self._names[session], action, "no rule of the Authority allows it")
+        yield from self._stopped(plain)
         for why in _TLS.findall(plain):
             yield Refusal("somebody", "connect", _meaning(_HINT.sub("", why.decode(errors="replace"))))
+
+    def _stopped(self, log: bytes) -> Iterator[Refusal]:
+        """Yield the messages that were stopped coming in, each because of what its thread found last."""
+        if len(self._denied) > _KEPT_THREADS:
+            self._denied.clear()
+        for thread, session, what, direction, where, intercepted in _DECISION.findall(log):
+            if not intercepted:
+                self._denied[thread] = (session, what, where) if direction == b"in" else None
+            elif (denied := self._denied.pop(thread, None)) and denied[0] in self._names:
+                action = f"{denied[1].decode().lower()} {denied[2].decode(errors='replace')}"
+                yield Refusal(self._names[denied[0]], action, "no rule of the Authority allows it")
 
 
 def _meaning(why: str) -> str:
