@@ -6,7 +6,7 @@ RUN := $(VENV)/.run
 READY := $(VENV)/.ready
 PIP := $(BIN)/pip install --disable-pip-version-check
 
-.PHONY: demo demo-11 docs test test-slow fuzz lint type format bench journals clean
+.PHONY: demo demo-11 docs test test-slow test-all fuzz lint type format bench journals clean
 
 $(RUN): pyproject.toml
 	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' || { echo "robochoc needs Python 3.11 or newer; say: make PYTHON=python3.12 ..."; exit 1; }
@@ -32,11 +32,21 @@ demo-11: $(RUN)  ## the flagship: 121 robots in 121 processes, planar and full
 		$(BIN)/robochoc solve out/queens3d-11-$$model --html out/queens3d-11-$$model.html || exit $$?; \
 	done
 
-test: $(READY)
-	$(BIN)/pytest -n 2 --dist worksteal
+# The same problems each time. SHUFFLE=7 runs the tests in an order drawn from 7: they must not depend on it.
+JOBS ?= 2
+PYTEST := $(BIN)/pytest -n $(JOBS) --dist worksteal
+test: $(READY)  ## every rule, command and refusal, and one fault of each kind
+	$(PYTEST) $(if $(SHUFFLE),--random-order-bucket=global --random-order-seed=$(SHUFFLE))
 
-test-slow: $(READY)
-	$(BIN)/pytest -n 2 --dist worksteal -m slow
+# New random problems each time; a failure names the seed, and `make test-slow SEED=...` repeats it.
+ifndef SEED
+SEED := $(shell date +%s)
+endif
+test-slow: $(READY)  ## the rest: random batches in length, faults in all variants
+	@echo "seed $(SEED): make test-slow SEED=$(SEED) draws the same examples"
+	$(PYTEST) -m 'slow or hypothesis' --hypothesis-profile=new --hypothesis-seed=$(SEED)
+
+test-all: test test-slow
 
 DOCS := $(VENV)/.docs
 $(DOCS): $(READY)
@@ -52,7 +62,7 @@ docs: $(DOCS)  ## the documentation site: out/site/index.html, readable without 
 # .venv/bin/python -m tests.fuzz --target NAME FILE
 SECONDS ?= 600
 fuzz: $(READY)  ## spoilt inputs for all that reads them: make fuzz SECONDS=600 SEED=1 ENGINE=loop
-	$(BIN)/python -m tests.fuzz --seconds $(SECONDS) $(if $(SEED),--seed $(SEED)) $(if $(ENGINE),--engine $(ENGINE))
+	$(BIN)/python -m tests.fuzz --seconds $(SECONDS) --seed $(SEED) $(if $(ENGINE),--engine $(ENGINE))
 
 lint: $(READY)
 	$(BIN)/ruff check .

@@ -9,7 +9,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import pytest
-from hypothesis import settings
 
 from robochoc.authority.authority import Authority
 from robochoc.formats import write_team
@@ -17,13 +16,12 @@ from robochoc.generators.queens3d import queens3d
 from tests.support.authorities import Clock, Seen
 from tests.support.authority_service import AuthorityService, open_files
 from tests.support.deployments import Deployment
+from tests.support.examples import register_profiles
 
 if TYPE_CHECKING:
     from tests.support.sniffer_server import SnifferServer
 
-# How long an example takes says something of the machine, and nothing of what is tested.
-settings.register_profile("robochoc", deadline=None)
-settings.load_profile("robochoc")
+register_profiles()
 
 # A shell script starts what it puts in the background (`make test &`) with SIGINT ignored. Every program that a test
 # starts would inherit that.

@@ -28,7 +28,8 @@ from robochoc.generators.random_csp import random_csp
 from robochoc.journal.events import Registered, Sent
 from robochoc.journal.journal import Follower, JournalEntry, read_journal
 from robochoc.model.problem import Team
-from tests.support.faults import PROGRAM, Run, gone_within_s, ignores_ctrl_c, running, wait_until
+from tests.support.faults import PROGRAM, Run, gone_within_s, ignores_ctrl_c, running
+from tests.support.limits import wait_until
 
 pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="looks into /proc")
 

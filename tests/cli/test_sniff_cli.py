@@ -17,7 +17,8 @@ from robochoc.cli.options.solve import SolveCommand
 from robochoc.formats import write_team
 from robochoc.generators.queens3d import queens3d
 from robochoc.sniffer.viewer import Viewer
-from tests.support.faults import PROGRAM, Run, gone_within_s, running, wait_until
+from tests.support.faults import PROGRAM, Run, gone_within_s, running
+from tests.support.limits import wait_until
 from tests.support.program import ROOT
 from tests.support.sniffer_server import journal_of, run_events
 

@@ -6,7 +6,7 @@ from dataclasses import replace
 from random import Random
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from robochoc.communication.run_result import RunResult
@@ -15,6 +15,7 @@ from robochoc.model.problem import INFINITE, Team
 from robochoc.run import Options, Runtime, Withdrawal, solve
 from robochoc.run.registry import protocol_named, protocol_names
 from robochoc.verification.checker import violations
+from tests.support.examples import examples
 from tests.support.loose_problems import any_order, loosened, minimum_cost
 from tests.support.problems import ON_ONE_MACHINE, random_team, solutions
 from tests.support.random_options import MAX_MESSAGES, random_options
@@ -74,7 +75,7 @@ def test_simulator_agrees_with_brute_force(protocol: str, batch: int) -> None:
 
 @EVERY_PROTOCOL
 @given(seed=st.integers(0, 2**32), chance=st.randoms(use_true_random=False))
-@settings(max_examples=30, deadline=None)
+@examples(30)
 def test_simulator_agrees_with_brute_force_and_shrinks(protocol: str, seed: int, chance: Random) -> None:
     team = team_for(protocol, Random(seed))
     agrees(team, random_options(team, protocol, chance))

@@ -7,7 +7,7 @@ from typing import get_args
 
 import msgspec
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from robochoc.communication.control import Counters, Events, Failed, Ready, Wave
@@ -48,6 +48,7 @@ from robochoc.journal.events import Received
 from robochoc.model.outcome import Metrics, PseudoTreeNode
 from robochoc.model.problem import ProblemKind
 from robochoc.protocols.findings import Findings, Incumbent, Trail
+from tests.support.examples import examples
 
 PROFILE = Profile("R1", ProblemKind.DISCSP, ("R0",), (), {"X": ((1, 3), (5, 5))}, {}, 1, 0, ("/R1/goal",))
 OUTSIDE = (
@@ -130,7 +131,7 @@ def test_every_word_comes_as_it_was_sent(kind: type[ControlMessage]) -> None:
     sender, receiver = ("R1", MASTER) if kind in WORDS[0] else (MASTER, "R1") if kind in WORDS[1] else ("R1", "R2")
 
     @given(word=some(kind))
-    @settings(max_examples=15, deadline=None)
+    @examples(15)
     def arrives(word: ControlMessage) -> None:
         writer, reader = pair(sender, receiver)
         opened = reader.read(sender, writer.write(receiver, word))
@@ -268,7 +269,7 @@ def test_the_largest_frame_passes() -> None:
     ids=["to the master", "to a robot", "to a peer"],
 )
 @given(data=st.data())
-@settings(max_examples=3, deadline=None)
+@examples(3)
 def test_words_of_another_direction_are_refused(
     sender: str, receiver: str, direction: int, data: st.DataObject
 ) -> None:
@@ -289,7 +290,7 @@ def test_words_of_another_direction_are_refused(
 
 @pytest.mark.parametrize(("sender", "receiver"), [("R1", MASTER), (MASTER, "R1"), ("R1", "R2")])
 @given(content=st.binary(max_size=200))
-@settings(max_examples=100, deadline=None)
+@examples(100)
 def test_arbitrary_bytes_are_refused(sender: str, receiver: str, content: bytes) -> None:
     with pytest.raises(FrameRefusedError, match="malformed"):
         Framing(receiver, "run").read(sender, content)
@@ -309,7 +310,7 @@ FRAMES = [
 
 
 @given(frame=st.sampled_from(FRAMES), data=st.data())
-@settings(max_examples=300, deadline=None)
+@examples(300)
 def test_damaged_frames_are_refused_or_read_never_worse(frame: tuple[str, str, bytes], data: st.DataObject) -> None:
     sender, receiver, content = frame
     bit = data.draw(st.integers(0, 8 * len(content) - 1))

@@ -12,8 +12,9 @@ from click.testing import CliRunner
 
 from robochoc.cli.group import cli
 from robochoc.journal.journal import read_journal
-from tests.support.deployments import PAIR, TRIANGLE, Deployment, Program, ended, one_line, wait_until, written
+from tests.support.deployments import PAIR, TRIANGLE, Deployment, Program, ended, one_line, written
 from tests.support.journal_entries import entries_of
+from tests.support.limits import wait_until
 
 OBSERVER = ("--role", "observer")
 SNIFFER = (*OBSERVER, "--may", "sniff")

@@ -30,7 +30,8 @@ from robochoc.solver.agent_problem import RunParameters
 from robochoc.solver.compiled_team import CompiledRobot
 from tests.support.authorities import identity_of
 from tests.support.clocks import waiting
-from tests.support.faults import Run, running, wait_until
+from tests.support.faults import Run, running
+from tests.support.limits import wait_until
 from tests.support.network_runs import NetworkRun, free_endpoint
 from tests.support.paused_abt import CHAIN, PausedABT
 from tests.support.program import ROOT

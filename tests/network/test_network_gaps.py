@@ -23,7 +23,7 @@ from robochoc.communication.network.settings import LEASE_MS, NetworkSettings
 from robochoc.communication.network.transport import Transport
 from robochoc.communication.run_result import RobotsLostError
 from robochoc.model.outcome import Verdict
-from tests.support.faults import wait_until
+from tests.support.limits import wait_until
 from tests.support.network_runs import NetworkRun, frame, free_endpoint
 from tests.support.paused_abt import CHAIN
 

@@ -9,7 +9,7 @@ from random import Random
 
 import msgspec
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from robochoc.communication.network.control_messages import Task
@@ -40,6 +40,7 @@ from robochoc.solver.compiled_team import CompiledRobot, CompiledTeam
 from robochoc.solver.domain import CompiledDomain
 from tests.support.complex_problems import random_complex_team
 from tests.support.cost_problems import random_complex_cost_team, random_cost_team
+from tests.support.examples import examples
 from tests.support.pkc_problems import random_pkc_team
 from tests.support.problems import random_team
 from tests.support.program import ROOT
@@ -118,13 +119,13 @@ def test_robots_of_files_know_what_the_whole_team_would_tell_them(folder: Path) 
 
 
 @given(team=random_teams)
-@settings(max_examples=120, deadline=None)
+@examples(120)
 def test_robots_know_what_the_whole_team_would_tell_them(team: Team) -> None:
     assert_same(team, registered(team), team.robots, DEFAULT_PARAMETERS)
 
 
 @given(team=random_teams, data=st.data())
-@settings(max_examples=120, deadline=None)
+@examples(120)
 def test_robots_left_behind_know_what_a_smaller_team_would_tell_them(team: Team, data: st.DataObject) -> None:
     gone = data.draw(st.sets(st.sampled_from(team.order), max_size=len(team.order) - 1))
     members = registered(team)
@@ -143,7 +144,7 @@ def test_robots_left_behind_know_what_a_smaller_team_would_tell_them(team: Team,
 
 
 @given(team=random_teams)
-@settings(max_examples=60, deadline=None)
+@examples(60)
 def test_profiles_travel_and_agree(team: Team) -> None:
     profiles = profiles_of(team)
     for name, profile in profiles.items():
@@ -154,7 +155,7 @@ def test_profiles_travel_and_agree(team: Team) -> None:
 
 
 @given(team=random_teams)
-@settings(max_examples=60, deadline=None)
+@examples(60)
 def test_acquaintances_are_neighbours_and_sharers_of_constraints(team: Team) -> None:
     met = possible_neighbours(profiles_of(team))
     for robot in team.robots:
@@ -245,7 +246,7 @@ def test_what_is_shown_later_is_looked_at_as_well() -> None:
     ranges=st.lists(st.tuples(st.integers(-(2**63), 2**64), st.integers(-(2**63), 2**64)), max_size=4).map(tuple)
     | st.lists(st.tuples(st.integers(-3, 9), st.integers(-3, 9)), max_size=3).map(tuple)
 )
-@settings(max_examples=150, deadline=None)
+@examples(150)
 def test_any_ranges_are_a_domain_or_refused(ranges: tuple[tuple[int, int], ...]) -> None:
     try:
         domain = domain_of("X", ranges)

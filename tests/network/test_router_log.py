@@ -8,11 +8,12 @@ from collections.abc import Iterator
 from itertools import pairwise
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from robochoc.authority.admission import InMemoryAuthority
 from robochoc.communication.network.router import Log, Refusal, Router
+from tests.support.examples import examples
 
 NO_RULE = "no rule of the Authority allows it"
 ACCESS = "rx-0 ThreadId(07) zenoh::net::routing::interceptor::access_control:"
@@ -99,7 +100,7 @@ def test_colours_do_not_matter() -> None:
 
 
 @given(content=st.binary(max_size=300) | st.lists(st.sampled_from(LINES)).map(lambda lines: "\n".join(lines).encode()))
-@settings(max_examples=60)
+@examples(60)
 def test_any_bytes_can_be_looked_at(content: bytes) -> None:
     assert all(refusal.what for refusal in refusals(content))
 
@@ -115,7 +116,7 @@ def test_the_log_in_one_piece() -> None:
 
 
 @given(cuts=st.lists(st.integers(1, len(LOG) - 1), max_size=12))
-@settings(max_examples=60, deadline=None)
+@examples(60)
 def test_any_split_tells_the_same(cuts: list[int]) -> None:
     places = [0, *sorted(set(cuts)), len(LOG)]
     pieces = [LOG[start:end] for start, end in pairwise(places)]

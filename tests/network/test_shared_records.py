@@ -9,7 +9,7 @@ from random import Random
 
 import msgspec
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from robochoc.communication.network.shared import (
@@ -27,6 +27,7 @@ from robochoc.model.problem import INFINITE, Constraint, ConstraintModel, Semant
 from robochoc.solver.explanation import KeyedConstraint, held_above, held_below
 from tests.support.complex_problems import random_complex_team
 from tests.support.cost_problems import random_complex_cost_team, random_cost_team
+from tests.support.examples import examples
 from tests.support.pkc_problems import random_pkc_team
 from tests.support.problems import random_team
 
@@ -51,7 +52,7 @@ def sent(known: KeyedConstraint) -> KeyedConstraint:
 
 
 @given(make=st.sampled_from(MAKERS), seed=st.integers(0, 2**32))
-@settings(max_examples=80, deadline=None)
+@examples(80)
 def test_constraints_come_as_they_were_sent(make: Callable[[Random], Team], seed: int) -> None:
     for robot in make(Random(seed)).robots:
         for known in chain(held_above(robot), (part for _, part in held_below(robot))):

@@ -6,7 +6,7 @@ import doctest
 from random import Random
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 import robochoc.protocols.agile_abt
@@ -22,6 +22,7 @@ from robochoc.protocols.order import PriorityOrder
 from robochoc.solver.agent_problem import agent_problems
 from robochoc.solver.compiled import LocalProblem
 from tests.support.agents import replies, value
+from tests.support.examples import examples
 from tests.support.problems import random_team, team_of
 from tests.support.small_teams import differ, triangle
 
@@ -70,7 +71,7 @@ chances = st.integers(0, 2**32).map(Random)
 
 
 @given(chances)
-@settings(max_examples=200, deadline=None)
+@examples(200)
 def test_a_proposed_order_is_compatible_with_all_updated_explanations(chance: Random) -> None:
     names, explanations, sizes = random_explanations(chance)
     conflict = chance.sample(names, chance.randint(1, len(names)))
@@ -87,7 +88,7 @@ def test_a_proposed_order_is_compatible_with_all_updated_explanations(chance: Ra
 
 
 @given(chances)
-@settings(max_examples=200, deadline=None)
+@examples(200)
 def test_of_the_robots_that_may_come_next_the_one_with_the_fewest_values_left_does(chance: Random) -> None:
     names, explanations, _ = random_explanations(chance)
     left = {name: chance.randint(0, 3) for name in names}

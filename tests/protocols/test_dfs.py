@@ -8,7 +8,7 @@ from random import Random
 from typing import ClassVar
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from robochoc.communication.run_result import RunResult
@@ -25,6 +25,7 @@ from robochoc.run import Options, Runtime, solve
 from robochoc.solver.agent_problem import agent_problems
 from robochoc.solver.compiled import LocalProblem
 from tests.support.agents import replies
+from tests.support.examples import examples
 from tests.support.problems import team_of
 
 
@@ -135,7 +136,7 @@ def schedule_of(chance: Random) -> Schedule:
 
 
 @given(chance=st.randoms(use_true_random=False))
-@settings(max_examples=100, deadline=None)
+@examples(100)
 def test_every_schedule_builds_the_tree_of_a_depth_first_search(chance: Random) -> None:
     """The root has the most neighbours of its part, a token goes to the neighbour with the most; ties by priority."""
     team = random_graph(chance)
@@ -145,7 +146,7 @@ def test_every_schedule_builds_the_tree_of_a_depth_first_search(chance: Random) 
 
 
 @given(chance=st.randoms(use_true_random=False))
-@settings(max_examples=60, deadline=None)
+@examples(60)
 def test_neighbours_stand_one_above_the_other(chance: Random) -> None:
     """All robots of an n-ary constraint stand on one branch, as any two of them do."""
     team = random_graph(chance)
@@ -164,7 +165,7 @@ def test_neighbours_stand_one_above_the_other(chance: Random) -> None:
 
 
 @given(chance=st.randoms(use_true_random=False))
-@settings(max_examples=60, deadline=None)
+@examples(60)
 def test_a_token_passes_twice_between_a_robot_and_its_parent_and_a_wave_along_each_edge_both_ways(
     chance: Random,
 ) -> None:

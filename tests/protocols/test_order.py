@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from random import Random
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from robochoc.model.problem import Team
@@ -15,9 +15,10 @@ from robochoc.solver.agent_problem import AgentProblem, agent_problems
 from robochoc.solver.compile import Compiler
 from robochoc.solver.compiled_team import CompiledTeam
 from tests.support.complex_problems import random_complex_team
+from tests.support.examples import examples
 from tests.support.problems import random_team, teams
 
-EVERY = settings(max_examples=50, deadline=None)
+EVERY = examples(50)
 complex_teams = st.integers(0, 2**32).map(lambda seed: random_complex_team(Random(seed)))
 
 

@@ -13,7 +13,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from robochoc.ros.live import rosbridge_connection
@@ -24,6 +24,7 @@ from robochoc.ros.live.rosbridge_json import MalformedMessageError, incoming, ou
 from robochoc.ros.sink import SinkError
 from robochoc.ros.source import ReceivedMessage, SourceError
 from tests.support.clocks import waiting
+from tests.support.examples import examples
 from tests.support.fake_servers import fake_server
 from tests.support.rosbridge_server import Manner, Server
 
@@ -284,7 +285,7 @@ JSON = st.recursive(
 )
 
 
-@settings(max_examples=25)
+@examples(25)
 @given(JSON)
 def test_whatever_comes_is_fields_or_refused(message: object) -> None:
     try:
@@ -306,7 +307,7 @@ STAMPED = st.recursive(
 )
 
 
-@settings(max_examples=25)
+@examples(25)
 @given(
     st.integers(0, 2**32 * 10**9 - 1),
     st.dictionaries(st.text(max_size=5).filter(lambda name: name != "stamp"), STAMPED, max_size=3),

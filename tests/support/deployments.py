@@ -8,8 +8,7 @@ import signal
 import socket
 import subprocess
 import sys
-import time
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, Self
@@ -19,16 +18,16 @@ from click.testing import CliRunner
 from robochoc.cli.group import cli
 from robochoc.formats import write_team
 from robochoc.model.problem import Constraint, Team
+from tests.support.limits import HANG_S, wait_until
 from tests.support.problems import PREDICATES, team_of
 from tests.support.program import ROOT
 
 LOOPBACK = "127.0.0.1"
-LONG_S = 90.0
+LONG_S = HANG_S
 SOON_S = 20.0
 _DIFFERENT = [Constraint("C", PREDICATES[0], pair, pair) for pair in (("A", "B"), ("B", "C"), ("A", "C"))]
 PAIR = team_of(dict.fromkeys("AB", range(1, 3)), _DIFFERENT[:1])
 TRIANGLE = team_of(dict.fromkeys("ABC", range(1, 3)), _DIFFERENT)
-_POLL_S = 0.02
 
 
 class Program:
@@ -173,14 +172,6 @@ def free_port(host: str = LOOPBACK) -> int:
                     return port
             except (OSError, OverflowError):
                 continue
-
-
-def wait_until(done: Callable[[], bool], otherwise: Callable[[], str], within_s: float = LONG_S) -> None:
-    """Wait until `done()`."""
-    deadline = time.monotonic() + within_s
-    while not done():
-        assert time.monotonic() < deadline, otherwise()
-        time.sleep(_POLL_S)
 
 
 def ended(programs: Mapping[str, Program], status: int = 0) -> None:

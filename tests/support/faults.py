@@ -17,13 +17,13 @@ from pathlib import Path
 from secrets import token_hex
 
 from tests.support.clocks import standstill
+from tests.support.limits import HANG_S, wait_until
 from tests.support.program import ROOT
 
 PROGRAM = str(Path(sys.executable).with_name("robochoc"))
 GONE_WITHIN_S = 2.0
 """What is promised, on a machine that has time for it; see `gone_within_s`."""
 POLL_S = 0.01
-_PATIENCE_S = 30.0
 _MARK = "ROBOCHOC_FAULT_TEST"
 _SHARED_MEMORY = Path("/dev/shm")  # noqa: S108 - where shared memory would be left
 _LISTENING = "0A"
@@ -109,7 +109,7 @@ class Run:
 
     # Afterwards
 
-    def end(self, within_s: float = _PATIENCE_S) -> float:
+    def end(self, within_s: float = HANG_S) -> float:
         """Wait until no process is left; return how long that took since the last strike, in which the machine ran."""
         known = {self.pid, *self.processes()}
         deadline = time.monotonic() + within_s
@@ -133,7 +133,7 @@ class Run:
 
     def status(self) -> int:
         """The exit status; negative: killed by that signal."""
-        return self._process.wait(_PATIENCE_S)
+        return self._process.wait(HANG_S)
 
     def errors(self) -> str:
         """What it has written to stderr."""
@@ -179,15 +179,6 @@ def running(command: list[str], home: Path, *, open_files: int | None = None, st
         yield run
     finally:
         run.put_out()
-
-
-def wait_until(condition: Callable[[], bool], otherwise: str, within_s: float = _PATIENCE_S) -> None:
-    """Look at `condition` again and again until it holds."""
-    deadline = time.monotonic() + within_s
-    while not condition():
-        if time.monotonic() > deadline:
-            raise AssertionError(otherwise)
-        time.sleep(POLL_S / 10)
 
 
 def gone_within_s(promised_s: float = GONE_WITHIN_S) -> float:

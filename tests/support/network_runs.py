@@ -30,10 +30,9 @@ from robochoc.journal.events import AnyEvent, Lost, Received, Refused
 from robochoc.model.problem import Team
 from robochoc.solver.agent_problem import RunParameters
 from robochoc.solver.compiled_team import CompiledRobot
-from tests.support.faults import wait_until
+from tests.support.limits import HANG_S, wait_until
 from tests.support.paused_abt import CHAIN, PausedABT
 
-WITHIN_S = 30.0
 SLICE_S = 0.2
 
 
@@ -139,7 +138,7 @@ class NetworkRun:
 
     def wait_for_result(self) -> RunResult:
         """What came of the search, as soon as it is over."""
-        self._search.join(WITHIN_S)
+        self._search.join(HANG_S)
         assert not self._search.is_alive(), "the search does not end"
         if self.error:
             raise self.error
@@ -159,19 +158,19 @@ class NetworkRun:
             return bool(found)
 
         try:
-            wait_until(look, "", WITHIN_S)
+            wait_until(look, "", HANG_S)
         except AssertionError:
             raise AssertionError(f"no refusal of {who}, {what}, {why} among {self.refusals}") from None
         return found[0]
 
     def wait_until(self, condition: Callable[[], bool], otherwise: str) -> None:
         """Wait until `condition` holds."""
-        wait_until(condition, otherwise, WITHIN_S)
+        wait_until(condition, otherwise, HANG_S)
 
     def wait_for_progress(self) -> None:
         """Wait until three more messages of the search have come."""
         before = self.received
-        wait_until(lambda: self.received >= before + 3, f"the search does not go on: {self.error}", WITHIN_S)
+        wait_until(lambda: self.received >= before + 3, f"the search does not go on: {self.error}", HANG_S)
 
     @property
     def received(self) -> int:
@@ -196,7 +195,7 @@ class NetworkRun:
 
     def _run(self) -> None:
         try:
-            deadline = time.monotonic() + WITHIN_S
+            deadline = time.monotonic() + HANG_S
             while not self._given_up and time.monotonic() < deadline and not self.master.members.closed:
                 self.master.gather(time.monotonic() + SLICE_S)
             if self.master.members.closed:

@@ -9,7 +9,7 @@ from random import Random
 
 import msgspec
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from robochoc.communication.simulator.channel import CHANNELS, ChannelModel
@@ -25,6 +25,7 @@ from robochoc.model.outcome import Verdict
 from robochoc.model.problem import Team
 from robochoc.run import Options, Runtime, ScheduleName, Withdrawal, solve
 from robochoc.solver.encoding import UnsupportedError
+from tests.support.examples import examples
 from tests.support.problems import random_team, solutions, teams
 from tests.support.program import ROOT
 
@@ -116,7 +117,7 @@ def test_as_many_transmissions_are_lost_as_it_says(loss: float) -> None:
 
 
 @given(model=models, seed=st.integers(0, 2**32), messages=st.lists(st.tuples(*[st.integers(0, 2)] * 3), max_size=30))
-@settings(max_examples=60, deadline=None)
+@examples(60)
 def test_every_message_arrives_once_in_its_channels_order_and_not_too_soon(
     model: ChannelModel, seed: int, messages: list[tuple[int, int, int]]
 ) -> None:
@@ -186,7 +187,7 @@ def test_the_medium_is_given_to_whom_is_ready_first_not_to_whom_began_first() ->
 
 
 @given(team=teams, seed=st.integers(0, 2**32), model=models)
-@settings(max_examples=30, deadline=None)
+@examples(30)
 def test_a_seed_is_a_run(team: Team, seed: int, model: ChannelModel) -> None:
     assert recorded(team, simulated(model, seed=seed)) == recorded(team, simulated(model, seed=seed))
 
@@ -245,7 +246,7 @@ def test_latency_does_not_leak_into_ncccs() -> None:
 
 
 @given(team=teams, seed=st.integers(0, 2**32))
-@settings(max_examples=25, deadline=None)
+@examples(25)
 def test_where_nothing_takes_time_no_time_passes(team: Team, seed: int) -> None:
     outcome = solve(team, simulated(NOTHING, seed=seed))
     assert outcome.metrics.simulated_s == 0
@@ -253,7 +254,7 @@ def test_where_nothing_takes_time_no_time_passes(team: Team, seed: int) -> None:
 
 
 @given(team=teams, seed=st.integers(0, 2**32))
-@settings(max_examples=25, deadline=None)
+@examples(25)
 def test_where_only_checks_take_time_it_lies_between_the_longest_chain_of_them_and_all(team: Team, seed: int) -> None:
     spent = solve(team, simulated(msgspec.structs.replace(NOTHING, check_ns=1000), seed=seed)).metrics
     assert spent.ncccs <= round(spent.simulated_s * 1e6) <= spent.checks

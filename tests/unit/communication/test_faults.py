@@ -23,10 +23,11 @@ from robochoc.formats import write_team
 from robochoc.generators.queens3d import queens3d
 from robochoc.journal.events import Lost, Sent
 from robochoc.journal.journal import Ended, Follower, Header, read_journal, sorted_by_time
-from tests.support.faults import PROGRAM, Run, gone_within_s, running, wait_until
+from tests.support.faults import PROGRAM, Run, gone_within_s, running
 from tests.support.faulty_protocols import (
     TEAM,
 )
+from tests.support.limits import wait_until
 from tests.support.program import ROOT
 
 pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="looks into /proc")

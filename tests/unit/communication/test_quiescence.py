@@ -5,10 +5,11 @@ from __future__ import annotations
 from collections import deque
 from random import Random
 
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from robochoc.communication.quiescence import Counts, FourCounters
+from tests.support.examples import examples
 
 ROBOTS = ("A", "B", "C", "D")
 
@@ -55,7 +56,7 @@ class Network:
 
 
 @given(seed=st.integers(0, 2**32), budget=st.integers(0, 40))
-@settings(max_examples=500, deadline=None)
+@examples(500)
 def test_quiet_is_declared_when_it_is_true_and_only_then(seed: int, budget: int) -> None:
     network, counters = Network(Random(seed), budget), FourCounters(ROBOTS)
     for _ in range(20_000):

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from robochoc.communication.simulator.schedule import Concurrent, RandomChannels, Schedule
@@ -17,6 +17,7 @@ from robochoc.model.problem import Constraint, Relation, Semantics, Team
 from robochoc.run import Options, Runtime, ScheduleName, Withdrawal, solve
 from tests.support import golden
 from tests.support.clocks import waiting
+from tests.support.examples import examples
 from tests.support.problems import team_of, teams
 
 
@@ -39,7 +40,7 @@ def test_journals_are_as_they_were(file: str) -> None:
 
 
 @given(team=teams, seed=st.integers(0, 2**32), schedule=st.sampled_from(list(ScheduleName)))
-@settings(max_examples=50, deadline=None)
+@examples(50)
 def test_a_seed_is_a_run(team: Team, seed: int, schedule: ScheduleName) -> None:
     delay = seed % 30 if schedule is ScheduleName.CONCURRENT else 0
     options = Options(runtime=Runtime.SIMULATOR, seed=seed, schedule=schedule, delay=delay)
@@ -48,7 +49,7 @@ def test_a_seed_is_a_run(team: Team, seed: int, schedule: ScheduleName) -> None:
 
 
 @given(team=teams, seed=st.integers(0, 2**32))
-@settings(max_examples=50, deadline=None)
+@examples(50)
 def test_metrics_from_the_journal_are_the_hosts(team: Team, seed: int) -> None:
     recorder = JournalRecorder(Header(team=team.name, protocol="abt", runtime="simulator", seed=seed))
     options = Options(runtime=Runtime.SIMULATOR, seed=seed, withdraw=Withdrawal.MAXIMAL)

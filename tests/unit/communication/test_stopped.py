@@ -20,8 +20,9 @@ from robochoc.formats import write_team
 from robochoc.generators.queens3d import queens3d
 from robochoc.journal.events import AnyEvent, Lost
 from robochoc.model.outcome import Verdict
-from tests.support.faults import PROGRAM, running, wait_until
+from tests.support.faults import PROGRAM, running
 from tests.support.faulty_protocols import TEAM, Spins, StopsItself
+from tests.support.limits import wait_until
 
 pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="looks into /proc")
 

@@ -6,7 +6,7 @@ from itertools import product
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from robochoc.flight.routes.motion import Motion, MotionLimits, RoutePlan
@@ -14,6 +14,7 @@ from robochoc.flight.routes.moves import NoRouteError
 from robochoc.flight.routes.paths import Space
 from robochoc.flight.routes.spacing import Array, TooCloseError, norms, segment_distances
 from robochoc.flight.routes.timetable import plan_routes
+from tests.support.examples import examples
 
 HZ = 100
 LIMITS = MotionLimits()
@@ -87,7 +88,7 @@ def cells(draw: st.DrawFn) -> tuple[Array, Array, Array]:
     return np.array(starts[:count], float), np.array(goals[:count], float), np.array(standing, float).reshape(-1, 3)
 
 
-@settings(max_examples=25, deadline=None)
+@examples(25)
 @given(cells(), st.sampled_from((0.3, 0.5, 0.8, 1.0)), st.lists(st.sampled_from((0.0, 0.33, 2.0)), min_size=7))
 def test_in_a_grid_all_keep_their_distance(
     places: tuple[Array, Array, Array], distance: float, waits: list[float]
@@ -96,7 +97,7 @@ def test_in_a_grid_all_keep_their_distance(
     fly(starts, goals, distance, standing, np.array(waits[: len(starts)]))
 
 
-@settings(max_examples=25, deadline=None)
+@examples(25)
 @given(st.integers(0, 10**6), st.integers(1, 9), st.integers(0, 3), st.sampled_from((0.4, 0.7)))
 def test_anywhere_all_keep_their_distance(seed: int, count: int, standing: int, distance: float) -> None:
     chance = np.random.default_rng(seed)

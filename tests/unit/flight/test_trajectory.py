@@ -21,6 +21,7 @@ from robochoc.flight.quadrotor.trajectory import STOP_S, Trajectory
 from robochoc.flight.quadrotor.wind import Wind
 from robochoc.flight.routes.motion import MotionLimits
 from robochoc.flight.routes.timetable import plan_routes
+from tests.support.examples import examples
 
 
 def test_gusts_have_the_spread_that_is_asked_for_and_come_again_from_their_seed() -> None:
@@ -35,7 +36,7 @@ def test_gusts_have_the_spread_that_is_asked_for_and_come_again_from_their_seed(
     assert not np.array_equal(air[:9], blow(2, 9))
 
 
-@settings(max_examples=20, deadline=None)
+@examples(20)
 @given(st.integers(0, 2**32 - 1), st.integers(2, 12), st.floats(0.01, 0.4))
 def test_no_pair_is_ever_nearer_than_the_watch_says(seed: int, number: int, pace: float) -> None:
     chance = np.random.default_rng(seed)

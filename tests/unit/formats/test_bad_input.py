@@ -6,7 +6,7 @@ import os
 from pathlib import Path
 
 import pytest
-from hypothesis import HealthCheck, given, settings
+from hypothesis import HealthCheck, given
 from hypothesis import strategies as st
 
 from robochoc.formats import InvalidInputError, find_teams, read_robot, read_team
@@ -14,10 +14,9 @@ from robochoc.model.problem import Robot, Team
 from tests.support.broken import CASES
 from tests.support.broken_case import TEAM, Broken, write_files
 from tests.support.clocks import working
+from tests.support.examples import examples
 
-FUZZ = settings(
-    max_examples=300, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture, HealthCheck.too_slow]
-)
+FUZZ = examples(300, also_suppress=(HealthCheck.function_scoped_fixture,))
 
 
 def read_all(path: Path) -> list[Team]:

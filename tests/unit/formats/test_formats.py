@@ -10,7 +10,7 @@ import time
 from pathlib import Path
 
 import pytest
-from hypothesis import HealthCheck, given, settings
+from hypothesis import HealthCheck, given
 from hypothesis import strategies as st
 from lxml import etree
 
@@ -41,6 +41,7 @@ from robochoc.model.problem import (
     Variable,
 )
 from tests.support.broken_case import TEAM, write_files
+from tests.support.examples import examples
 from tests.support.program import ROOT
 
 DATA = ROOT / "tests" / "data"
@@ -272,9 +273,7 @@ def robots(draw: st.DrawFn) -> Robot:
     return Robot("Robot1", variables, kind, private, parents, children, topics, weight=weight)
 
 
-@settings(
-    max_examples=200, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture, HealthCheck.too_slow]
-)
+@examples(200, also_suppress=(HealthCheck.function_scoped_fixture,))
 @given(robot=robots())
 def test_what_is_written_is_read_back(tmp_path: Path, robot: Robot) -> None:
     file = tmp_path / "Robot1.xml"

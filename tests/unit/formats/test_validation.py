@@ -10,7 +10,7 @@ from pathlib import Path
 from random import Random
 
 import pytest
-from hypothesis import example, given, settings
+from hypothesis import example, given
 from hypothesis import strategies as st
 
 import robochoc
@@ -53,6 +53,7 @@ from tests.support.broken_case import TEAM, write_files
 from tests.support.broken_objects import AS_IN_FILES, OF_OBJECTS, breakages
 from tests.support.clocks import working
 from tests.support.complex_problems import random_complex_team
+from tests.support.examples import examples
 from tests.support.problems import random_team, team_of
 from tests.support.team_mutations import mutated
 
@@ -277,7 +278,7 @@ def same(one: Team, other: Team) -> bool:
     return [robot_xml(robot) for robot in one.robots] == [robot_xml(robot) for robot in other.robots]
 
 
-@settings(max_examples=30, deadline=None, derandomize=True)
+@examples(30)
 @given(seed=st.integers(0, 2**32))
 def test_what_is_valid_is_written_and_read_back(tmp_path_factory: pytest.TempPathFactory, seed: int) -> None:
     team = draw(seed)
@@ -323,7 +324,7 @@ def without_places(messages: list[str]) -> list[str]:
     return sorted(one.partition(" has no file")[0].partition(" is not in the team")[0] for one in renamed)
 
 
-@settings(max_examples=100, deadline=None, derandomize=True)
+@examples(100)
 @given(seed=st.integers(0, 2**32), times=st.integers(1, 2))
 @example(seed=65, times=2)  # two equal domains, both too large
 @example(seed=2645, times=2)  # two constraints of one name and scope, both misplaced

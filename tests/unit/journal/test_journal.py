@@ -13,7 +13,7 @@ from typing import BinaryIO, cast
 
 import msgspec
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from robochoc.generators.queens3d import queens3d
@@ -37,6 +37,7 @@ from robochoc.model.problem import Constraint, Relation, Semantics
 from robochoc.run import Options, Runtime, solve
 from robochoc.verification.objective import Objective
 from tests.support.events import any_event, headers, outcomes
+from tests.support.examples import examples
 from tests.support.problems import team_of
 
 HEADER = Header(team="four", protocol="abt", runtime="simulator", seed=0)
@@ -61,7 +62,7 @@ def settled(number: int, t: float | None = None) -> Settled:
 
 
 @given(header=headers, events=st.lists(any_event, max_size=12), outcome=st.none() | outcomes)
-@settings(max_examples=100, deadline=None)
+@examples(100)
 def test_what_goes_in_comes_out_in_both_forms(header: Header, events: list[AnyEvent], outcome: Outcome | None) -> None:
     recorder = JournalRecorder(header)
     recorder.outcome = outcome
@@ -83,7 +84,7 @@ def test_what_goes_in_comes_out_in_both_forms(header: Header, events: list[AnyEv
 
 
 @given(st.lists(st.floats(0, 1e6), min_size=1, max_size=10))
-@settings(max_examples=50, deadline=None)
+@examples(50)
 def test_clocks_are_kept_to_the_nanosecond_and_in_order(times: list[float]) -> None:
     events: list[AnyEvent] = [settled(number, t) for number, t in enumerate(sorted(times))]
     kept = read_journal(told(events, header=Header(team="t", protocol="p", runtime="processes", seed=0))).events

@@ -14,7 +14,7 @@ from typing import Any
 
 import msgspec
 import pytest
-from hypothesis import example, given, settings
+from hypothesis import example, given
 from hypothesis import strategies as st
 
 from robochoc.journal.blocks import BEGINNING, MAX_BLOCK_BYTES, PREAMBLE, frame_block
@@ -31,6 +31,7 @@ from robochoc.journal.journal import (
     read_journal,
 )
 from robochoc.model.outcome import Outcome, Verdict
+from tests.support.examples import examples
 
 HEADER = Header(team="four", protocol="abt", runtime="simulator", seed=0)
 CORRUPTIONS = 10_000
@@ -292,7 +293,7 @@ anything = st.recursive(
 
 
 @given(place=st.integers(0, 13), within=st.integers(0, 40), new=anything)
-@settings(max_examples=200, deadline=None)
+@examples(200)
 @example(place=4, within=0, new=18_446_744_073_709_550_592)  # a time beyond 64 bits, in nanoseconds
 def test_columns_that_were_altered_are_entries_or_refused(place: int, within: int, new: object) -> None:
     parts: list[Any] = msgspec.msgpack.decode(columns(*run(0, 3)))

@@ -27,6 +27,7 @@ from robochoc.model.expression import (
     text,
 )
 from tests.support.clocks import working
+from tests.support.examples import examples
 
 NAMES = ("X", "Y", "i", "V3.1")
 FIGURE_2 = "and( (neq(X, Y) , neq( abs(minus(X , Y) ) , abs(minus(i-j) ) ) ) )"
@@ -130,7 +131,7 @@ def compiled_value(expression: Expression, values: Mapping[str, int]) -> int | N
         return None
 
 
-@settings(max_examples=500, deadline=None)
+@examples(500)
 @given(st.one_of(NUMBERS, TRUTHS), ENVIRONMENTS)
 def test_evaluate_compiled_and_plain_python_agree(expression: Expression, values: dict[str, int]) -> None:
     expected = oracle(expression, values)
@@ -296,7 +297,7 @@ GARBAGE = st.one_of(
 )
 
 
-@settings(max_examples=500, deadline=None)
+@examples(500)
 @given(GARBAGE, st.sampled_from(Type))
 def test_garbage_is_an_expression_or_an_expression_error(written: str, wanted: Type) -> None:
     try:

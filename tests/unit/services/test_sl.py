@@ -7,7 +7,7 @@ import doctest
 
 import pytest
 import sexpdata
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 import robochoc.services.sl
@@ -37,6 +37,7 @@ from robochoc.services.symbolic import (
     written,
 )
 from tests.support.clocks import working
+from tests.support.examples import examples
 
 CAPS = Caps(10_000, 100, 10)
 DF = df_on("host:7447/robochoc")
@@ -127,7 +128,7 @@ def test_backslashes_before_other_characters_stand_for_themselves() -> None:
 
 
 @given(st.text(alphabet='()":#\\ ab0\n', max_size=40))
-@settings(max_examples=300)
+@examples(300)
 def test_any_text_is_read_or_refused(text: str) -> None:
     with contextlib.suppress(SymbolicExpressionError):
         expression = read(text, CAPS)

@@ -28,6 +28,7 @@ from tests.support.acl_conversations import (
     conversation,
     types_of,
 )
+from tests.support.examples import examples
 from tests.support.program import ROOT
 
 DOCS = (ROOT / "docs" / "guides" / "acl.md").read_text()
@@ -135,7 +136,7 @@ def test_bad_texts_are_told_with_their_place(bad: str, message: str, at: int) ->
 
 
 @given(st.text(alphabet='()": \\#:aX-0', max_size=60))
-@settings(max_examples=300)
+@examples(300)
 def test_any_text_is_a_message_or_bad(anything: str) -> None:
     for whole in (anything, f"(INFORM {anything})", f"(INFORM :sender (agent-identifier {anything}))"):
         try:

@@ -13,7 +13,7 @@ from typing import Annotated, Any, ClassVar, Literal, Union, get_args, get_origi
 
 import msgspec
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from robochoc.communication.simulator.schedule import RandomChannels
@@ -36,6 +36,7 @@ from tests.support.acl_conversations import (
     types_of,
 )
 from tests.support.cost_problems import random_cost_team
+from tests.support.examples import examples
 from tests.support.problems import random_team
 
 # Every message of every protocol
@@ -134,7 +135,7 @@ def test_any_message_is_the_same_again(protocol: str) -> None:
         names=st.tuples(st.text(min_size=1, max_size=5), st.text(min_size=1, max_size=5)),
         clock=st.integers(0, 10**18 - 1),
     )
-    @settings(max_examples=30, deadline=None)
+    @examples(30)
     def check(message: Message, names: tuple[str, str], clock: int) -> None:
         assert returned(talk, Envelope(*names, encode(message), clock), 7).language == "json"
 

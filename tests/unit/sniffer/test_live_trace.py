@@ -16,10 +16,11 @@ from robochoc.sniffer.cache import Cache
 from robochoc.sniffer.growing_file import GrowingFile, NoFileError
 from robochoc.sniffer.live_trace import LiveTrace, events_by_time
 from robochoc.sniffer.trace import Trace
+from tests.support.examples import examples
 from tests.support.sniffer_server import header, journal_of, run_events
 
 EVENTS, OUTCOME = run_events()
-QUICK = settings(max_examples=5, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+QUICK = examples(5, also_suppress=(HealthCheck.function_scoped_fixture,))
 
 
 def opened(path: Path, content: bytes) -> GrowingFile:

@@ -11,7 +11,7 @@ from random import Random
 from typing import Any, get_args
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from robochoc.generators.queens3d import queens3d
@@ -26,6 +26,7 @@ from robochoc.sniffer.page_data import PageData
 from robochoc.sniffer.sentences import sentence
 from robochoc.sniffer.trace import Trace
 from tests.support.complex_problems import random_complex_team
+from tests.support.examples import examples
 from tests.support.problems import random_team
 from tests.support.random_changes import random_changing_team
 from tests.support.recorded_journals import feed_of, record
@@ -345,7 +346,7 @@ anything = st.recursive(
 
 
 @given(st.sampled_from(TYPES), st.data())
-@settings(max_examples=100, deadline=None)
+@examples(100)
 def test_there_are_words_for_whatever_a_journal_holds(kind: type[Message], data: st.DataObject) -> None:
     content: Mapping[str, Any] = {name: data.draw(anything) for name in kind.__struct_fields__}
     told = sentence(kind.__name__, content, TWO, kind)

@@ -26,7 +26,7 @@ from robochoc.sniffer import live_trace, server
 from robochoc.sniffer.page_data import message_columns, step_columns
 from robochoc.sniffer.session import SnifferSession
 from robochoc.sniffer.trace import Trace
-from tests.support.faults import wait_until
+from tests.support.limits import wait_until
 from tests.support.sniffer_server import TOKEN, SnifferServer, header, journal_of, run_events, sniffer_server
 
 EVENTS, OUTCOME = run_events()

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from robochoc.generators.queens3d import queens3d
@@ -20,6 +20,7 @@ from robochoc.run import Options, Runtime, ScheduleName
 from robochoc.sniffer.columns import NOT_YET
 from robochoc.sniffer.page_data import message_columns, step_columns
 from robochoc.sniffer.trace import MOST_COUNTED, MOST_NAMES, Trace, TraceTooLargeError
+from tests.support.examples import examples
 from tests.support.recorded_journals import record, recorded
 
 HEADER = Header(team="a team", protocol="abt", runtime="simulator", seed=0)
@@ -137,7 +138,7 @@ def test_what_a_message_and_a_step_were_stands_in_their_rows() -> None:
 
 
 @given(st.integers(0, 1 << 32))
-@settings(max_examples=40, deadline=None)
+@examples(40)
 def test_any_order_that_keeps_each_robots_own_gives_the_same_causes(seed: int) -> None:
     chance = Random(seed)
     events = recorded("abt").events
@@ -175,7 +176,7 @@ def _whose(event: AnyEvent) -> str:
 
 
 @given(st.integers(0, len(recorded("abt").events)))
-@settings(max_examples=60, deadline=None)
+@examples(60)
 def test_a_journal_that_ends_early_is_a_shorter_one(end: int) -> None:
     events = recorded("abt").events[:end]
     trace = whole(events)
@@ -185,7 +186,7 @@ def test_a_journal_that_ends_early_is_a_shorter_one(end: int) -> None:
 
 
 @given(st.integers(0, 1 << 32), st.floats(0, 0.3))
-@settings(max_examples=40, deadline=None)
+@examples(40)
 def test_a_journal_with_holes_loses_what_is_missing_and_no_more(seed: int, share: float) -> None:
     chance = Random(seed)
     events = [event for event in recorded("abt").events if isinstance(event, Began) or chance.random() >= share]

@@ -32,7 +32,8 @@ from robochoc.solver.encoding import MAX_ALLOWED_ROWS, Network, Table
 from robochoc.solver.failures import SolverLostError, SolverMissingError, SolverTimeoutError
 from tests.support.clocks import waiting
 from tests.support.complex_problems import complex_team
-from tests.support.faults import open_descriptors, wait_until
+from tests.support.faults import open_descriptors
+from tests.support.limits import wait_until
 from tests.support.program import PROGRAM, ROOT, robochoc
 from tests.support.solver_networks import SMALL_NETWORK, brute_force, queens_network, random_network
 

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from typing import ClassVar
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 
 import robochoc.run.orchestrator
 from robochoc.generators.queens3d import queens3d
@@ -23,6 +23,7 @@ from robochoc.verification.checker import (
     needlessly_withdrawn,
     violations,
 )
+from tests.support.examples import examples
 from tests.support.problems import ON_ONE_MACHINE, team_of, teams
 
 
@@ -34,7 +35,7 @@ def some_assignments(team: Team) -> Iterator[dict[str, int]]:
 
 
 @given(team=teams)
-@settings(max_examples=100, deadline=None)
+@examples(100)
 def test_it_agrees_with_the_model_of_the_problem(team: Team) -> None:
     for assignment in some_assignments(team):
         truth = all(constraint.allows(assignment) for constraint in team.constraints())

@@ -14,7 +14,7 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 import umsgpack
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from robochoc.flight import preview as previews
@@ -31,6 +31,7 @@ from robochoc.view.palette import GREY, RED, web
 from robochoc.view.playback import DroneState
 from robochoc.view.scene import Scene, scene_of
 from tests.support.clocks import working
+from tests.support.examples import examples
 from tests.support.flights import FPS, LEG_S, TILT, epochs_of_three, five, straight
 from tests.support.flights import scene_of as flown_scene_of
 from tests.support.program import robochoc
@@ -78,7 +79,7 @@ def walks(width: int) -> st.SearchStrategy[Array]:
     return steps.map(lambda taken: np.cumsum(np.array(taken), axis=0))
 
 
-@settings(max_examples=50)
+@examples(50)
 @given(walks(3), st.floats(0.001, 1))
 def test_positions_between_keys_are_nearly_those_that_were_flown(walk: Array, tolerance: float) -> None:
     times = np.arange(len(walk)) / FPS
@@ -88,7 +89,7 @@ def test_positions_between_keys_are_nearly_those_that_were_flown(walk: Array, to
     assert (keys[0], keys[-1]) == (0, len(walk) - 1)
 
 
-@settings(max_examples=50)
+@examples(50)
 @given(walks(4), st.floats(0.001, 1))
 def test_attitudes_between_keys_are_nearly_those_that_were_flown(walk: Array, tolerance: float) -> None:
     turned = walk + np.array([0, 0, 0, 0.1])
