@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import signal
+import tempfile
 import threading
 from collections.abc import Iterator
 from pathlib import Path
+from secrets import token_hex
 from typing import TYPE_CHECKING, Any
 
 import pytest
@@ -13,6 +15,7 @@ import pytest
 from robochoc.authority.authority import Authority
 from robochoc.formats import write_team
 from robochoc.generators.queens3d import queens3d
+from tests.support import leftovers
 from tests.support.authorities import Clock, Seen
 from tests.support.authority_service import AuthorityService, open_files
 from tests.support.deployments import Deployment
@@ -28,6 +31,33 @@ register_profiles()
 # starts would inherit that.
 if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
     signal.signal(signal.SIGINT, signal.default_int_handler)
+
+
+@pytest.fixture(autouse=True, scope="session")
+def temporary_folder(tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
+    """A folder for temporary files that nobody else uses, and a mark that all processes of these tests inherit."""
+    with pytest.MonkeyPatch.context() as patch:
+        folder = tmp_path_factory.mktemp("t")
+        patch.setenv("TMPDIR", str(folder))
+        patch.setattr(tempfile, "tempdir", str(folder))
+        mark = token_hex(8)
+        patch.setenv(leftovers.MARK, mark)
+        with leftovers.no_process_left(mark):
+            yield mark
+
+
+@pytest.fixture(autouse=True, scope="module")
+def no_process_left(temporary_folder: str) -> Iterator[None]:
+    with leftovers.no_process_left(temporary_folder):
+        yield
+
+
+@pytest.fixture(autouse=True)
+def nothing_left_behind(no_process_left: None) -> Iterator[None]:
+    """No test leaves a thread, a process, a descriptor, a port or a file behind."""
+    del no_process_left
+    with leftovers.nothing_left_behind():
+        yield
 
 
 @pytest.fixture

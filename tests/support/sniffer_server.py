@@ -5,7 +5,7 @@ from __future__ import annotations
 import asyncio
 import threading
 from collections.abc import Iterator
-from contextlib import contextmanager, suppress
+from contextlib import closing, contextmanager, suppress
 from typing import Any, Self
 from urllib.error import HTTPError
 from urllib.request import Request, urlopen
@@ -105,5 +105,5 @@ class SnifferServer:
 
 @contextmanager
 def sniffer_server(session: SnifferSession) -> Iterator[SnifferServer]:
-    with SnifferServer(session) as server:
+    with closing(session), SnifferServer(session) as server:
         yield server

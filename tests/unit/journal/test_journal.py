@@ -174,6 +174,7 @@ def test_without_any_event_nothing_is_written(tmp_path: Path) -> None:
     empty = [recorder.is_empty]
     recorder(settled(0))
     assert [*empty, recorder.is_empty] == [True, False]
+    file.close()
     assert is_journal((tmp_path / "run.journal").read_bytes())
 
 

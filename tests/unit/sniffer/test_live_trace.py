@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
@@ -23,9 +25,11 @@ EVENTS, OUTCOME = run_events()
 QUICK = examples(5, also_suppress=(HealthCheck.function_scoped_fixture,))
 
 
-def opened(path: Path, content: bytes) -> GrowingFile:
+@contextmanager
+def opened(path: Path, content: bytes) -> Iterator[GrowingFile]:
     path.write_bytes(content)
-    return GrowingFile(os.open(path, os.O_RDONLY))
+    with path.open("rb") as file:
+        yield GrowingFile(file.fileno())
 
 
 def numbers(trace: Trace) -> object:
@@ -57,21 +61,21 @@ def test_in_pieces_as_in_whole(
     monkeypatch.setattr(live_trace, "_EVENTS_AT_ONCE", at_once)
     content = journal_of(late(EVENTS, robot), OUTCOME, header("processes"))
     whole = Trace.of(read_journal(content))
-    window = opened(tmp_path / "run.journal", content)
-    follows = LiveTrace(window)
     before = 0
-    while follows.advance():
-        assert follows.trace is None or follows.trace.generation == before or follows.settled
-    assert follows.trace is not None
-    assert numbers(follows.trace) == numbers(whole)
-    assert (follows.trace.over, follows.trace.outcome, follows.loaded) == (True, whole.outcome, 1)
+    with opened(tmp_path / "run.journal", content) as window:
+        follows = LiveTrace(window)
+        while follows.advance():
+            assert follows.trace is None or follows.trace.generation == before or follows.settled
+        assert follows.trace is not None
+        assert numbers(follows.trace) == numbers(whole)
+        assert (follows.trace.over, follows.trace.outcome, follows.loaded) == (True, whole.outcome, 1)
 
 
 def test_events_by_time_are_the_journals(tmp_path: Path) -> None:
     content = journal_of(late(EVENTS, "Robot2.2"), OUTCOME, header("processes"))
-    window = opened(tmp_path / "run.journal", content)
-    window.widen(len(content))
-    events = [event for some in events_by_time(window) for event in some]
+    with opened(tmp_path / "run.journal", content) as window:
+        window.widen(len(content))
+        events = [event for some in events_by_time(window) for event in some]
     assert tuple(events) == read_journal(content).events
 
 
@@ -103,12 +107,13 @@ def test_what_is_no_file_is_refused(tmp_path: Path) -> None:
 @given(content=st.binary(min_size=1, max_size=300))
 @QUICK
 def test_no_bytes_do_harm(tmp_path: Path, content: bytes) -> None:
-    follows = LiveTrace(opened(tmp_path / "any", content), lambda: 1e9)
-    try:
-        while follows.advance():
-            pass
-    except JournalError:
-        return
+    with opened(tmp_path / "any", content) as window:
+        follows = LiveTrace(window, lambda: 1e9)
+        try:
+            while follows.advance():
+                pass
+        except JournalError:
+            return
     assert follows.trace is None or follows.trace.over
 
 

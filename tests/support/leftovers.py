@@ -1,0 +1,150 @@
+"""What a test leaves behind: threads, processes, descriptors (with them ports), files.
+
+`Belongings` is what there is at a moment; what is there after a test and was not before it is left behind. What tests
+share (a browser, a solver) is begun inside `shared_by_tests`, and belongs to nobody.
+
+Linux only: /proc says what there is.
+"""
+
+from __future__ import annotations
+
+import gc
+import multiprocessing
+import os
+import tempfile
+import threading
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from pathlib import Path
+from typing import NamedTuple, Self
+from weakref import WeakSet
+
+from tests.support.limits import wait_until
+from tests.support.program import ROOT
+
+MARK = "ROBOCHOC_TESTS"
+"""The environment's variable that all processes of a test run inherit."""
+_OWN_KINDS = ("anon_inode:", "/dev/", "/proc/", "/sys/")
+"""Descriptors of the interpreter and of native libraries, once for all: event polls, random numbers."""
+_SHARED_MEMORY = Path("/dev/shm")  # noqa: S108 - where shared memory would be left
+_OUR_SHARED_MEMORY = ("psm_", "sem.mp", "pym-", "robo")
+"""As Python names it, and we; browsers put theirs there too."""
+_HELPERS = (b"multiprocessing.resource_tracker", b"multiprocessing.forkserver")
+"""Python's own processes, which stay until the interpreter ends."""
+
+_shared_threads: WeakSet[threading.Thread] = WeakSet()
+_shared_processes: set[int] = set()
+_shared_descriptors: set[str] = set()
+
+
+class Belongings(NamedTuple):
+    """What this process has at a moment."""
+
+    threads: frozenset[threading.Thread]
+    processes: frozenset[int]
+    descriptors: frozenset[str]
+    files: frozenset[str]
+
+    @classmethod
+    def now(cls) -> Self:
+        """Return what there is."""
+        multiprocessing.active_children()  # takes leave of those that have ended
+        return cls(frozenset(threading.enumerate()), frozenset(_children()), frozenset(_descriptors()), _files())
+
+    def left(self) -> list[str]:
+        """Return in words what has been added since."""
+        now = self.now()
+        threads = {thread for thread in now.threads - self.threads if thread not in _shared_threads}
+        processes = {pid for pid in now.processes - self.processes - _shared_processes if not _is_helper(pid)}
+        descriptors = now.descriptors - self.descriptors - _shared_descriptors
+        return [
+            *(f"thread {thread.name}" for thread in threads),
+            *(f"process {pid}: {_command(pid)}" for pid in processes),
+            *(f"descriptor {target}" for target in descriptors),
+            *(f"file {path}" for path in now.files - self.files),
+        ]
+
+
+@contextmanager
+def nothing_left_behind() -> Iterator[None]:
+    """Whatever was begun inside must have ended afterwards, or end by itself."""
+    before = Belongings.now()
+    yield
+    if before.left():
+        gc.collect()
+        wait_until(lambda: not before.left(), lambda: f"left behind: {before.left()}", 8)
+
+
+@contextmanager
+def shared_by_tests() -> Iterator[None]:
+    """What is begun inside is shared by tests: none of them has left it behind."""
+    before = Belongings.now()
+    yield
+    now = Belongings.now()
+    _shared_threads.update(now.threads - before.threads)
+    _shared_processes.update(now.processes - before.processes)
+    _shared_descriptors.update(now.descriptors - before.descriptors)
+
+
+@contextmanager
+def no_process_left(mark: str) -> Iterator[None]:
+    """Whatever process was started inside has ended, also when it has left this one's family."""
+    before = set(_marked(mark))
+
+    def left() -> list[str]:
+        new = set(_marked(mark)) - before - _shared_processes
+        return [f"{pid}: {_command(pid)}" for pid in new if not _is_helper(pid)]
+
+    yield
+    wait_until(lambda: not left(), lambda: f"processes left behind: {left()}", 8)
+
+
+def _children() -> Iterator[int]:
+    """Yield the processes below this one that run."""
+    below = [os.getpid()]
+    while below:
+        pid = below.pop()
+        with suppress(OSError):
+            for task in Path(f"/proc/{pid}/task").iterdir():
+                with suppress(OSError):
+                    found = [int(child) for child in (task / "children").read_text().split()]
+                    below.extend(found)
+                    yield from found
+
+
+def _descriptors() -> Iterator[str]:
+    for entry in Path("/proc/self/fd").iterdir():
+        with suppress(OSError):
+            target = str(entry.readlink())
+            if not target.startswith(_OWN_KINDS):
+                yield target
+
+
+def _files() -> frozenset[str]:
+    """Return what tests must not write to: the folder for temporary files, shared memory, the checkout."""
+    shared = {str(path) for path in _SHARED_MEMORY.iterdir() if path.name.startswith(_OUR_SHARED_MEMORY)}
+    return frozenset(shared).union(
+        str(path) for folder in (tempfile.gettempdir(), ROOT) for path in Path(folder).iterdir()
+    )
+
+
+def _marked(mark: str) -> Iterator[int]:
+    sought = f"{MARK}={mark}".encode()
+    for entry in Path("/proc").iterdir():
+        if entry.name.isdigit() and int(entry.name) != os.getpid():
+            with suppress(OSError):
+                if sought in (entry / "environ").read_bytes().split(b"\0"):
+                    yield int(entry.name)
+
+
+def _is_helper(pid: int) -> bool:
+    with suppress(OSError):
+        return any(name in Path(f"/proc/{pid}/cmdline").read_bytes() for name in _HELPERS)
+    return False
+
+
+def _command(pid: int) -> str:
+    try:
+        return Path(f"/proc/{pid}/cmdline").read_bytes().replace(b"\0", b" ").decode(errors="replace")[:200] or "zombie"
+    except OSError:
+        return "it has just ended"
