@@ -18,6 +18,7 @@ from tests.support.authorities import Clock, Seen
 from tests.support.authority_service import AuthorityService, open_files
 from tests.support.deployments import Deployment
 from tests.support.examples import register_profiles
+from tests.support.warm_programs import WarmPrograms
 
 if TYPE_CHECKING:
     from tests.support.sniffer_server import SnifferServer
@@ -43,9 +44,15 @@ def in_a_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
 
 
+@pytest.fixture(scope="session")
+def warm() -> Iterator[WarmPrograms]:
+    with WarmPrograms() as programs:
+        yield programs
+
+
 @pytest.fixture
-def site(tmp_path: Path) -> Iterator[Deployment]:
-    with Deployment(tmp_path) as site:
+def site(tmp_path: Path, warm: WarmPrograms) -> Iterator[Deployment]:
+    with Deployment(tmp_path, warm=warm) as site:
         yield site
 
 
