@@ -76,7 +76,9 @@ def in_a_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
 
 @pytest.fixture(scope="session")
 def warm() -> Iterator[WarmPrograms]:
-    with WarmPrograms() as programs:
+    with leftovers.shared_by_tests():
+        programs = WarmPrograms()
+    with programs:
         yield programs
 
 

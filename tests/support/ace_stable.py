@@ -14,6 +14,7 @@ from unittest.mock import patch
 
 from robochoc.solver import ace
 from robochoc.solver.ace import AceProcess
+from tests.support.leftovers import shared_by_tests
 
 _PROCESS = ("_process", "_folder", "_socket", "_lifeline", "_tasks")
 """What of an `AceProcess` is its process."""
@@ -32,7 +33,8 @@ class AceStable:
 
         def take_over(solver: AceProcess) -> None:
             if not self._idle:
-                start(solver)
+                with shared_by_tests():
+                    start(solver)
             else:
                 vars(solver).update(self._idle.pop())
 

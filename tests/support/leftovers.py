@@ -22,6 +22,8 @@ from weakref import WeakSet
 from tests.support.limits import wait_until
 from tests.support.program import ROOT
 
+WITHIN_S = 20.0
+"""What ends by itself has ended by then."""
 MARK = "ROBOCHOC_TESTS"
 """The environment's variable that all processes of a test run inherit."""
 _OWN_KINDS = ("anon_inode:", "/dev/", "/proc/", "/sys/")
@@ -29,12 +31,15 @@ _OWN_KINDS = ("anon_inode:", "/dev/", "/proc/", "/sys/")
 _SHARED_MEMORY = Path("/dev/shm")  # noqa: S108 - where shared memory would be left
 _OUR_SHARED_MEMORY = ("psm_", "sem.mp", "pym-", "robo")
 """As Python names it, and we; browsers put theirs there too."""
+_PYTESTS_OWN = "pytest-of-"
+"""A pytest that a test starts keeps the folders of its last runs."""
 _HELPERS = (b"multiprocessing.resource_tracker", b"multiprocessing.forkserver")
 """Python's own processes, which stay until the interpreter ends."""
 
 _shared_threads: WeakSet[threading.Thread] = WeakSet()
 _shared_processes: set[int] = set()
 _shared_descriptors: set[str] = set()
+_shared_files: set[str] = set()
 
 
 class Belongings(NamedTuple):
@@ -61,7 +66,7 @@ class Belongings(NamedTuple):
             *(f"thread {thread.name}" for thread in threads),
             *(f"process {pid}: {_command(pid)}" for pid in processes),
             *(f"descriptor {target}" for target in descriptors),
-            *(f"file {path}" for path in now.files - self.files),
+            *(f"file {path}" for path in now.files - self.files - _shared_files if _PYTESTS_OWN not in path),
         ]
 
 
@@ -72,7 +77,7 @@ def nothing_left_behind() -> Iterator[None]:
     yield
     if before.left():
         gc.collect()
-        wait_until(lambda: not before.left(), lambda: f"left behind: {before.left()}", 8)
+        wait_until(lambda: not before.left(), lambda: f"left behind: {before.left()}", WITHIN_S)
 
 
 @contextmanager
@@ -84,6 +89,7 @@ def shared_by_tests() -> Iterator[None]:
     _shared_threads.update(now.threads - before.threads)
     _shared_processes.update(now.processes - before.processes)
     _shared_descriptors.update(now.descriptors - before.descriptors)
+    _shared_files.update(now.files - before.files)
 
 
 @contextmanager
@@ -96,7 +102,7 @@ def no_process_left(mark: str) -> Iterator[None]:
         return [f"{pid}: {_command(pid)}" for pid in new if not _is_helper(pid)]
 
     yield
-    wait_until(lambda: not left(), lambda: f"processes left behind: {left()}", 8)
+    wait_until(lambda: not left(), lambda: f"processes left behind: {left()}", WITHIN_S)
 
 
 def _children() -> Iterator[int]:
