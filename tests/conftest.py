@@ -13,6 +13,7 @@ import pytest
 from robochoc.authority.authority import Authority
 from robochoc.formats import write_team
 from robochoc.generators.queens3d import queens3d
+from tests.support.ace_stable import AceStable
 from tests.support.authorities import Clock, Seen
 from tests.support.authority_service import AuthorityService, open_files
 from tests.support.deployments import Deployment
@@ -85,6 +86,21 @@ def desk(tmp_path: Path) -> Iterator[AuthorityService]:
     with desk.server:
         yield desk
     assert (threading.active_count(), open_files()) == before, "nothing is left behind"
+
+
+@pytest.fixture(scope="session")
+def ace_stable() -> Iterator[AceStable]:
+    stable = AceStable()
+    yield stable
+    stable.close()
+
+
+@pytest.fixture
+def warm_ace(ace_stable: AceStable) -> Iterator[None]:
+    """Solvers take over each other's processes: a JVM is started once for all tests of a worker."""
+    ace_stable.warm()
+    with ace_stable.lent():
+        yield
 
 
 # The sniffer's page; what it needs is imported by those tests only that look at it
