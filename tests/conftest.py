@@ -13,10 +13,12 @@ import pytest
 from robochoc.authority.authority import Authority
 from robochoc.formats import write_team
 from robochoc.generators.queens3d import queens3d
+from tests.support.ace_stable import AceStable
 from tests.support.authorities import Clock, Seen
 from tests.support.authority_service import AuthorityService, open_files
 from tests.support.deployments import Deployment
 from tests.support.examples import register_profiles
+from tests.support.warm_programs import WarmPrograms
 
 if TYPE_CHECKING:
     from tests.support.sniffer_server import SnifferServer
@@ -42,9 +44,15 @@ def in_a_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
 
 
+@pytest.fixture(scope="session")
+def warm() -> Iterator[WarmPrograms]:
+    with WarmPrograms() as programs:
+        yield programs
+
+
 @pytest.fixture
-def site(tmp_path: Path) -> Iterator[Deployment]:
-    with Deployment(tmp_path) as site:
+def site(tmp_path: Path, warm: WarmPrograms) -> Iterator[Deployment]:
+    with Deployment(tmp_path, warm=warm) as site:
         yield site
 
 
@@ -78,6 +86,21 @@ def desk(tmp_path: Path) -> Iterator[AuthorityService]:
     with desk.server:
         yield desk
     assert (threading.active_count(), open_files()) == before, "nothing is left behind"
+
+
+@pytest.fixture(scope="session")
+def ace_stable() -> Iterator[AceStable]:
+    stable = AceStable()
+    yield stable
+    stable.close()
+
+
+@pytest.fixture
+def warm_ace(ace_stable: AceStable) -> Iterator[None]:
+    """Solvers take over each other's processes: a JVM is started once for all tests of a worker."""
+    ace_stable.warm()
+    with ace_stable.lent():
+        yield
 
 
 # The sniffer's page; what it needs is imported by those tests only that look at it

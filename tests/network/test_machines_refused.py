@@ -14,7 +14,8 @@ from click.testing import CliRunner
 
 from robochoc.cli.group import cli
 from robochoc.formats import write_team
-from tests.support.deployments import LONG_S, LOOPBACK, PAIR, SOON_S, Deployment, ended, one_line, taken, written
+from tests.support.deployments import LONG_S, PAIR, SOON_S, Deployment, ended, one_line, taken, written
+from tests.support.ports import LOOPBACK
 from tests.support.program import ROOT
 
 # Who is turned away

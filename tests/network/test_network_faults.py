@@ -32,8 +32,9 @@ from tests.support.authorities import identity_of
 from tests.support.clocks import waiting
 from tests.support.faults import Run, running
 from tests.support.limits import wait_until
-from tests.support.network_runs import NetworkRun, free_endpoint
+from tests.support.network_runs import NetworkRun
 from tests.support.paused_abt import CHAIN, PausedABT
+from tests.support.ports import free_endpoint
 from tests.support.program import ROOT
 from tests.support.relays import Relay
 
