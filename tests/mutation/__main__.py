@@ -45,7 +45,7 @@ SHARED = {
     "verification": ("tests/unit/run", "tests/unit/solver/test_central_costs.py"),
 }
 """More tests of what is no protocol."""
-CPU_S = {True: 60, False: 400}
+CPU_S = {True: 30, False: 300}
 """A mutant hangs once the tests of its own file have used so many seconds of CPU time, or all others."""
 HANG_S = 900
 """So long may it wait without using the CPU."""
