@@ -7,7 +7,6 @@ from, or a test is missing. `python -m tests.mutation --again PATH:NUMBER` tries
 from __future__ import annotations
 
 import argparse
-import compileall
 import contextlib
 import os
 import re
@@ -53,14 +52,14 @@ MEMORY = 4 << 30
 UNNOTICED = (pytest.ExitCode.OK, pytest.ExitCode.NO_TESTS_COLLECTED)
 
 
-def main() -> int:
+def main(words: Sequence[str] | None = None) -> int:
     """Run the command line. The tests must pass as they are: `make test` before."""
     parser = argparse.ArgumentParser(prog="mutate", description="Spoil code, and look whether tests notice.")
     parser.add_argument("files", nargs="*", help=f"files to mutate [{' '.join(FILES)}]")
     parser.add_argument("--count", type=int, default=100, help="mutants to draw [100]")
     parser.add_argument("--seed", type=int, help="repeats a draw [drawn]")
     parser.add_argument("--again", action="append", metavar="PATH:NUMBER", help="only this mutant")
-    options = parser.parse_args()
+    options = parser.parse_args(words)
     paths = sorted(str(path.relative_to(ROOT)) for files in options.files or FILES for path in ROOT.glob(files))
     drawn = [mutant for path in paths for mutant in mutants_of(path, (ROOT / path).read_text())]
     if options.again:
@@ -71,8 +70,7 @@ def main() -> int:
         drawn = Random(seed).sample(drawn, min(options.count, len(drawn)))
     with tempfile.TemporaryDirectory(prefix="mutate-") as folder:
         tree = Path(folder, "tree")
-        shutil.copytree(ROOT, tree, ignore=shutil.ignore_patterns(".*", "__pycache__", "out"))
-        compileall.compile_dir(tree, quiet=2)
+        shutil.copytree(ROOT, tree, ignore=shutil.ignore_patterns(".*", "out"))
         bench = _Bench(tree)
         fates = Counter(bench.fate(mutant) for mutant in drawn)
     _say(", ".join(f"{fates[fate]} {fate}" for fate in ("killed", "hung", "survived")))
@@ -90,7 +88,7 @@ class _Bench:
         file = self._tree / mutant.path
         as_it_was = file.stat()
         file.write_text(mutant.text)
-        codes = (self._run(tests, CPU_S[not place]) for place, tests in enumerate(_tests_of(mutant.path)))
+        codes = (self._run(tests, CPU_S[not place]) for place, tests in enumerate(commands_for(mutant.path)))
         code = next((code for code in codes if code not in UNNOTICED), 0)
         file.write_text(mutant.source)
         os.utime(file, ns=(as_it_was.st_atime_ns, as_it_was.st_mtime_ns))
@@ -125,7 +123,7 @@ class _Bench:
             run.wait()
 
 
-def _tests_of(path: str) -> Iterator[tuple[str, ...]]:
+def commands_for(path: str) -> Iterator[tuple[str, ...]]:
     """Yield what pytest runs for a mutant of this file: its own tests, then those that run more of the program."""
     stem = Path(path).stem
     own = sorted(ROOT.glob(f"tests/*/**/test_{stem}.py")) + sorted(ROOT.glob(f"tests/*/**/test_{stem}_*.py"))

@@ -1,6 +1,7 @@
 """All mutants of a file: its text, changed in one place, such as `<` for `<=`, or with a statement left out.
 
-What has no effect on a run is left alone: annotations, `assert`, `case never`, and the sentences of `in_words`.
+What has no effect on a run is left alone: annotations, `assert`, `case never`, and how messages are called (`act`,
+`in_words`).
 """
 
 from __future__ import annotations
@@ -33,6 +34,8 @@ COMPUTED: dict[type[ast.operator], type[ast.operator]] = {
 }
 CALLED = {"min": "max", "max": "min", "any": "all", "all": "any"}
 LEFT_OUT = (ast.AugAssign, ast.Delete, ast.Raise, ast.Continue, ast.Break)
+NOTHING = ("None", "False", "''", "()")
+"""What a `return` might as well not return."""
 SKIPPED = ("annotation", "returns", "decorator_list")
 
 
@@ -83,6 +86,8 @@ def _changes(node: ast.AST) -> Iterator[tuple[ast.expr | ast.stmt, str]]:
         return
     if isinstance(node, ast.match_case) and ast.unparse(node.pattern) == "never":
         return
+    if isinstance(node, ast.Assign) and ast.unparse(node.targets[0]) == "act":
+        return
     if isinstance(node, ast.stmt):
         yield from ((node, new) for new in _statements(node))
     elif isinstance(node, ast.expr):
@@ -98,7 +103,7 @@ def _statements(node: ast.stmt) -> Iterator[str]:
     stored = isinstance(node, ast.Assign) and not any(isinstance(target, ast.Name) for target in node.targets)
     if stored or isinstance(node, LEFT_OUT) or (isinstance(node, ast.Expr) and isinstance(node.value, ast.Call)):
         yield "pass"
-    elif isinstance(node, ast.Return) and node.value is not None and ast.unparse(node.value) != "None":
+    elif isinstance(node, ast.Return) and node.value is not None and ast.unparse(node.value) not in NOTHING:
         yield "return None"
 
 

@@ -7,7 +7,17 @@ from collections.abc import Sequence
 import pytest
 
 from robochoc.model.outcome import Verdict
-from robochoc.model.problem import Child, Constraint, ConstraintModel, Parent, Relation, Robot, Semantics, Variable
+from robochoc.model.problem import (
+    Child,
+    Constraint,
+    ConstraintModel,
+    Domain,
+    Parent,
+    Relation,
+    Robot,
+    Semantics,
+    Variable,
+)
 from robochoc.protocols.abt import ABT, AddLink
 from robochoc.protocols.order import PriorityOrder
 from robochoc.protocols.requirements import unmet_requirement
@@ -18,6 +28,7 @@ from tests.support.small_teams import different
 
 NOT_BOTH = Relation("N", 2, Semantics.CONFLICTS, ((0, 0),))
 NOT_ALL = Relation("T", 3, Semantics.CONFLICTS, ((0, 0, 0),))
+BITS = Domain("D", (range(2),))
 OWNERS = {"A": "RA", "B": "RB", "B2": "RB", "C": "RC"}
 
 
@@ -75,7 +86,7 @@ def test_a_robot_without_a_value_has_no_assignment_and_nothing_to_tell() -> None
 def holder(relation: Relation, scope: Sequence[str]) -> Robot:
     """A robot that holds a constraint with a robot above it."""
     constraint = Constraint("C", relation, tuple(scope), tuple(scope))
-    return Robot("RA", (Variable("A", (0, 1)),), parents=(Parent("RB", constraints=(constraint,)),))
+    return Robot("RA", (Variable("A", BITS),), parents=(Parent("RB", constraints=(constraint,)),))
 
 
 @pytest.mark.parametrize(
@@ -95,6 +106,6 @@ def test_constraints_over_more_than_two_robots(
 
 def test_partially_known_constraints_are_for_those_who_take_them() -> None:
     part = Constraint("C", NOT_BOTH, ("A", "B"), ("A", "B"), ConstraintModel.PKC)
-    robot = Robot("RA", (Variable("A", (0, 1)),), children=(Child("RB", constraints=(part,)),))
+    robot = Robot("RA", (Variable("A", BITS),), children=(Child("RB", constraints=(part,)),))
     assert unmet_requirement(robot, Traits(partially_known=True), OWNERS) == ""
     assert unmet_requirement(robot, Traits(), OWNERS) == "RA shares a partially known constraint (PKC, C)"

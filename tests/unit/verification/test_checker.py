@@ -13,7 +13,7 @@ import robochoc.verification.checker
 from robochoc.generators.queens3d import queens3d
 from robochoc.model.expression import Type, parse
 from robochoc.model.message import Message
-from robochoc.model.problem import INFINITE, Constraint, Predicate, Relation, Robot, Semantics, Team, Variable
+from robochoc.model.problem import INFINITE, Constraint, Domain, Predicate, Relation, Robot, Semantics, Team, Variable
 from robochoc.protocols.abt import Ok
 from robochoc.protocols.protocol import Protocol
 from robochoc.run import Options, Runtime, solve
@@ -98,7 +98,8 @@ def test_an_undefined_predicate_is_a_broken_one() -> None:
 
 def alone(variables: dict[str, Sequence[int]], *constraints: Constraint) -> Robot:
     """A robot without neighbours."""
-    return Robot("R", tuple(Variable(name, tuple(domain)) for name, domain in variables.items()), private=constraints)
+    domains = {name: Domain(name, tuple(range(value, value + 1) for value in own)) for name, own in variables.items()}
+    return Robot("R", tuple(Variable(name, domain) for name, domain in domains.items()), private=constraints)
 
 
 EQUAL = Relation("E", 2, Semantics.SUPPORTS, ((1, 1), (2, 2), (3, 3)))
