@@ -44,7 +44,7 @@ SHARED = {
     "verification": ("tests/unit/run", "tests/unit/solver/test_central_costs.py"),
 }
 """More tests of what is no protocol."""
-CPU_S = {True: 30, False: 300}
+OWN_CPU_S, CPU_S = 30, 300
 """A mutant hangs once the tests of its own file have used so many seconds of CPU time, or all others."""
 HANG_S = 900
 """So long may it wait without using the CPU."""
@@ -88,7 +88,7 @@ class _Bench:
         file = self._tree / mutant.path
         as_it_was = file.stat()
         file.write_text(mutant.text)
-        codes = (self._run(tests, CPU_S[not place]) for place, tests in enumerate(commands_for(mutant.path)))
+        codes = (self._run(tests, cpu_s) for tests, cpu_s in commands_for(mutant.path))
         code = next((code for code in codes if code not in UNNOTICED), 0)
         file.write_text(mutant.source)
         os.utime(file, ns=(as_it_was.st_atime_ns, as_it_was.st_mtime_ns))
@@ -123,24 +123,27 @@ class _Bench:
             run.wait()
 
 
-def commands_for(path: str) -> Iterator[tuple[str, ...]]:
-    """Yield what pytest runs for a mutant of this file: its own tests, then those that run more of the program."""
+def commands_for(path: str) -> Iterator[tuple[tuple[str, ...], int]]:
+    """Yield what pytest runs for a mutant of this file: its own tests, then those that run more of the program.
+
+    With each, the CPU time that it may take.
+    """
     stem = Path(path).stem
     own = sorted(ROOT.glob(f"tests/*/**/test_{stem}.py")) + sorted(ROOT.glob(f"tests/*/**/test_{stem}_*.py"))
     if own:
-        yield tuple(str(file.relative_to(ROOT)) for file in own)
+        yield tuple(str(file.relative_to(ROOT)) for file in own), OWN_CPU_S
     room = Path(path).parent.name
     if room in SHARED:
-        yield SHARED[room]
-        yield "tests/conformance", "-k", "abt or syncbb"
+        yield SHARED[room], CPU_S
+        yield ("tests/conformance", "-k", "abt or syncbb"), CPU_S
         return
     users = _users(f"robochoc.protocols.{stem}")
     others = [file for file in sorted(ROOT.glob("tests/protocols/test_*.py")) if users & _imported(file)]
     if set(others) - set(own):
-        yield tuple(str(file.relative_to(ROOT)) for file in others if file not in own)
+        yield tuple(str(file.relative_to(ROOT)) for file in others if file not in own), CPU_S
     points = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]["entry-points"]["robochoc.protocols"]
     names = [name for name, place in points.items() if place.partition(":")[0] in users]
-    yield "tests/conformance", "-k", " or ".join(names)
+    yield ("tests/conformance", "-k", " or ".join(names)), CPU_S
 
 
 def _users(module: str) -> set[str]:

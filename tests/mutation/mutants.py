@@ -125,7 +125,7 @@ def _expressions(node: ast.expr) -> Iterator[str]:
             yield _with(node, test=test, body=orelse, orelse=body)
         case ast.Call(func=ast.Name(id=name)) if name in CALLED:
             yield _with(node, func=ast.Name(CALLED[name]))
-        case ast.Call(args=[first, second, *others]):
+        case ast.Call(args=[first, second, *others]) if ast.unparse(first) != ast.unparse(second):
             yield _with(node, args=[second, first, *others])
         case _:
             pass
