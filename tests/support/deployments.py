@@ -8,7 +8,7 @@ import signal
 import socket
 import subprocess
 import sys
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, Self
@@ -22,7 +22,7 @@ from tests.support.limits import HANG_S, wait_until
 from tests.support.ports import LOOPBACK, free_port
 from tests.support.problems import PREDICATES, team_of
 from tests.support.program import ROOT
-from tests.support.warm_programs import WarmProcess, WarmPrograms
+from tests.support.warm_programs import HURRY, WarmProcess, WarmPrograms
 
 LONG_S = HANG_S
 SOON_S = 20.0
@@ -86,6 +86,20 @@ class Program:
     def wait_to_print(self, words: str) -> None:
         """Wait until `words` stand on its standard output."""
         wait_until(lambda: words in self.output, lambda: f"{words!r} was never printed: {self.output} {self.errors}")
+
+    def hurry_until(self, done: Callable[[], bool]) -> None:
+        """Let days pass for it until `done()`: whatever it waits for in vain is over. Programs that start warm only."""
+
+        def hurried() -> bool:
+            self._process.send_signal(HURRY)
+            return done()
+
+        wait_until(hurried, lambda: f"it goes on for days: {self.errors}")
+
+    def hurried_status(self) -> int:
+        """Its exit status; it has ended because its patience was over."""
+        self.hurry_until(lambda: not self.is_running)
+        return self.status()
 
     def status(self, within_s: float = LONG_S) -> int:
         """Its exit status, once it has ended; no program ends with a traceback."""

@@ -24,6 +24,8 @@ from tests.support.limits import HANG_S
 from tests.support.program import ROOT
 
 _MODULE = "tests.support.warm_server"
+HURRY = signal.SIGURG
+"""A signal at which a day passes for a program: nothing that it waits for takes longer. By default it does nothing."""
 LONGEST = 2**17
 """Bytes of one request: a command, and an environment."""
 
