@@ -6,7 +6,7 @@ RUN := $(VENV)/.run
 READY := $(VENV)/.ready
 PIP := $(BIN)/pip install --disable-pip-version-check
 
-.PHONY: demo demo-11 docs test test-slow test-all fuzz lint type format bench journals clean
+.PHONY: demo demo-11 docs test test-slow test-all coverage fuzz lint type format bench journals clean
 
 $(RUN): pyproject.toml
 	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' || { echo "robochoc needs Python 3.11 or newer; say: make PYTHON=python3.12 ..."; exit 1; }
@@ -47,6 +47,19 @@ test-slow: $(READY)  ## the rest: random batches in length, faults in all varian
 	$(PYTEST) -m 'slow or hypothesis' --hypothesis-profile=new --hypothesis-seed=$(SEED)
 
 test-all: test test-slow
+
+# TESTS="tests/protocols" measures what some of the tests reach. Left out: signals that meet Python's own start, which is
+# when coverage.py starts as well, and it swallows them. What is killed while it writes its data spoils them: a warning.
+TESTS ?= tests
+COVERAGE := $(BIN)/coverage
+coverage: $(READY)  ## lines and branches that make test reaches, by room: out/coverage/rooms.txt, out/coverage/html
+	rm -rf out/coverage
+	$(COVERAGE) run -m pytest -n $(JOBS) --dist worksteal $(TESTS) \
+		--deselect tests/unit/communication/test_faults.py::test_a_signal_before_the_program_has_begun; \
+	tests=$$?; PYTHONWARNINGS=ignore $(COVERAGE) combine --quiet && rm -f out/coverage/data.* && \
+	$(COVERAGE) json --quiet && $(COVERAGE) html --quiet && \
+	$(BIN)/python -m tests.support.coverage_by_room out/coverage/coverage.json >out/coverage/rooms.txt; \
+	table=$$?; cat out/coverage/rooms.txt; exit $$((tests | table))
 
 DOCS := $(VENV)/.docs
 $(DOCS): $(READY)

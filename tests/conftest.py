@@ -6,20 +6,19 @@ import signal
 import threading
 from collections.abc import Iterator
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import pytest
 
 from robochoc.authority.authority import Authority
 from robochoc.formats import write_team
 from robochoc.generators.queens3d import queens3d
+from tests.support.ace_stable import AceStable
 from tests.support.authorities import Clock, Seen
 from tests.support.authority_service import AuthorityService, open_files
 from tests.support.deployments import Deployment
 from tests.support.examples import register_profiles
-
-if TYPE_CHECKING:
-    from tests.support.sniffer_server import SnifferServer
+from tests.support.warm_programs import WarmPrograms
 
 register_profiles()
 
@@ -42,9 +41,15 @@ def in_a_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
 
 
+@pytest.fixture(scope="session")
+def warm() -> Iterator[WarmPrograms]:
+    with WarmPrograms() as programs:
+        yield programs
+
+
 @pytest.fixture
-def site(tmp_path: Path) -> Iterator[Deployment]:
-    with Deployment(tmp_path) as site:
+def site(tmp_path: Path, warm: WarmPrograms) -> Iterator[Deployment]:
+    with Deployment(tmp_path, warm=warm) as site:
         yield site
 
 
@@ -80,35 +85,25 @@ def desk(tmp_path: Path) -> Iterator[AuthorityService]:
     assert (threading.active_count(), open_files()) == before, "nothing is left behind"
 
 
-# The sniffer's page; what it needs is imported by those tests only that look at it
+@pytest.fixture(scope="session")
+def ace_stable() -> Iterator[AceStable]:
+    stable = AceStable()
+    yield stable
+    stable.close()
 
 
-@pytest.fixture(scope="module")
-def without_the_scenes_viewer() -> Iterator[None]:
-    """A megabyte that each page would take its time to read, and nobody there looks at."""
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("robochoc.sniffer.page.viewer_script", lambda: "")
+@pytest.fixture
+def warm_ace(ace_stable: AceStable) -> Iterator[None]:
+    """Solvers take over each other's processes: a JVM is started once for all tests of a worker."""
+    ace_stable.warm()
+    with ace_stable.lent():
         yield
 
 
 @pytest.fixture(scope="module")
 def browser() -> Iterator[Any]:
-    """Chromium, by Playwright."""
-    from tests.support.sniffer_pages import chromium  # noqa: PLC0415 - see above
+    """Chromium, by Playwright. While it is there, no test may run an event loop in the main thread."""
+    from tests.support.browser_pages import chromium  # noqa: PLC0415 - for those tests only that look at pages
 
     with chromium() as browser:
         yield browser
-
-
-@pytest.fixture(scope="module")
-def server(without_the_scenes_viewer: None, tmp_path_factory: pytest.TempPathFactory) -> Iterator[SnifferServer]:
-    """A page of the journal `sniffer_pages.WHOLE`."""
-    from robochoc.sniffer.session import SnifferSession  # noqa: PLC0415 - see above
-    from tests.support.sniffer_pages import WHOLE  # noqa: PLC0415 - see above
-    from tests.support.sniffer_server import sniffer_server  # noqa: PLC0415 - see above
-
-    del without_the_scenes_viewer  # it only has to be there before the page is made
-    file = tmp_path_factory.mktemp("sniffed") / "run.journal"
-    file.write_bytes(WHOLE)
-    with sniffer_server(SnifferSession(file)) as running:
-        yield running

@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.support.deployments import free_port
+from tests.support.ports import free_port
 from tests.support.program import ROOT
 from tests.support.snippets import Block, Reader, Step, agrees, blocks_of, steps_of
 
@@ -65,7 +65,7 @@ def reader_of(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Reader:
     for name, value in given.items():
         monkeypatch.setenv(name, value)
     monkeypatch.chdir(tmp_path)
-    return Reader(tmp_path, os.environ, {MACHINE: "127.0.0.1", PORT: str(free_port())})
+    return Reader(tmp_path, os.environ, {MACHINE: "127.0.0.1", PORT: str(free_port(count=2))})
 
 
 def possible(step: Step) -> bool:

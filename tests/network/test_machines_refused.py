@@ -6,7 +6,6 @@ import signal
 import socket
 import subprocess
 import sys
-import time
 from pathlib import Path
 
 import pytest
@@ -14,7 +13,8 @@ from click.testing import CliRunner
 
 from robochoc.cli.group import cli
 from robochoc.formats import write_team
-from tests.support.deployments import LONG_S, LOOPBACK, PAIR, SOON_S, Deployment, ended, one_line, taken, written
+from tests.support.deployments import LONG_S, PAIR, Deployment, ended, one_line, taken, written
+from tests.support.ports import LOOPBACK
 from tests.support.program import ROOT
 
 # Who is turned away
@@ -74,24 +74,21 @@ def test_identities_that_do_not_fit(site: Deployment) -> None:
 def test_no_master_there(site: Deployment) -> None:
     files = written(PAIR, site)
     token = site.enrol("RA")["RA"]
-    began = time.monotonic()
-    stranger = site.robot(files / "RA.xml", "--token", token, "--patience", 1)
-    watcher = site.start("desk", "directory", "--master", site.place, "--as", "RA", "--token", token, "--patience", 1)
+    patient = ("--patience", 3600)
+    stranger = site.robot(files / "RA.xml", "--token", token, *patient)
+    watcher = site.start("desk", "directory", "--master", site.place, "--as", "RA", "--token", token, *patient)
     for program in (stranger, watcher):
-        assert program.status() == 4
+        assert program.hurried_status() == 4
         assert "is 'robochoc master' running there?" in one_line(program)
-    assert time.monotonic() - began < LONG_S / 3
     master = site.master("--gather", 60)
     known = site.robot(files / "RA.xml", "--token", token)
     master.wait_to_say("RA is there")
     master.kill()
     known.strike(signal.SIGINT)
     assert known.status() == 130, known.errors
-    began = time.monotonic()
     known = site.robot(files / "RA.xml", "--patience", 1)
     assert known.status() == 4
     assert f"no master answers at {site.place}" in one_line(known)
-    assert time.monotonic() - began < LONG_S / 3
 
 
 @pytest.mark.slow
@@ -106,15 +103,15 @@ def test_ctrl_c_ends_a_robot_that_waits_for_its_master(site: Deployment) -> None
         robot = site.start("RA", "robot", files / "RA.xml", "--master", place, "--patience", 3600)
         with silent.accept()[0]:
             robot.strike(signal.SIGINT)
-            assert robot.status(SOON_S) == 130, robot.errors
+            assert robot.status() == 130, robot.errors
 
 
 def test_a_master_that_nobody_joins(site: Deployment) -> None:
     files = written(PAIR, site)
-    master = site.master("--gather", 1, "--team", files)
-    assert (master.status(), master.output) == (3, "")
+    master = site.master("--gather", 3600, "--team", files)
+    assert (master.hurried_status(), master.output) == (3, "")
     told = master.errors.splitlines()[-1]
-    assert "not complete after 1 s" in told
+    assert "not complete after 3600 s" in told
     assert "awaited: RA, RB" in told
 
 
@@ -122,8 +119,9 @@ def test_a_master_that_nobody_joins(site: Deployment) -> None:
 def test_a_robot_hears_that_the_others_did_not_come(site: Deployment) -> None:
     files = written(PAIR, site)
     robot = site.robot(files / "RA.xml", "--token", site.enrol("RA")["RA"])
-    master = site.master("--gather", 15)
-    assert master.status() == 3
+    master = site.master("--gather", 3600)
+    master.wait_to_say("RA is there")
+    assert master.hurried_status() == 3
     assert "awaited: RB" in master.errors
     assert robot.status() == 4
     assert "awaited: RB" in one_line(robot)

@@ -107,14 +107,14 @@ def test_a_master_that_is_killed_and_the_page_stays(site: Deployment) -> None:
     tokens = site.enrol("--team", files)
     token = site.enrol("Sniffer", *SNIFFER)["Sniffer"]
     master = site.master("--sniffable", "--robots", 2)
-    words = ("--token", token, "--journal", copy_of(site, "Sniffer"), "--patience", 1)
+    words = ("--token", token, "--journal", copy_of(site, "Sniffer"), "--patience", 3600)
     sniffer = site.start("desk", "sniff", "--master", site.place, *words)
-    robot = site.robot(files / "RA.xml", "--token", tokens["RA"], "--patience", 1)
+    robot = site.robot(files / "RA.xml", "--token", tokens["RA"], "--patience", 3600)
     wait_until(lambda: "Registered" in heard(site, "Sniffer"), lambda: sniffer.errors)
     master.kill()
-    sniffer.wait_to_say("is gone, or lets Sniffer sniff no more")
+    sniffer.hurry_until(lambda: "is gone, or lets Sniffer sniff no more" in sniffer.errors)
     sniffer.wait_to_say("stays until Ctrl-C")
-    ended({"RA": robot}, status=4)
+    assert robot.hurried_status() == 4
     url = re.search(r"http://127\S+/", sniffer.errors)
     assert url
     with urlopen(f"{url[0]}about", timeout=30) as answer:  # noqa: S310 - our own server

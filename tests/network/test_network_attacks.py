@@ -30,8 +30,9 @@ from robochoc.model.outcome import Verdict
 from robochoc.protocols.abt import Ok
 from robochoc.protocols.protocol import Protocol
 from robochoc.solver.compiled_team import CompiledRobot
-from tests.support.network_runs import NetworkRun, frame, free_endpoint, put
+from tests.support.network_runs import NetworkRun, frame, put
 from tests.support.paused_abt import CHAIN, PausedABT
+from tests.support.ports import free_endpoint
 
 A_DAY_S = 86_400
 JUNK = 10_000

@@ -12,104 +12,45 @@ import tempfile
 import threading
 import time
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
 
 from robochoc.authority.authority import Authority
-from robochoc.communication.network.local import LocalNetwork
 from robochoc.communication.network.robot import Ending, NetworkRobot
 from robochoc.communication.network.robot_settings import RobotSettings
-from robochoc.communication.network.settings import NetworkSettings
+from robochoc.communication.network.settings import LEASE_MS, NetworkSettings
 from robochoc.communication.network.transport import Transport
-from robochoc.communication.run_result import RobotsLostError, RunResult
+from robochoc.communication.run_result import RobotsLostError
 from robochoc.journal.events import AnyEvent, Lost, Received, Sent
 from robochoc.model.outcome import Verdict
-from robochoc.solver.agent_problem import RunParameters
 from robochoc.solver.compiled_team import CompiledRobot
 from tests.support.authorities import identity_of
-from tests.support.clocks import waiting
 from tests.support.faults import Run, running
-from tests.support.limits import wait_until
-from tests.support.network_runs import NetworkRun, free_endpoint
+from tests.support.held_teams import held_team
+from tests.support.limits import HANG_S, wait_until
+from tests.support.network_runs import NetworkRun
 from tests.support.paused_abt import CHAIN, PausedABT
+from tests.support.ports import free_endpoint
 from tests.support.program import ROOT
 from tests.support.relays import Relay
 
 pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="looks into /proc")
 
-GONE_WITHIN_S = 10.0
-WHILE_A_MASTER_STARTS_S = 60.0
-"""However busy the machine is; nobody waits for it to be over."""
+QUICK_S, LONG_S = 1.5, 5.0
+"""How long faults last that nobody notices."""
+
+FOR_EVER_S = 3600.0
+"""A patience that is over when the test moves the clock, and not because the machine is busy."""
 
 
 # Processes that die or stop
 
 
-class Team:
-    """CHAIN in processes, whose search is held, in a thread of its own."""
-
-    def __init__(self, network: LocalNetwork, events: list[AnyEvent], go: Path) -> None:
-        self.network = network
-        self.events = events
-        self.result: RunResult | None = None
-        self.error: Exception | None = None
-        self._go = go
-        self._thread = threading.Thread(target=self._search)
-        self._thread.start()
-
-    def wait_for_progress(self) -> None:
-        before = self.received
-        wait_until(lambda: self.received >= before + 3 or self.error is not None, "the search does not go on")
-        if self.error:
-            raise self.error
-
-    @property
-    def received(self) -> int:
-        return sum(isinstance(event, Received) for event in list(self.events))
-
-    def strike(self, name: str, signum: int) -> None:
-        wait_until(lambda: name in self.network.processes, f"{name} does not start")
-        os.kill(self.network.processes[name].pid or 0, signum)
-
-    def end(self) -> RunResult:
-        self._thread.join(60)
-        assert not self._thread.is_alive(), "the search does not end"
-        if self.error:
-            raise self.error
-        assert self.result
-        return self.result
-
-    def let_go(self) -> RunResult:
-        self._go.touch()
-        return self.end()
-
-    def _search(self) -> None:
-        try:
-            self.result = self.network.search(90)
-        except Exception as error:  # noqa: BLE001 - the test is told
-            self.error = error
-
-
-@contextmanager
-def held_team(folder: Path, settings: NetworkSettings = NetworkSettings()) -> Iterator[Team]:
-    events: list[AnyEvent] = []
-    parameters = RunParameters(settings={"file": str(folder / "go")})
-    with LocalNetwork(CHAIN, PausedABT, observer=events.append, settings=settings, parameters=parameters) as network:
-        team = Team(network, events, folder / "go")
-        try:
-            yield team
-        finally:
-            (folder / "go").touch()
-            with suppress(RobotsLostError):
-                team.end()
-    assert not network.processes
-
-
 def test_a_robot_killed_before_the_search(tmp_path: Path) -> None:
     """It is not waited for: nobody will start it again."""
-    with waiting(40), held_team(tmp_path) as team:
+    with held_team(tmp_path) as team:
         team.strike("RX2", signal.SIGKILL)
         with pytest.raises(RobotsLostError, match="RX2 was lost: its process was killed by SIGKILL"):
             team.end()
@@ -126,7 +67,7 @@ def test_a_robot_killed_in_the_search(tmp_path: Path) -> None:
 
 @pytest.mark.slow
 def test_robots_killed_in_a_search_that_survives_it(tmp_path: Path) -> None:
-    with held_team(tmp_path, NetworkSettings(survive=True)) as team:
+    with held_team(tmp_path, NetworkSettings(survive=True, patience_s=HANG_S)) as team:
         team.wait_for_progress()
         team.strike("RX2", signal.SIGKILL)
         result = team.end()
@@ -143,20 +84,24 @@ def test_a_robot_killed_after_the_search(tmp_path: Path) -> None:
 
 
 def test_a_robot_that_is_stopped_for_too_long(tmp_path: Path) -> None:
-    with held_team(tmp_path, NetworkSettings(lease_ms=1000, patience_s=2)) as team:
+    with held_team(tmp_path, NetworkSettings(lease_ms=500, patience_s=FOR_EVER_S)) as team:
         team.wait_for_progress()
         team.strike("RX2", signal.SIGSTOP)
-        with pytest.raises(RobotsLostError, match="RX2 was lost: it has not been there for 2 s"):
+        team.wait_until_away("RX2").away_since = time.monotonic() - 2 * FOR_EVER_S
+        with pytest.raises(RobotsLostError, match="RX2 was lost: it has not been there for 3600 s"):
             team.end()
 
 
-@pytest.mark.parametrize("lease_ms", [10_000, pytest.param(500, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("lease_ms", [500, pytest.param(LEASE_MS, marks=pytest.mark.slow)])
 def test_a_robot_that_is_stopped_for_a_while(tmp_path: Path, lease_ms: int) -> None:
     """Within the lease nobody notices; after it the router hangs up, and the robot comes back."""
-    with held_team(tmp_path, NetworkSettings(lease_ms=lease_ms, patience_s=20)) as team:
+    with held_team(tmp_path, NetworkSettings(lease_ms=lease_ms, patience_s=FOR_EVER_S)) as team:
         team.wait_for_progress()
         team.strike("RX1", signal.SIGSTOP)
-        time.sleep(1.5)
+        if lease_ms < LEASE_MS:
+            team.wait_until_away("RX1")
+        else:
+            time.sleep(QUICK_S)
         team.strike("RX1", signal.SIGCONT)
         team.wait_for_progress()
         assert team.let_go().verdict is Verdict.SOLUTION
@@ -179,10 +124,7 @@ def nothing_was_lost(events: list[AnyEvent]) -> None:
     assert numbers == list(range(1, len(numbers) + 1))
 
 
-QUICK_S, LONG_S = 1.5, 5.0
-
-
-@pytest.mark.parametrize("down_s", [QUICK_S, pytest.param(LONG_S, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("down_s", [0, *(pytest.param(s, marks=pytest.mark.slow) for s in (QUICK_S, LONG_S))])
 @pytest.mark.parametrize("how", [Relay.cut, pytest.param(Relay.freeze, marks=pytest.mark.slow)])
 @pytest.mark.parametrize("filters", [(), pytest.param(("signed", "sealed"), marks=pytest.mark.slow)])
 def test_a_link_that_is_down(
@@ -190,13 +132,16 @@ def test_a_link_that_is_down(
 ) -> None:
     """All robots are behind it. Afterwards all goes on, and nothing is lost."""
     with (
-        NetworkRun(tmp_path, settings=NetworkSettings(filters, patience_s=20), absent=CHAIN.order) as run,
+        NetworkRun(tmp_path, settings=NetworkSettings(filters, patience_s=HANG_S), absent=CHAIN.order) as run,
         Relay(run.endpoint) as relay,
     ):
         for name in CHAIN.order:
             run.start(name, relay.endpoint)
         run.wait_for_progress()
         how(relay)
+        if how is Relay.cut:
+            members = run.master.members.robots.values()
+            run.wait_until(lambda: all(one.away_since is not None for one in members), "the cut is not noticed")
         time.sleep(down_s)
         relay.mend()
         run.wait_for_progress()
@@ -218,13 +163,13 @@ def test_a_link_of_one_robot_that_does_not_come_back(tmp_path: Path) -> None:
         relay.cut()
         with pytest.raises(RobotsLostError, match="RX3 was lost: it has not been there for 3 s"):
             run.wait_for_result()
-        run.threads["RX3"].join(GONE_WITHIN_S)
+        run.threads["RX3"].join(HANG_S)
         assert run.endings["RX3"].why == "the master is gone: no link to it for 3 s"
 
 
 def test_a_router_that_is_opened_anew(tmp_path: Path) -> None:
     """Somebody else is enrolled in mid-run: that needs other rules, and so another router."""
-    with NetworkRun(tmp_path, settings=NetworkSettings(patience_s=20)) as run:
+    with NetworkRun(tmp_path) as run:
         run.wait_for_progress()
         for number in range(2):
             before = run.router
@@ -266,7 +211,8 @@ class Elsewhere:
         self.identities = {name: identity_of(self.authority, name, folder / name) for name in CHAIN.order}
         self.endpoint = free_endpoint()
         self.endings: dict[str, Ending] = {}
-        self.threads: list[threading.Thread] = []
+        self.robots: dict[str, NetworkRobot] = {}
+        self.threads: dict[str, threading.Thread] = {}
 
     @contextmanager
     def master(self) -> Iterator[subprocess.Popen[bytes]]:
@@ -279,11 +225,17 @@ class Elsewhere:
             process.kill()
             process.communicate()
 
-    def start(self, patience_s: float) -> None:
+    def start(self) -> None:
         for name in CHAIN.order:
-            thread = threading.Thread(target=self._take_part, args=[name, patience_s])
-            thread.start()
-            self.threads.append(thread)
+            self.threads[name] = threading.Thread(target=self._take_part, args=[name])
+            self.threads[name].start()
+
+    def lose_patience(self, *names: str) -> None:
+        """Move these robots' clocks, once they have lost their links."""
+        for name in names:
+            registration = self.robots[name]._registration  # noqa: SLF001
+            wait_until(lambda of=registration: not of._transport.router, f"{name} keeps its link")  # type: ignore[misc]  # noqa: SLF001
+            registration._connected_at -= 2 * FOR_EVER_S  # noqa: SLF001
 
     def wait_until_free(self) -> None:
         """Wait until nobody listens at the endpoint any more."""
@@ -295,19 +247,18 @@ class Elsewhere:
 
         wait_until(is_free, "the router does not end")
 
-    def wait(self) -> set[str]:
-        """Why the robots have ended, as soon as they have."""
-        for thread in self.threads:
-            thread.join(2 * WHILE_A_MASTER_STARTS_S)
-        assert all(self.endings[name].failed for name in CHAIN.order)
-        return {ending.why for ending in self.endings.values()}
+    def wait(self, *names: str) -> set[str]:
+        """Why these robots have ended, as soon as they have."""
+        for name in names:
+            self.threads[name].join(HANG_S)
+        assert all(self.endings[name].failed for name in names)
+        return {self.endings[name].why for name in names}
 
-    def _take_part(self, name: str, patience_s: float) -> None:
-        identity = self.identities[name]
-        with Transport(self.endpoint, identity, watch=(), patience_s=30) as transport:
-            robot = NetworkRobot(
-                CompiledRobot(CHAIN[name]), identity, transport, lambda _: PausedABT, RobotSettings(patience_s)
-            )
+    def _take_part(self, name: str) -> None:
+        own, identity = CompiledRobot(CHAIN[name]), self.identities[name]
+        with Transport(self.endpoint, identity, watch=(), patience_s=HANG_S) as transport:
+            robot = NetworkRobot(own, identity, transport, lambda _: PausedABT, RobotSettings(FOR_EVER_S))
+            self.robots[name] = robot
             self.endings[name] = robot.run()
 
 
@@ -316,28 +267,21 @@ def searching(master: subprocess.Popen[bytes]) -> bool:
     return master.stdout.readline() == b"searching\n"
 
 
-def test_a_master_that_is_killed(tmp_path: Path) -> None:
-    """Its router ends with it, and the robots by themselves."""
+def test_a_master_that_is_killed_and_started_anew(tmp_path: Path) -> None:
+    """Its router ends with it. Robots end by themselves after their patience, or when there is another master."""
     robots = Elsewhere(tmp_path)
     with robots.master() as master:
-        robots.start(patience_s=4)
-        assert searching(master)
-        master.kill()
-        assert robots.wait() == {"the master is gone: no link to it for 4 s"}
-    host, _, port = robots.endpoint.rpartition(":")
-    with socket.create_server((host, int(port))):
-        pass
-
-
-def test_a_master_that_is_started_anew(tmp_path: Path) -> None:
-    robots = Elsewhere(tmp_path)
-    with robots.master() as master:
-        robots.start(WHILE_A_MASTER_STARTS_S)
+        robots.start()
         assert searching(master)
         master.kill()
     robots.wait_until_free()
+    robots.lose_patience("RX2", "RX3")
+    assert robots.wait("RX2", "RX3") == {"the master is gone: no link to it for 3600 s"}
+    host, _, port = robots.endpoint.rpartition(":")
+    with socket.create_server((host, int(port))):
+        pass
     with robots.master():
-        assert robots.wait() == {"the master was started anew; start this robot anew as well"}
+        assert robots.wait("RX0", "RX1") == {"the master was started anew; start this robot anew as well"}
 
 
 # The parent of a team on this machine
@@ -351,7 +295,8 @@ def short_path() -> Iterator[Path]:
 
 
 @pytest.mark.parametrize(
-    "signum", [signal.SIGINT, signal.SIGKILL, pytest.param(signal.SIGTERM, marks=pytest.mark.slow)]
+    "signum",
+    [signal.SIGKILL, *(pytest.param(other, marks=pytest.mark.slow) for other in (signal.SIGINT, signal.SIGTERM))],
 )
 def test_a_parent_that_is_struck_leaves_nothing(signum: signal.Signals, short_path: Path) -> None:
     program = "tests.support.network_parent"

@@ -9,6 +9,7 @@ import pytest
 from robochoc.model.problem import Constraint, Team
 from tests.support import traitors
 from tests.support.deployments import Deployment, Program, ended, written
+from tests.support.limits import HANG_S
 from tests.support.problems import PREDICATES, team_of
 
 SLOW = pytest.mark.slow
@@ -32,8 +33,8 @@ def betrayed(
         )
     tokens = site.enrol("--team", files)
     master = site.master("--team", files, *words)
-    honest = site.robots(files, {name: token for name, token in tokens.items() if name != "RB"}, "--patience", 5)
-    robot = ("robot", files / "RB.xml", "--master", site.place, "--token", tokens["RB"], "--patience", 5)
+    honest = site.robots(files, {name: token for name, token in tokens.items() if name != "RB"}, "--patience", HANG_S)
+    robot = ("robot", files / "RB.xml", "--master", site.place, "--token", tokens["RB"], "--patience", HANG_S)
     site.script("traitor", traitors.program(lie, "RB", *robot))
     status = master.status()
     ended(honest, status)

@@ -8,7 +8,7 @@ import signal
 import socket
 import subprocess
 import sys
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, Self
@@ -19,10 +19,11 @@ from robochoc.cli.group import cli
 from robochoc.formats import write_team
 from robochoc.model.problem import Constraint, Team
 from tests.support.limits import HANG_S, wait_until
+from tests.support.ports import LOOPBACK, free_port
 from tests.support.problems import PREDICATES, team_of
 from tests.support.program import ROOT
+from tests.support.warm_programs import HURRY, WarmProcess, WarmPrograms
 
-LOOPBACK = "127.0.0.1"
 LONG_S = HANG_S
 SOON_S = 20.0
 _DIFFERENT = [Constraint("C", PREDICATES[0], pair, pair) for pair in (("A", "B"), ("B", "C"), ("A", "C"))]
@@ -31,17 +32,25 @@ TRIANGLE = team_of(dict.fromkeys("ABC", range(1, 3)), _DIFFERENT)
 
 
 class Program:
-    """A process that was started as a user would, with what it prints in files."""
+    """A process that was started as a user would, with what it prints in files.
 
-    def __init__(self, command: Sequence[object], home: Path) -> None:
+    `command` is `robochoc`'s words where there are `warm` programs to start it from.
+    """
+
+    def __init__(self, command: Sequence[object], home: Path, warm: WarmPrograms | None = None) -> None:
         home.mkdir(parents=True, exist_ok=True)
         stem = str(len(list(home.iterdir())))
         self._out, self._err = home / f"{stem}.out", home / f"{stem}.err"
         environment = {**os.environ, "XDG_DATA_HOME": str(home), "PYTHONPATH": str(ROOT)}
+        words = list(map(str, command))
+        self._process: subprocess.Popen[bytes] | WarmProcess
         with self._out.open("wb") as out, self._err.open("wb") as err:
-            self._process = subprocess.Popen(
-                list(map(str, command)), stdin=subprocess.DEVNULL, stdout=out, stderr=err, env=environment, cwd=home
-            )
+            if warm:
+                self._process = warm.start(words, out, err, environment, home)
+            else:
+                self._process = subprocess.Popen(
+                    words, stdin=subprocess.DEVNULL, stdout=out, stderr=err, env=environment, cwd=home
+                )
         self.pid = self._process.pid
 
     @property
@@ -78,6 +87,20 @@ class Program:
         """Wait until `words` stand on its standard output."""
         wait_until(lambda: words in self.output, lambda: f"{words!r} was never printed: {self.output} {self.errors}")
 
+    def hurry_until(self, done: Callable[[], bool]) -> None:
+        """Let days pass for it until `done()`: whatever it waits for in vain is over. Programs that start warm only."""
+
+        def hurried() -> bool:
+            self._process.send_signal(HURRY)
+            return done()
+
+        wait_until(hurried, lambda: f"it goes on for days: {self.errors}")
+
+    def hurried_status(self) -> int:
+        """Its exit status; it has ended because its patience was over."""
+        self.hurry_until(lambda: not self.is_running)
+        return self.status()
+
     def status(self, within_s: float = LONG_S) -> int:
         """Its exit status, once it has ended; no program ends with a traceback."""
         status = self._process.wait(within_s)
@@ -98,12 +121,15 @@ class Program:
 class Deployment:
     """Machines around one master at `place`, with an Authority, below `folder`. A context manager: none outlives it.
 
-    `inside` is put before a command: what starts it elsewhere.
+    `inside` is put before a command: what starts it elsewhere. All others are forked from `warm`, if it is given.
     """
 
-    def __init__(self, folder: Path, host: str = LOOPBACK, port: int | None = None) -> None:
+    def __init__(
+        self, folder: Path, host: str = LOOPBACK, port: int | None = None, warm: WarmPrograms | None = None
+    ) -> None:
         self.folder = folder
-        self.port = port or free_port(host)
+        self._warm = warm
+        self.port = port or free_port(host, 2)  # the Authority's service is at the second
         self.place = f"{host}:{self.port}"
         self.authority_folder = folder / "authority"
         self._programs: list[Program] = []
@@ -122,7 +148,10 @@ class Deployment:
 
     def start(self, machine: str, *words: object, inside: Sequence[str] = ()) -> Program:
         """Start the program on `machine`."""
-        program = Program([*inside, sys.executable, "-m", "robochoc", *words], self.folder / machine)
+        if self._warm and not inside:
+            program = Program(words, self.folder / machine, self._warm)
+        else:
+            program = Program([*inside, sys.executable, "-m", "robochoc", *words], self.folder / machine)
         self._programs.append(program)
         return program
 
@@ -160,18 +189,6 @@ def taken(port: int, host: str = LOOPBACK) -> Iterator[None]:
     """Somebody else listens there."""
     with socket.create_server((host, port)):
         yield
-
-
-def free_port(host: str = LOOPBACK) -> int:
-    """A port that nobody listens at now, nor at the one after it."""
-    while True:
-        with socket.create_server((host, 0)) as first:
-            port: int = first.getsockname()[1]
-            try:
-                with socket.create_server((host, port + 1)):
-                    return port
-            except (OSError, OverflowError):
-                continue
 
 
 def ended(programs: Mapping[str, Program], status: int = 0) -> None:

@@ -16,7 +16,6 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 from secrets import token_hex
 
-from tests.support.clocks import standstill
 from tests.support.limits import HANG_S, wait_until
 from tests.support.program import ROOT
 
@@ -48,7 +47,8 @@ class Run:
         self._mark = f"{_MARK}={token_hex(8)}".encode()
         self._shared_before = _shared_memory()
         self._struck = 0.0
-        self.runs_in_processes = True
+        self.names: list[str] = []
+        """The robots, in the order in which they are started, as far as a test tells."""
         key, value = self._mark.decode().split("=")
         environment = {**os.environ, "TMPDIR": str(self.temporary), key: value}
         with (home / "stdout").open("wb") as out, (home / "stderr").open("wb") as err:
@@ -110,19 +110,18 @@ class Run:
     # Afterwards
 
     def end(self, within_s: float = HANG_S) -> float:
-        """Wait until no process is left; return how long that took since the last strike, in which the machine ran."""
+        """Wait until no process is left; return how long that took since the last strike."""
         known = {self.pid, *self.processes()}
         deadline = time.monotonic() + within_s
-        with standstill() as stood:
-            while True:
-                self._process.poll()
-                known = {pid for pid in known if _alive(pid)}
-                took = time.monotonic() - self._struck - stood[0]
-                if not known and not (known := set(self.processes())):
-                    return took
-                if time.monotonic() > deadline + stood[0]:
-                    raise AssertionError(f"after {took:.1f} s there are still {sorted(known)}: {self.errors()}")
-                time.sleep(POLL_S)
+        while True:
+            self._process.poll()
+            known = {pid for pid in known if _alive(pid)}
+            took = time.monotonic() - self._struck
+            if not known and not (known := set(self.processes())):
+                return took
+            if time.monotonic() > deadline:
+                raise AssertionError(f"after {took:.1f} s there are still {sorted(known)}: {self.errors()}")
+            time.sleep(POLL_S)
 
     def processes(self) -> list[int]:
         """The ids of all processes of this run."""

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-import socket
 import threading
 import time
 from collections.abc import Callable, Iterable
@@ -32,14 +31,11 @@ from robochoc.solver.agent_problem import RunParameters
 from robochoc.solver.compiled_team import CompiledRobot
 from tests.support.limits import HANG_S, wait_until
 from tests.support.paused_abt import CHAIN, PausedABT
+from tests.support.ports import free_endpoint
 
 SLICE_S = 0.2
-
-
-def free_endpoint() -> str:
-    """An address of this machine where nobody listens."""
-    with socket.create_server((LOOPBACK, 0)) as trial:
-        return f"{LOOPBACK}:{trial.getsockname()[1]}"
+PATIENT = NetworkSettings(patience_s=HANG_S)
+"""Nobody is lost who is only slow."""
 
 
 def put(transport: Transport, key: str, content: bytes = b"anything") -> None:
@@ -66,10 +62,10 @@ class NetworkRun:
         self,
         folder: Path,
         team: Team = CHAIN,
-        settings: NetworkSettings = NetworkSettings(),
+        settings: NetworkSettings = PATIENT,
         *,
         absent: Iterable[str] = (),
-        seconds: float | None = 60,
+        seconds: float | None = None,
         publication: Publication | None = None,
     ) -> None:
         self.team = team
@@ -122,7 +118,7 @@ class NetworkRun:
         self.threads[name] = threading.Thread(target=self._take_part, args=[name, endpoint or self.endpoint])
         self.threads[name].start()
 
-    def transport(self, name: str, *, endpoint: str = "", patience_s: float = 10) -> Transport:
+    def transport(self, name: str, *, endpoint: str = "", patience_s: float = HANG_S) -> Transport:
         """A connection of somebody who has an identity of `name` from the household."""
         place, identity = endpoint or self.endpoint, self.household.identity(name)
         return Transport(place, identity, watch=(), patience_s=patience_s, lease_ms=self.settings.lease_ms)

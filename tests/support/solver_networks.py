@@ -5,7 +5,11 @@ from __future__ import annotations
 import itertools
 from random import Random
 
+import pytest
+
 from robochoc.model.problem import Team
+from robochoc.solver.ace import AceProcess
+from robochoc.solver.ace_messages import FromSolver
 from robochoc.solver.compiled_team import CompiledTeam
 from robochoc.solver.domain import compile_domain
 from robochoc.solver.encoding import Codes, Network, Table
@@ -50,6 +54,17 @@ def random_network(chance: Random) -> Network:
 
 
 SMALL_SOLUTIONS: tuple[Codes, ...] = ((0, 1), (1, 0), (1, 1))
+
+
+def misheard(patch: pytest.MonkeyPatch, word: FromSolver) -> None:
+    """Whatever ACE answers, `word` is what is heard."""
+    hear = vars(AceProcess)["_hear"]
+
+    def hear_another(solver: AceProcess, deadline: float | None) -> FromSolver:
+        hear(solver, deadline)
+        return word
+
+    patch.setattr(AceProcess, "_hear", hear_another)
 
 
 def compiled_by_brute_force(team: Team) -> CompiledTeam:

@@ -45,7 +45,7 @@ LOOPBACK = "127.0.0.1"
 FAREWELL_S = 1.0
 """Seconds for which the end of the run is announced. Stopped robots do not confirm it and are then killed."""
 GRACE_S = 2.0
-"""The time that dismissed robots have to end by themselves, in seconds."""
+"""The time that robots have to end by themselves once they have confirmed the end of the run, in seconds."""
 _ATTEMPTS = 5
 _DESCRIPTORS, _DESCRIPTORS_PER_ROBOT = 32, 2
 """Open files: of the master's session, the router's pipes and the fork server, and of each robot's process."""
@@ -207,8 +207,10 @@ class LocalNetwork(Session):
                     self._master.lose(name, describe_end(processes[name]))
 
     def _end_processes(self) -> None:
+        """End all processes. Robots that have not confirmed the end of the run would not end by themselves."""
         until = time.monotonic() + GRACE_S
-        alive = {process.sentinel for process in self._processes.values()}
+        leaving = {name for name, member in self._master.members.robots.items() if member.left}
+        alive = {process.sentinel for name, process in self._processes.items() if name in leaving}
         while alive and time.monotonic() < until:
             alive.difference_update(cast("list[int]", wait(list(alive), max(0.0, until - time.monotonic()))))
         for process in self._processes.values():

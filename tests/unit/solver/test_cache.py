@@ -22,7 +22,7 @@ from robochoc.solver.ace import AceProcess
 from robochoc.solver.cache import SolutionCache
 from robochoc.solver.compile import Compilation, CompiledFrom, Compiler
 from robochoc.solver.encoding import Codes, Network, Table
-from tests.support.program import ROOT, robochoc
+from tests.support.program import ROOT, robochoc_within
 from tests.support.solver_networks import SMALL_NETWORK, SMALL_SOLUTIONS
 
 OTHERS = (
@@ -107,8 +107,9 @@ def cache(tmp_path: Path) -> SolutionCache:
     return SolutionCache(tmp_path / "cache")
 
 
-@pytest.fixture(scope="module")
-def solver() -> Iterator[AceProcess]:
+@pytest.fixture
+def solver(warm_ace: None) -> Iterator[AceProcess]:
+    del warm_ace
     with AceProcess(always=True) as process:
         yield process
 
@@ -120,8 +121,9 @@ def row() -> Robot:
 
 
 @pytest.fixture
-def rows(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+def rows(warm_ace: None, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """A team's folder; the program's cache is at `home`, beside it."""
+    del warm_ace
     folder = tmp_path / "rows"
     write_team(queens3d(4, QueensModel.PLANAR, QueensRobots.ROWS), folder)
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "home"))
@@ -136,7 +138,7 @@ def compiled(robot: Robot, cache: SolutionCache, solver: AceProcess) -> Compilat
 
 def sources(*words: object) -> list[str]:
     """Where the program says that robots' local solutions come from."""
-    done = robochoc("compile", "--json", *words)
+    done = robochoc_within("compile", "--json", *words)
     assert (done.returncode, done.stderr) == (0, "")
     return [robot["source"] for robot in json.loads(done.stdout)["robots"]]
 
@@ -292,22 +294,22 @@ def test_clearing_removes_the_cache_and_nothing_else(cache: SolutionCache) -> No
 
 def test_the_program_keeps_shows_and_clears_its_cache(rows: Path) -> None:
     home = rows.parent / "home" / "robochoc"
-    assert robochoc("cache", "show").stdout == f"{home}: 0 problems, 0 bytes\n"
+    assert robochoc_within("cache", "show").stdout == f"{home}: 0 problems, 0 bytes\n"
     assert sources("--ace", rows) == ["ace", "equal", "equal", "equal"]
     (path,) = home.iterdir()
-    assert robochoc("cache", "show").stdout == f"{home}: 1 problem, {path.stat().st_size} bytes\n"
+    assert robochoc_within("cache", "show").stdout == f"{home}: 1 problem, {path.stat().st_size} bytes\n"
     assert sources(rows) == ["cache", "equal", "equal", "equal"]
-    cleared = robochoc("cache", "clear")
+    cleared = robochoc_within("cache", "clear")
     assert (cleared.returncode, cleared.stdout) == (0, f"{home}: 1 problem removed\n")
     assert not list(home.iterdir())
-    assert robochoc("cache", "clear").stdout == f"{home}: 0 problems removed\n"
+    assert robochoc_within("cache", "clear").stdout == f"{home}: 0 problems removed\n"
 
 
 def test_without_the_cache_it_is_neither_used_nor_filled(rows: Path) -> None:
     assert sources("--ace", "--no-cache", rows) == ["ace", "equal", "equal", "equal"]
-    assert robochoc("solve", "--no-cache", "--runtime", "simulator", rows).returncode == 0
+    assert robochoc_within("solve", "--no-cache", "--runtime", "simulator", rows).returncode == 0
     assert not (rows.parent / "home").exists()
-    assert robochoc("solve", "--ace", "--runtime", "simulator", rows).returncode == 0
+    assert robochoc_within("solve", "--ace", "--runtime", "simulator", rows).returncode == 0
     assert len(list((rows.parent / "home" / "robochoc").iterdir())) == 1
     assert sources("--ace", "--no-cache", rows) == ["ace", "equal", "equal", "equal"]
 
@@ -316,5 +318,5 @@ def test_the_program_does_without_a_cache_that_it_cannot_have(rows: Path) -> Non
     home = rows.parent / "home"
     home.write_text("in the way")
     assert sources("--ace", rows) == ["ace", "equal", "equal", "equal"]
-    assert robochoc("cache", "show").stdout == f"{home / 'robochoc'}: 0 problems, 0 bytes\n"
-    assert robochoc("cache", "clear").returncode == 0
+    assert robochoc_within("cache", "show").stdout == f"{home / 'robochoc'}: 0 problems, 0 bytes\n"
+    assert robochoc_within("cache", "clear").returncode == 0

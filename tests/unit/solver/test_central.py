@@ -27,16 +27,16 @@ from robochoc.solver.failures import SolverLostError
 from robochoc.solver.symmetry import Symmetry, break_symmetries, orbits, symmetries
 from robochoc.solver.team_network import identifiers
 from robochoc.verification.checker import RefutedError
-from tests.support.clocks import waiting
 from tests.support.complex_problems import complex_team, random_complex_team
 from tests.support.problems import solutions
-from tests.support.solver_networks import brute_force
+from tests.support.solver_networks import brute_force, misheard
 from tests.support.xcsp3_solvers import integers, rows_of, run_java, solver_jar
 
 
-@pytest.fixture(scope="module", params=[False, True], ids=["enumerated", "by ACE"])
-def solver(request: pytest.FixtureRequest) -> Iterator[AceProcess]:
+@pytest.fixture(params=[False, True], ids=["enumerated", "by ACE"])
+def solver(request: pytest.FixtureRequest, warm_ace: None) -> Iterator[AceProcess]:
     """A solver that enumerates what is small, and one that asks ACE always."""
+    del warm_ace
     with AceProcess(always=request.param) as one:
         yield one
 
@@ -140,8 +140,10 @@ def test_queens_are_counted(n: int, model: str, count: int, robots: str, solver:
     assert judgement.verdict is (Verdict.SOLUTION if count else Verdict.NO_SOLUTION)
 
 
-def test_the_papers_528_solutions_are_all_there(solver: AceProcess) -> None:
-    assert CentralSolver(solver=solver).solve(queens3d(11), count=True).count == 528
+@pytest.mark.usefixtures("warm_ace")
+@pytest.mark.parametrize("always", [True, pytest.param(False, marks=pytest.mark.slow)], ids=["by ACE", "as it comes"])
+def test_the_papers_528_solutions_are_all_there(*, always: bool) -> None:
+    assert CentralSolver(always_ace=always).solve(queens3d(11), count=True).count == 528
 
 
 @pytest.mark.slow
@@ -188,12 +190,6 @@ def test_parts_that_share_nothing_are_multiplied(solver: AceProcess) -> None:
     assert len(CentralSolver(solver=solver).solve(team).assignment) == 60
 
 
-def test_when_the_time_is_over_the_judge_says_unknown() -> None:
-    with waiting(6):
-        outcome = solve(queens3d(12), Options(protocol="central", timeout=2.5, cache=False))
-    assert outcome.verdict is Verdict.UNKNOWN
-
-
 def test_a_no_solution_that_the_judge_refutes_ends_the_run(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(CentralSolver, "solve", lambda *_, **__: CentralAnswer(Verdict.SOLUTION))
     with pytest.raises(RefutedError, match="no solution, and the central solver has found one"):
@@ -235,11 +231,13 @@ def read_back(document: bytes) -> int:
     )
 
 
+@pytest.mark.usefixtures("warm_ace")
 def test_what_is_exported_has_the_same_solutions() -> None:
     chance = Random("exported")
-    for _ in range(12):
-        team = random_complex_team(chance)
-        assert read_back(xcsp3(team)) == sum(1 for _ in solutions(team)), team
+    with AceProcess() as writer:
+        for _ in range(12):
+            team = random_complex_team(chance)
+            assert read_back(xcsp3(team, writer)) == sum(1 for _ in solutions(team)), team
 
 
 def negative_team() -> Team:
@@ -266,16 +264,16 @@ NEGATIVE = negative_team()
     ],
     ids=lambda one: one.name if isinstance(one, Team) else "",
 )
-def test_ace_and_choco_read_what_is_exported(team: Team, answer: str, tmp_path: Path) -> None:
+def test_choco_reads_what_is_exported(team: Team, answer: str, tmp_path: Path) -> None:
     path = tmp_path / "team.xml"
     path.write_bytes(xcsp3(team))
-    assert answer in run_java(solver_jar("ace"), "main.Head", str(path), "-s=1", "-npc")
     assert answer in run_java(solver_jar("choco"), "org.chocosolver.parser.xcsp.ChocoXCSP", str(path), "-limit=[50s]")
 
 
+@pytest.mark.usefixtures("warm_ace")
 def test_a_search_that_broke_off_proves_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
     """ACE says so in one line of many; a broken-off search without solutions is no `no-solution`."""
-    monkeypatch.setattr(AceProcess, "_hear", lambda *_: Solved(found=0, complete=False, solutions=b""))
+    misheard(monkeypatch, Solved(found=0, complete=False, solutions=b""))
     for options in ({"count": True}, {"count": False}):
         with pytest.raises(SolverLostError, match="stopped before"):
             CentralSolver(always_ace=True).solve(queens3d(7), **options)

@@ -40,16 +40,18 @@ from tests.support.cost_problems import (
 )
 from tests.support.pkc_problems import random_pkc_team, with_constraints
 from tests.support.problems import random_team, team_of
-from tests.support.program import robochoc
+from tests.support.program import robochoc_within
+from tests.support.solver_networks import misheard
 
 CENTRAL = Options(protocol="central")
 FEWEST = replace(CENTRAL, withdraw=Withdrawal.MINIMUM)
 BATCHES = [0, *(pytest.param(batch, marks=pytest.mark.slow) for batch in range(1, 21))]
 
 
-@pytest.fixture(scope="module", params=[False, True], ids=["enumerated", "by ACE"])
-def solver(request: pytest.FixtureRequest) -> Iterator[AceProcess]:
+@pytest.fixture(params=[False, True], ids=["enumerated", "by ACE"])
+def solver(request: pytest.FixtureRequest, warm_ace: None) -> Iterator[AceProcess]:
     """A solver that enumerates what is small, and one that asks ACE always."""
+    del warm_ace
     with AceProcess(always=request.param) as one:
         yield one
 
@@ -139,8 +141,9 @@ def test_an_answer_that_does_not_cost_what_the_judge_says_is_none(monkeypatch: p
         solve(team, CENTRAL)
 
 
+@pytest.mark.usefixtures("warm_ace")
 def test_a_search_that_broke_off_proves_no_optimum(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(AceProcess, "_hear", lambda *_: Solved(found=1, complete=False, solutions=b"\0" * 4 * 6))
+    misheard(monkeypatch, Solved(found=1, complete=False, solutions=b"\0" * 4 * 6))
     with pytest.raises(SolverLostError, match="stopped before"):
         CentralSolver(always_ace=True).solve(coloring(3, 2, 2))
 
@@ -313,19 +316,21 @@ def test_a_no_solution_of_costs_is_refuted_too(monkeypatch: pytest.MonkeyPatch) 
 # --- on the command line ----------------------------------------------------------------------------------------------
 
 
+@pytest.mark.usefixtures("warm_ace")
 def test_the_program_tells_who_steps_aside(four: Path) -> None:
-    done = robochoc("solve", four, "--protocol", "central", "--withdraw=fewest", "--json")
+    done = robochoc_within("solve", four, "--protocol", "central", "--withdraw=fewest", "--json")
     assert done.returncode == 0, done.stderr
     result = json.loads(done.stdout)
     assert (result["verdict"], len(result["withdrawn"]), result["verified"]) == ("optimal", 6, True)
 
 
+@pytest.mark.usefixtures("warm_ace")
 def test_the_program_refuses_to_count_costs(tmp_path: Path) -> None:
     write_team(coloring(3, 2, 2), tmp_path / "triangle")
-    done = robochoc("solve", tmp_path / "triangle", "--protocol", "central", "--count")
+    done = robochoc_within("solve", tmp_path / "triangle", "--protocol", "central", "--count")
     assert (done.returncode, done.stdout) == (2, "")
     assert "every assignment that breaks nothing hard is a solution" in done.stderr
-    optimum = robochoc("solve", tmp_path / "triangle", "--protocol", "central", "--json")
+    optimum = robochoc_within("solve", tmp_path / "triangle", "--protocol", "central", "--json")
     assert json.loads(optimum.stdout)["cost"] == 1
 
 

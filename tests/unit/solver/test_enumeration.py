@@ -37,16 +37,17 @@ from robochoc.solver.weighted import WeightedComponent, weighted_components
 from tests.support.complex_problems import complex_team, random_complex_team
 from tests.support.cost_problems import random_complex_cost_team, random_cost_team
 from tests.support.meetings import meetings
-from tests.support.program import robochoc
+from tests.support.program import robochoc_within
 from tests.support.solver_networks import brute_force, queens_network, random_network
 
 ENOUGH = 10**9
 BATCHES = [0, *(pytest.param(batch, marks=pytest.mark.slow) for batch in range(1, 11))]
 
 
-@pytest.fixture(scope="module")
-def ace() -> Iterator[AceProcess]:
+@pytest.fixture
+def ace(warm_ace: None) -> Iterator[AceProcess]:
     """A process that is asked always."""
+    del warm_ace
     with AceProcess(always=True) as solver:
         yield solver
 
@@ -203,6 +204,7 @@ def test_the_same_steps_are_taken_every_time() -> None:
     assert short.used == short.steps
 
 
+@pytest.mark.usefixtures("warm_ace")
 def test_a_task_that_takes_too_many_steps_goes_to_ace(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(front, "STEPS_BEFORE_ACE", 0)
     monkeypatch.setattr(front, "STEPS_EACH", 20_000)
@@ -317,18 +319,19 @@ def no_java(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     "words", [["solve"], ["solve", "--protocol", "central"], ["compile"]], ids=["solve", "central", "compile"]
 )
 def test_the_program_needs_no_java_for_meetings(folder: Path, words: list[str], tmp_path: Path) -> None:
-    done = robochoc(*words, folder)
+    done = robochoc_within(*words, folder)
     assert (done.returncode, done.stderr) == (0, "")
     assert not (tmp_path / "cache").exists(), "what is enumerated is cached"
-    blocked = robochoc(*words, "--ace", folder)
+    blocked = robochoc_within(*words, "--ace", folder)
     assert blocked.returncode == 2
     assert "blocked" in blocked.stderr
 
 
+@pytest.mark.usefixtures("warm_ace")
 def test_compile_says_who_has_solved(folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
     for words, who in (([], "enumerated"), (["--ace"], "ace"), ([], "cache")):
-        robots = json.loads(robochoc("compile", "--json", *words, folder).stdout)["robots"]
+        robots = json.loads(robochoc_within("compile", "--json", *words, folder).stdout)["robots"]
         sources = {robot["source"] for robot in robots}
         assert who in sources
         assert sources <= {who, "equal", "direct"}

@@ -10,13 +10,14 @@ import pytest
 
 from robochoc.formats import PREDEFINED, write_team
 from robochoc.formats.xcsp3 import xcsp3
+from robochoc.generators.queens3d import queens3d
 from robochoc.model.problem import INFINITE, Constraint, ProblemKind, Relation, Semantics, Team
 from robochoc.solver.ace import AceProcess
 from robochoc.solver.encoding import UnsupportedError
 from tests.support.complex_problems import complex_team, random_complex_team
 from tests.support.cost_problems import least_cost, random_complex_cost_team, random_cost_team, with_costs
 from tests.support.problems import random_team, solutions, team_of
-from tests.support.program import robochoc
+from tests.support.program import robochoc_within
 from tests.support.warm_ace import ace_said
 
 TWO = {"A": (1, 2), "B": (1, 2)}
@@ -37,13 +38,14 @@ SPECIAL = (
     team_of({"A": (LEAST, 0), "B": (-1, 0, MOST)}, [Constraint("C", PREDEFINED["lt"], ("A", "B"), ("A", "B"))]),
     team_of({"A": (-WIDEST // 2, WIDEST // 2), "B": (MOST,)}, []),
     complex_team({"R": ["A", "B"]}, {**TWO, "B": range(1000)}, []),
+    queens3d(3),
 )
 
 
 def check(teams: list[Team], folder: Path) -> None:
     """ACE finds of every exported team what brute force finds."""
     files = [folder / f"{number}.xml" for number in range(len(teams))]
-    with AceProcess(java=False) as writer:
+    with AceProcess() as writer:
         for file, team in zip(files, teams, strict=True):
             file.write_bytes(xcsp3(team, writer))
     said = ace_said(files)
@@ -65,6 +67,7 @@ def drawn(chance: Random) -> Team:
     return make(chance)
 
 
+@pytest.mark.usefixtures("warm_ace")
 @pytest.mark.parametrize("batch", [0, *(pytest.param(batch, marks=pytest.mark.slow) for batch in range(1, 6))])
 def test_ace_accepts_what_is_exported(batch: int, tmp_path: Path) -> None:
     chance = Random(f"accepted {batch}")
@@ -81,7 +84,7 @@ def test_integers_that_ace_cannot_read_are_refused(values: tuple[int, ...]) -> N
 def test_what_is_refused_is_not_half_written(tmp_path: Path) -> None:
     team = team_of({"A": (10**17,), "B": (1, 2)}, [])
     write_team(team, tmp_path / "far")
-    done = robochoc("export", tmp_path / "far", "-o", tmp_path / "far.xml")
+    done = robochoc_within("export", tmp_path / "far", "-o", tmp_path / "far.xml")
     assert done.returncode == 2
     (line,) = done.stderr.splitlines()
     assert "ACE takes values from -2,147,483,638 to 2,147,483,637" in line

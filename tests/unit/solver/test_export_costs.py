@@ -15,11 +15,12 @@ from robochoc.formats import PREDEFINED, write_team
 from robochoc.formats.xcsp3 import xcsp3
 from robochoc.generators.coloring import coloring
 from robochoc.model.problem import INFINITE, Constraint, Relation, Semantics, Team
+from robochoc.solver.ace import AceProcess
 from robochoc.solver.encoding import UnsupportedError
 from tests.support.complex_problems import complex_team
 from tests.support.cost_problems import least_cost, random_complex_cost_team, random_cost_team, with_costs
 from tests.support.problems import team_of
-from tests.support.program import robochoc
+from tests.support.program import robochoc, robochoc_within
 from tests.support.xcsp3_solvers import integers, rows_of, run_java, solver_jar
 
 
@@ -60,11 +61,13 @@ def least_exported(document: bytes) -> float:
     return best
 
 
+@pytest.mark.usefixtures("warm_ace")
 def test_what_is_exported_costs_the_same() -> None:
     chance = Random("exported costs")
-    for _ in range(12):
-        team = random_cost_team(chance) if chance.random() < 0.6 else random_complex_cost_team(chance)
-        assert least_exported(xcsp3(team)) == least_cost(team), team
+    with AceProcess() as writer:
+        for _ in range(12):
+            team = random_cost_team(chance) if chance.random() < 0.6 else random_complex_cost_team(chance)
+            assert least_exported(xcsp3(team, writer)) == least_cost(team), team
 
 
 @pytest.mark.slow
@@ -129,11 +132,11 @@ def pair(tmp_path: Path) -> Path:
 
 
 def test_compile_shows_what_groups_cost(pair: Path) -> None:
-    done = robochoc("compile", pair)
+    done = robochoc_within("compile", pair)
     assert done.returncode == 0, done.stderr
     head, *rows = (re.split(r" {2,}", line.strip()) for line in done.stdout.splitlines()[1:4])
     assert [row[head.index("cost")] for row in rows] == ["3..8", "0..0"]
-    report = json.loads(robochoc("compile", "--json", pair).stdout)
+    report = json.loads(robochoc_within("compile", "--json", pair).stdout)
     first, second = report["robots"]
     assert [first[name] for name in ("local_solutions", "groups", "cheapest", "dearest")] == [3, 2, 3, 8]
     assert (second["cheapest"], second["dearest"]) == (0, 0)

@@ -1,0 +1,66 @@
+"""The table of `make coverage`: lines and branches that tests have reached, by room of the package.
+
+`python -m tests.support.coverage_by_room REPORT` reads the JSON report of coverage.py. It ends with 1 where a room has
+fewer of its branches than `FLOORS` asks for.
+"""
+
+from __future__ import annotations
+
+import json
+import sys
+from collections import Counter
+from pathlib import Path
+
+FLOORS: dict[str, float] = {}
+"""The share of branches, in percent, that tests have to reach in a room."""
+
+
+def rooms(report: str) -> dict[str, Counter[str]]:
+    """Return what the report counts, by room; what stands loose at the top of the package is "robochoc"."""
+    found: dict[str, Counter[str]] = {}
+    for name, file in json.loads(report)["files"].items():
+        parts = Path(name).parts
+        below = parts[parts.index("robochoc") + 1 :]
+        counts = {key: value for key, value in file["summary"].items() if isinstance(value, int)}
+        found.setdefault(below[0] if len(below) > 1 else "robochoc", Counter()).update(counts)
+    return dict(sorted(found.items()))
+
+
+def share(counts: Counter[str], kind: str, of: str) -> float:
+    """Return the percentage of `of` that was reached, rounded down: only all of them are 100.0."""
+    return counts[kind] * 1000 // counts[of] / 10 if counts[of] else 100.0
+
+
+def table(found: dict[str, Counter[str]]) -> str:
+    """Return a line for each room, and one for all."""
+    lines = [f"{'room':<14}{'lines':>8}{'reached':>9}{'branches':>10}{'reached':>9}"]
+    for room, counts in {**found, "all": sum(found.values(), Counter())}.items():
+        of_lines, of_branches = (
+            share(counts, kind, of)
+            for kind, of in (("covered_lines", "num_statements"), ("covered_branches", "num_branches"))
+        )
+        numbers = f"{counts['num_statements']:>8,}{of_lines:>8.1f}%{counts['num_branches']:>10,}{of_branches:>8.1f}%"
+        lines.append(f"{room:<14}{numbers}")
+    return "\n".join(lines)
+
+
+def below_the_floor(found: dict[str, Counter[str]], floors: dict[str, float]) -> list[str]:
+    """Return a line for each room whose branches were reached too seldom."""
+    return [
+        f"{room}: tests reach {reached} % of the branches, and {floor:g} % are asked for"
+        for room, floor in floors.items()
+        if (reached := share(found.get(room, Counter()), "covered_branches", "num_branches")) < floor
+    ]
+
+
+def main() -> int:
+    """Print the table, and what is below its floor."""
+    found = rooms(Path(sys.argv[1]).read_text(encoding="utf-8"))
+    print(table(found))  # noqa: T201 - for make
+    failed = below_the_floor(found, FLOORS)
+    print(*failed, sep="\n", end="\n" if failed else "", file=sys.stderr)  # noqa: T201 - the same
+    return bool(failed)
+
+
+if __name__ == "__main__":
+    sys.exit(main())
