@@ -21,7 +21,8 @@ from robochoc.protocols.settings import SettingsError, settings_of
 from robochoc.solver import cost_table
 from robochoc.solver.encoding import UnsupportedError
 from tests.support.agents import replies, value
-from tests.support.cost_problems import MAX_COST, least_cost, random_cost_team
+from tests.support.brute_force import least_cost
+from tests.support.cost_problems import MAX_COST, random_cost_team
 from tests.support.local_search_runs import (
     any_schedule,
     assignments_by_cycle,

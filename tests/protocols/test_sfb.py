@@ -25,7 +25,8 @@ from robochoc.solver.agent_problem import RunParameters
 from robochoc.solver.encoding import TooLargeError
 from robochoc.solver.exact_costs import EXACT
 from tests.support.agents import replies, value
-from tests.support.cost_problems import least_cost, random_cost_team
+from tests.support.brute_force import least_cost
+from tests.support.cost_problems import random_cost_team
 from tests.support.problems import team_of
 from tests.support.sfb_robots import CHAIN, agents, cpas, introduced, row, rows, team
 

@@ -21,7 +21,8 @@ from robochoc.protocols.syncbb import Backtrack, BestPath, Cost, Path, SyncBB, T
 from robochoc.solver.agent_problem import RunParameters, agent_problems
 from robochoc.solver.compiled import LocalProblem
 from tests.support.agents import replies, value
-from tests.support.cost_problems import least_cost, random_cost_team
+from tests.support.brute_force import least_cost
+from tests.support.cost_problems import random_cost_team
 from tests.support.problems import team_of
 
 NONE = BestPath(math.inf)
