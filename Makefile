@@ -6,7 +6,7 @@ RUN := $(VENV)/.run
 READY := $(VENV)/.ready
 PIP := $(BIN)/pip install --disable-pip-version-check
 
-.PHONY: demo demo-11 docs test test-slow test-all coverage fuzz lint type format bench journals clean
+.PHONY: demo demo-11 docs test test-slow test-all coverage fuzz mutate lint type format bench journals clean
 
 $(RUN): pyproject.toml
 	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' || { echo "robochoc needs Python 3.11 or newer; say: make PYTHON=python3.12 ..."; exit 1; }
@@ -76,6 +76,11 @@ docs: $(DOCS)  ## the documentation site: out/site/index.html, readable without 
 SECONDS ?= 600
 fuzz: $(READY)  ## spoilt inputs for all that reads them: make fuzz SECONDS=600 SEED=1 ENGINE=loop
 	$(BIN)/python -m tests.fuzz --seconds $(SECONDS) --seed $(SEED) $(if $(ENGINE),--engine $(ENGINE))
+
+# What survives is shown; the same mutant again: .venv/bin/python -m tests.mutation --again PATH:NUMBER
+COUNT ?= 100
+mutate: $(READY)  ## the protocols, spoilt in one place each: do the tests notice? make mutate SEED=1 COUNT=100 FILES=...
+	$(BIN)/python -m tests.mutation --count $(COUNT) --seed $(SEED) $(FILES)
 
 lint: $(READY)
 	$(BIN)/ruff check .

@@ -259,6 +259,12 @@ def test_one_that_is_no_cheaper_is_none() -> None:
     assert value(robots["RC"]) is None
 
 
+def test_one_that_costs_more_than_the_robot_before_said_is_none() -> None:
+    robots, _ = introduced(team(CHAIN))
+    assert replies(robots["RC"], ("RB", cpas([1, 3, 1, 0, 2, 4], least=5, ceiling=10))) == [("RB", Explored())]
+    assert value(robots["RC"]) is None
+
+
 def test_a_solution_is_told_up_the_order_and_everybody_holds_its_value() -> None:
     robots, _ = introduced(team(CHAIN))
     replies(robots["RB"], ("RA", cpas(row(0), ceiling=10)))
