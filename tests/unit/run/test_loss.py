@@ -25,7 +25,7 @@ pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="looks into /pro
 TEAMS = {team.name: team for team in (queens3d(4), queens3d(5), queens3d(7))}
 LONGEST_S = {"queens3d-4": 0.3, "queens3d-5": 0.8, "queens3d-7": 0.8}
 """About so long they search; a robot dies within that."""
-FEW, MANY = 4, 100
+FEW, MANY = 3, 100
 
 
 @pytest.fixture(scope="module")
@@ -84,7 +84,7 @@ def test_the_others_go_on_and_are_right(seed: int, folders: dict[str, Path], tmp
     assert set(assignment) == (set(rest.variables) if answer["verdict"] == "solution" else set())
 
 
-@pytest.mark.parametrize("protocol", ["dynabt", "abt"])
+@pytest.mark.parametrize("protocol", ["dynabt", pytest.param("abt", marks=pytest.mark.slow)])
 def test_a_spare_comes_back_and_the_whole_team_has_a_verdict(
     protocol: str, folders: dict[str, Path], tmp_path: Path
 ) -> None:
@@ -127,18 +127,6 @@ def test_a_spare_whose_file_is_gone_stays_out(folders: dict[str, Path], tmp_path
             assert len(withdrawn) == 1
             assert "could not come back" in str(answer["reason"])
             return
-    raise AssertionError("every run was over before the robot died")
-
-
-def test_without_the_option_a_loss_ends_the_run(folders: dict[str, Path], tmp_path: Path) -> None:
-    for attempt in range(10):
-        with running(solving(folders["queens3d-7"]), tmp_path / f"{attempt}") as run:
-            run.wait_for_robots(49)
-            run.strike(signal.SIGKILL, run.robots()[20])
-            run.end()
-            if run.status() == 4:
-                assert "was lost" in run.errors()
-                return
     raise AssertionError("every run was over before the robot died")
 
 
