@@ -44,6 +44,8 @@ SHARED = {
     "verification": ("tests/unit/run", "tests/unit/solver/test_central_costs.py"),
 }
 """More tests of what is no protocol."""
+SENTENCES = "tests/unit/sniffer/test_sentences.py"
+"""What protocols say, in words."""
 OWN_CPU_S, CPU_S = 30, 300
 """A mutant hangs once the tests of its own file have used so many seconds of CPU time, or all others."""
 HANG_S = 900
@@ -139,8 +141,7 @@ def commands_for(path: str) -> Iterator[tuple[tuple[str, ...], int]]:
         return
     users = _users(f"robochoc.protocols.{stem}")
     others = [file for file in sorted(ROOT.glob("tests/protocols/test_*.py")) if users & _imported(file)]
-    if set(others) - set(own):
-        yield tuple(str(file.relative_to(ROOT)) for file in others if file not in own), CPU_S
+    yield (SENTENCES, *(str(file.relative_to(ROOT)) for file in others if file not in own)), CPU_S
     points = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]["entry-points"]["robochoc.protocols"]
     names = [name for name, place in points.items() if place.partition(":")[0] in users]
     yield ("tests/conformance", "-k", " or ".join(names)), CPU_S

@@ -1,6 +1,6 @@
 """All mutants of a file: its text, changed in one place, such as `<` for `<=`, or with a statement left out.
 
-What has no effect on a run is left alone: annotations, `assert`, `case never`, and how messages are called (`act`,
+What has no effect on a run is left alone: annotations, `assert`, `case never`, and how messages are called (`Act`,
 `in_words`).
 """
 
@@ -86,7 +86,7 @@ def _changes(node: ast.AST) -> Iterator[tuple[ast.expr | ast.stmt, str]]:
         return
     if isinstance(node, ast.match_case) and ast.unparse(node.pattern) == "never":
         return
-    if isinstance(node, ast.Assign) and ast.unparse(node.targets[0]) == "act":
+    if isinstance(node, ast.Call) and ast.unparse(node.func) == "Act":
         return
     if isinstance(node, ast.stmt):
         yield from ((node, new) for new in _statements(node))

@@ -45,9 +45,11 @@ def test_the_first_robot_tells_its_values_and_each_adds_its_own() -> None:
 
 
 def test_the_last_robot_turns_round_with_what_its_values_are_charged() -> None:
-    robots = agents(team({**CHAIN, "C": (5, 0)}))
+    robots = agents(team(CHAIN))
+    robots["RC"].problem.charges = (5.0, 0.0)
     said = replies(robots["RC"], ("RB", Above.of([BOTH] * 2)))
     assert said == [("RB", Below.of([(BOTH, (5, 0))], 5))]
+    assert encode(said[0][1]) == encode(Below.of([(BOTH, (5, 0))], 5)), "integers, which take fewer bytes"
 
 
 def test_on_the_way_up_each_robot_adds_the_most_that_it_can_come_to() -> None:
