@@ -6,7 +6,7 @@ import signal
 import threading
 from collections.abc import Iterator
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import pytest
 
@@ -19,9 +19,6 @@ from tests.support.authority_service import AuthorityService, open_files
 from tests.support.deployments import Deployment
 from tests.support.examples import register_profiles
 from tests.support.warm_programs import WarmPrograms
-
-if TYPE_CHECKING:
-    from tests.support.sniffer_server import SnifferServer
 
 register_profiles()
 
@@ -103,35 +100,10 @@ def warm_ace(ace_stable: AceStable) -> Iterator[None]:
         yield
 
 
-# The sniffer's page; what it needs is imported by those tests only that look at it
-
-
-@pytest.fixture(scope="module")
-def without_the_scenes_viewer() -> Iterator[None]:
-    """A megabyte that each page would take its time to read, and nobody there looks at."""
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("robochoc.sniffer.page.viewer_script", lambda: "")
-        yield
-
-
 @pytest.fixture(scope="module")
 def browser() -> Iterator[Any]:
-    """Chromium, by Playwright."""
-    from tests.support.sniffer_pages import chromium  # noqa: PLC0415 - see above
+    """Chromium, by Playwright. While it is there, no test may run an event loop in the main thread."""
+    from tests.support.browser_pages import chromium  # noqa: PLC0415 - for those tests only that look at pages
 
     with chromium() as browser:
         yield browser
-
-
-@pytest.fixture(scope="module")
-def server(without_the_scenes_viewer: None, tmp_path_factory: pytest.TempPathFactory) -> Iterator[SnifferServer]:
-    """A page of the journal `sniffer_pages.WHOLE`."""
-    from robochoc.sniffer.session import SnifferSession  # noqa: PLC0415 - see above
-    from tests.support.sniffer_pages import WHOLE  # noqa: PLC0415 - see above
-    from tests.support.sniffer_server import sniffer_server  # noqa: PLC0415 - see above
-
-    del without_the_scenes_viewer  # it only has to be there before the page is made
-    file = tmp_path_factory.mktemp("sniffed") / "run.journal"
-    file.write_bytes(WHOLE)
-    with sniffer_server(SnifferSession(file)) as running:
-        yield running

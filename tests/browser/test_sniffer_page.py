@@ -4,9 +4,7 @@ from __future__ import annotations
 
 import json
 import re
-from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
 
 import pytest
 
@@ -24,19 +22,12 @@ from tests.support.sniffer_pages import (
     painted,
     robot,
     rows,
-    shown,
     text_is,
     until,
 )
 from tests.support.sniffer_server import SnifferServer
 
 pytestmark = pytest.mark.usefixtures("without_the_scenes_viewer")
-
-
-@pytest.fixture(scope="module")
-def tab(browser: Any, server: SnifferServer) -> Iterator[Page]:  # noqa: ANN401
-    with shown(browser, server.url) as page:
-        yield page
 
 
 @pytest.fixture

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator
 from typing import Any
 
 import pytest
@@ -24,7 +23,6 @@ from tests.support.sniffer_pages import (
     heads,
     robot,
     rows,
-    shown,
     text_is,
     until,
 )
@@ -40,12 +38,6 @@ IN_SIGHT = """(m) => {
 
 
 pytestmark = pytest.mark.usefixtures("without_the_scenes_viewer")
-
-
-@pytest.fixture(scope="module")
-def tab(browser: Any, server: SnifferServer) -> Iterator[Page]:  # noqa: ANN401 - Playwright's
-    with shown(browser, server.url) as page:
-        yield page
 
 
 @pytest.fixture

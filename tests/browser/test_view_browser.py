@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import io
-import subprocess
-import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import replace
@@ -22,7 +20,7 @@ from robochoc.view.page import scene_page
 from robochoc.view.scene import Scene, scene_of
 from tests.support.browser_pages import watched_page
 from tests.support.flights import LEG_S, epochs_of_three, five, straight
-from tests.support.program import ROOT
+from tests.support.live_scenes import served_scene
 from tests.support.sniffer_pages import CONTRAST, NAMELESS, until
 
 HOSTILE = "</script><img src=x onerror=document.title='broken'>"
@@ -60,19 +58,21 @@ def opened(browser: Any, url: str, **options: Any) -> Iterator[Page]:  # noqa: A
 
 @pytest.fixture(scope="module")
 def one(browser: Any, file: Path) -> Iterator[Page]:  # noqa: ANN401 - Playwright's
-    with opened(browser, file.as_uri()) as page:
+    with opened(browser, file.as_uri(), reduced_motion="reduce") as page:
         yield page
 
 
 @pytest.fixture
-def player(one: Page) -> Page:
-    """The page, paused at the beginning."""
+def player(one: Page) -> Iterator[Page]:
+    """The page, paused at the beginning; its camera turns at once."""
+    one.emulate_media(reduced_motion="reduce")
     one.evaluate("Playback.player.pause(); Playback.player.seek(0); Playback.camera.see('overview', true)")
     one.select_option("#speed", "1")
     one.select_option("#trail", "all")
     one.locator("#play").focus()
     one.evaluate("document.activeElement.blur()")
-    return one
+    yield one
+    one.evaluate("Playback.player.pause()")  # what moves is painted again and again
 
 
 def now(page: Page) -> float:
@@ -92,9 +92,14 @@ def pressed(page: Page) -> str | None:
     return names[0] if names else None
 
 
+def drawn_again(page: Page) -> None:
+    """Wait until the page has drawn all that is so now."""
+    page.evaluate("new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done)))")
+
+
 def picture(page: Page) -> npt.NDArray[np.int16]:
     """The scene between caption and controls, as it is drawn: rows of red, green and blue."""
-    page.evaluate("new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done)))")
+    drawn_again(page)
     image = Image.open(io.BytesIO(page.screenshot())).convert("RGB")
     return np.asarray(image, dtype=np.int16)[20:400, 330:]
 
@@ -131,25 +136,38 @@ def test_of_names_that_would_cover_each_other_one_is_written(player: Page) -> No
     assert all(named())
 
 
+SLOW, FAST = 1e-4, 1e4
+"""Speeds at which the end is hours away, however busy the machine is, or a picture away."""
+
+
+def run_at(page: Page, speed: float) -> None:
+    page.evaluate(f"Playback.player.speed = {speed}")
+
+
 def test_it_plays_to_its_end_and_again(player: Page) -> None:
     player.select_option("#speed", "4")
+    assert player.evaluate("Playback.player.speed") == 4
+    run_at(player, SLOW)
     assert player.get_attribute("#play", "aria-label") == "Play"
     player.click("#play")
     assert player.get_attribute("#play", "aria-label") == "Pause"
-    until(lambda: now(player) > 1, "it does not play")
+    until(lambda: 0 < now(player) < END_S, "it does not play")
+    run_at(player, FAST)
     until(lambda: now(player) == END_S, "it does not end")
     assert player.get_attribute("#play", "aria-label") == "Play again"
     assert place(player, 0) == pytest.approx(scene().drones[0].end, abs=0.01)
+    run_at(player, SLOW)
     player.keyboard.press("Home")
     player.locator("body").press(" ")
     until(lambda: 0 < now(player) < END_S, "it does not begin again")
     player.keyboard.press(" ")
     paused = now(player)
-    player.wait_for_timeout(100)
+    drawn_again(player)
     assert now(player) == paused
 
 
 def test_it_begins_anew(player: Page) -> None:
+    run_at(player, SLOW)
     player.evaluate("Playback.player.seek(5)")
     player.click("#again")
     assert now(player) < 1
@@ -221,7 +239,10 @@ def test_cameras_by_keys_and_by_buttons(player: Page) -> None:
         return list(player.evaluate("Playback.viewer.camera.position.toArray()"))
 
     overview = looked_from()
+    player.emulate_media(reduced_motion="no-preference")
     player.keyboard.press("2")
+    assert player.evaluate("Boolean(Playback.camera.turning)"), "it turns"
+    player.emulate_media(reduced_motion="reduce")
     assert pressed(player) == "top"
     above = looked_from()
     assert above[1] > 2 * abs(above[0])
@@ -360,7 +381,7 @@ def test_without_a_flight_there_is_nothing_to_play(browser: Any, tmp_path: Path)
     bare = Scene("a team: a solution", (("flight", "none"),), scene().drones, scene().axes)
     html = tmp_path / "page.html"
     html.write_bytes(scene_page(bare))
-    with opened(browser, html.as_uri()) as shown:
+    with opened(browser, html.as_uri(), reduced_motion="reduce") as shown:
         assert shown.locator("#play").is_hidden()
         assert shown.locator("#time").is_hidden()
         shown.keyboard.press("4")
@@ -369,31 +390,16 @@ def test_without_a_flight_there_is_nothing_to_play(browser: Any, tmp_path: Path)
         assert place(shown, 0) == pytest.approx(bare.drones[0].end)
 
 
-LIVE = """
-import sys
-from tests.support.flights import epochs_of_three, five, straight
-from robochoc.flight.mission import mission_of
-from robochoc.view.live import serve_scene
-from robochoc.view.scene import scene_of
-outcome, mission = epochs_of_three(), mission_of(epochs_of_three(), five())
-serve_scene(scene_of(outcome, mission, straight(mission)), ready=lambda url: print(url, flush=True))
-"""
-
-
 def test_the_live_page_plays_the_same(browser: Any, one: Page) -> None:  # noqa: ANN401 - Playwright's
-    with subprocess.Popen([sys.executable, "-c", LIVE], stdout=subprocess.PIPE, text=True, cwd=ROOT) as server:
-        try:
-            assert server.stdout
-            with opened(browser, server.stdout.readline().strip(), viewport=one.viewport_size) as live:
-                until(lambda: live.evaluate("Boolean(Playback.trails.mesh)"), "nothing to play has come")
-                live.evaluate("Playback.player.pause(); Playback.player.seek(4.5)")
-                assert live.inner_text("#epoch").startswith("Epoch 2 (0 to 2)")
-                assert place(live, 0) != pytest.approx(place(live, 1), abs=0.5)
-                assert pressed(live) == "overview"
-                away = "Playback.viewer.camera.position.length()"
-                assert live.evaluate(away) > 2, "as the window wants it"
-        finally:
-            server.kill()
+    with served_scene(scene()) as url, opened(browser, url, viewport=one.viewport_size) as live:
+        until(lambda: live.evaluate("Boolean(Playback.trails.mesh)"), "nothing to play has come")
+        assert live.evaluate("Playback.player.playing || Playback.player.ended"), "by itself"
+        live.evaluate("Playback.player.pause(); Playback.player.seek(4.5)")
+        assert live.inner_text("#epoch").startswith("Epoch 2 (0 to 2)")
+        assert place(live, 0) != pytest.approx(place(live, 1), abs=0.5)
+        assert pressed(live) == "overview"
+        away = "Playback.viewer.camera.position.length()"
+        assert live.evaluate(away) > 2, "as the window wants it"
 
 
 def test_its_keys_are_a_key_away(player: Page) -> None:
@@ -410,6 +416,7 @@ def test_its_keys_are_a_key_away(player: Page) -> None:
 
 
 def test_space_plays_after_a_click_on_a_button(player: Page) -> None:
+    run_at(player, SLOW)
     player.click("#top")
     player.keyboard.press(" ")
     until(lambda: player.evaluate("Playback.player.playing"), "it does not play")

@@ -21,12 +21,13 @@ from robochoc.solver.agent_problem import RunParameters
 from robochoc.solver.compiled_team import CompiledTeam
 from robochoc.solver.encoding import TooLargeError
 from robochoc.verification.checker import assignment_cost, violations
+from tests.support.brute_force import least_cost, solutions
 from tests.support.complex_problems import random_complex_team
-from tests.support.cost_problems import least_cost, random_cost_team
+from tests.support.cost_problems import random_cost_team
 from tests.support.limits import HANG_S
 from tests.support.paused_abt import CHAIN, CrashingABT, OverloadedABT, PausedABT
 from tests.support.pkc_problems import random_pkc_team
-from tests.support.problems import random_team, solutions
+from tests.support.problems import random_team
 from tests.support.solver_networks import compiled_by_brute_force
 
 TIMEOUT_S = HANG_S

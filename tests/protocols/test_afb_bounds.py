@@ -15,7 +15,8 @@ from robochoc.model.message import Message, Value
 from robochoc.model.problem import INFINITE, Team
 from robochoc.protocols.afb import AFB
 from robochoc.protocols.afb_messages import CPA, FBEstimate
-from tests.support.cost_problems import cost_of, least_cost, random_cost_team
+from tests.support.brute_force import least_cost
+from tests.support.cost_problems import cost_of, random_cost_team
 
 
 class Watched(AFB):

@@ -15,7 +15,8 @@ from robochoc.protocols import adopt, bnb_adopt
 from robochoc.protocols.bounding import BoundingProtocol, Terminate
 from robochoc.run.incumbent import lower_bound
 from tests.support.agents import replies
-from tests.support.cost_problems import least_cost, random_cost_team
+from tests.support.brute_force import least_cost
+from tests.support.cost_problems import random_cost_team
 from tests.support.pseudo_trees import context, placed, priced, root, to, unplaced
 
 

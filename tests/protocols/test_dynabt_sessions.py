@@ -18,8 +18,8 @@ from robochoc.run.scenario import ScenarioRun
 from robochoc.solver.compiled_team import CompiledTeam
 from robochoc.solver.explanation import Invalidated, invalidated_by
 from robochoc.verification.checker import violations
+from tests.support.brute_force import solutions
 from tests.support.complex_changes import random_complex_changing_team
-from tests.support.problems import solutions
 from tests.support.random_changes import random_changing_team, stages
 from tests.support.solver_networks import compiled_by_brute_force
 

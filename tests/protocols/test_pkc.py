@@ -22,6 +22,7 @@ from robochoc.solver.agent_problem import agent_problems
 from robochoc.solver.compiled import LocalProblem
 from robochoc.solver.encoding import UnsupportedError
 from tests.support.agents import replies
+from tests.support.brute_force import solutions
 from tests.support.complex_problems import complex_team, random_complex_team
 from tests.support.pkc_bytes import changed_elsewhere, nothing_hidden, restated, run, watched
 from tests.support.pkc_problems import (
@@ -34,7 +35,7 @@ from tests.support.pkc_problems import (
     with_part,
     with_private_parts,
 )
-from tests.support.problems import ON_ONE_MACHINE, random_team, solutions, team_of
+from tests.support.problems import ON_ONE_MACHINE, random_team, team_of
 
 
 def agent(team: Team, name: str) -> ABT:

@@ -1,13 +1,32 @@
-"""A page in a browser, watched: what it complains of, and what it asks for."""
+"""A browser, and a page in it that is watched: what it complains of, and what it asks for."""
 
 from __future__ import annotations
 
+import shutil
 from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any, NamedTuple
 
+import pytest
+
+from tests.support.limits import HANG_S
+
 if TYPE_CHECKING:
     from playwright.sync_api import Page
+
+_CHROMIUM = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
+
+
+@contextmanager
+def chromium() -> Iterator[Any]:
+    """A browser; without one, or without Playwright, the test is skipped."""
+    playwright = pytest.importorskip("playwright.sync_api")
+    if _CHROMIUM is None:
+        pytest.skip("no Chromium on the path")
+    with playwright.sync_playwright() as play:
+        browser = play.chromium.launch(executable_path=_CHROMIUM, args=["--no-sandbox"], timeout=HANG_S * 1000)
+        yield browser
+        browser.close()
 
 
 class WatchedPage(NamedTuple):
@@ -19,15 +38,28 @@ class WatchedPage(NamedTuple):
 
 
 @contextmanager
-def watched_page(browser: Any, **options: Any) -> Iterator[WatchedPage]:  # noqa: ANN401 - Playwright's
-    """A page that shows nothing yet; it is closed in the end."""
-    context = browser.new_context(**options)
+def watched_page(browser: Any, viewport: dict[str, int] | None = None, **media: str) -> Iterator[WatchedPage]:  # noqa: ANN401 - Playwright's
+    """A page that shows nothing yet; it is closed in the end.
+
+    All pages share one context, and so one process of the browser, which starts once.
+
+    Args:
+        browser: Chromium.
+        viewport: The width and height of the window.
+        media: What the reader prefers: `color_scheme`, `reduced_motion`.
+    """
+    context = browser.contexts[0] if browser.contexts else browser.new_context()
     page = context.new_page()
-    page.set_default_timeout(15_000)
+    page.set_default_timeout(HANG_S * 1000)
+    if viewport:
+        page.set_viewport_size(viewport)
+    page.emulate_media(**media)
     seen = WatchedPage(page, [], [])
     page.on("console", lambda message: seen.complaints.append(message.text))
     page.on("pageerror", lambda error: seen.complaints.append(str(error)))
     page.on("request", lambda request: seen.asked.append(request.url))
     page.on("websocket", lambda socket: seen.asked.append(socket.url.replace("ws", "http", 1)))
-    yield seen
-    context.close()
+    try:
+        yield seen
+    finally:
+        page.close()

@@ -3,14 +3,11 @@
 from __future__ import annotations
 
 import io
-import shutil
-import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import Any
 
 import numpy as np
-import pytest
 from PIL import Image
 
 from robochoc.generators.queens3d import queens3d
@@ -21,9 +18,9 @@ from robochoc.run.options import Options, Runtime
 from robochoc.sniffer.page_data import PageData
 from robochoc.sniffer.trace import Trace
 from tests.support.browser_pages import watched_page
+from tests.support.limits import wait_until
 from tests.support.sniffer_server import journal_of
 
-CHROMIUM = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
 REFUSED = "ERR_CONNECTION_REFUSED"
 """A browser complains by itself when a server has ended."""
 
@@ -41,35 +38,22 @@ Page = Any
 
 
 @contextmanager
-def chromium() -> Iterator[Any]:
-    """A browser; without one, or without Playwright, the test is skipped."""
-    playwright = pytest.importorskip("playwright.sync_api")
-    if CHROMIUM is None:
-        pytest.skip("no Chromium on the path")
-    with playwright.sync_playwright() as play:
-        browser = play.chromium.launch(executable_path=CHROMIUM, args=["--no-sandbox"])
-        yield browser
-        browser.close()
-
-
-@contextmanager
 def shown(browser: Any, url: str, whole: str = ALL, **options: Any) -> Iterator[Page]:  # noqa: ANN401 - Playwright's
     """The page at `url` once it says `whole`. No script may complain, and nothing else may be asked for anything."""
     with watched_page(browser, **{"viewport": {"width": 1400, "height": 900}, **options}) as (page, complaints, asked):
         page.goto(url)
         text_is(page, "#counts", whole)
-        yield page
+        try:
+            yield page
+        finally:
+            page.evaluate("localStorage.clear()")  # a theme that was chosen is another page's too
     assert not [one for one in complaints if REFUSED not in one or whole == ALL]
     origin = "/".join(url.split("#", maxsplit=1)[0].split("/")[:3])
     assert not [one for one in asked if not one.startswith((f"{origin}/", "data:", "blob:"))]
 
 
 def until(true: Callable[[], object], why: str) -> None:
-    for _ in range(400):
-        if true():
-            return
-        time.sleep(0.02)
-    pytest.fail(why)
+    wait_until(lambda: bool(true()), why)
 
 
 def text_is(page: Page, selector: str, expected: str) -> None:

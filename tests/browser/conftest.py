@@ -1,0 +1,45 @@
+"""One Chromium for all tests that look at pages, and one tab for those that look at the same page of the sniffer."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any
+
+import pytest
+
+from robochoc.sniffer.session import SnifferSession
+from tests.support.browser_pages import chromium
+from tests.support.sniffer_pages import WHOLE, Page, shown
+from tests.support.sniffer_server import SnifferServer, sniffer_server
+
+
+@pytest.fixture(scope="package")
+def browser() -> Iterator[Any]:
+    """Chromium, by Playwright, for the package: tests elsewhere run event loops in the main thread, as it does."""
+    with chromium() as browser:
+        yield browser
+
+
+@pytest.fixture(scope="package")
+def without_the_scenes_viewer() -> Iterator[None]:
+    """A megabyte that each page of the sniffer would take its time to read, and nobody there looks at."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("robochoc.sniffer.page.viewer_script", lambda: "")
+        yield
+
+
+@pytest.fixture(scope="package")
+def server(without_the_scenes_viewer: None, tmp_path_factory: pytest.TempPathFactory) -> Iterator[SnifferServer]:
+    """A page of the journal `sniffer_pages.WHOLE`."""
+    del without_the_scenes_viewer  # it only has to be there before the page is made
+    file = tmp_path_factory.mktemp("sniffed") / "run.journal"
+    file.write_bytes(WHOLE)
+    with sniffer_server(SnifferSession(file)) as running:
+        yield running
+
+
+@pytest.fixture(scope="package")
+def tab(browser: Any, server: SnifferServer) -> Iterator[Page]:  # noqa: ANN401 - Playwright's
+    """A tab that shows it, in whatever state a test has left it: see `sniffer_pages.begin_again`."""
+    with shown(browser, server.url) as page:
+        yield page
