@@ -9,7 +9,7 @@ READY := $(VENV)/.ready
 PIP := pip install --disable-pip-version-check
 LOCKED := --require-hashes --only-binary :all: -r requirements/build.txt -r
 
-.PHONY: demo demo-11 docs test test-slow test-all coverage fuzz mutate lint type format bench journals lock sbom audit nox test-newest clean
+.PHONY: demo demo-11 docs test test-slow test-all test-part coverage fuzz mutate lint type format bench journals lock sbom audit nox test-newest clean
 
 $(RUN): pyproject.toml requirements/build.txt requirements/run.txt
 	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' || { echo "robochoc needs Python 3.11 or newer; say: make PYTHON=python3.12 ..."; exit 1; }
@@ -51,6 +51,11 @@ test-slow: $(READY)  ## the rest: random batches in length, faults in all varian
 	$(PYTEST) -m 'slow or hypothesis' --hypothesis-profile=new --hypothesis-seed=$(SEED)
 
 test-all: test test-slow
+
+# One of PART slow tests, the same ones with the same problems each time: what CI has time for.
+PART ?= 16
+test-part: $(READY)  ## a fixed part of the slow tests, for CI
+	$(PYTEST) -m slow -p tests.support.parts --part $(PART)
 
 # TESTS="tests/protocols" measures what some of the tests reach. Left out: signals that meet Python's own start, which is
 # when coverage.py starts as well, and it swallows them. What is killed while it writes its data spoils them: a warning.
