@@ -65,6 +65,22 @@ def test_verdicts_that_are_not_declared_are_faults(concludes: tuple[Verdict, ...
     assert bool(told) is bool(fault)
 
 
+def test_a_protocol_that_declares_nothing_may_write_to_all_and_gets_nothing_special() -> None:
+    assert Traits() == Traits(
+        complete=True,
+        synchronous=False,
+        costs=False,
+        n_ary=True,
+        partially_known=False,
+        shared_scopes=False,
+        writes_to_non_neighbours=True,
+        tree=False,
+        dynamic=False,
+        concludes=tuple(verdict for verdict in Verdict if verdict is not Verdict.OPTIMAL),
+        tables=False,
+    )
+
+
 def test_a_message_carries_the_checks_that_were_done_when_it_was_sent() -> None:
     robot = agent("RB")
     robot.send("RA", AddLink())
