@@ -19,6 +19,7 @@ from robochoc.protocols.maxsum import MaxSum, MaxSumSettings, Q, R
 from robochoc.protocols.maxsum_factor import Factor
 from robochoc.protocols.settings import SettingsError, settings_of
 from robochoc.solver import cost_table
+from robochoc.solver.cost_table import CostTable
 from robochoc.solver.encoding import UnsupportedError
 from tests.support.agents import replies, value
 from tests.support.brute_force import least_cost
@@ -52,6 +53,14 @@ def middle(team: Team, **settings: float) -> MaxSum:
     robot.settings = MaxSumSettings(preference=0, **{"damping": 0.0, **settings})  # type: ignore[arg-type]
     assert started(robot) == [("RC", TWO)]
     return robot
+
+
+def test_functions_over_the_same_robots_are_one_and_what_no_other_robot_is_in_is_none() -> None:
+    alone, pair = np.array([9.0, 9.0]), np.array([[3.0, 1.0], [4.0, 6.0]])
+    tables = [CostTable("P", (), alone), CostTable("F", ("RA",), pair), CostTable("S", ("RA",), pair)]
+    (function,) = Factor.joined(tables)
+    assert function.agents == ("RA",)
+    assert function.r([[0, 0], [0, 0]]) == [[2, 8], [6, 2]]
 
 
 def test_domains_go_to_those_who_hold_the_functions() -> None:

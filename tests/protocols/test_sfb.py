@@ -46,9 +46,11 @@ def test_the_first_robot_tells_its_values_and_each_adds_its_own() -> None:
 
 
 def test_the_last_robot_turns_round_with_what_its_values_are_charged() -> None:
-    robots = agents(team({**CHAIN, "C": (5, 0)}))
+    robots = agents(team(CHAIN))
+    robots["RC"].problem.charges = (5.0, 0.0)
     said = replies(robots["RC"], ("RB", Above.of([BOTH] * 2)))
     assert said == [("RB", Below.of([(BOTH, (5, 0))], 5))]
+    assert encode(said[0][1]) == encode(Below.of([(BOTH, (5, 0))], 5)), "integers, which take fewer bytes"
 
 
 def test_on_the_way_up_each_robot_adds_the_most_that_it_can_come_to() -> None:
@@ -257,6 +259,12 @@ def test_the_last_robot_makes_the_cheapest_of_its_cpas_a_solution() -> None:
 def test_one_that_is_no_cheaper_is_none() -> None:
     robots, _ = introduced(team(CHAIN))
     assert replies(robots["RC"], ("RB", cpas([1, 1, 1, 0, 0, 4], least=1, ceiling=10))) == [("RB", Explored())]
+    assert value(robots["RC"]) is None
+
+
+def test_one_that_costs_more_than_the_robot_before_said_is_none() -> None:
+    robots, _ = introduced(team(CHAIN))
+    assert replies(robots["RC"], ("RB", cpas([1, 3, 1, 0, 2, 4], least=5, ceiling=10))) == [("RB", Explored())]
     assert value(robots["RC"]) is None
 
 

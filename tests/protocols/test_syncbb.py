@@ -128,6 +128,15 @@ def test_the_best_path_is_told_to_all_when_the_first_robot_has_no_value_left() -
     assert robot.verdict is None
 
 
+def test_nothing_is_said_after_the_verdict() -> None:
+    hard = team_of({"A": (1,), "B": (1,)}, [priced("AB", {(1, 1): INFINITE})])
+    robot = agent(hard, "RA")
+    assert replies(robot, ("RB", Backtrack(NONE))) == []
+    assert robot.verdict is Verdict.NO_SOLUTION
+    assert replies(robot, ("RB", Terminate(best(1, 1, 1)))) == []
+    assert value(robot) is None
+
+
 def test_who_is_told_the_end_takes_its_value_in_the_best_path_and_is_silent() -> None:
     robot = agent(triangle(), "RB")
     assert replies(robot, ("RA", Terminate(best(1, 1, 2, 1)))) == []

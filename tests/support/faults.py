@@ -225,6 +225,11 @@ def _read(pid: int, file: str) -> bytes:
         return b""
 
 
+def is_stopped(pid: int) -> bool:
+    """Whether the process has been stopped, or has ended."""
+    return not _alive(pid) or _stat(pid)[:1] in ([], ["T"])
+
+
 def ignores_ctrl_c(pid: int) -> bool:
     """Whether the process ignores SIGINT."""
     return bool(_signals(pid, "SigIgn") & 1 << (signal.SIGINT - 1))
