@@ -51,7 +51,7 @@ def watch(team: Team, seen: Counter[str]) -> type[AFB]:
     return type("Watched", (Watched,), {"least_with": staticmethod(least.__getitem__), "seen": seen})
 
 
-@pytest.mark.parametrize("batch", range(3))
+@pytest.mark.parametrize("batch", [0, *(pytest.param(batch, marks=pytest.mark.slow) for batch in range(1, 4))])
 def test_no_bound_is_too_high_and_no_cpa_goes_back_from_a_better_solution(batch: int) -> None:
     chance = Random(f"bounds {batch}")
     seen = Counter[str]()

@@ -27,6 +27,7 @@ from robochoc.solver.exact_costs import EXACT
 from tests.support.agents import replies, value
 from tests.support.brute_force import least_cost
 from tests.support.cost_problems import random_cost_team
+from tests.support.examples import count
 from tests.support.problems import team_of
 from tests.support.sfb_robots import CHAIN, agents, cpas, introduced, row, rows, team
 
@@ -298,9 +299,10 @@ def test_when_the_first_robot_has_explored_all_without_a_solution_there_is_none(
     assert robots["RA"].verdict is Verdict.NO_SOLUTION
 
 
-def test_all_robots_hold_an_optimal_solution_in_the_end() -> None:
+@count("teams", 25, 100)
+def test_all_robots_hold_an_optimal_solution_in_the_end(teams: int) -> None:
     chance = Random("sfb held")
-    for seed in range(60):
+    for seed in range(teams):
         problem = random_cost_team(chance)
         result = Simulation(problem, SFB, RandomChannels(seed)).run(60)
         bests = [found.best for found in result.findings.values()]
@@ -376,9 +378,10 @@ def test_whoever_has_heard_of_a_solution_tells_it() -> None:
     assert best.values == {"RA": (1,), "RB": (2,), "RC": (1,)}
 
 
-def test_the_bound_is_never_more_than_the_least_cost_and_is_it_in_the_end() -> None:
+@count("teams", 10, 50)
+def test_the_bound_is_never_more_than_the_least_cost_and_is_it_in_the_end(teams: int) -> None:
     chance = Random("sfb bounds")
-    for seed in range(20):
+    for seed in range(teams):
         problem = random_cost_team(chance)
         end = Simulation(problem, SFB, RandomChannels(seed)).run(60)
         best = end.findings["RX00"].best

@@ -38,7 +38,7 @@ def some_assignments(team: Team) -> Iterator[dict[str, int]]:
 
 
 @given(team=teams)
-@examples(100)
+@examples(50, slow=1000)
 def test_it_agrees_with_the_model_of_the_problem(team: Team) -> None:
     for assignment in some_assignments(team):
         truth = all(constraint.allows(assignment) for constraint in team.constraints())
