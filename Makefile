@@ -4,20 +4,24 @@ VENV := .venv
 BIN := $(VENV)/bin
 RUN := $(VENV)/.run
 READY := $(VENV)/.ready
-PIP := $(BIN)/pip install --disable-pip-version-check
+# What is installed is what requirements/ has, by version and hash: wheels only, so that nothing is built but robochoc
+# itself, by the locked build backend. `make lock` writes it: docs/guides/testing.md.
+PIP := pip install --disable-pip-version-check
+LOCKED := --require-hashes --only-binary :all: -r requirements/build.txt -r
 
-.PHONY: demo demo-11 docs test test-slow test-all coverage fuzz lint type format bench journals clean
+.PHONY: demo demo-11 docs test test-slow test-all test-part coverage fuzz mutate lint type format bench journals lock sbom audit nox test-newest clean
 
-$(RUN): pyproject.toml
+$(RUN): pyproject.toml requirements/build.txt requirements/run.txt
 	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' || { echo "robochoc needs Python 3.11 or newer; say: make PYTHON=python3.12 ..."; exit 1; }
 	@echo "Installing robochoc into $(VENV): about 340 MB, a third of it Java for the solver ACE."
 	$(PYTHON) -m venv $(VENV)
-	$(PIP) --editable .
+	$(BIN)/$(PIP) $(LOCKED) requirements/run.txt
+	$(BIN)/$(PIP) --quiet --no-index --no-deps --no-build-isolation --editable .
 	@touch $@
 
-$(READY): $(RUN)
+$(READY): $(RUN) requirements/dev.txt
 	@echo "Adding the development tools to $(VENV): about 430 MB more. This takes a minute."
-	$(PIP) --quiet --editable '.[dev]'
+	$(BIN)/$(PIP) --quiet $(LOCKED) requirements/dev.txt
 	@touch $@
 
 demo: $(RUN)  ## 16 robots, no solution, the others fly: out/queens3d-4.html
@@ -48,6 +52,11 @@ test-slow: $(READY)  ## the rest: random batches in length, faults in all varian
 
 test-all: test test-slow
 
+# One of PART slow tests, the same ones with the same problems each time: what CI has time for.
+PART ?= 16
+test-part: $(READY)  ## a fixed part of the slow tests, for CI
+	$(PYTEST) -m slow -p tests.support.parts --part $(PART)
+
 # TESTS="tests/protocols" measures what some of the tests reach. Left out: signals that meet Python's own start, which is
 # when coverage.py starts as well, and it swallows them. What is killed while it writes its data spoils them: a warning.
 TESTS ?= tests
@@ -62,8 +71,8 @@ coverage: $(READY)  ## lines and branches that make test reaches, by room: out/c
 	table=$$?; cat out/coverage/rooms.txt; exit $$((tests | table))
 
 DOCS := $(VENV)/.docs
-$(DOCS): $(READY)
-	$(PIP) --quiet --editable '.[docs]'
+$(DOCS): $(READY) requirements/docs.txt
+	$(BIN)/$(PIP) --quiet $(LOCKED) requirements/docs.txt
 	@touch $@
 
 # --strict: a broken link, anchor or reference ends the build.
@@ -76,6 +85,11 @@ docs: $(DOCS)  ## the documentation site: out/site/index.html, readable without 
 SECONDS ?= 600
 fuzz: $(READY)  ## spoilt inputs for all that reads them: make fuzz SECONDS=600 SEED=1 ENGINE=loop
 	$(BIN)/python -m tests.fuzz --seconds $(SECONDS) --seed $(SEED) $(if $(ENGINE),--engine $(ENGINE))
+
+# What survives is shown; the same mutant again: .venv/bin/python -m tests.mutation --again PATH:NUMBER
+COUNT ?= 100
+mutate: $(READY)  ## the protocols, spoilt in one place each: do the tests notice? make mutate SEED=1 COUNT=100 FILES=...
+	$(BIN)/python -m tests.mutation --count $(COUNT) --seed $(SEED) $(FILES)
 
 lint: $(READY)
 	$(BIN)/ruff check .
@@ -96,6 +110,43 @@ bench: $(READY)  ## figures into benchmarks/RESULTS.md
 
 journals: $(READY)  ## rewrite the golden journals: a changed one is a changed protocol
 	$(BIN)/python -m tests.support.golden
+
+# Tools in an environment of their own: their versions and the project's cannot be in each other's way.
+TOOLS := $(VENV)/tools
+$(TOOLS)/.ready: requirements/build.txt requirements/tools.txt
+	$(PYTHON) -m venv $(TOOLS)
+	$(TOOLS)/bin/$(PIP) --quiet $(LOCKED) requirements/tools.txt
+	@touch $@
+
+# Versions stay where they still fit pyproject.toml; NEWEST=1 takes the newest. The index is not written down: it is the
+# one that uv is set to here. docs.txt has most, and the others keep to its versions.
+LOCK = $(TOOLS)/bin/uv pip compile pyproject.toml --quiet --universal --python-version 3.11 --generate-hashes \
+	--no-emit-index-url --no-emit-find-links --no-header --annotation-style line $(if $(NEWEST),--upgrade)
+lock: $(TOOLS)/.ready  ## requirements/*.txt from pyproject.toml: make lock NEWEST=1
+	$(LOCK) --extra dev --extra docs -o requirements/docs.txt
+	$(LOCK) --extra dev -c requirements/docs.txt -o requirements/dev.txt
+	$(LOCK) --extra network --extra ros -c requirements/dev.txt -o requirements/extras.txt
+	$(LOCK) -c requirements/dev.txt -o requirements/run.txt
+	$(subst pyproject.toml,,$(LOCK)) --group build -c requirements/dev.txt -o requirements/build.txt
+	$(subst pyproject.toml,,$(LOCK)) --group tools -c requirements/build.txt -o requirements/tools.txt
+
+# An environment that has nothing else says licences and what needs what, which a lock does not.
+sbom: $(TOOLS)/.ready  ## what robochoc consists of, with its extras network and ros, in CycloneDX: out/sbom.cdx.json
+	@mkdir -p out && rm -rf $(VENV)/sbom
+	@$(PYTHON) -m venv --without-pip $(VENV)/sbom
+	@$(TOOLS)/bin/uv pip install --quiet --python $(VENV)/sbom/bin/python --require-hashes --no-build -r requirements/extras.txt
+	@$(TOOLS)/bin/cyclonedx-py environment --pyproject pyproject.toml --output-reproducible -o out/sbom.cdx.json $(VENV)/sbom
+	@rm -rf $(VENV)/sbom
+	@echo out/sbom.cdx.json
+
+audit: $(TOOLS)/.ready  ## known vulnerabilities of what is locked, as PyPI's service knows them
+	@$(PYTHON) tests/support/audit.py $(TOOLS)/bin/pip-audit requirements/*.txt
+
+nox: $(TOOLS)/.ready  ## tests and types with each Python that is there, 3.11 to 3.14
+	$(TOOLS)/bin/nox
+
+test-newest: $(TOOLS)/.ready  ## a part of the tests, with the newest of what pyproject.toml allows
+	$(TOOLS)/bin/nox -s newest
 
 clean:
 	rm -rf $(VENV) out dist build .pytest_cache .mypy_cache .ruff_cache .hypothesis .import_linter_cache

@@ -291,7 +291,6 @@ class AFB(Protocol):
 
     def _stop(self) -> None:
         self.over = True
-        self.lower_bounds = None
         self._take_best()
 
     def _take_best(self) -> None:

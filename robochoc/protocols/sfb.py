@@ -172,9 +172,10 @@ class SFB(Protocol):
         """Dispatch on the message's type. Raises `ValueError` for a message that is not possible at this point."""
         if self.verdict is not None:
             return
-        if not self._expects(sender, message):
+        heard = cast("Above | Below | CPAs | Explored | Solution", message)
+        if not self._expects(sender, heard):
             raise ValueError(f"{sender} says {type(message).__name__}, which it cannot say now")
-        match cast("Above | Below | CPAs | Explored | Solution", message):
+        match heard:
             case Above(domains, runs):
                 self._tell_below(expanded(domains, runs))
             case Below() as below:
@@ -189,7 +190,7 @@ class SFB(Protocol):
             case never:
                 assert_never(never)
 
-    def _expects(self, sender: str, message: Message) -> bool:
+    def _expects(self, sender: str, message: Above | Below | CPAs | Explored | Solution) -> bool:
         """Return whether `sender`, the robot before or the next one, may send `message` at this point."""
         match message:
             case Above(domains, runs):
@@ -209,8 +210,8 @@ class SFB(Protocol):
                     0 <= p < size for p, size in zip(places, sizes, strict=True)
                 )
                 return sender == self.next and fitting
-            case _:
-                return False
+            case never:
+                assert_never(never)
 
     @property
     def _priced(self) -> bool:

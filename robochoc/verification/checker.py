@@ -7,6 +7,7 @@ and term by term.
 from __future__ import annotations
 
 from collections.abc import Collection, Iterator, Sequence
+from typing import assert_never
 
 from robochoc.model.expression import UndefinedValueError, evaluate
 from robochoc.model.problem import INFINITE, Assignment, Constraint, Relation, Robot, Semantics, Team, Variable
@@ -109,3 +110,5 @@ def _price_in_extension(relation: Relation, values: tuple[int, ...]) -> float:
             return INFINITE if listed else 0
         case Semantics.SOFT:
             return relation.costs[listed[0]] if listed else relation.default_cost
+        case never:
+            assert_never(never)

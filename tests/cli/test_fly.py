@@ -18,7 +18,7 @@ from robochoc.formats import write_team
 from robochoc.formats.result import result_json
 from robochoc.generators.queens3d import queens3d
 from robochoc.model.outcome import EpochOutcome, Outcome, Verdict
-from tests.support.program import ROOT, on_a_terminal, robochoc
+from tests.support.program import ROOT, robochoc_within
 
 HANGAR = ROOT / "docs" / "examples" / "hangar"
 RESCUE = ROOT / "docs" / "examples" / "rescue"
@@ -75,10 +75,12 @@ def two(tmp_path: Path) -> Path:
 # How it went
 
 
-def test_progress_is_shown_on_a_terminal_only(tmp_path: Path) -> None:
-    solution = solved(tmp_path, ROOT / "instances" / "queens3d-7")
-    assert robochoc("fly", solution).stderr == ""
-    assert re.search(rb"queens3d-7: leg 1, [0-9.]+ s of [0-9.]+ s flown, [0-9.]+ s", on_a_terminal("fly", solution))
+def test_progress_is_shown_on_a_terminal_only(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("robochoc.cli.reports.progress.REFRESH_S", 0)  # every stage, however soon the next one comes
+    solution = saved(tmp_path, {"Robot1": 1, "Robot2": 2})
+    assert "flown" not in robochoc_within("fly", solution).stderr
+    shown = robochoc_within("fly", solution, terminal=True).stderr
+    assert re.search(r"two: leg 1, [0-9.]+ s of [0-9.]+ s flown, [0-9.]+ s", shown)
 
 
 def test_a_table_for_people(two: Path) -> None:

@@ -14,7 +14,7 @@ from robochoc import load
 from robochoc.cli.group import COMMANDS, cli
 from robochoc.cli.options.sections import COMMON, REST, SectionedCommand
 from robochoc.run.registry import installed_spelling
-from tests.support.program import robochoc
+from tests.support.program import robochoc_within
 
 MANY = 12
 """A command with more options has sections."""
@@ -64,7 +64,7 @@ def test_commands_with_many_options_have_sections() -> None:
 
 
 def test_help_on_solve_shows_what_most_runs_need_on_the_first_screen() -> None:
-    lines = robochoc("solve", "--help").stdout.splitlines()
+    lines = robochoc_within("solve", "--help").stdout.splitlines()
     assert len(lines) < 100
     screen = "\n".join(lines[:40])
     for option in ("--protocol", "--runtime", "--timeout", "--withdraw", "--json", "--html", "--journal", "--sniff"):
@@ -72,14 +72,14 @@ def test_help_on_solve_shows_what_most_runs_need_on_the_first_screen() -> None:
 
 
 def test_help_on_robochoc_names_every_command() -> None:
-    words = robochoc("--help").stdout
+    words = robochoc_within("--help").stdout
     assert all(f"\n  {name} " in words for name in COMMANDS)
 
 
 @pytest.mark.parametrize(("typed", "name"), [("ABT", "abt"), ("AFC-ng", "afc-ng"), ("Central", "central"), ("?", "?")])
 def test_a_protocol_is_known_in_any_case(typed: str, name: str, four: Path) -> None:
     assert installed_spelling(typed) == name
-    done = robochoc("solve", str(four), "--runtime", "simulator", "--protocol", typed)
+    done = robochoc_within("solve", str(four), "--runtime", "simulator", "--protocol", typed)
     assert done.returncode == (2 if name == "?" else 0)
     assert name in (done.stderr if name == "?" else done.stdout)
 
@@ -91,7 +91,7 @@ def test_a_protocol_is_known_in_any_case_from_python(four: Path) -> None:
 @pytest.mark.parametrize("word", ["minimum", "fewest", "", "Fewest"])
 def test_the_minimum_withdrawal_has_its_former_name_too(word: str, four: Path) -> None:
     option = f"--withdraw={word}" if word else "--withdraw"
-    done = robochoc("solve", str(four), "--runtime", "simulator", option)
+    done = robochoc_within("solve", str(four), "--runtime", "simulator", option)
     assert done.returncode == (2 if word == "Fewest" else 0)
     if word == "Fewest":
         assert "minimum" in done.stderr

@@ -13,7 +13,7 @@ from robochoc.formats.order_file import read_order
 from robochoc.journal.journal import read_journal
 from robochoc.model.orders import Order
 from tests.support.journal_entries import entries_of
-from tests.support.program import robochoc
+from tests.support.program import robochoc_within
 from tests.support.small_teams import graph_team, pkc_team
 
 
@@ -25,10 +25,10 @@ def test_the_command_line_knows_every_order() -> None:
 def test_solve_in_an_order_by_name(four: Path, runtime: str) -> None:
     journal = four.parent / "run.jsonl"
     words = ["solve", four, "--json", "--runtime", runtime, "--seed", 5, "--journal", journal]
-    done = robochoc(*words, "--order", "random")
+    done = robochoc_within(*words, "--order", "random")
     assert (done.returncode, json.loads(done.stdout)["verdict"]) == (0, "no-solution")
     assert read_journal(journal.read_bytes()).header.order == "random"
-    assert robochoc(*words).returncode == 0
+    assert robochoc_within(*words).returncode == 0
     assert "order" not in entries_of(journal)[0]
 
 
@@ -37,7 +37,7 @@ def test_solve_in_the_order_of_a_file(four: Path) -> None:
     listed, journal = four.parent / "order.txt", four.parent / "run.jsonl"
     listed.write_text("# from the end\n\n" + "\n".join(f"  {name}  # {name}" for name in names), encoding="utf-8-sig")
     words = ["solve", four, "--order", listed, "--runtime", "simulator", "--json", "--journal", journal]
-    done = robochoc(*words)
+    done = robochoc_within(*words)
     assert done.returncode == 0, done.stderr
     assert json.loads(done.stdout)["verdict"] == "no-solution"
     lines = entries_of(journal)
@@ -71,7 +71,7 @@ def test_every_mistake_of_an_order_file_is_told_with_its_line(
 def test_a_wrong_order_file_is_invalid_input(four: Path) -> None:
     listed = four.parent / "order.txt"
     listed.write_text("Robot1.1\nRobot9.9\n")
-    done = robochoc("solve", four, "--order", listed)
+    done = robochoc_within("solve", four, "--order", listed)
     assert done.returncode == 1
     assert done.stdout == ""
     first, second = done.stderr.splitlines()
@@ -99,7 +99,7 @@ def test_what_is_no_text_is_no_order(tmp_path: Path, content: bytes | None, said
     ],
 )
 def test_wrong_orders_are_wrong_usage(four: Path, words: list[str], said: str) -> None:
-    done = robochoc("solve", four, *words)
+    done = robochoc_within("solve", four, *words)
     assert done.returncode == 2
     assert said in done.stderr
 
@@ -108,7 +108,7 @@ def test_links_that_cannot_be_turned_are_said_in_one_sentence(tmp_path: Path) ->
     write_team(pkc_team(), tmp_path / "private")
     listed = tmp_path / "order.txt"
     listed.write_text("RX\nRB\nRA\n")
-    done = robochoc("solve", tmp_path / "private", "--order", listed)
+    done = robochoc_within("solve", tmp_path / "private", "--order", listed)
     assert (done.returncode, len(done.stderr.splitlines())) == (2, 1)
     assert "choose an order with RA before it" in done.stderr
 
@@ -116,5 +116,6 @@ def test_links_that_cannot_be_turned_are_said_in_one_sentence(tmp_path: Path) ->
 def test_dom_deg_may_be_written_as_elsewhere(four: Path) -> None:
     words = ["solve", four, "--json", "--runtime", "simulator"]
     assert [
-        json.loads(robochoc(*words, "--order", name).stdout)["metrics"]["messages"] for name in ("dom/deg", "dom-deg")
-    ] == [json.loads(robochoc(*words, "--order", "dom-deg").stdout)["metrics"]["messages"]] * 2
+        json.loads(robochoc_within(*words, "--order", name).stdout)["metrics"]["messages"]
+        for name in ("dom/deg", "dom-deg")
+    ] == [json.loads(robochoc_within(*words, "--order", "dom-deg").stdout)["metrics"]["messages"]] * 2

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import csv
 import io
+import json
 import os
 import re
 import shlex
@@ -20,23 +21,29 @@ from pathlib import Path
 
 import pytest
 
+from robochoc.journal.journal import read_journal
 from robochoc.protocols.protocol import Protocol
 from robochoc.protocols.traits import Traits
 from robochoc.run.registry import UnknownProtocolError, protocol_named, protocol_names
+from robochoc.sniffer.page_data import PageData
+from robochoc.sniffer.trace import Trace
 from robochoc.solver.agent_problem import agent_problems
 from robochoc.solver.compiled import LocalProblem
 from tests.support import golden
+from tests.support.limits import HANG_S
 from tests.support.problems import team_of
-from tests.support.program import ROOT
+from tests.support.program import ROOT, robochoc_within
 
 EXAMPLE = ROOT / "docs" / "examples" / "breakout"
 GUIDE = (ROOT / "docs" / "tutorials" / "write-a-protocol.md").read_text()
 BLOCKS = re.findall(r"^```(\w+)\n(.*?)^```$", GUIDE, re.MULTILINE | re.DOTALL)
 COMMANDS = [place for place, (kind, _) in enumerate(BLOCKS) if kind == "sh"]
+IN_A_PROCESS = next(place for place in COMMANDS if BLOCKS[place][1].startswith("robochoc "))
+"""The first call of the program; the others are made within this process."""
 INSTALL = "pip install docs/examples/breakout"
 SUFFIXES = {"python": ".py", "toml": ".toml"}
-PATIENCE_S = 250
-"""The conformance suite takes half a minute, and more on a machine that is busy."""
+LONG = "pytest tests/conformance/"
+"""A command that begins so is run by `make test-slow`: the suite itself has its place in `make test`."""
 SCOUTS = str(ROOT / "docs" / "examples" / "scouts")
 
 
@@ -56,7 +63,7 @@ def environment(*packages: Path, **more: str) -> dict[str, str]:
 
 def run(command: str, environ: Mapping[str, str]) -> subprocess.CompletedProcess[str]:
     return subprocess.run(
-        ["sh", "-c", command], cwd=ROOT, env=environ, capture_output=True, text=True, timeout=PATIENCE_S, check=False
+        ["sh", "-c", command], cwd=ROOT, env=environ, capture_output=True, text=True, timeout=HANG_S, check=False
     )
 
 
@@ -77,18 +84,40 @@ def installed(tmp_path_factory: pytest.TempPathFactory) -> dict[str, str]:
     return environment(target, HYPOTHESIS_STORAGE_DIRECTORY=str(target / "hypothesis"))
 
 
+@pytest.fixture
+def found(installed: dict[str, str], monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
+    """This process finds the guide's package too."""
+    target = installed["PYTHONPATH"].partition(os.pathsep)[0]
+    monkeypatch.syspath_prepend(target)
+    yield
+    forget_modules(Path(target))
+
+
+def forget_modules(folder: Path) -> None:
+    """What was imported from there is imported anew, or not found, by whoever comes next."""
+    for name, module in [*sys.modules.items()]:
+        if Path(getattr(module, "__file__", None) or "/").is_relative_to(folder):
+            del sys.modules[name]
+
+
 # The guide
 
 
-@pytest.mark.timeout(PATIENCE_S)
-@pytest.mark.parametrize("place", COMMANDS, ids=lambda place: BLOCKS[place][1].splitlines()[0])
+@pytest.mark.usefixtures("found")
+@pytest.mark.parametrize(
+    "place",
+    [pytest.param(place, marks=pytest.mark.slow if BLOCKS[place][1].startswith(LONG) else ()) for place in COMMANDS],
+    ids=lambda place: BLOCKS[place][1].splitlines()[0],
+)
 def test_the_guides_commands_do_what_it_says(place: int, installed: dict[str, str]) -> None:
     """Each line ends with status 0, unless it says otherwise; a text after the commands is what they print."""
     printed = ""
     for line in BLOCKS[place][1].splitlines():
         if line == INSTALL:
             continue
-        done = run(line, installed)
+        program, *words = shlex.split(line, comments=True)
+        within = program == "robochoc" and place != IN_A_PROCESS
+        done = robochoc_within(*words, folder=ROOT) if within else run(line, installed)
         said = re.search(r"# exit status (\d)$", line)
         assert done.returncode == int(said[1] if said else 0), done.stdout + done.stderr
         printed += done.stdout
@@ -143,39 +172,29 @@ def _without_seconds(text: str) -> str:
 # Its messages, where others look at them
 
 
-def exported(form: str, journal: Path, environ: Mapping[str, str]) -> str:
-    done = run(f"robochoc journal export {journal} --format {form}", environ)
+def exported(form: str, journal: Path) -> str:
+    done = robochoc_within("journal", "export", journal, "--format", form)
     assert done.returncode == 0, done.stderr
     return done.stdout
 
 
-def test_its_words_and_acts_are_in_the_sniffer_and_the_exports(installed: dict[str, str], tmp_path: Path) -> None:
+@pytest.mark.usefixtures("found")
+def test_its_words_and_acts_are_in_the_sniffer_and_the_exports(tmp_path: Path) -> None:
     journal = tmp_path / "breakout.journal"
-    solve = f"robochoc solve {SCOUTS} --protocol breakout --runtime simulator --journal {journal}"
-    assert run(solve, installed).returncode == 0
+    assert solved("--protocol", "breakout", "--runtime", "simulator", "--journal", str(journal)).returncode == 0
     ok, improve = "V1 = 1 in this wave", "I have 0 weighted violations, and could do with 0 less"
-    rows = list(csv.DictReader(io.StringIO(exported("csv", journal, installed))))
+    rows = list(csv.DictReader(io.StringIO(exported("csv", journal))))
     assert {row["type"]: row["performative"] for row in rows} == {"Ok": "inform", "Improve": "propose"}
     assert {f"Scout says: {ok}", f"Scout says: {improve}"} <= {row["words"] for row in rows}
-    acl = exported("acl", journal, installed)
+    acl = exported("acl", journal)
     assert acl.count("(PROPOSE ") == sum(row["type"] == "Improve" for row in rows)
     assert acl.count("(INFORM ") == sum(row["type"] == "Ok" for row in rows)
-    feed = run(f"{sys.executable} -c {shlex.quote(FEED)} {journal}", installed)
-    assert feed.stdout.splitlines() == ["Improve propose, of neighbours, the one that improves most is to move", ok]
-
-
-FEED = """
-import json, sys
-from pathlib import Path
-from robochoc.journal.journal import read_journal
-from robochoc.sniffer.page_data import PageData
-from robochoc.sniffer.trace import Trace
-feed = PageData(Trace.of(read_journal(Path(sys.argv[1]).read_bytes())))
-about, details = json.loads(feed.about()), json.loads(feed.details(0))
-(improve,) = [kind for kind in about["kinds"] if kind["name"] == "Improve"]
-print(improve["name"], improve["performative"] + ",", improve["why"])
-print(next(one["words"] for one in details if "V1" in one["words"]).removeprefix("Scout says: "))
-"""
+    feed = PageData(Trace.of(read_journal(journal.read_bytes())))
+    about, details = json.loads(feed.about()), json.loads(feed.details(0))
+    (improved,) = [kind for kind in about["kinds"] if kind["name"] == "Improve"]
+    assert improved["performative"] == "propose"
+    assert improved["why"] == "of neighbours, the one that improves most is to move"
+    assert next(one["words"] for one in details if "V1" in one["words"]) == f"Scout says: {ok}"
 
 
 # What may go wrong
@@ -225,14 +244,12 @@ def package(folder: Path, name: str, offers: Mapping[str, str], code: str = SILE
 def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
     """A folder for packages, in which this process looks too."""
     monkeypatch.syspath_prepend(tmp_path)
-    modules = set(sys.modules)
     yield tmp_path
-    for name in set(sys.modules) - modules:
-        del sys.modules[name]
+    forget_modules(tmp_path)
 
 
-def solved(folder: Path, *words: str) -> subprocess.CompletedProcess[str]:
-    return run(f"robochoc solve {SCOUTS} {' '.join(words)}", environment(folder))
+def solved(*words: str) -> subprocess.CompletedProcess[str]:
+    return robochoc_within("solve", SCOUTS, *words)
 
 
 @pytest.mark.parametrize(
@@ -255,14 +272,14 @@ def test_what_cannot_be_used_is_said(place: str, why: str, here: Path) -> None:
 @pytest.mark.parametrize(
     "code", ["import nothing_of_the_kind", "def (", "raise RuntimeError('no')", "raise SystemExit"]
 )
-def test_a_module_that_cannot_be_imported_is_said_in_one_line(code: str, tmp_path: Path) -> None:
+def test_a_module_that_cannot_be_imported_is_said_in_one_line(code: str, here: Path) -> None:
     """And other protocols are not concerned."""
-    package(tmp_path, "mine", {"own": "mine:Silent"}, code)
-    done = solved(tmp_path, "--protocol own")
+    package(here, "mine", {"own": "mine:Silent"}, code)
+    done = solved("--protocol", "own")
     assert done.returncode == 2
     assert f"{SCOUTS}: mine:Silent, installed as protocol 'own', cannot be imported: " in done.stderr
     assert len(done.stderr.splitlines()) == 1
-    assert solved(tmp_path).returncode == 0
+    assert solved().returncode == 0
 
 
 def test_a_name_that_two_packages_offer_is_refused(here: Path) -> None:
@@ -273,7 +290,7 @@ def test_a_name_that_two_packages_offer_is_refused(here: Path) -> None:
     ):
         protocol_named("own")
     assert list(protocol_names()).count("own") == 1
-    done = solved(here, "--protocol abt")
+    done = solved("--protocol", "abt")
     assert done.returncode == 2
     assert "installed as protocol 'abt', is offered by several packages" in done.stderr
     assert len(done.stderr.splitlines()) == 1
@@ -303,18 +320,19 @@ def test_what_is_installed_beside_ours_is_tested_but_has_no_golden_journals(here
 
 
 @pytest.mark.parametrize("runtime", ["processes", "simulator"])
-def test_a_wrong_solution_is_refuted(runtime: str, tmp_path: Path) -> None:
-    package(tmp_path, "mine", {"own": "mine:Silent"})
-    done = solved(tmp_path, "--protocol own --runtime", runtime)
+def test_a_wrong_solution_is_refuted(runtime: str, here: Path) -> None:
+    package(here, "mine", {"own": "mine:Silent"})
+    done = solved("--protocol", "own", "--runtime", runtime)
     assert done.returncode == 4
     assert "the checker refutes the answer for scouts" in done.stderr
 
 
 def test_an_exception_is_told_with_its_place(tmp_path: Path) -> None:
     package(tmp_path, "mine", {"own": "mine:Raises"})
-    done = solved(tmp_path, "--protocol own")
+    solve = f"robochoc solve {SCOUTS} --protocol own"
+    done = run(solve, environment(tmp_path))
     assert done.returncode == 4
     assert re.search(r"was lost: ValueError: out of ideas \(.*mine\.py:\d+\)", done.stderr)
-    done = solved(tmp_path, "--protocol own --runtime simulator")
+    done = run(f"{solve} --runtime simulator", environment(tmp_path))
     assert "Traceback" in done.stderr
     assert "ValueError: out of ideas" in done.stderr

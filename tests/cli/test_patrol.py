@@ -9,7 +9,7 @@ from robochoc.model.outcome import Verdict
 from robochoc.model.problem import ProblemKind
 from robochoc.run import Options, Runtime, solve
 from robochoc.run.registry import protocol_named, protocol_names
-from tests.support.cost_problems import least_cost
+from tests.support.brute_force import least_cost
 from tests.support.program import ROOT
 
 PATROL = ROOT / "docs" / "examples" / "patrol"

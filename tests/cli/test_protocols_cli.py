@@ -22,7 +22,7 @@ from robochoc.run.registry import (
     protocol_named,
     protocol_names,
 )
-from tests.support.program import robochoc
+from tests.support.program import robochoc_within
 
 WITHOUT_DOCSTRING = """
     from robochoc.protocols.first_fit import FirstFit, Placed
@@ -89,7 +89,7 @@ def row(table: str, name: str) -> str:
 
 
 def test_the_list_has_a_line_for_each_protocol_and_the_central_solver() -> None:
-    done = robochoc("protocols")
+    done = robochoc_within("protocols")
     assert done.returncode == 0
     assert done.stderr == ""
     heading, *lines = done.stdout.splitlines()
@@ -101,13 +101,13 @@ def test_the_list_has_a_line_for_each_protocol_and_the_central_solver() -> None:
 
 
 def test_the_list_is_narrow_and_every_protocol_of_ours_says_when_to_use_it() -> None:
-    assert max(map(len, robochoc("protocols").stdout.splitlines())) <= 100
+    assert max(map(len, robochoc_within("protocols").stdout.splitlines())) <= 100
     for name in protocol_names():
         assert 0 < len(protocol_named(name).traits.use_when) <= 60
 
 
 def test_the_long_list_has_all_traits() -> None:
-    told = robochoc("protocols", "--long").stdout
+    told = robochoc_within("protocols", "--long").stdout
     heading = ["name", "for", "complete", "synchronous", "constraints", "dynamic", "privacy", "paper"]
     assert told.splitlines()[0].split() == heading
     assert row(told, "abt").split()[1:7] == ["satisfaction", "yes", "no", "n-ary,", "PKC", "no"]
@@ -202,7 +202,7 @@ def test_a_protocol_without_docstring_says_so() -> None:
 
 @pytest.mark.parametrize(("name", "near"), [("abtt", "abt"), ("centrl", "central"), ("ABT ", None)])
 def test_an_unknown_protocol_is_wrong_usage(name: str, near: str | None) -> None:
-    done = robochoc("protocols", name)
+    done = robochoc_within("protocols", name)
     assert done.returncode == 2
     assert done.stdout == ""
     assert len(done.stderr.splitlines()) == 1
@@ -211,7 +211,7 @@ def test_an_unknown_protocol_is_wrong_usage(name: str, near: str | None) -> None
 
 
 def test_solve_points_to_the_list() -> None:
-    assert "robochoc protocols" in " ".join(robochoc("solve", "--help").stdout.split())
+    assert "robochoc protocols" in " ".join(robochoc_within("solve", "--help").stdout.split())
 
 
 @pytest.mark.parametrize("columns", [60, 80, 200])

@@ -11,7 +11,7 @@ from robochoc.formats import read_robot, read_team
 from robochoc.model.change import team_after_events
 from robochoc.model.problem import AddAgent, AddConstraint, RemoveAgent, RemoveConstraint, RemoveValue
 from tests.support.journal_entries import entries_of
-from tests.support.program import ROOT, robochoc
+from tests.support.program import ROOT, robochoc_within
 
 RESCUE = ROOT / "docs" / "examples" / "rescue"
 VERDICTS = ["solution", "solution", "solution", "no-solution", "solution"]
@@ -43,7 +43,7 @@ def test_the_story() -> None:
 
 
 def test_validate_finds_nothing_wrong() -> None:
-    done = robochoc("validate", RESCUE, RESCUE / "late" / "Spare.xml")
+    done = robochoc_within("validate", RESCUE, RESCUE / "late" / "Spare.xml")
     assert done.returncode == 0
     assert done.stdout.count(": ok") == 2
 
@@ -52,7 +52,7 @@ def test_validate_finds_nothing_wrong() -> None:
     "words", [["dynabt"], ["dynabt", "--runtime", "simulator"], ["abt", "--runtime", "simulator"], ["central"]]
 )
 def test_all_come_to_the_same_verdicts(words: list[str]) -> None:
-    done = robochoc("solve", RESCUE, "--json", "--protocol", *words)
+    done = robochoc_within("solve", RESCUE, "--json", "--protocol", *words)
     assert done.returncode == 0, done.stderr
     result = json.loads(done.stdout)
     epochs = result["epochs"]
@@ -71,7 +71,7 @@ def test_all_come_to_the_same_verdicts(words: list[str]) -> None:
 def test_going_on_costs_less_than_to_begin_anew() -> None:
     messages = []
     for protocol in ("dynabt", "abt"):
-        done = robochoc("solve", RESCUE, "--json", "--protocol", protocol, "--runtime", "simulator")
+        done = robochoc_within("solve", RESCUE, "--json", "--protocol", protocol, "--runtime", "simulator")
         messages.append([epoch["messages"] for epoch in json.loads(done.stdout)["epochs"]])
     went_on, anew = messages
     assert went_on[0] == anew[0]
@@ -79,7 +79,7 @@ def test_going_on_costs_less_than_to_begin_anew() -> None:
 
 
 def test_the_report_of_the_tutorial_is_what_is_printed() -> None:
-    done = robochoc("solve", RESCUE, "--protocol", "dynabt", "--runtime", "simulator")
+    done = robochoc_within("solve", RESCUE, "--protocol", "dynabt", "--runtime", "simulator")
     *told, cost = done.stdout.splitlines()
     tutorial = (ROOT / "docs" / "tutorials" / "change.md").read_text()
     assert "\n".join(told) in tutorial
@@ -89,10 +89,10 @@ def test_the_report_of_the_tutorial_is_what_is_printed() -> None:
 def test_the_scene_shows_the_robots_of_the_last_epoch(tmp_path: Path) -> None:
     html, journal, result = (tmp_path / name for name in ("page.html", "run.jsonl", "result.json"))
     words = ("solve", RESCUE, "--protocol", "dynabt", "--json", "--html", html, "--journal", journal)
-    result.write_text(robochoc(*words).stdout)
+    result.write_text(robochoc_within(*words).stdout)
     for saved in (journal, result):
         page = tmp_path / f"{saved.name}.html"
-        assert robochoc("animate", saved, "--team", RESCUE, "-o", page).returncode == 0
+        assert robochoc_within("animate", saved, "--team", RESCUE, "-o", page).returncode == 0
         assert page.read_bytes() == html.read_bytes()
     began = [event for event in entries_of(journal) if event["event"] == "Began"]
     assert [event.get("epoch", 0) for event in began] == [0, 1, 2, 3, 4]
@@ -107,6 +107,6 @@ def test_the_scene_shows_the_robots_of_the_last_epoch(tmp_path: Path) -> None:
     ],
 )
 def test_what_does_not_go_with_changes_is_said(words: list[object], said: str, tmp_path: Path) -> None:
-    done = robochoc(*map(str, words), folder=tmp_path)
+    done = robochoc_within(*map(str, words), folder=tmp_path)
     assert done.returncode == 2
     assert said in done.stderr

@@ -28,7 +28,7 @@ from robochoc.generators.random_csp import random_csp
 from robochoc.journal.events import Registered, Sent
 from robochoc.journal.journal import Follower, JournalEntry, read_journal
 from robochoc.model.problem import Team
-from tests.support.faults import PROGRAM, Run, gone_within_s, ignores_ctrl_c, running
+from tests.support.faults import PROGRAM, Run, ignores_ctrl_c, is_stopped, running
 from tests.support.limits import wait_until
 
 pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="looks into /proc")
@@ -57,9 +57,6 @@ MOMENTS = {
     "viewer": ("there", "registered", "searching", "staying"),
 }
 """When a target can be struck. `there`: it has just been started (parent: the first of the others)."""
-GONE_S = 5.0
-OVER_S = 60.0
-"""After so long, on a machine that has time for it, a run hangs."""
 STAYS = "stays until Ctrl-C"
 PATIENCE_S = 2
 STRIKES = 200
@@ -198,9 +195,9 @@ class Watched:
         moment, began = self._strike.moment, happened[self._strike.moment]
         if self._strike.target == "parent" and moment == "there":
             began = lambda: self.run.program("solver") is not None  # noqa: E731
-        wait_until(lambda: began() or self.run.is_over, f"it never came to {moment}", OVER_S)
+        wait_until(lambda: began() or self.run.is_over, f"it never came to {moment}")
         if self._strike.then is KILL:  # nobody wakes who is stopped before it could ask for that
-            wait_until(lambda: self.run.is_over or self.is_ready(), "it never listened", OVER_S)
+            wait_until(lambda: self.run.is_over or self.is_ready(), "it never listened")
         time.sleep(self._strike.later_s)
         return None if self.run.is_over else self.target()
 
@@ -236,7 +233,7 @@ class Watched:
 
     def leave(self) -> None:
         """Ctrl-C, once the run is over and its page only stays."""
-        wait_until(lambda: STAYS in self.run.errors() or self.run.is_over, "it does not come to its end", OVER_S)
+        wait_until(lambda: STAYS in self.run.errors() or self.run.is_over, "it does not come to its end")
         if not self.run.is_over:
             self.run.strike(INT)
 
@@ -252,19 +249,17 @@ def struck(strike: Strike, folder: Path, home: Path) -> str:
         fatal = on_parent and (strike.signum in FATAL or strike.then in FATAL)
         if strike.watched and not fatal:
             watched.leave()
-        took = run.end(OVER_S)
+        took = run.end()
         status, errors = run.status(), run.errors()
         ended = f"{strike}: status {status} after {took:.1f} s: {errors}"
         for fault in ("Traceback", "Exception", "Fatal", "panicked"):
             assert fault not in errors, ended
         last = strike.then if strike.then in FATAL else strike.signum
         assert status in statuses(strike, last, fatal=fatal, struck=target is not None), ended
-        if fatal and status != 0:
-            assert took < gone_within_s(GONE_S), ended
         if status > 0 and status < 128:
             assert told(strike, errors), ended
         right(strike, run, status)
-        wait_until(lambda: not run.left_behind(), f"{ended}: it leaves {run.left_behind()}", gone_within_s(GONE_S))
+        wait_until(lambda: not run.left_behind(), f"{ended}: it leaves {run.left_behind()}")
         assert not run.still_listening(sockets), ended
     _journal_is_right(strike, home, killed=fatal and last is KILL)
     return f"{status}" + ("" if target else " (too late)") + f", {took:.1f} s"
@@ -276,7 +271,9 @@ def _send(strike: Strike, run: Run, target: int) -> None:
         run.strike(strike.signum, *([] if strike.group else [target]), group=strike.group)
     if strike.signum is not STOP or strike.then is None:
         return
-    time.sleep(STOPPED_S)
+    wait_until(lambda: is_stopped(target), "it cannot be stopped")
+    if strike.then is CONT:
+        time.sleep(STOPPED_S)  # so that the others notice, or do not; whatever they do has to be right
     if strike.then in FATAL:
         run.strike(strike.then)
     if strike.target == "parent" or strike.then is CONT:

@@ -17,9 +17,9 @@ from robochoc.cli.options.solve import SolveCommand
 from robochoc.formats import write_team
 from robochoc.generators.queens3d import queens3d
 from robochoc.sniffer.viewer import Viewer
-from tests.support.faults import PROGRAM, Run, gone_within_s, running
+from tests.support.faults import PROGRAM, Run, running
 from tests.support.limits import wait_until
-from tests.support.program import ROOT
+from tests.support.program import ROOT, robochoc_within
 from tests.support.sniffer_server import journal_of, run_events
 
 pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="looks into /proc")
@@ -49,12 +49,15 @@ def about(url: str) -> dict[str, object]:
 
 
 def viewer_of(run: Run) -> int:
-    """The viewer's process."""
-    return next(pid for pid in run.processes() if b"viewer_process" in Path(f"/proc/{pid}/cmdline").read_bytes())
+    """The viewer's process, once it can be told from the run that starts it."""
+    wait_until(lambda: run.program("viewer") is not None, "there is no viewer")
+    viewer = run.program("viewer")
+    assert viewer is not None
+    return viewer
 
 
 def all_is_gone(run: Run) -> None:
-    assert run.end() < gone_within_s()
+    run.end()
     assert run.left_behind() == []
 
 
@@ -118,19 +121,19 @@ def test_no_process_shows_the_secret_address_to_others(
 def test_what_is_no_journal_is_told_in_one_line(tmp_path: Path, content: bytes, said: str) -> None:
     file = tmp_path / "file"
     file.write_bytes(content)
-    with running([PROGRAM, "sniff", str(file)], tmp_path / "run") as run:
-        assert run.status() == 1
+    done = robochoc_within("sniff", file)
+    assert done.returncode == 1
     assert re.fullmatch(
-        rf".*/file: .*{re.escape(said)}.* \(give what 'robochoc solve --journal' wrote\)\n", run.errors()
+        rf".*/file: .*{re.escape(said)}.* \(give what 'robochoc solve --journal' wrote\)\n", done.stderr
     )
 
 
 def test_a_file_that_is_not_there_or_none_is_told(tmp_path: Path) -> None:
     for path, said in ((tmp_path / "nowhere", "No such file"), (tmp_path, "no file"), (Path("/dev/null"), "no file")):
-        with running([PROGRAM, "sniff", str(path)], tmp_path / f"run {path.name}") as run:
-            assert run.status() == 1
-        assert said in run.errors()
-        assert run.errors().count("\n") == 1
+        done = robochoc_within("sniff", path)
+        assert done.returncode == 1
+        assert said in done.stderr
+        assert done.stderr.count("\n") == 1
 
 
 @pytest.mark.parametrize(("signum", "status"), [(signal.SIGINT, 0), (signal.SIGTERM, 128 + signal.SIGTERM)])
@@ -165,8 +168,17 @@ def test_a_run_is_shown_until_ctrl_c_and_its_result_is_told_before(teams: Path, 
         assert run.status() == 0
 
 
-@pytest.mark.parametrize("signum", [signal.SIGINT, signal.SIGTERM, signal.SIGKILL])
-@pytest.mark.parametrize("watched", [False, True])
+@pytest.mark.parametrize(
+    ("signum", "watched"),
+    [
+        (signal.SIGINT, True),
+        (signal.SIGTERM, False),
+        (signal.SIGKILL, True),
+        pytest.param(signal.SIGINT, False, marks=pytest.mark.slow),
+        pytest.param(signal.SIGTERM, True, marks=pytest.mark.slow),
+        pytest.param(signal.SIGKILL, False, marks=pytest.mark.slow),
+    ],
+)
 def test_whoever_ends_the_run_ends_the_viewer(teams: Path, tmp_path: Path, signum: int, *, watched: bool) -> None:
     runtime = "simulator" if watched else "processes"  # which leaves the viewer a core to itself
     command = [PROGRAM, "solve", str(teams / "long"), *LONG, "--sniff", "--runtime", runtime]
@@ -188,22 +200,29 @@ def test_ctrl_c_never_ends_the_viewer_not_even_while_it_starts(tmp_path: Path) -
         assert any(int(mask, 16) & 1 << (signal.SIGINT - 1) for mask in masks.values())
 
 
+def robot_of(run: Run, viewer: int) -> int:
+    """A robot's process. Robots are children of the run, as the viewer is."""
+    return next(pid for pid in run.robots() if pid != viewer)
+
+
 def test_a_run_goes_on_without_its_viewer_and_says_so(teams: Path, tmp_path: Path) -> None:
-    command = [PROGRAM, "solve", str(teams / "long"), "--timeout", "2", "--sniff"]
-    with running(command, tmp_path / "run") as run:
-        url_of(run)
-        run.strike(signal.SIGKILL, viewer_of(run))
-        assert run.status() == 3
-        assert "the page is gone: its process ended during the run, which went on without it" in run.errors()
+    with running([PROGRAM, "solve", str(teams / "long"), *LONG, "--sniff"], tmp_path / "run") as run:
+        viewer = viewer_of(run)
+        run.strike(signal.SIGKILL, viewer)
+        wait_until(lambda: run.program("viewer") is None, "the viewer stays")
+        run.wait_for_robots(10)
+        run.strike(signal.SIGKILL, robot_of(run, viewer))
         all_is_gone(run)
+        assert run.status() == 4, "it went on until a robot was lost"
+        assert "the page is gone: its process ended during the run, which went on without it" in run.errors()
 
 
 def test_a_page_outlives_a_run_that_has_failed(teams: Path, tmp_path: Path) -> None:
     with running([PROGRAM, "solve", str(teams / "long"), *LONG, "--sniff"], tmp_path / "run") as run:
         url = url_of(run)
+        viewer = viewer_of(run)
         run.wait_for_robots(10)
-        robot = next(pid for pid in run.robots() if pid != viewer_of(run))
-        run.strike(signal.SIGKILL, robot)
+        run.strike(signal.SIGKILL, robot_of(run, viewer))
         wait_until(lambda: "stays" in run.errors(), "it does not stay")
         wait_until(lambda: bool(about(url)["over"]), "the page does not know")
         run.strike(signal.SIGINT)
@@ -215,9 +234,9 @@ def test_an_invalid_team_has_no_page(tmp_path: Path) -> None:
     folder = tmp_path / "team"
     folder.mkdir()
     (folder / "Robot1.xml").write_text("<robot/>")
-    with running([PROGRAM, "solve", str(folder), "--sniff"], tmp_path / "run") as run:
-        assert run.status() == 1
-    assert "http://" not in run.errors()
+    done = robochoc_within("solve", folder, "--sniff")
+    assert done.returncode == 1
+    assert "http://" not in done.stderr
 
 
 @pytest.mark.parametrize(
@@ -229,10 +248,10 @@ def test_an_invalid_team_has_no_page(tmp_path: Path) -> None:
         (["{teams}/short", "--sniff", "--protocol", "central", "--count"], "--count gives only a number"),
     ],
 )
-def test_what_does_not_go_together_is_wrong_usage(teams: Path, tmp_path: Path, words: list[str], said: str) -> None:
-    with running([PROGRAM, "solve", *(word.format(teams=teams) for word in words)], tmp_path / "run") as run:
-        assert run.status() == 2
-    assert said in " ".join(run.errors().split())
+def test_what_does_not_go_together_is_wrong_usage(teams: Path, words: list[str], said: str) -> None:
+    done = robochoc_within("solve", *(word.format(teams=teams) for word in words))
+    assert done.returncode == 2
+    assert said in " ".join(done.stderr.split())
 
 
 @pytest.mark.parametrize(

@@ -23,9 +23,9 @@ from robochoc.solver.central import CentralSolver
 from robochoc.solver.compile import Compiler
 from robochoc.solver.domain import CompiledDomain, compile_domain
 from robochoc.verification.checker import violations
+from tests.support.brute_force import solutions
 from tests.support.complex_problems import random_complex_team
 from tests.support.loose_problems import any_order, loosened
-from tests.support.problems import solutions
 from tests.support.random_options import random_schedule
 from tests.support.solver_networks import brute_force, compiled_by_brute_force
 
@@ -67,7 +67,7 @@ def test_domains_and_abt_agree_with_brute_force(batch: int) -> None:
     """Without Java: local problems are solved by hand."""
     chance = Random(f"complex {batch}")
     seen = Counter[Verdict]()
-    for _ in range(150):
+    for _ in range(150 if batch else 60):
         team = random_complex_team(chance)
         for robot in team.robots:
             check_domain(robot, compile_domain(robot, brute_force))
@@ -75,15 +75,16 @@ def test_domains_and_abt_agree_with_brute_force(batch: int) -> None:
         verdict = solved_by_brute_force(with_order(team, any_order(team, chance)), chance)
         assert verdict is (Verdict.SOLUTION if any(solutions(team)) else Verdict.NO_SOLUTION), team
         seen[verdict] += 1
-    assert min(seen[Verdict.SOLUTION], seen[Verdict.NO_SOLUTION]) > 20, seen
+    assert min(seen[Verdict.SOLUTION], seen[Verdict.NO_SOLUTION]) > (20 if batch else 8), seen
 
 
+@pytest.mark.usefixtures("warm_ace")
 @pytest.mark.parametrize("batch", [0, *(pytest.param(batch, marks=pytest.mark.slow) for batch in range(1, 20))])
 def test_ace_abt_the_judge_and_brute_force_agree(batch: int) -> None:
     chance = Random(f"judged {batch}")
     seen = Counter[Verdict]()
     with AceProcess(always=True) as solver, Compiler(solver=solver) as compiler:
-        for _ in range(100 if batch else 50):
+        for _ in range(100 if batch else 25):
             team = loosened(random_complex_team(chance), chance)
             for robot in team.robots:
                 check_domain(robot, compiler.compile(robot).domain)
@@ -94,18 +95,21 @@ def test_ace_abt_the_judge_and_brute_force_agree(batch: int) -> None:
             options = replace(random_schedule(chance), cache=False, order=any_order(team, chance))
             assert solve(team, options, solver=solver).verdict is expected
             seen[expected] += 1
-    assert min(seen.values()) > (15 if batch else 7), seen
+    assert min(seen.values()) > (15 if batch else 3), seen
 
 
-def test_processes_agree_with_brute_force() -> None:
+@pytest.mark.usefixtures("warm_ace")
+@pytest.mark.parametrize("teams", [5, pytest.param(25, marks=pytest.mark.slow)])
+def test_processes_agree_with_brute_force(teams: int) -> None:
     chance = Random("complex processes")
     with AceProcess() as solver:
-        for _ in range(8):
+        for _ in range(teams):
             team = loosened(random_complex_team(chance), chance)
             outcome = solve(team, Options(timeout=60, cache=False, order=any_order(team, chance)), solver=solver)
             assert outcome.verdict is (Verdict.SOLUTION if any(solutions(team)) else Verdict.NO_SOLUTION)
 
 
+@pytest.mark.usefixtures("warm_ace")
 def test_withdrawing_leaves_a_placement_that_no_robot_could_join() -> None:
     chance = Random("complex withdraw")
     wanted = 15
@@ -127,10 +131,11 @@ def fits(team: Team, assignment: dict[str, int]) -> bool:
     return all(constraint.allows(assignment) for constraint in met)
 
 
-def test_many_values_are_looked_up_as_few_are(monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.mark.parametrize("teams", [60, pytest.param(300, marks=pytest.mark.slow)])
+def test_many_values_are_looked_up_as_few_are(teams: int, monkeypatch: pytest.MonkeyPatch) -> None:
     """Conflicts of large domains come from numpy tables; the walk over constraints finds and counts the same."""
     chance = Random("tables")
-    for _ in range(150):
+    for _ in range(teams):
         team = random_complex_team(chance)
         by_itself = compiled_by_brute_force(team)
         seed = chance.getrandbits(32)

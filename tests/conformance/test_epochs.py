@@ -30,8 +30,9 @@ from robochoc.model.problem import (
 )
 from robochoc.run import Options, Runtime, solve
 from robochoc.run.registry import protocol_named, protocol_names
+from tests.support.brute_force import solutions
 from tests.support.loose_problems import loosened
-from tests.support.problems import ON_ONE_MACHINE, random_team, solutions, team_of
+from tests.support.problems import ON_ONE_MACHINE, random_team, team_of
 from tests.support.random_changes import random_changing_team, stages
 from tests.support.random_options import random_schedule
 from tests.support.small_teams import differ, pair
@@ -61,8 +62,8 @@ def agrees(team: Team, options: Options) -> int:
 @pytest.mark.parametrize("batch", [0, *(pytest.param(batch, marks=pytest.mark.slow) for batch in range(1, 10))])
 def test_dynabt_agrees_with_brute_force_after_each_change(batch: int) -> None:
     chance = Random(f"dynabt {batch}")
-    steps = sum(agrees(random_changing_team(chance), random_dynabt(chance)) for _ in range(100 if batch else 60))
-    assert steps > (900 if batch else 540)
+    steps = sum(agrees(random_changing_team(chance), random_dynabt(chance)) for _ in range(100 if batch else 30))
+    assert steps > (900 if batch else 270)
 
 
 def random_dynabt(chance: Random) -> Options:
@@ -74,16 +75,17 @@ def random_dynabt(chance: Random) -> Options:
 def test_any_protocol_begins_anew_after_each_change(protocol: str, batch: int) -> None:
     traits = protocol_named(protocol).traits
     chance = Random(f"anew {protocol} {batch}")
-    for _ in range(8):
+    for _ in range(8 if batch else 4):
         team = random_changing_team(chance, 6)
         if traits.n_ary and traits.complete:
             agrees(team, replace(random_schedule(chance), protocol=protocol))
 
 
+@pytest.mark.parametrize("batch", [0, pytest.param(1, marks=pytest.mark.slow)])
 @pytest.mark.parametrize("protocol", ["dynabt", "abt"])
-def test_processes_go_through_epochs_as_well(protocol: str) -> None:
-    chance = Random(f"processes {protocol}")
-    for _ in range(4):
+def test_processes_go_through_epochs_as_well(protocol: str, batch: int) -> None:
+    chance = Random(f"processes {protocol} {batch}")
+    for _ in range(12 if batch else 1):
         agrees(random_changing_team(chance, 6), Options(protocol=protocol, timeout=60))
 
 

@@ -14,7 +14,7 @@ from tests.support.program import ROOT
 
 SOURCES = sorted((ROOT / "robochoc").rglob("*.py"))
 LINES_AT_MOST = 400
-SHARED = ("support", "fuzz")
+SHARED = ("support", "fuzz", "mutation")
 """Packages of `tests` that others import."""
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from random import Random
 
 import pytest
@@ -9,6 +10,7 @@ import pytest
 from robochoc.communication.network.local import LocalNetwork
 from robochoc.communication.network.settings import NetworkSettings
 from robochoc.communication.run_result import RobotsLostError, RunResult
+from robochoc.communication.session import over
 from robochoc.generators.queens3d import queens3d
 from robochoc.journal.events import AnyEvent, Decided, Lost, Received, Refused, Registered, Sent
 from robochoc.model.outcome import Verdict
@@ -19,15 +21,16 @@ from robochoc.solver.agent_problem import RunParameters
 from robochoc.solver.compiled_team import CompiledTeam
 from robochoc.solver.encoding import TooLargeError
 from robochoc.verification.checker import assignment_cost, violations
-from tests.support.clocks import once
+from tests.support.brute_force import least_cost, solutions
 from tests.support.complex_problems import random_complex_team
-from tests.support.cost_problems import least_cost, random_cost_team
+from tests.support.cost_problems import random_cost_team
+from tests.support.limits import HANG_S
 from tests.support.paused_abt import CHAIN, CrashingABT, OverloadedABT, PausedABT
 from tests.support.pkc_problems import random_pkc_team
-from tests.support.problems import random_team, solutions
+from tests.support.problems import random_team
 from tests.support.solver_networks import compiled_by_brute_force
 
-TIMEOUT_S = 60
+TIMEOUT_S = HANG_S
 FEW = (("afc-ng", ("signed", "sealed")), ("awc", ()), ("dynabt", ("signed",)))
 MANY = ("abt", "afc-ng", "awc", "dynabt", "sbt", "agile-abt", "afc-tree", "sfb", "dpop", "adopt")
 
@@ -169,12 +172,20 @@ def test_limits() -> None:
         assert sum(result.metrics.messages.values()) >= 20
 
 
-def test_when_the_time_is_over_there_is_what_was_decided_so_far() -> None:
-    def searched(limit: float) -> RunResult:
-        with LocalNetwork(CHAIN, PausedABT, parameters=RunParameters(settings={"file": "/nowhere"})) as network:
-            return network.search(timeout=limit)
+def test_when_the_time_is_over_there_is_what_was_decided_so_far(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The time is over when the test says so: when robots have begun to talk."""
+    events: list[AnyEvent] = []
+    an_hour = 3600.0
 
-    result = once(lambda result: len(result.assignments) == len(CHAIN.order), searched)
+    def is_over(deadline: float | None) -> bool:
+        far = deadline is not None and deadline > time.monotonic() + an_hour / 2
+        return over(deadline) or (far and any(isinstance(event, Received) for event in list(events)))
+
+    for module in ("master_loop", "network.master"):
+        monkeypatch.setattr(f"robochoc.communication.{module}.over", is_over)
+    parameters = RunParameters(settings={"file": "/nowhere"})
+    with LocalNetwork(CHAIN, PausedABT, observer=events.append, parameters=parameters) as network:
+        result = network.search(timeout=an_hour)
     assert result.verdict is Verdict.UNKNOWN
     assert not result.lost
     assert set(result.assignments) == set(CHAIN.order)

@@ -10,6 +10,7 @@ from robochoc.communication.network.framing import MASTER, Framing, Opened
 from robochoc.communication.network.inbox import FrameArrived
 from robochoc.communication.network.profile import profile_of
 from robochoc.communication.network.transport import Transport
+from tests.support.limits import HANG_S
 from tests.support.network_runs import SLICE_S, NetworkRun
 from tests.support.paused_abt import CHAIN
 from tests.support.relays import Relay
@@ -37,7 +38,7 @@ def test_who_joins_while_the_master_says_farewell_hears_it(tmp_path: Path) -> No
         framing = Framing("RX0")
         transport.send(MASTER, framing.write(MASTER, Register(profile_of(CHAIN["RX0"]), "a life")))
         run.give_up()
-        welcomes = [heard(transport, framing) for _ in range(4)]  # until it answers
+        welcomes = [heard(transport, framing) for _ in range(2)]  # until it answers
         assert {type(opened.message) for opened in welcomes} == {Welcome}
         framing.begin(run.master.run)
         transport.send(MASTER, framing.write(MASTER, Joined("a life", b"")))
@@ -48,6 +49,6 @@ def test_who_joins_while_the_master_says_farewell_hears_it(tmp_path: Path) -> No
 
 
 def heard(transport: Transport, framing: Framing) -> Opened:
-    item = transport.inbox.get(timeout=10)
+    item = transport.inbox.get(timeout=HANG_S)
     assert isinstance(item, FrameArrived)
     return framing.read(MASTER, item.content)

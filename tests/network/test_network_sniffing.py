@@ -8,10 +8,10 @@ import subprocess
 import sys
 import tempfile
 import threading
-import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from random import Random
+from typing import Any
 
 import pytest
 import zenoh
@@ -21,19 +21,25 @@ from robochoc.communication.network.control_messages import JournalAnswer, Journ
 from robochoc.communication.network.framing import MASTER, Framing
 from robochoc.communication.network.inbox import FrameArrived
 from robochoc.communication.network.journal_server import ANSWERED_AT_MOST, Publication, piece_in, question
+from robochoc.communication.network.router import Router
+from robochoc.communication.network.settings import NetworkSettings
 from robochoc.communication.network.transport import CannotConnectError
 from robochoc.journal.blocks import BEGINNING, PREAMBLE, frame_block
 from robochoc.model.outcome import Verdict
 from robochoc.run.networked.address import Address
 from robochoc.run.networked.directory_query import NoAnswerError
 from robochoc.sniffer.remote import Followed, receive
-from tests.support.clocks import waiting
+from tests.support.limits import HANG_S
 from tests.support.network_runs import NetworkRun
 
 BLOCK = 1000
 FLOOD = 10 * ANSWERED_AT_MOST
 HUGE = 200 * 60_000
-WATCHED_S = 3.0
+WATCHED = 20
+LEASE_MS = 3_600_000
+"""Longer than all else: no link is given up because somebody is silent."""
+GIVES_UP = "transport/link/tx/queue/congestion_control/block/wait_before_close"
+"""How long zenoh waits, in microseconds, for who does not read; then it gives the link up."""
 STOPS = """
 import json, os, signal, sys, time
 import zenoh
@@ -43,7 +49,7 @@ from robochoc.communication.network.transport import Transport
 from robochoc.communication.network.journal_server import question
 
 texts, endpoint, run = json.loads(sys.stdin.readline())
-transport = Transport(endpoint, Identity.of(IdentityTexts(*map(str.encode, texts))), watch=())
+transport = Transport(endpoint, Identity.of(IdentityTexts(*map(str.encode, texts))), watch=(), lease_ms=3_600_000)
 while not transport.ask(journal_key("Eye"), question(run, 0), 1):
     time.sleep(0.1)
 waited_for = {"congestion_control": zenoh.CongestionControl.BLOCK, "priority": zenoh.Priority.REAL_TIME}
@@ -116,9 +122,19 @@ def publication() -> Iterator[Publication]:
 
 
 @pytest.fixture(name="run")
-def running(tmp_path: Path, publication: Publication) -> Iterator[NetworkRun]:
-    """A team in the middle of its search, whose master gives its journal out; it comes to its right verdict."""
-    with NetworkRun(tmp_path, publication=publication) as run:
+def running(tmp_path: Path, publication: Publication, monkeypatch: pytest.MonkeyPatch) -> Iterator[NetworkRun]:
+    """A team in the middle of its search, whose master gives its journal out; it comes to its right verdict.
+
+    Its router never gives up who does not read: who waits for that, waits for ever.
+    """
+    given = Router._settings  # noqa: SLF001
+
+    def for_ever(router: Router, *rules: Any) -> dict[str, object]:  # noqa: ANN401 - passed on
+        return {**given(router, *rules), GIVES_UP: 1000 * LEASE_MS}
+
+    monkeypatch.setattr(Router, "_settings", for_ever)
+    settings = NetworkSettings(patience_s=HANG_S, lease_ms=LEASE_MS)
+    with NetworkRun(tmp_path, settings=settings, publication=publication) as run:
         run.wait_for_progress()
         yield run
         if run.result is None:
@@ -147,7 +163,7 @@ def test_who_may_has_all_of_it_whenever_it_comes_and_who_may_not_nothing(
     run.household.enrol("Eye", sniffs=True)
     run.household.enrol("Spy")
     early = sniffing("Eye")
-    assert early.granted.wait(30)
+    assert early.granted.wait(HANG_S)
     whole, last = b"".join(BLOCKS[:-1]), BLOCKS[-1]
     for each in BLOCKS[:-1]:
         publication.write(each)
@@ -158,7 +174,7 @@ def test_who_may_has_all_of_it_whenever_it_comes_and_who_may_not_nothing(
 
     run.household.enrol("Late", sniffs=True)  # after a hundred blocks
     late = sniffing("Late")
-    assert late.granted.wait(30)
+    assert late.granted.wait(HANG_S)
     publication.write(last[:600])
     run.wait_until(lambda: late.content == whole, "it has not got all")
     publication.write(last[600:])
@@ -244,10 +260,8 @@ def test_one_that_asks_for_answers_that_are_waited_for_and_stops(run: NetworkRun
         eye.stdin.flush()
         try:
             run.wait_until(lambda: state_of(eye.pid) == "T", "it never stops")
-            began = time.monotonic()
-            while time.monotonic() - began < WATCHED_S:
-                with waiting(WATCHED_S):
-                    run.wait_for_progress()
+            for _ in range(WATCHED):
+                run.wait_for_progress()
             assert run.let_go().verdict is Verdict.SOLUTION  # and the master does not wait for it for long
         finally:
             eye.kill()
@@ -265,7 +279,7 @@ def test_a_master_that_gives_nothing_out(tmp_path: Path) -> None:
             for number in range(50):
                 transport.send(MASTER, framing.write(MASTER, JournalRequest(number)))
             run.wait_for_refusal("Eye", "ask", "more than 20 requests a second")
-            first = transport.inbox.get(timeout=10)
+            first = transport.inbox.get(timeout=HANG_S)
             assert isinstance(first, FrameArrived)
             assert isinstance(framing.read(MASTER, first.content).message, JournalAnswer)
         assert run.let_go().verdict is Verdict.SOLUTION

@@ -12,11 +12,12 @@ from robochoc.model.problem import INFINITE
 from robochoc.protocols.abt import ABT
 from robochoc.run.registry import protocol_named, protocol_names
 from robochoc.solver.agent_problem import RunParameters
-from tests.support.cost_problems import least_cost, random_cost_team
+from tests.support.brute_force import least_cost, solutions
+from tests.support.cost_problems import random_cost_team
 from tests.support.in_memory_network import InMemoryNetwork
 from tests.support.lone_robot import chain_of_three
 from tests.support.pkc_problems import random_pkc_team
-from tests.support.problems import known_to_both, random_team, solutions
+from tests.support.problems import known_to_both, random_team
 
 
 @pytest.mark.parametrize("protocol", ["abt", "afc-ng", "awc", "agile-abt", "afc-tree"])

@@ -10,6 +10,7 @@ import msgspec
 import pytest
 
 from robochoc.communication.network.control_messages import (
+    Bye,
     ControlMessage,
     Copies,
     ProtocolMessage,
@@ -26,6 +27,7 @@ from robochoc.model.message import encode
 from robochoc.model.outcome import Verdict
 from robochoc.model.problem import ProblemKind
 from robochoc.protocols.abt import Ok
+from tests.support.limits import HANG_S
 from tests.support.network_runs import NetworkRun, frame
 from tests.support.paused_abt import CHAIN, TRIANGLE, PausedABT
 
@@ -34,12 +36,13 @@ from tests.support.paused_abt import CHAIN, TRIANGLE, PausedABT
 
 @pytest.mark.parametrize("filters", [("signed", "sealed"), pytest.param((), marks=pytest.mark.slow)])
 def test_a_robot_is_revoked_and_the_others_are_told_of_it(tmp_path: Path, filters: tuple[str, ...]) -> None:
-    with NetworkRun(tmp_path, settings=NetworkSettings(filters, survive=True, patience_s=2)) as run:
+    with NetworkRun(tmp_path, settings=NetworkSettings(filters, survive=True, patience_s=HANG_S)) as run:
         run.wait_for_progress()
         run.household.revoke("RX2")
         result = run.wait_for_result()
         run.wait_for_refusal("RX2", "take part", "its certificate was revoked")
         run.wait_for_refusal("RX2", "connect", "not registered with the Authority")
+        run.wait_until_impatient("RX2")
     assert result.verdict is Verdict.UNKNOWN
     assert result.lost == {"RX2": "its certificate was revoked"}
     assert [lost.robot for lost in run.losses] == ["RX2"]
@@ -92,7 +95,7 @@ def test_profiles_that_lie(tmp_path: Path) -> None:
 def told(transport: Transport, incarnation: str) -> bool:
     """Whether the master denies the registration `incarnation`."""
     framing = Framing(transport.name)
-    while isinstance(item := transport.inbox.get(timeout=10), FrameArrived):
+    while isinstance(item := transport.inbox.get(timeout=HANG_S), FrameArrived):
         word = framing.read(item.sender, item.content).message
         if isinstance(word, RegistrationDenied) and word.incarnation == incarnation:
             return True
@@ -105,6 +108,7 @@ def test_what_the_directory_cannot_take_does_not_keep_a_robot_out(tmp_path: Path
         transport.send(MASTER, frame(run, "RX3", MASTER, Register(boastful, "1")))
         run.wait_for_refusal("RX3", "be in the directory", "unrecognised-parameter-value")
         assert "RX3" in run.master.members.robots
+        transport.send(MASTER, frame(run, "RX3", MASTER, Bye()))  # so that the master does not wait for it
         run.give_up()
 
 
@@ -153,7 +157,7 @@ def test_constraints_that_others_have_to_know_are_sealed_too(
 
 def recorded_said(reader: Transport) -> ProtocolMessage:
     framing = Framing(reader.name)
-    while isinstance(item := reader.inbox.get(timeout=10), FrameArrived):
+    while isinstance(item := reader.inbox.get(timeout=HANG_S), FrameArrived):
         word = framing._of_robot.decode(item.content).message if item.sender != MASTER else None  # noqa: SLF001
         if isinstance(word, ProtocolMessage):
             return word

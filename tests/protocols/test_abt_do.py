@@ -172,10 +172,11 @@ def test_a_sender_passes_only_those_with_more_values_left(left_a: int, left_b: i
     assert abt.order.names == names(expected)
 
 
-def test_a_sender_does_not_pass_a_robot_of_which_nothing_is_known() -> None:
+@pytest.mark.parametrize("left", [0, 1])
+def test_a_sender_does_not_pass_a_robot_of_which_nothing_is_known(left: int) -> None:
     abt = agent(clique(), "RC")
     replies(abt, ("RA", Ok((2,), 3)))
-    replies(abt, ("RD", Nogood({}, (1,), 1)))
+    replies(abt, ("RD", Nogood({}, (1,), left)))
     assert abt.order.names == names("ABDCE")
 
 

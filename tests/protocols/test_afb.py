@@ -345,5 +345,14 @@ def test_the_best_solution_and_a_bound_are_found_before_the_end() -> None:
     assert agent(team, "RB").findings == Findings()
 
 
+def test_the_bound_counts_what_the_present_value_is_expected_to_cost_until_its_cpa_is_back() -> None:
+    team = team_of(dict.fromkeys("AB", (1, 2)), [priced("A", {(1,): 2, (2,): 5}), priced("AB", {(1, 1): 1})])
+    robot = agent(team, "RA")
+    replies(robot, ("RB", FBEstimate([1], [0, 2])))
+    assert robot.findings == Findings(bound=4)
+    robot.receive("RB", cpa((1, 1), least=[]))
+    assert robot.findings == Findings(bound=5)
+
+
 def test_the_docstring_shows_what_happens() -> None:
     assert doctest.testmod(robochoc.protocols.afb).failed == 0

@@ -15,7 +15,8 @@ from robochoc.model.message import Message, Value
 from robochoc.model.problem import INFINITE, Team
 from robochoc.protocols.afb import AFB
 from robochoc.protocols.afb_messages import CPA, FBEstimate
-from tests.support.cost_problems import cost_of, least_cost, random_cost_team
+from tests.support.brute_force import least_cost
+from tests.support.cost_problems import cost_of, random_cost_team
 
 
 class Watched(AFB):
@@ -50,7 +51,7 @@ def watch(team: Team, seen: Counter[str]) -> type[AFB]:
     return type("Watched", (Watched,), {"least_with": staticmethod(least.__getitem__), "seen": seen})
 
 
-@pytest.mark.parametrize("batch", range(3))
+@pytest.mark.parametrize("batch", [0, *(pytest.param(batch, marks=pytest.mark.slow) for batch in range(1, 4))])
 def test_no_bound_is_too_high_and_no_cpa_goes_back_from_a_better_solution(batch: int) -> None:
     chance = Random(f"bounds {batch}")
     seen = Counter[str]()

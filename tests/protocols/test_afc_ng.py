@@ -65,6 +65,17 @@ def test_another_robot_s_cpa_only_checks_forward() -> None:
     assert list(afc.store) == [{"RA": (1,)}]
 
 
+def test_a_cpa_with_values_that_are_known_already_is_not_checked_again() -> None:
+    afc = agent(triangle(3), "RC")
+    replies(afc, ("RA", cpa((1, 1))))
+    before = afc.problem.checks
+    assert replies(afc, ("RA", cpa((1, 2)))) == []
+    assert afc.problem.checks == before
+    assert list(afc.store) == [{"RA": (1,)}]
+    replies(afc, ("RB", cpa((1, 2), (3, 1))))
+    assert afc.counters == [2, 1]
+
+
 def test_a_cpa_goes_to_the_next_robot_and_to_those_that_share_a_constraint() -> None:
     afc = AFCng(
         LocalProblem(agent_problems(team := different("ABCDE", "AD AE BC", 2))["RA"]), PriorityOrder(team.order)

@@ -15,7 +15,8 @@ from robochoc.protocols import adopt, bnb_adopt
 from robochoc.protocols.bounding import BoundingProtocol, Terminate
 from robochoc.run.incumbent import lower_bound
 from tests.support.agents import replies
-from tests.support.cost_problems import least_cost, random_cost_team
+from tests.support.brute_force import least_cost
+from tests.support.cost_problems import random_cost_team
 from tests.support.pseudo_trees import context, placed, priced, root, to, unplaced
 
 
@@ -139,7 +140,7 @@ def test_when_nobody_speaks_all_have_ended_and_the_roots_bounds_are_the_least_co
 
     monkeypatch.setattr(protocol, "begin", noted)
     chance = Random(f"quiet {longest} {batch}")
-    for seed in range(10):
+    for seed in range(10 if batch else 5):
         team = random_cost_team(chance)
         ends.clear()
         schedule = RandomChannels(seed) if longest is None else Concurrent(seed, longest)

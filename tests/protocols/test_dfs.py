@@ -25,7 +25,7 @@ from robochoc.run import Options, Runtime, solve
 from robochoc.solver.agent_problem import agent_problems
 from robochoc.solver.compiled import LocalProblem
 from tests.support.agents import replies
-from tests.support.examples import examples
+from tests.support.examples import count, examples
 from tests.support.problems import team_of
 
 
@@ -179,10 +179,11 @@ def test_a_token_passes_twice_between_a_robot_and_its_parent_and_a_wave_along_ea
     assert messages.get("Hello", 0) == edges
 
 
-def test_each_begins_once_and_what_comes_early_is_kept_for_then() -> None:
+@count("teams", 40, 150)
+def test_each_begins_once_and_what_comes_early_is_kept_for_then(teams: int) -> None:
     chance = Random("early")
     early = 0
-    for _ in range(80):
+    for _ in range(teams):
         team = random_graph(chance)
         _, robots = played(team, schedule_of(chance))
         met = neighbours_of(team)
@@ -191,7 +192,7 @@ def test_each_begins_once_and_what_comes_early_is_kept_for_then() -> None:
             assert robot.decided
             assert sorted(robot.greeted) == sorted(met[name])
             early += robot.early
-    assert early > 100
+    assert early > teams
 
 
 def test_unconnected_parts_have_a_root_each() -> None:

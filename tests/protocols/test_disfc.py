@@ -28,6 +28,7 @@ from robochoc.solver.encoding import UnsupportedError
 from robochoc.solver.filters import allows
 from tests.support.agents import replies
 from tests.support.complex_problems import complex_team, random_complex_team
+from tests.support.examples import count
 from tests.support.pkc_bytes import changed_where_nobody_was, nothing_hidden, renamed, restated, run
 from tests.support.pkc_problems import (
     SECRETS,
@@ -221,24 +222,27 @@ def test_the_docstring_shows_what_happens() -> None:
 # The truth
 
 
-def test_disfc_agrees_with_brute_force() -> None:
+@count("teams", 150, 500)
+def test_disfc_agrees_with_brute_force(teams: int) -> None:
     chance = Random("pkc disfc")
-    seen = Counter(check_against_brute_force(random_pkc_team(chance), DisFC, chance) for _ in range(500))
-    assert min(seen.values()) > 125, seen
+    seen = Counter(check_against_brute_force(random_pkc_team(chance), DisFC, chance) for _ in range(teams))
+    assert min(seen.values()) > teams // 4, seen
 
 
-def test_disfc_agrees_where_all_is_known_and_where_all_is_split() -> None:
+@count("teams", 15, 60)
+def test_disfc_agrees_where_all_is_known_and_where_all_is_split(teams: int) -> None:
     chance = Random("disfc split")
-    for _ in range(40):
+    for _ in range(teams):
         team = random_team(chance, n_ary=False)
         check_against_brute_force(team, DisFC, chance)
         check_against_brute_force(with_private_parts(team, chance), DisFC, chance)
 
 
-def test_disfc_agrees_on_complex_robots() -> None:
+@count("teams", 16, 60)
+def test_disfc_agrees_on_complex_robots(teams: int) -> None:
     chance = Random("disfc complex")
     seen = Counter[bool]()
-    while seen.total() < 40:
+    while seen.total() < teams:
         team = random_complex_team(chance)
         if all(len({team.owner[name] for name in c.variables}) < 3 for robot in team.robots for c in robot.shared):
             split = seen.total() % 2 == 1
@@ -280,10 +284,11 @@ def hides(team: Team, seed: int, chance: Random) -> tuple[bool, bool]:
     return unused != team, run(everywhere, DisFC, seed).envelopes != before.envelopes
 
 
-def test_no_value_and_no_row_of_a_value_that_was_not_taken_can_be_seen() -> None:
+@count("teams", 15, 60)
+def test_no_value_and_no_row_of_a_value_that_was_not_taken_can_be_seen(teams: int) -> None:
     chance = Random("hides")
-    seen = Counter(hides(random_pkc_team(chance), chance.getrandbits(32), chance) for _ in range(40))
-    assert seen[True, True] > 20, seen
+    seen = Counter(hides(random_pkc_team(chance), chance.getrandbits(32), chance) for _ in range(teams))
+    assert seen[True, True] > teams // 2, seen
 
 
 def test_counters_count_assignments_and_nothing_else(private_queens: Team) -> None:

@@ -15,6 +15,7 @@ from robochoc.model.message import Message, encode
 from robochoc.model.problem import Constraint, Relation, Semantics
 from robochoc.protocols.dpop import DPOP
 from robochoc.protocols.dpop_messages import UTIL, VALUE, Dimensions, Need, Proceed
+from robochoc.protocols.dpop_tables import Extent, bytes_of
 from robochoc.run import Options, Runtime, Withdrawal, solve
 from robochoc.solver.agent_problem import RunParameters
 from robochoc.solver.encoding import TooLargeError, UnsupportedError
@@ -57,6 +58,15 @@ def test_a_robot_s_arrays_never_take_more_than_it_has_told() -> None:
     assert said.most.bytes > size**4
     assert peak < said.most.bytes + 50_000
     assert left < 2 * size**3 + 30_000
+
+
+def test_a_robot_needs_room_for_the_tables_of_its_constraints_and_of_its_children() -> None:
+    robot = begun(products("ABCD", "AC BC CD", (1, 2, 3)), "RC", "BA", "D")
+    heard = [("RB", domain()), ("RA", domain()), ("RD", dimensions({"RC": 3, "RA": 3}, dearest=300))]
+    ((_, said),) = replies(robot, *heard)
+    assert isinstance(said, Dimensions)
+    floats, child = Extent(3 * 3, 8), Extent(3 * 3, 2)
+    assert said.most == Need(bytes_of([3, 3], 3, 2, [floats, floats, child]), "RC")
 
 
 def test_sizes_do_not_overflow() -> None:

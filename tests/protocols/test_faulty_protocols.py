@@ -13,6 +13,7 @@ from robochoc.communication.run_result import RobotsLostError
 from robochoc.journal.events import AnyEvent, Lost
 from robochoc.model.outcome import Verdict
 from robochoc.protocols.protocol import Protocol
+from tests.support.examples import count
 from tests.support.faults import open_descriptors
 from tests.support.faulty_protocols import (
     FLOOD,
@@ -84,8 +85,9 @@ def test_deaf_robots_do_not_outlive_the_time_limit() -> None:
     assert verdict is Verdict.UNKNOWN
 
 
-def test_many_runs_leave_nothing_open() -> None:
+@count("runs", 5, 50)
+def test_many_runs_leave_nothing_open(runs: int) -> None:
     before = open_descriptors()
-    for _ in range(30):
+    for _ in range(runs):
         speaking(Speaks)
     assert open_descriptors() == before

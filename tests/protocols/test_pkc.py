@@ -22,7 +22,9 @@ from robochoc.solver.agent_problem import agent_problems
 from robochoc.solver.compiled import LocalProblem
 from robochoc.solver.encoding import UnsupportedError
 from tests.support.agents import replies
+from tests.support.brute_force import solutions
 from tests.support.complex_problems import complex_team, random_complex_team
+from tests.support.examples import count
 from tests.support.pkc_bytes import changed_elsewhere, nothing_hidden, restated, run, watched
 from tests.support.pkc_problems import (
     SECRETS,
@@ -34,7 +36,7 @@ from tests.support.pkc_problems import (
     with_part,
     with_private_parts,
 )
-from tests.support.problems import ON_ONE_MACHINE, random_team, solutions, team_of
+from tests.support.problems import ON_ONE_MACHINE, random_team, team_of
 
 
 def agent(team: Team, name: str) -> ABT:
@@ -137,35 +139,40 @@ def test_who_steps_aside_cannot_be_found_with_pkc() -> None:
 # The truth
 
 
-def test_abt_agrees_with_brute_force() -> None:
+@count("teams", 150, 500)
+def test_abt_agrees_with_brute_force(teams: int) -> None:
     chance = Random("pkc abt")
-    seen = Counter(check_against_brute_force(random_pkc_team(chance), ABT, chance) for _ in range(500))
-    assert min(seen.values()) > 125, seen
+    seen = Counter(check_against_brute_force(random_pkc_team(chance), ABT, chance) for _ in range(teams))
+    assert min(seen.values()) > teams // 4, seen
 
 
-def test_abt_agrees_where_all_is_split_and_n_ary_constraints_stay() -> None:
+@count("teams", 25, 100)
+def test_abt_agrees_where_all_is_split_and_n_ary_constraints_stay(teams: int) -> None:
     chance = Random("pkc split")
-    for _ in range(60):
+    for _ in range(teams):
         check_against_brute_force(with_private_parts(random_team(chance), chance), ABT, chance)
 
 
-def test_abt_agrees_on_complex_robots() -> None:
+@count("teams", 16, 60)
+def test_abt_agrees_on_complex_robots(teams: int) -> None:
     chance = Random("pkc complex")
-    for _ in range(40):
+    for _ in range(teams):
         team = with_private_parts(random_complex_team(chance), chance)
         check_against_brute_force(team, ABT, chance)
 
 
-def test_splitting_keeps_the_solutions() -> None:
+@count("teams", 20, 80)
+def test_splitting_keeps_the_solutions(teams: int) -> None:
     chance = Random("split")
-    for _ in range(50):
+    for _ in range(teams):
         team = random_team(chance)
         assert list(solutions(team)) == list(solutions(with_private_parts(team, chance)))
 
 
-def test_teams_with_parts_are_written_and_read_back(tmp_path: Path) -> None:
+@count("teams", 12, 50)
+def test_teams_with_parts_are_written_and_read_back(tmp_path: Path, teams: int) -> None:
     chance = Random("files")
-    for number in range(30):
+    for number in range(teams):
         team = random_pkc_team(chance)
         write_team(team, tmp_path / f"{number}")
         again = read_team(tmp_path / f"{number}")
@@ -198,19 +205,21 @@ def asked_only(team: Team, seed: int, chance: Random) -> tuple[bool, bool]:
     return elsewhere != team, run(there, ABT, seed).envelopes != before.envelopes
 
 
-def test_what_abt_says_depends_on_the_pairs_asked_about_and_on_nothing_else_of_a_part() -> None:
+@count("teams", 25, 100)
+def test_what_abt_says_depends_on_the_pairs_asked_about_and_on_nothing_else_of_a_part(teams: int) -> None:
     chance = Random("asked")
-    seen = Counter(asked_only(random_pkc_team(chance), chance.getrandbits(32), chance) for _ in range(60))
-    assert seen[True, True] > 30, seen
+    seen = Counter(asked_only(random_pkc_team(chance), chance.getrandbits(32), chance) for _ in range(teams))
+    assert seen[True, True] > teams // 2, seen
 
 
 def test_what_abt_says_of_queens_depends_on_the_pairs_asked_about(private_queens: Team) -> None:
     assert asked_only(private_queens, 1, Random(1)) == (True, True)
 
 
-def test_how_a_part_is_stated_changes_no_byte() -> None:
+@count("teams", 20, 80)
+def test_how_a_part_is_stated_changes_no_byte(teams: int) -> None:
     chance = Random("stated")
-    for _ in range(50):
+    for _ in range(teams):
         team, seed = random_pkc_team(chance), chance.getrandbits(32)
         assert run(restated(team, chance), ABT, seed).envelopes == run(team, ABT, seed).envelopes
 

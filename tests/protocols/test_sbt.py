@@ -15,7 +15,8 @@ from robochoc.protocols.order import PriorityOrder
 from robochoc.protocols.sbt import CPA, SBT, Backtrack
 from robochoc.solver.agent_problem import agent_problems
 from robochoc.solver.compiled import LocalProblem
-from tests.support.problems import random_team, solutions, team_of
+from tests.support.brute_force import solutions
+from tests.support.problems import random_team, team_of
 from tests.support.small_teams import differ
 
 

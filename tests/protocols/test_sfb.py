@@ -25,7 +25,9 @@ from robochoc.solver.agent_problem import RunParameters
 from robochoc.solver.encoding import TooLargeError
 from robochoc.solver.exact_costs import EXACT
 from tests.support.agents import replies, value
-from tests.support.cost_problems import least_cost, random_cost_team
+from tests.support.brute_force import least_cost
+from tests.support.cost_problems import random_cost_team
+from tests.support.examples import count
 from tests.support.problems import team_of
 from tests.support.sfb_robots import CHAIN, agents, cpas, introduced, row, rows, team
 
@@ -44,9 +46,11 @@ def test_the_first_robot_tells_its_values_and_each_adds_its_own() -> None:
 
 
 def test_the_last_robot_turns_round_with_what_its_values_are_charged() -> None:
-    robots = agents(team({**CHAIN, "C": (5, 0)}))
+    robots = agents(team(CHAIN))
+    robots["RC"].problem.charges = (5.0, 0.0)
     said = replies(robots["RC"], ("RB", Above.of([BOTH] * 2)))
     assert said == [("RB", Below.of([(BOTH, (5, 0))], 5))]
+    assert encode(said[0][1]) == encode(Below.of([(BOTH, (5, 0))], 5)), "integers, which take fewer bytes"
 
 
 def test_on_the_way_up_each_robot_adds_the_most_that_it_can_come_to() -> None:
@@ -258,6 +262,12 @@ def test_one_that_is_no_cheaper_is_none() -> None:
     assert value(robots["RC"]) is None
 
 
+def test_one_that_costs_more_than_the_robot_before_said_is_none() -> None:
+    robots, _ = introduced(team(CHAIN))
+    assert replies(robots["RC"], ("RB", cpas([1, 3, 1, 0, 2, 4], least=5, ceiling=10))) == [("RB", Explored())]
+    assert value(robots["RC"]) is None
+
+
 def test_a_solution_is_told_up_the_order_and_everybody_holds_its_value() -> None:
     robots, _ = introduced(team(CHAIN))
     replies(robots["RB"], ("RA", cpas(row(0), ceiling=10)))
@@ -289,9 +299,10 @@ def test_when_the_first_robot_has_explored_all_without_a_solution_there_is_none(
     assert robots["RA"].verdict is Verdict.NO_SOLUTION
 
 
-def test_all_robots_hold_an_optimal_solution_in_the_end() -> None:
+@count("teams", 25, 100)
+def test_all_robots_hold_an_optimal_solution_in_the_end(teams: int) -> None:
     chance = Random("sfb held")
-    for seed in range(60):
+    for seed in range(teams):
         problem = random_cost_team(chance)
         result = Simulation(problem, SFB, RandomChannels(seed)).run(60)
         bests = [found.best for found in result.findings.values()]
@@ -367,9 +378,10 @@ def test_whoever_has_heard_of_a_solution_tells_it() -> None:
     assert best.values == {"RA": (1,), "RB": (2,), "RC": (1,)}
 
 
-def test_the_bound_is_never_more_than_the_least_cost_and_is_it_in_the_end() -> None:
+@count("teams", 10, 50)
+def test_the_bound_is_never_more_than_the_least_cost_and_is_it_in_the_end(teams: int) -> None:
     chance = Random("sfb bounds")
-    for seed in range(20):
+    for seed in range(teams):
         problem = random_cost_team(chance)
         end = Simulation(problem, SFB, RandomChannels(seed)).run(60)
         best = end.findings["RX00"].best

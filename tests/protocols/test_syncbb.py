@@ -21,7 +21,8 @@ from robochoc.protocols.syncbb import Backtrack, BestPath, Cost, Path, SyncBB, T
 from robochoc.solver.agent_problem import RunParameters, agent_problems
 from robochoc.solver.compiled import LocalProblem
 from tests.support.agents import replies, value
-from tests.support.cost_problems import least_cost, random_cost_team
+from tests.support.brute_force import least_cost
+from tests.support.cost_problems import random_cost_team
 from tests.support.problems import team_of
 
 NONE = BestPath(math.inf)
@@ -125,6 +126,15 @@ def test_the_best_path_is_told_to_all_when_the_first_robot_has_no_value_left() -
     assert replies(robot, ("RB", Backtrack(found))) == [("RB", Terminate(found)), ("RC", Terminate(found))]
     assert value(robot) == (1,)
     assert robot.verdict is None
+
+
+def test_nothing_is_said_after_the_verdict() -> None:
+    hard = team_of({"A": (1,), "B": (1,)}, [priced("AB", {(1, 1): INFINITE})])
+    robot = agent(hard, "RA")
+    assert replies(robot, ("RB", Backtrack(NONE))) == []
+    assert robot.verdict is Verdict.NO_SOLUTION
+    assert replies(robot, ("RB", Terminate(best(1, 1, 1)))) == []
+    assert value(robot) is None
 
 
 def test_who_is_told_the_end_takes_its_value_in_the_best_path_and_is_silent() -> None:

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import multiprocessing
 import sys
-import time
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import replace
 
 import pytest
@@ -15,14 +14,15 @@ from robochoc.communication.run_result import RobotsLostError
 from robochoc.formats import read_team
 from robochoc.model.outcome import EpochOutcome, Outcome, Verdict
 from robochoc.model.problem import AddAgent, RemoveAgent, RemoveValue, ScenarioEvent, Team
-from robochoc.ros.closed_loop import ClosedLoop, drones_of
+from robochoc.ros.closed_loop import TOGETHER_S, ClosedLoop, drones_of
 from robochoc.ros.report_decoder import ReportDecoder
 from robochoc.ros.sink import Fields, Sink
 from robochoc.ros.source import ReceivedMessage, Source, SourceError
 from robochoc.ros.source_feedback import SourceFeedback
 from robochoc.run import OnLoss, Options, Runtime, Withdrawal, solve
 from robochoc.solver.encoding import UnsupportedError
-from tests.support.clocks import waiting
+from tests.support.limits import HANG_S
+from tests.support.moved_clock import MovedClock
 from tests.support.problems import ON_ONE_MACHINE
 from tests.support.program import ROOT
 from tests.support.small_teams import pair
@@ -30,6 +30,8 @@ from tests.support.small_teams import pair
 HANGAR = read_team(ROOT / "docs" / "examples" / "hangar")
 SIMULATED = Options(protocol="dynabt", runtime=Runtime.SIMULATOR)
 SECOND = 1_000_000_000
+SLICE_S = 1.0
+"""How long the source is waited for at a time."""
 PORTS = {"point": {"x": 3.0, "y": 1.0, "z": 3.0}}
 """Where Port flies first."""
 
@@ -108,15 +110,18 @@ def test_what_a_changing_problem_cannot_have_is_refused(options: Options, named:
         solve(pair(values=3), options, environment=Says())
 
 
-def test_when_the_time_is_over_nothing_that_comes_is_heeded() -> None:
+def test_when_the_time_is_over_nothing_that_comes_is_heeded(monkeypatch: pytest.MonkeyPatch) -> None:
+    clock = MovedClock()
+    monkeypatch.setattr("robochoc.run.context.time", clock)
+
     class Slow(Says):
         def __call__(self, team: Team, epoch: EpochOutcome, left_s: float | None) -> ScenarioEvent | None:
-            assert left_s is not None
-            time.sleep(left_s)
+            assert left_s == (0 if self.summary else HANG_S)
+            clock.end()
             return super().__call__(team, epoch, left_s)
 
     field = Slow(ScenarioEvent((RemoveValue("A", 1),)))
-    outcome = solve(pair(values=3), Options(protocol="dynabt", runtime=Runtime.SIMULATOR, timeout=1), environment=field)
+    outcome = solve(pair(values=3), replace(SIMULATED, timeout=HANG_S), environment=field)
     assert (outcome.verdict, openings(outcome)) == (Verdict.UNKNOWN, ["the start", "A without 1"])
     assert field.summary[-1][2] == 0
     assert "--timeout" in (outcome.reason or "")
@@ -166,13 +171,29 @@ def test_no_process_outlives_a_field_that_fails(error: BaseException | type[Base
 # A loop with a source
 
 
-class Tape(Source):
-    """A source that gives what it was given; a live one whenever it comes, for nothing comes of itself."""
+class WaitedClock:
+    """A clock that goes on while somebody waits, and then only."""
 
-    def __init__(self, *messages: ReceivedMessage, live: bool = False) -> None:
+    def __init__(self) -> None:
+        self.waited_s = 0.0
+
+    def monotonic(self) -> float:
+        return self.waited_s
+
+    time = monotonic
+
+    def time_ns(self) -> int:
+        return round(self.waited_s * SECOND)
+
+
+class Tape(Source):
+    """A source that gives what it was given; a live one, on which nothing more comes, lets `clock` go on."""
+
+    def __init__(self, *messages: ReceivedMessage, clock: WaitedClock | None = None) -> None:
         super().__init__("tape")
         self.messages = list(messages)
-        self.live = live
+        self.live = clock is not None
+        self.clock = clock
         self.topics: Mapping[str, str] = {}
 
     def listen(self, topics: Mapping[str, str]) -> None:
@@ -181,8 +202,8 @@ class Tape(Source):
     def next(self, wait_s: float) -> ReceivedMessage | None:
         if self.messages:
             return self.messages.pop(0)
-        if self.live:
-            time.sleep(wait_s)
+        if self.clock:
+            self.clock.waited_s += wait_s
         return None
 
     def close(self) -> None:
@@ -276,26 +297,36 @@ def test_who_leaves_lands() -> None:
     assert [goal.lands for goal in loop.mission.legs[1].goals.values()] == [True, False, False, False, False, False]
 
 
-def live(patience_s: float, *messages: ReceivedMessage) -> tuple[ClosedLoop, Callable[[], int]]:
-    feedback = SourceFeedback(Tape(*messages, live=True), ReportDecoder(drones_of(HANGAR), "map"), patience_s)
-    waited: list[float] = []
-    feedback.idle = lambda: waited.append(time.monotonic())
-    return ClosedLoop(HANGAR, (), feedback), lambda: len(waited)
+@pytest.fixture
+def waited(monkeypatch: pytest.MonkeyPatch) -> WaitedClock:
+    """The clock of what waits for reports."""
+    clock = WaitedClock()
+    monkeypatch.setattr("robochoc.ros.source_feedback.time", clock)
+    monkeypatch.setattr("robochoc.ros.source_feedback._SLICE_S", SLICE_S)
+    return clock
 
 
-def test_a_live_source_is_waited_for_and_somebody_told_so() -> None:
-    loop, waited = live(0.5, at(time.time(), "/port/blocked", PORTS))
-    with waiting(30, at_least_s=0.9):
-        outcome = solve(HANGAR, SIMULATED, environment=loop)
+def live(clock: WaitedClock, patience_s: float, *messages: ReceivedMessage) -> tuple[ClosedLoop, list[float]]:
+    """A loop with a live source, and when it has said that it waits."""
+    feedback = SourceFeedback(Tape(*messages, clock=clock), ReportDecoder(drones_of(HANGAR), "map"), patience_s)
+    idle: list[float] = []
+    feedback.idle = lambda: idle.append(clock.waited_s)
+    return ClosedLoop(HANGAR, (), feedback), idle
+
+
+def test_a_live_source_is_waited_for_and_somebody_told_so(waited: WaitedClock) -> None:
+    loop, idle = live(waited, 60, at(0, "/port/blocked", PORTS))
+    outcome = solve(HANGAR, SIMULATED, environment=loop)
     assert openings(outcome) == ["the start", "port without 3"]
-    assert waited() >= 2
+    assert waited.waited_s == pytest.approx(60, abs=TOGETHER_S), "from the last decision on"
+    assert len(idle) >= 60 / SLICE_S
 
 
-def test_waiting_is_bounded_by_the_time_for_all() -> None:
-    loop, _ = live(60)
-    with waiting(30):
-        outcome = solve(HANGAR, Options(protocol="dynabt", runtime=Runtime.SIMULATOR, timeout=1.5), environment=loop)
+def test_waiting_is_bounded_by_the_time_for_all(waited: WaitedClock) -> None:
+    loop, _ = live(waited, 10 * HANG_S)
+    outcome = solve(HANGAR, replace(SIMULATED, timeout=HANG_S), environment=loop)
     assert (outcome.verdict, openings(outcome)) == (Verdict.SOLUTION, ["the start"])
+    assert 0 < waited.waited_s <= HANG_S + SLICE_S
 
 
 def test_the_team_of_a_run_nobody_changed_is_as_its_files_have_it() -> None:

@@ -3,8 +3,12 @@
 from __future__ import annotations
 
 import math
-import time
+import sys
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import replace
+from types import FrameType
+from typing import Any
 
 import pytest
 from hypothesis import example, given
@@ -192,16 +196,37 @@ def test_rows_of_drones_with_a_variable_each() -> None:
 
 def test_thousands_of_obstacles_cost_no_more_each_than_a_few() -> None:
     """A hundred million comparisons of places would take half a minute."""
-    team, sees = pair(), situation(pair())
-    for number in range(9_000):
-        assert sees.changes(team, Blocked("A", (1.0, 50.0 + number, 1.0))) == ()
-    for number in range(9_000):
-        assert sees.changes(team, Cleared("A", (1.0, 50.0 + number, 5.0))) == ()
-    began = time.process_time()
-    for _ in range(300):
-        assert sees.changes(team, Blocked("A", (1.0, 9_049.0, 1.0))) == ()
-        assert sees.changes(team, Cleared("A", (9.0, 9_049.0, 1.0))) == ()
-    assert time.process_time() - began < 0.3
+
+    def steps(obstacles: int) -> int:
+        team, sees = pair(), situation(pair())
+        for number in range(obstacles):
+            assert sees.changes(team, Blocked("A", (1.0, 50.0 + number, 1.0))) == ()
+        for number in range(obstacles):
+            assert sees.changes(team, Cleared("A", (1.0, 50.0 + number, 5.0))) == ()
+        last = 49.0 + obstacles
+        with counted_steps() as count:
+            assert sees.changes(team, Blocked("A", (1.0, last, 1.0))) == ()
+            assert sees.changes(team, Cleared("A", (9.0, last, 1.0))) == ()
+        return count[0]
+
+    assert 0 < steps(4_000) < 2 * steps(20)
+
+
+@contextmanager
+def counted_steps() -> Iterator[list[int]]:
+    """How many of Python's instructions are executed meanwhile."""
+    count, before = [0], sys.gettrace()
+
+    def trace(frame: FrameType, event: str, _: object) -> Callable[..., Any]:
+        frame.f_trace_opcodes = True
+        count[0] += event == "opcode"
+        return trace
+
+    sys.settrace(trace)
+    try:
+        yield count
+    finally:
+        sys.settrace(before)
 
 
 somewhere = st.tuples(*[st.floats(-2, 2) | st.sampled_from([-0.5, 0.0, 0.5, 1.0])] * 3)

@@ -18,19 +18,20 @@ from robochoc.authority.frames import (
     Exchange,
 )
 from tests.support.authorities import Clock, Seen
+from tests.support.limits import HANG_S
 
-SOON_S = 5.0
+SOON_S = HANG_S
 
 
 class AuthorityService:
     """An Authority with its service, whose clock is the machine's plus what a test adds."""
 
-    def __init__(self, folder: Path) -> None:
+    def __init__(self, folder: Path, patience_s: float = 1.0) -> None:
         self.clock = Clock(0)
         self.seen = Seen()
         self.authority = Authority.create(folder, observer=self.seen, clock=lambda: time.time() + self.clock.now)
         self.master = self.authority.master_identity(["127.0.0.1"])
-        self.server = EnrolmentServer(self.authority, self.master, patience_s=1.0, connections=4)
+        self.server = EnrolmentServer(self.authority, self.master, patience_s=patience_s, connections=4)
 
     @property
     def place(self) -> tuple[str, int]:

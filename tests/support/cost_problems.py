@@ -81,16 +81,6 @@ def softened(team: Team, chance: Random) -> Team:
     return with_costs(replace(team, robots=tuple(map(of, team.robots))))
 
 
-def least_cost(team: Team) -> float:
-    """The cost of the cheapest assignment, by trying them all; `INFINITE` when all break something hard."""
-    names = list(team.variables)
-    constraints = list(team.constraints())
-    combinations = itertools.product(*(team.variables[name].domain for name in names))
-    return min(
-        (cost_of(dict(zip(names, values, strict=True)), constraints) for values in combinations), default=INFINITE
-    )
-
-
 def cost_of(assignment: Assignment, constraints: Sequence[Constraint]) -> float:
     total: float = 0
     for constraint in constraints:

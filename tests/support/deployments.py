@@ -37,7 +37,9 @@ class Program:
     `command` is `robochoc`'s words where there are `warm` programs to start it from.
     """
 
-    def __init__(self, command: Sequence[object], home: Path, warm: WarmPrograms | None = None) -> None:
+    def __init__(
+        self, command: Sequence[object], home: Path, warm: WarmPrograms | None = None, inside: str = ""
+    ) -> None:
         home.mkdir(parents=True, exist_ok=True)
         stem = str(len(list(home.iterdir())))
         self._out, self._err = home / f"{stem}.out", home / f"{stem}.err"
@@ -46,7 +48,7 @@ class Program:
         self._process: subprocess.Popen[bytes] | WarmProcess
         with self._out.open("wb") as out, self._err.open("wb") as err:
             if warm:
-                self._process = warm.start(words, out, err, environment, home)
+                self._process = warm.start(words, out, err, environment, home, inside)
             else:
                 self._process = subprocess.Popen(
                     words, stdin=subprocess.DEVNULL, stdout=out, stderr=err, env=environment, cwd=home
@@ -121,7 +123,7 @@ class Program:
 class Deployment:
     """Machines around one master at `place`, with an Authority, below `folder`. A context manager: none outlives it.
 
-    `inside` is put before a command: what starts it elsewhere. All others are forked from `warm`, if it is given.
+    `inside` names a network namespace. Programs are forked from `warm`, if it is given.
     """
 
     def __init__(
@@ -146,12 +148,12 @@ class Deployment:
         rows = [json.loads(line) for line in self.authority("enrol", *words, "--json").splitlines()]
         return {row["name"]: row["token"] for row in rows}
 
-    def start(self, machine: str, *words: object, inside: Sequence[str] = ()) -> Program:
+    def start(self, machine: str, *words: object, inside: str = "") -> Program:
         """Start the program on `machine`."""
-        if self._warm and not inside:
-            program = Program(words, self.folder / machine, self._warm)
+        if self._warm:
+            program = Program(words, self.folder / machine, self._warm, inside)
         else:
-            program = Program([*inside, sys.executable, "-m", "robochoc", *words], self.folder / machine)
+            program = Program([sys.executable, "-m", "robochoc", *words], self.folder / machine)
         self._programs.append(program)
         return program
 
@@ -161,14 +163,14 @@ class Deployment:
         self._programs.append(program)
         return program
 
-    def master(self, *words: object, inside: Sequence[str] = ()) -> Program:
+    def master(self, *words: object, inside: str = "") -> Program:
         """Start a master, and wait until robots can come."""
         listening = ("--listen", self.place, "--authority", self.authority_folder)
         program = self.start("master", "master", *listening, *words, inside=inside)
         program.wait_to_say("listening at")
         return program
 
-    def robot(self, file: Path, *words: object, inside: Sequence[str] = ()) -> Program:
+    def robot(self, file: Path, *words: object, inside: str = "") -> Program:
         """Start a robot."""
         return self.start(file.stem, "robot", file.resolve(), "--master", self.place, *words, inside=inside)
 

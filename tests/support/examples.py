@@ -1,4 +1,4 @@
-"""How many examples Hypothesis draws, and which.
+"""How many random examples there are, and which Hypothesis draws.
 
 `make test` draws the same ones each time (profile `same`). `make test-slow` draws more, and others each time (profile
 `new`), and says the seed that repeats them.
@@ -6,6 +6,7 @@
 
 from __future__ import annotations
 
+import pytest
 from hypothesis import HealthCheck, settings
 
 SAME, NEW = "same", "new"
@@ -25,3 +26,8 @@ def examples(fast: int, slow: int = 0, also_suppress: tuple[HealthCheck, ...] = 
     """Return a decorator: draw `fast` examples in `make test` and `slow` (ten times as many) in `make test-slow`."""
     count = fast if settings.get_current_profile_name() == SAME else slow or 10 * fast
     return settings(max_examples=count, suppress_health_check=(*_BUSY, *also_suppress))
+
+
+def count(name: str, fast: int, slow: int) -> pytest.MarkDecorator:
+    """Return a decorator: the parameter `name` is `fast` in `make test`, and `slow` in `make test-slow`."""
+    return pytest.mark.parametrize(name, [fast, pytest.param(slow, marks=pytest.mark.slow)])

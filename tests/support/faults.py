@@ -20,8 +20,6 @@ from tests.support.limits import HANG_S, wait_until
 from tests.support.program import ROOT
 
 PROGRAM = str(Path(sys.executable).with_name("robochoc"))
-GONE_WITHIN_S = 2.0
-"""What is promised, on a machine that has time for it; see `gone_within_s`."""
 POLL_S = 0.01
 _MARK = "ROBOCHOC_FAULT_TEST"
 _SHARED_MEMORY = Path("/dev/shm")  # noqa: S108 - where shared memory would be left
@@ -180,11 +178,6 @@ def running(command: list[str], home: Path, *, open_files: int | None = None, st
         run.put_out()
 
 
-def gone_within_s(promised_s: float = GONE_WITHIN_S) -> float:
-    """`promised_s`, times as many as want each processor now: here other tests run beside it."""
-    return promised_s * max(1.0, os.getloadavg()[0] / (os.cpu_count() or 1))
-
-
 def open_descriptors() -> int:
     """How many files this process holds open."""
     return len(list(Path("/proc/self/fd").iterdir()))
@@ -223,6 +216,11 @@ def _read(pid: int, file: str) -> bytes:
         return Path(f"/proc/{pid}/{file}").read_bytes()
     except OSError:
         return b""
+
+
+def is_stopped(pid: int) -> bool:
+    """Whether the process has been stopped, or has ended."""
+    return not _alive(pid) or _stat(pid)[:1] in ([], ["T"])
 
 
 def ignores_ctrl_c(pid: int) -> bool:

@@ -29,10 +29,11 @@ from robochoc.run import solve
 from robochoc.run.options import Options
 from robochoc.run.registry import protocol_named
 from robochoc.solver.ace import AceProcess
+from tests.support.brute_force import least_cost, solutions
 from tests.support.complex_problems import random_complex_team
-from tests.support.cost_problems import least_cost, random_cost_team, softened
+from tests.support.cost_problems import random_cost_team, softened
 from tests.support.pkc_problems import random_pkc_team
-from tests.support.problems import random_team, solutions
+from tests.support.problems import random_team
 
 PAIR = 2
 ENOUGH = 3000
@@ -60,20 +61,28 @@ def loosened(team: Team, chance: Random) -> Team:
 
 def every_order(team: Team, chance: Random) -> list[Order | tuple[str, ...] | None]:
     """The files' order, each by name, and two that are listed: those that `team` can be turned to."""
-    listed = [tuple(chance.sample(team.order, len(team.order))) for _ in range(2)]
-    orders: list[Order | tuple[str, ...] | None] = [None]
-    for order in (*Order, *listed):
-        try:
-            with_order(team, order)
-        except OrderError:
-            continue
-        orders.append(order)
-    return orders
+    return [order for order in _orders(team, chance) if _turns(team, order)]
 
 
 def any_order(team: Team, chance: Random) -> Order | tuple[str, ...] | None:
     """One of these."""
-    return chance.choice(every_order(team, chance))
+    orders = _orders(team, chance)
+    while not _turns(team, order := chance.choice(orders)):
+        orders.remove(order)
+    return order
+
+
+def _orders(team: Team, chance: Random) -> list[Order | tuple[str, ...] | None]:
+    return [None, *Order, *(tuple(chance.sample(team.order, len(team.order))) for _ in range(2))]
+
+
+def _turns(team: Team, order: Order | tuple[str, ...] | None) -> bool:
+    """Whether `team` can be turned to `order`."""
+    try:
+        with_order(team, order)
+    except OrderError:
+        return False
+    return True
 
 
 def loose_team(protocol: str, chance: Random, *, costs: bool = False) -> Team:

@@ -30,11 +30,6 @@ def why_not() -> str:
     return ""
 
 
-def inside(namespace: str) -> tuple[str, ...]:
-    """What is put before a command that is to run in `namespace`."""
-    return ("ip", "netns", "exec", namespace)
-
-
 @contextmanager
 def namespaces(count: int) -> Iterator[list[str]]:
     """So many new namespaces, each with its loopback. Their devices go with them."""

@@ -75,6 +75,7 @@ class NetworkRun:
         self.error: Exception | None = None
         self.held: tuple[bool, float] | None = None
         self.endings: dict[str, Ending] = {}
+        self.robots: dict[str, NetworkRobot] = {}
         self.threads: dict[str, threading.Thread] = {}
         self.settings = settings
         self._seconds = seconds
@@ -131,6 +132,12 @@ class NetworkRun:
     def give_up(self) -> None:
         """End the run before all robots are there."""
         self._given_up = True
+
+    def wait_until_impatient(self, name: str) -> None:
+        """Wait until the master does not answer the robot any more, and move its clock until its patience is over."""
+        registration = self.robots[name]._registration  # noqa: SLF001
+        self.wait_until(lambda: registration._unanswered_since is not None, f"{name} is answered")  # noqa: SLF001
+        registration._unanswered_since = time.monotonic() - 2 * self.settings.patience_s  # noqa: SLF001
 
     def wait_for_result(self) -> RunResult:
         """What came of the search, as soon as it is over."""
@@ -212,4 +219,5 @@ class NetworkRun:
                 lambda _name: PausedABT,
                 RobotSettings(self.settings.patience_s),
             )
+            self.robots[name] = robot
             self.endings[name] = robot.run()

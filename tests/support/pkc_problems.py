@@ -24,7 +24,8 @@ from robochoc.model.problem import (
 )
 from robochoc.protocols.protocol import Protocol
 from robochoc.verification.checker import violations
-from tests.support.problems import PREDICATES, solutions, team_of
+from tests.support.brute_force import solutions
+from tests.support.problems import PREDICATES, team_of
 from tests.support.program import ROOT
 from tests.support.solver_networks import compiled_by_brute_force
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from random import Random
 
@@ -101,16 +101,6 @@ def random_team(chance: Random, *, n_ary: bool = True) -> Team:
         constraints += [_random_table(chance, domains, scope, 0.35) for scope in triples if chance.random() < 0.4]
     constraints += [_random_table(chance, domains, (name,), 0.3) for name in domains if chance.random() < 0.15]
     return team_of(domains, constraints)
-
-
-def solutions(team: Team) -> Iterator[dict[str, int]]:
-    """All assignments that every constraint allows, one after the other, by trying them all."""
-    names = list(team.variables)
-    constraints = list(team.constraints())
-    for values in itertools.product(*(team.variables[name].domain for name in names)):
-        assignment = dict(zip(names, values, strict=True))
-        if all(constraint.allows(assignment) for constraint in constraints):
-            yield assignment
 
 
 teams = st.integers(0, 2**32).map(lambda seed: random_team(Random(seed)))

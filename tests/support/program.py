@@ -7,11 +7,12 @@ import os
 import pty
 import subprocess
 import sys
-from contextlib import redirect_stderr, redirect_stdout
+from contextlib import ExitStack, chdir, redirect_stderr, redirect_stdout
 from pathlib import Path
 from unittest.mock import patch
 
 from robochoc.cli.group import run
+from tests.support.limits import HANG_S
 
 PROGRAM = str(Path(sys.executable).parent / "robochoc")
 ROOT = Path(__file__).parents[2]
@@ -20,23 +21,49 @@ ROOT = Path(__file__).parents[2]
 def robochoc(*words: object, folder: Path | None = None) -> subprocess.CompletedProcess[str]:
     """Run the program; no run prints a traceback."""
     done = subprocess.run(
-        [PROGRAM, *map(str, words)], cwd=folder, capture_output=True, text=True, timeout=100, check=False
+        [PROGRAM, *map(str, words)], cwd=folder, capture_output=True, text=True, timeout=HANG_S, check=False
     )
     assert "Traceback" not in done.stderr, done.stderr
     return done
 
 
-def robochoc_within(*words: object) -> subprocess.CompletedProcess[str]:
-    """Run the program in this process, which takes a twentieth of the time; what it does not catch, the test gets."""
+class _Stream(io.TextIOWrapper):
+    """What is written to it, and whether it passes for a terminal."""
+
+    def __init__(self, *, terminal: bool) -> None:
+        super().__init__(io.BytesIO(), encoding="utf-8", write_through=True)
+        self._terminal = terminal
+
+    def isatty(self) -> bool:
+        return self._terminal
+
+    @property
+    def written(self) -> str:
+        assert isinstance(self.buffer, io.BytesIO)
+        return self.buffer.getvalue().decode()
+
+
+def robochoc_within(
+    *words: object, folder: Path | None = None, terminal: bool = False
+) -> subprocess.CompletedProcess[str]:
+    """Run the program in this process, which takes a twentieth of the time; what it does not catch, the test gets.
+
+    Its robots, solvers, routers and viewers have processes of their own all the same. What differs: signals are the
+    test's, warnings are errors, and modules are there already. `terminal`: standard error is one.
+    """
     command = [PROGRAM, *map(str, words)]
-    output, errors = (io.TextIOWrapper(io.BytesIO(), encoding="utf-8", write_through=True) for _ in range(2))
-    with patch.object(sys, "argv", command), redirect_stdout(output), redirect_stderr(errors):
+    output, errors = _Stream(terminal=False), _Stream(terminal=terminal)
+    with ExitStack() as place:
+        place.enter_context(patch.object(sys, "argv", command))
+        place.enter_context(redirect_stdout(output))
+        place.enter_context(redirect_stderr(errors))
+        if folder is not None:
+            place.enter_context(chdir(folder))
         try:
             status = run()
         except SystemExit as leaving:
             status = leaving.code if isinstance(leaving.code, int) else 1
-    printed, complaints = (stream.buffer.getvalue().decode() for stream in (output, errors))
-    return subprocess.CompletedProcess(command, status, printed, complaints)
+    return subprocess.CompletedProcess(command, status, output.written, errors.written)
 
 
 def on_a_terminal(*words: object) -> bytes:
@@ -51,6 +78,6 @@ def on_a_terminal(*words: object) -> bytes:
             except OSError:  # the program has hung up
                 break
             shown += chunk
-        running.wait(timeout=30)
+        running.wait(timeout=HANG_S)
     os.close(ours)
     return shown

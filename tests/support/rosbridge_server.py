@@ -14,6 +14,8 @@ from tornado.httpserver import HTTPServer
 from tornado.web import Application
 from tornado.websocket import WebSocketHandler
 
+from tests.support.limits import HANG_S
+
 Message = dict[str, Any]
 
 
@@ -51,12 +53,12 @@ class Server:
         self.changed = threading.Condition()
         self._thread = threading.Thread(target=self._run)
         self._thread.start()
-        assert self._ready.wait(10)
+        assert self._ready.wait(HANG_S)
         return self
 
     def __exit__(self, *_: object) -> None:
         self._loop.call_soon_threadsafe(self._end.set)
-        self._thread.join(10)
+        self._thread.join(HANG_S)
         assert not self._thread.is_alive()
 
     @property
@@ -77,8 +79,8 @@ class Server:
         for handler in [*self.handlers]:
             self._loop.call_soon_threadsafe(handler.break_off)
 
-    def wait_for(self, what: Callable[[], object], seconds: float = 5.0) -> bool:
-        """Whether that is so in time."""
+    def wait_for(self, what: Callable[[], object], seconds: float = HANG_S) -> bool:
+        """Whether that comes to be so."""
         with self.changed:
             return bool(self.changed.wait_for(what, seconds))
 

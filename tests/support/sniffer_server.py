@@ -21,6 +21,7 @@ from robochoc.run.options import Options, Runtime, Withdrawal
 from robochoc.sniffer.server import Server
 from robochoc.sniffer.session import SnifferSession
 from robochoc.view.address import loopback_socket, url_of
+from tests.support.limits import HANG_S
 
 TOKEN = "a-path-that-nobody-guesses"  # noqa: S105 - it is for tests
 
@@ -58,12 +59,12 @@ class SnifferServer:
 
     def __enter__(self) -> Self:
         self._thread.start()
-        assert self._ready.wait(10)
+        assert self._ready.wait(HANG_S)
         return self
 
     def __exit__(self, *_: object) -> None:
         self.loop.call_soon_threadsafe(self._serving.cancel)
-        self._thread.join(10)
+        self._thread.join(HANG_S)
 
     def _run(self) -> None:
         with suppress(asyncio.CancelledError), asyncio.Runner(loop_factory=lambda: self.loop) as runner:
@@ -83,7 +84,7 @@ class SnifferServer:
 
     def ask(self, what: str, **headers: str) -> Any:  # noqa: ANN401 - urllib's answer
         """The answer itself; of another status than 200: raises `HTTPError`."""
-        return urlopen(Request(self.url + what, headers=headers), timeout=20)  # noqa: S310 - our own server
+        return urlopen(Request(self.url + what, headers=headers), timeout=HANG_S)  # noqa: S310 - our own server
 
     def refusal(self, what: str, **headers: str) -> tuple[int, str]:
         """The status other than 200 that answers `what`, and why."""

@@ -28,6 +28,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import NamedTuple
 
+from tests.support.limits import HANG_S
 from tests.support.program import robochoc_within
 
 _FENCE = re.compile(
@@ -41,7 +42,8 @@ _VARIES = re.compile(r"\b\d[\d,]*(\.\d+)?(?= (?:seconds|s|ms|MB|MiB|times as fas
 _SERVES = re.compile(r"--sniff\b|--serve\b|--watch\b|robochoc sniff (?!.*--no-page)")
 _ALONE = {"network", "master", "robot", "directory"}
 """What leaves threads behind is run in a process of its own."""
-LONG_S = 100
+_LONG_S = 2 * HANG_S
+"""A command may wait for several events."""
 _INTERRUPTED = 130
 """The status of a program that Ctrl-C has ended, which is right where nothing else ends it."""
 
@@ -165,7 +167,7 @@ class Reader:
     def finish(self) -> None:
         """Wait for what runs in the background, the last that was started first, and compare what it has printed."""
         for step, process in reversed(self._background):
-            output, _ = process.communicate(timeout=LONG_S)
+            output, _ = process.communicate(timeout=_LONG_S)
             self._compare(step, Done(process.returncode, output), 0)
         self._background.clear()
 
@@ -174,7 +176,7 @@ class Reader:
         for _, process in self._background:
             if process.poll() is None:
                 os.killpg(process.pid, signal.SIGTERM)
-                process.communicate(timeout=LONG_S)
+                process.communicate(timeout=_LONG_S)
 
     def _here(self, code: str) -> str:
         for said, here in self._said.items():
@@ -229,7 +231,7 @@ class Reader:
             stdout=subprocess.PIPE,
             stderr=subprocess.STDOUT,
             text=True,
-            timeout=LONG_S,
+            timeout=_LONG_S,
             check=False,
         )
         return Done(done.returncode, done.stdout)
@@ -256,5 +258,5 @@ class Reader:
             if all(words in "".join(lines) for words in awaited):
                 os.kill(process.pid, signal.SIGINT)
                 break
-        rest, _ = process.communicate(timeout=LONG_S)
+        rest, _ = process.communicate(timeout=_LONG_S)
         return Done(process.returncode % _INTERRUPTED, "".join(lines) + rest)

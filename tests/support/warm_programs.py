@@ -48,10 +48,21 @@ class WarmPrograms:
             )
 
     def start(
-        self, words: Sequence[str], out: IO[bytes], err: IO[bytes], environment: Mapping[str, str], folder: Path
+        self,
+        words: Sequence[str],
+        out: IO[bytes],
+        err: IO[bytes],
+        environment: Mapping[str, str],
+        folder: Path,
+        namespace: str = "",
     ) -> WarmProcess:
-        """Start `robochoc` with `words`."""
-        request = {"words": list(words), "environment": dict(environment), "folder": str(folder)}
+        """Start `robochoc` with `words`, in a network `namespace` if that is given."""
+        request = {
+            "words": list(words),
+            "environment": dict(environment),
+            "folder": str(folder),
+            "namespace": namespace,
+        }
         with self._lock:
             socket.send_fds(self._socket, [json.dumps(request).encode()], [out.fileno(), err.fileno()])
             while "started" not in (answer := self._answer(HANG_S)):

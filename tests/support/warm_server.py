@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ctypes
 import gc
 import importlib
 import json
@@ -14,10 +15,14 @@ import socket
 import sys
 import time
 from contextlib import suppress
+from pathlib import Path
 
 from tests.support.warm_programs import HURRY, LONGEST
 
 A_DAY_S = 86_400.0
+_NAMESPACES = Path("/run/netns")
+_NETWORK = 0x40000000
+"""What `setns` calls CLONE_NEWNET."""
 
 _PACKAGES = ("robochoc.authority", "robochoc.communication.network", "robochoc.run.networked")
 _COMMANDS = tuple(f"robochoc.cli.commands.{name}" for name in ("directory", "master", "robot", "sniff", "sniff_master"))
@@ -71,8 +76,16 @@ def _become(request: dict[str, object], files: list[int]) -> None:
     os.environ.clear()
     os.environ.update(environment)
     os.chdir(str(request["folder"]))
+    if request["namespace"]:
+        _enter(str(request["namespace"]))
     _let_hurry()
     sys.argv = ["robochoc", *words]
+
+
+def _enter(namespace: str) -> None:
+    """Enter a network namespace, as `ip netns exec` does."""
+    with (_NAMESPACES / namespace).open() as file:
+        assert ctypes.CDLL(None).setns(file.fileno(), _NETWORK) == 0, f"{namespace} cannot be entered"
 
 
 def _let_hurry() -> None:

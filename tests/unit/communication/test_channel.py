@@ -25,8 +25,9 @@ from robochoc.model.outcome import Verdict
 from robochoc.model.problem import Team
 from robochoc.run import Options, Runtime, ScheduleName, Withdrawal, solve
 from robochoc.solver.encoding import UnsupportedError
+from tests.support.brute_force import solutions
 from tests.support.examples import examples
-from tests.support.problems import random_team, solutions, teams
+from tests.support.problems import random_team, teams
 from tests.support.program import ROOT
 
 RESCUE = ROOT / "docs" / "examples" / "rescue"

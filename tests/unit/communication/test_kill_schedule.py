@@ -2,22 +2,30 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import pytest
 
 from robochoc.communication.kill_schedule import Kill, KillSchedule
 from robochoc.communication.run_result import RobotsLostError
-from robochoc.formats import read_team
+from robochoc.formats import read_team, write_team
 from robochoc.model.outcome import Verdict
+from robochoc.model.problem import Team
 from robochoc.run.options import OnLoss, Options, Runtime
 from robochoc.run.orchestrator import solve
 from robochoc.solver.encoding import UnsupportedError
 from tests.support.problems import team_of
-from tests.support.program import ROOT
 
 TEAM = team_of({"A": (1, 2), "B": (1, 2)}, [])
-SEVEN = read_team(ROOT / "instances" / "queens3d-7")
-"""49 robots with files, which search for longer than it takes to notice a loss."""
-AT_ONCE = (Kill("Robot2.6", 0),)
+AT_ONCE = (Kill("RA", 0),)
+"""The master kills before it asks a second time whether all is quiet: no solution is found before."""
+
+
+@pytest.fixture
+def with_files(tmp_path: Path) -> Team:
+    """The team, as it is read: a spare robot begins with its file."""
+    write_team(TEAM, tmp_path / "team")
+    return read_team(tmp_path / "team")
 
 
 def test_each_is_due_once_after_the_search_began() -> None:
@@ -66,14 +74,14 @@ def test_kills_that_cannot_be(options: Options, why: str) -> None:
 
 
 def test_by_default_a_loss_ends_the_run() -> None:
-    with pytest.raises(RobotsLostError, match=r"^Robot2\.6 was lost: its process was killed by SIGKILL$"):
-        solve(SEVEN, Options(kill=AT_ONCE))
+    with pytest.raises(RobotsLostError, match=r"^RA was lost: its process was killed by SIGKILL$"):
+        solve(TEAM, Options(kill=AT_ONCE))
 
 
 @pytest.mark.parametrize("spares", [0, 1])
-def test_the_others_continue_and_it_may_come_back(spares: int) -> None:
+def test_the_others_continue_and_it_may_come_back(spares: int, with_files: Team) -> None:
     options = Options(protocol="dynabt", kill=AT_ONCE, on_loss=OnLoss.WITHDRAW, spares=spares)
-    outcome = solve(SEVEN, options)
+    outcome = solve(with_files, options)
     assert outcome.verdict is Verdict.SOLUTION
-    assert outcome.epochs[0].lost == ("Robot2.6",)
-    assert [len(epoch.robots) for epoch in outcome.epochs] == [49, 48 + spares]
+    assert outcome.epochs[0].lost == ("RA",)
+    assert [len(epoch.robots) for epoch in outcome.epochs] == [2, 1 + spares]

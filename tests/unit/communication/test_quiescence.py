@@ -73,6 +73,62 @@ def test_nobody_is_quiet_before_all_have_been_heard() -> None:
     assert not counters.due
 
 
+def test_the_silent_are_those_of_whom_nothing_is_known_then_those_that_owe_an_answer() -> None:
+    counters = FourCounters(("B", "A", "C"))
+    counters.hear("B", Counts(2, 1))
+    assert (counters.silent, counters.latest("A"), counters.latest("B")) == (("A", "C"), None, Counts(2, 1))
+    assert (counters.total, counters.sent) == (None, 2)
+    counters.hear("A", Counts(0, 1))
+    counters.hear("C", Counts(1, 1))
+    assert (counters.silent, counters.waving) == ((), False)
+    assert (counters.total, counters.sent) == (Counts(3, 3), 3)
+    wave = counters.begin_wave()
+    counters.answer("A", wave, Counts(0, 1))
+    assert (counters.silent, counters.waving) == (("B", "C"), True)
+
+
+def test_an_answer_to_an_older_wave_is_counted_and_ends_nothing() -> None:
+    counters = FourCounters(("A", "B"))
+    for robot in ("A", "B"):
+        counters.hear(robot, Counts(1, 1))
+    older = counters.begin_wave()
+    for robot in ("A", "B"):
+        counters.answer(robot, older, Counts(2, 1))
+    assert not counters.quiescent
+    for robot in ("A", "B"):
+        counters.hear(robot, Counts(2, 2))
+    newer = counters.begin_wave()
+    assert newer == older + 1
+    counters.answer("A", newer, Counts(2, 2))
+    counters.answer("B", older, Counts(2, 2))
+    assert (counters.quiescent, counters.silent) == (False, ("B",))
+    counters.answer("B", newer, Counts(2, 2))
+    assert counters.quiescent
+
+
+def test_a_wave_that_finds_the_same_is_not_enough_while_messages_are_under_way() -> None:
+    counters = FourCounters(("A", "B"))
+    for robot, counts in (("A", Counts(1, 0)), ("B", Counts(0, 0))):
+        counters.hear(robot, counts)
+    wave = counters.begin_wave()  # as the count is wanted
+    for robot, counts in (("A", Counts(1, 0)), ("B", Counts(0, 0))):
+        counters.answer(robot, wave, counts)
+    assert not counters.quiescent
+
+
+def test_a_wave_begun_before_all_were_heard_has_nothing_to_be_compared_with() -> None:
+    counters = FourCounters(("A", "B"))
+    wave = counters.begin_wave()
+    for robot in ("A", "B"):
+        counters.answer(robot, wave, Counts(0, 0))
+    assert not counters.quiescent
+    assert counters.due
+    wave = counters.begin_wave()
+    for robot in ("A", "B"):
+        counters.answer(robot, wave, Counts(0, 0))
+    assert counters.quiescent
+
+
 def test_one_balanced_wave_is_not_enough() -> None:
     counters = FourCounters(("A", "B"))
     counters.hear("A", Counts(1, 0))

@@ -16,7 +16,6 @@ from robochoc.model.outcome import Verdict
 from robochoc.model.problem import Constraint, Relation, Semantics, Team
 from robochoc.run import Options, Runtime, ScheduleName, Withdrawal, solve
 from tests.support import golden
-from tests.support.clocks import waiting
 from tests.support.examples import examples
 from tests.support.problems import team_of, teams
 
@@ -87,10 +86,10 @@ def test_a_timeout_is_an_unknown() -> None:
 
 
 def test_a_timeout_holds_where_a_packet_takes_long() -> None:
+    """The first one alone takes half an hour, and proves then that there is no solution."""
     never = Relation("R", 2, Semantics.SUPPORTS, ((-1, -1),))
     team = team_of({"X": range(20_000), "Y": range(20_000)}, [Constraint("C", never, ("X", "Y"), ("X", "Y"))])
-    with waiting(5):
-        outcome = solve(team, Options(runtime=Runtime.SIMULATOR, timeout=0.5))
+    outcome = solve(team, Options(runtime=Runtime.SIMULATOR, timeout=0.3))
     assert outcome.verdict is Verdict.UNKNOWN
 
 

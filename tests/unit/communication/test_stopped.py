@@ -80,7 +80,7 @@ WHY = re.compile(r"its process had been stopped \(SIGSTOP\) for \d+ s")
 
 def test_a_stopped_robot_is_lost_when_patience_is_over() -> None:
     lost: list[AnyEvent] = []
-    with ProcessesRun(TEAM, StopsItself, patience_s=0.3, observer=lost.append) as session:
+    with ProcessesRun(TEAM, StopsItself, patience_s=0.1, observer=lost.append) as session:
         with pytest.raises(RobotsLostError) as refused:
             session.search()
         pids = [robot.process.pid for robot in session._pool.robots.values()]  # noqa: SLF001 - nothing else knows them
@@ -91,7 +91,7 @@ def test_a_stopped_robot_is_lost_when_patience_is_over() -> None:
 
 
 def test_the_others_go_on_without_it() -> None:
-    with ProcessesRun(TEAM, StopsItself, patience_s=0.3, survive=True) as session:
+    with ProcessesRun(TEAM, StopsItself, patience_s=0.1, survive=True) as session:
         result = session.search()
         assert FIRST not in session._pool.robots  # noqa: SLF001 - nothing else knows them
     assert [*result.lost] == [FIRST]
@@ -145,4 +145,4 @@ def test_one_that_goes_on_in_time_is_told_of_and_not_lost(team: Path, tmp_path: 
 
 def test_one_that_computes_for_long_is_not_stopped() -> None:
     with ProcessesRun(TEAM, Spins, patience_s=0.05) as session:
-        assert session.search(timeout=1).verdict is Verdict.UNKNOWN
+        assert session.search(timeout=0.4).verdict is Verdict.UNKNOWN

@@ -273,7 +273,7 @@ def robots(draw: st.DrawFn) -> Robot:
     return Robot("Robot1", variables, kind, private, parents, children, topics, weight=weight)
 
 
-@examples(200, also_suppress=(HealthCheck.function_scoped_fixture,))
+@examples(60, slow=2000, also_suppress=(HealthCheck.function_scoped_fixture,))
 @given(robot=robots())
 def test_what_is_written_is_read_back(tmp_path: Path, robot: Robot) -> None:
     file = tmp_path / "Robot1.xml"

@@ -51,10 +51,10 @@ from robochoc.run.options import Options, Runtime
 from tests.support.broken import CASES
 from tests.support.broken_case import TEAM, write_files
 from tests.support.broken_objects import AS_IN_FILES, OF_OBJECTS, breakages
-from tests.support.clocks import working
 from tests.support.complex_problems import random_complex_team
 from tests.support.examples import examples
 from tests.support.problems import random_team, team_of
+from tests.support.steps import steps_of
 from tests.support.team_mutations import mutated
 
 HERE = Options(runtime=Runtime.SIMULATOR)
@@ -97,8 +97,7 @@ def test_the_messages_are_those_for_files(name: str, team: Team, tmp_path: Path)
 @pytest.mark.parametrize("name", OF_OBJECTS)
 def test_what_only_objects_can_get_wrong(name: str, team: Team) -> None:
     case = OF_OBJECTS[name]
-    with working(2):
-        found = refused(case.breakage(team)).diagnostics
+    found = refused(case.breakage(team)).diagnostics
     assert len(found) == len(case.expected), found
     for diagnostic, (place, message) in zip(found, case.expected, strict=True):
         assert place in diagnostic.file
@@ -246,10 +245,12 @@ def test_teams_that_are_gone_are_forgotten(team: Team) -> None:
     assert len(validating._valid) <= before  # noqa: SLF001
 
 
-def test_a_large_team_is_looked_at_quickly() -> None:
-    team = queens3d(11)
-    with working(2):
-        check_team(team)
+def test_a_large_team_takes_as_many_steps_for_each_constraint_as_a_small_one() -> None:
+    def steps(n: int) -> float:
+        team = replace(queens3d(n), name=f"queens of {n}")
+        return steps_of(lambda: check_team(team)) / len(list(team.constraints()))
+
+    assert steps(9) < steps(4)
 
 
 # Orders

@@ -13,11 +13,11 @@ from robochoc.model.outcome import Verdict
 from robochoc.model.problem import Constraint
 from robochoc.run import Options, Runtime, Withdrawal, solve
 from robochoc.verification.checker import needlessly_withdrawn, violations
-from tests.support.problems import ON_ONE_MACHINE
 from tests.support.program import ROOT
 
 FIGURE_2 = ROOT / "tests" / "data" / "figure2" / "Robot3.1.xml"
 INSTANCES = ROOT / "instances"
+IN_PROCESSES = pytest.param(Runtime.PROCESSES, marks=pytest.mark.slow)
 
 
 def attacks(model: QueensModel, one: tuple[int, int, int], other: tuple[int, int, int]) -> bool:
@@ -91,8 +91,15 @@ def test_absurd_sizes_are_refused(n: int) -> None:
         queens3d(n)
 
 
-@pytest.mark.parametrize("runtime", ON_ONE_MACHINE)
-@pytest.mark.parametrize("model", list(QueensModel))
+@pytest.mark.parametrize(
+    ("model", "runtime"),
+    [
+        (QueensModel.PLANAR, Runtime.SIMULATOR),
+        (QueensModel.FULL, Runtime.SIMULATOR),
+        (QueensModel.FULL, Runtime.PROCESSES),
+        pytest.param(QueensModel.PLANAR, Runtime.PROCESSES, marks=pytest.mark.slow),
+    ],
+)
 def test_four_has_no_solution_and_some_can_fly(model: QueensModel, runtime: Runtime) -> None:
     team = queens3d(4, model)
     assert solve(team, Options(runtime=runtime)).verdict is Verdict.NO_SOLUTION
@@ -104,7 +111,7 @@ def test_four_has_no_solution_and_some_can_fly(model: QueensModel, runtime: Runt
     assert len(outcome.assignment) <= most
 
 
-@pytest.mark.parametrize("runtime", ON_ONE_MACHINE)
+@pytest.mark.parametrize("runtime", [Runtime.SIMULATOR, IN_PROCESSES])
 @pytest.mark.parametrize("protocol", ["abt", "sfb"])
 @pytest.mark.parametrize(("model", "most"), [("planar", 10), ("full", 7)])
 def test_of_four_it_is_proven_how_many_can_fly(protocol: str, model: str, most: int, runtime: Runtime) -> None:
@@ -117,13 +124,14 @@ def test_of_four_it_is_proven_how_many_can_fly(protocol: str, model: str, most: 
     assert len(outcome.assignment) == most
 
 
-@pytest.mark.parametrize("runtime", ON_ONE_MACHINE)
+@pytest.mark.parametrize("runtime", [Runtime.SIMULATOR, IN_PROCESSES])
 def test_seven_has_a_solution_in_planar_and_none_in_full(runtime: Runtime) -> None:
     assert solve(queens3d(7, "planar"), Options(runtime=runtime)).verdict is Verdict.SOLUTION
     assert solve(queens3d(7, "full"), Options(runtime=runtime)).verdict is Verdict.NO_SOLUTION
 
 
-@pytest.mark.parametrize("model", [QueensModel.PLANAR, pytest.param(QueensModel.FULL, marks=pytest.mark.slow)])
+@pytest.mark.slow
+@pytest.mark.parametrize("model", list(QueensModel))
 def test_the_flagship_121_robots_in_121_processes(model: QueensModel) -> None:
     outcome = solve(queens3d(11, model), Options(timeout=100))
     assert outcome.verdict is Verdict.SOLUTION

@@ -14,7 +14,7 @@ from robochoc.generators.random_csp import random_csp
 from robochoc.model.orders import constraint_graph
 from robochoc.model.problem import INFINITE, ProblemKind, Semantics, Team
 from tests.support.binary_problems import edges_of, relation_of, shared_constraints
-from tests.support.program import robochoc
+from tests.support.program import robochoc_within
 
 
 def test_the_graph_is_model_bs() -> None:
@@ -93,13 +93,14 @@ def test_impossible_problems_are_refused() -> None:
 # On the command line
 
 
+@pytest.mark.usefixtures("in_a_folder")
 def test_generate_writes_costs_where_it_says(tmp_path: Path) -> None:
     words = ["generate", "random", "--agents", 6, "--domain", 3, "--density", 0.4, "--max-cost", 10, "--seed", 4]
-    done = robochoc(*words, folder=tmp_path)
+    done = robochoc_within(*words)
     folder = Path("instances") / "random-6-3-0.4-0.0-cost10-4"
     assert done.stdout == f"{folder}: 6 robots, 6 constraints; next: robochoc solve {folder}\n"
     assert read_team(tmp_path / folder) == random_csp(6, 3, 0.4, 0, 4, max_cost=10)
-    done = robochoc("generate", "coloring", "--agents", 6, "--degree", 3, "--connected", folder=tmp_path)
+    done = robochoc_within("generate", "coloring", "--agents", 6, "--degree", 3, "--connected")
     folder = Path("instances") / "coloring-6-3-3.0-0-connected"
     assert done.stdout == f"{folder}: 6 robots, 9 constraints; next: robochoc solve {folder}\n"
     assert read_team(tmp_path / folder) == coloring(6, 3, 3, connected=True)
@@ -115,8 +116,9 @@ def test_generate_writes_costs_where_it_says(tmp_path: Path) -> None:
         (["coloring", "--agents", 5], "--degree"),
     ],
 )
+@pytest.mark.usefixtures("in_a_folder")
 def test_what_does_not_fit_is_wrong_usage(tmp_path: Path, words: list[str], said: str) -> None:
-    done = robochoc("generate", *words, folder=tmp_path)
+    done = robochoc_within("generate", *words)
     assert done.returncode == 2
     assert said in done.stderr
     assert not list(tmp_path.iterdir())

@@ -13,7 +13,7 @@ from robochoc.generators.random_csp import random_csp
 from robochoc.model.orders import constraint_graph
 from robochoc.model.problem import Robot, Semantics
 from tests.support.binary_problems import edges_of, relation_of, shared_constraints
-from tests.support.program import robochoc
+from tests.support.program import robochoc_within
 
 SIZES = [
     (20, 10, 0.2, 0.6, 38, 60),
@@ -127,17 +127,18 @@ def test_a_graph_that_cannot_be_connected_is_refused() -> None:
 # On the command line
 
 
+@pytest.mark.usefixtures("in_a_folder")
 def test_generate_random_writes_where_it_says(tmp_path: Path) -> None:
     words = ["generate", "random", "--agents", 6, "--domain", 3, "--density", 0.4, "--tightness", 0.3, "--seed", 4]
-    done = robochoc(*words, folder=tmp_path)
+    done = robochoc_within(*words)
     folder = Path("instances") / "random-6-3-0.4-0.3-4"
     assert done.stdout == f"{folder}: 6 robots, 6 constraints; next: robochoc solve {folder}\n"
     assert read_team(tmp_path / folder) == random_csp(6, 3, 0.4, 0.3, 4)
-    again = robochoc(*words, folder=tmp_path)
+    again = robochoc_within(*words)
     assert again.returncode == 1
     assert "--force" in again.stderr
-    assert robochoc(*words, "--force", folder=tmp_path).returncode == 0
-    assert robochoc(*words, "--connected", "-o", tmp_path / "linked").returncode == 0
+    assert robochoc_within(*words, "--force").returncode == 0
+    assert robochoc_within(*words, "--connected", "-o", tmp_path / "linked").returncode == 0
     assert all(constraint_graph(read_team(tmp_path / "linked")).values())
 
 
@@ -151,9 +152,10 @@ def test_generate_random_writes_where_it_says(tmp_path: Path) -> None:
         (["--density", "0.1", "--connected"], "needs 4 constraints"),
     ],
 )
+@pytest.mark.usefixtures("in_a_folder")
 def test_impossible_problems_are_wrong_usage(tmp_path: Path, changed: list[str], said: str) -> None:
     words = ["generate", "random", "--agents", 5, "--domain", 3, "--density", 0.4, "--tightness", 0.3]
-    done = robochoc(*words, *changed, folder=tmp_path)
+    done = robochoc_within(*words, *changed)
     assert done.returncode == 2
     assert said in done.stderr
     assert not list(tmp_path.iterdir())

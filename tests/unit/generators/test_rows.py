@@ -13,7 +13,7 @@ from robochoc.model.outcome import Metrics, Outcome, Verdict
 from robochoc.run import Options, Runtime, solve
 from tests.support.flights import scene_of
 from tests.support.problems import ON_ONE_MACHINE
-from tests.support.program import robochoc
+from tests.support.program import robochoc_within
 
 
 @pytest.mark.parametrize("model", ["planar", "full"])
@@ -28,10 +28,11 @@ def test_a_team_of_rows_says_what_a_team_of_cells_says(model: str) -> None:
     assert all(len(robot.private) == 6 and len(robot.variables) == 4 for robot in rows.robots)
 
 
+@pytest.mark.usefixtures("in_a_folder")
 def test_a_team_of_rows_is_written_and_read_back(tmp_path: Path) -> None:
     write_team(queens3d(5, robots="rows"), tmp_path / "queens3d-5-rows")
     assert read_team(tmp_path / "queens3d-5-rows") == queens3d(5, robots="rows")
-    done = robochoc("generate", "queens3d", "--n", 5, "--robots", "rows", folder=tmp_path)
+    done = robochoc_within("generate", "queens3d", "--n", 5, "--robots", "rows")
     assert done.stdout.startswith("instances/queens3d-5-rows: 5 robots")
     assert read_team(tmp_path / "instances" / "queens3d-5-rows") == queens3d(5, robots="rows")
 
@@ -44,7 +45,7 @@ def test_a_team_of_rows_is_written_and_read_back(tmp_path: Path) -> None:
         (4, "full", Verdict.NO_SOLUTION),
         (7, "planar", Verdict.SOLUTION),
         (7, "full", Verdict.NO_SOLUTION),
-        (11, "planar", Verdict.SOLUTION),
+        pytest.param(11, "planar", Verdict.SOLUTION, marks=pytest.mark.slow),
     ],
 )
 def test_rows_reach_the_verdict_that_cells_reach(n: int, model: str, verdict: Verdict, runtime: Runtime) -> None:
@@ -63,7 +64,7 @@ def test_counts_of_rows_are_exact_and_repeat() -> None:
 
 def test_a_robot_takes_its_whole_row_from_the_scene(tmp_path: Path) -> None:
     write_team(queens3d(4, robots="rows"), tmp_path / "four")
-    result = json.loads(robochoc("solve", tmp_path / "four", "--withdraw", "--json").stdout)
+    result = json.loads(robochoc_within("solve", tmp_path / "four", "--withdraw", "--json").stdout)
     assert result["verified"] is True
     assert len(result["assignment"]) == 4 * (4 - len(result["withdrawn"]))
 

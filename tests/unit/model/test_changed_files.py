@@ -11,8 +11,9 @@ from robochoc.formats import read_robot, read_team, write_team
 from robochoc.model.problem import Domain, Robot, Team
 from robochoc.model.rejoin import rejoin
 from robochoc.model.team_edits import ChangeError, without_robots
+from tests.support.brute_force import solutions
 from tests.support.complex_changes import random_complex_changing_team
-from tests.support.problems import solutions, with_unique_definitions
+from tests.support.problems import with_unique_definitions
 from tests.support.random_changes import random_changing_team, stages
 from tests.support.small_teams import triangle
 

@@ -26,8 +26,8 @@ from robochoc.model.expression import (
     parse,
     text,
 )
-from tests.support.clocks import working
 from tests.support.examples import examples
+from tests.support.steps import steps_of
 
 NAMES = ("X", "Y", "i", "V3.1")
 FIGURE_2 = "and( (neq(X, Y) , neq( abs(minus(X , Y) ) , abs(minus(i-j) ) ) ) )"
@@ -131,7 +131,7 @@ def compiled_value(expression: Expression, values: Mapping[str, int]) -> int | N
         return None
 
 
-@examples(500)
+@examples(100, slow=3000)
 @given(st.one_of(NUMBERS, TRUTHS), ENVIRONMENTS)
 def test_evaluate_compiled_and_plain_python_agree(expression: Expression, values: dict[str, int]) -> None:
     expected = oracle(expression, values)
@@ -285,9 +285,15 @@ def test_errors_say_what_where_and_what_next(written: str, position: int, fragme
     ],
 )
 def test_deep_and_huge_texts_are_refused_quickly(written: str) -> None:
-    with working(1), pytest.raises(ExpressionError) as caught:
-        parse(written, ("X",), Type.BOOLEAN)
-    assert len(str(caught.value)) < 300
+    caught: list[ExpressionError] = []
+
+    def refused() -> None:
+        with pytest.raises(ExpressionError) as refusal:
+            parse(written, ("X",), Type.BOOLEAN)
+        caught.append(refusal.value)
+
+    assert steps_of(refused) < 1000 + 20 * len(written)
+    assert len(str(caught[0])) < 300
 
 
 GARBAGE = st.one_of(
@@ -297,7 +303,7 @@ GARBAGE = st.one_of(
 )
 
 
-@examples(500)
+@examples(100, slow=3000)
 @given(GARBAGE, st.sampled_from(Type))
 def test_garbage_is_an_expression_or_an_expression_error(written: str, wanted: Type) -> None:
     try:

@@ -19,8 +19,9 @@ from robochoc.model.problem import Child, Constraint, ConstraintModel, Parent, R
 from robochoc.protocols.order import PseudoTree
 from robochoc.run import Options, Runtime, solve
 from robochoc.solver.encoding import UnsupportedError
+from tests.support.brute_force import solutions
 from tests.support.complex_problems import complex_team, random_complex_team
-from tests.support.problems import random_team, shuffled, solutions, team_of, with_unique_definitions
+from tests.support.problems import random_team, shuffled, team_of, with_unique_definitions
 from tests.support.small_teams import DIFFERENT, graph_team, pkc_team
 
 SIMULATED = Options(runtime=Runtime.SIMULATOR, cache=False)

@@ -21,29 +21,29 @@ ALL_FLY = Options(protocol="abt", runtime=Runtime.SIMULATOR)
 
 
 @pytest.fixture(scope="module")
-def four() -> Journal:
-    """Four queens' robots search, and as few as possible withdraw: two runs."""
-    journal = recorded(queens3d(4), replace(ALL_FLY, withdraw=Withdrawal.MINIMUM))
+def three() -> Journal:
+    """Three queens' robots search, and as few as possible withdraw: two runs."""
+    journal = recorded(queens3d(3), replace(ALL_FLY, withdraw=Withdrawal.MINIMUM))
     assert replay(journal).identical
     return journal
 
 
-def test_a_header_that_is_another_runs_is_found(four: Journal) -> None:
+def test_a_header_that_is_another_runs_is_found(three: Journal) -> None:
     for field, value in (("protocol", "afc"), ("seed", 7), ("order", ("Robot1.2", "Robot1.1"))):
         changes: dict[str, Any] = {field: value}
-        header = msgspec.structs.replace(four.header, **changes)
-        assert four.outcome is not None
-        own = replace(four.outcome, **changes) if field != "order" else four.outcome
-        found = replay(replace(four, header=header, outcome=own))
+        header = msgspec.structs.replace(three.header, **changes)
+        assert three.outcome is not None
+        own = replace(three.outcome, **changes) if field != "order" else three.outcome
+        found = replay(replace(three, header=header, outcome=own))
         assert [one.what for one in found.contradictions] == [f"the header's {field}"]
         assert not found.identical
     for field, value in (("team", "five"), ("runtime", "processes")):
-        found = replay(replace(four, header=msgspec.structs.replace(four.header, **{field: value})))
+        found = replay(replace(three, header=msgspec.structs.replace(three.header, **{field: value})))
         assert [one.what for one in found.contradictions] == [f"the outcome's {field}"]
 
 
-def test_an_outcome_that_does_not_follow_is_found(four: Journal) -> None:
-    outcome = four.outcome
+def test_an_outcome_that_does_not_follow_is_found(three: Journal) -> None:
+    outcome = three.outcome
     assert outcome is not None
     metrics = outcome.metrics
     other = dict(outcome.assignment)
@@ -60,7 +60,7 @@ def test_an_outcome_that_does_not_follow_is_found(four: Journal) -> None:
         ("checks", replace(outcome, metrics=replace(metrics, checks=0))),
         ("largest", replace(outcome, metrics=replace(metrics, largest=metrics.largest + 1))),
     ):
-        found = replay(replace(four, outcome=claimed))
+        found = replay(replace(three, outcome=claimed))
         assert found.difference is None
         assert [one.what for one in found.contradictions] == [f"the outcome's {field}"]
         assert not found.identical

@@ -164,7 +164,7 @@ main_container.set_agent_type("MasterABT")
 main_container.add_agent("MASTER", sniff=False)
 {settings}
 events = []
-outcome = main_container.run(observer=events.append, gather_s=60)
+outcome = main_container.run(observer=events.append, gather_s=600)
 print(outcome.verdict, outcome.protocol, dict(sorted(outcome.assignment.items())), outcome.verified)
 print(*sorted({{event.sender for event in events if type(event).__name__ == "Sent"}}))
 """

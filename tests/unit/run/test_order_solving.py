@@ -18,8 +18,9 @@ from robochoc.run import Options, Runtime, solve
 from robochoc.run.registry import protocol_named
 from robochoc.solver.central import CentralAnswer, CentralSolver
 from robochoc.verification.checker import violations
+from tests.support.brute_force import solutions
 from tests.support.complex_problems import random_complex_team
-from tests.support.problems import random_team, shuffled, solutions
+from tests.support.problems import random_team, shuffled
 from tests.support.small_teams import graph_team
 from tests.support.solver_networks import compiled_by_brute_force
 

@@ -26,7 +26,7 @@ from robochoc.sniffer import live_trace, server
 from robochoc.sniffer.page_data import message_columns, step_columns
 from robochoc.sniffer.session import SnifferSession
 from robochoc.sniffer.trace import Trace
-from tests.support.limits import wait_until
+from tests.support.limits import HANG_S, wait_until
 from tests.support.sniffer_server import TOKEN, SnifferServer, header, journal_of, run_events, sniffer_server
 
 EVENTS, OUTCOME = run_events()
@@ -147,7 +147,7 @@ def test_json_is_compressed_where_the_browser_can(page: SnifferServer) -> None:
 
 
 def test_only_this_machine_is_listened_to(page: SnifferServer) -> None:
-    with pytest.raises(OSError, match="refused"), socket.create_connection(("127.0.0.2", page.port), 2):
+    with pytest.raises(OSError, match="refused"), socket.create_connection(("127.0.0.2", page.port), HANG_S):
         pass
 
 
@@ -164,7 +164,7 @@ def blocks(events: list[AnyEvent], outcome: Outcome | None, sizes: int) -> list[
 def in_the_loop(page: SnifferServer, does: Callable[[], Any]) -> Any:  # noqa: ANN401
     """What `does`, a coroutine's maker, comes to in the server's own loop."""
     future: Future[Any] = asyncio.run_coroutine_threadsafe(does(), page.loop)
-    return future.result(20)
+    return future.result(HANG_S)
 
 
 def connected(page: SnifferServer) -> WebSocketClientConnection:
@@ -177,7 +177,7 @@ async def _connect(url: str, **headers: str) -> WebSocketClientConnection:
 
 
 async def _news_until(socket: WebSocketClientConnection, enough: Callable[[dict[str, Any]], bool]) -> dict[str, Any]:
-    async with asyncio.timeout(15):
+    async with asyncio.timeout(HANG_S):
         while True:
             message = await socket.read_message()
             assert message is not None
@@ -215,7 +215,7 @@ def test_another_site_hears_no_news(page: SnifferServer) -> None:
 
 
 def test_bundles_out_of_order_are_put_in_order_at_the_end(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    events, outcome = run_events(Runtime.PROCESSES)
+    events, outcome = run_events(Runtime.PROCESSES, 3)
     content = journal_of(events, outcome, header("processes"))
     expected = Trace.of(read_journal(content))
     monkeypatch.setattr(live_trace, "PIECE_BYTES", 700)

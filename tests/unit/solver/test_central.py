@@ -27,8 +27,8 @@ from robochoc.solver.failures import SolverLostError
 from robochoc.solver.symmetry import Symmetry, break_symmetries, orbits, symmetries
 from robochoc.solver.team_network import identifiers
 from robochoc.verification.checker import RefutedError
+from tests.support.brute_force import solutions
 from tests.support.complex_problems import complex_team, random_complex_team
-from tests.support.problems import solutions
 from tests.support.solver_networks import brute_force, misheard
 from tests.support.xcsp3_solvers import integers, rows_of, run_java, solver_jar
 

@@ -29,10 +29,10 @@ from robochoc.solver.failures import SolverLostError
 from robochoc.verification.checker import RefutedError, violations
 from robochoc.verification.objective import withdrawal_cost
 from robochoc.verification.second_opinion import contradiction
+from tests.support.brute_force import least_cost
 from tests.support.complex_problems import complex_team, random_complex_team
 from tests.support.cost_problems import (
     cost_of,
-    least_cost,
     minimum_withdrawal,
     random_complex_cost_team,
     random_cost_team,

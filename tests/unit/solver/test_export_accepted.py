@@ -14,9 +14,10 @@ from robochoc.generators.queens3d import queens3d
 from robochoc.model.problem import INFINITE, Constraint, ProblemKind, Relation, Semantics, Team
 from robochoc.solver.ace import AceProcess
 from robochoc.solver.encoding import UnsupportedError
+from tests.support.brute_force import least_cost, solutions
 from tests.support.complex_problems import complex_team, random_complex_team
-from tests.support.cost_problems import least_cost, random_complex_cost_team, random_cost_team, with_costs
-from tests.support.problems import random_team, solutions, team_of
+from tests.support.cost_problems import random_complex_cost_team, random_cost_team, with_costs
+from tests.support.problems import random_team, team_of
 from tests.support.program import robochoc_within
 from tests.support.warm_ace import ace_said
 

@@ -17,8 +17,9 @@ from robochoc.generators.coloring import coloring
 from robochoc.model.problem import INFINITE, Constraint, Relation, Semantics, Team
 from robochoc.solver.ace import AceProcess
 from robochoc.solver.encoding import UnsupportedError
+from tests.support.brute_force import least_cost
 from tests.support.complex_problems import complex_team
-from tests.support.cost_problems import least_cost, random_complex_cost_team, random_cost_team, with_costs
+from tests.support.cost_problems import random_complex_cost_team, random_cost_team, with_costs
 from tests.support.problems import team_of
 from tests.support.program import robochoc, robochoc_within
 from tests.support.xcsp3_solvers import integers, rows_of, run_java, solver_jar

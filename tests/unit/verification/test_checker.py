@@ -2,17 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from typing import ClassVar
 
 import pytest
 from hypothesis import given
 
 import robochoc.run.orchestrator
+import robochoc.verification.checker
 from robochoc.generators.queens3d import queens3d
 from robochoc.model.expression import Type, parse
 from robochoc.model.message import Message
-from robochoc.model.problem import INFINITE, Constraint, Predicate, Relation, Semantics, Team
+from robochoc.model.problem import INFINITE, Constraint, Domain, Predicate, Relation, Robot, Semantics, Team, Variable
 from robochoc.protocols.abt import Ok
 from robochoc.protocols.protocol import Protocol
 from robochoc.run import Options, Runtime, solve
@@ -20,9 +21,11 @@ from robochoc.verification.checker import (
     RefutedError,
     assignment_cost,
     constraint_cost,
+    has_local_solution,
     needlessly_withdrawn,
     violations,
 )
+from robochoc.verification.second_opinion import total_cost
 from tests.support.examples import examples
 from tests.support.problems import ON_ONE_MACHINE, team_of, teams
 
@@ -35,7 +38,7 @@ def some_assignments(team: Team) -> Iterator[dict[str, int]]:
 
 
 @given(team=teams)
-@examples(100)
+@examples(50, slow=1000)
 def test_it_agrees_with_the_model_of_the_problem(team: Team) -> None:
     for assignment in some_assignments(team):
         truth = all(constraint.allows(assignment) for constraint in team.constraints())
@@ -91,6 +94,55 @@ def test_an_undefined_predicate_is_a_broken_one() -> None:
     assert constraint_cost(constraint, {"A": 1, "B": 0}) == 7
     team = team_of({"A": (1,), "B": (0,)}, [constraint])
     assert assignment_cost(team, {"A": 1, "B": 0}) == 7
+
+
+def alone(variables: dict[str, Sequence[int]], *constraints: Constraint) -> Robot:
+    """A robot without neighbours."""
+    domains = {name: Domain(name, tuple(range(value, value + 1) for value in own)) for name, own in variables.items()}
+    return Robot("R", tuple(Variable(name, domain) for name, domain in domains.items()), private=constraints)
+
+
+EQUAL = Relation("E", 2, Semantics.SUPPORTS, ((1, 1), (2, 2), (3, 3)))
+
+
+def test_a_robot_has_a_local_solution_if_its_private_constraints_have_one() -> None:
+    forbids_one = Constraint("F", Relation("F", 1, Semantics.CONFLICTS, ((1,),)), ("B",), ("B",))
+    equal = Constraint("E", EQUAL, ("A", "B"), ("A", "B"))
+    assert has_local_solution(alone({"A": (1, 2), "B": (1, 2)}, equal, forbids_one)) is True
+    assert has_local_solution(alone({"A": (1, 2), "B": (1,)}, equal, forbids_one)) is False
+    assert has_local_solution(alone({"A": (1, 2), "B": (3, 4)}, equal)) is False
+    dear = Constraint("S", Relation("S", 1, Semantics.SOFT, ((1,),), (9,)), ("A",), ("A",))
+    assert has_local_solution(alone({"A": (1,)}, dear)) is True, "a cost rules nothing out"
+
+
+def test_who_tries_too_often_leaves_it_open(monkeypatch: pytest.MonkeyPatch) -> None:
+    equal = Constraint("E", EQUAL, ("A", "B"), ("A", "B"))
+    robot = alone({"A": (1, 2), "B": (3, 4)}, equal)  # two values of A, each with two of B: six tries
+    monkeypatch.setattr(robochoc.verification.checker, "MAX_TRIES", 7)
+    assert has_local_solution(robot) is False
+    monkeypatch.setattr(robochoc.verification.checker, "MAX_TRIES", 5)
+    assert has_local_solution(robot) is None
+    assert has_local_solution(alone({"A": (1, 2, 3), "B": (3,)}, equal)) is None
+    monkeypatch.setattr(robochoc.verification.checker, "MAX_TRIES", 6)
+    assert has_local_solution(alone({"A": (1, 2, 3), "B": (3,)}, equal)) is True
+
+
+def test_who_cannot_join_is_not_named() -> None:
+    conflict = Relation("R", 2, Semantics.CONFLICTS, ((1, 1), (2, 1)))
+    team = team_of({"A": (1, 2), "B": (1,), "C": (1,)}, [Constraint("C", conflict, ("A", "B"), ("A", "B"))])
+    assert list(needlessly_withdrawn(team, {"A": 1}, ("RB", "RC"))) == ["RC"]
+    assert list(needlessly_withdrawn(team, {"B": 1}, ("RA", "RC"))) == ["RC"]
+    assert list(needlessly_withdrawn(team, {}, ("RA", "RB", "RC"))) == ["RA", "RB", "RC"], "each for itself"
+
+
+def test_costs_are_of_constraints_whose_variables_all_have_values() -> None:
+    price = Relation("P", 2, Semantics.SOFT, ((1, 1),), (4,), 1)
+    team = team_of(
+        dict.fromkeys("ABC", (1, 2)), [Constraint(f"C{at}", price, tuple(at), tuple(at)) for at in ("AB", "BC")]
+    )
+    assert [assignment_cost(team, at) for at in ({"A": 1}, {"A": 1, "B": 1}, {"A": 1, "B": 1, "C": 2})] == [0, 4, 5]
+    assert total_cost(team, {"A": 1, "B": 1}, None) == 4
+    assert total_cost(team, {"A": 1}, 10) == 20
 
 
 class Liar(Protocol):

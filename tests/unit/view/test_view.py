@@ -30,6 +30,8 @@ from robochoc.view.live import serve_scene
 from robochoc.view.page import scene_page
 from robochoc.view.scene import DrawnDrone, Scene
 from tests.support.flights import scene_of, straight
+from tests.support.limits import HANG_S
+from tests.support.live_scenes import served_scene
 
 HOSTILE = "</script><img src=x onerror=alert(1)>/../__proto__"
 
@@ -321,17 +323,17 @@ def live_viewer() -> Iterator[tuple[subprocess.Popen[str], int, str]]:
     with subprocess.Popen([sys.executable, "-W", "error", "-c", LIVE], stdout=subprocess.PIPE, text=True) as process:
         try:
             assert process.stdout
-            url = process.stdout.readline()
-            parts = re.fullmatch(r"http://127\.0\.0\.1:(\d+)(/[\w-]{24}/)\n", url)
-            assert parts, url
-            yield process, int(parts[1]), parts[2]
+            yield process, *port_and_path(process.stdout.readline().removesuffix("\n"))
         finally:
             process.kill()
 
 
 def first_message(port: int, path: str, host: str, origin: str) -> tuple[int, bytes]:
     """The status of a WebSocket handshake and, if it was accepted, the first message."""
-    with socket.create_connection(("127.0.0.1", port), timeout=10) as connection, connection.makefile("rwb") as stream:
+    with (
+        socket.create_connection(("127.0.0.1", port), timeout=HANG_S) as connection,
+        connection.makefile("rwb") as stream,
+    ):
         stream.write(
             f"GET {path}commands HTTP/1.1\r\nHost: {host}\r\nOrigin: http://{origin}\r\nUpgrade: websocket\r\n"
             "Connection: Upgrade\r\nSec-WebSocket-Key: dGhlIHNhbXBsZSBub25jZQ==\r\n"
@@ -349,36 +351,50 @@ def first_message(port: int, path: str, host: str, origin: str) -> tuple[int, by
         return status, stream.read(size)
 
 
-def test_the_live_viewer_serves_page_and_commands() -> None:
-    with live_viewer() as (_, port, path):
-        with urlopen(f"http://127.0.0.1:{port}{path}", timeout=10) as answer:
-            assert b"live team" in answer.read()
-        status, message = first_message(port, path, f"localhost:{port}", f"localhost:{port}")
-        assert status == 101
-        assert umsgpack.unpackb(message)["type"] == "set_transform"
+@pytest.fixture(scope="module")
+def live() -> Iterator[tuple[int, str]]:
+    """The port of a live viewer, and the path that nobody guesses."""
+    one = Outcome("live team", "abt", "processes", 0, Verdict.SOLUTION, {"V1.1": 1})
+    with served_scene(scene_of(one)) as url:
+        yield port_and_path(url)
 
 
-def test_the_live_viewer_answers_this_machine_only() -> None:
-    with live_viewer() as (_, port, path):
-        for host in ("evil.example", f"127.0.0.1.evil.example:{port}", "localhost.evil.example"):
-            with pytest.raises(HTTPError, match="404") as refused:
-                urlopen(Request(f"http://127.0.0.1:{port}{path}", headers={"Host": host}), timeout=10)
-            refused.value.close()
-            assert first_message(port, path, host, host)[0] == 404
-        assert first_message(port, path, f"127.0.0.1:{port}", "evil.example")[0] == 403
+def port_and_path(url: str) -> tuple[int, str]:
+    parts = re.fullmatch(r"http://127\.0\.0\.1:(\d+)(/[\w-]{24}/)", url)
+    assert parts, url
+    return int(parts[1]), parts[2]
 
 
-def test_the_live_viewer_answers_those_only_who_know_its_path() -> None:
-    with live_viewer() as (_, port, path):
-        here = f"127.0.0.1:{port}"
-        for guess in ("/", "//", f"/{'x' * 24}/", path[:-2] + "/", path.upper()):
-            with pytest.raises(HTTPError, match="404") as refused:
-                urlopen(f"http://{here}{guess}", timeout=10)
-            refused.value.close()
-            assert first_message(port, guess, here, here)[0] == 404
-        with pytest.raises(HTTPError, match="403") as refused:
-            urlopen(Request(f"http://{here}{path}", headers={"Origin": "http://evil.example"}), timeout=10)
+def test_the_live_viewer_serves_page_and_commands(live: tuple[int, str]) -> None:
+    port, path = live
+    with urlopen(f"http://127.0.0.1:{port}{path}", timeout=HANG_S) as answer:
+        assert b"live team" in answer.read()
+    status, message = first_message(port, path, f"localhost:{port}", f"localhost:{port}")
+    assert status == 101
+    assert umsgpack.unpackb(message)["type"] == "set_transform"
+
+
+def test_the_live_viewer_answers_this_machine_only(live: tuple[int, str]) -> None:
+    port, path = live
+    for host in ("evil.example", f"127.0.0.1.evil.example:{port}", "localhost.evil.example"):
+        with pytest.raises(HTTPError, match="404") as refused:
+            urlopen(Request(f"http://127.0.0.1:{port}{path}", headers={"Host": host}), timeout=HANG_S)
         refused.value.close()
+        assert first_message(port, path, host, host)[0] == 404
+    assert first_message(port, path, f"127.0.0.1:{port}", "evil.example")[0] == 403
+
+
+def test_the_live_viewer_answers_those_only_who_know_its_path(live: tuple[int, str]) -> None:
+    port, path = live
+    here = f"127.0.0.1:{port}"
+    for guess in ("/", "//", f"/{'x' * 24}/", path[:-2] + "/", path.upper()):
+        with pytest.raises(HTTPError, match="404") as refused:
+            urlopen(f"http://{here}{guess}", timeout=HANG_S)
+        refused.value.close()
+        assert first_message(port, guess, here, here)[0] == 404
+    with pytest.raises(HTTPError, match="403") as refused:
+        urlopen(Request(f"http://{here}{path}", headers={"Origin": "http://evil.example"}), timeout=HANG_S)
+    refused.value.close()
 
 
 @pytest.mark.skipif(not Path("/proc/net/tcp").exists(), reason="needs Linux's /proc")
@@ -389,7 +405,7 @@ def test_the_live_viewer_listens_on_loopback_only_and_leaves_nothing() -> None:
         assert children.read_text() == ""
         first_message(port, path, f"127.0.0.1:{port}", f"127.0.0.1:{port}")
         process.send_signal(signal.SIGINT)
-        assert process.wait(10) == 0
+        assert process.wait(HANG_S) == 0
         assert process.stdout
         assert process.stdout.read() == "left\n"
         with pytest.raises(ConnectionRefusedError):

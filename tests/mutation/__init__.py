@@ -1,0 +1,1 @@
+"""Mutation testing: code is spoilt in one place, and the tests should notice (`make mutate`)."""
