@@ -3,14 +3,25 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from contextlib import ExitStack
 from typing import Any
 
 import pytest
 
 from robochoc.sniffer.session import SnifferSession
+from tests.support import leftovers
 from tests.support.browser_pages import chromium
+from tests.support.leftovers import shared_by_tests
 from tests.support.sniffer_pages import WHOLE, Page, shown
 from tests.support.sniffer_server import SnifferServer, sniffer_server
+
+
+@pytest.fixture(autouse=True)
+def nothing_left_behind(no_process_left: None) -> Iterator[None]:
+    """As elsewhere; but the browser keeps connections to the server that tests share, and makes new ones."""
+    del no_process_left
+    with leftovers.nothing_left_behind(but="descriptor socket"):
+        yield
 
 
 @pytest.fixture(scope="package")
@@ -34,7 +45,10 @@ def server(without_the_scenes_viewer: None, tmp_path_factory: pytest.TempPathFac
     del without_the_scenes_viewer  # it only has to be there before the page is made
     file = tmp_path_factory.mktemp("sniffed") / "run.journal"
     file.write_bytes(WHOLE)
-    with sniffer_server(SnifferSession(file)) as running:
+    with ExitStack() as stack:
+        with shared_by_tests():
+            running = stack.enter_context(sniffer_server(SnifferSession(file)))
+            running.get("states?robot=0&chunk=0")  # all its threads have begun
         yield running
 
 

@@ -26,6 +26,7 @@ from robochoc.communication.network.transport import Transport
 from robochoc.communication.network.zenoh_config import RX_BYTES, config
 from robochoc.generators.random_csp import random_csp
 from robochoc.protocols.abt import ABT
+from tests.support.leftovers import shared_by_tests
 from tests.support.limits import HANG_S
 from tests.support.ports import free_endpoint
 from tests.support.program import ROOT
@@ -153,7 +154,8 @@ def test_what_was_sent_in_an_outage_arrives_without_a_heartbeat(
     sent = [FrameArrived("A", number.to_bytes(2)) for number in range(50)]
     for each in sent:
         sender.send("B", each.content)
-    router.open(REACH)
+    with shared_by_tests():
+        router.open(REACH)
     assert [frame(receiver) for _ in sent] == sent
 
 

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import shutil
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import pytest
 
+from tests.support.leftovers import shared_by_tests
 from tests.support.limits import HANG_S
 
 if TYPE_CHECKING:
@@ -23,8 +24,10 @@ def chromium() -> Iterator[Any]:
     playwright = pytest.importorskip("playwright.sync_api")
     if _CHROMIUM is None:
         pytest.skip("no Chromium on the path")
-    with playwright.sync_playwright() as play:
-        browser = play.chromium.launch(executable_path=_CHROMIUM, args=["--no-sandbox"], timeout=HANG_S * 1000)
+    with ExitStack() as stack:
+        with shared_by_tests(with_children=True):
+            play = stack.enter_context(playwright.sync_playwright())
+            browser = play.chromium.launch(executable_path=_CHROMIUM, args=["--no-sandbox"], timeout=HANG_S * 1000)
         yield browser
         browser.close()
 

@@ -19,11 +19,11 @@ from pathlib import Path
 from typing import NamedTuple, Self
 from weakref import WeakSet
 
-from tests.support.limits import wait_until
+from tests.support.limits import HANG_S, wait_until
 from tests.support.program import ROOT
 
-WITHIN_S = 20.0
-"""What ends by itself has ended by then."""
+WITHIN_S = HANG_S
+"""What ends by itself has ended by then, however busy the machine is."""
 MARK = "ROBOCHOC_TESTS"
 """The environment's variable that all processes of a test run inherit."""
 _OWN_KINDS = ("anon_inode:", "/dev/", "/proc/", "/sys/")
@@ -40,6 +40,7 @@ _shared_threads: WeakSet[threading.Thread] = WeakSet()
 _shared_processes: set[int] = set()
 _shared_descriptors: set[str] = set()
 _shared_files: set[str] = set()
+_shared_programs: set[int] = set()
 
 
 class Belongings(NamedTuple):
@@ -62,6 +63,8 @@ class Belongings(NamedTuple):
         threads = {thread for thread in now.threads - self.threads if thread not in _shared_threads}
         processes = {pid for pid in now.processes - self.processes - _shared_processes if not _is_helper(pid)}
         descriptors = now.descriptors - self.descriptors - _shared_descriptors
+        for helper in filter(_is_helper, now.processes - self.processes if descriptors else ()):
+            descriptors -= set(_descriptors(helper))  # the other ends of what holds them
         return [
             *(f"thread {thread.name}" for thread in threads),
             *(f"process {pid}: {_command(pid)}" for pid in processes),
@@ -71,23 +74,37 @@ class Belongings(NamedTuple):
 
 
 @contextmanager
-def nothing_left_behind() -> Iterator[None]:
-    """Whatever was begun inside must have ended afterwards, or end by itself."""
+def nothing_left_behind(but: str = "nothing") -> Iterator[None]:
+    """Whatever was begun inside must have ended afterwards, or end by itself.
+
+    Args:
+        but: The beginning of what may stay, as in "descriptor socket".
+    """
     before = Belongings.now()
+
+    def left() -> list[str]:
+        return [each for each in before.left() if not each.startswith(but)]
+
     yield
-    if before.left():
+    if left():
         gc.collect()
-        wait_until(lambda: not before.left(), lambda: f"left behind: {before.left()}", WITHIN_S)
+        wait_until(lambda: not left(), lambda: f"left behind: {left()}", WITHIN_S)
 
 
 @contextmanager
-def shared_by_tests() -> Iterator[None]:
-    """What is begun inside is shared by tests: none of them has left it behind."""
+def shared_by_tests(*, with_children: bool = False) -> Iterator[None]:
+    """What is begun inside is shared by tests: none of them has left it behind.
+
+    Args:
+        with_children: The same holds for all that its processes start later, as a browser does.
+    """
     before = Belongings.now()
     yield
     now = Belongings.now()
     _shared_threads.update(now.threads - before.threads)
     _shared_processes.update(now.processes - before.processes)
+    if with_children:
+        _shared_programs.update(now.processes - before.processes)
     _shared_descriptors.update(now.descriptors - before.descriptors)
     _shared_files.update(now.files - before.files)
 
@@ -99,7 +116,7 @@ def no_process_left(mark: str) -> Iterator[None]:
 
     def left() -> list[str]:
         new = set(_marked(mark)) - before - _shared_processes
-        return [f"{pid}: {_command(pid)}" for pid in new if not _is_helper(pid)]
+        return [f"{pid}: {_command(pid)}" for pid in new if not (_is_helper(pid) or _is_of_a_shared_program(pid))]
 
     yield
     wait_until(lambda: not left(), lambda: f"processes left behind: {left()}", WITHIN_S)
@@ -109,21 +126,38 @@ def _children() -> Iterator[int]:
     """Yield the processes below this one that run."""
     below = [os.getpid()]
     while below:
-        pid = below.pop()
-        with suppress(OSError):
-            for task in Path(f"/proc/{pid}/task").iterdir():
-                with suppress(OSError):
-                    found = [int(child) for child in (task / "children").read_text().split()]
-                    below.extend(found)
-                    yield from found
+        found = _children_of(below.pop())
+        below.extend(found - _shared_programs)
+        yield from found
 
 
-def _descriptors() -> Iterator[str]:
-    for entry in Path("/proc/self/fd").iterdir():
-        with suppress(OSError):
-            target = str(entry.readlink())
-            if not target.startswith(_OWN_KINDS):
-                yield target
+def _children_of(pid: int) -> set[int]:
+    found: set[int] = set()
+    with suppress(OSError):
+        for task in Path(f"/proc/{pid}/task").iterdir():
+            with suppress(OSError):
+                found.update(map(int, (task / "children").read_text().split()))
+    return found
+
+
+def _is_of_a_shared_program(pid: int) -> bool:
+    while pid > 1:
+        if pid in _shared_programs:
+            return True
+        try:
+            pid = int(Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[1])
+        except OSError:
+            return False
+    return False
+
+
+def _descriptors(pid: str | int = "self") -> Iterator[str]:
+    with suppress(OSError):
+        for entry in Path(f"/proc/{pid}/fd").iterdir():
+            with suppress(OSError):
+                target = str(entry.readlink())
+                if not target.startswith(_OWN_KINDS):
+                    yield target
 
 
 def _files() -> frozenset[str]:

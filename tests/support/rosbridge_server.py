@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import importlib
 import json
 import socket
 import threading
@@ -14,6 +15,7 @@ from tornado.httpserver import HTTPServer
 from tornado.web import Application
 from tornado.websocket import WebSocketHandler
 
+from tests.support.leftovers import shared_by_tests
 from tests.support.limits import HANG_S
 
 Message = dict[str, Any]
@@ -48,6 +50,8 @@ class Server:
     handlers: list[Handler] = field(default_factory=list)
 
     def __enter__(self) -> Self:
+        with shared_by_tests():  # roslibpy has one loop for all connections of a process
+            importlib.import_module("roslibpy.comm.comm_asyncio")._get_shared_manager().run()  # noqa: SLF001
         self._loop = asyncio.new_event_loop()
         self._ready, self._end = threading.Event(), asyncio.Event()
         self.changed = threading.Condition()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import ExitStack
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -95,11 +96,14 @@ def _session(journal: Path, chosen: str, folder: Path | None) -> SnifferSession:
     from robochoc.sniffer.trace import TraceTooLargeError
 
     robots = {robot.name: robot for robot in read_team(folder).robots} if folder else {}
-    try:
-        session = SnifferSession(journal, chosen=patterns_in(chosen), robots=robots)
-        session.begin()
-    except (JournalError, TraceTooLargeError) as wrong:
-        raise Failure(INVALID, on_one_line(f"{journal}: {wrong} ({JOURNAL_STEP})")) from wrong
-    except OSError as error:
-        raise Failure(INVALID, on_one_line(f"{journal}: {error.strerror or error} ({JOURNAL_STEP})")) from error
+    with ExitStack() as unless_it_can_be_shown:
+        try:
+            session = SnifferSession(journal, chosen=patterns_in(chosen), robots=robots)
+            unless_it_can_be_shown.callback(session.close)
+            session.begin()
+        except (JournalError, TraceTooLargeError) as wrong:
+            raise Failure(INVALID, on_one_line(f"{journal}: {wrong} ({JOURNAL_STEP})")) from wrong
+        except OSError as error:
+            raise Failure(INVALID, on_one_line(f"{journal}: {error.strerror or error} ({JOURNAL_STEP})")) from error
+        unless_it_can_be_shown.pop_all()
     return session
