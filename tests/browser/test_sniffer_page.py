@@ -272,6 +272,7 @@ def test_keys_alone(loaded: Page) -> None:
 
 def test_keys_work_wherever_the_focus_is_but_in_text(page: Page) -> None:
     page.locator("[name=layout][value=chart]").click(force=True)
+    until(lambda: page.evaluate("document.activeElement.name") == "layout", "the choice takes no focus")
     page.keyboard.press("j")
     page.wait_for_selector("#message h2")
     until(lambda: page.inner_text("#message h2").startswith("0 "), "the choice of a layout keeps the key")

@@ -70,6 +70,7 @@ def begin_again(page: Page) -> None:
 
 _BEGIN_AGAIN = """() => {
   const { page } = Sniffer;
+  document.activeElement.blur();
   page.time.pause();
   page.view.set({
     selected: -1, robot: -1, moment: 0, top: 0, left: 0, rowHeight: 24, laneWidth: 0,
