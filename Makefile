@@ -40,7 +40,7 @@ demo-11: $(RUN)  ## the flagship: 121 robots in 121 processes, planar and full
 JOBS ?= 2
 PYTEST := $(BIN)/pytest -n $(JOBS) --dist worksteal
 test: $(READY)  ## every rule, command and refusal, and one fault of each kind
-	$(PYTEST) $(if $(SHUFFLE),--random-order-bucket=global --random-order-seed=$(SHUFFLE))
+	$(PYTEST) $(if $(SHUFFLE),--random-order --random-order-seed=$(SHUFFLE))
 
 # New random problems each time; a failure names the seed, and `make test-slow SEED=...` repeats it.
 ifndef SEED
