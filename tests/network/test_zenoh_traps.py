@@ -87,13 +87,10 @@ def test_nothing_listens_but_the_router_and_nothing_looks_for_others() -> None:
         session.search(HANG_S)
         port = int(session.master.endpoint.rpartition(":")[2])
         robots = [process.pid for process in session.processes.values()]
-        router = next(
-            int(child)
-            for child in Path(f"/proc/{os.getpid()}/task/{os.getpid()}/children").read_text().split()
-            if b"network.router" in Path(f"/proc/{child}/cmdline").read_bytes()
-        )
+        process = session.master._policy._router._process  # noqa: SLF001
+        assert process
         before = open_sockets(os.getpid())
-        assert open_sockets(router) == ({f"{LOOPBACK}:{port:04X}"}, set())
+        assert open_sockets(process.pid) == ({f"{LOOPBACK}:{port:04X}"}, set())
         assert len(robots) == 3
         for robot in robots:
             assert robot
