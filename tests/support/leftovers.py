@@ -1,4 +1,4 @@
-"""What a test leaves behind: threads, processes, descriptors (with them ports), files.
+"""What a test leaves behind: threads, processes, descriptors (with them ports), temporary files.
 
 `Belongings` is what there is at a moment; what is there after a test and was not before it is left behind. What tests
 share (a browser, a solver) is begun inside `shared_by_tests`, and belongs to nobody.
@@ -20,7 +20,6 @@ from typing import NamedTuple, Self
 from weakref import WeakSet
 
 from tests.support.limits import HANG_S, wait_until
-from tests.support.program import ROOT
 
 WITHIN_S = HANG_S
 """What ends by itself has ended by then, however busy the machine is."""
@@ -28,9 +27,6 @@ MARK = "ROBOCHOC_TESTS"
 """The environment's variable that all processes of a test run inherit."""
 _OWN_KINDS = ("anon_inode:", "/dev/", "/proc/", "/sys/")
 """Descriptors of the interpreter and of native libraries, once for all: event polls, random numbers."""
-_SHARED_MEMORY = Path("/dev/shm")  # noqa: S108 - where shared memory would be left
-_OUR_SHARED_MEMORY = ("psm_", "sem.mp", "pym-", "robo")
-"""As Python names it, and we; browsers put theirs there too."""
 _PYTESTS_OWN = "pytest-of-"
 """A pytest that a test starts keeps the folders of its last runs."""
 _HELPERS = (b"multiprocessing.resource_tracker", b"multiprocessing.forkserver")
@@ -69,7 +65,7 @@ class Belongings(NamedTuple):
             *(f"thread {thread.name}" for thread in threads),
             *(f"process {pid}: {_command(pid)}" for pid in processes),
             *(f"descriptor {target}" for target in descriptors),
-            *(f"file {path}" for path in now.files - self.files - _shared_files if _PYTESTS_OWN not in path),
+            *(f"file {path}" for path in now.files - self.files - _shared_files),
         ]
 
 
@@ -161,11 +157,9 @@ def _descriptors(pid: str | int = "self") -> Iterator[str]:
 
 
 def _files() -> frozenset[str]:
-    """Return what tests must not write to: the folder for temporary files, shared memory, the checkout."""
-    shared = {str(path) for path in _SHARED_MEMORY.iterdir() if path.name.startswith(_OUR_SHARED_MEMORY)}
-    return frozenset(shared).union(
-        str(path) for folder in (tempfile.gettempdir(), ROOT) for path in Path(folder).iterdir()
-    )
+    """Return what is in the folder for temporary files, which these tests have for themselves."""
+    temporary = Path(tempfile.gettempdir())
+    return frozenset(str(path) for path in temporary.iterdir() if not path.name.startswith(_PYTESTS_OWN))
 
 
 def _marked(mark: str) -> Iterator[int]:
