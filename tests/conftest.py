@@ -6,6 +6,7 @@ import signal
 import tempfile
 import threading
 from collections.abc import Iterator
+from multiprocessing.util import get_temp_dir
 from pathlib import Path
 from secrets import token_hex
 from typing import Any
@@ -38,6 +39,7 @@ def temporary_folder(tmp_path_factory: pytest.TempPathFactory) -> Iterator[str]:
         folder = tmp_path_factory.mktemp("t")
         patch.setenv("TMPDIR", str(folder))
         patch.setattr(tempfile, "tempdir", str(folder))
+        get_temp_dir()  # multiprocessing makes one for this process, and keeps it
         mark = token_hex(8)
         patch.setenv(leftovers.MARK, mark)
         with leftovers.no_process_left(mark):
