@@ -38,9 +38,9 @@ def a_port(stack: ExitStack) -> None:
 
 
 def a_file(stack: ExitStack) -> None:
-    file = Path(tempfile.gettempdir()) / "forgotten"
-    file.touch()
-    stack.callback(file.unlink)
+    descriptor, name = tempfile.mkstemp("-forgotten")  # what was shared once is so for good: another name each time
+    os.close(descriptor)
+    stack.callback(Path(name).unlink)
 
 
 @pytest.mark.parametrize(
