@@ -18,7 +18,7 @@ from robochoc.authority.frames import (
     Exchange,
 )
 from tests.support.authorities import Clock, Seen
-from tests.support.limits import HANG_S
+from tests.support.limits import HANG_S, wait_until
 
 SOON_S = HANG_S
 
@@ -39,9 +39,7 @@ class AuthorityService:
 
     def refusal(self, count: int = 1) -> str:
         """Why the last one was refused, as soon as `count` were."""
-        deadline = time.monotonic() + SOON_S
-        while len(self.seen.refusals) < count and time.monotonic() < deadline:
-            time.sleep(0.005)
+        wait_until(lambda: len(self.seen.refusals) >= count, lambda: f"not refused: {self.seen.refusals}")
         assert len(self.seen.refusals) == count, self.seen.refusals
         return self.seen.refusals[-1].why
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 import socket
 import ssl
 import threading
-import time
 from contextlib import ExitStack
 from pathlib import Path
 
@@ -28,7 +27,7 @@ from robochoc.authority.frames import (
     decode_question,
 )
 from tests.support.authority_service import SOON_S, AuthorityService, answered, drip, framed, trusting
-from tests.support.limits import HANG_S
+from tests.support.limits import HANG_S, wait_until
 
 
 def test_oversized_requests_are_not_even_read(desk: AuthorityService) -> None:
@@ -136,8 +135,7 @@ def test_closing_hangs_up_on_everybody_at_once(tmp_path: Path) -> None:
             serving.enter_context(desk.server)
             for _ in range(3):
                 stack.enter_context(socket.create_connection(desk.place, SOON_S))
-            while threading.active_count() < before + 3:
-                time.sleep(0.005)
+            wait_until(lambda: threading.active_count() >= before + 3, "they are not served")
             serving.close()
         assert threading.active_count() == before
     assert desk.seen.events == [], "what we do ourselves is no refusal"
