@@ -13,7 +13,7 @@ from robochoc.formats.diagnostics import MistakeError, shortened
 from robochoc.formats.names import BEYOND, check_cost, check_integer, check_word, digits, in_short
 from robochoc.model.expression import Apply, Constant, Expression, ExpressionError, Name, Type, parse, text
 from robochoc.model.expression.parser import MAX_DEPTH, MAX_NODES
-from robochoc.model.problem import Domain, Predicate, ProblemKind, Relation, Semantics, Term, Topic
+from robochoc.model.problem import Domain, Function, Predicate, ProblemKind, Relation, Semantics, Term, Topic
 
 MAX_VALUES = 100_000
 """The maximum size of a domain."""
@@ -106,6 +106,12 @@ def check_predicate(predicate: Predicate) -> None:
     """Raise `MistakeError` unless it is a Boolean expression over its parameters, and nothing else."""
     check_formal(predicate.parameters)
     check_expression(f"predicate {shortened(predicate.name)}", predicate.body, predicate.parameters, Type.BOOLEAN)
+
+
+def check_function(function: Function) -> None:
+    """Raise `MistakeError` unless it is an integer expression over its parameters, and nothing else."""
+    check_formal(function.parameters)
+    check_expression(f"function {shortened(function.name)}", function.body, function.parameters, Type.INTEGER)
 
 
 def check_formal(names: Sequence[str]) -> None:

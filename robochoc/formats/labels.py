@@ -8,7 +8,7 @@ from itertools import count
 from typing import TypeVar
 
 from robochoc.formats.definitions import PREDEFINED
-from robochoc.model.problem import Constraint, Domain, Predicate, Relation, Robot
+from robochoc.model.problem import Constraint, Definition, Domain, Robot
 
 
 def with_names_apart(robot: Robot) -> Robot:
@@ -30,7 +30,7 @@ def _constraints(robot: Robot) -> Iterable[Constraint]:
         yield from child.constraints
 
 
-_Named = TypeVar("_Named", Domain, Relation | Predicate)
+_Named = TypeVar("_Named", Domain, Definition)
 
 
 def _names(things: Iterable[_Named], predefined: Mapping[str, _Named] = {}) -> dict[_Named, str] | None:
@@ -49,7 +49,7 @@ def _names(things: Iterable[_Named], predefined: Mapping[str, _Named] = {}) -> d
     return names or None
 
 
-def _renamed(robot: Robot, domains: Mapping[Domain, str], definitions: Mapping[Relation | Predicate, str]) -> Robot:
+def _renamed(robot: Robot, domains: Mapping[Domain, str], definitions: Mapping[Definition, str]) -> Robot:
     def renamed(constraints: Iterable[Constraint]) -> tuple[Constraint, ...]:
         return tuple(
             replace(one, definition=replace(one.definition, name=definitions[one.definition]))

@@ -8,6 +8,7 @@ from contextlib import contextmanager
 from robochoc.formats.definitions import (
     PREDEFINED,
     check_domain,
+    check_function,
     check_predicate,
     check_relation,
     check_semantics,
@@ -30,18 +31,28 @@ from robochoc.formats.rules import (
     refuse_private_part,
     repeated_neighbours,
 )
-from robochoc.model.problem import Constraint, ConstraintModel, Domain, Predicate, ProblemKind, Relation, Robot
+from robochoc.model.problem import (
+    Constraint,
+    ConstraintModel,
+    Definition,
+    Domain,
+    Function,
+    Predicate,
+    ProblemKind,
+    Relation,
+    Robot,
+)
 
-Definition = Domain | Relation | Predicate
+Defined = Domain | Definition
 
 
 class Objects:
     """Checks robots one after the other. What they share, domains and definitions, is looked at once."""
 
     def __init__(self) -> None:
-        self._known: dict[int, tuple[Definition, bool]] = {}
+        self._known: dict[int, tuple[Defined, bool]] = {}
         """By `id`: the object, which is kept so that the number stays its own, and whether it is right."""
-        self._wrong: list[Definition] = []
+        self._wrong: list[Defined] = []
         """The definitions of the robot in hand that are wrong. In a file, equal ones are written once."""
         self._found: list[Diagnostic] = []
 
@@ -171,14 +182,14 @@ class Objects:
             check_constraint(constraint, kind)
         return right
 
-    def _defined(self, thing: Definition, places: ObjectLocations) -> bool:
+    def _defined(self, thing: Defined, places: ObjectLocations) -> bool:
         """Return whether a domain or a definition is right. Its mistake is noted for the first robot that has it."""
         known = self._known.get(id(thing))
         if known is None:
             known = self._known[id(thing)] = (thing, self._is_right(thing, places))
         return known[1]
 
-    def _is_right(self, thing: Definition, places: ObjectLocations) -> bool:
+    def _is_right(self, thing: Defined, places: ObjectLocations) -> bool:
         try:
             _check_defined(thing)
         except MistakeError as mistake:
@@ -201,7 +212,7 @@ class Objects:
         self._found.append(place.mistake(message, hint))
 
 
-def _check_defined(thing: Definition) -> None:
+def _check_defined(thing: Defined) -> None:
     check_word(thing.name)
     if isinstance(thing, Domain):
         check_domain(thing)
@@ -209,10 +220,13 @@ def _check_defined(thing: Definition) -> None:
     if PREDEFINED.get(thing.name) == thing:
         return
     refuse_predefined(thing.name)
-    if isinstance(thing, Relation):
-        check_relation(thing)
-    else:
-        check_predicate(thing)
+    match thing:
+        case Relation():
+            check_relation(thing)
+        case Predicate():
+            check_predicate(thing)
+        case Function():
+            check_function(thing)
 
 
 def repeated_robots(robots: Iterable[Robot]) -> Iterator[Diagnostic]:

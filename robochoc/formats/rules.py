@@ -18,6 +18,7 @@ from robochoc.model.problem import (
     Child,
     Constraint,
     ConstraintModel,
+    Definition,
     Parent,
     Predicate,
     ProblemKind,
@@ -50,7 +51,7 @@ def check_constraint(constraint: Constraint, kind: ProblemKind) -> None:
         return
     if kind is not ProblemKind.DISWCSP:
         raise MistakeError("a cost in a DisCSP", 'write type="DisWCSP" in the presentation, or delete the cost')
-    if isinstance(constraint.definition, Relation):
+    if not isinstance(constraint.definition, Predicate):
         raise MistakeError("a cost on a relation", 'a soft relation names the costs of its tuples: semantics="soft"')
     check_cost(constraint.cost)
 
@@ -86,7 +87,7 @@ def check_shared(constraint: Constraint, own: Collection[str]) -> None:
         raise MistakeError(f"the scope '{shown(constraint.scope)}' has no variable of the neighbour", hint)
 
 
-def _check_application(definition: Relation | Predicate, scope: tuple[Term, ...], parameters: tuple[Term, ...]) -> None:
+def _check_application(definition: Definition, scope: tuple[Term, ...], parameters: tuple[Term, ...]) -> None:
     """Raise `MistakeError` unless the definition takes so many terms, and scope and parameters are about the same."""
     if isinstance(definition, Relation) and parameters != scope:
         raise MistakeError(

@@ -14,6 +14,7 @@ from robochoc.model.expression import text
 from robochoc.model.problem import (
     INFINITE,
     Constraint,
+    Definition,
     Domain,
     Predicate,
     Relation,
@@ -137,7 +138,7 @@ def _write_neighbours(instance: etree._Element, robot: Robot) -> None:
         _write_constraints(agent, child.constraints)
 
 
-_Named = TypeVar("_Named", Domain, Relation | Predicate)
+_Named = TypeVar("_Named", Domain, Definition)
 
 
 def _by_name(things: Iterable[_Named]) -> Mapping[str, _Named]:

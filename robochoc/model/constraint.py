@@ -1,4 +1,8 @@
-"""Variables with their domains, and constraints as data: in extension (relations) and in intension (predicates)."""
+"""Variables with their domains, and constraints as data: in extension, and in intension (predicates, functions).
+
+Costs are integers in the unit of their robot's `CostUnits` (`model/costs.py`), or `INFINITE`: a hard constraint that is
+broken, whether costs are minimised or maximised. They may be negative; what protocols work on has been normalised.
+"""
 
 from __future__ import annotations
 
@@ -44,10 +48,17 @@ class Domain:
     """A finite set of integers, as disjoint ascending ranges.
 
     Adjacent ranges are merged, so equal sets are equal domains.
+
+    Attributes:
+        name: Its name.
+        ranges: The values.
+        symbols: Of a symbolic domain: the names of all symbols of the team; the value 2 stands for `symbols[2]`. All
+            symbolic domains of a team have the same `symbols`, so that equal values are equal names.
     """
 
     name: str
     ranges: tuple[range, ...]
+    symbols: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "ranges", merge_ranges(self.ranges))
@@ -61,6 +72,10 @@ class Domain:
 
     def __contains__(self, value: object) -> bool:
         return any(value in part for part in self.ranges)
+
+    def label(self, value: int) -> int | str:
+        """Return `value` as its user wrote it: its name where the domain is symbolic."""
+        return self.symbols[value] if self.symbols else value
 
 
 @dataclass(frozen=True)
@@ -128,26 +143,51 @@ class Predicate:
 
 
 @dataclass(frozen=True)
+class Function:
+    """A constraint's definition in intension whose value is its cost: an integer expression over `parameters`.
+
+    The value counts whole units of the user (`CostUnits.places` does not move its point).
+    """
+
+    name: str
+    parameters: tuple[str, ...]
+    body: Expression
+
+    def cost(self, arguments: Sequence[int]) -> float:
+        """Return the cost of `arguments`. Where the body is undefined (division by zero) it is `INFINITE`."""
+        try:
+            return evaluate(self.body, dict(zip(self.parameters, arguments, strict=True)))
+        except UndefinedValueError:
+            return INFINITE
+
+
+Definition = Relation | Predicate | Function
+"""What a constraint says of its terms."""
+
+
+@dataclass(frozen=True)
 class Constraint:
-    """A relation or predicate, applied to a scope of variables and integer constants.
+    """A relation, predicate or function, applied to a scope of variables and integer constants.
 
     Attributes:
         name: Its name, which need not be unique: Figure 2 calls every constraint `C5`.
-        definition: The relation or predicate.
+        definition: The relation, predicate or function.
         scope: The variables and constants.
         parameters: The actual parameters of a predicate. For a relation they equal `scope`.
         model: How much robots know of a shared constraint. None: the constraint is private.
         cost: The cost of violating a predicate, in a DisWCSP. `INFINITE`: a hard constraint.
         line: The line of the file that it was read from.
+        offset: What was taken out of each of its costs, so that none is negative (`model/costs.py`).
     """
 
     name: str
-    definition: Relation | Predicate
+    definition: Definition
     scope: tuple[Term, ...]
     parameters: tuple[Term, ...]
     model: ConstraintModel | None = ConstraintModel.TKC
     cost: float = INFINITE
     line: int = field(default=0, compare=False)
+    offset: int = 0
 
     @cached_property
     def variables(self) -> tuple[str, ...]:
@@ -157,9 +197,9 @@ class Constraint:
     def price(self, assignment: Assignment) -> float:
         """Return the cost of `assignment`, which has values for the scope. 0: the constraint holds."""
         values = [assignment[term] if isinstance(term, str) else term for term in self.parameters]
-        if isinstance(self.definition, Relation):
-            return self.definition.cost(values)
-        return 0 if self.definition.holds(values) else self.cost
+        if isinstance(self.definition, Predicate):
+            return 0 if self.definition.holds(values) else self.cost
+        return self.definition.cost(values)
 
     def allows(self, assignment: Assignment) -> bool:
         """Return whether the cost of `assignment` is finite."""

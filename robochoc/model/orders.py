@@ -19,7 +19,7 @@ from random import Random
 from typing import assert_never
 
 from robochoc.model.priorities import natural_key, priority_order
-from robochoc.model.problem import Child, Constraint, ConstraintModel, Parent, Predicate, Relation, Robot, Team
+from robochoc.model.problem import Child, Constraint, ConstraintModel, Definition, Parent, Robot, Team
 
 Graph = Mapping[str, frozenset[str]]
 """The neighbours of each robot."""
@@ -307,7 +307,7 @@ class _Reordering:
                 yield replace(constraint, definition=_unlike(constraint.definition, known), line=0)
 
 
-def _unlike(definition: Relation | Predicate, known: dict[str, Relation | Predicate]) -> Relation | Predicate:
+def _unlike(definition: Definition, known: dict[str, Definition]) -> Definition:
     """Return `definition`, under the first of its name, name_2, ...
 
     that means nothing else in `known`; and puts it there.

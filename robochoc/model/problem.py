@@ -5,7 +5,8 @@ A `Team` is a set of `Robot` objects (A). Each owns variables (X) with domains (
 and can be imported from here.
 
 These are plain data. `formats` makes them from XML, `solver` compiles them, `protocols` see only what was compiled.
-Values are integers. Costs are integers or `INFINITE`; a violated hard constraint costs `INFINITE`.
+Values are integers; a symbolic domain knows their names. Costs are integers, in the unit that `Robot.costs` states, or
+`INFINITE`: a violated hard constraint.
 """
 
 from __future__ import annotations
@@ -20,13 +21,16 @@ from robochoc.model.constraint import (
     Assignment,
     Constraint,
     ConstraintModel,
+    Definition,
     Domain,
+    Function,
     Predicate,
     Relation,
     Semantics,
     Term,
     Variable,
 )
+from robochoc.model.cost_units import PLAIN_COSTS, CostUnits
 from robochoc.model.expression import Expression
 
 __all__ = [
@@ -39,7 +43,10 @@ __all__ = [
     "Child",
     "Constraint",
     "ConstraintModel",
+    "CostUnits",
+    "Definition",
     "Domain",
+    "Function",
     "Parent",
     "Predicate",
     "ProblemKind",
@@ -58,7 +65,7 @@ __all__ = [
 
 
 class ProblemKind(StrEnum):
-    """The kind of a team's problem: satisfaction (DisCSP), or minimisation of the sum of costs (DisWCSP)."""
+    """The kind of a team's problem: satisfaction (DisCSP), or the best sum of costs (DisWCSP)."""
 
     DISCSP = "DisCSP"
     DISWCSP = "DisWCSP"
@@ -123,6 +130,7 @@ class Robot:
         shown: Variables that neighbours see although nothing else here says so: they stand in a parent's part of a
             partially known constraint.
         weight: How much its withdrawal counts: one robot of weight 3 as much as three of weight 1.
+        costs: The unit of its costs, and whether their sum is minimised or maximised, as its file says.
     """
 
     name: str
@@ -135,6 +143,7 @@ class Robot:
     file: str = field(default="", compare=False)
     shown: tuple[str, ...] = ()
     weight: int = 1
+    costs: CostUnits = PLAIN_COSTS
 
     @cached_property
     def shared(self) -> tuple[Constraint, ...]:
@@ -224,11 +233,13 @@ class Team:
         name: The team's name.
         robots: The robots.
         scenario: How the problem changes over time. With events it is a DDisCSP, and this is its function delta.
+        told_in: Of a normalised team (`model/costs.py`): the units in which its costs are told to the user.
     """
 
     name: str
     robots: tuple[Robot, ...]
     scenario: tuple[ScenarioEvent, ...] = ()
+    told_in: CostUnits = PLAIN_COSTS
 
     @cached_property
     def _by_name(self) -> dict[str, Robot]:

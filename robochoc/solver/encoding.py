@@ -10,11 +10,13 @@ from __future__ import annotations
 
 import itertools
 import math
+from collections import defaultdict
 from collections.abc import Callable, Hashable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 from robochoc.model.expression import UndefinedValueError, compile_expression
-from robochoc.model.problem import INFINITE, Constraint, Predicate, Relation, Semantics, Variable
+from robochoc.model.expression.bounds import ANY_INTEGER, bounds
+from robochoc.model.problem import INFINITE, Constraint, Function, Predicate, Relation, Semantics, Variable
 
 MAX_TUPLES = 4_000_000
 """The maximum number of tuples of values that a constraint is tried on."""
@@ -122,24 +124,33 @@ def cost_function(constraint: Constraint, names: Sequence[str]) -> Callable[[Seq
         holds = _truth_on(constraint, definition, names)
         cost = constraint.cost
         return lambda values: 0 if holds(values) else cost
+    if isinstance(definition, Function):
+        return _cost_on(constraint, definition, names)
     arguments = _arguments(constraint, names)
     return lambda values: definition.cost(arguments(values))
 
 
 def max_cost(constraint: Constraint) -> float:
-    """Return the most that `constraint` charges short of being broken."""
-    definition = constraint.definition
-    if isinstance(definition, Predicate):
-        prices: tuple[float, ...] = (constraint.cost,)
-    else:
-        prices = (*definition.costs, definition.default_cost)
+    """Return the most that `constraint` charges short of being broken; of a function, what its expression says."""
+    match constraint.definition:
+        case Relation() as relation:
+            prices: tuple[float, ...] = (*relation.costs, relation.default_cost)
+        case Predicate():
+            prices = (constraint.cost,)
+        case Function() as function:
+            prices = (bounds(function.body, defaultdict(lambda: ANY_INTEGER)).high,)
     return max((price for price in prices if price < INFINITE), default=0)
 
 
 def is_soft(constraint: Constraint) -> bool:
     """Return whether `constraint` may cost something without being broken."""
-    definition = constraint.definition
-    return definition.semantics is Semantics.SOFT if isinstance(definition, Relation) else constraint.cost < INFINITE
+    match constraint.definition:
+        case Relation(semantics=semantics):
+            return semantics is Semantics.SOFT
+        case Predicate():
+            return constraint.cost < INFINITE
+        case Function():
+            return True
 
 
 def _truth_on(constraint: Constraint, predicate: Predicate, names: Sequence[str]) -> Callable[[Sequence[int]], bool]:
@@ -156,6 +167,20 @@ def _truth_on(constraint: Constraint, predicate: Predicate, names: Sequence[str]
     return holds
 
 
+def _cost_on(constraint: Constraint, function: Function, names: Sequence[str]) -> Callable[[Sequence[int]], float]:
+    """Return the cost of values of `names`; where the function is undefined, it is `INFINITE`."""
+    arguments = _arguments(constraint, names)
+    body = compile_expression(function.body, function.parameters)
+
+    def cost(values: Sequence[int]) -> float:
+        try:
+            return body(arguments(values))
+        except UndefinedValueError:
+            return INFINITE
+
+    return cost
+
+
 def _arguments(constraint: Constraint, names: Sequence[str]) -> Callable[[Sequence[int]], list[int]]:
     """Return what the definition of `constraint` receives, of values of the variables `names`."""
     place = {name: index for index, name in enumerate(names)}
@@ -164,7 +189,7 @@ def _arguments(constraint: Constraint, names: Sequence[str]) -> Callable[[Sequen
 
 
 def _forbids_something(constraint: Constraint) -> bool:
-    return isinstance(constraint.definition, Relation) or constraint.cost == INFINITE
+    return not isinstance(constraint.definition, Predicate) or constraint.cost == INFINITE
 
 
 def _fold(constraint: Constraint, domains: dict[str, list[int]]) -> None:

@@ -10,7 +10,17 @@ from collections.abc import Collection, Iterator, Sequence
 from typing import assert_never
 
 from robochoc.model.expression import UndefinedValueError, evaluate
-from robochoc.model.problem import INFINITE, Assignment, Constraint, Relation, Robot, Semantics, Team, Variable
+from robochoc.model.problem import (
+    INFINITE,
+    Assignment,
+    Constraint,
+    Predicate,
+    Relation,
+    Robot,
+    Semantics,
+    Team,
+    Variable,
+)
 
 MAX_TRIES = 20_000
 """The maximum number of values that are tried for the variables of a withdrawn robot."""
@@ -95,10 +105,12 @@ def constraint_cost(constraint: Constraint, assignment: Assignment) -> float:
     if isinstance(definition, Relation):
         return _price_in_extension(definition, values)
     try:
-        holds = evaluate(definition.body, dict(zip(definition.parameters, values, strict=True)))
+        value = evaluate(definition.body, dict(zip(definition.parameters, values, strict=True)))
     except UndefinedValueError:
-        holds = 0
-    return 0 if holds else constraint.cost
+        return constraint.cost if isinstance(definition, Predicate) else INFINITE
+    if isinstance(definition, Predicate):
+        return 0 if value else constraint.cost
+    return value
 
 
 def _price_in_extension(relation: Relation, values: tuple[int, ...]) -> float:

@@ -10,7 +10,18 @@ import msgspec
 from robochoc.formats.diagnostics import shortened
 from robochoc.formats.names import is_name
 from robochoc.model.expression import Expression, ExpressionError, Type, parse, text
-from robochoc.model.problem import Constraint, ConstraintModel, Predicate, Relation, Semantics, Term
+from robochoc.model.expression.bounds import ANY_INTEGER, bounds
+from robochoc.model.expression.tree import BOUND
+from robochoc.model.problem import (
+    Constraint,
+    ConstraintModel,
+    Definition,
+    Function,
+    Predicate,
+    Relation,
+    Semantics,
+    Term,
+)
 from robochoc.solver.explanation import KeyedConstraint
 
 MOST_TERMS = 1000
@@ -40,12 +51,23 @@ class PredicateRecord(msgspec.Struct, frozen=True, tag=True, array_like=True):
     body: str
 
 
+class FunctionRecord(msgspec.Struct, frozen=True, tag=True, array_like=True):
+    """A function; `body` is a functional expression whose value is the cost."""
+
+    name: str
+    parameters: tuple[str, ...]
+    body: str
+
+
+Record = RelationRecord | PredicateRecord | FunctionRecord
+
+
 class SharedRecord(msgspec.Struct, frozen=True, array_like=True):
     """A shared constraint with its `key` (`solver/explanation.py`)."""
 
     key: str
     name: str
-    definition: RelationRecord | PredicateRecord
+    definition: Record
     scope: tuple[Term, ...]
     parameters: tuple[Term, ...]
     model: ConstraintModel | None
@@ -77,9 +99,11 @@ def known_of(record: SharedRecord) -> KeyedConstraint:
     )
 
 
-def _defined(definition: Relation | Predicate) -> RelationRecord | PredicateRecord:
+def _defined(definition: Definition) -> Record:
     if isinstance(definition, Predicate):
         return PredicateRecord(definition.name, definition.parameters, text(definition.body))
+    if isinstance(definition, Function):
+        return FunctionRecord(definition.name, definition.parameters, text(definition.body))
     return RelationRecord(
         definition.name,
         definition.arity,
@@ -90,12 +114,9 @@ def _defined(definition: Relation | Predicate) -> RelationRecord | PredicateReco
     )
 
 
-def _definition(record: RelationRecord | PredicateRecord) -> Relation | Predicate:
-    if isinstance(record, PredicateRecord):
-        names = record.parameters
-        if len(names) > MOST_TERMS or len(set(names)) < len(names):
-            raise SharedConstraintError(f"the parameters of {shortened(record.name)!r} are none")
-        return Predicate(record.name, names, _body(record))
+def _definition(record: Record) -> Definition:
+    if not isinstance(record, RelationRecord):
+        return _in_intension(record)
     if any(len(values) != record.arity for values in record.tuples):
         raise SharedConstraintError(f"a tuple of {shortened(record.name)!r} has not {record.arity} values")
     if len(set(record.tuples)) < len(record.tuples):
@@ -106,8 +127,21 @@ def _definition(record: RelationRecord | PredicateRecord) -> Relation | Predicat
     return Relation(record.name, record.arity, record.semantics, record.tuples, record.costs, record.default_cost)
 
 
-def _body(record: PredicateRecord) -> Expression:
+def _in_intension(record: PredicateRecord | FunctionRecord) -> Predicate | Function:
+    names = record.parameters
+    if len(names) > MOST_TERMS or len(set(names)) < len(names):
+        raise SharedConstraintError(f"the parameters of {shortened(record.name)!r} are none")
+    if isinstance(record, PredicateRecord):
+        return Predicate(record.name, names, _body(record, Type.BOOLEAN))
+    function = Function(record.name, names, _body(record, Type.INTEGER))
+    low, high = bounds(function.body, dict.fromkeys(names, ANY_INTEGER))
+    if low < 0 or high > BOUND:
+        raise SharedConstraintError(f"the costs of {shortened(record.name)!r} are none")
+    return function
+
+
+def _body(record: PredicateRecord | FunctionRecord, wanted: Type) -> Expression:
     try:
-        return parse(record.body, record.parameters, Type.BOOLEAN)
+        return parse(record.body, record.parameters, wanted)
     except ExpressionError as error:
-        raise SharedConstraintError(f"the predicate {shortened(record.name)!r}: {error}") from None
+        raise SharedConstraintError(f"the definition {shortened(record.name)!r}: {error}") from None

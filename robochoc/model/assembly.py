@@ -1,0 +1,155 @@
+"""Teams from variables and constraints: who holds which constraint, and who is whose parent, follows from an order.
+
+The lowest robot of a constraint's scope holds it, and all others of the scope are its parents (the format's
+reference, "One robot"). Importers, generators and `robochoc.Model` make their teams here.
+"""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+
+from robochoc.model.constraint import Constraint, ConstraintModel, Variable
+from robochoc.model.cost_units import PLAIN_COSTS, CostUnits
+from robochoc.model.priorities import priority_order
+from robochoc.model.problem import Child, Parent, ProblemKind, Robot, Team, Topic
+
+
+@dataclass(frozen=True, kw_only=True)
+class Extras:
+    """What robots of a team have beside variables and constraints.
+
+    Attributes:
+        links: Pairs of robots that are neighbours without a constraint; the one that comes first is the parent.
+        topics: The topics of robots.
+        weights: The weights of robots; 1 where there is none.
+        parts: The parts of partially known constraints (PKC), by the robot that knows them. Each is over variables of
+            that robot and of one other; where the other holds no part, it allows everything.
+    """
+
+    links: Sequence[tuple[str, str]] = ()
+    topics: Mapping[str, Sequence[Topic]] = field(default_factory=dict)
+    weights: Mapping[str, int] = field(default_factory=dict)
+    parts: Mapping[str, Sequence[Constraint]] = field(default_factory=dict)
+
+
+def assemble(
+    name: str,
+    variables: Mapping[str, Sequence[Variable]],
+    constraints: Iterable[Constraint],
+    *,
+    kind: ProblemKind = ProblemKind.DISCSP,
+    costs: CostUnits = PLAIN_COSTS,
+    extras: Extras = Extras(),
+) -> Team:
+    """Return the team in which robots own `variables` and share `constraints`.
+
+    Args:
+        name: The team's name.
+        variables: The variables of each robot, by its name; the robots are in priority order, the highest first.
+        constraints: Totally known constraints over these variables, with costs in the unit `costs`. Those over
+            variables of one robot are private.
+        kind: The kind of problem.
+        costs: The unit of costs. The constant goes to the first robot alone.
+        extras: What robots have besides.
+
+    Raises:
+        ValueError: if a constraint has a variable that no robot owns.
+    """
+    links = _Links(variables)
+    for constraint in constraints:
+        links.add(constraint)
+    for robot, parts in extras.parts.items():
+        for part in parts:
+            links.add_part(robot, part)
+    for one, other in extras.links:
+        links.link(one, other)
+    links.place()
+    robots = tuple(
+        Robot(
+            name=robot,
+            variables=tuple(own),
+            kind=kind,
+            private=tuple(links.private[robot]),
+            parents=links.parents_of(robot),
+            children=links.children_of(robot),
+            topics=tuple(extras.topics.get(robot, ())),
+            weight=extras.weights.get(robot, 1),
+            costs=costs if number == 0 else replace(costs, constant=0),
+        )
+        for number, (robot, own) in enumerate(variables.items())
+    )
+    return Team(name, robots)
+
+
+class _Links:
+    """Constraints in the hands of robots, and the links that follow."""
+
+    def __init__(self, variables: Mapping[str, Sequence[Variable]]) -> None:
+        self._variables = variables
+        self._owner = {variable.name: robot for robot, own in variables.items() for variable in own}
+        self._rank = {robot: place for place, robot in enumerate(variables)}
+        self._held: list[tuple[str, set[str], Constraint]] = []
+        self._parents: dict[str, set[str]] = {robot: set() for robot in variables}
+        self._shown: dict[tuple[str, str], set[str]] = defaultdict(set)
+        self._with: dict[tuple[str, str], list[Constraint]] = defaultdict(list)
+        self.private: dict[str, list[Constraint]] = defaultdict(list)
+
+    def add(self, constraint: Constraint) -> None:
+        """Give a totally known constraint to the lowest robot of its scope."""
+        robots = self._owners(constraint)
+        lowest = max(robots, key=self._rank.__getitem__)
+        if len(robots) == 1:
+            self.private[lowest].append(replace(constraint, model=None))
+            return
+        self._held.append((lowest, robots - {lowest}, replace(constraint, model=ConstraintModel.TKC)))
+        for other in robots - {lowest}:
+            self.link(lowest, other)
+        self._show(constraint, lowest)
+
+    def add_part(self, robot: str, part: Constraint) -> None:
+        """Give `robot` its part of a partially known constraint."""
+        (other,) = self._owners(part) - {robot}
+        self._with[robot, other].append(replace(part, model=ConstraintModel.PKC))
+        self.link(robot, other)
+        self._show(part, max(robot, other, key=self._rank.__getitem__))
+
+    def link(self, one: str, other: str) -> None:
+        """Make the two neighbours."""
+        higher, lower = sorted((one, other), key=self._rank.__getitem__)
+        self._parents[lower].add(higher)
+
+    def place(self) -> None:
+        """Put every shared constraint under the lowest of its parents, as readers of the files see the order."""
+        seen = {robot: place for place, robot in enumerate(priority_order(self._parents))}
+        for lowest, others, constraint in self._held:
+            self._with[lowest, max(others, key=seen.__getitem__)].append(constraint)
+
+    def parents_of(self, robot: str) -> tuple[Parent, ...]:
+        """Return the parents of `robot`, the highest first."""
+        names = sorted(self._parents[robot], key=self._rank.__getitem__)
+        return tuple(Parent(name, tuple(self._with[robot, name])) for name in names)
+
+    def children_of(self, robot: str) -> tuple[Child, ...]:
+        """Return the children of `robot`, the highest first."""
+        names = [name for name in self._variables if robot in self._parents[name]]
+        own = [variable.name for variable in self._variables[robot]]
+        return tuple(
+            Child(
+                name,
+                tuple(variable for variable in own if variable in self._shown[robot, name]),
+                tuple(self._with[robot, name]),
+            )
+            for name in names
+        )
+
+    def _show(self, constraint: Constraint, lowest: str) -> None:
+        for variable in constraint.variables:
+            self._shown[self._owner[variable], lowest].add(variable)
+
+    def _owners(self, constraint: Constraint) -> set[str]:
+        unknown = [name for name in constraint.variables if name not in self._owner]
+        if unknown:
+            raise ValueError(f"constraint {constraint.name} has a variable {unknown[0]!r}, which no robot owns")
+        return {self._owner[name] for name in constraint.variables}

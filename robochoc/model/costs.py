@@ -1,0 +1,233 @@
+"""Normalised costs: what protocols and solvers work on has integer costs of 0 or more, whose sum is minimised.
+
+Users write decimals, negative costs and utilities that are maximised. `normalized` turns such a team into one of the
+same solutions and the same order among them: utilities change their sign, functions are counted in the team's unit, and
+the least cost of a constraint that has negative ones is taken out of it (`Constraint.offset`). `told_cost` turns a sum
+of normalised costs back into the user's number. All of this is integer arithmetic, so nothing is rounded.
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections import defaultdict
+from collections.abc import Iterable, Mapping
+from dataclasses import replace
+
+from robochoc.model.constraint import (
+    INFINITE,
+    Constraint,
+    Domain,
+    Function,
+    Predicate,
+    Relation,
+    Semantics,
+)
+from robochoc.model.cost_units import PLAIN_COSTS, Cost, CostUnits
+from robochoc.model.expression import Apply, Constant, Expression
+from robochoc.model.expression.bounds import ANY_INTEGER, Interval, bounds
+from robochoc.model.problem import AddAgent, AddConstraint, AddValue, Change, Robot, Team
+
+MAX_TRIED = 4096
+"""The maximum number of combinations of values of which the least cost of a function is computed exactly."""
+
+Domains = Mapping[str, Domain]
+
+
+class UnboundedCostError(ValueError):
+    """Nothing bounds the cost of a function: the domain of a variable is not known here."""
+
+
+def team_units(robots: Iterable[Robot]) -> CostUnits:
+    """Return the units of a team: the finest of its robots', with the sum of their constants."""
+    units = [robot.costs for robot in robots]
+    places = max((unit.places for unit in units), default=0)
+    constant = sum(unit.constant * 10 ** (places - unit.places) for unit in units)
+    return CostUnits(any(unit.maximize for unit in units), places, constant)
+
+
+def normalized(team: Team) -> Team:
+    """Return `team` with integer costs of 0 or more that are minimised; `told_in` says how to tell them.
+
+    A team that is so already is returned as it is.
+
+    Raises:
+        UnboundedCostError: if nothing bounds a function's cost.
+    """
+    if team.told_in != PLAIN_COSTS or not any(map(_needs_it, [*team.robots, *_joining(team)])):
+        return team
+    units = team_units(team.robots)
+    domains = _domains(team)
+    robots = tuple(normalized_robot(robot, units, domains) for robot in team.robots)
+    events = tuple(
+        replace(event, changes=tuple(_normalized_change(change, units, domains) for change in event.changes))
+        for event in team.scenario
+    )
+    return replace(team, robots=robots, scenario=events, told_in=units)
+
+
+def normalized_robot(robot: Robot, units: CostUnits, domains: Domains) -> Robot:
+    """Return `robot` with normalised costs.
+
+    Args:
+        robot: The robot.
+        units: The units of its team.
+        domains: The domains of variables, as far as they are known. A function over others must say its bounds in its
+            expression.
+
+    Raises:
+        UnboundedCostError: if it does not.
+    """
+    finer = 10 ** (units.places - robot.costs.places)
+
+    def all_of(constraints: Iterable[Constraint]) -> tuple[Constraint, ...]:
+        return tuple(normalized_constraint(one, units, domains, finer) for one in constraints)
+
+    return replace(
+        robot,
+        private=all_of(robot.private),
+        parents=tuple(replace(one, constraints=all_of(one.constraints)) for one in robot.parents),
+        children=tuple(
+            replace(one, constraints=all_of(one.constraints), copies=all_of(one.copies)) for one in robot.children
+        ),
+        costs=PLAIN_COSTS,
+    )
+
+
+def normalized_constraint(constraint: Constraint, units: CostUnits, domains: Domains, finer: int = 1) -> Constraint:
+    """Return `constraint` with costs of 0 or more. See `normalized_robot`; its costs count `finer` of the team's."""
+    sign = -1 if units.maximize else 1
+    match constraint.definition:
+        case Relation(semantics=Semantics.SOFT) as relation:
+            return _with_relation(constraint, relation, sign * finer)
+        case Predicate() as predicate if constraint.cost < INFINITE:
+            return _with_predicate(constraint, predicate, int(constraint.cost) * sign * finer)
+        case Function() as function:
+            return _with_function(constraint, function, sign * 10**units.places, domains)
+        case Relation() | Predicate():
+            return constraint
+
+
+def offset(team: Team) -> int:
+    """Return what was taken out of the costs of all constraints of a normalised team."""
+    return sum(constraint.offset for constraint in team.constraints())
+
+
+def told_cost(team: Team, total: float) -> Cost:
+    """Return `total`, a sum of normalised costs of all constraints of `team`, in the user's numbers."""
+    sign = -1 if team.told_in.maximize else 1
+    return team.told_in.told(sign * (int(total) + offset(team)))
+
+
+def _needs_it(robot: Robot) -> bool:
+    return robot.costs != PLAIN_COSTS or any(map(_may_be_negative, _constraints(robot)))
+
+
+def _may_be_negative(constraint: Constraint) -> bool:
+    match constraint.definition:
+        case Relation() as relation:
+            return min((*relation.costs, relation.default_cost)) < 0
+        case Predicate():
+            return constraint.cost < 0
+        case Function():
+            return True
+
+
+def _joining(team: Team) -> list[Robot]:
+    changes = itertools.chain.from_iterable(event.changes for event in team.scenario)
+    return [change.robot for change in changes if isinstance(change, AddAgent)]
+
+
+def _constraints(robot: Robot) -> Iterable[Constraint]:
+    yield from robot.private
+    yield from robot.shared
+    for child in robot.children:
+        yield from child.constraints
+
+
+def _domains(team: Team) -> dict[str, Domain]:
+    """Return the domains of all variables, with the values that the scenario adds."""
+    domains = {name: variable.domain for name, variable in team.variables.items()}
+    domains.update((one.name, one.domain) for robot in _joining(team) for one in robot.variables)
+    for event in team.scenario:
+        for change in event.changes:
+            if isinstance(change, AddValue) and change.variable in domains:
+                known = domains[change.variable]
+                wider = sorted({*known, change.value})
+                domains[change.variable] = replace(known, ranges=tuple(range(value, value + 1) for value in wider))
+    return domains
+
+
+def _normalized_change(change: Change, units: CostUnits, domains: Domains) -> Change:
+    match change:
+        case AddAgent(robot):
+            return replace(change, robot=normalized_robot(robot, units, domains))
+        case AddConstraint(constraint=constraint):
+            return replace(change, constraint=normalized_constraint(constraint, units, domains))
+        case _:
+            return change
+
+
+def _with_relation(constraint: Constraint, relation: Relation, factor: int) -> Constraint:
+    costs = [_scaled(cost, factor) for cost in relation.costs]
+    default = _scaled(relation.default_cost, factor)
+    least = int(min(0, *costs, default))
+    moved = replace(
+        relation, costs=tuple(cost - least for cost in costs), default_cost=default - least if least else default
+    )
+    return replace(constraint, definition=moved, offset=least)
+
+
+def _scaled(cost: float, factor: int) -> float:
+    return INFINITE if cost == INFINITE else int(cost) * factor
+
+
+def _with_predicate(constraint: Constraint, predicate: Predicate, cost: int) -> Constraint:
+    """Return a predicate of this `cost`; of a negative one: that it costs something where it holds."""
+    if cost >= 0:
+        return replace(constraint, cost=cost)
+    body = Apply("if", (predicate.body, Constant(-cost), Constant(0)))
+    function = Function(predicate.name, predicate.parameters, body)
+    return replace(constraint, definition=function, cost=INFINITE, offset=cost)
+
+
+def _with_function(constraint: Constraint, function: Function, factor: int, domains: Domains) -> Constraint:
+    """Return a function whose expression alone says its bounds: from 0 to the most that values of `domains` cost."""
+    body = function.body if factor == 1 else Apply("mul", (Constant(factor), function.body))
+    least, most = _bounds(constraint, body, function.parameters, domains)
+    if least < 0:
+        body = Apply("add", (body, Constant(-least)))
+        most -= least
+    if bounds(body, defaultdict(lambda: ANY_INTEGER)).high > most:
+        body = Apply("min", (body, Constant(most)))
+    return replace(constraint, definition=replace(function, body=body), offset=min(0, least))
+
+
+def _bounds(constraint: Constraint, body: Expression, parameters: tuple[str, ...], domains: Domains) -> tuple[int, int]:
+    """Return the least and the greatest cost of a function, or bounds of them."""
+    names = constraint.variables
+    size = math.prod(len(domains[name]) if name in domains else MAX_TRIED + 1 for name in names)
+    if size <= MAX_TRIED:
+        tried = replace(constraint, definition=Function("", parameters, body))
+        values = itertools.product(*(domains[name] for name in names))
+        costs = [tried.price(dict(zip(names, one, strict=True))) for one in values]
+        finite = [int(cost) for cost in costs if cost < INFINITE] or [0]
+        return min(finite), max(finite)
+    limits = {formal: _interval(term, domains) for formal, term in zip(parameters, constraint.parameters, strict=True)}
+    low, high = bounds(body, limits)
+    if math.isinf(low) or math.isinf(high):
+        unknown = " and ".join(name for name in names if name not in domains)
+        raise UnboundedCostError(
+            f"nothing bounds the cost of {constraint.name} here, where the domain of {unknown} is not known; write"
+            " bounds into the function: max(0, min(..., 100))"
+        )
+    return int(low), int(high)
+
+
+def _interval(term: str | int, domains: Domains) -> Interval:
+    if isinstance(term, int):
+        return Interval(term, term)
+    if term not in domains or not domains[term]:
+        return ANY_INTEGER
+    ranges = domains[term].ranges
+    return Interval(ranges[0][0], ranges[-1][-1])
