@@ -1,0 +1,110 @@
+"""What every dialect has in common: what it is asked, what it returns, and what it tells about it."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Collection, Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import NamedTuple
+
+from robochoc.formats.names import MAX_NAME, RESERVED, is_name
+from robochoc.model.problem import Team
+
+MAX_FILE = 256 * 1024 * 1024
+"""The maximum size of a file, in bytes."""
+
+
+@dataclass(frozen=True)
+class ImportOptions:
+    """The options of an import.
+
+    Attributes:
+        infinity: Costs of at least so much forbid; of at most minus so much when maximising. None: none do.
+        owner: A regular expression; variables whose names have the same first group (or match) belong to one robot.
+        allow_code: Whether Python files that a problem names may be executed.
+        name: The name of the team. None: that of the file, or of its problem.
+    """
+
+    infinity: int | None = None
+    owner: str | None = None
+    allow_code: bool = False
+    name: str | None = None
+
+
+class Note(NamedTuple):
+    """What an import has changed, in a word that scripts can look for, and in a sentence."""
+
+    kind: str
+    text: str
+
+
+@dataclass(frozen=True)
+class Imported:
+    """A problem of another tool, as a team.
+
+    Attributes:
+        team: The team.
+        dialect: The name of the dialect.
+        names: The original names of robots and variables, by the team's, where they differ.
+        notes: What has been mapped: `renamed`, `scale`, `shared variable`, ...
+    """
+
+    team: Team
+    dialect: str
+    names: Mapping[str, str] = field(default_factory=dict)
+    notes: tuple[Note, ...] = ()
+
+
+@dataclass(frozen=True)
+class Dialect:
+    """A format of another tool.
+
+    Attributes:
+        name: Its name on the command line, such as `frodo`.
+        title: Its name in messages, such as `FRODO's XCSP 2.1`.
+        recognises: Returns whether the file at a path, which begins with some bytes, is in it.
+        read: Returns the problem in some files. Raises `InvalidInputError`.
+        write: Returns the files that a team makes in it, by their names. Raises `UnsupportedError` where the team has
+            what the dialect has not. None: it is only read.
+    """
+
+    name: str
+    title: str
+    recognises: Callable[[Path, bytes], bool]
+    read: Callable[[Sequence[Path], ImportOptions], Imported]
+    write: Callable[[Team], Mapping[str, bytes]] | None = None
+
+
+class Names:
+    """Names that are allowed here, for names of other tools: the same one where it is allowed, and each only once."""
+
+    def __init__(self) -> None:
+        self._taken: dict[str, str] = {}
+        self._given: dict[str, str] = {}
+
+    def of(self, original: str) -> str:
+        """Return the name for `original`. The same original always gets the same one."""
+        if original not in self._given:
+            self._given[original] = self._free(original)
+            self._taken[self._given[original]] = original
+        return self._given[original]
+
+    @property
+    def changed(self) -> dict[str, str]:
+        """The originals, by the names that they got, where these differ."""
+        return {name: original for name, original in self._taken.items() if name != original}
+
+    def _free(self, original: str) -> str:
+        name = re.sub(r"[^A-Za-z0-9_.]", "_", original)[: MAX_NAME - 12] or "_"
+        name = name if is_name(name) and name != RESERVED else f"v{name}"
+        free, number = name, 1
+        while free in self._taken:
+            number += 1
+            free = f"{name}_{number}"
+        return free
+
+
+def notes_on_names(changed: Collection[tuple[str, str]]) -> list[Note]:
+    """Return a note for each pair of a name and its original."""
+    return [Note("renamed", f"{original} is {name}") for name, original in changed]
