@@ -356,9 +356,6 @@ OF_OBJECTS: dict[str, Wrong] = {
         weighted(relation((1, 1), semantics=Semantics.SOFT, costs=(1,), default_cost=float("-inf"))),
         ("robot Robot2, relation r1", "the cost -inf is no integer"),
     ),
-    "a predicate's negative cost": wrong(
-        weighted(constraint("C4", cost=-1)), ("robot Robot3, constraint C4 (V1 V3)", "the cost -1 is negative")
-    ),
     "a relation of no arity": wrong(
         constraint("C2", definition=Relation("r1", 0, Semantics.CONFLICTS, ())),
         ("robot Robot2, relation r1", "a relation of arity 0"),
