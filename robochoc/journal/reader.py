@@ -94,7 +94,7 @@ def sorted_by_time(events: Iterable[AnyEvent]) -> Iterator[AnyEvent]:
 
 def lines_of(journal: Journal) -> Iterator[bytes]:
     """Yield the text form of a journal: one JSON object a line."""
-    encode = msgspec.json.Encoder().encode
+    encode = msgspec.json.Encoder(decimal_format="number").encode
     yield encode(journal.header) + b"\n"
     for event in journal.events:
         yield encode(event) + b"\n"
