@@ -64,6 +64,7 @@ class _Builder:
         self._robots.sort(key=lambda robot: rank.get(robot.name, 0) if order else -robot.priority)
         self._drafts = [draft for rule in model.constraints for draft in rule.drafts()]
         costs, constant = costs_of(model.objective, model.free_prefix("cost"))
+        constant += model.constant
         self._drafts += costs
         self._parts = {robot.name: [d for rule in robot.parts for d in rule.drafts()] for robot in self._robots}
         self._added = {
@@ -71,7 +72,9 @@ class _Builder:
         }
         every = [*self._drafts, *(draft for found in (*self._parts.values(), *self._added.values()) for draft in found)]
         soft = model.maximized is not None or any(draft.soft for draft in every)
-        self._kind = ProblemKind.DISWCSP if soft or (given and given.kind is ProblemKind.DISWCSP) else ProblemKind.DISCSP
+        self._kind = (
+            ProblemKind.DISWCSP if soft or (given and given.kind is ProblemKind.DISWCSP) else ProblemKind.DISCSP
+        )
         known = given.units if given else PLAIN_COSTS
         places = max([known.places, places_of(constant), *(draft.places for draft in every)])
         self._finer = 10 ** (places - known.places)
@@ -186,16 +189,15 @@ class _Changing:
         """Return the constraints that two robots get; those of robots that join go with them."""
         found = []
         for constraint in self._builder.finished_rule(rule):
-            *_, above, lowest = (None, *self._builder.owners(constraint, self._order))
+            *others, lowest = self._builder.owners(constraint, self._order)
             if lowest in new:
                 new[lowest].append(constraint)
-            elif above is None:
+            elif not others:
                 hint = "an event adds constraints between robots, and values of one"
                 raise ModelError(f"the constraint {rule.name} is over variables of {lowest} alone", hint, rule.place)
             else:
-                found.append(AddConstraint(str(lowest), above, constraint))
-            if above is not None:
-                self._held.add((rule.name, str(lowest), above))
+                found.append(AddConstraint(lowest, others[-1], constraint))
+            self._held |= {(rule.name, lowest, above) for above in others[-1:]}
         return found
 
     def _removed(self, removal: Removal) -> Iterable[RemoveConstraint]:

@@ -179,12 +179,16 @@ def codes_of(domain: object, symbols: Symbols, place: Place) -> Codes:
         raise ModelTypeError(f"{domain!r} is no domain", "expected a range, an Enum, or a list of values", place)
     values = list(itertools.islice(domain, MAX_VALUES + 1))
     _check_size(len(values), place)
+    for value in values:
+        try:
+            hash(value)
+        except TypeError:
+            hint = "use values that cannot, such as tuples"
+            raise ModelTypeError(f"the value {value!r} can change", hint, place) from None
     return _listed(values, symbols, place)
 
 
 def _listed(values: list[Hashable], symbols: Symbols, place: Place) -> Codes:
-    if lists := [value for value in values if not isinstance(value, Hashable)]:
-        raise ModelTypeError(f"the value {lists[0]!r} can change", "use values that cannot, such as tuples", place)
     kinds = dict.fromkeys(map(kind_of, values))
     if len(kinds) > 1:
         one, other = list(kinds)[:2]

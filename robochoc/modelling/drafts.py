@@ -11,11 +11,13 @@ from robochoc.formats.definitions import PREDEFINED
 from robochoc.model.constraint import INFINITE, Constraint, Definition, Function, Predicate, Relation, Semantics
 from robochoc.model.constraint import Term as Actual
 from robochoc.model.expression import Apply, Constant, Expression, Name
+from robochoc.modelling.meanings import UndefinedTermError
 from robochoc.modelling.numbers import Exact, exact, places_of
-from robochoc.modelling.places import Place
+from robochoc.modelling.places import ModelError, Place
+from robochoc.modelling.rules import check_constant
 from robochoc.modelling.tables import Price, Row, commonest, listed_rows, prices, truths
 from robochoc.modelling.terms import Applied, Linear, Tabled, Term, Variable
-from robochoc.modelling.translation import Translator, UntranslatableError
+from robochoc.modelling.translation import Translator, UntranslatableError, may_be_undefined
 
 
 @dataclass(frozen=True)
@@ -68,6 +70,8 @@ def conditions(term: Term, name: str, place: Place) -> Iterator[Draft]:
         for number, one in enumerate(term.arguments):
             for other in term.arguments[:number]:
                 yield from conditions(Applied("ne", other, one), name, place)
+    elif not term.variables:
+        check_constant(term, place)
     elif draft := _condition(term, name, place):
         yield draft
 
@@ -75,20 +79,16 @@ def conditions(term: Term, name: str, place: Place) -> Iterator[Draft]:
 def soft_condition(term: Term, cost: Exact, name: str, place: Place) -> Draft:
     """Return what says that it costs something where `term` does not hold."""
     body = _body(term)
-    if body is not None:
+    if body is not None and (cost >= 0 or not may_be_undefined(body)):  # where it is undefined, it is broken as well
         return Draft(name, term.variables, place, body, cost=cost)
     holds, fails = truths(term, place)
     few = len(fails) <= len(holds)
     rows = dict.fromkeys(fails, cost) if few else dict.fromkeys(holds, 0)
     default = 0 if few else cost
-    return Draft(
-        name, term.variables, place, rows=rows, semantics=Semantics.SOFT, default=default, is_penalty=True
-    )
+    return Draft(name, term.variables, place, rows=rows, semantics=Semantics.SOFT, default=default, is_penalty=True)
 
 
-def costs_of(
-    parts: Iterable[tuple[Exact, Term, Place]], name: str
-) -> tuple[list[Draft], Exact]:
+def costs_of(parts: Iterable[tuple[Exact, Term, Place]], name: str) -> tuple[list[Draft], Exact]:
     """Return what a weighted sum of terms costs: one draft for all terms over the same variables, and a constant."""
     groups: dict[frozenset[str], list[tuple[Exact, Term, Place]]] = {}
     constant: Exact = 0
@@ -96,7 +96,7 @@ def costs_of(
         if term.variables:
             groups.setdefault(frozenset(one.name for one in term.variables), []).append((factor, term, place))
         else:
-            constant += factor * exact(term.value({}))
+            constant += factor * _constant(term, place)
     return [_sum(group, f"{name}{number}") for number, group in enumerate(groups.values(), 1)], constant
 
 
@@ -105,6 +105,13 @@ def split(term: Term, place: Place) -> tuple[list[tuple[Exact, Term, Place]], Ex
     if isinstance(term, Linear):
         return [(factor, one, place) for factor, one in term.parts], term.constant
     return [(1, term, place)], 0
+
+
+def _constant(term: Term, place: Place) -> Exact:
+    try:
+        return exact(term.value({}))
+    except UndefinedTermError:
+        raise ModelError(f"{term!r} has no value: a division by zero", "", place) from None
 
 
 def _sum(group: Sequence[tuple[Exact, Term, Place]], name: str) -> Draft:
@@ -118,7 +125,7 @@ def _sum(group: Sequence[tuple[Exact, Term, Place]], name: str) -> Draft:
             priced = {row: _scaled(value, factor) for row, value in rows.items()}
             return _table(name, scope, place, priced, _scaled(table.default, factor))
     try:
-        scaled = Translator(_formals(scope)).number(whole)
+        scaled = Translator(_formals(scope)).whole_number(whole)
     except UntranslatableError:
         scaled = None
     if scaled is not None and scaled.divisor == 1:
@@ -155,7 +162,7 @@ def _condition(term: Term, name: str, place: Place) -> Draft | None:
 
 def _body(term: Term) -> Expression | None:
     try:
-        return Translator(_formals(term.variables)).condition(term)
+        return Translator(_formals(term.variables)).whole_condition(term)
     except UntranslatableError:
         return None
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from typing import Any
 
 from robochoc.modelling.codes import NUMBER, kind_of
 from robochoc.modelling.numbers import exact, is_number
@@ -89,7 +90,7 @@ def forbidden(terms: object, rows: Iterable[Sequence[object]]) -> Term:
     return Tabled(scope, dict.fromkeys(_rows(scope, rows), False), default=True)
 
 
-def costs(terms: object, table: Mapping[object, object], default: object = 0) -> Term:
+def costs(terms: object, table: Mapping[Any, object], default: object = 0) -> Term:
     """Return the number that a table has for the values of `terms`.
 
     Args:

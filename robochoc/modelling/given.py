@@ -5,10 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
-from robochoc.model.constraint import INFINITE, Constraint, Predicate, Relation
+from robochoc.model.constraint import INFINITE, Constraint, Function, Predicate, Relation
 from robochoc.model.constraint import Variable as TeamVariable
-from robochoc.model.costs import team_units
-from robochoc.model.cost_units import CostUnits
+from robochoc.model.cost_units import CostUnits, common_units
 from robochoc.model.problem import AddConstraint, Change, ConstraintModel, ProblemKind, ScenarioEvent, Team
 from robochoc.modelling.codes import NUMBER, Codes, Symbols, kind_of
 from robochoc.modelling.places import Place
@@ -53,7 +52,7 @@ class Given:
 
 def given_by(team: Team) -> Given:
     """Return what `team` says."""
-    units = team_units(team.robots)
+    units = common_units(robot.costs for robot in team.robots)
     constraints: list[Constraint] = []
     parts: dict[str, list[Constraint]] = {}
     for robot in team.robots:
@@ -92,7 +91,8 @@ def in_finer_units(constraint: Constraint, factor: int) -> Constraint:
             return replace(constraint, definition=finer)
         case Predicate():
             return replace(constraint, cost=_times(constraint.cost, factor))
-    return constraint
+        case Function():
+            return constraint
 
 
 def changes_in_finer_units(changes: Iterable[Change], factor: int) -> tuple[Change, ...]:

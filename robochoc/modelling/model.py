@@ -17,6 +17,7 @@ from __future__ import annotations
 
 import itertools
 from pathlib import Path
+from typing import Self
 
 from robochoc.formats import read_team, write_team
 from robochoc.model.cost_units import PLAIN_COSTS
@@ -30,7 +31,7 @@ from robochoc.modelling.given import Given, given_by, given_variable
 from robochoc.modelling.numbers import Exact
 from robochoc.modelling.places import ModelError, Place, UnknownNameError, did_you_mean, here
 from robochoc.modelling.robots import ModelRobot, check_robot
-from robochoc.modelling.rules import Rule, check_owned, conditions_in, positive_or_any
+from robochoc.modelling.rules import Rule, check_owned, conditions_in, exact_or_none
 from robochoc.modelling.solution import Solution
 from robochoc.modelling.solving import Solvable
 from robochoc.modelling.terms import Term, Variable, all_of, number
@@ -99,6 +100,7 @@ class Model(Solvable):
         return self.add_robot(check_robot(name, self.robots, weight), priority, weight, here())
 
     def add_robot(self, name: str, priority: float, weight: int, place: Place) -> ModelRobot:
+        """Add a robot of a name that is free. See `robot`."""
         self.robots[name] = ModelRobot(self, name, priority, weight, place)
         self.changed()
         return self.robots[name]
@@ -114,7 +116,8 @@ class Model(Solvable):
 
         Args:
             *constraints: Conditions, or lists of them.
-            cost: What it costs if they do not all hold. It counts against a sum that is maximised. None: they must hold.
+            cost: What it costs if they do not all hold. It counts against a sum that is
+                maximised. None: they must hold.
             name: A name, by which an event can remove them.
 
         Returns:
@@ -128,7 +131,7 @@ class Model(Solvable):
         self.changed()
         return rule
 
-    def __iadd__(self, constraints: object) -> Model:
+    def __iadd__(self, constraints: object) -> Self:
         """Add constraints, as `add` does."""
         self.add(constraints)
         return self
@@ -169,7 +172,7 @@ class Model(Solvable):
         place = here()
         term = all_of(conditions_in(constraints, place))
         check_owned(term, self.variables, place, event)
-        return Rule(name or self._free_name(), term, positive_or_any(cost), place)
+        return Rule(name or self._free_name(), term, exact_or_none(cost), place)
 
     def free_prefix(self, prefix: str) -> str:
         """Return `prefix`, or something like it, with which no name of a constraint begins."""

@@ -65,10 +65,10 @@ class ModelRobot:
         """
         place = here()
         whole = f"{self.name}.{name}" if qualified else name
-        if not isinstance(name, str) or not is_name(whole) or len(whole) > MAX_NAME:
+        if not is_name(whole) or len(whole) > MAX_NAME:
             raise ModelError(f"{name!r} cannot be a variable's name", "a letter, then letters, digits, '.' and '_'")
         if name in self.variables or whole in self._model.variables:
-            there = self._model.variables.get(whole) or self.variables[name]
+            there = self._model.variables[whole] if whole in self._model.variables else self.variables[name]
             raise ModelError(f"there is a variable {there!r} already, made at {there.place}", "give it another name")
         codes = codes_of(domain, self._model.symbols, place)
         made = Variable(whole, codes, self.name, place, self.joins)
@@ -105,7 +105,13 @@ class ModelRobot:
         return rule
 
     def topic(
-        self, name: str, *, x: object = None, y: object = None, z: object = None, type: str = Topic.type  # noqa: A002 - ROS calls it so
+        self,
+        name: str,
+        *,
+        x: object = None,
+        y: object = None,
+        z: object = None,
+        type: str = Topic.type,  # noqa: A002 - ROS calls it so
     ) -> None:
         """Publish where the robot's decision sends it.
 

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 from robochoc.modelling.meanings import UndefinedTermError
 from robochoc.modelling.numbers import Exact, exact
 from robochoc.modelling.places import ModelError, ModelTypeError, Place
-from robochoc.modelling.terms import Constant, Term, Variable, condition
+from robochoc.modelling.terms import Term, Variable, condition
 
 if TYPE_CHECKING:
     from robochoc.modelling.drafts import Draft
@@ -57,13 +57,18 @@ def conditions_in(given: object, place: Place) -> list[Term]:
     term = condition(given)
     if term.variables:
         return [term]
+    check_constant(term, place)
+    return []
+
+
+def check_constant(term: Term, place: Place) -> None:
+    """Raise `ModelError` for a condition that depends on nothing and is false."""
     try:
         holds = bool(term.value({}))
     except UndefinedTermError:
         holds = False
     if not holds:
         raise ModelError("this constraint is False whatever the values are", "compare variables of the model", place)
-    return []
 
 
 def check_owned(term: Term, known: dict[str, Variable], place: Place, event: object = None) -> None:
@@ -78,11 +83,6 @@ def check_owned(term: Term, known: dict[str, Variable], place: Place, event: obj
             raise ModelError(f"{variable.owner}, made at {variable.place}, joins later", hint, place)
 
 
-def positive_or_any(cost: object) -> Exact | None:
+def exact_or_none(cost: object) -> Exact | None:
     """Return the cost of breaking a constraint; None: it must hold."""
     return None if cost is None else exact(cost)
-
-
-def is_constant(term: Term) -> bool:
-    """Return whether a term depends on nothing."""
-    return isinstance(term, Constant) or not term.variables

@@ -6,7 +6,7 @@ import json
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, fields
 from functools import cached_property
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from robochoc.formats.result import result_json
 from robochoc.model.headline import describe_outcome
@@ -15,6 +15,9 @@ from robochoc.model.problem import Team
 from robochoc.modelling.meanings import UndefinedTermError
 from robochoc.modelling.places import UnknownNameError, did_you_mean
 from robochoc.modelling.terms import Term, Variable
+
+if TYPE_CHECKING:
+    from robochoc.modelling.notebook.scenes import ScenePage
 
 
 @dataclass(frozen=True, repr=False)
@@ -74,6 +77,21 @@ class Solution(Outcome):
     def __repr__(self) -> str:
         robots = len(self.problem.robots) if self.problem else len(self.assignment)
         return f"<{self.team}: {describe_outcome(self, robots)}; {self.protocols}, {self.runtime}>"
+
+    def scene(self, *, height: int = 520) -> ScenePage:
+        """Return the scene: the drones fly to where the team has decided, in calm air.
+
+        Args:
+            height: Its height in a notebook, in pixels.
+        """
+        from robochoc.modelling.notebook.scenes import ScenePage  # noqa: PLC0415 - numpy and the viewer: start-up
+
+        return ScenePage(self, self.problem, height=height)
+
+    def _repr_html_(self) -> str:
+        from robochoc.modelling.notebook.pages import solution_html  # noqa: PLC0415 - notebooks only
+
+        return solution_html(self)
 
     def _is_foreign(self, variable: Variable) -> bool:
         return bool(self.variables) and self.variables.get(variable.name) is not variable

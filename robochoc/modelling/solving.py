@@ -1,11 +1,11 @@
-"""`solve`, for problems from files and from Python: the options of a run by their names, and hints where one is wrong."""
+"""`solve`, for problems from files and from Python: the options of a run by name, with hints where one is wrong."""
 
 from __future__ import annotations
 
 import inspect
 from collections.abc import Iterable, Mapping, Sequence
 from enum import StrEnum
-from typing import TYPE_CHECKING, NoReturn, TypeVar
+from typing import TYPE_CHECKING, Never, TypeVar
 
 from robochoc.journal.events import Observer
 from robochoc.model.orders import Order
@@ -24,6 +24,8 @@ if TYPE_CHECKING:
     from robochoc.communication.kill_schedule import Kill
     from robochoc.communication.simulator.channel import ChannelModel
 
+NO_LIMITS = Limits()
+"""The default limits on the compilation of domains."""
 _Choice = TypeVar("_Choice", bound=StrEnum)
 
 
@@ -46,7 +48,7 @@ class Solvable:
         verify: bool = False,
         count: bool = False,
         cache: bool = True,
-        local: Limits = Limits(),
+        local: Limits = NO_LIMITS,
         schedule: str = ScheduleName.CONCURRENT,
         delay: int = 0,
         channel: ChannelModel | None = None,
@@ -55,7 +57,7 @@ class Solvable:
         patience: float | None = None,
         kill: Sequence[Kill] = (),
         filters: Sequence[str] = (),
-        **unknown: NoReturn,
+        **unknown: Never,
     ) -> Solution:
         """Let the robots solve the problem together.
 
@@ -80,7 +82,8 @@ class Solvable:
             schedule: How the simulator orders events: `concurrent` or `random`.
             delay: The longest delay of a message in the simulator, in constraint checks.
             channel: A channel model: the simulator counts seconds of computing and radio.
-            on_loss: What the loss of a robot means: `fail` or `withdraw`. None: the run fails, unless there are `spares`.
+            on_loss: What the loss of a robot means: `fail` or `withdraw`. None: the run fails, unless there are
+                `spares`.
             spares: How many robots that are lost come back.
             patience: A robot whose process is stopped for so many seconds is lost. None: it is waited for.
             kill: Robots whose processes are killed, and when.
@@ -129,6 +132,11 @@ class Solvable:
             kill=tuple(kill),
         )
         return self._solution(solve(team, options, observer=observer, environment=environment), team)
+
+    def _repr_html_(self) -> str:
+        from robochoc.modelling.notebook.pages import team_html  # noqa: PLC0415 - notebooks only
+
+        return team_html(self._team_to_solve())
 
     def _team_to_solve(self) -> Team:
         raise NotImplementedError

@@ -64,9 +64,7 @@ def commonest(found: Mapping[Row, Price]) -> Price:
     return Counter(found.values()).most_common(1)[0][0] if found else 0
 
 
-def _combinations(
-    scope: Sequence[Variable], place: Place, term: Term
-) -> Iterator[tuple[Row, dict[Variable, object]]]:
+def _combinations(scope: Sequence[Variable], place: Place, term: Term) -> Iterator[tuple[Row, dict[Variable, object]]]:
     size = math.prod(len(variable.codes.ever) for variable in scope)
     if size > MAX_COMBINATIONS:
         shown = repr(term) if len(repr(term)) <= 60 else f"{repr(term)[:57]}..."  # noqa: PLR2004 - of a message

@@ -179,6 +179,7 @@ class Variable(Term):
         return tuple(self.codes.value(code) for code in self.codes)
 
     def value(self, values: Values) -> object:
+        """Return its value."""
         return values[self]
 
     def __repr__(self) -> str:
@@ -192,6 +193,7 @@ class Constant(Term):
         self.given, self.kind = given, kind_of(given)
 
     def value(self, values: Values) -> object:  # noqa: ARG002 - see Term
+        """Return its value."""
         return self.given
 
     def __repr__(self) -> str:
@@ -206,13 +208,14 @@ class Linear(Term):
         self.arguments = tuple(term for _, term in parts)
 
     def value(self, values: Values) -> object:
+        """Return its value."""
         total = self.constant
         for factor, term in self.parts:
             total += factor * exact(term.value(values))
         return total
 
     def __repr__(self) -> str:
-        words = [f"{'' if factor == 1 else f'{factor}*'}{term!r}" for factor, term in self.parts]
+        words = [f"{_FACTORS.get(factor, f'{factor}*')}{term!r}" for factor, term in self.parts]
         return f"({' + '.join([*words, *([str(self.constant)] if self.constant else [])])})".replace("+ -", "- ")
 
 
@@ -224,9 +227,10 @@ class Applied(Term):
         self.kind = MEANINGS[operator].gives
 
     def value(self, values: Values) -> object:
+        """Return its value."""
         meaning = MEANINGS[self.operator]
         if meaning.lazy is not None:
-            return meaning.lazy(*(lambda one=one: one.value(values) for one in self.arguments))  # type: ignore[misc]
+            return meaning.lazy(*(lambda one=one: one.value(values) for one in self.arguments))
         return meaning.compute(*(one.value(values) for one in self.arguments))
 
     def __repr__(self) -> str:
@@ -242,6 +246,7 @@ class Called(Term):
         self.function, self.arguments, self.place = function, arguments, place
 
     def value(self, values: Values) -> object:
+        """Return its value."""
         given = [one.value(values) for one in self.arguments]
         try:
             return self.function(*given)
@@ -264,12 +269,14 @@ class Tabled(Term):
         self.kind = BOOLEAN if isinstance(default, bool) else NUMBER
 
     def value(self, values: Values) -> object:
+        """Return its value."""
         return self.rows.get(tuple(one.value(values) for one in self.arguments), self.default)
 
     def __repr__(self) -> str:
         return f"table({', '.join(map(repr, self.arguments))})"
 
 
+_FACTORS: dict[Exact, str] = {1: "", -1: "-"}
 _OPPOSITES = {"eq": "ne", "ne": "eq", "lt": "ge", "ge": "lt", "gt": "le", "le": "gt"}
 
 
@@ -361,4 +368,6 @@ def _check_known(variable: Variable, value: object) -> None:
     """Raise `ModelError` where a text is compared that is no value of the variable: a slip of the pen."""
     if isinstance(value, str) and variable.codes.symbolic and variable.codes.code(value) is None:
         shown = " ".join(map(str, variable.domain[:20]))
-        raise ModelError(f"{variable!r} has no value {value!r}", did_you_mean(value, variable.domain, f"it has {shown}"))
+        raise ModelError(
+            f"{variable!r} has no value {value!r}", did_you_mean(value, variable.domain, f"it has {shown}")
+        )

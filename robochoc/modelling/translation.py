@@ -18,8 +18,10 @@ from robochoc.modelling.codes import BOOLEAN, NUMBER
 from robochoc.modelling.numbers import exact
 from robochoc.modelling.terms import Applied, Constant, Linear, Term, Variable
 
-MAX_POWER = 64
-"""Constant exponents are at most so large."""
+MAX_SIZE = 5_000
+"""The maximum number of operators and terms of an expression: nested quotients double it each time."""
+MAX_LEVELS = 60
+"""The maximum depth of an expression."""
 
 
 class UntranslatableError(Exception):
@@ -40,6 +42,15 @@ class Translator:
         self._names = names
         self._limits = {name: _interval(variable) for variable, name in names.items()}
 
+    def whole_condition(self, term: Term) -> Expression:
+        """Return a Boolean expression of a size that files can hold. Raises `UntranslatableError`."""
+        return _of_some_size(self.condition(term))
+
+    def whole_number(self, term: Term) -> Scaled:
+        """Return a number whose expression has such a size. Raises `UntranslatableError`."""
+        found = self.number(term)
+        return found._replace(expression=_of_some_size(found.expression))
+
     def condition(self, term: Term) -> Expression:
         """Return a Boolean expression. Raises `UntranslatableError`."""
         match term:
@@ -47,9 +58,7 @@ class Translator:
                 return Apply("eq", (Integer(int(bool(given))), Integer(1)))
             case Variable(kind=kind) if kind == BOOLEAN:
                 return Apply("eq", (Name(self._names[term]), Integer(1)))
-            case Applied(operator="and" | "or" as operator, arguments=arguments):
-                return Apply(operator, tuple(map(self.condition, arguments)))
-            case Applied(operator="not" | "xor" as operator, arguments=arguments):
+            case Applied(operator="and" | "or" | "not" | "xor" as operator, arguments=arguments):
                 return Apply(operator, tuple(map(self.condition, arguments)))
             case Applied(operator="implies", arguments=(one, other)):
                 return Apply("or", (Apply("not", (self.condition(one),)), self.condition(other)))
@@ -59,7 +68,8 @@ class Translator:
                 return found[0] if len(found) == 1 else Apply("and", found)
             case Applied(operator=operator, arguments=(one, other)) if operator in _COMPARISONS:
                 return self._comparison(operator, one, other)
-        raise UntranslatableError
+            case _:
+                raise UntranslatableError
 
     def number(self, term: Term) -> Scaled:
         """Return a number. Raises `UntranslatableError`."""
@@ -75,22 +85,22 @@ class Translator:
                 return Scaled(Apply("if", (self.condition(term), Integer(1), Integer(0))))
             case Applied(operator=operator, arguments=arguments):
                 return self._applied(operator, arguments)
-        raise UntranslatableError
+            case _:
+                raise UntranslatableError
 
     def _applied(self, operator: str, arguments: Sequence[Term]) -> Scaled:
         if operator == "if":
-            test, *numbers = arguments
-            branches, divisor = _together(map(self.number, numbers))
+            test, *chosen = arguments
+            branches, divisor = _together(map(self.number, chosen))
             return Scaled(Apply("if", (self.condition(test), *branches)), divisor)
         numbers = [self.number(one) for one in arguments]
         match operator:
-            case "abs":
-                return Scaled(Apply("abs", (numbers[0].expression,)), numbers[0].divisor)
-            case "min" | "max":
+            case "abs" | "min" | "max":
                 found, divisor = _together(numbers)
                 return Scaled(Apply(operator, tuple(found)), divisor)
             case "mul":
-                return Scaled(_product(*(one.expression for one in numbers)), math.prod(one.divisor for one in numbers))
+                factors = tuple(one.expression for one in numbers)
+                return Scaled(Apply("mul", factors), math.prod(one.divisor for one in numbers))
             case "floordiv" | "mod":
                 return self._division(operator, numbers)
             case "element":
@@ -102,9 +112,7 @@ class Translator:
         factors = [Fraction(factor) / number.divisor for factor, number in parts]
         divisor = math.lcm(constant.denominator, *(factor.denominator for factor in factors))
         whole = [int(factor * divisor) for factor in factors]
-        terms = [
-            (factor, number.expression) for factor, (_, number) in zip(whole, parts, strict=True) if factor
-        ]
+        terms = [(factor, number.expression) for factor, (_, number) in zip(whole, parts, strict=True) if factor]
         rest = int(constant * divisor)
         if not terms:
             return Scaled(Integer(rest), divisor)
@@ -180,8 +188,35 @@ def _times(factor: int, expression: Expression) -> Expression:
             return Integer(factor * value)
         case -1, _:
             return Apply("neg", (expression,))
-    return Apply("mul", (Integer(factor), expression))
+        case _:
+            return Apply("mul", (Integer(factor), expression))
 
 
-def _product(*factors: Expression) -> Expression:
-    return Apply("mul", factors)
+def _of_some_size(expression: Expression) -> Expression:
+    """Return `expression`, if it is not too large. Raises `UntranslatableError`. What is shared is looked at once."""
+    known: dict[int, tuple[int, int]] = {}
+
+    def size(one: Expression) -> tuple[int, int]:
+        if not isinstance(one, Apply):
+            return 1, 1
+        if id(one) not in known:
+            parts = [size(argument) for argument in one.arguments]
+            known[id(one)] = 1 + sum(count for count, _ in parts), 1 + max(depth for _, depth in parts)
+        return known[id(one)]
+
+    count, depth = size(expression)
+    if count > MAX_SIZE or depth > MAX_LEVELS:
+        raise UntranslatableError
+    return expression
+
+
+def may_be_undefined(expression: Expression) -> bool:
+    """Return whether an expression divides, or has a power: it may have no value."""
+    waiting = [expression]
+    while waiting:
+        one = waiting.pop()
+        if isinstance(one, Apply):
+            if one.operator in {"div", "mod", "pow"}:
+                return True
+            waiting += one.arguments
+    return False
