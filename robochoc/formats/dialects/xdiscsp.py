@@ -1,0 +1,71 @@
+"""XDisCSP 1.0, the files of DisChoco 2 and of DCOPSolver: DisCSP, DCOP, MaxDisCSP, and ADCOP with two costs a tuple.
+
+Facts: DisChoco's parser, and the files of czy920/DCOPSolverOld and czy920/DCOPSolverInfrastructure. The variant with one
+file for each agent is this platform's own format.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from decimal import Decimal
+from pathlib import Path
+
+from lxml import etree
+
+from robochoc.formats.diagnostics import MistakeError, shortened
+from robochoc.formats.dialects.dialect import Dialect, Imported, ImportOptions, Note
+from robochoc.formats.dialects.xcsp21.instance import ForeignConstraint, Formula, Instance, Table, refuse
+from robochoc.formats.dialects.xcsp21.reader import read_instance
+from robochoc.formats.dialects.xcsp21.recognition import Beginning
+from robochoc.formats.dialects.xcsp21.team import as_team
+from robochoc.formats.dialects.xcsp21.xdiscsp_file import xdiscsp_file
+from robochoc.formats.xml import attribute
+from robochoc.model.constraint import INFINITE, Predicate
+
+NAME = "xdiscsp"
+MAX_DISCSP = "MaxDisCSP"
+
+
+def _recognises(_path: Path, beginning: bytes) -> bool:
+    found = Beginning(beginning)
+    return found.is_instance and found.has_agents and "XDisCSP" in found.format
+
+
+def _read(paths: Sequence[Path], options: ImportOptions) -> Imported:
+    if len(paths) > 1:
+        refuse(paths[1], 0, "is a whole problem by itself", "import one such file at a time, or their folder")
+    instance = read_instance(paths[0], options, _knower)
+    instance.name = paths[0].stem
+    if instance.type == MAX_DISCSP:
+        instance.constraints = list(map(_costing_one, instance.constraints))
+        instance.notes.append(Note("MaxDisCSP", "each violated constraint costs 1"))
+    return as_team(instance, NAME, options)
+
+
+def _knower(element: etree._Element, instance: Instance) -> str:
+    """Return the agent that alone knows a constraint. Raises `MistakeError` where a partially known one names none."""
+    model = attribute(element, "model") or instance.constraint_model
+    owner = attribute(element, "ownerId")
+    if model != "PKC":
+        return ""
+    if not owner:
+        what = f"a partially known constraint (PKC) '{shortened(attribute(element, 'name'))}' without ownerId"
+        raise MistakeError(what, 'write ownerId="1", the id of the agent that knows it, or model="TKC"')
+    return instance.ids.get(owner, owner)
+
+
+def _costing_one(one: ForeignConstraint) -> ForeignConstraint:
+    """Return a hard constraint as one that costs 1."""
+    match one.content:
+        case Formula(definition=Predicate()) as formula:
+            return replace(one, content=replace(formula, cost=Decimal(1)))
+        case Table() as table:
+            costs = {values: Decimal(1) if cost == INFINITE else cost for values, cost in table.costs.items()}
+            default = Decimal(1) if table.default == INFINITE else table.default
+            return replace(one, content=replace(table, costs=costs, default=default))
+        case _:
+            return one
+
+
+DIALECT = Dialect(NAME, "XDisCSP 1.0", _recognises, _read, xdiscsp_file)
