@@ -56,7 +56,7 @@ def read_xml(path: Path, root: str) -> etree._Element:
 
 
 def read_tree(path: Path, most: int) -> etree._Element:
-    """Return the root element of any XML file of at most `most` bytes. Raises `InvalidInputError` as `read_xml` does."""
+    """Return the root element of any XML file of at most `most` bytes. Raises `InvalidInputError`, as `read_xml`."""
     try:
         content = _bytes(path, most)
     except OSError as error:

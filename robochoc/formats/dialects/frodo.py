@@ -1,4 +1,4 @@
-"""FRODO's XCSP 2.1 (`format="XCSP 2.1_FRODO"`), in one file or in one for each agent, and XCSP 2.0 and 2.1 without agents.
+"""FRODO's XCSP 2.1 (`format="XCSP 2.1_FRODO"`), in one file or in one for each agent, and plain XCSP 2.0 and 2.1.
 
 Facts: FRODO's manual, Appendix A, and its schemas; Roussel and Lecoutre, arXiv 0902.2362.
 """

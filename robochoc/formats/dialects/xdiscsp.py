@@ -1,7 +1,7 @@
 """XDisCSP 1.0, the files of DisChoco 2 and of DCOPSolver: DisCSP, DCOP, MaxDisCSP, and ADCOP with two costs a tuple.
 
-Facts: DisChoco's parser, and the files of czy920/DCOPSolverOld and czy920/DCOPSolverInfrastructure. The variant with one
-file for each agent is this platform's own format.
+Facts: the names in DisChoco's parser, and the files that come with DCOPSolver. The variant with one file for each agent
+is this platform's own format.
 """
 
 from __future__ import annotations
@@ -26,6 +26,8 @@ from robochoc.model.constraint import INFINITE, Predicate
 NAME = "xdiscsp"
 MAX_DISCSP = "MaxDisCSP"
 
+_ONE = Decimal(1)
+
 
 def _recognises(_path: Path, beginning: bytes) -> bool:
     found = Beginning(beginning)
@@ -38,7 +40,7 @@ def _read(paths: Sequence[Path], options: ImportOptions) -> Imported:
     instance = read_instance(paths[0], options, _knower)
     instance.name = paths[0].stem
     if instance.type == MAX_DISCSP:
-        instance.constraints = list(map(_costing_one, instance.constraints))
+        _cost_one(instance)
         instance.notes.append(Note("MaxDisCSP", "each violated constraint costs 1"))
     return as_team(instance, NAME, options)
 
@@ -55,17 +57,25 @@ def _knower(element: etree._Element, instance: Instance) -> str:
     return instance.ids.get(owner, owner)
 
 
-def _costing_one(one: ForeignConstraint) -> ForeignConstraint:
-    """Return a hard constraint as one that costs 1."""
-    match one.content:
-        case Formula(definition=Predicate()) as formula:
-            return replace(one, content=replace(formula, cost=Decimal(1)))
-        case Table() as table:
-            costs = {values: Decimal(1) if cost == INFINITE else cost for values, cost in table.costs.items()}
-            default = Decimal(1) if table.default == INFINITE else table.default
-            return replace(one, content=replace(table, costs=costs, default=default))
-        case _:
-            return one
+def _cost_one(instance: Instance) -> None:
+    """Let every hard constraint cost 1 where it is violated."""
+    tables: dict[int, Table] = {}
+
+    def costing_one(one: ForeignConstraint) -> ForeignConstraint:
+        match one.content:
+            case Formula(definition=Predicate()) as formula:
+                return replace(one, content=replace(formula, cost=_ONE))
+            case Table() as table:
+                return replace(one, content=tables.setdefault(id(table), _with_ones(table)))
+            case _:
+                return one
+
+    instance.constraints = list(map(costing_one, instance.constraints))
+
+
+def _with_ones(table: Table) -> Table:
+    costs = {values: _ONE if cost == INFINITE else cost for values, cost in table.costs.items()}
+    return replace(table, costs=costs, default=_ONE if table.default == INFINITE else table.default)
 
 
 DIALECT = Dialect(NAME, "XDisCSP 1.0", _recognises, _read, xdiscsp_file)

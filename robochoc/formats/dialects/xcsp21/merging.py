@@ -38,7 +38,9 @@ def merged(instances: Sequence[Instance]) -> Instance:
             elif not _same(first, constraint):
                 if not (is_hard(first) and is_hard(constraint)):
                     hint = f"constraints of one name are copies; it also stands in {first.file}:{first.line}"
-                    refuse(one.file, constraint.line, f"constraint '{shortened(constraint.name)}' costs otherwise", hint)
+                    refuse(
+                        one.file, constraint.line, f"constraint '{shortened(constraint.name)}' costs otherwise", hint
+                    )
                 whole.constraints.append(constraint)
     return whole
 

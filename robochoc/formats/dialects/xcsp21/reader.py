@@ -1,4 +1,4 @@
-"""From an XML file of XCSP 2.1 with agents to an `Instance`. Counts and arities are not trusted: what is there counts."""
+"""From an XML file of XCSP 2.1 with agents to an `Instance`. Counts that it states are not looked at."""
 
 from __future__ import annotations
 
@@ -114,7 +114,9 @@ class _Reader:
         if most and most != "infinity":
             bound = finite_cost(most)
             self._read.costs_from = bound
-            told = f"costs of {most} or more forbid (maximalCost); an optimum of as much means that there is no solution"
+            told = (
+                f"costs of {most} or more forbid (maximalCost); an optimum of as much means that there is no solution"
+            )
             self._read.notes.append(Note("bound", told))
 
     def _agent(self, element: etree._Element) -> None:
@@ -143,9 +145,7 @@ class _Reader:
         refuse(self._path, line(element), f"{what}: stochastic problems are not read", "give the variable one value")
 
     def _define(self) -> None:
-        costs = CostReader(
-            maximize=self._read.maximize, infinity=self._options.infinity, bound=self._read.costs_from
-        )
+        costs = CostReader(maximize=self._read.maximize, infinity=self._options.infinity, bound=self._read.costs_from)
         for element in self._every("relations", "relation"):
             with self._at(element):
                 self._relations[self._new(element)] = read_relation(element, costs)
@@ -193,22 +193,20 @@ class _Reader:
             relation = self._relations[reference]
             arity = relation.arity if isinstance(relation, Table) else relation.first.arity
             if arity not in {0, len(scope)}:
-                raise MistakeError(
-                    f"{len(scope)} variables in the scope, but the tuples of '{shortened(reference)}' have {arity} values",
-                    "one for each variable",
-                )
+                there = f"{len(scope)} variables in the scope, but tuples of {arity} values in '{shortened(reference)}'"
+                raise MistakeError(there, "one for each variable")
             return [relation]
-        formula = self._formulas.get(reference) or PREDEFINED.get(reference)
-        if formula is None:
+        definition = self._formulas.get(reference) or PREDEFINED.get(reference)
+        if definition is None:
             hint = suggestion(reference, [*self._relations, *self._formulas], "relations, predicates and functions")
             raise MistakeError(f"there is no '{shortened(reference)}'", hint)
         words = (element.findtext("parameters") or " ".join(scope)).split()
         terms = tuple(integer(word) if is_integer(word) else word for word in words)
         self._check_terms(terms)
-        if len(terms) != len(formula.parameters):
-            there = f"{len(terms)} parameters for '{shortened(reference)}', which has {len(formula.parameters)}"
+        if len(terms) != len(definition.parameters):
+            there = f"{len(terms)} parameters for '{shortened(reference)}', which has {len(definition.parameters)}"
             raise MistakeError(there, "one for each")
-        return [Formula(formula, terms)]
+        return [Formula(definition, terms)]
 
     def _check_terms(self, terms: tuple[str | int, ...]) -> None:
         for term in terms:
@@ -226,4 +224,3 @@ class _Reader:
             yield
         except MistakeError as mistake:
             refuse(self._path, mistake.line or line(element), mistake.message, mistake.hint)
-

@@ -25,7 +25,8 @@ class Beginning:
         root = _ROOT.match(text)
         self.is_instance = bool(root and root[1] == b"instance" and b"XCSP3" not in root[2])
         presentation = _PRESENTATION.search(text)
-        stated = {name: one or other for name, one, other in _ATTRIBUTE.findall(presentation[1] if presentation else b"")}
+        found = _ATTRIBUTE.findall(presentation[1] if presentation else b"")
+        stated = {name: one or other for name, one, other in found}
         self.format = stated.get(b"format", b"").decode("utf-8", "replace").strip()
         self.type = stated.get(b"type", b"").decode("utf-8", "replace").strip()
         self.has_agents = re.search(rb"<agents[\s/>]", text) is not None and b"<agents_neighbours" not in text
