@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import keyword
 import os
 import signal
 from pkgutil import resolve_name
@@ -29,9 +30,10 @@ COMMANDS = {
     "compile": ("compile_team", "Compile the robots' local problems, and show their sizes."),
     "completion": ("completion", "Print the script for completion in bash, zsh or fish."),
     "directory": ("directory", "List the agents of a running master, and their services."),
-    "export": ("export", "Write a team's problem for other solvers (XCSP3)."),
+    "export": ("export", "Write a team's problem for other tools, or as a graph."),
     "fly": ("fly", "Simulate the flight of a saved result: 3D scene, ROS."),
     "generate": ("generate", "Write a team of a problem family."),
+    "import": ("import_", "Make teams of the files of FRODO, pyDCOP, XCSP3, ..."),
     "journal": ("journal", "Summarise or export a journal."),
     "master": ("master", "Lead a team whose robots run on other machines."),
     "protocols": ("protocols", "List the installed protocols, or explain one."),
@@ -55,7 +57,8 @@ class Commands(click.Group):
         """Return the command of that name, or None."""
         if cmd_name not in COMMANDS:
             return None
-        command: click.Command = resolve_name(f"robochoc.cli.commands.{cmd_name}:{COMMANDS[cmd_name][0]}")
+        module = f"{cmd_name}_" if keyword.iskeyword(cmd_name) else cmd_name
+        command: click.Command = resolve_name(f"robochoc.cli.commands.{module}:{COMMANDS[cmd_name][0]}")
         return command
 
     def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:  # noqa: ARG002 - click's
