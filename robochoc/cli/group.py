@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import keyword
 import os
 import signal
 from pkgutil import resolve_name
@@ -57,8 +56,7 @@ class Commands(click.Group):
         """Return the command of that name, or None."""
         if cmd_name not in COMMANDS:
             return None
-        module = f"{cmd_name}_" if keyword.iskeyword(cmd_name) else cmd_name
-        command: click.Command = resolve_name(f"robochoc.cli.commands.{module}:{COMMANDS[cmd_name][0]}")
+        command: click.Command = resolve_name(f"robochoc.cli.commands.{cmd_name}:{COMMANDS[cmd_name][0]}")
         return command
 
     def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:  # noqa: ARG002 - click's

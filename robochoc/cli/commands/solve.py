@@ -174,9 +174,7 @@ def solve(
     explain: bool,
     **settings: Any,  # noqa: ANN401 - the other options
 ) -> None:
-    """Solve all teams in the folders PATH and below; every solution is checked against all constraints.
-
-    PATH may also be a problem in a file of another tool, as 'robochoc import' reads them.
+    """Solve all teams in the folders PATH and below, or files that 'robochoc import' reads; solutions are checked.
 
     \b
     robochoc solve instances/queens3d-4 --withdraw --html out/page.html

@@ -1,4 +1,4 @@
-"""`robochoc import`: problems in the files of other tools, as folders of teams."""
+"""`robochoc import`: problems in the files of other tools, as folders of teams."""  # noqa: N999 - the name of the command
 
 from __future__ import annotations
 
