@@ -172,7 +172,7 @@ def _listed(term: Tabled, listed: Mapping[Row, object], name: str, place: Place)
 
 def _never(name: str, variable: Variable, place: Place) -> Draft:
     """Return what no value of a variable satisfies."""
-    rows = dict.fromkeys(((code,) for code in variable.codes.ever), 0)
+    rows: dict[Row, Price] = dict.fromkeys([(code,) for code in variable.codes.ever], 0)
     return Draft(name, (variable,), place, rows=rows, semantics=Semantics.CONFLICTS)
 
 
