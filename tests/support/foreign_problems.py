@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 from fractions import Fraction
 from pathlib import Path
 from random import Random
+from typing import Any
 
 from robochoc.formats.dialects.dialect import Imported, ImportOptions
 from robochoc.formats.dialects.registry import read_foreign
@@ -65,11 +66,11 @@ def optimum(team: Team) -> Fraction | None:
     return best
 
 
-def imported(text: str, folder: Path, name: str = "problem.xml", **options: object) -> Imported:
+def imported(text: str, folder: Path, name: str = "problem.xml", **options: Any) -> Imported:  # noqa: ANN401
     """What is imported of a file with this text."""
     path = folder / name
     path.write_text(text, encoding="utf-8")
-    return read_foreign([path], ImportOptions(**options))  # type: ignore[arg-type]
+    return read_foreign([path], ImportOptions(**options))
 
 
 _FORMULAS: Sequence[tuple[str, Callable[..., int]]] = (

@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from fractions import Fraction
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -35,7 +36,7 @@ def soft(text: str, more: str = "", scope: str = "xa xb") -> str:
         <constraints><constraint name="c" scope="{scope}" arity="2" reference="r"/></constraints>"""
 
 
-def refused(text: str, folder: Path, **options: object) -> str:
+def refused(text: str, folder: Path, **options: Any) -> str:  # noqa: ANN401
     with pytest.raises(InvalidInputError) as failure:
         check_team(imported(text, folder, **options).team)
     assert len(failure.value.diagnostics) == 1

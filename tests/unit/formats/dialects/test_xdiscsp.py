@@ -25,7 +25,8 @@ def xdiscsp(constraints: str, relations: str, *, kind: str = "DCOP", model: str 
   <agents nbAgents="2"><agent name="A1" id="1" description="first"/><agent name="A2" id="2"/></agents>
   <domains nbDomains="1"><domain name="D1" nbValues="2">1..2</domain></domains>
   <variables nbVariables="3"><variable agent="A1" name="X1.1" id="1" domain="D1" description="of A1"/>
-    <variable agent="A2" name="X2.1" id="1" domain="D1"/><variable agent="A2" name="X2.2" id="2" domain="D1"/></variables>
+    <variable agent="A2" name="X2.1" id="1" domain="D1"/><variable agent="A2" name="X2.2" id="2" domain="D1"/>
+  </variables>
   <constraints nbConstraints="1" {more}>{constraints}</constraints>
   <relations nbRelations="1">{relations}</relations>
   <GuiPresentation type="{kind}" name="i"/></instance>"""
@@ -35,7 +36,7 @@ def over(scope: str, reference: str = "R0", more: str = "") -> str:
     return f'<constraint name="C" model="TKC" arity="2" scope="{scope}" reference="{reference}" {more}/>'
 
 
-SOFT = '<relation name="R0" arity="2" nbTuples="4" semantics="soft" defaultCost="infinity">7:1 1|4:1 2|5:2 1|6:2 2</relation>'
+SOFT = '<relation name="R0" semantics="soft" defaultCost="infinity">7:1 1|4:1 2|5:2 1|6:2 2</relation>'
 HARD = '<relation name="R0" arity="2" semantics="conflicts">1 1|2 2</relation>'
 
 
@@ -77,7 +78,8 @@ def test_two_costs_a_tuple_are_parts_of_two_robots(tmp_path: Path) -> None:
     ((first,),) = (parent.constraints for parent in turned["A2"].parents)
     assert first.price({"X1.1": 2, "X2.1": 1}) == 5
     alone = imported(xdiscsp(over("X2.1 X2.2"), SIDES, kind="ADCOP"), tmp_path).team
-    assert (optimum(alone), len(alone["A2"].private)) == (3, 2)
+    assert optimum(alone) == 3
+    assert len(alone["A2"].private) == 2
 
 
 def test_partially_known_constraints_say_who_knows_them(tmp_path: Path) -> None:
@@ -95,7 +97,7 @@ def test_two_files_are_two_problems(tmp_path: Path) -> None:
     files = [tmp_path / "one.xml", tmp_path / "two.xml"]
     for file in files:
         file.write_text(xdiscsp(over("X1.1 X2.1"), SOFT))
-    with pytest.raises(InvalidInputError, match="two.xml: is a whole problem by itself"):
+    with pytest.raises(InvalidInputError, match=r"two\.xml: is a whole problem by itself"):
         read_foreign(files, ImportOptions())
 
 
