@@ -147,27 +147,32 @@ def _scaled(value: object, factor: Exact) -> Price:
 def _condition(term: Term, name: str, place: Place) -> Draft | None:
     """Return a hard constraint. None: it always holds."""
     if isinstance(term, Tabled) and (listed := listed_rows(term)) is not None:
-        rows = dict.fromkeys((row for row, value in listed.items() if value is not term.default), 0)
-        if not rows:
-            return None if term.default else _never(name, term.variables[0], place)
-        semantics = Semantics.CONFLICTS if term.default else Semantics.SUPPORTS
-        return Draft(name, term.variables, place, rows=rows, semantics=semantics)
+        return _listed(term, listed, name, place)
     body = _body(term)
     if body is not None:
         return Draft(name, term.variables, place, body)
     holds, fails = truths(term, place)
     if not fails:
         return None
-    if len(fails) <= len(holds):
-        return Draft(name, term.variables, place, rows=dict.fromkeys(fails, 0), semantics=Semantics.CONFLICTS)
     if not holds:
         return _never(name, term.variables[0], place)
-    return Draft(name, term.variables, place, rows=dict.fromkeys(holds, 0), semantics=Semantics.SUPPORTS)
+    few = len(fails) <= len(holds)
+    semantics = Semantics.CONFLICTS if few else Semantics.SUPPORTS
+    return Draft(name, term.variables, place, rows=dict.fromkeys(fails if few else holds, 0), semantics=semantics)
+
+
+def _listed(term: Tabled, listed: Mapping[Row, object], name: str, place: Place) -> Draft | None:
+    """Return what a table of allowed or forbidden rows becomes. None: it forbids nothing."""
+    rows = dict.fromkeys((row for row, value in listed.items() if value is not term.default), 0)
+    if not rows:
+        return None if term.default else _never(name, term.variables[0], place)
+    semantics = Semantics.CONFLICTS if term.default else Semantics.SUPPORTS
+    return Draft(name, term.variables, place, rows=rows, semantics=semantics)
 
 
 def _never(name: str, variable: Variable, place: Place) -> Draft:
     """Return what no value of a variable satisfies."""
-    rows = dict.fromkeys(((code,) for code in variable.codes.ever), 0)
+    rows: dict[Row, Price] = dict.fromkeys([(code,) for code in variable.codes.ever], 0)
     return Draft(name, (variable,), place, rows=rows, semantics=Semantics.CONFLICTS)
 
 
