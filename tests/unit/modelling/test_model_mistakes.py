@@ -9,6 +9,7 @@ from pathlib import Path
 import pytest
 
 import robochoc
+from robochoc.model.problem import Team
 from robochoc.modelling.places import ModelTypeError, UnknownNameError
 from robochoc.modelling.terms import Variable
 
@@ -42,6 +43,12 @@ def stranger() -> Variable:
 def _both_ways(made: Made) -> None:
     made.model.minimize(made.x)
     made.model.maximize(made.y)
+
+
+def _built(made: Made, mistake: Callable[[Made], object]) -> Team:
+    """Make a mistake, and build the team, where some are seen."""
+    mistake(made)
+    return made.model.team
 
 
 MISTAKES: list[tuple[Callable[[Made], object], str]] = [
@@ -112,8 +119,7 @@ MISTAKES: list[tuple[Callable[[Made], object], str]] = [
 def test_a_mistake_is_told_with_its_line(mistake: Callable[[Made], object], says: str) -> None:
     made = Made()
     with pytest.raises(robochoc.ModelError) as refused:
-        mistake(made)
-        _ = made.model.team
+        _built(made, mistake)
     assert says in str(refused.value)
     file, _, rest = str(refused.value).partition(":")
     assert Path(file).name == Path(__file__).name
