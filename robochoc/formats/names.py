@@ -55,14 +55,12 @@ def check_integer(value: int) -> None:
 
 
 def check_cost(cost: float) -> None:
-    """Raise `MistakeError` unless `cost` is an integer of 0 or more, or infinite."""
+    """Raise `MistakeError` unless `cost` is an integer, in the unit of its robot's costs, or infinite."""
     if cost == INFINITE:
         return
     if not isinstance(cost, int):
-        raise MistakeError(f"the cost {cost} is no integer", "costs are integers of 0 or more, or 'infinity'")
+        raise MistakeError(f"the cost {cost} is no integer", "costs are integers, in a unit, or 'infinity'")
     check_integer(cost)
-    if cost < 0:
-        raise MistakeError(f"the cost {cost} is negative", "costs are 0 or more, or 'infinity'")
 
 
 def check_weight(weight: int) -> None:

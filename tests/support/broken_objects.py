@@ -189,7 +189,6 @@ AS_IN_FILES: dict[str, Breakage] = {
     "a tuple twice": relation((1, 1), (1, 1), (3, 3)),
     "a soft relation in a DisCSP": relation((1, 1), semantics=Semantics.SOFT, costs=(5,)),
     "a defaultCost without soft": relation((1, 1), default_cost=1),
-    "a negative cost": weighted(relation((1, 1), semantics=Semantics.SOFT, costs=(-5,))),
     "a predefined name": predicate(Apply("lt", (Name("X"), Name("Y"))), name="neq"),
     "two parameters of one name": predicate(Apply("ne", (Name("X"), Name("X"))), "X", "X", "i", "j"),
     "an unknown operator": predicate(Apply("nee", (Name("X"), Name("Y")))),
@@ -356,9 +355,6 @@ OF_OBJECTS: dict[str, Wrong] = {
         weighted(relation((1, 1), semantics=Semantics.SOFT, costs=(1,), default_cost=float("-inf"))),
         ("robot Robot2, relation r1", "the cost -inf is no integer"),
     ),
-    "a predicate's negative cost": wrong(
-        weighted(constraint("C4", cost=-1)), ("robot Robot3, constraint C4 (V1 V3)", "the cost -1 is negative")
-    ),
     "a relation of no arity": wrong(
         constraint("C2", definition=Relation("r1", 0, Semantics.CONFLICTS, ())),
         ("robot Robot2, relation r1", "a relation of arity 0"),
@@ -399,7 +395,7 @@ OF_OBJECTS: dict[str, Wrong] = {
         constraint("C4", scope="V1 V3"), ("robot Robot3", "constraints[0].scope: 'V1 V3' where a tuple should stand")
     ),
     "a definition that is a function": wrong(
-        constraint("C4", definition=print), ("robot Robot3", "where Relation or Predicate should stand")
+        constraint("C4", definition=print), ("robot Robot3", "where Relation or Predicate or Function should stand")
     ),
     "a copy of what the robot is not in": wrong(
         child("Robot3", "Robot1", copies=(bound("V2", "V3"),)),

@@ -80,11 +80,6 @@ DEFINITIONS = [
         [relation('<relation name="r1" semantics="soft" defaultCost="infinity">5:1 1|2 2</relation>')],
         (R2, "<relation ", ("'2 2' has no cost", "cost:tuple")),
     ),
-    weighted(
-        "a negative cost",
-        [relation('<relation name="r1" semantics="soft" defaultCost="0">-5:1 1</relation>')],
-        (R2, "<relation ", "-5 is negative"),
-    ),
     case(
         "a predicate named like a relation",
         [(R2, '<predicate name="p1">', P + '\n<predicate name="p1">'), (R2, ' nbPredicates="1"', "")],

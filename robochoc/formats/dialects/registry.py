@@ -1,0 +1,93 @@
+"""The dialects by name, and which of them a file is in.
+
+Each is a module of this package that ends in `DIALECT = Dialect(...)`. It is imported when it is asked for.
+"""
+
+from __future__ import annotations
+
+import importlib
+import os
+import stat
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+
+from robochoc.formats.diagnostics import Diagnostic, InvalidInputError, encodable
+from robochoc.formats.dialects.dialect import MAX_FILE, Dialect, Imported, ImportOptions
+
+NAMES = ("frodo", "xdiscsp", "pydcop", "xcsp3", "cfn", "wcsp", "dot", "graphml")
+"""The names of all dialects, in the order in which they are asked whether a file is in them."""
+
+_BEGINNING = 64 * 1024
+"""The bytes of a file by which it is recognised."""
+
+
+def dialect_called(name: str) -> Dialect | None:
+    """Return the dialect called `name`. None: this version has none of that name."""
+    module = f"{__package__}.{name}"
+    if name not in NAMES:
+        return None
+    try:
+        found: Dialect = importlib.import_module(module).DIALECT
+    except ModuleNotFoundError as error:
+        if error.name != module:
+            raise
+        return None
+    return found
+
+
+def dialects() -> Iterator[Dialect]:
+    """Yield all dialects."""
+    for name in NAMES:
+        if dialect := dialect_called(name):
+            yield dialect
+
+
+def recognise(path: Path) -> Dialect | None:
+    """Return the dialect that the file at `path` is in. None: it is in none, or is no file that can be read."""
+    beginning = _beginning(path)
+    if beginning is None:
+        return None
+    return next((dialect for dialect in dialects() if dialect.recognises(path, beginning)), None)
+
+
+def read_foreign(paths: Sequence[Path], options: ImportOptions, name: str | None = None) -> Imported:
+    """Return the problem in the files `paths` of another tool.
+
+    Args:
+        paths: The files of one problem.
+        options: What the import is asked.
+        name: The name of the dialect. None: it is recognised.
+
+    Raises:
+        InvalidInputError: if a file is in no dialect that is read here, the files are in several, or they are invalid.
+    """
+    found = [dialect_called(name) if name else recognise(path) for path in paths]
+    for path, dialect in zip(paths, found, strict=True):
+        if dialect is None:
+            raise _invalid(path, "is of no format that is read here", "'robochoc import --help' lists those that are")
+        if dialect is not found[0]:
+            first = found[0].title if found[0] else ""
+            raise _invalid(path, f"is {dialect.title}, and {paths[0]} is {first}", "import them one by one")
+        if path.stat().st_size > MAX_FILE:
+            raise _invalid(path, f"is larger than {MAX_FILE // 2**20} MiB", "import a smaller problem")
+    if not found or found[0] is None:
+        raise ValueError("no file")
+    return found[0].read(paths, options)
+
+
+def _beginning(path: Path) -> bytes | None:
+    """Return the first bytes of a regular file; None where there is none. A FIFO is not waited for."""
+    try:
+        descriptor = os.open(path, os.O_RDONLY | getattr(os, "O_NONBLOCK", 0))
+    except OSError:
+        return None
+    try:
+        return os.read(descriptor, _BEGINNING) if stat.S_ISREG(os.fstat(descriptor).st_mode) else None
+    except OSError:
+        return None
+    finally:
+        os.close(descriptor)
+
+
+def _invalid(path: Path, message: str, hint: str) -> InvalidInputError:
+    return InvalidInputError([Diagnostic(encodable(str(path)), 0, message, hint)])
