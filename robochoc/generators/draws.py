@@ -69,7 +69,7 @@ def bounded(constraints: Iterable[Constraint]) -> list[Constraint]:
     Raises:
         ValueError: if there are more than `MAX_CONSTRAINTS`.
     """
-    kept = []
+    kept: list[Constraint] = []
     for constraint in constraints:
         if len(kept) == MAX_CONSTRAINTS:
             raise ValueError(f"the team would have more than {MAX_CONSTRAINTS:,} constraints; ask for a smaller one")

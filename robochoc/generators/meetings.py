@@ -88,9 +88,8 @@ def meetings(
     seed: int = 0,
     *,
     max_length: int = 1,
-    max_value: int = 10,
+    max_value: int | None = 10,
     model: MeetingsModel | str = MeetingsModel.PEAV,
-    preferences: bool = True,
 ) -> Team:
     """Return the problem of scheduling `meetings` of so many `participants` each that `seed` stands for.
 
@@ -104,9 +103,9 @@ def meetings(
         slots: The number of time slots.
         seed: The same seed makes the same problem on every machine, and the same one in both models.
         max_length: Meetings take from 1 to so many slots.
-        max_value: A meeting's slot is worth from 1 to so much to a participant; a free one from 0.
+        max_value: A meeting's slot is worth from 1 to so much to a participant; a free one from 0. None: preferences
+            do not count, and all meetings must take place.
         model: What a variable is.
-        preferences: Whether the sum of what meetings are worth is maximised. Otherwise all must take place.
 
     Raises:
         ValueError: if a number is out of its bounds. The text says which.
@@ -114,8 +113,10 @@ def meetings(
     model = MeetingsModel(model)
     check_bounds({"agents": (agents, 1, MAX_AGENTS), "meetings": (meetings, 1, MAX_AGENTS)})
     check_bounds({"participants": (participants, 1, agents), "slots": (slots, 1, MAX_VALUES)})
-    check_bounds({"max-length": (max_length, 1, slots), "max-value": (max_value, 1, MAX_COST)})
-    problem = drawn_meetings(seeded(seed), (agents, meetings, participants, slots), max_length, max_value)
+    preferences = max_value is not None
+    most = 1 if max_value is None else max_value
+    check_bounds({"max-length": (max_length, 1, slots), "max-value": (most, 1, MAX_COST)})
+    problem = drawn_meetings(seeded(seed), (agents, meetings, participants, slots), max_length, most)
     match model:
         case MeetingsModel.PEAV:
             variables, constraints = _peav(problem, preferences=preferences)
@@ -164,8 +165,8 @@ def _peav(problem: Meetings, *, preferences: bool) -> _Parts:
                 if preferences:
                     worth = {start: problem.worth(meeting, person, start) for start in problem.starts(meeting)}
                     yield _worth(f"{person}.{meeting.number}", worth)
-            for one, other in itertools.combinations(meeting.worth, 2):
-                scope = (f"V{one}.{meeting.number}", f"V{other}.{meeting.number}")
+            for pair in itertools.combinations(meeting.worth, 2):
+                scope = tuple(f"V{person}.{meeting.number}" for person in pair)
                 yield Constraint(f"M{meeting.number}", PREDEFINED["eq"], scope, scope)
         for one, other, shared in _rivals(problem):
             for person in shared:
@@ -176,9 +177,7 @@ def _peav(problem: Meetings, *, preferences: bool) -> _Parts:
 
 def _eav(problem: Meetings, *, preferences: bool) -> _Parts:
     variables = {
-        f"Meeting{meeting.number}": [
-            Variable(f"V{meeting.number}", _starts(problem, meeting, preferences=preferences))
-        ]
+        f"Meeting{meeting.number}": [Variable(f"V{meeting.number}", _starts(problem, meeting, preferences=preferences))]
         for meeting in problem.meetings
     }
 

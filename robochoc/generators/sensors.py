@@ -5,8 +5,8 @@ communication, computation and complexity", AIJ 161 (2005); CSPLib, problem 72. 
 
 * `sensors`, SensorDCSP: each target is visible to each sensor, and each pair of sensors compatible, with a given
   probability.
-* `grid_sensors`, GSensorDCSP: sensors stand on the nodes of a grid and targets in its cells, one a cell at most. Sensors
-  see and hear as far as is said; some of these links may fail, with a probability.
+* `grid_sensors`, GSensorDCSP: sensors stand on the nodes of a grid and targets in its cells, one a cell at most.
+  Sensors see and hear as far as is said; some of these links may fail, with a probability.
 
 Two models, satisfiable together:
 
@@ -28,9 +28,11 @@ from robochoc.formats import PREDEFINED
 from robochoc.generators.draws import MAX_AGENTS, bounded, check_bounds, seeded, some, total
 from robochoc.model.assembly import assemble
 from robochoc.model.expression import Apply, Constant, Name, Type, parse
-from robochoc.model.problem import Constraint, Domain, Predicate, Relation, Semantics, Team, Variable
+from robochoc.model.problem import Constraint, Domain, Predicate, Relation, Semantics, Team, Term, Variable
 
 MAX_NEEDED = 10
+MAX_PAIRS = 1_000_000
+"""The maximum number of pairs of sensors that see the same target, of all targets together."""
 
 NOT_BOTH = Predicate("notBoth", ("X", "Y", "t"), parse("or(ne(X, t), ne(Y, t))", ("X", "Y", "t"), Type.BOOLEAN))
 """X and Y do not both track the target t."""
@@ -41,6 +43,23 @@ class SensorsModel(StrEnum):
 
     TARGETS = "targets"
     SENSORS = "sensors"
+
+
+@dataclass(frozen=True)
+class Reach:
+    """How far sensors on a grid see and hear.
+
+    Attributes:
+        sight: Sensors see so far: 1, the four cells around them; 2, the sixteen; and so on.
+        hearing: Sensors hear others at most so many steps away, along the grid or diagonally.
+        visibility: The probability that a sensor that is near enough sees a target.
+        compatibility: The probability that two sensors that are near enough are compatible.
+    """
+
+    sight: int = 1
+    hearing: int = 1
+    visibility: float = 1
+    compatibility: float = 1
 
 
 @dataclass(frozen=True)
@@ -82,7 +101,7 @@ def sensors(
         model: What a robot is.
 
     Raises:
-        ValueError: if a number is out of its bounds, or the model cannot say the problem. The text says why.
+        ValueError: if a number is out of its bounds, or no sensor sees a target. The text says which.
     """
     check_bounds({"sensors": (sensors, 1, MAX_AGENTS), "targets": (targets, 1, MAX_AGENTS)})
     _check_shares(visibility, compatibility, needed)
@@ -102,10 +121,7 @@ def grid_sensors(
     targets: int,
     seed: int = 0,
     *,
-    sight: int = 1,
-    hearing: int = 1,
-    visibility: float = 1,
-    compatibility: float = 1,
+    reach: Reach = Reach(),
     needed: int = 3,
     model: SensorsModel | str = SensorsModel.TARGETS,
 ) -> Team:
@@ -118,21 +134,19 @@ def grid_sensors(
         columns: The number of columns of sensors.
         targets: The number of targets, each in the middle of a cell of its own.
         seed: The same seed makes the same problem on every machine, and the same one in both models.
-        sight: Sensors see so far: 1, the four cells around them; 2, the sixteen; and so on.
-        hearing: Sensors hear others at most so many steps away, along the grid or diagonally.
-        visibility: The probability that a sensor that is near enough sees a target.
-        compatibility: The probability that two sensors that are near enough are compatible.
+        reach: How far sensors see and hear.
         needed: The number of sensors that a target needs.
         model: What a robot is.
 
     Raises:
-        ValueError: if a number is out of its bounds, or the model cannot say the problem. The text says why.
+        ValueError: if a number is out of its bounds, or no sensor sees a target. The text says which.
     """
     check_bounds({"rows": (rows, 2, MAX_AGENTS), "columns": (columns, 2, MAX_AGENTS)})
     cells = (rows - 1) * (columns - 1)
     check_bounds({"rows x columns": (rows * columns, 4, MAX_AGENTS), "targets": (targets, 1, cells)})
+    sight, hearing = reach.sight, reach.hearing
     check_bounds({"sight": (sight, 1, MAX_AGENTS), "hearing": (hearing, 1, MAX_AGENTS)})
-    _check_shares(visibility, compatibility, needed)
+    _check_shares(reach.visibility, reach.compatibility, needed)
     chance = seeded(seed)
     nodes = list(itertools.product(range(rows), range(columns)))
     seen_by = []
@@ -143,14 +157,14 @@ def grid_sensors(
             for number, (i, j) in enumerate(nodes, 1)
             if -sight < i - row <= sight and -sight < j - column <= sight
         )
-        seen_by.append([number for number in near if chance.random() < visibility])
+        seen_by.append([number for number in near if chance.random() < reach.visibility])
     compatible = frozenset(
         (one + 1, other + 1)
         for one, other in itertools.combinations(range(len(nodes)), 2)
         if max(abs(a - b) for a, b in zip(nodes[one], nodes[other], strict=True)) <= hearing
-        and chance.random() < compatibility
+        and chance.random() < reach.compatibility
     )
-    shares = f"{sight}-{hearing}-{float(visibility)}-{float(compatibility)}"
+    shares = f"{sight}-{hearing}-{float(reach.visibility)}-{float(reach.compatibility)}"
     name = f"grid-sensors-{SensorsModel(model)}-{rows}x{columns}-{targets}-{needed}-{shares}-{seed}"
     return _team(name, SensorNetwork(len(nodes), seen_by, compatible, needed), SensorsModel(model))
 
@@ -161,6 +175,12 @@ def _check_shares(visibility: float, compatibility: float, needed: int) -> None:
 
 
 def _team(name: str, network: SensorNetwork, model: SensorsModel) -> Team:
+    for target, seen in enumerate(network.seen_by, 1):
+        if not seen:
+            raise ValueError(f"no sensor sees target {target}: nothing to choose from; take another seed or more sight")
+    pairs = sum(len(seen) ** 2 for seen in network.seen_by)
+    if pairs > MAX_PAIRS:
+        raise ValueError(f"{pairs:,} pairs of sensors see the same target, more than {MAX_PAIRS:,}; ask for fewer")
     match model:
         case SensorsModel.TARGETS:
             variables, constraints = _of_targets(network)
@@ -189,8 +209,8 @@ def _of_targets(network: SensorNetwork) -> _Parts:
             pairs = [pair for pair in itertools.combinations(seen, 2) if pair in network.compatible]
             rows = tuple(sorted([*pairs, *((other, one) for one, other in pairs)]))
             together = Relation(f"Compatible{target}", 2, Semantics.SUPPORTS, rows)
-            for scope in itertools.combinations([one.name for one in variables[f"Target{target}"]], 2):
-                yield Constraint("compatible", together, scope, scope)
+            for pair in itertools.combinations([one.name for one in variables[f"Target{target}"]], 2):
+                yield Constraint("compatible", together, pair, pair)
         for one, other in itertools.combinations(range(len(network.seen_by)), 2):
             if not set(network.seen_by[one]).isdisjoint(network.seen_by[other]):
                 sides = ([variable.name for variable in variables[f"Target{place + 1}"]] for place in (one, other))
@@ -203,8 +223,6 @@ def _of_targets(network: SensorNetwork) -> _Parts:
 def _of_sensors(network: SensorNetwork) -> _Parts:
     tracked: dict[int, list[int]] = {sensor: [] for sensor in range(1, network.sensors + 1)}
     for target, seen in enumerate(network.seen_by, 1):
-        if not seen:
-            raise ValueError(f"no sensor sees target {target}, and no sensor could say so; another seed or more sight")
         for sensor in seen:
             tracked[sensor].append(target)
     variables = {
@@ -214,7 +232,7 @@ def _of_sensors(network: SensorNetwork) -> _Parts:
 
     def constraints() -> Iterator[Constraint]:
         for target, seen in enumerate(network.seen_by, 1):
-            scope = (*(f"T{sensor}" for sensor in seen), target, network.needed)
+            scope: tuple[Term, ...] = (*(f"T{sensor}" for sensor in seen), target, network.needed)
             yield Constraint(f"tracked{target}", _at_least(len(seen)), scope, scope)
             for one, other in itertools.combinations(seen, 2):
                 if (one, other) not in network.compatible:

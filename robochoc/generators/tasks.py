@@ -62,6 +62,34 @@ class Distance(StrEnum):
 
 
 @dataclass(frozen=True)
+class Ways:
+    """Where robots and tasks are, and how long ways are.
+
+    Attributes:
+        side: Robots and tasks lie in a square, at whole coordinates from 0 to `side`.
+        distance: How long a way is.
+        places: The decimal places of straight ways.
+    """
+
+    side: int = 100
+    distance: Distance = Distance.STREETS
+    places: int = 0
+
+
+@dataclass(frozen=True)
+class Skills:
+    """What robots can do.
+
+    Attributes:
+        number: The number of skills that there are. A task asks for one, each as likely as any other.
+        each: The number of skills that a robot has, any choice as likely as any other.
+    """
+
+    number: int = 1
+    each: int = 1
+
+
+@dataclass(frozen=True)
 class Tasks:
     """A problem of tasks.
 
@@ -81,12 +109,9 @@ def tasks(
     tasks: int,
     seed: int = 0,
     *,
-    side: int = 100,
-    worth: int = 100,
-    skills: int = 1,
-    skilled: int = 1,
-    distance: Distance | str = Distance.STREETS,
-    places: int = 0,
+    worth: int = 200,
+    ways: Ways = Ways(),
+    skills: Skills = Skills(),
     model: TasksModel | str = TasksModel.ASSIGNMENT,
     capacity: int = 3,
 ) -> Team:
@@ -98,26 +123,22 @@ def tasks(
         agents: The number of robots.
         tasks: The number of tasks.
         seed: The same seed makes the same problem on every machine.
-        side: Robots and tasks lie in a square, at whole coordinates from 0 to `side`.
         worth: A task is worth from 1 to so much.
-        skills: The number of skills that there are. A task asks for one, each as likely as any other.
-        skilled: The number of skills that a robot has, any choice as likely as any other.
-        distance: How long a way is.
-        places: The decimal places of straight ways.
+        ways: Where all are, and how long ways are.
+        skills: What robots can do.
         model: How many tasks a robot can do.
         capacity: The room of a robot for several tasks, of which each takes from 1 to 3.
 
     Raises:
         ValueError: if a number is out of its bounds. The text says which.
     """
-    model, distance = TasksModel(model), Distance(distance)
+    model = TasksModel(model)
     check_bounds({"agents": (agents, 1, MAX_AGENTS), "tasks": (tasks, 1, MAX_AGENTS)})
-    check_bounds({"side": (side, 1, MAX_SIDE), "worth": (worth, 1, MAX_COST)})
-    check_bounds({"skills": (skills, 1, MAX_SKILLS), "skilled": (skilled, 1, skills)})
+    check_bounds({"side": (ways.side, 1, MAX_SIDE), "worth": (worth, 1, MAX_COST)})
+    check_bounds({"skills": (skills.number, 1, MAX_SKILLS), "skilled": (skills.each, 1, skills.number)})
     check_bounds({"capacity": (capacity, 1, MAX_AGENTS)})
-    check_places(places)
-    chance = seeded(seed)
-    problem = drawn_tasks(chance, (agents, tasks), (side, worth), (skills, skilled), (distance, places), capacity)
+    check_places(ways.places)
+    problem = drawn_tasks(seeded(seed), (agents, tasks, worth), ways, skills, capacity)
     match model:
         case TasksModel.ASSIGNMENT:
             variables, constraints = _assignment(problem)
@@ -127,42 +148,33 @@ def tasks(
             assert_never(never)
     if not variables:
         raise ValueError("no robot has a skill that a task asks for; another seed, or more of skilled")
-    told = f"{side}-{worth}-{skilled}of{skills}-{distance}{places or ''}"
+    told = f"{ways.side}-{worth}-{skills.each}of{skills.number}-{ways.distance}{ways.places or ''}"
     room = f"-{capacity}" if model is TasksModel.SEVERAL else ""
     return assemble(
         f"tasks-{model}-{agents}-{tasks}-{told}{room}-{seed}",
         variables,
         bounded(constraints),
         kind=ProblemKind.DISWCSP,
-        costs=CostUnits(maximize=True, places=places),
+        costs=CostUnits(maximize=True, places=ways.places),
     )
 
 
-def drawn_tasks(
-    chance: Random,
-    numbers: tuple[int, int],
-    sizes: tuple[int, int],
-    skills: tuple[int, int],
-    ways: tuple[Distance, int],
-    capacity: int,
-) -> Tasks:
-    """Return random tasks; the arguments are those of `tasks`, by two."""
-    agents, count = numbers
-    side, most = sizes
-    distance, places = ways
+def drawn_tasks(chance: Random, numbers: tuple[int, int, int], ways: Ways, skills: Skills, capacity: int) -> Tasks:
+    """Return random tasks; `numbers` are those of robots and tasks, and what a task is worth at most."""
+    agents, count, most = numbers
 
     def point() -> tuple[int, int]:
-        return uniform(chance, 0, side), uniform(chance, 0, side)
+        return uniform(chance, 0, ways.side), uniform(chance, 0, ways.side)
 
-    robots = {robot: (point(), set(some(chance, *skills))) for robot in range(1, agents + 1)}
+    robots = {robot: (point(), set(some(chance, skills.number, skills.each))) for robot in range(1, agents + 1)}
     profit: dict[int, dict[int, int]] = {robot: {} for robot in robots}
     load = {}
     for task in range(1, count + 1):
-        place, skill = point(), uniform(chance, 0, skills[0] - 1)
-        worth, load[task] = uniform(chance, 1, most) * 10**places, uniform(chance, 1, 3)
+        place, skill = point(), uniform(chance, 0, skills.number - 1)
+        worth, load[task] = uniform(chance, 1, most) * 10**ways.places, uniform(chance, 1, 3)
         for robot, (start, has) in robots.items():
             if skill in has:
-                profit[robot][task] = worth - way(start, place, distance, places)
+                profit[robot][task] = worth - way(start, place, ways.distance, ways.places)
     return Tasks(profit, load, capacity)
 
 
@@ -170,8 +182,10 @@ def way(start: tuple[int, int], end: tuple[int, int], distance: Distance, places
     """Return the length of a way in units of 10**-places: a straight one rounded, halves up."""
     across, along = abs(start[0] - end[0]), abs(start[1] - end[1])
     if distance is Distance.STREETS:
-        return (across + along) * 10**places
-    return (isqrt(4 * (across**2 + along**2) * 100**places) + 1) // 2
+        streets: int = (across + along) * 10**places
+        return streets
+    square: int = (across**2 + along**2) * 100**places
+    return (isqrt(4 * square) + 1) // 2
 
 
 _Parts = tuple[dict[str, list[Variable]], Iterator[Constraint]]

@@ -15,6 +15,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass
 from math import prod
+from random import Random
 
 from robochoc.generators.draws import MAX_AGENTS, bounded, check_bounds, seeded, some, total, uniform
 from robochoc.model.assembly import assemble
@@ -89,10 +90,7 @@ def tracking(
     check_bounds({"side": (side, 1, MAX_SIDE), "agents": (agents, 1, min(MAX_AGENTS, side**2))})
     check_bounds({"targets": (targets, 1, side**2), "mobility": (mobility, 0, side), "sensing": (sensing, 0, side)})
     check_bounds({"requirement": (requirement, 1, MAX_REQUIREMENT), "credibility": (credibility, 1, MAX_REQUIREMENT)})
-    chance = seeded(seed)
-    starts = some(chance, side**2, agents)
-    credible = [uniform(chance, 1, credibility) for _ in range(agents)]
-    field = Field(side, starts, credible, some(chance, side**2, targets), mobility, sensing)
+    field = drawn_field(seeded(seed), (agents, targets, side), credibility, mobility, sensing)
     cells = [field.cells(robot) for robot in range(agents)]
     lost = 0
     constraints = []
@@ -118,6 +116,14 @@ def tracking(
         kind=ProblemKind.DISWCSP,
         costs=CostUnits(constant=lost),
     )
+
+
+def drawn_field(chance: Random, numbers: tuple[int, int, int], credibility: int, mobility: int, sensing: int) -> Field:
+    """Return a random field; `numbers` are those of robots and targets, and of the rows."""
+    agents, targets, side = numbers
+    starts = some(chance, side**2, agents)
+    credible = [uniform(chance, 1, credibility) for _ in range(agents)]
+    return Field(side, starts, credible, some(chance, side**2, targets), mobility, sensing)
 
 
 def _uncovered(number: int, field: Field, near: list[int], requirement: int) -> Constraint:
