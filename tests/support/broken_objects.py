@@ -205,7 +205,6 @@ AS_IN_FILES: dict[str, Breakage] = {
     "parameters of a relation": constraint(
         "C1", definition=Relation("r1", 2, Semantics.CONFLICTS, ((1, 1),)), parameters=("V1", "V2")
     ),
-    "a shared constraint without model": constraint("C4", model=None),
     "a private constraint with a part": constraint("C0", model=ConstraintModel.PKC),
     "another's variable in private": over("C0", "V1", "V2"),
     "own variables only with a parent": over("C4", "V3", 3),
@@ -354,6 +353,13 @@ OF_OBJECTS: dict[str, Wrong] = {
     "a default cost below 0": wrong(
         weighted(relation((1, 1), semantics=Semantics.SOFT, costs=(1,), default_cost=float("-inf"))),
         ("robot Robot2, relation r1", "the cost -inf is no integer"),
+    ),
+    "a cost of 19 digits": wrong(
+        weighted(constraint("C4", cost=-(10**18))),
+        ("robot Robot3, constraint C4 (V1 V3)", "an integer of 19 digits"),
+    ),
+    "a shared constraint without model": wrong(
+        constraint("C4", model=None), ("robot Robot3, constraint C4 (V1 V3)", "lacks its model")
     ),
     "a relation of no arity": wrong(
         constraint("C2", definition=Relation("r1", 0, Semantics.CONFLICTS, ())),
