@@ -6,6 +6,7 @@ graphs that a seed stands for are drawn in `generators/graphs.py`.
 
 from __future__ import annotations
 
+import re
 from collections.abc import Hashable, Iterable
 from itertools import chain
 from pathlib import Path
@@ -15,6 +16,7 @@ from robochoc.generators.draws import MAX_AGENTS
 from robochoc.generators.graphs import Edge, Graph
 
 MAX_BYTES = 16 * 1024 * 1024
+MAX_LABEL = 50
 READERS = {
     ".graphml": "read_graphml",
     ".gexf": "read_gexf",
@@ -58,7 +60,8 @@ def read_graph(path: Path) -> Graph:
         if one == other:
             raise _invalid(path, f"the node {one!s:.100} is linked to itself", "a constraint is between two robots")
     known: list[Edge] = sorted({(min(pair), max(pair)) for pair in ((numbered[a], numbered[b]) for a, b in edges)})
-    return Graph(len(nodes), path.stem, lambda _: list(known))
+    label = re.sub(r"[^A-Za-z0-9_.]+", "-", path.stem)[:MAX_LABEL].strip("-.") or "graph"
+    return Graph(len(nodes), label, lambda _: list(known))
 
 
 def _content(path: Path) -> bytes:

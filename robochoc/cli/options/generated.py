@@ -84,6 +84,11 @@ def write(make: Callable[[], Team], output: Path | None, *, replace: bool) -> No
     click.echo(f"{folder}: {len(team.robots)} robots, {constraints} constraints; next: robochoc solve {folder}")
 
 
+OUTPUT = ("--seed", "-o", "--force", "--help")
+"""The last section of a family's help."""
+GRAPH = ("--connected", "--links", "--neighbours", "--rewiring", "--rows", "--torus")
+"""The section on graphs."""
+
 KINDS = ("random", "scale-free", "small-world", "grid", "tree")
 
 

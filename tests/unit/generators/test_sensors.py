@@ -61,9 +61,10 @@ def test_a_seed_is_one_problem_everywhere() -> None:
 @pytest.mark.parametrize(("count", "targets", "needed"), [(8, 2, 3), (7, 2, 2), (6, 3, 2)])
 @pytest.mark.parametrize("seed", range(3))
 def test_both_models_say_what_is_so(count: int, targets: int, needed: int, seed: int) -> None:
-    shares = {"visibility": 0.7, "compatibility": 0.7}
-    of_targets = sensors(count, targets, seed, **shares, needed=needed)
-    of_sensors = sensors(count, targets, seed, **shares, needed=needed, model="sensors")
+    of_targets, of_sensors = (
+        sensors(count, targets, seed, visibility=0.7, compatibility=0.7, needed=needed, model=model)
+        for model in ("targets", "sensors")
+    )
     wanted = "solution" if trackable(of_targets, needed) else "no-solution"
     assert verdict(of_targets) == verdict(of_sensors) == wanted
 

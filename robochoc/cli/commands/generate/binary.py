@@ -6,7 +6,8 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from robochoc.cli.options.generated import graph_of, graph_options, number, seed_option, team_written
+from robochoc.cli.options.generated import GRAPH, OUTPUT, graph_of, graph_options, number, seed_option, team_written
+from robochoc.cli.options.sections import COMMON, SectionedCommand
 
 if TYPE_CHECKING:
     from robochoc.model.problem import Team
@@ -15,7 +16,17 @@ MAX_COST = 1_000_000
 places_option = number("--places", "Decimal places of costs.", least=0, most=9, default=0)
 
 
-@click.command("random", short_help="Model B: random binary constraints, on a graph of your choice.")
+@click.command(
+    "random",
+    cls=SectionedCommand,
+    sections={
+        COMMON: ("--agents", "--domain", "--density", "--tightness", "--graph"),
+        "Graph": GRAPH,
+        "Costs": ("--max-cost", "--places", "--maximize"),
+        "Output": OUTPUT,
+    },
+    short_help="Model B: random binary constraints, on a graph of your choice.",
+)
 @graph_options
 @number("--domain", "Number of values of each variable.")
 @click.option("--density", type=float, metavar="P", help="random: fraction of pairs of robots with a constraint.")
@@ -62,7 +73,16 @@ def random_problem(places: int, *, maximize: bool, **problem: Any) -> Team:  # n
     return random_csp(**problem) if graph is None else random_on(graph, **problem)
 
 
-@click.command(short_help="Graph colouring: hard, with a cost for each conflict, or weighted.")
+@click.command(
+    cls=SectionedCommand,
+    sections={
+        COMMON: ("--agents", "--colors", "--degree", "--graph"),
+        "Graph": GRAPH,
+        "Costs": ("--conflicts", "--max-cost", "--places"),
+        "Output": OUTPUT,
+    },
+    short_help="Graph colouring: hard, soft or weighted.",
+)
 @graph_options
 @number("--colors", "Number of values of each variable.", default=3)
 @click.option("--degree", type=float, metavar="D", help="random: average number of neighbours.")

@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from robochoc.cli.options.generated import Command, number, seed_option, share, team_written
+from robochoc.cli.options.generated import OUTPUT, Command, number, seed_option, share, team_written
+from robochoc.cli.options.sections import COMMON, SectionedCommand
 
 if TYPE_CHECKING:
     from robochoc.model.problem import Team
@@ -18,7 +19,15 @@ def model_option(name: str, choices: list[str], text: str) -> Callable[..., Any]
     return click.option(name, type=click.Choice(choices), default=choices[0], show_default=True, help=text)
 
 
-@click.command(short_help="Meetings with preferences (DiMES): PEAV and EAV.")
+@click.command(
+    cls=SectionedCommand,
+    sections={
+        COMMON: ("--agents", "--meetings", "--participants", "--slots", "--model"),
+        "Preferences": ("--max-length", "--max-value", "--required"),
+        "Output": OUTPUT,
+    },
+    short_help="Meetings with preferences (DiMES): PEAV and EAV.",
+)
 @number("--agents", "Number of persons.")
 @number("--meetings", "Number of meetings.")
 @number("--participants", "Persons in each meeting.", default=2)
@@ -84,7 +93,16 @@ def sensors(**problem: Any) -> Team:  # noqa: ANN401 - `sensors`'s own
     return tracked(**problem)
 
 
-@click.command("grid-sensors", short_help="GSensorDCSP: sensors on a grid, targets in its cells.")
+@click.command(
+    "grid-sensors",
+    cls=SectionedCommand,
+    sections={
+        COMMON: ("--rows", "--columns", "--targets", "--needed", "--model"),
+        "Reach": ("--sight", "--hearing", "--visibility", "--compatibility"),
+        "Output": OUTPUT,
+    },
+    short_help="GSensorDCSP: sensors on a grid, targets in its cells.",
+)
 @number("--rows", "Rows of sensors.", least=2)
 @number("--columns", "Columns of sensors.", least=2)
 @_sensor_options
@@ -112,7 +130,15 @@ def grid_sensors(
     return tracked(**problem, reach=Reach(sight, hearing, visibility, compatibility))
 
 
-@click.command(short_help="Target tracking by mobile sensors (DCOP_MST).")
+@click.command(
+    cls=SectionedCommand,
+    sections={
+        COMMON: ("--agents", "--targets", "--side"),
+        "Reach": ("--mobility", "--sensing", "--requirement", "--credibility"),
+        "Output": OUTPUT,
+    },
+    short_help="Target tracking by mobile sensors (DCOP_MST).",
+)
 @number("--agents", "Number of robots.")
 @number("--targets", "Number of targets.", most=10_000)
 @number("--side", "Rows and columns of the field.", most=100)
@@ -136,7 +162,15 @@ def tracking(**problem: Any) -> Team:  # noqa: ANN401 - `tracking`'s own
     return covering(**problem)
 
 
-@click.command(short_help="Task allocation: skills, ways, one task a robot or several.")
+@click.command(
+    cls=SectionedCommand,
+    sections={
+        COMMON: ("--agents", "--tasks", "--model", "--capacity"),
+        "Worth": ("--worth", "--skills", "--skilled", "--side", "--distance", "--places"),
+        "Output": OUTPUT,
+    },
+    short_help="Task allocation: skills, ways, one task a robot or several.",
+)
 @number("--agents", "Number of robots.")
 @number("--tasks", "Number of tasks.")
 @number("--side", "All lie in a square at whole coordinates from 0 to N.", most=10_000, default=100)
