@@ -87,8 +87,8 @@ def apply_possible_changes(team: Team, changes: Iterable[Change]) -> tuple[Team,
     return team, taken
 
 
-def describe_change(change: Change, team: Team | None = None) -> str:
-    """Return `change` in a few words; with the `team` that it happens to, symbols have their names."""
+def describe_change(change: Change, team: Team) -> str:
+    """Return `change` in a few words; values are told as the variables of `team` have them."""
     match change:
         case RemoveAgent(name):
             return f"-{name}"
@@ -106,8 +106,8 @@ def describe_change(change: Change, team: Team | None = None) -> str:
             assert_never(never)
 
 
-def _label(team: Team | None, variable: str, value: int) -> int | str:
-    known = team.variables.get(variable) if team else None
+def _label(team: Team, variable: str, value: int) -> int | str:
+    known = team.variables.get(variable)
     return known.domain.label(value) if known else value
 
 

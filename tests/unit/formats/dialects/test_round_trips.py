@@ -14,7 +14,7 @@ from tests.support.examples import count
 from tests.support.foreign_problems import optimum, random_problem
 
 
-@count("rounds", 60, 3000)
+@count("rounds", 60, 1000)
 def test_frodo_there_and_back(rounds: int, tmp_path: Path) -> None:
     chance = Random("frodo")
     for _ in range(rounds):
@@ -22,7 +22,7 @@ def test_frodo_there_and_back(rounds: int, tmp_path: Path) -> None:
         assert _there_and_back("frodo", team, tmp_path) == problem.optimum() == optimum(team)
 
 
-@count("rounds", 60, 3000)
+@count("rounds", 60, 1000)
 def test_xdiscsp_there_and_back(rounds: int, tmp_path: Path) -> None:
     chance = Random("xdiscsp")
     for _ in range(rounds):
