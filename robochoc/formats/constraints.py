@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 from lxml import etree
 
+from robochoc.formats.costs import read_cost
 from robochoc.formats.definitions import PREDEFINED
 from robochoc.formats.diagnostics import MistakeError, shortened, suggestion
 from robochoc.formats.extension import integer
@@ -15,11 +16,10 @@ from robochoc.formats.rules import (
     check_constraint,
     check_private,
     check_shared,
-    refuse_no_model,
     refuse_private_part,
 )
 from robochoc.formats.xml import attribute, line
-from robochoc.model.problem import INFINITE, Constraint, ConstraintModel, Predicate, ProblemKind, Relation, Term
+from robochoc.model.problem import INFINITE, Constraint, ConstraintModel, CostUnits, Definition, ProblemKind, Term
 
 
 @dataclass(frozen=True)
@@ -31,11 +31,12 @@ class Context:
     """
 
     kind: ProblemKind
-    model: ConstraintModel | None
+    units: CostUnits
+    model: ConstraintModel
     """The file's default for constraints that do not name theirs."""
     own: Collection[str]
     """The robot's own variables."""
-    definitions: Mapping[str, Relation | Predicate | None]
+    definitions: Mapping[str, Definition | None]
 
 
 def read_private(element: etree._Element, context: Context) -> Constraint | None:
@@ -50,9 +51,8 @@ def read_private(element: etree._Element, context: Context) -> Constraint | None
 
 def read_shared(element: etree._Element, context: Context) -> Constraint | None:
     """Return a constraint with a neighbour: over own variables and others'. See `_read` for the rest."""
-    model = attribute(element, "model") or context.model
-    refuse_no_model(model)
-    constraint = _read(element, context, ConstraintModel(model) if model else None)
+    model = attribute(element, "model")
+    constraint = _read(element, context, ConstraintModel(model) if model else context.model)
     if constraint:
         check_shared(constraint, context.own)
     return constraint
@@ -67,9 +67,9 @@ def _read(element: etree._Element, context: Context, model: ConstraintModel | No
     if not definition:
         return None
     cost = attribute(element, "cost")
-    price = int(cost) if cost else INFINITE
+    price = read_cost(cost, context.units) if cost else INFINITE
     constraint = Constraint(attribute(element, "name"), definition, scope, parameters, model, price, line(element))
-    check_constraint(constraint, context.kind)
+    check_constraint(constraint, context.kind, context.units)
     _check_arity(attribute(element, "arity"), constraint)
     return constraint
 
@@ -86,7 +86,7 @@ def _constant(word: str) -> int:
         raise MistakeError(f"'{shortened(word)}' is neither a variable's name nor an integer", hint) from None
 
 
-def _definition(reference: str, context: Context) -> Relation | Predicate | None:
+def _definition(reference: str, context: Context) -> Definition | None:
     if reference in context.definitions:
         return context.definitions[reference]
     if reference in PREDEFINED:

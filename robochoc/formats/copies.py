@@ -11,10 +11,12 @@ from collections import Counter
 from collections.abc import Callable, Collection, Hashable, Iterable, Iterator, Mapping, Sequence
 from itertools import product
 
+from robochoc.formats.costs import cost_text
 from robochoc.formats.diagnostics import Diagnostic, shortened
 from robochoc.formats.team_members import TeamMembers
+from robochoc.model.cost_units import CostUnits
 from robochoc.model.expression import Apply, Constant, Expression, Name, UndefinedValueError, compile_expression
-from robochoc.model.problem import INFINITE, Constraint, ConstraintModel, Domain, Relation, Robot
+from robochoc.model.problem import INFINITE, Constraint, ConstraintModel, Domain, Function, Relation, Robot
 
 MAX_COMPARED = 1_000_000
 """The maximum number of tuples that are compared."""
@@ -40,7 +42,7 @@ def _differing(
             message = f"{what}: '{child.name}' has no such constraint"
             yield Diagnostic(file, group[0].line, message, f"delete the copy, or add the constraint to {child.file}")
         elif _written(group) != _written(originals):
-            difference = _difference(variables, group, originals, domains)
+            difference = _difference(variables, group, originals, domains, child.costs)
             if difference:
                 hint = f"leave the copy out, or make it equal to {child.file}:{originals[0].line}"
                 yield Diagnostic(file, group[0].line, f"{what} {difference}", hint)
@@ -63,12 +65,12 @@ def _written(group: Iterable[Constraint]) -> Counter[Hashable]:
             tuples = frozenset(zip(definition.tuples, definition.costs or definition.tuples, strict=True))
             written[definition.semantics, definition.default_cost, constraint.parameters, tuples] += 1
         else:
-            written[_applied(constraint), constraint.cost] += 1
+            written[type(definition), _applied(constraint), constraint.cost] += 1
     return written
 
 
 def _applied(constraint: Constraint) -> Expression:
-    """Return the body of a predicate, about the variables and constants it is applied to."""
+    """Return the body of a predicate or function, about the variables and constants it is applied to."""
     if isinstance(constraint.definition, Relation):
         raise TypeError("a relation has no body")
     terms: dict[str, Expression] = {
@@ -93,37 +95,43 @@ def _difference(
     copies: Sequence[Constraint],
     originals: Sequence[Constraint],
     domains: Mapping[str, Domain],
+    units: CostUnits,
 ) -> str:
-    """Return where the two say different things; empty where they nowhere do."""
+    """Return where the two say different things; empty where they nowhere do. Costs count in `units`."""
     if any(variable not in domains for variable in variables):
         return ""  # of a robot whose file is broken
     if math.prod(len(domains[variable]) for variable in variables) > MAX_COMPARED:
         return f"is written differently from the child's, and more than {MAX_COMPARED} tuples are not compared"
-    left = [_price(constraint, variables) for constraint in copies]
-    right = [_price(constraint, variables) for constraint in originals]
+    left = [_price(constraint, variables, units) for constraint in copies]
+    right = [_price(constraint, variables, units) for constraint in originals]
     for values in product(*(domains[variable] for variable in variables)):
         here, there = sum(price(values) for price in left), sum(price(values) for price in right)
         if here != there:
             shown = shortened(" ".join(map(str, values)))
-            return f"has the tuple '{shown}' {_said(here)}, and the child has it {_said(there)}"
+            return f"has the tuple '{shown}' {_said(here, units)}, and the child has it {_said(there, units)}"
     return ""
 
 
-def _said(cost: float) -> str:
-    return {0: "allowed", INFINITE: "forbidden"}.get(cost, f"at a cost of {cost}")
+def _said(cost: float, units: CostUnits) -> str:
+    if cost in {0, INFINITE}:
+        return "forbidden" if cost else "allowed"
+    return f"at a cost of {cost_text(cost, units)}"
 
 
-def _price(constraint: Constraint, variables: tuple[str, ...]) -> Callable[[tuple[int, ...]], float]:
+def _price(constraint: Constraint, variables: tuple[str, ...], units: CostUnits) -> Callable[[tuple[int, ...]], float]:
     """Return what values of `variables` pay: `Constraint.price`, made for a million calls."""
     definition = constraint.definition
     if isinstance(definition, Relation):
         slots = [(variables.index(term), 0) if isinstance(term, str) else (-1, term) for term in constraint.parameters]
         return lambda values: definition.cost([values[slot] if slot >= 0 else constant for slot, constant in slots])
-    holds = compile_expression(_applied(constraint), variables)
+    value = compile_expression(_applied(constraint), variables)
+    one: int = 10**units.places
 
     def price(values: tuple[int, ...]) -> float:
         try:
-            return 0 if holds(values) else constraint.cost
+            if isinstance(definition, Function):
+                return value(values) * one
+            return 0 if value(values) else constraint.cost
         except UndefinedValueError:
             return constraint.cost
 

@@ -62,12 +62,19 @@ def check_semantics(semantics: Semantics, kind: ProblemKind) -> None:
         raise MistakeError("a soft relation in a DisCSP", hint)
 
 
+def refuse_function(kind: ProblemKind) -> None:
+    """Raise `MistakeError` where a robot of that `kind` cannot have a function: its value is a cost."""
+    if kind is not ProblemKind.DISWCSP:
+        hint = 'write type="DisWCSP" in the presentation, or a predicate'
+        raise MistakeError("a function, whose value is a cost, in a DisCSP", hint)
+
+
 def check_relation(relation: Relation) -> None:
     """Raise `MistakeError` unless its tuples have its arity, stand once, and cost something if it is soft."""
     check_tuple_count(len(relation.tuples))
     if relation.semantics is not Semantics.SOFT and (relation.default_cost != 0 or relation.costs):
         wrong = "defaultCost" if relation.default_cost != 0 else "costs"
-        hint = "a soft relation has one, an integer or 'infinity'; no other has"
+        hint = "supports and conflicts forbid, and cost nothing: make it soft"
         raise MistakeError(f"{wrong} in a {relation.semantics} relation", hint)
     if relation.arity < 1:
         message = f"a relation of arity {in_short(relation.arity)}"

@@ -6,6 +6,7 @@ import re
 
 from lxml import etree
 
+from robochoc.formats.costs import read_cost
 from robochoc.formats.definitions import (
     MAX_VALUES,
     check_domain,
@@ -14,7 +15,7 @@ from robochoc.formats.definitions import (
 )
 from robochoc.formats.diagnostics import MistakeError, shortened
 from robochoc.formats.xml import attribute
-from robochoc.model.problem import INFINITE, Domain, Relation, Semantics
+from robochoc.model.problem import INFINITE, CostUnits, Domain, Relation, Semantics
 
 __all__ = ["MAX_VALUES", "check_count", "integer", "read_domain", "read_relation"]
 
@@ -60,32 +61,48 @@ def _range(word: str) -> range:
     return range(first, last + 1)
 
 
-def read_relation(element: etree._Element) -> Relation:
-    """Return a relation from its tuples, `1 2|2 3` or, where soft, `5:1 2|3:2 2`. Raises `MistakeError`."""
+def read_relation(element: etree._Element, units: CostUnits) -> Relation:
+    """Return a relation from its tuples, `1 2|2 3` or, where soft, `5:1 2|3:2 2`; costs count in `units`.
+
+    A cost holds for the tuples that follow, until the next one. Raises `MistakeError`.
+    """
     semantics = Semantics(attribute(element, "semantics"))
-    default = attribute(element, "defaultCost")
-    if (semantics is Semantics.SOFT) != bool(default):
-        wrong = "a soft relation lacks its defaultCost" if not default else f"defaultCost in a {semantics} relation"
-        raise MistakeError(wrong, "a soft relation has one, an integer or 'infinity'; no other has")
     words = [part for part in (element.text or "").split("|") if part.strip()]
     check_tuple_count(len(words))
     costs: list[float] = []
-    tuples: list[tuple[int, ...]] = []
-    for word in words:
-        values = word
-        if semantics is Semantics.SOFT:
-            price, colon, values = word.partition(":")
-            if not colon:
-                raise MistakeError(
-                    f"the tuple '{shortened(word.strip())}' has no cost", "write cost:tuple, 5:1 2|3:2 2"
-                )
-            costs.append(_cost(price.strip()))
-        tuples.append(tuple([integer(value) for value in values.split()]))
+    if semantics is Semantics.SOFT:
+        words, costs = _priced(words, units)
+    tuples = [tuple([integer(value) for value in word.split()]) for word in words]
     check_count(element, "nbTuples", len(tuples))
     name, arity = attribute(element, "name"), _arity(element, tuples)
-    relation = Relation(name, arity, semantics, tuple(tuples), tuple(costs), _cost(default or "0"))
+    default = _default_cost(attribute(element, "defaultCost"), semantics, units)
+    relation = Relation(name, arity, semantics, tuple(tuples), tuple(costs), default)
     check_relation(relation)
     return relation
+
+
+def _priced(words: list[str], units: CostUnits) -> tuple[list[str], list[float]]:
+    """Return the tuples without their costs, and the cost of each."""
+    tuples, costs = [], []
+    cost: float | None = None
+    for word in words:
+        price, colon, values = word.rpartition(":")
+        if colon:
+            cost = read_cost(price.strip(), units)
+        elif cost is None:
+            raise MistakeError(f"the tuple '{shortened(word.strip())}' has no cost", "write cost:tuple, 5:1 2|3:2 2")
+        tuples.append(values)
+        costs.append(cost)
+    return tuples, costs
+
+
+def _default_cost(given: str, semantics: Semantics, units: CostUnits) -> float:
+    if semantics is Semantics.SOFT:
+        return read_cost(given, units) if given else INFINITE
+    if given:
+        hint = 'write semantics="soft", or delete it: supports and conflicts forbid, and cost nothing'
+        raise MistakeError(f"defaultCost in a {semantics} relation", hint)
+    return 0
 
 
 def _arity(element: etree._Element, tuples: list[tuple[int, ...]]) -> int:
@@ -94,7 +111,3 @@ def _arity(element: etree._Element, tuples: list[tuple[int, ...]]) -> int:
     if not given and not tuples:
         raise MistakeError("a relation without tuples lacks its arity", 'write arity="2"')
     return int(given) if given else len(tuples[0])
-
-
-def _cost(word: str) -> float:
-    return INFINITE if word == "infinity" else integer(word)

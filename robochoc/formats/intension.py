@@ -13,23 +13,19 @@ from robochoc.formats.definitions import PREDEFINED, check_formal, expression_mi
 from robochoc.formats.diagnostics import MistakeError, shortened
 from robochoc.formats.xml import attribute, line
 from robochoc.model.expression import Expression, ExpressionError, Type, parse
-from robochoc.model.problem import Predicate, Topic
+from robochoc.model.problem import Function, Predicate, Topic
 
-__all__ = ["PREDEFINED", "read_predicate", "read_topic"]
+__all__ = ["PREDEFINED", "read_function", "read_predicate", "read_topic"]
 
 
 def read_predicate(element: etree._Element) -> Predicate:
     """Return a predicate from `int X int Y` and a Boolean functional expression. Raises `MistakeError`."""
-    name = attribute(element, "name")
-    parameters = _formal(element.findtext("parameters") or "")
-    functional = element.find("expression/functional")
-    body = (functional.text if functional is not None else None) or ""
-    try:
-        return Predicate(name, parameters, parsed(body, parameters, Type.BOOLEAN))
-    except ExpressionError as error:
-        below = body[: error.position].count("\n")
-        start = line(element if functional is None else functional)
-        raise expression_mistake(f"predicate {shortened(name)}", error, start + below) from None
+    return Predicate(attribute(element, "name"), *_stated(element, Type.BOOLEAN))
+
+
+def read_function(element: etree._Element) -> Function:
+    """Return a function from `int X int Y` and an integer functional expression. Raises `MistakeError`."""
+    return Function(attribute(element, "name"), *_stated(element, Type.INTEGER))
 
 
 def read_topic(element: etree._Element, variables: Collection[str]) -> Topic:
@@ -47,6 +43,20 @@ def read_topic(element: etree._Element, variables: Collection[str]) -> Topic:
                 raise expression_mistake(f"{axis} of the topic", error) from None
     kind = attribute(element, "type") or Topic.type
     return Topic(attribute(element, "name"), kind, given.get("x"), given.get("y"), given.get("z"))
+
+
+def _stated(element: etree._Element, wanted: Type) -> tuple[tuple[str, ...], Expression]:
+    """Return the formal parameters and the body of a predicate or function."""
+    parameters = _formal(element.findtext("parameters") or "")
+    functional = element.find("expression/functional")
+    body = (functional.text if functional is not None else None) or ""
+    try:
+        return parameters, parsed(body, parameters, wanted)
+    except ExpressionError as error:
+        below = body[: error.position].count("\n")
+        start = line(element if functional is None else functional)
+        what = f"{element.tag} {shortened(attribute(element, 'name'))}"
+        raise expression_mistake(what, error, start + below) from None
 
 
 def _formal(text: str) -> tuple[str, ...]:

@@ -14,6 +14,8 @@ BEYOND = 10**18
 """Integers have at most 18 digits."""
 MAX_NAME = 251
 """Characters of a robot's name: with `.xml` it is a file's, and no file system takes a longer one."""
+_WRITABLE = 2000
+"""Bits of an integer that Python writes in any case."""
 RESERVED = "scenario"
 """No robot's name: the file of that name says how a team changes."""
 
@@ -55,14 +57,13 @@ def check_integer(value: int) -> None:
 
 
 def check_cost(cost: float) -> None:
-    """Raise `MistakeError` unless `cost` is an integer of 0 or more, or infinite."""
+    """Raise `MistakeError` unless `cost` is an integer, or infinite."""
     if cost == INFINITE:
         return
     if not isinstance(cost, int):
-        raise MistakeError(f"the cost {cost} is no integer", "costs are integers of 0 or more, or 'infinity'")
+        hint = "costs are integers in the unit of `Robot.costs`, or INFINITE, which forbids also when maximising"
+        raise MistakeError(f"the cost {cost} is no integer", hint)
     check_integer(cost)
-    if cost < 0:
-        raise MistakeError(f"the cost {cost} is negative", "costs are 0 or more, or 'infinity'")
 
 
 def check_weight(weight: int) -> None:
@@ -79,8 +80,9 @@ def check_unique(what: str, name: str, known: Collection[str]) -> None:
 
 
 def digits(value: int) -> int:
-    """Return how many there are, more or less: Python writes no integer of more than a few thousand."""
-    return max(19, int(value.bit_length() * 0.30103) + 1)
+    """Return how many there are; of thousands more or less, as Python writes no integer of so many."""
+    bits = value.bit_length()
+    return len(str(abs(value))) if bits < _WRITABLE else int(bits * 0.30103) + 1
 
 
 def in_short(term: str | int) -> str:

@@ -11,6 +11,7 @@ from collections.abc import Iterator
 from robochoc.formats.diagnostics import Diagnostic, shortened, suggestion
 from robochoc.formats.team_members import TeamMembers
 from robochoc.model.priorities import CycleError, priority_order
+from robochoc.model.problem import Robot
 
 
 def missing_robots(members: TeamMembers) -> Iterator[Diagnostic]:
@@ -65,6 +66,27 @@ def mixed_kinds(members: TeamMembers) -> Iterator[Diagnostic]:
             message = f"the robot is a {robot.kind}, but '{other.name}' is a {other.kind}"
             hint = f"a team is one or the other: change the type here or at {members.place(other.name)}"
             yield members.place(robot.name).mistake(message, hint)
+
+
+def mixed_costs(members: TeamMembers) -> Iterator[Diagnostic]:
+    """Yield robots that differ from most others in what is done with the sum of costs, or in the unit of costs."""
+    usual = Counter((robot.costs.maximize, robot.costs.places) for robot in members.robots).most_common(1)
+    for robot in members.robots:
+        maximize, places = robot.costs.maximize, robot.costs.places
+        if (maximize, places) == usual[0][0]:
+            continue
+        other = next(one for one in members.robots if (one.costs.maximize, one.costs.places) == usual[0][0])
+        if maximize is not other.costs.maximize:
+            message = f"the robot {_objective(robot)} costs, but '{other.name}' {_objective(other)} them"
+            hint = f"a team does one or the other: change the objective here or at {members.place(other.name)}"
+        else:
+            message = f"costs of {places} decimal places, but '{other.name}' has {other.costs.places}"
+            hint = "the robots of a team count costs in one unit"
+        yield members.place(robot.name).mistake(message, hint)
+
+
+def _objective(robot: Robot) -> str:
+    return "maximizes" if robot.costs.maximize else "minimizes"
 
 
 def shared_variables(members: TeamMembers) -> Iterator[Diagnostic]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Collection, Iterable, Iterator
 from contextlib import contextmanager
 
+from robochoc.formats.costs import check_units
 from robochoc.formats.definitions import (
     PREDEFINED,
     check_domain,
@@ -13,6 +14,7 @@ from robochoc.formats.definitions import (
     check_relation,
     check_semantics,
     check_topic,
+    refuse_function,
     refuse_predefined,
 )
 from robochoc.formats.diagnostics import MAX_PER_FILE, Diagnostic, MistakeError, shortened
@@ -38,7 +40,6 @@ from robochoc.model.problem import (
     Domain,
     Function,
     Predicate,
-    ProblemKind,
     Relation,
     Robot,
 )
@@ -71,7 +72,7 @@ class Objects:
         """Return what is wrong with a constraint that `robot` is to share from now on."""
         self._found, self._wrong = [], []
         own = dict.fromkeys(variable.name for variable in robot.variables)
-        self._shared(constraint, own, robot.kind, ObjectLocations(robot.name))
+        self._shared(constraint, own, robot, ObjectLocations(robot.name))
         return self._found
 
     def _is_made_right(self, robot: Robot) -> bool:
@@ -90,18 +91,20 @@ class Objects:
             check_robot_name(robot.name)
         with self._at(places.robot):
             check_weight(robot.weight)
+        with self._at(places.robot):
+            check_units(robot.costs, robot.kind)
         yield from self._variables(robot, places)
         if not own:
             return  # whatever else is wrong may follow from it
         yield from self._topics(robot, own, places)
         for constraint in robot.private:
-            self._private(constraint, own, robot.kind, places)
+            self._private(constraint, own, robot, places)
             yield
         for parent in robot.parents:
             with self._at(places.neighbour, parent):
                 check_name(parent.name)
             for constraint in parent.constraints:
-                self._shared(constraint, own, robot.kind, places)
+                self._shared(constraint, own, robot, places)
                 yield
         yield from self._children(robot, own, places)
         for neighbour, message in repeated_neighbours(robot.name, robot.parents, robot.children):
@@ -145,31 +148,29 @@ class Objects:
                     hint = "the child holds it; with the parent stands its part of a PKC only"
                     self._note(places.constraint(constraint), message, hint)
                 else:
-                    self._shared(constraint, own, robot.kind, places)
+                    self._shared(constraint, own, robot, places)
                 yield
             for copy in child.copies:
                 if copy.model is ConstraintModel.PKC:
                     message = f"a copy of a partially known constraint (PKC) of the child '{shortened(child.name)}'"
                     self._note(places.constraint(copy), message, "nobody knows another's part: leave the copy out")
                 else:
-                    self._shared(copy, own, robot.kind, places)
+                    self._shared(copy, own, robot, places)
                 yield
 
-    def _private(
-        self, constraint: Constraint, own: Collection[str], kind: ProblemKind, places: ObjectLocations
-    ) -> None:
+    def _private(self, constraint: Constraint, own: Collection[str], robot: Robot, places: ObjectLocations) -> None:
         with self._at(places.constraint, constraint):
             refuse_private_part(constraint.model)
-            if self._applied(constraint, kind, places):
+            if self._applied(constraint, robot, places):
                 check_private(constraint, own)
 
-    def _shared(self, constraint: Constraint, own: Collection[str], kind: ProblemKind, places: ObjectLocations) -> None:
+    def _shared(self, constraint: Constraint, own: Collection[str], robot: Robot, places: ObjectLocations) -> None:
         with self._at(places.constraint, constraint):
             refuse_no_model(constraint.model)
-            if self._applied(constraint, kind, places):
+            if self._applied(constraint, robot, places):
                 check_shared(constraint, own)
 
-    def _applied(self, constraint: Constraint, kind: ProblemKind, places: ObjectLocations) -> bool:
+    def _applied(self, constraint: Constraint, robot: Robot, places: ObjectLocations) -> bool:
         """Check a constraint. Return False if its definition has the mistake. Raises `MistakeError`."""
         definition = constraint.definition
         check_word(constraint.name)
@@ -177,9 +178,11 @@ class Objects:
         check_terms(constraint.parameters)
         right = self._defined(definition, places)
         if isinstance(definition, Relation):
-            check_semantics(definition.semantics, kind)
+            check_semantics(definition.semantics, robot.kind)
+        if isinstance(definition, Function):
+            refuse_function(robot.kind)
         if right:
-            check_constraint(constraint, kind)
+            check_constraint(constraint, robot.kind, robot.costs)
         return right
 
     def _defined(self, thing: Defined, places: ObjectLocations) -> bool:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from decimal import Decimal
 from typing import Any
 
 import msgspec
@@ -33,7 +34,7 @@ class _EpochForm(msgspec.Struct, omit_defaults=True):
     opened_by: str
     robots: list[str]
     assignment: dict[str, int]
-    cost: float | int | None
+    cost: int | Decimal | None
     messages: int
     bytes: int
     ncccs: int
@@ -57,7 +58,7 @@ class _Form(msgspec.Struct, omit_defaults=True):
     seed: int
     verdict: Verdict
     assignment: dict[str, int]
-    cost: float | int | None
+    cost: int | Decimal | None
     withdrawn: list[str]
     epochs: list[_EpochForm]
     metrics: _MetricsForm
@@ -66,7 +67,7 @@ class _Form(msgspec.Struct, omit_defaults=True):
     reason: str | None = None
     lost: list[str] = []
     order: str | None = None
-    bound: float | int | None = None
+    bound: int | Decimal | None = None
     placed_by: str | None = None
     tree: dict[str, PseudoTreeNode] = {}
     confirmed: bool = False
@@ -82,6 +83,9 @@ _SAME = (
 """The fields that are the same in an outcome and in its JSON form."""
 
 
+_ENCODER = msgspec.json.Encoder(decimal_format="number")
+
+
 def result_json(outcome: Outcome) -> bytes:
     """Return `outcome` as one line of JSON, without the line's end."""
     same: dict[str, Any] = {name: getattr(outcome, name) for name in _SAME}
@@ -93,7 +97,7 @@ def result_json(outcome: Outcome) -> bytes:
         metrics=_metrics(outcome.metrics),
         checked=_CheckedForm(*outcome.checked) if outcome.checked else None,
     )
-    return msgspec.json.encode(form)
+    return _ENCODER.encode(form)
 
 
 def _metrics(spent: Metrics) -> _MetricsForm:

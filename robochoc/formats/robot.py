@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from lxml import etree
 
 from robochoc.formats.constraints import Context, read_private, read_shared
-from robochoc.formats.definitions import check_semantics, refuse_predefined
+from robochoc.formats.costs import Rescaled, places_used, read_units
+from robochoc.formats.definitions import check_semantics, refuse_function, refuse_predefined
 from robochoc.formats.diagnostics import (
     MAX_PER_FILE,
     Diagnostic,
@@ -21,7 +22,7 @@ from robochoc.formats.diagnostics import (
     suggestion,
 )
 from robochoc.formats.extension import check_count, read_domain, read_relation
-from robochoc.formats.intension import read_predicate, read_topic
+from robochoc.formats.intension import read_function, read_predicate, read_topic
 from robochoc.formats.locations import FileLocations
 from robochoc.formats.names import check_robot_name, check_unique
 from robochoc.formats.repair import without_schema_errors
@@ -33,11 +34,11 @@ from robochoc.model.problem import (
     Child,
     Constraint,
     ConstraintModel,
+    CostUnits,
+    Definition,
     Domain,
     Parent,
-    Predicate,
     ProblemKind,
-    Relation,
     Robot,
     Semantics,
     Topic,
@@ -51,6 +52,26 @@ class RobotFile(TeamMember):
 
     context: Context
     """The names that constraints of a scenario can refer to."""
+
+    def in_places(self, places: int) -> RobotFile:
+        """Return the file with costs counted in units of so many decimal places, or more than now.
+
+        Raises:
+            InvalidInputError: when a cost has then too many digits.
+        """
+        finer = 10 ** (places - self.robot.costs.places)
+        if finer == 1:
+            return self
+        rescaled = Rescaled(finer)
+        try:
+            robot = rescaled.robot(self.robot)
+            copies = {name: rescaled.constraints(held) for name, held in self.copies.items()}
+            definitions = rescaled.definitions(self.context.definitions)
+        except MistakeError as mistake:
+            hint = f"another file of the team has costs of {places} decimal places, and all are counted in one unit"
+            raise InvalidInputError([self.places.robot().mistake(mistake.message, hint)]) from None
+        context = replace(self.context, units=robot.costs, definitions=definitions)
+        return replace(self, robot=robot, copies=copies, context=context)
 
 
 def read_robot(path: Path | str) -> Robot:
@@ -123,8 +144,9 @@ class _Reader:
         kind = ProblemKind(attribute(presentation, "type"))
         variables = self._variables(self._domains())
         topics = self._topics()
-        model = attribute(presentation, "constraintModel")
-        context = Context(kind, ConstraintModel(model) if model else None, self._own, self._definitions(kind))
+        model = ConstraintModel(attribute(presentation, "constraintModel") or ConstraintModel.TKC)
+        units = self._units(presentation, kind)
+        context = Context(kind, units, model, self._own, self._definitions(kind, units))
         private = self._constraints(self._instance, context, read_private)
         copies: dict[str, tuple[Constraint, ...]] = {}
         parents = tuple(self._parents(context))
@@ -133,7 +155,7 @@ class _Reader:
         self._report.finish()
         weight = int(attribute(presentation, "weight") or Robot.weight)
         file = self._report.file
-        robot = Robot(self._name, variables, kind, private, parents, children, topics, file, weight=weight)
+        robot = Robot(self._name, variables, kind, private, parents, children, topics, file, weight=weight, costs=units)
         unsaid = frozenset(
             attribute(agent, "name") for agent in self._agents("agents_children") if agent.get("variable") is None
         )
@@ -183,21 +205,32 @@ class _Reader:
                 topics[topic.name] = topic
         return tuple(topics.values())
 
-    def _definitions(self, kind: ProblemKind) -> dict[str, Relation | Predicate | None]:
-        definitions: dict[str, Relation | Predicate | None] = {}
+    def _units(self, presentation: etree._Element, kind: ProblemKind) -> CostUnits:
+        places = places_used(self._instance)
+        units = [CostUnits(attribute(presentation, "objective") == "maximize", places)]  # to go on with
+        with self._report.at(line(presentation)):
+            units.append(read_units(presentation, kind, places))
+        return units[-1]
+
+    def _definitions(self, kind: ProblemKind, units: CostUnits) -> dict[str, Definition | None]:
+        definitions: dict[str, Definition | None] = {}
         for element in self._elements("relations", "relation", "nbRelations"):
-            self._define(element, read_relation, definitions)
+            self._define(element, lambda one: read_relation(one, units), definitions)
             with self._report.at(line(element)):
                 check_semantics(Semantics(attribute(element, "semantics")), kind)
         for element in self._elements("predicates", "predicate", "nbPredicates"):
             self._define(element, read_predicate, definitions)
+        for element in self._elements("functions", "function", "nbFunctions"):
+            self._define(element, read_function, definitions)
+            with self._report.at(line(element)):
+                refuse_function(kind)
         return definitions
 
     def _define(
         self,
         element: etree._Element,
-        read: Callable[[etree._Element], Relation | Predicate],
-        definitions: dict[str, Relation | Predicate | None],
+        read: Callable[[etree._Element], Definition],
+        definitions: dict[str, Definition | None],
     ) -> None:
         name = attribute(element, "name")
         with self._report.at(line(element)):

@@ -13,16 +13,20 @@ from collections.abc import Collection, Iterator, Sequence
 from robochoc.formats.definitions import shown
 from robochoc.formats.diagnostics import MistakeError, shortened, suggestion
 from robochoc.formats.names import check_cost, check_integer, is_name
+from robochoc.model.cost_units import PLAIN_COSTS, CostUnits
+from robochoc.model.expression import Apply, Expression
 from robochoc.model.problem import (
     INFINITE,
     Child,
     Constraint,
     ConstraintModel,
     Definition,
+    Function,
     Parent,
     Predicate,
     ProblemKind,
     Relation,
+    Robot,
     Term,
 )
 
@@ -42,7 +46,7 @@ def check_terms(terms: Sequence[Term]) -> None:
             raise MistakeError(f"'{shortened(term)}' is neither a variable's name nor an integer", hint)
 
 
-def check_constraint(constraint: Constraint, kind: ProblemKind) -> None:
+def check_constraint(constraint: Constraint, kind: ProblemKind, units: CostUnits = PLAIN_COSTS) -> None:
     """Raise `MistakeError` unless its definition takes its terms, and a robot of that `kind` may charge its cost."""
     if not constraint.variables:
         raise MistakeError("a constraint without variables in its scope", 'write scope="V1.1 V2.1"')
@@ -51,9 +55,32 @@ def check_constraint(constraint: Constraint, kind: ProblemKind) -> None:
         return
     if kind is not ProblemKind.DISWCSP:
         raise MistakeError("a cost in a DisCSP", 'write type="DisWCSP" in the presentation, or delete the cost')
-    if not isinstance(constraint.definition, Predicate):
+    if isinstance(constraint.definition, Relation):
         raise MistakeError("a cost on a relation", 'a soft relation names the costs of its tuples: semantics="soft"')
+    if isinstance(constraint.definition, Function):
+        raise MistakeError("a cost on a function", "its value is the cost: delete the attribute, or write a predicate")
     check_cost(constraint.cost)
+    if constraint.cost * (-1 if units.maximize else 1) < 0:
+        _refuse_undefined(constraint.definition)
+
+
+_PARTIAL = ("div", "mod", "pow")
+"""The operators that are undefined for some arguments, however small these are."""
+
+
+def _refuse_undefined(predicate: Predicate) -> None:
+    """Raise `MistakeError` for a predicate that may be undefined, where breaking it is worth something."""
+    waiting: list[Expression] = [predicate.body]
+    while waiting:
+        node = waiting.pop()
+        if isinstance(node, Apply):
+            if node.operator in _PARTIAL:
+                raise MistakeError(
+                    f"breaking {shortened(predicate.name)} is worth something, and with '{node.operator}' it may be"
+                    " undefined",
+                    "write a function, whose value is the cost: if(..., 0, -5)",
+                )
+            waiting += node.arguments
 
 
 def refuse_private_part(model: ConstraintModel | None) -> None:
@@ -149,6 +176,13 @@ def check_added_constraint(constraint: Constraint) -> None:
     if constraint.model is ConstraintModel.PKC:
         message = "a partially known constraint (PKC) in a scenario"
         raise MistakeError(message, 'each side would need its part: write model="TKC"')
+
+
+def check_added_robot(robot: Robot) -> None:
+    """Raise `MistakeError` for what a robot that a scenario adds brings to the costs of the whole team."""
+    if robot.costs.constant:
+        message = "a constant cost of a robot that a scenario adds"
+        raise MistakeError(message, "write it into the presentation of a robot of the start")
 
 
 def check_constraint_of_added_robot(constraint: Constraint) -> None:

@@ -4,15 +4,22 @@ from __future__ import annotations
 
 import os
 from collections.abc import Iterator, Mapping
+from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
 
 from lxml import etree
 
 from robochoc.formats.constraints import Context, read_shared
+from robochoc.formats.costs import places_used
 from robochoc.formats.diagnostics import Diagnostic, DiagnosticCollector, InvalidInputError, MistakeError, shortened
 from robochoc.formats.robot import RobotFile, read_robot_file
-from robochoc.formats.rules import NOBODY_LEFT, check_added_constraint, check_constraint_of_added_robot
+from robochoc.formats.rules import (
+    NOBODY_LEFT,
+    check_added_constraint,
+    check_added_robot,
+    check_constraint_of_added_robot,
+)
 from robochoc.formats.xml import attribute, line, read_xml
 from robochoc.model.change import apply_changes
 from robochoc.model.problem import (
@@ -48,6 +55,20 @@ def read_scenario(folder: Path, team: Team | None, files: Mapping[str, RobotFile
     return _Reader(folder, team, files).events()
 
 
+def places_of_scenario(folder: Path) -> int:
+    """Return how many decimal places the costs in the scenario in `folder` have, the added robots' included."""
+    try:
+        root = read_xml(folder / SCENARIO, "scenario")
+    except InvalidInputError:
+        return 0
+    places = places_used(root)
+    for element in root.iter("add_agent"):
+        with suppress(InvalidInputError, MistakeError):
+            path = _inside(folder, attribute(element, "file"))
+            places = max(places, read_robot_file(path).robot.costs.places)
+    return places
+
+
 class _Reader:
     """Walks through the events, and changes the team on the way.
 
@@ -57,10 +78,10 @@ class _Reader:
 
     def __init__(self, folder: Path, team: Team | None, files: Mapping[str, RobotFile]) -> None:
         self._folder = folder
-        self._inside = folder.resolve()
         self._path = folder / SCENARIO
         self._team = team
         self._contexts: dict[str, Context] = {name: file.context for name, file in files.items()}
+        self._places = max((file.robot.costs.places for file in files.values()), default=0)
         self._report = DiagnosticCollector(str(self._path))
         self._elsewhere: list[Diagnostic] = []
         """Mistakes in the files of added robots."""
@@ -107,14 +128,7 @@ class _Reader:
 
     def _added(self, name: str) -> Robot | None:
         """Return the robot in the file `name`; None: it has mistakes, which are reported with that file's lines."""
-        try:
-            path = resolved(self._inside / name)
-            there = path.is_file()
-        except (OSError, ValueError):
-            path, there = self._inside, False
-        if not path.is_relative_to(self._inside):
-            raise MistakeError(f"the file '{shortened(name)}' lies outside the team's folder", "move it inside")
-        if not there:
+        if not _inside(self._folder, name).is_file():
             self._missed.add(Path(name).stem)
             self._unread = True
             message = f"there is no file '{shortened(name)}' in the team's folder"
@@ -122,9 +136,9 @@ class _Reader:
         own = Path(name).stem
         there_already = self._team is not None and own in self._team
         try:
-            file = read_robot_file(self._folder / name)
+            file = read_robot_file(self._folder / name).in_places(self._places)
             if not there_already:
-                _refuse_parts(file.robot)
+                _refuse_parts(file)
         except InvalidInputError as invalid:
             self._elsewhere += invalid.diagnostics
             self._unread = True
@@ -190,10 +204,24 @@ def _change(element: etree._Element) -> Change:
             return RemoveConstraint(*(attribute(element, name) for name in ("agent", "parent", "name")))
 
 
-def _refuse_parts(robot: Robot) -> None:
-    """Raise `InvalidInputError` where an added robot brings its part of partially known constraints."""
-    report = DiagnosticCollector(robot.file)
-    for constraint in robot.shared:
+def _inside(folder: Path, name: str) -> Path:
+    """Return the path of the file `name` in `folder`, whether it is there or not. Raises `MistakeError`."""
+    top = folder.resolve()
+    try:
+        path = resolved(top / name)
+    except (OSError, ValueError):
+        path = top
+    if not path.is_relative_to(top):
+        raise MistakeError(f"the file '{shortened(name)}' lies outside the team's folder", "move it inside")
+    return path
+
+
+def _refuse_parts(file: RobotFile) -> None:
+    """Raise `InvalidInputError` where an added robot brings what only robots of the start can have."""
+    report = DiagnosticCollector(file.robot.file)
+    with report.at(file.places.robot().line):
+        check_added_robot(file.robot)
+    for constraint in file.robot.shared:
         with report.at(constraint.line):
             check_constraint_of_added_robot(constraint)
     report.finish()

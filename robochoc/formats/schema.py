@@ -13,7 +13,7 @@ from lxml import etree
 from robochoc.formats.diagnostics import Diagnostic, DiagnosticCollector, InvalidInputError, shortened
 
 _SCHEMAS = {"instance": "robot.xsd", "scenario": "scenario.xsd"}
-_OPTIONAL = {"topics", "relations", "predicates", "constraints"}
+_OPTIONAL = {"topics", "relations", "predicates", "functions", "constraints"}
 """The optional elements among those that libxml2 names where one is missing."""
 
 _PARTS = (

@@ -9,11 +9,11 @@ from pathlib import Path
 
 from robochoc.formats.diagnostics import Diagnostic, InvalidInputError, encodable
 from robochoc.formats.robot import RobotFile, read_robot_file
-from robochoc.formats.scenario import SCENARIO, has_scenario, read_scenario
+from robochoc.formats.scenario import SCENARIO, has_scenario, places_of_scenario, read_scenario
 from robochoc.formats.team_members import TeamMembers
 from robochoc.formats.validation import check_between_robots, note_valid
 from robochoc.model.priorities import natural_key, priority_order
-from robochoc.model.problem import Robot, Team
+from robochoc.model.problem import ProblemKind, Robot, Team
 
 _NEXT_STEP = "give a folder with one XML file per robot; 'robochoc generate queens3d --n 4' writes one"
 
@@ -53,6 +53,7 @@ def read_team(folder: Path | str) -> Team:
             files[path.stem] = read_robot_file(path)
         except InvalidInputError as invalid:
             found.extend(invalid.diagnostics)
+    files = _in_one_unit(folder, files, found)
     members = TeamMembers(files, frozenset(path.stem for path in paths) - files.keys())
     found.extend(check_between_robots(members))
     team = None if found else _whole(folder, members)
@@ -80,6 +81,22 @@ def robot_names(folder: Path | str) -> tuple[str, ...]:
     if not names:
         raise _invalid(folder, "there is no robot here: no XML file", _NEXT_STEP)
     return names
+
+
+def _in_one_unit(folder: Path, files: dict[str, RobotFile], found: list[Diagnostic]) -> dict[str, RobotFile]:
+    """Return `files` with costs in the finest unit of any, the scenario's included; mistakes are added to `found`."""
+    if not any(file.robot.kind is ProblemKind.DISWCSP for file in files.values()):
+        return files
+    places = max(file.robot.costs.places for file in files.values())
+    if has_scenario(folder):
+        places = max(places, places_of_scenario(folder))
+    same: dict[str, RobotFile] = {}
+    for name, file in files.items():
+        try:
+            same[name] = file.in_places(places)
+        except InvalidInputError as invalid:
+            found.extend(invalid.diagnostics)
+    return same
 
 
 def _whole(folder: Path, members: TeamMembers) -> Team:

@@ -23,12 +23,18 @@ from robochoc.formats.neighbours import (
     cycles,
     disagreements,
     missing_robots,
+    mixed_costs,
     mixed_kinds,
     out_of_order,
     shared_variables,
 )
 from robochoc.formats.objects import Objects, repeated_robots
-from robochoc.formats.rules import NOBODY_LEFT, check_added_constraint, check_constraint_of_added_robot
+from robochoc.formats.rules import (
+    NOBODY_LEFT,
+    check_added_constraint,
+    check_added_robot,
+    check_constraint_of_added_robot,
+)
 from robochoc.formats.scopes import misplaced_constraints, misplaced_parts, missing_shown_variables
 from robochoc.formats.team_members import TeamMember, TeamMembers
 from robochoc.model.change import apply_changes
@@ -154,6 +160,7 @@ def _between(members: TeamMembers) -> Iterator[Diagnostic]:
     yield from cycles(members)
     yield from out_of_order(members)
     yield from mixed_kinds(members)
+    yield from mixed_costs(members)
     yield from shared_variables(members)
     scopes = list(misplaced_constraints(members))
     yield from scopes
@@ -250,12 +257,22 @@ def _robots(team: Team, event: ScenarioEvent = _NOTHING) -> dict[str, Robot]:
     return {robot.name: robot for robot in (*team.robots, *coming)}
 
 
+def _check_same_places(robot: Robot, robots: Mapping[str, Robot]) -> None:
+    """Raise `MistakeError` unless a robot that joins counts costs in the unit of those that are there."""
+    for other in robots.values():
+        if other.costs.places != robot.costs.places:
+            message = f"'{shortened(robot.name)}' has costs of {robot.costs.places} decimal places"
+            raise MistakeError(message, f"'{other.name}' has {other.costs.places}: a team counts costs in one unit")
+
+
 def _of_the_change(robots: Mapping[str, Robot], change: Change, place: Location) -> Iterator[Diagnostic]:
     """Yield mistakes of a change that do not depend on the rest of the team."""
     try:
         match change:
             case AddAgent(robot):
                 yield from Objects().mistakes(robot)
+                check_added_robot(robot)
+                _check_same_places(robot, robots)
                 for constraint in robot.shared:
                     check_constraint_of_added_robot(constraint)
             case AddConstraint(agent, _, constraint):

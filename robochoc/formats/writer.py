@@ -8,14 +8,17 @@ from typing import TypeVar
 
 from lxml import etree
 
+from robochoc.formats.costs import cost_text, scale_text
 from robochoc.formats.definitions import PREDEFINED
 from robochoc.formats.labels import with_names_apart
 from robochoc.model.expression import text
 from robochoc.model.problem import (
     INFINITE,
     Constraint,
+    CostUnits,
     Definition,
     Domain,
+    Function,
     Predicate,
     Relation,
     Robot,
@@ -38,16 +41,26 @@ def robot_xml(robot: Robot) -> bytes:
     presentation = etree.SubElement(instance, "presentation", type=robot.kind)
     if robot.weight != Robot.weight:
         presentation.set("weight", str(robot.weight))
+    _write_units(presentation, robot.costs)
     _write_domains(instance, robot)
     variables = etree.SubElement(instance, "variables", nbVariables=str(len(robot.variables)))
     for variable in robot.variables:
         etree.SubElement(variables, "variable", name=variable.name, domain=variable.domain.name)
     _write_topics(instance, robot.topics)
     _write_definitions(instance, robot)
-    _write_constraints(instance, robot.private)
+    _write_constraints(instance, robot.private, robot.costs)
     _write_neighbours(instance, robot)
     body = etree.tostring(instance, pretty_print=True, encoding="unicode")
     return f'<?xml version="1.0" encoding="UTF-8"?>\n{body}'.encode()
+
+
+def _write_units(presentation: etree._Element, units: CostUnits) -> None:
+    if units.maximize:
+        presentation.set("objective", "maximize")
+    if units.places:
+        presentation.set("scale", scale_text(units.places))
+    if units.constant:
+        presentation.set("constant", cost_text(units.constant, units))
 
 
 def _write_domains(instance: etree._Element, robot: Robot) -> None:
@@ -81,35 +94,41 @@ def _write_definitions(instance: etree._Element, robot: Robot) -> None:
     definitions = _by_name(constraint.definition for constraint in constraints)
     relations = [one for one in definitions.values() if isinstance(one, Relation)]
     predicates = [one for one in definitions.values() if isinstance(one, Predicate) and one != PREDEFINED.get(one.name)]
+    functions = [one for one in definitions.values() if isinstance(one, Function)]
     if relations:
         section = etree.SubElement(instance, "relations", nbRelations=str(len(relations)))
         for relation in relations:
-            _write_relation(section, relation)
+            _write_relation(section, relation, robot.costs)
     if predicates:
         section = etree.SubElement(instance, "predicates", nbPredicates=str(len(predicates)))
         for predicate in predicates:
-            _write_predicate(section, predicate)
+            _write_expression(etree.SubElement(section, "predicate", name=predicate.name), predicate)
+    if functions:
+        section = etree.SubElement(instance, "functions", nbFunctions=str(len(functions)))
+        for function in functions:
+            element = etree.SubElement(section, "function", name=function.name)
+            element.set("return", "int")
+            _write_expression(element, function)
 
 
-def _write_relation(section: etree._Element, relation: Relation) -> None:
+def _write_relation(section: etree._Element, relation: Relation, units: CostUnits) -> None:
     element = etree.SubElement(section, "relation", name=relation.name, arity=str(relation.arity))
     element.set("nbTuples", str(len(relation.tuples)))
     element.set("semantics", relation.semantics)
     tuples = [" ".join(map(str, values)) for values in relation.tuples]
     if relation.semantics is Semantics.SOFT:
-        element.set("defaultCost", _cost(relation.default_cost))
-        tuples = [f"{_cost(cost)}:{values}" for cost, values in zip(relation.costs, tuples, strict=True)]
+        element.set("defaultCost", cost_text(relation.default_cost, units))
+        tuples = [f"{cost_text(cost, units)}:{values}" for cost, values in zip(relation.costs, tuples, strict=True)]
     element.text = "|".join(tuples)
 
 
-def _write_predicate(section: etree._Element, predicate: Predicate) -> None:
-    element = etree.SubElement(section, "predicate", name=predicate.name)
-    etree.SubElement(element, "parameters").text = " ".join(f"int {name}" for name in predicate.parameters)
+def _write_expression(element: etree._Element, definition: Predicate | Function) -> None:
+    etree.SubElement(element, "parameters").text = " ".join(f"int {name}" for name in definition.parameters)
     expression = etree.SubElement(element, "expression")
-    etree.SubElement(expression, "functional").text = text(predicate.body)
+    etree.SubElement(expression, "functional").text = text(definition.body)
 
 
-def _write_constraints(holder: etree._Element, constraints: Sequence[Constraint]) -> None:
+def _write_constraints(holder: etree._Element, constraints: Sequence[Constraint], units: CostUnits) -> None:
     if not constraints:
         return
     section = etree.SubElement(holder, "constraints", nbConstraints=str(len(constraints)))
@@ -121,8 +140,8 @@ def _write_constraints(holder: etree._Element, constraints: Sequence[Constraint]
         element.set("reference", constraint.definition.name)
         element.set("scope", _terms(constraint.scope))
         if constraint.cost != INFINITE:
-            element.set("cost", _cost(constraint.cost))
-        if isinstance(constraint.definition, Predicate):
+            element.set("cost", cost_text(constraint.cost, units))
+        if not isinstance(constraint.definition, Relation):
             etree.SubElement(element, "parameters").text = _terms(constraint.parameters)
 
 
@@ -130,12 +149,12 @@ def _write_neighbours(instance: etree._Element, robot: Robot) -> None:
     neighbours = etree.SubElement(instance, "agents_neighbours")
     section = etree.SubElement(neighbours, "agents_parent")
     for parent in robot.parents:
-        _write_constraints(etree.SubElement(section, "agent", name=parent.name), parent.constraints)
+        _write_constraints(etree.SubElement(section, "agent", name=parent.name), parent.constraints, robot.costs)
     section = etree.SubElement(neighbours, "agents_children")
     for child in robot.children:
         agent = etree.SubElement(section, "agent", name=child.name)
         agent.set("variable", " ".join(child.variables))
-        _write_constraints(agent, child.constraints)
+        _write_constraints(agent, child.constraints, robot.costs)
 
 
 _Named = TypeVar("_Named", Domain, Definition)
@@ -147,11 +166,3 @@ def _by_name(things: Iterable[_Named]) -> Mapping[str, _Named]:
 
 def _terms(terms: Sequence[Term]) -> str:
     return " ".join(map(str, terms))
-
-
-def _cost(cost: float) -> str:
-    if cost == INFINITE:
-        return "infinity"
-    if cost != int(cost):
-        raise ValueError(f"the cost {cost} is no integer")
-    return str(int(cost))

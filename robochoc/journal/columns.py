@@ -64,7 +64,7 @@ class _Numbers(dict[Any, int]):
 
 
 _encode = msgspec.msgpack.Encoder().encode
-_json = msgspec.json.Encoder().encode
+_json = msgspec.json.Encoder(decimal_format="number").encode
 
 
 def columns_of(entries: Iterable[JournalEntry], *, exact: bool) -> bytes:

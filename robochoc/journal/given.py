@@ -12,10 +12,13 @@ from collections.abc import Collection, Iterable
 from dataclasses import replace
 
 import msgspec
+from msgspec import UNSET, UnsetType
 
 from robochoc.formats import InvalidInputError, robot_in, robot_xml
 from robochoc.formats.names import is_name
 from robochoc.journal.events import Given
+from robochoc.model.cost_units import PLAIN_COSTS, CostUnits
+from robochoc.model.costs import flat_units
 from robochoc.model.problem import INFINITE, Constraint, Domain, Relation, Robot, Team, Variable
 from robochoc.solver.agent_problem import DEFAULT_PARAMETERS, RunParameters
 from robochoc.solver.explanation import Invalidated
@@ -59,6 +62,7 @@ class TeamWriter:
             quiet=quiet,
             shown={robot.name: robot.shown for robot in team.robots if robot.shown},
             empty=tuple(name for name, variable in team.variables.items() if not variable.domain),
+            told_in=_units(flat_units(team)),
         )
         try:
             files = {robot.name: self._file(robot) for robot in team.robots}
@@ -100,9 +104,15 @@ class TeamReader:
             raise GivenProblemError(f"the problem of {missing[0]} is missing")
         empty = set(given.empty)
         robots = tuple(_as_given(self._robots[name], given.shown.get(name, ()), empty) for name in given.order)
+        if robots and given.told_in is not UNSET:
+            robots = (replace(robots[0], told_in=CostUnits(*given.told_in)), *robots[1:])
         team = Team(self._name, robots)
         _check(team)
         return team
+
+
+def _units(units: CostUnits) -> tuple[bool, int, int] | UnsetType:
+    return UNSET if units == PLAIN_COSTS else (units.maximize, units.places, units.constant)
 
 
 def run_parameters_of(given: Given) -> RunParameters:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import gc
 import io
 import os
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from itertools import pairwise
@@ -94,7 +94,7 @@ def sorted_by_time(events: Iterable[AnyEvent]) -> Iterator[AnyEvent]:
 
 def lines_of(journal: Journal) -> Iterator[bytes]:
     """Yield the text form of a journal: one JSON object a line."""
-    encode = msgspec.json.Encoder().encode
+    encode = msgspec.json.Encoder(decimal_format="number").encode
     yield encode(journal.header) + b"\n"
     for event in journal.events:
         yield encode(event) + b"\n"
@@ -122,12 +122,14 @@ class Follower:
     def read(self, most: int | None = None) -> list[JournalEntry]:
         """Return the entries that are complete since the last call, in the file's order. The first is the `Header`.
 
+        What is appended to a file from now on is left to the next call: its writer may be faster than this reader.
         Stops after the block with which there are more than `most`.
 
         Raises:
             JournalError: when it turns out that the file is no journal.
         """
         lines: list[JournalEntry] = []
+        self._source.look()
         while self.damage is None and (most is None or len(lines) <= most):
             found = self._next()
             if found is None:
@@ -166,7 +168,7 @@ class Follower:
             except JournalDamagedError as damaged:
                 self._break_off(damaged)
                 return None
-            piece = self._source()
+            piece = self._source.piece()
             if not piece:
                 return None
             if self._form is None:
@@ -206,22 +208,45 @@ class Follower:
         return lines
 
 
-def _source(file: BinaryIO) -> Callable[[], bytes]:
-    """Return what reads the next piece of `file`."""
-    place = 0
+class _Stream:
+    """Reads `file`, which is in memory, or a pipe, piece by piece."""
 
-    def at_an_offset() -> bytes:
-        nonlocal place
-        piece = os.pread(descriptor, _PIECE, place)
-        place += len(piece)
+    def __init__(self, file: BinaryIO) -> None:
+        self._file = file
+
+    def look(self) -> None:
+        """Nobody knows how long it is."""
+
+    def piece(self) -> bytes:
+        """Return the next piece; an empty one: there is none yet."""
+        return self._file.read(_PIECE)
+
+
+class _Stored:
+    """Reads a file that has a length, piece by piece, up to the end that it had at the last look."""
+
+    def __init__(self, descriptor: int) -> None:
+        self._descriptor = descriptor
+        self._place = self._end = 0
+
+    def look(self) -> None:
+        """Take notice of what has been appended."""
+        self._end = os.fstat(self._descriptor).st_size
+
+    def piece(self) -> bytes:
+        """Return the next piece; an empty one: there was no more."""
+        piece = os.pread(self._descriptor, max(0, min(_PIECE, self._end - self._place)), self._place)
+        self._place += len(piece)
         return piece
 
+
+def _source(file: BinaryIO) -> _Stream | _Stored:
     try:
         descriptor = file.fileno()
         os.pread(descriptor, 0, 0)
     except (OSError, AttributeError):  # it is in memory, or a pipe
-        return lambda: file.read(_PIECE)
-    return at_an_offset
+        return _Stream(file)
+    return _Stored(descriptor)
 
 
 class _Form(Protocol):

@@ -144,6 +144,10 @@ def _check_newcomer(team: Team, robot: Robot) -> None:
         raise ChangeError(f"the robot {own} is there already", "a robot can come again once it has left")
     if team.robots and robot.kind is not team.kind:
         raise ChangeError(f"{own} is a {robot.kind} in a team of {team.kind}", "write the same type in both")
+    if team.robots and robot.costs.maximize is not team.robots[0].costs.maximize:
+        does, others = ("maximizes", "minimizes") if robot.costs.maximize else ("minimizes", "maximizes")
+        hint = "write the same objective in both"
+        raise ChangeError(f"{own} {does} costs in a team that {others} them", hint)
     check_variables_free(team, robot)
     for child in robot.children:
         hint = "it takes the lowest priority, so its file names parents only"

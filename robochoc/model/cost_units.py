@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 from decimal import Decimal
 
@@ -34,3 +35,11 @@ class CostUnits:
 
 PLAIN_COSTS = CostUnits()
 """Integers that are minimised."""
+
+
+def common_units(units: Iterable[CostUnits]) -> CostUnits:
+    """Return the units of a team whose robots have these `units`: the finest, with the sum of all constants."""
+    known = list(units)
+    places = max((unit.places for unit in known), default=0)
+    constant = sum(unit.constant * 10 ** (places - unit.places) for unit in known)
+    return CostUnits(any(unit.maximize for unit in known), places, constant)

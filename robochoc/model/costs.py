@@ -11,7 +11,7 @@ from __future__ import annotations
 import itertools
 import math
 from collections import defaultdict
-from collections.abc import Iterable, Mapping
+from collections.abc import Collection, Iterable, Mapping
 from dataclasses import replace
 
 from robochoc.model.constraint import (
@@ -23,10 +23,10 @@ from robochoc.model.constraint import (
     Relation,
     Semantics,
 )
-from robochoc.model.cost_units import PLAIN_COSTS, Cost, CostUnits
+from robochoc.model.cost_units import PLAIN_COSTS, Cost, CostUnits, common_units
 from robochoc.model.expression import Apply, Constant, Expression
 from robochoc.model.expression.bounds import ANY_INTEGER, Interval, bounds
-from robochoc.model.problem import AddAgent, AddConstraint, AddValue, Change, Robot, Team
+from robochoc.model.problem import AddAgent, AddConstraint, AddValue, Change, Robot, ScenarioEvent, Team
 
 MAX_TRIED = 4096
 """The maximum number of combinations of values of which the least cost of a function is computed exactly."""
@@ -38,14 +38,6 @@ class UnboundedCostError(ValueError):
     """Nothing bounds the cost of a function: the domain of a variable is not known here."""
 
 
-def team_units(robots: Iterable[Robot]) -> CostUnits:
-    """Return the units of a team: the finest of its robots', with the sum of their constants."""
-    units = [robot.costs for robot in robots]
-    places = max((unit.places for unit in units), default=0)
-    constant = sum(unit.constant * 10 ** (places - unit.places) for unit in units)
-    return CostUnits(any(unit.maximize for unit in units), places, constant)
-
-
 def normalized(team: Team) -> Team:
     """Return `team` with integer costs of 0 or more that are minimised; `told_in` says how to tell them.
 
@@ -54,16 +46,16 @@ def normalized(team: Team) -> Team:
     Raises:
         UnboundedCostError: if nothing bounds a function's cost.
     """
-    if team.told_in != PLAIN_COSTS or not any(map(_needs_it, [*team.robots, *_joining(team)])):
+    if not any(map(_needs_it, [*team.robots, *_joining(team)])):
         return team
-    units = team_units(team.robots)
+    units = common_units(robot.costs for robot in team.robots)
     domains = _domains(team)
     robots = tuple(normalized_robot(robot, units, domains) for robot in team.robots)
     events = tuple(
         replace(event, changes=tuple(_normalized_change(change, units, domains) for change in event.changes))
         for event in team.scenario
     )
-    return replace(team, robots=robots, scenario=events, told_in=units)
+    return replace(team, robots=robots, scenario=events)
 
 
 def normalized_robot(robot: Robot, units: CostUnits, domains: Domains) -> Robot:
@@ -91,6 +83,7 @@ def normalized_robot(robot: Robot, units: CostUnits, domains: Domains) -> Robot:
             replace(one, constraints=all_of(one.constraints), copies=all_of(one.copies)) for one in robot.children
         ),
         costs=PLAIN_COSTS,
+        told_in=CostUnits(units.maximize, units.places, robot.costs.constant * finer),
     )
 
 
@@ -108,18 +101,63 @@ def normalized_constraint(constraint: Constraint, units: CostUnits, domains: Dom
             return constraint
 
 
-def offset(team: Team) -> int:
-    """Return what was taken out of the costs of all constraints of a normalised team."""
-    return sum(constraint.offset for constraint in team.constraints())
+def told_cost(team: Team, total: float, without: Collection[str] = ()) -> Cost:
+    """Return a cost in the user's numbers.
 
-
-def told_cost(team: Team, total: float) -> Cost:
-    """Return `total`, a sum of normalised costs of all constraints of `team`, in the user's numbers."""
+    Args:
+        team: A normalised team.
+        total: A sum of normalised costs of the constraints of `team`.
+        without: Robots whose constraints are not in it: they have withdrawn.
+    """
     sign = -1 if team.told_in.maximize else 1
-    return team.told_in.told(sign * (int(total) + offset(team)))
+    return team.told_in.told(sign * (int(total) + _taken_out(team, without)))
+
+
+def flat_units(team: Team) -> CostUnits:
+    """Return the units of a normalised `team`, with what was taken out of its costs in the constant."""
+    sign = -1 if team.told_in.maximize else 1
+    return replace(team.told_in, constant=team.told_in.constant + sign * _taken_out(team))
+
+
+def _taken_out(team: Team, without: Collection[str] = ()) -> int:
+    return sum(
+        constraint.offset
+        for constraint in team.constraints()
+        if not (without and any(team.owner[name] in without for name in constraint.variables))
+    )
+
+
+def normalized_joining(team: Team, robot: Robot) -> Robot:
+    """Return `robot`, as its file says, for a normalised `team` that it joins. Raises `UnboundedCostError`."""
+    domains = {**_domains(team), **{variable.name: variable.domain for variable in robot.variables}}
+    return normalized_robot(robot, team.told_in, domains)
+
+
+def normalized_event(team: Team, event: ScenarioEvent) -> ScenarioEvent:
+    """Return `event`, which nobody knew of before, for a normalised `team`.
+
+    Raises:
+        UnboundedCostError: if nothing bounds the cost of a function in it, or a value is added to a variable whose
+            functions are bounded for its present values.
+    """
+    domains = _domains(replace(team, scenario=(event,)))
+    for change in event.changes:
+        if isinstance(change, AddValue) and any(
+            isinstance(constraint.definition, Function) and change.variable in constraint.variables
+            for constraint in team.constraints()
+        ):
+            raise UnboundedCostError(
+                f"the value {change.value} is new to {change.variable}, whose costs are functions: their bounds are"
+                " those of the values that the files and the scenario name"
+            )
+    changes = tuple(_normalized_change(change, team.told_in, domains) for change in event.changes)
+    return replace(event, changes=changes)
 
 
 def _needs_it(robot: Robot) -> bool:
+    """Return whether the costs of `robot`, which may be normalised already, are not."""
+    if robot.told_in != PLAIN_COSTS:
+        return False
     return robot.costs != PLAIN_COSTS or any(map(_may_be_negative, _constraints(robot)))
 
 

@@ -52,4 +52,4 @@ def _lost(outcome: Outcome) -> str:
 
 
 def _cost(outcome: Outcome) -> str:
-    return f", cost {int(outcome.cost):,}" if outcome.cost else ""
+    return f", cost {outcome.cost:,}" if outcome.cost else ""

@@ -6,6 +6,8 @@ from dataclasses import dataclass, field
 from enum import StrEnum
 from typing import NamedTuple
 
+from robochoc.model.cost_units import Cost
+
 RULED_OUT = "has ruled everything out"
 """The reason for which one robot can conclude `no-solution`. It covers every protocol: the robot has derived the empty
 nogood, tried all values, or used bounds."""
@@ -98,12 +100,12 @@ class EpochOutcome:
     robots: tuple[str, ...]
     opened_by: str = "the start"
     assignment: dict[str, int] = field(default_factory=dict)
-    cost: float | None = None
+    cost: Cost | None = None
     metrics: Metrics = field(default_factory=Metrics)
     verified: bool = False
     witness: str | None = None
     lost: tuple[str, ...] = ()
-    bound: float | None = None
+    bound: Cost | None = None
     tree: dict[str, PseudoTreeNode] = field(default_factory=dict)
     confirmed: bool = False
 
@@ -135,7 +137,8 @@ class Outcome:
         seed: The seed of the run.
         verdict: The answer to the problem.
         assignment: The values of all variables of the robots that are not withdrawn.
-        cost: The cost of the assignment. None: there is no assignment.
+        cost: The cost of the assignment in the user's numbers, exactly; the utility where that is maximised. None:
+            there is no assignment.
         withdrawn: The names of the withdrawn robots, the lost ones included.
         metrics: What the run took.
         verified: Whether the checker has compared the assignment with every constraint of a team that was validated
@@ -145,8 +148,8 @@ class Outcome:
         count: The number of solutions, if it was asked for.
         lost: The names of the withdrawn robots whose processes died, and that did not come back.
         order: The name of the priority order that was asked for; `listed` for a list of names.
-        bound: A lower bound on the cost of any assignment; with withdrawal, on the weight of the withdrawn robots.
-            None: not known.
+        bound: A lower bound on the cost of any assignment (an upper one on the utility, where that is maximised); with
+            withdrawal, on the weight of the withdrawn robots. None: not known.
         tree: The pseudo-tree that the robots have built, if their protocol builds one.
         confirmed: Whether the central solver was asked, and has found the same `no-solution` or the same minimum cost.
         epochs: The epochs, if there were several.
@@ -163,7 +166,7 @@ class Outcome:
     seed: int
     verdict: Verdict
     assignment: dict[str, int] = field(default_factory=dict)
-    cost: float | None = None
+    cost: Cost | None = None
     withdrawn: tuple[str, ...] = ()
     metrics: Metrics = field(default_factory=Metrics)
     verified: bool = False
@@ -172,7 +175,7 @@ class Outcome:
     count: int | None = None
     lost: tuple[str, ...] = ()
     order: str | None = None
-    bound: float | None = None
+    bound: Cost | None = None
     tree: dict[str, PseudoTreeNode] = field(default_factory=dict)
     confirmed: bool = False
     epochs: tuple[EpochOutcome, ...] = ()

@@ -30,7 +30,7 @@ from robochoc.model.constraint import (
     Term,
     Variable,
 )
-from robochoc.model.cost_units import PLAIN_COSTS, CostUnits
+from robochoc.model.cost_units import PLAIN_COSTS, CostUnits, common_units
 from robochoc.model.expression import Expression
 
 __all__ = [
@@ -131,6 +131,7 @@ class Robot:
             partially known constraint.
         weight: How much its withdrawal counts: one robot of weight 3 as much as three of weight 1.
         costs: The unit of its costs, and whether their sum is minimised or maximised, as its file says.
+        told_in: Of a robot with normalised costs (`model/costs.py`): the units in which its costs are told to the user.
     """
 
     name: str
@@ -144,6 +145,7 @@ class Robot:
     shown: tuple[str, ...] = ()
     weight: int = 1
     costs: CostUnits = PLAIN_COSTS
+    told_in: CostUnits = PLAIN_COSTS
 
     @cached_property
     def shared(self) -> tuple[Constraint, ...]:
@@ -233,13 +235,11 @@ class Team:
         name: The team's name.
         robots: The robots.
         scenario: How the problem changes over time. With events it is a DDisCSP, and this is its function delta.
-        told_in: Of a normalised team (`model/costs.py`): the units in which its costs are told to the user.
     """
 
     name: str
     robots: tuple[Robot, ...]
     scenario: tuple[ScenarioEvent, ...] = ()
-    told_in: CostUnits = PLAIN_COSTS
 
     @cached_property
     def _by_name(self) -> dict[str, Robot]:
@@ -264,6 +264,11 @@ class Team:
     def kind(self) -> ProblemKind:
         """The kind of problem, the same for all robots. Without robots it is a DisCSP."""
         return self.robots[0].kind if self.robots else ProblemKind.DISCSP
+
+    @cached_property
+    def told_in(self) -> CostUnits:
+        """Of a normalised team (`model/costs.py`): the units in which its costs are told to the user."""
+        return common_units(robot.told_in for robot in self.robots)
 
     @cached_property
     def order(self) -> tuple[str, ...]:

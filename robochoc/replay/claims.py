@@ -17,6 +17,7 @@ from robochoc.communication.run_result import RunResult
 from robochoc.journal.entries import STAMPED_LATE
 from robochoc.journal.events import AnyEvent, Lost, Received, Sent
 from robochoc.journal.journal import Header, Journal, metrics_of
+from robochoc.model.costs import told_cost
 from robochoc.model.outcome import EpochOutcome, Outcome, Verdict
 from robochoc.replay.rebuild import RebuiltRobots
 from robochoc.replay.steps import RecordedRun
@@ -139,7 +140,7 @@ def _answer(run: RecordedRun, robots: RebuiltRobots, outcome: Outcome) -> EpochO
     phase = Phase("", robots.protocol, RunParameters(withdrawal_cost=given.aside), withdrawal)
     check = partial(check_with_files, phase, result, team, robots.compiled)
     try:
-        answer = evaluate_search(phase, Search(result, check), team.kind)
+        answer = evaluate_search(phase, Search(result, check), team.kind, partial(told_cost, team))
     except (RefutedError, TooManySolutionsError):
         return EpochOutcome(Verdict.UNKNOWN, team.order)
     if not withdrawal:

@@ -7,6 +7,8 @@ from dataclasses import replace
 from typing import NamedTuple
 
 from robochoc.model.change import describe_change, team_after_events
+from robochoc.model.cost_units import Cost
+from robochoc.model.costs import told_cost
 from robochoc.model.outcome import Metrics, Outcome, Verdict
 from robochoc.model.problem import ProblemKind, Team
 from robochoc.run.context import RunContext
@@ -94,16 +96,17 @@ def _answer_of(found: CentralAnswer, team: Team, price: int | None, options: Opt
 
     `price` is the withdrawal cost of a robot of weight 1 (None: no robot may withdraw).
     """
-    verdict, assignment, bound = found.verdict, found.assignment, None
+    verdict, assignment = found.verdict, found.assignment
+    bound: Cost | None = None
     if found.cost is not None:
         total = total_cost(team, assignment, price)
         if total != found.cost:
             raise SolverLostError(f"the constraint solver's answer costs {total:,}, and it says {found.cost:,}")
     if verdict is Verdict.UNKNOWN and found.bound is not None:
-        bound = found.bound // (price or 1)
+        bound = told_cost(team, found.bound) if price is None else found.bound // price
     if verdict is Verdict.OPTIMAL and team.kind is ProblemKind.DISCSP and not robots_without_values(team, assignment):
         verdict = Verdict.SOLUTION
     has_answer = found.cost is not None or verdict is Verdict.SOLUTION
     withdrawn = robots_without_values(team, assignment) if has_answer and options.withdraw else ()
-    paid = assignment_cost(team, assignment) if has_answer else None
+    paid = told_cost(team, assignment_cost(team, assignment), without=withdrawn) if has_answer else None
     return Answer(verdict, assignment=assignment, cost=paid, withdrawn=withdrawn, bound=bound, verified=has_answer)

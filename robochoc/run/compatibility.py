@@ -184,6 +184,11 @@ class Case:
         return self.team.kind is ProblemKind.DISWCSP
 
     @property
+    def has_negative_costs(self) -> bool:
+        """Return whether something was taken out of costs, so that none is negative."""
+        return self.team.told_in.maximize or any(constraint.offset for constraint in self.team.constraints())
+
+    @property
     def is_distributed(self) -> bool:
         """Return whether the robots solve the problem together, without the central solver."""
         return self.options.protocol != CENTRAL
@@ -258,6 +263,11 @@ TEAM_RULES = (
         lambda c: c.has_costs and not c.traits.costs and not c.minimum_withdrawal,
         "{team} is a DisWCSP, and {protocol} does not minimise costs",
         other_protocol=True,
+    ),
+    TeamRule(
+        lambda c: c.options.withdraw is not None and c.has_negative_costs,
+        "{team} has negative costs, or utilities; with --withdraw a robot that withdraws would save or lose them",
+        "add a constant to the costs of each constraint, so that all are 0 or more and minimised",
     ),
     TeamRule(
         lambda c: c.has_costs and c.options.withdraw is Withdrawal.MAXIMAL,

@@ -11,6 +11,7 @@ from collections.abc import Mapping
 from dataclasses import replace
 
 from robochoc.communication.run_result import RobotsLostError, RunResult
+from robochoc.model.cost_units import Cost
 from robochoc.model.outcome import Metrics, Outcome, Verdict
 from robochoc.model.problem import ProblemKind
 from robochoc.protocols.protocol import Protocol
@@ -36,6 +37,10 @@ class Deployment(ABC):
     @abstractmethod
     def kind(self) -> ProblemKind:
         """Return the kind of the team's problem: with or without costs."""
+
+    @abstractmethod
+    def told(self, total: float) -> Cost:
+        """Return `total`, a sum of costs as the robots count them, in the user's numbers."""
 
     @property
     @abstractmethod
@@ -85,7 +90,7 @@ class Deployment(ABC):
 
     def evaluated(self, phase: Phase, search: Search) -> Answer:
         """Return the answer of `search`, confirmed by the central solver if that is asked for."""
-        answer = evaluate_search(phase, search, self.kind)
+        answer = evaluate_search(phase, search, self.kind, self.told)
         if answer.verdict is Verdict.NO_SOLUTION:
             sure = self.confirm(phase, answer)
             return replace(answer, verified=sure, confirmed=sure)

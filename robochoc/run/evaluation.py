@@ -11,6 +11,8 @@ from dataclasses import dataclass, field, replace
 from typing import NamedTuple
 
 from robochoc.communication.run_result import RunResult
+from robochoc.model.cost_units import Cost
+from robochoc.model.costs import told_cost
 from robochoc.model.outcome import CheckCounts, EpochOutcome, Metrics, Outcome, PseudoTreeNode, Verdict
 from robochoc.model.problem import ProblemKind, Team
 from robochoc.run.incumbent import best_known, lower_bound, merged_values, pseudo_tree, robots_without_values
@@ -27,7 +29,7 @@ class CheckedAssignment(NamedTuple):
     """
 
     assignment: dict[str, int]
-    cost: float | None = None
+    cost: Cost | None = None
     withdrawn: tuple[str, ...] = ()
     verified: bool = True
     check_counts: CheckCounts | None = None
@@ -47,7 +49,7 @@ class Search(NamedTuple):
 
 @dataclass(frozen=True)
 class Answer:
-    """The result of a phase of a run. Most fields are those of `model.outcome.Outcome`.
+    """The result of a phase of a run. Most fields are those of `model.outcome.Outcome`: costs are the user's numbers.
 
     `withdrawn` are the robots that withdrew so that the others have a solution; those that were lost are not among
     them. `ended`: the protocol has come to its end, no limit was reached.
@@ -57,9 +59,9 @@ class Answer:
     metrics: Metrics = field(default_factory=Metrics)
     witness: str | None = None
     assignment: dict[str, int] = field(default_factory=dict)
-    cost: float | None = None
+    cost: Cost | None = None
     withdrawn: tuple[str, ...] = ()
-    bound: float | None = None
+    bound: Cost | None = None
     tree: dict[str, PseudoTreeNode] = field(default_factory=dict)
     verified: bool = False
     confirmed: bool = False
@@ -116,8 +118,8 @@ class Answer:
         )
 
 
-def evaluate_search(phase: Phase, search: Search, kind: ProblemKind) -> Answer:
-    """Return the answer of a `search` in `phase`, for a problem of this `kind`.
+def evaluate_search(phase: Phase, search: Search, kind: ProblemKind, told: Callable[[float], Cost]) -> Answer:
+    """Return the answer of a `search` in `phase`, for a problem of this `kind`; `told` tells a cost to the user.
 
     A protocol that minimises costs has an assignment whenever it is asked. Whether that is proven depends on the
     protocol, and on whether it came to its end. A solution of a problem without costs needs no proof.
@@ -130,7 +132,7 @@ def evaluate_search(phase: Phase, search: Search, kind: ProblemKind) -> Answer:
     answer = Answer(result.verdict, result.metrics, result.witness, tree=pseudo_tree(result.findings), ended=ended)
     if result.lost or result.verdict is Verdict.NO_SOLUTION or not (ended or phase.traits.costs):
         return answer
-    bound = None if is_proven(phase, result) else _bound_of(phase, result)
+    bound = None if is_proven(phase, result) else _bound_of(phase, result, told)
     found = search.check()
     if found is None:
         return replace(answer, verdict=Verdict.UNKNOWN, bound=bound)
@@ -178,7 +180,8 @@ def check_with_files(phase: Phase, result: RunResult, team: Team, compiled: Comp
     withdrawn = robots_without_values(team, assignment) if phase.withdrawal else ()
     check_assignment(team, assignment, withdrawn, maximal=proven)
     in_order = {name: assignment[name] for name in team.variables if name in assignment}
-    return CheckedAssignment(in_order, assignment_cost(team, assignment), withdrawn)
+    paid = told_cost(team, assignment_cost(team, assignment), without=withdrawn)
+    return CheckedAssignment(in_order, paid, withdrawn)
 
 
 def check_assignment(
@@ -216,8 +219,10 @@ def _verdict_of(phase: Phase, result: RunResult, kind: ProblemKind, found: Check
     return result.verdict
 
 
-def _bound_of(phase: Phase, result: RunResult) -> float | None:
-    """Return the lower bound of the cost; where robots may withdraw, of the weight of those that do."""
+def _bound_of(phase: Phase, result: RunResult, told: Callable[[float], Cost]) -> Cost | None:
+    """Return the bound of the cost; where robots may withdraw, the lower bound of the weight of those that do."""
     bound = lower_bound(result.findings)
     withdrawal_cost = phase.parameters.withdrawal_cost
-    return bound if bound is None or withdrawal_cost is None else bound // withdrawal_cost
+    if bound is None:
+        return None
+    return told(bound) if withdrawal_cost is None else int(bound // withdrawal_cost)

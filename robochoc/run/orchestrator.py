@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 from robochoc.communication.run_result import Progress
 from robochoc.formats import check_team, with_checked_events
 from robochoc.journal.events import Observer
+from robochoc.model.costs import UnboundedCostError, normalized
 from robochoc.model.orders import OrderError
 from robochoc.model.outcome import Outcome, Verdict
 from robochoc.model.problem import Team
@@ -28,6 +29,7 @@ from robochoc.solver.compile import CompileTimeoutError
 from robochoc.solver.domain import TooManySolutionsError
 from robochoc.solver.encoding import TooLargeError, UnsupportedError
 from robochoc.solver.team_compiler import OutOfTimeError
+from robochoc.verification.checker import check_told_cost
 
 if TYPE_CHECKING:
     from robochoc.solver.ace import AceProcess
@@ -70,11 +72,16 @@ def solve(
     refuse_options(options, environment=environment is not None)
     try:
         context = RunContext(options, observer, progress, solver)
+        counted = normalized(team)
         if options.protocol == CENTRAL:
-            return _solve_centrally(team, context)
-        return _solve_distributed(team, context, environment)
-    except OrderError as refused:
+            outcome = _solve_centrally(counted, context)
+        else:
+            outcome = _solve_distributed(counted, context, environment)
+    except (OrderError, UnboundedCostError) as refused:
         raise UnsupportedError(str(refused)) from None
+    if counted is not team and not outcome.epochs:
+        check_told_cost(team, outcome.assignment, outcome.cost, without=outcome.withdrawn)
+    return outcome
 
 
 def _solve_centrally(team: Team, context: RunContext) -> Outcome:

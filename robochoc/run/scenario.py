@@ -25,6 +25,7 @@ from robochoc.model.change import (
     describe_change,
     team_after_events,
 )
+from robochoc.model.costs import normalized_joining
 from robochoc.model.orders import with_priorities
 from robochoc.model.outcome import EpochOutcome, Verdict
 from robochoc.model.problem import AddAgent, Change, Robot, ScenarioEvent, Team
@@ -238,7 +239,7 @@ class ScenarioRun:
 
     def _read_again(self, name: str) -> None:
         """Replace the robot `name` by what its file says now, as if it had said so from the beginning."""
-        robot = read_robot(Path(self.team[name].file))
+        robot = normalized_joining(self.team, read_robot(Path(self.team[name].file)))
         if name in self._files:
             self._files = rejoin(self._files, robot)
         else:

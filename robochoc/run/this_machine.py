@@ -8,6 +8,8 @@ from functools import partial
 
 from robochoc.communication.run_result import RobotsLostError
 from robochoc.communication.session import Epoch, Session
+from robochoc.model.cost_units import Cost
+from robochoc.model.costs import normalized_event, told_cost
 from robochoc.model.orders import Order, compute_order, with_dom_deg_order
 from robochoc.model.outcome import EpochOutcome, Metrics, Verdict
 from robochoc.model.problem import INFINITE, ProblemKind, Team
@@ -56,6 +58,10 @@ class ThisMachine(Deployment):
     def kind(self) -> ProblemKind:
         """See `Deployment.kind`."""
         return self._scenario.team.kind
+
+    def told(self, total: float) -> Cost:
+        """See `Deployment.told`."""
+        return told_cost(self._scenario.team, total)
 
     @property
     def lost(self) -> tuple[str, ...]:
@@ -152,7 +158,7 @@ class ThisMachine(Deployment):
         left_s = 0 if self._scenario.is_over else self.left_s()
         event = self._environment(self._scenario.team, self.epochs[-1], left_s)
         if event:
-            self._scenario.add_event(event)
+            self._scenario.add_event(normalized_event(self._scenario.team, event))
 
     def _with_epochs(self, answer: Answer) -> Answer:
         """Return the last epoch's `answer`, with what all epochs have cost."""

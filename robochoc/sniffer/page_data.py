@@ -231,7 +231,7 @@ def _ending(trace: Trace, outcome: Outcome) -> str:
         headline = describe_outcome(outcome, len(trace.robots))
         return f"{headline}: no solution for all{witness}; withdrawn: {_cut(outcome.withdrawn_alive)}{out}."
     said = _said(outcome.verdict)
-    cost = f", of cost {outcome.cost:g}" if outcome.cost else ""
+    cost = f", of cost {outcome.cost}" if outcome.cost else ""
     return f"{said[0].upper()}{said[1:]}{cost}{_by(outcome)}{reason}{out}."
 
 

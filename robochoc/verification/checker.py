@@ -7,13 +7,17 @@ and term by term.
 from __future__ import annotations
 
 from collections.abc import Collection, Iterator, Sequence
+from decimal import Decimal
+from fractions import Fraction
 from typing import assert_never
 
+from robochoc.model.cost_units import Cost
 from robochoc.model.expression import UndefinedValueError, evaluate
 from robochoc.model.problem import (
     INFINITE,
     Assignment,
     Constraint,
+    Function,
     Predicate,
     Relation,
     Robot,
@@ -55,6 +59,43 @@ def assignment_cost(team: Team, assignment: Assignment) -> float:
     """Return the cost of `assignment`: of all constraints whose variables have values."""
     met = (c for c in team.constraints() if all(name in assignment for name in c.variables))
     return sum(constraint_cost(constraint, assignment) for constraint in met)
+
+
+def check_told_cost(team: Team, assignment: Assignment, cost: Cost | None, without: Collection[str] = ()) -> None:
+    """Check a cost in the user's numbers against every constraint of every file, as the files state them.
+
+    Args:
+        team: The team as its files have it: its costs have not been normalised.
+        assignment: The values of all robots that have not withdrawn.
+        cost: What they cost, it is said. None: there is no assignment.
+        without: The robots that have withdrawn.
+
+    Raises:
+        RefutedError: if the cost is another.
+    """
+    if cost is None:
+        return
+    places = max(robot.costs.places for robot in team.robots)
+    total = Fraction(0)
+    for robot in team.robots:
+        unit = Fraction(1, 10**robot.costs.places)
+        total += robot.costs.constant * unit
+        for constraint in robot_constraints(robot):
+            if any(team.owner[name] in without for name in constraint.variables):
+                continue
+            paid = int(constraint_cost(constraint, assignment))
+            total += paid if isinstance(constraint.definition, Function) else paid * unit
+    if Fraction(cost) != total:
+        exact = Decimal(int(total * 10**places)).scaleb(-places)
+        raise RefutedError(f"the answer for {team.name} costs {exact:,}, and it is said to cost {cost:,}")
+
+
+def robot_constraints(robot: Robot) -> Iterator[Constraint]:
+    """Yield all constraints in the file of `robot`."""
+    yield from robot.private
+    yield from robot.shared
+    for child in robot.children:
+        yield from child.constraints
 
 
 def needlessly_withdrawn(team: Team, assignment: Assignment, withdrawn: Collection[str]) -> Iterator[str]:

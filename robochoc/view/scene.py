@@ -139,6 +139,6 @@ def _facts(outcome: Outcome, mission: Mission) -> tuple[tuple[str, str], ...]:
     if outcome.lost:
         facts.append(("lost", ", ".join(outcome.lost)))
     if outcome.cost:
-        facts.append(("cost", f"{outcome.cost:,g}"))
+        facts.append(("cost", f"{outcome.cost:,}"))
     facts.append(("messages", f"{sum(outcome.metrics.messages.values()):,}"))
     return tuple(facts)

@@ -166,7 +166,7 @@ def results() -> Sequence[bytes]:
     counts = Metrics({"Ok": 3, "Nogood": 1}, 90, 7, 20, 0.5, 0.25, 4096, 1.5)
     epoch = EpochOutcome(Verdict.SOLUTION, ("A", "B"), assignment={"V": 1}, cost=2, metrics=counts, lost=("B",))
     whole = Outcome(
-        *("four", "abt", "simulator", 7, Verdict.OPTIMAL, {"V1.1": 1, "V1.2": -3}, 12.0, ("Robot3",)),
+        *("four", "abt", "simulator", 7, Verdict.OPTIMAL, {"V1.1": 1, "V1.2": -3}, 12, ("Robot3",)),
         metrics=counts,
         reason="why",
         count=3,

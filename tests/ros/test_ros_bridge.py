@@ -26,7 +26,7 @@ from robochoc.ros.source import ReceivedMessage, SourceError
 from tests.support.examples import examples
 from tests.support.fake_servers import fake_server
 from tests.support.limits import HANG_S
-from tests.support.rosbridge_server import Manner, Server
+from tests.support.rosbridge_server import Manner, Server, begin_the_loop_of_roslibpy
 
 POSE = "geometry_msgs/PoseStamped"
 STAMP = 1_700_000_000_123_456_789
@@ -65,6 +65,11 @@ SHORT_S = 0.1
 def publish_long(sink: RosbridgeSink, times: int) -> None:
     for _ in range(times):
         sink.publish("/a", "std_msgs/String", {"data": "x" * 50_000}, STAMP)
+
+
+@pytest.fixture(autouse=True, scope="module")
+def loop() -> None:
+    begin_the_loop_of_roslibpy()
 
 
 @pytest.fixture(autouse=True)

@@ -7,6 +7,7 @@ tests a command can as well: `case.write(folder)`, give it `folder / case.target
 from __future__ import annotations
 
 from tests.support.broken_case import Broken
+from tests.support.broken_costs import COSTS
 from tests.support.broken_files import FILES, SCHEMA, WELL_FORMED
 from tests.support.broken_robots import CONSTRAINTS, DEFINITIONS, DOMAINS
 from tests.support.broken_scenarios import CHANGES
@@ -19,6 +20,7 @@ CASES: list[Broken] = [
     *DOMAINS,
     *DEFINITIONS,
     *CONSTRAINTS,
+    *COSTS,
     *NEIGHBOURS,
     *SCENARIOS,
     *CHANGES,

@@ -189,7 +189,6 @@ AS_IN_FILES: dict[str, Breakage] = {
     "a tuple twice": relation((1, 1), (1, 1), (3, 3)),
     "a soft relation in a DisCSP": relation((1, 1), semantics=Semantics.SOFT, costs=(5,)),
     "a defaultCost without soft": relation((1, 1), default_cost=1),
-    "a negative cost": weighted(relation((1, 1), semantics=Semantics.SOFT, costs=(-5,))),
     "a predefined name": predicate(Apply("lt", (Name("X"), Name("Y"))), name="neq"),
     "two parameters of one name": predicate(Apply("ne", (Name("X"), Name("X"))), "X", "X", "i", "j"),
     "an unknown operator": predicate(Apply("nee", (Name("X"), Name("Y")))),
@@ -206,7 +205,6 @@ AS_IN_FILES: dict[str, Breakage] = {
     "parameters of a relation": constraint(
         "C1", definition=Relation("r1", 2, Semantics.CONFLICTS, ((1, 1),)), parameters=("V1", "V2")
     ),
-    "a shared constraint without model": constraint("C4", model=None),
     "a private constraint with a part": constraint("C0", model=ConstraintModel.PKC),
     "another's variable in private": over("C0", "V1", "V2"),
     "own variables only with a parent": over("C4", "V3", 3),
@@ -356,8 +354,12 @@ OF_OBJECTS: dict[str, Wrong] = {
         weighted(relation((1, 1), semantics=Semantics.SOFT, costs=(1,), default_cost=float("-inf"))),
         ("robot Robot2, relation r1", "the cost -inf is no integer"),
     ),
-    "a predicate's negative cost": wrong(
-        weighted(constraint("C4", cost=-1)), ("robot Robot3, constraint C4 (V1 V3)", "the cost -1 is negative")
+    "a cost of 19 digits": wrong(
+        weighted(constraint("C4", cost=-(10**18))),
+        ("robot Robot3, constraint C4 (V1 V3)", "an integer of 19 digits"),
+    ),
+    "a shared constraint without model": wrong(
+        constraint("C4", model=None), ("robot Robot3, constraint C4 (V1 V3)", "lacks its model")
     ),
     "a relation of no arity": wrong(
         constraint("C2", definition=Relation("r1", 0, Semantics.CONFLICTS, ())),
@@ -399,7 +401,7 @@ OF_OBJECTS: dict[str, Wrong] = {
         constraint("C4", scope="V1 V3"), ("robot Robot3", "constraints[0].scope: 'V1 V3' where a tuple should stand")
     ),
     "a definition that is a function": wrong(
-        constraint("C4", definition=print), ("robot Robot3", "where Relation or Predicate should stand")
+        constraint("C4", definition=print), ("robot Robot3", "where Relation or Predicate or Function should stand")
     ),
     "a copy of what the robot is not in": wrong(
         child("Robot3", "Robot1", copies=(bound("V2", "V3"),)),

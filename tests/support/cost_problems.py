@@ -67,6 +67,7 @@ def softened(team: Team, chance: Random) -> Team:
         definition = constraint.definition
         if isinstance(definition, Predicate):
             return replace(constraint, cost=chance.randint(1, MAX_COST))
+        assert isinstance(definition, Relation)
         listed, other = chance.randint(0, MAX_COST), chance.randint(0, MAX_COST)
         costs = tuple(chance.choice((listed, chance.randint(0, MAX_COST), INFINITE)) for _ in definition.tuples)
         return replace(

@@ -25,7 +25,6 @@ from tests.support.program import ROOT
 from tests.support.warm_programs import HURRY, WarmProcess, WarmPrograms
 
 LONG_S = HANG_S
-SOON_S = 20.0
 _DIFFERENT = [Constraint("C", PREDICATES[0], pair, pair) for pair in (("A", "B"), ("B", "C"), ("A", "C"))]
 PAIR = team_of(dict.fromkeys("AB", range(1, 3)), _DIFFERENT[:1])
 TRIANGLE = team_of(dict.fromkeys("ABC", range(1, 3)), _DIFFERENT)

@@ -78,7 +78,7 @@ outcomes = st.builds(
     seed=counts,
     verdict=st.sampled_from(Verdict),
     assignment=assignments,
-    cost=st.none() | st.floats(0, 1e9),
+    cost=st.none() | st.integers(-(10**9), 10**9) | st.decimals(-(10**9), 10**9, places=3),
     metrics=st.builds(Metrics, messages=assignments, bytes=counts, wall_s=st.floats(0, 1e9)),
     tree=st.dictionaries(names, st.builds(PseudoTreeNode, st.none() | names), max_size=2),
     epochs=st.lists(st.builds(EpochOutcome, st.sampled_from(Verdict), st.just(("R",))), max_size=2).map(tuple),

@@ -100,6 +100,14 @@ class Run:
         for pid in victims or ((self.pid,) if not group else ()):
             os.kill(pid, signum)
 
+    @contextmanager
+    def standing_still(self) -> Iterator[None]:
+        """Stop the program itself; it notices what happens inside all at once, afterwards."""
+        self.strike(signal.SIGSTOP)
+        wait_until(lambda: is_stopped(self.pid), "it cannot be stopped")
+        yield
+        self.strike(signal.SIGCONT)
+
     @property
     def is_over(self) -> bool:
         """Whether the program itself has ended."""

@@ -21,6 +21,12 @@ from tests.support.limits import HANG_S
 Message = dict[str, Any]
 
 
+def begin_the_loop_of_roslibpy() -> None:
+    """Begin what roslibpy has once for all connections of a process, and never ends: tests share it."""
+    with shared_by_tests():
+        importlib.import_module("roslibpy.comm.comm_asyncio")._get_shared_manager().run()  # noqa: SLF001
+
+
 @dataclass
 class Manner:
     """How a server behaves. It is good, unless told otherwise."""
@@ -50,8 +56,6 @@ class Server:
     handlers: list[Handler] = field(default_factory=list)
 
     def __enter__(self) -> Self:
-        with shared_by_tests():  # roslibpy has one loop for all connections of a process
-            importlib.import_module("roslibpy.comm.comm_asyncio")._get_shared_manager().run()  # noqa: SLF001
         self._loop = asyncio.new_event_loop()
         self._ready, self._end = threading.Event(), asyncio.Event()
         self.changed = threading.Condition()

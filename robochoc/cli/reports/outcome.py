@@ -9,6 +9,7 @@ from robochoc.cli.reports.table import table_lines
 from robochoc.formats import on_one_line
 from robochoc.formats.diagnostics import shortened
 from robochoc.model.change import team_after_events
+from robochoc.model.cost_units import Cost
 from robochoc.model.headline import describe_outcome
 from robochoc.model.outcome import ALL_ROBOTS, Metrics, Outcome, Verdict
 from robochoc.model.priorities import natural_key
@@ -123,9 +124,8 @@ def _weight(team: Team, outcome: Outcome) -> str:
     return f" (weight {sum(team[name].weight for name in outcome.withdrawn_alive)})"
 
 
-def _number(cost: float | None) -> str:
-    """Return a cost, which is an integer."""
-    return "unknown" if cost is None else f"{int(cost):,}"
+def _number(cost: Cost | None) -> str:
+    return "unknown" if cost is None else f"{cost:,}"
 
 
 def _so_far(team: Team, outcome: Outcome) -> str:

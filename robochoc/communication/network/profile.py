@@ -13,8 +13,10 @@ import msgspec
 
 from robochoc.formats.extension import MAX_VALUES
 from robochoc.formats.names import is_name
+from robochoc.model.cost_units import MAX_PLACES, CostUnits
+from robochoc.model.costs import flat_units
 from robochoc.model.priorities import CycleError, priority_order
-from robochoc.model.problem import Child, Constraint, Domain, Parent, ProblemKind, Robot, Variable
+from robochoc.model.problem import Child, Constraint, Domain, Parent, ProblemKind, Robot, Team, Variable
 from robochoc.solver.encoding import max_cost
 
 Ranges = tuple[tuple[int, int], ...]
@@ -29,6 +31,10 @@ LARGEST_DEAREST = 2.0**80
 """More than the costs of any file. The cost of withdrawing all robots still fits into a number."""
 
 
+LARGEST_CONSTANT = 2**62
+"""What is added to the costs of all constraints, at most."""
+
+
 class ProfileError(ValueError):
     """The profile of a robot is invalid."""
 
@@ -39,7 +45,8 @@ class Profile(msgspec.Struct, frozen=True, array_like=True):
     `variables` are its interface variables with their domains. `looks_at` names, by child, the child's variables that
     this robot's parts of partially known constraints look at; `wants` are the others' variables in the constraints that
     it holds towards its parents. `max_cost` is the most that the constraints it holds can
-    charge together, short of being broken. `topics` are where it publishes its decision.
+    charge together, short of being broken. `topics` are where it publishes its decision. `told_in` are its cost units:
+    whether the sum is maximised, the decimal places, and a constant.
     """
 
     name: str
@@ -52,6 +59,12 @@ class Profile(msgspec.Struct, frozen=True, array_like=True):
     max_cost: float
     topics: tuple[str, ...]
     wants: tuple[str, ...] = ()
+    told_in: tuple[bool, int, int] = (False, 0, 0)
+
+    @property
+    def units(self) -> CostUnits:
+        """The units in which its costs are told to the user, with what was taken out of its constraints' costs."""
+        return CostUnits(*self.told_in)
 
     @property
     def neighbours(self) -> tuple[str, ...]:
@@ -64,6 +77,7 @@ def profile_of(robot: Robot) -> Profile:
     shown = set(robot.interface)
     own = {variable.name for variable in robot.variables}
     parts = [constraint for child in robot.children for constraint in child.constraints]
+    units = flat_units(Team(robot.name, (robot,)))
     return Profile(
         name=robot.name,
         kind=robot.kind,
@@ -81,6 +95,7 @@ def profile_of(robot: Robot) -> Profile:
         max_cost=sum(max_cost(constraint) for constraint in (*robot.private, *robot.shared, *parts)),
         topics=tuple(topic.name for topic in robot.topics),
         wants=tuple(dict.fromkeys(name for one in robot.shared for name in one.variables if name not in own)),
+        told_in=(units.maximize, units.places, units.constant),
     )
 
 
@@ -119,6 +134,8 @@ def visible_robot(profile: Profile, also: Mapping[str, Ranges]) -> Robot:
     strangers = profile.looks_at.keys() - set(profile.children)
     if strangers:  # the master would make them show variables to a robot that is not their neighbour
         raise ProfileError(f"it looks at variables of {min(strangers)[:LONGEST_NAME]}, which is no child of it")
+    if not (0 <= profile.told_in[1] <= MAX_PLACES and abs(profile.told_in[2]) <= LARGEST_CONSTANT):
+        raise ProfileError("its cost units are out of range")
     if not (0 <= profile.max_cost <= LARGEST_DEAREST and 1 <= profile.weight <= LARGEST_WEIGHT):
         raise ProfileError(f"costs of {profile.max_cost:g} or a weight of {profile.weight} are out of range")
     shown = {**profile.variables, **also}
@@ -150,10 +167,17 @@ def profile_contradictions(profiles: Mapping[str, Profile]) -> Iterator[str]:
     kinds = {profile.kind: profile.name for profile in profiles.values()}
     if len(kinds) > 1:
         yield f"{' and '.join(f'{name} is a {kind}' for kind, name in kinds.items())}: a team is one or the other"
+    yield from _differing_units(profiles)
     try:
         priority_order({profile.name: profile.parents for profile in profiles.values()})
     except CycleError as cycle:
         yield f"the parents form a cycle: {cycle}"
+
+
+def _differing_units(profiles: Mapping[str, Profile]) -> Iterator[str]:
+    units = {profile.told_in[:2]: profile.name for profile in profiles.values()}
+    if len(units) > 1:
+        yield f"the costs of {' and '.join(units.values())} differ in objective or scale: write both into every file"
 
 
 def missing(profiles: Mapping[str, Profile]) -> set[str]:

@@ -13,11 +13,13 @@ from robochoc.communication.network.robot import Ending, NetworkRobot
 from robochoc.communication.network.robot_settings import RobotSettings
 from robochoc.communication.network.transport import Transport
 from robochoc.formats import check_robot
+from robochoc.model.costs import UnboundedCostError, normalized_robot
 from robochoc.model.problem import Robot
 from robochoc.run.networked.address import Address
 from robochoc.run.registry import protocol_or_first_fit
 from robochoc.solver.compile import Compiler
 from robochoc.solver.compiled_team import CompiledRobot
+from robochoc.solver.encoding import UnsupportedError
 
 PATIENCE_S = 30.0
 """The longest time for which the master may be out of reach, in seconds."""
@@ -70,6 +72,14 @@ def _enrolled(name: str, place: Address, folder: Path, token: str, patience_s: f
             time.sleep(_TRY_AGAIN_S)
 
 
+def _normalized(robot: Robot) -> Robot:
+    """Return `robot` with costs as protocols count them. Raises `UnsupportedError`."""
+    try:
+        return normalized_robot(robot, robot.costs, {one.name: one.domain for one in robot.variables})
+    except UnboundedCostError as error:
+        raise UnsupportedError(f"{error}; the domains of other robots are not known across machines") from None
+
+
 def join(robot: Robot, place: Address, identity: Identity, settings: RobotSettings, compiler: Compiler) -> Ending:
     """Take part as `robot` in one run of a master.
 
@@ -86,9 +96,11 @@ def join(robot: Robot, place: Address, identity: Identity, settings: RobotSettin
     Raises:
         InvalidInputError: when the robot is not valid by itself.
         CannotConnectError: when no master answers.
+        UnsupportedError: when nothing bounds the cost of one of its functions.
         CompileError: when its domain cannot be compiled, and the others of `Compiler.compile`.
     """
     check_robot(robot)
+    robot = _normalized(robot)
     settings.stage("compiling")
     settings = replace(settings, compiled=lambda shown: compiler.compile(shown).domain)
     own = CompiledRobot(robot, settings.compiled)

@@ -17,6 +17,7 @@ from msgspec import UNSET
 from robochoc.communication.network.master import Master
 from robochoc.communication.run_result import RobotsLostError, RunResult
 from robochoc.journal.events import Began, Observer
+from robochoc.model.cost_units import Cost, common_units
 from robochoc.model.outcome import ALL_ROBOTS, Outcome, Verdict
 from robochoc.model.problem import Domain, ProblemKind, Team, Variable
 from robochoc.run.distributed import Deployment
@@ -53,6 +54,11 @@ class Machines(Deployment):
     def kind(self) -> ProblemKind:
         """See `Deployment.kind`."""
         return registered_team(self._master, self._name).kind
+
+    def told(self, total: float) -> Cost:
+        """See `Deployment.told`."""
+        units = common_units(member.profile.units for member in self._master.members.robots.values())
+        return units.told(-int(total) if units.maximize else int(total))
 
     @property
     def lost(self) -> tuple[str, ...]:
@@ -118,7 +124,8 @@ class Machines(Deployment):
         held, cost = self._master.checked(self._values)
         self._refuse_contradictions()
         if held and (phase.withdrawal or not without):
-            return CheckedAssignment(merged_values(self._values), cost, without, check_counts=state.thoroughness)
+            values = merged_values(self._values)
+            return CheckedAssignment(values, self.told(cost), without, check_counts=state.thoroughness)
         if is_proven(phase, result):
             against = "; ".join(state.objections) or f"{first_names(without)} has no value"
             source = f"{result.witness} says that" if result.witness else "all fell quiet, so that"

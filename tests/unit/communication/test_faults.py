@@ -237,7 +237,8 @@ def test_the_journal_of_a_run_that_was_killed_lacks_its_last_block(runtime: str,
 def test_many_robots_killed_at_once(team: Path, tmp_path: Path) -> None:
     with searching(team, tmp_path / "run", watched=True) as run:
         once_it_is_told(run)
-        run.strike(signal.SIGKILL, *run.robots()[1::2])
+        with run.standing_still():
+            run.strike(signal.SIGKILL, *run.robots()[1::2])
         run.end()
         assert run.status() == 4
         nothing_is_left(run)
@@ -253,9 +254,11 @@ def test_many_robots_killed_at_once(team: Path, tmp_path: Path) -> None:
 def test_all_robots_killed_at_once(team: Path, tmp_path: Path) -> None:
     with searching(team, tmp_path / "run") as run:
         in_the_middle(run)
-        run.strike(signal.SIGKILL, *run.robots())
+        with run.standing_still():
+            run.strike(signal.SIGKILL, *run.robots())
         run.end()
         assert run.status() == 4
+        assert "was lost: its process was killed by SIGKILL" in run.errors()
         nothing_is_left(run)
 
 

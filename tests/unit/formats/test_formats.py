@@ -11,7 +11,6 @@ from pathlib import Path
 
 import pytest
 from hypothesis import HealthCheck, given
-from hypothesis import strategies as st
 from lxml import etree
 
 from robochoc.formats import (
@@ -24,9 +23,8 @@ from robochoc.formats import (
     robot_xml,
     write_atomically,
 )
-from robochoc.model.expression import Apply, Constant, Expression, Name, text
+from robochoc.model.expression import Apply, Constant, Name, text
 from robochoc.model.problem import (
-    INFINITE,
     Child,
     Constraint,
     ConstraintModel,
@@ -43,6 +41,7 @@ from robochoc.model.problem import (
 from tests.support.broken_case import TEAM, write_files
 from tests.support.examples import examples
 from tests.support.program import ROOT
+from tests.support.random_robots import random_robots
 
 DATA = ROOT / "tests" / "data"
 FIGURE_2 = DATA / "figure2" / "Robot3.1.xml"
@@ -191,90 +190,9 @@ def test_a_diagnostic_is_one_line_whatever_the_names() -> None:
 
 # --- what is written is read back ---------------------------------------------------------------------------------
 
-WORDS = st.from_regex(r"[A-Za-z][A-Za-z0-9_.]{0,4}", fullmatch=True)
-INTEGERS = st.integers(-50, 50)
-
-
-@st.composite
-def domains(draw: st.DrawFn, name: str) -> Domain:
-    starts = sorted(draw(st.sets(INTEGERS, min_size=1, max_size=4)))
-    ends = [
-        draw(st.integers(start + 1, max(start + 1, following - 1)))
-        for start, following in zip(starts, [*starts[1:], 99], strict=True)
-    ]
-    parts = [range(start, end) for start, end in zip(starts, ends, strict=True)]
-    apart = [
-        part
-        for part, following in zip(parts, [*parts[1:], range(999, 1000)], strict=True)
-        if part.stop < following.start
-    ]
-    return Domain(name, tuple(apart))
-
-
-@st.composite
-def relations(draw: st.DrawFn, name: str, arity: int, kind: ProblemKind) -> Relation:
-    semantics = draw(
-        st.sampled_from(Semantics if kind is ProblemKind.DISWCSP else [Semantics.SUPPORTS, Semantics.CONFLICTS])
-    )
-    tuples = tuple(draw(st.lists(st.tuples(*[INTEGERS] * arity), unique=True, max_size=5)))
-    if semantics is not Semantics.SOFT:
-        return Relation(name, arity, semantics, tuples)
-    costs = st.one_of(st.integers(0, 99), st.just(INFINITE))
-    return Relation(name, arity, semantics, tuples, tuple(draw(costs) for _ in tuples), draw(costs))
-
-
-@st.composite
-def constraints(
-    draw: st.DrawFn, scope: tuple[str, ...], kind: ProblemKind, model: ConstraintModel | None, number: int
-) -> Constraint:
-    name, described = f"C{number}", f"d{number}"
-    if draw(st.booleans()):
-        return Constraint(name, draw(relations(described, len(scope), kind)), scope, scope, model)
-    extra = tuple(draw(st.lists(INTEGERS, max_size=2)))
-    formal = tuple(f"p{index}" for index in range(len(scope) + len(extra)))
-    body: Expression = Apply(draw(st.sampled_from(["ne", "lt", "ge"])), (Name(formal[0]), Constant(draw(INTEGERS))))
-    for parameter in formal[1:]:
-        body = Apply("or", (body, Apply("eq", (Name(parameter), Constant(0)))))
-    cost = draw(st.integers(0, 99)) if kind is ProblemKind.DISWCSP and draw(st.booleans()) else INFINITE
-    predicate = Predicate(described, formal, body)
-    if len(formal) == 2 and draw(st.booleans()):
-        predicate = PREDEFINED[draw(st.sampled_from(sorted(PREDEFINED)))]
-    return Constraint(name, predicate, (*scope, *extra), (*scope, *extra), model, cost)
-
-
-@st.composite
-def robots(draw: st.DrawFn) -> Robot:
-    kind = draw(st.sampled_from(ProblemKind))
-    names = draw(st.lists(WORDS, min_size=1, max_size=3, unique=True))
-    values = [draw(domains(f"D{number}")) for number in range(2)]
-    variables = tuple(Variable(name, draw(st.sampled_from(values))) for name in names)
-    others = draw(
-        st.lists(WORDS, min_size=1, max_size=4, unique=True).map(lambda words: [f"z_{word}" for word in words])
-    )
-    count = iter(range(99))
-
-    def shared(model: ConstraintModel, other: str) -> tuple[Constraint, ...]:
-        scope = (draw(st.sampled_from(names)), f"other_{other}")
-        return tuple(draw(constraints(scope, kind, model, next(count))) for _ in range(draw(st.integers(0, 2))))
-
-    private = tuple(draw(constraints(tuple(names), kind, None, next(count))) for _ in range(draw(st.integers(0, 2))))
-    split = draw(st.integers(0, len(others)))
-    parents = tuple(Parent(other, shared(draw(st.sampled_from(ConstraintModel)), other)) for other in others[:split])
-    told = [tuple(name for name in names if draw(st.booleans())) for _ in others]
-    children = tuple(
-        Child(other, told[i], shared(ConstraintModel.PKC, other)) for i, other in enumerate(others[split:])
-    )
-    where = st.one_of(st.none(), st.builds(Constant, INTEGERS), st.builds(Name, st.sampled_from(names)))
-    topics = tuple(
-        Topic(f"/t{i}", draw(st.sampled_from([Topic.type, "std/Int"])), x=draw(where))
-        for i in range(draw(st.integers(0, 2)))
-    )
-    weight = draw(st.sampled_from((1, 1, 2, 1_000_000)))
-    return Robot("Robot1", variables, kind, private, parents, children, topics, weight=weight)
-
 
 @examples(60, slow=2000, also_suppress=(HealthCheck.function_scoped_fixture,))
-@given(robot=robots())
+@given(robot=random_robots())
 def test_what_is_written_is_read_back(tmp_path: Path, robot: Robot) -> None:
     file = tmp_path / "Robot1.xml"
     file.write_bytes(robot_xml(robot))

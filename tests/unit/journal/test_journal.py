@@ -203,6 +203,26 @@ def test_it_is_followed_while_it_is_written_through_the_same_descriptor(tmp_path
     assert read_journal(path.read_bytes()).outcome == OUTCOME
 
 
+def test_a_call_ends_though_the_writer_is_faster(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """As in an endless run on a busy machine: whenever something has been read, there is more."""
+    pread, numbers = os.pread, iter(range(1000))
+    with (tmp_path / "run.journal").open("wb", buffering=0) as file:
+        recorder = JournalRecorder(HEADER, sinks=[file.write])
+
+        def once_more_is_written(descriptor: int, size: int, place: int) -> bytes:
+            recorder(settled(next(numbers)))
+            recorder.flush()
+            return pread(descriptor, size, place)
+
+        with (tmp_path / "run.journal").open("rb") as following:
+            monkeypatch.setattr(os, "pread", once_more_is_written)
+            follower = Follower(following)
+            lines = [line for _ in range(10) for line in follower.read()]
+    assert lines[0] == HEADER
+    assert lines[1:] == [settled(number) for number in range(len(lines) - 1)]
+    assert 10 < len(lines) < 100
+
+
 @pytest.mark.parametrize("text", [False, True])
 def test_it_is_followed_byte_by_byte(text: bool) -> None:  # noqa: FBT001 - a parameter
     content = told([settled(number) for number in range(7)])

@@ -19,7 +19,7 @@ EPOCHS = (EpochOutcome(Verdict.SOLUTION, SIX, assignment={"V1": 1}), EpochOutcom
     ("changed", "headline"),
     [
         ({}, "solution for all 16 robots"),
-        ({"verdict": Verdict.OPTIMAL, "cost": 1200.0}, "optimal solution for all 16 robots, cost 1,200"),
+        ({"verdict": Verdict.OPTIMAL, "cost": 1200}, "optimal solution for all 16 robots, cost 1,200"),
         ({"verdict": Verdict.OPTIMAL, "withdrawn": SIX}, "10 of 16 fly (proven maximum)"),
         ({"withdrawn": SIX}, "10 of 16 fly (not proven to be the maximum)"),
         ({"withdrawn": SIX, "lost": SIX[:2]}, "10 of 16 fly (not proven to be the maximum; 2 lost)"),

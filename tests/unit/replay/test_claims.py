@@ -52,7 +52,7 @@ def test_an_outcome_that_does_not_follow_is_found(three: Journal) -> None:
         ("verdict", replace(outcome, verdict=Verdict.SOLUTION)),
         ("verdict", replace(outcome, verdict=Verdict.NO_SOLUTION)),
         ("assignment", replace(outcome, assignment=other)),
-        ("cost", replace(outcome, cost=17.0)),
+        ("cost", replace(outcome, cost=17)),
         ("withdrawn", replace(outcome, withdrawn=outcome.withdrawn[1:])),
         ("messages", replace(outcome, metrics=replace(metrics, messages={"Ok": 1}))),
         ("bytes", replace(outcome, metrics=replace(metrics, bytes=metrics.bytes + 1))),

@@ -8,6 +8,7 @@ from dataclasses import replace
 import pytest
 
 from robochoc.communication.run_result import RobotsLostError, RunResult
+from robochoc.model.cost_units import Cost
 from robochoc.model.outcome import Metrics, Outcome, Verdict
 from robochoc.model.problem import ProblemKind
 from robochoc.protocols.abt import ABT
@@ -45,6 +46,9 @@ class MadeUp(Deployment):
     @property
     def kind(self) -> ProblemKind:
         return ProblemKind.DISCSP
+
+    def told(self, total: float) -> Cost:
+        return int(total)
 
     @property
     def lost(self) -> tuple[str, ...]:

@@ -59,12 +59,11 @@ def kill_some(run: Run, chance: random.Random, within_s: float) -> int:
 def kill_one(run: Run, chance: random.Random, first: Callable[[], None] = lambda: None) -> None:
     """SIGKILL a robot once all have a process; meanwhile the master stands still, so that the run does not end."""
     run.wait_for_robots(len(TEAMS["queens3d-7"].robots))
-    run.strike(signal.SIGSTOP)
-    first()
-    robots = run.robots()
-    if robots:
-        run.strike(signal.SIGKILL, chance.choice(robots))
-    run.strike(signal.SIGCONT)
+    with run.standing_still():
+        first()
+        robots = run.robots()
+        if robots:
+            run.strike(signal.SIGKILL, chance.choice(robots))
 
 
 def told(run: Run) -> dict[str, object]:

@@ -198,7 +198,7 @@ def test_among_the_fewest_aside_costs_are_least(batch: int, solver: AceProcess) 
         away = sum(team[name].weight for name in outcome.withdrawn)
         assert outcome.verdict is Verdict.OPTIMAL
         assert outcome.cost is not None
-        assert away * withdrawal_cost(team) + outcome.cost == least_total(team), team
+        assert away * int(withdrawal_cost(team)) + outcome.cost == least_total(team), team
         aside += bool(away)
     assert aside > 2
 

@@ -1,0 +1,184 @@
+"""Costs as users write them, `5`, `0.25`, `-3`, `infinity`: exact integers of a `CostUnits`; no float is involved.
+
+docs/reference/format.md, "Costs".
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Mapping
+from dataclasses import replace
+
+from lxml import etree
+
+from robochoc.formats.diagnostics import MistakeError, shortened
+from robochoc.formats.names import check_integer
+from robochoc.formats.xml import attribute
+from robochoc.model.cost_units import MAX_PLACES, CostUnits
+from robochoc.model.problem import (
+    INFINITE,
+    Constraint,
+    Definition,
+    ProblemKind,
+    Relation,
+    Robot,
+    Semantics,
+)
+
+_NUMBER = re.compile(rf"([+-]?)([0-9]{{1,18}})(?:\.([0-9]{{1,{MAX_PLACES}}}))?")
+_SCALE = re.compile(rf"1|0\.0{{0,{MAX_PLACES - 1}}}1")
+_DECIMAL = f"write an integer or a decimal of at most {MAX_PLACES} places"
+
+
+def read_cost(word: str, units: CostUnits) -> float:
+    """Return the cost that `word` is, as an integer of `units`, or `INFINITE`. Raises `MistakeError`."""
+    if word in {"infinity", "+infinity", "-infinity"}:
+        _check_forbids(word, units)
+        return INFINITE
+    return _integer(word, units.places)
+
+
+def cost_text(cost: float, units: CostUnits) -> str:
+    """Return `cost`, an integer of `units` or `INFINITE`, as `read_cost` reads it.
+
+    Raises:
+        ValueError: for a cost that is no integer.
+    """
+    if cost == INFINITE:
+        return "-infinity" if units.maximize else "infinity"
+    if cost != int(cost):
+        raise ValueError(f"the cost {cost} is no integer")
+    return _decimal(int(cost), units.places)
+
+
+def scale_text(places: int) -> str:
+    """Return the `scale` of costs with so many decimal places: 0.001 for three."""
+    return _decimal(1, places)
+
+
+def places_used(root: etree._Element) -> int:
+    """Return how many decimal places the costs in a file have. What is no cost is not looked at here."""
+    words = [attribute(element, "constant") for element in root.iterchildren("presentation")]
+    words += [attribute(element, "defaultCost") for element in root.iterfind("relations/relation")]
+    words += [attribute(element, "cost") for element in root.iter("constraint")]
+    for relation in root.iterfind("relations/relation"):
+        text = relation.text or ""
+        if "." in text and attribute(relation, "semantics") == Semantics.SOFT:
+            words += [part.partition(":")[0].strip() for part in text.split("|") if ":" in part]
+    return max((_places(word) for word in words), default=0)
+
+
+def read_units(presentation: etree._Element, kind: ProblemKind, places: int) -> CostUnits:
+    """Return the unit of a file's costs, in which there are so many `places`. Raises `MistakeError`."""
+    units = CostUnits(attribute(presentation, "objective") == "maximize", _scale(presentation, places))
+    constant = attribute(presentation, "constant")
+    if constant:
+        units = replace(units, constant=_integer(constant, units.places))
+    check_units(units, kind)
+    return units
+
+
+def check_units(units: CostUnits, kind: ProblemKind) -> None:
+    """Raise `MistakeError` unless a robot of that `kind` can count its costs so."""
+    if not 0 <= units.places <= MAX_PLACES:
+        raise MistakeError(f"costs of {units.places} decimal places", f"expected 0 to {MAX_PLACES}")
+    check_integer(units.constant)
+    if kind is not ProblemKind.DISWCSP and units != CostUnits():
+        what = "maximize" if units.maximize else "a constant cost" if units.constant else "a scale of costs"
+        raise MistakeError(f"{what} in a DisCSP", 'write type="DisWCSP" in the presentation, or delete it')
+
+
+class Rescaled:
+    """What costs something, with costs that are `finer` times as many; a definition is rescaled once."""
+
+    def __init__(self, finer: int) -> None:
+        self._finer = finer
+        self._known: dict[int, tuple[Definition, Definition]] = {}
+
+    def robot(self, robot: Robot) -> Robot:
+        """Return `robot` with its costs in the finer unit. Raises `MistakeError`: they have too many digits then."""
+        constant = int(self.cost(robot.costs.constant))
+        places = robot.costs.places + len(str(self._finer)) - 1
+        return replace(
+            robot,
+            private=self.constraints(robot.private),
+            parents=tuple(replace(one, constraints=self.constraints(one.constraints)) for one in robot.parents),
+            children=tuple(
+                replace(one, constraints=self.constraints(one.constraints), copies=self.constraints(one.copies))
+                for one in robot.children
+            ),
+            costs=replace(robot.costs, places=places, constant=constant),
+        )
+
+    def cost(self, cost: float) -> float:
+        """Return `cost` in the finer unit. Raises `MistakeError`."""
+        if cost == INFINITE:
+            return cost
+        finer = int(cost) * self._finer
+        check_integer(finer)
+        return finer
+
+    def constraints(self, constraints: Iterable[Constraint]) -> tuple[Constraint, ...]:
+        """Return `constraints` in the finer unit. Raises `MistakeError`."""
+        return tuple(
+            replace(one, definition=self.definition(one.definition), cost=self.cost(one.cost)) for one in constraints
+        )
+
+    def definitions(self, definitions: Mapping[str, Definition | None]) -> dict[str, Definition | None]:
+        """Return `definitions` in the finer unit. Raises `MistakeError`."""
+        return {name: one and self.definition(one) for name, one in definitions.items()}
+
+    def definition(self, definition: Definition) -> Definition:
+        """Return `definition` in the finer unit. Raises `MistakeError`."""
+        if not isinstance(definition, Relation) or definition.semantics is not Semantics.SOFT:
+            return definition
+        if id(definition) not in self._known:
+            finer = replace(
+                definition,
+                costs=tuple(map(self.cost, definition.costs)),
+                default_cost=self.cost(definition.default_cost),
+            )
+            self._known[id(definition)] = definition, finer
+        return self._known[id(definition)][1]
+
+
+def _check_forbids(word: str, units: CostUnits) -> None:
+    if (word == "-infinity") != units.maximize:
+        aim, right = ("maximised", "-infinity") if units.maximize else ("minimised", "infinity")
+        raise MistakeError(f"the cost {word}, where costs are {aim}", f"write {right}: it forbids")
+
+
+def _integer(word: str, places: int) -> int:
+    match = _NUMBER.fullmatch(word)
+    if not match:
+        raise MistakeError(f"'{shortened(word)}' is no cost", f"{_DECIMAL}, or what forbids: infinity")
+    sign, whole, decimals = match[1], match[2], (match[3] or "").rstrip("0")
+    if len(decimals) > places:
+        hint = f'write scale="{scale_text(len(decimals))}" in the presentation, or leave the scale out'
+        raise MistakeError(f"the cost {word} has more decimal places than the scale of the file", hint)
+    value = int(whole + decimals.ljust(places, "0"))
+    check_integer(value)
+    return -value if sign == "-" else value
+
+
+def _places(word: str) -> int:
+    match = _NUMBER.fullmatch(word)
+    return len((match[3] or "").rstrip("0")) if match else 0
+
+
+def _scale(presentation: etree._Element, places: int) -> int:
+    given = attribute(presentation, "scale")
+    if not given:
+        return places
+    if not _SCALE.fullmatch(given):
+        hint = f"expected a power of ten of at most {MAX_PLACES} places: 1, 0.1, 0.01, ..."
+        raise MistakeError(f"the scale '{shortened(given)}'", hint)
+    return len(given.partition(".")[2])
+
+
+def _decimal(value: int, places: int) -> str:
+    if not places:
+        return str(value)
+    digits = str(abs(value)).rjust(places + 1, "0")
+    decimals = digits[-places:].rstrip("0")
+    return f"{'-' * (value < 0)}{digits[:-places]}{'.' * bool(decimals)}{decimals}"
