@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 
 from robochoc.formats.diagnostics import MistakeError, shortened, suggestion
 from robochoc.formats.dialects.dialect import Note
+from robochoc.formats.dialects.owners import owners_by
 from robochoc.formats.dialects.pydcop.yaml_tree import Node, Scalar
 
 
@@ -31,18 +31,7 @@ class Hosting:
 
     def by_pattern(self, pattern: str) -> None:
         """Let variables belong together that `pattern` finds the same in: its first group, or all of its match."""
-        try:
-            expression = re.compile(pattern)
-        except re.error as error:
-            raise MistakeError(
-                f"the owner '{shortened(pattern)}' is no regular expression: {error}", "mend it"
-            ) from None
-        for name in self.variables:
-            match = expression.search(name)
-            if match is None:
-                what = f"the owner '{shortened(pattern)}' finds nothing in the variable '{shortened(name)}'"
-                raise MistakeError(what, "let it find something in every variable's name")
-            self.owners[name] = match[1] if expression.groups and match[1] else match[0]
+        self.owners = owners_by(pattern, self.variables)
         self.agents = list(dict.fromkeys(self.owners.values()))
 
     def by_agent(self, node: Node, what: str) -> None:

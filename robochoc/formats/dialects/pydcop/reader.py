@@ -1,4 +1,4 @@
-"""pyDCOP's YAML as a team (pyDCOP's documentation, "File formats"; `PEERS.md`, 4.3)."""
+"""pyDCOP's YAML as a team (its documentation: "File formats")."""
 
 from __future__ import annotations
 
