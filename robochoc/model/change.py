@@ -87,23 +87,28 @@ def apply_possible_changes(team: Team, changes: Iterable[Change]) -> tuple[Team,
     return team, taken
 
 
-def describe_change(change: Change) -> str:
-    """Return `change` in a few words."""
+def describe_change(change: Change, team: Team) -> str:
+    """Return `change` in a few words; values are told as the variables of `team` have them."""
     match change:
         case RemoveAgent(name):
             return f"-{name}"
         case AddAgent(robot):
             return f"+{robot.name}"
         case RemoveValue(variable, value):
-            return f"{variable} without {value}"
+            return f"{variable} without {_label(team, variable, value)}"
         case AddValue(variable, value):
-            return f"{variable} with {value}"
+            return f"{variable} with {_label(team, variable, value)}"
         case AddConstraint(agent, parent, constraint):
             return f"+{constraint.name} ({parent}, {agent})"
         case RemoveConstraint(agent, parent, name):
             return f"-{name} ({parent}, {agent})"
         case never:
             assert_never(never)
+
+
+def _label(team: Team, variable: str, value: int) -> int | str:
+    known = team.variables.get(variable)
+    return known.domain.label(value) if known else value
 
 
 def affected_robots(team: Team, change: Change) -> set[str]:
@@ -212,21 +217,24 @@ def _less(team: Team, variable: str, value: int) -> Domain:
     domain = _domain(team, variable)
     if value not in domain:
         ranges = (f"{part[0]}..{part[-1]}" if len(part) > 1 else f"{part[0]}" for part in domain.ranges)
-        hint = f"its domain is {shortened(' '.join(ranges))}" if domain.ranges else "its domain is empty"
-        raise ChangeError(f"{quoted(variable)} has no value {value}", hint)
+        held = map(str, map(domain.label, domain)) if domain.symbols else ranges
+        hint = f"its domain is {shortened(' '.join(held))}" if domain.ranges else "its domain is empty"
+        raise ChangeError(f"{quoted(variable)} has no value {domain.label(value)}", hint)
     parts: list[range] = []
     for part in domain.ranges:
         pieces = (range(part.start, value), range(value + 1, part.stop)) if value in part else (part,)
         parts += [piece for piece in pieces if piece]
-    return Domain(domain.name, tuple(parts))
+    return replace(domain, ranges=tuple(parts))
 
 
 def _more(team: Team, variable: str, value: int) -> Domain:
     domain = _domain(team, variable)
     if value in domain:
-        raise ChangeError(f"{quoted(variable)} has the value {value} already", "add one that it does not have")
+        raise ChangeError(
+            f"{quoted(variable)} has the value {domain.label(value)} already", "add one that it does not have"
+        )
     ranges = sorted((*domain.ranges, range(value, value + 1)), key=lambda part: part.start)
-    return Domain(domain.name, tuple(ranges))
+    return replace(domain, ranges=tuple(ranges))
 
 
 def _domain(team: Team, variable: str) -> Domain:
