@@ -49,23 +49,24 @@ def read_xml(path: Path, root: str) -> etree._Element:
         InvalidInputError: with every mistake that the failing layer shows.
     """
     try:
-        content = _bytes(path)
+        content = _bytes(path, MAX_BYTES)
     except OSError as error:
-        raise _invalid(path, 0, f"cannot be read: {error.strerror}", "check the path and its permissions") from None
+        raise _unreadable(path, error) from None
     return parsed_xml(content, path, root)
+
+
+def read_tree(path: Path, most: int) -> etree._Element:
+    """Return the root element of any XML file of at most `most` bytes. Raises `InvalidInputError`, as `read_xml`."""
+    try:
+        content = _bytes(path, most)
+    except OSError as error:
+        raise _unreadable(path, error) from None
+    return parsed_tree(content, path, most)
 
 
 def parsed_xml(content: bytes, path: Path, root: str) -> etree._Element:
     """Return the root element of `content`, as `read_xml` does for a file at `path`. The content is not trusted."""
-    _check_text(content, path)
-    doctype = _DOCTYPE.match(content)
-    if doctype:
-        raise _invalid(path, doctype[0].count(b"\n") + 1, "a DOCTYPE is not accepted", "delete it, and every entity")
-    parser = _parser()
-    try:
-        tree = etree.fromstring(content, parser)
-    except etree.XMLSyntaxError as error:
-        raise _malformed(path, error, parser) from None
+    tree = parsed_tree(content, path)
     if tree.tag != root:
         what = f"the root element is <{etree.QName(tree).localname}>"
         if tree.tag.endswith(f"}}{root}"):
@@ -76,6 +77,23 @@ def parsed_xml(content: bytes, path: Path, root: str) -> etree._Element:
         tree = _with_few_mistakes(tree, content, schema)
     check_schema(tree, str(path), schema)
     return tree
+
+
+def parsed_tree(content: bytes, path: Path, most: int = MAX_BYTES) -> etree._Element:
+    """Return the root element of `content`, which is not trusted: no entities, no DTD, at most `most` bytes.
+
+    Raises:
+        InvalidInputError: if it is no such XML. It calls the file `path`.
+    """
+    _check_text(content, path, most)
+    doctype = _DOCTYPE.match(content)
+    if doctype:
+        raise _invalid(path, doctype[0].count(b"\n") + 1, "a DOCTYPE is not accepted", "delete it, and every entity")
+    parser = _parser()
+    try:
+        return etree.fromstring(content, parser)
+    except etree.XMLSyntaxError as error:
+        raise _malformed(path, error, parser) from None
 
 
 def attribute(element: etree._Element, name: str) -> str:
@@ -117,10 +135,10 @@ def _with_few_mistakes(tree: etree._Element, content: bytes, schema: etree.XMLSc
     return tree
 
 
-def _check_text(content: bytes, path: Path) -> None:
+def _check_text(content: bytes, path: Path, most: int) -> None:
     """Raise `InvalidInputError` unless `content` is UTF-8, not empty, and within the limit."""
-    if len(content) > MAX_BYTES:
-        raise _invalid(path, 0, f"is larger than {MAX_BYTES // 2**20} MiB", "a robot's file is a few kB; split it")
+    if len(content) > most:
+        raise _invalid(path, 0, f"is larger than {most // 2**20} MiB", "a robot's file is a few kB; split it")
     if not content.strip():
         raise _invalid(path, 0, "is empty", "see 'robochoc generate' for a file that is not")
     try:
@@ -130,14 +148,14 @@ def _check_text(content: bytes, path: Path) -> None:
         raise _invalid(path, number, "is not UTF-8", "save it in UTF-8, as the XML declaration says") from None
 
 
-def _bytes(path: Path) -> bytes:
+def _bytes(path: Path, most: int) -> bytes:
     """Return at most one byte more than is allowed. A FIFO is opened without waiting for its writer, and refused."""
     descriptor = os.open(path, os.O_RDONLY | getattr(os, "O_NONBLOCK", 0))
     if not stat.S_ISREG(os.fstat(descriptor).st_mode):
         os.close(descriptor)
         raise _invalid(path, 0, "is not a regular file", "every .xml here must be an XML file: move it away")
     with os.fdopen(descriptor, "rb") as file:
-        return file.read(MAX_BYTES + 1)
+        return file.read(most + 1)
 
 
 def _malformed(path: Path, error: etree.XMLSyntaxError, parser: etree.XMLParser) -> InvalidInputError:
@@ -148,6 +166,10 @@ def _malformed(path: Path, error: etree.XMLSyntaxError, parser: etree.XMLParser)
             path, first.line, f"is not well-formed XML: {what}", _HINTS.get(first.type, "mend the XML there")
         )
     return _invalid(path, 0, f"is not well-formed XML: {error}", "mend the XML")
+
+
+def _unreadable(path: Path, error: OSError) -> InvalidInputError:
+    return _invalid(path, 0, f"cannot be read: {error.strerror}", "check the path and its permissions")
 
 
 def _invalid(path: Path, number: int, message: str, hint: str) -> InvalidInputError:

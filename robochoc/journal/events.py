@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from decimal import Decimal
 from typing import Any, assert_never
 
 import msgspec
@@ -95,7 +96,8 @@ class Decided(Event, frozen=True):
 class Heard(Event, frozen=True):
     """A robot has found, or received, an assignment of all robots that is cheaper than those before: an incumbent.
 
-    `values` are the robots' values as others see them (null: a withdrawn one).
+    `values` are the robots' values as others see them (null: a withdrawn one). The cost is what protocols count
+    (`Given.told_in`).
     """
 
     robot: str
@@ -107,10 +109,10 @@ class Improved(Event, frozen=True):
     """The present assignment, or an incumbent that a robot has received, is cheaper than all before.
 
     A robot without a value counts as withdrawn. No robot reports this event: it follows from others, and stands in
-    journals only. Of an incumbent, variables that no neighbour sees are not known.
+    journals only. Of an incumbent, variables that no neighbour sees are not known. The cost is in the user's numbers.
     """
 
-    cost: float | int
+    cost: int | Decimal
     assignment: dict[str, int]
 
 

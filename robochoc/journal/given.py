@@ -17,7 +17,7 @@ from msgspec import UNSET, UnsetType
 from robochoc.formats import InvalidInputError, robot_in, robot_xml
 from robochoc.formats.names import is_name
 from robochoc.journal.events import Given
-from robochoc.model.cost_units import PLAIN_COSTS, CostUnits
+from robochoc.model.cost_units import PLAIN_COSTS, Cost, CostUnits
 from robochoc.model.costs import flat_units
 from robochoc.model.problem import INFINITE, Constraint, Domain, Relation, Robot, Team, Variable
 from robochoc.solver.agent_problem import DEFAULT_PARAMETERS, RunParameters
@@ -118,6 +118,14 @@ def _units(units: CostUnits) -> tuple[bool, int, int] | UnsetType:
 def run_parameters_of(given: Given) -> RunParameters:
     """Return the parameters of the run."""
     return RunParameters(given.seed, given.settings, given.aside)
+
+
+def told_by(given: Given | None, cost: float) -> Cost | float:
+    """Return `cost`, as protocols count it, in the user's numbers, as far as `given` says how."""
+    if given is None or given.told_in is UNSET:
+        return cost
+    units = CostUnits(*given.told_in)
+    return units.told(-cost if units.maximize else cost)
 
 
 def invalidated_of(given: Given) -> Invalidated:

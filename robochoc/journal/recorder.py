@@ -254,7 +254,7 @@ def improvements(events: Iterable[AnyEvent], objective: Objective) -> Iterator[A
         if cost < best and now is not None:
             best = cost
             values = {name: value for robot in sorted(now, key=natural_key) for name, value in now[robot].items()}
-            yield Improved(t=event.t, cost=best, assignment=values)
+            yield Improved(t=event.t, cost=objective.told(best), assignment=values)
 
 
 def _interfaces(reader: TeamReader, given: Given) -> dict[str, tuple[str, ...]]:

@@ -236,8 +236,11 @@ def _with_function(constraint: Constraint, function: Function, factor: int, doma
     if least < 0:
         body = Apply("add", (body, Constant(-least)))
         most -= least
-    if bounds(body, defaultdict(lambda: ANY_INTEGER)).high > most:
+    low, high = bounds(body, defaultdict(lambda: ANY_INTEGER))
+    if high > most:
         body = Apply("min", (body, Constant(most)))
+    if low < 0:
+        body = Apply("max", (body, Constant(0)))
     return replace(constraint, definition=replace(function, body=body), offset=min(0, least))
 
 

@@ -13,6 +13,7 @@ from robochoc.journal.events import Given, Lost
 from robochoc.journal.given import GivenProblemError, TeamReader, invalidated_of, run_parameters_of
 from robochoc.journal.journal import Header
 from robochoc.model.change import team_after_events
+from robochoc.model.costs import normalized
 from robochoc.model.orders import Order, OrderError, compute_order, with_priorities
 from robochoc.model.problem import Robot, Team
 from robochoc.model.team_edits import ChangeError, keep_interfaces, without_robots
@@ -165,7 +166,7 @@ class Rebuilder:
         if run.began is not None and isinstance(run.began.epoch, int):
             raise CannotReplayError("the journal does not say what the robots were given when their problem changed")
         try:
-            filed = self._ordered(team_after_events(self._options.team, events=0))
+            filed = self._ordered(team_after_events(normalized(self._options.team), events=0))
             team = self._left(filed)
         except (OrderError, ChangeError, ValueError) as why:
             raise CannotReplayError(f"the team cannot be brought into the order of the run: {why}") from why

@@ -29,6 +29,7 @@ from robochoc.journal.events import (
     Sent,
     Settled,
 )
+from robochoc.journal.given import told_by
 from robochoc.journal.journal import Header, Journal
 from robochoc.model.outcome import Outcome
 from robochoc.sniffer.columns import NOT_YET, floats, longs, shorts
@@ -216,7 +217,8 @@ class Trace:
                 note = (event.t, "concluded", f"concluded: {event.verdict.replace('-', ' ')}")
                 self._open_step(event.robot, event).notes.append(note)
             case Heard():
-                note = (event.t, "heard", f"{event.robot} knows of an assignment that costs {event.cost}")
+                cost = told_by(self.runs[-1].given, event.cost) if self.runs else event.cost
+                note = (event.t, "heard", f"{event.robot} knows of an assignment that costs {cost}")
                 self._open_step(event.robot, event).notes.append(note)
             case Began():
                 self._new_run(event)

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
+from robochoc.model.cost_units import Cost
+from robochoc.model.costs import told_cost
 from robochoc.model.message import Value
 from robochoc.model.problem import INFINITE, Team
 from robochoc.solver.encoding import cost_function, max_cost
@@ -13,7 +15,7 @@ class Objective:
     """The objective for an assignment that changes.
 
     Args:
-        team: The team.
+        team: The team, with normalised costs (`model/costs.py`).
         withdrawal_cost: The cost of withdrawing a robot of weight 1. Robots without values are withdrawn. None: no
             robot may withdraw, and the cost is infinite until all have values.
 
@@ -22,6 +24,7 @@ class Objective:
     """
 
     def __init__(self, team: Team, withdrawal_cost: float | None = None) -> None:
+        self._team = team
         self._weights = {robot.name: robot.weight for robot in team.robots}
         self._withdrawal_cost = withdrawal_cost
         self._constraints = [(c.variables, cost_function(c, c.variables)) for c in team.constraints()]
@@ -66,6 +69,10 @@ class Objective:
         if self._absent and self._withdrawal_cost is None:
             return INFINITE
         return sum(self._paid) + sum(self._weights[name] for name in self._absent) * (self._withdrawal_cost or 0)
+
+    def told(self, cost: float) -> Cost:
+        """Return `cost`, which includes withdrawal costs, in the user's numbers."""
+        return told_cost(self._team, cost)
 
 
 def withdrawal_cost(team: Team) -> float:

@@ -23,6 +23,7 @@ fields: st.SearchStrategy[Any] = st.recursive(
 )
 assignments = st.dictionaries(names, numbers, max_size=3)
 costs = st.integers(0, 2**60) | st.floats(0, 1e9)
+told_costs = st.integers(-(10**9), 10**9) | st.decimals(-(10**9), 10**9, places=3)
 contents = st.sampled_from([("value",), ("lhs", "value"), ()]).flatmap(
     lambda keys: st.fixed_dictionaries(dict.fromkeys(keys, fields))
 )
@@ -54,7 +55,7 @@ any_event: st.SearchStrategy[AnyEvent] = st.one_of(
         cost=costs,
         values=st.dictionaries(names, st.lists(st.none() | numbers, max_size=3).map(tuple), max_size=3),
     ),
-    _of(events.Improved, cost=costs, assignment=assignments),
+    _of(events.Improved, cost=told_costs, assignment=assignments),
     _of(events.Settled, robot=names, clock=counts, checks=counts),
     _of(events.Concluded, robot=names, verdict=names),
     _of(events.Lost, robot=names, why=names),
@@ -78,7 +79,7 @@ outcomes = st.builds(
     seed=counts,
     verdict=st.sampled_from(Verdict),
     assignment=assignments,
-    cost=st.none() | st.integers(-(10**9), 10**9) | st.decimals(-(10**9), 10**9, places=3),
+    cost=st.none() | told_costs,
     metrics=st.builds(Metrics, messages=assignments, bytes=counts, wall_s=st.floats(0, 1e9)),
     tree=st.dictionaries(names, st.builds(PseudoTreeNode, st.none() | names), max_size=2),
     epochs=st.lists(st.builds(EpochOutcome, st.sampled_from(Verdict), st.just(("R",))), max_size=2).map(tuple),

@@ -71,11 +71,12 @@ def _compile(folder: Path, bounds: Limits, cache: SolutionCache | None, *, as_js
     from robochoc.cli.reports.progress import progress_line
     from robochoc.communication.run_result import Progress
     from robochoc.formats import read_team
+    from robochoc.model.costs import normalized
     from robochoc.solver.compile import Compilation, Compiler, CompileTimeoutError
     from robochoc.solver.domain import TooManySolutionsError
 
     began = time.monotonic()
-    team = read_team(folder)
+    team = normalized(read_team(folder))
     found: list[Compilation | TooManySolutionsError | CompileTimeoutError] = []
     with progress_line(team.name) as progress, Compiler(bounds, cache) as compiler:
         for number, robot in enumerate(team.robots, 1):

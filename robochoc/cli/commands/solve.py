@@ -297,13 +297,15 @@ def _header(team: Team, options: Options) -> Header:
 
 def _objective(team: Team, options: Options) -> Callable[[], Objective] | None:
     """Return the journal's objective. None where nothing is minimised, or the problem changes."""
+    from robochoc.model.costs import normalized
     from robochoc.run.options import Withdrawal
     from robochoc.verification.objective import Objective, withdrawal_cost
 
     fewest = options.withdraw is Withdrawal.MINIMUM
     if team.dynamic or not (fewest or team.kind == "DisWCSP"):
         return None
-    return lambda: Objective(team, withdrawal_cost(team) if fewest else None)
+    counted = normalized(team)
+    return lambda: Objective(counted, withdrawal_cost(counted) if fewest else None)
 
 
 def _tell(team: Team, outcome: Outcome, wanted: Wanted) -> None:

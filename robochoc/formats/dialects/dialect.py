@@ -67,6 +67,8 @@ class Dialect:
         read: Returns the problem in some files. Raises `InvalidInputError`.
         write: Returns the files that a team makes in it, by their names. Raises `UnsupportedError` where the team has
             what the dialect has not. None: it is only read.
+        is_part: Returns whether the file at a path, which begins with some bytes, is one of several of a problem:
+            those in its folder are read together. None: none is.
     """
 
     name: str
@@ -74,6 +76,7 @@ class Dialect:
     recognises: Callable[[Path, bytes], bool]
     read: Callable[[Sequence[Path], ImportOptions], Imported]
     write: Callable[[Team], Mapping[str, bytes]] | None = None
+    is_part: Callable[[Path, bytes], bool] | None = None
 
 
 class Names:

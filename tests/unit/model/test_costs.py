@@ -14,6 +14,7 @@ from robochoc.model.expression import Type, evaluate, parse
 from robochoc.model.expression.bounds import ANY_INTEGER, Interval, bounds
 from robochoc.model.expression.tree import UndefinedValueError
 from robochoc.model.problem import INFINITE, Function
+from robochoc.solver.encoding import max_cost
 from robochoc.verification.checker import assignment_cost, constraint_cost
 from tests.support.examples import examples
 from tests.support.real_costs import random_costs_team
@@ -37,6 +38,17 @@ def test_normalised_costs_tell_the_cost_of_every_assignment(seed: int) -> None:
                 Fraction(cost) * (1 if isinstance(one.definition, Function) else unit) for one, cost in outer
             )
             assert Fraction(told_cost(counted, assignment_cost(counted, assignment))) == exact
+
+
+@examples(60)
+@given(st.integers(0, 10**6))
+def test_a_normalised_function_says_its_bounds_by_itself(seed: int) -> None:
+    for constraint in normalized(random_costs_team(seed)).constraints():
+        if isinstance(constraint.definition, Function):
+            unknown = dict.fromkeys(constraint.definition.parameters, ANY_INTEGER)
+            low, high = bounds(constraint.definition.body, unknown)
+            assert low >= 0
+            assert high <= max_cost(constraint) < INFINITE
 
 
 def test_a_team_with_plain_costs_stays_as_it_is() -> None:

@@ -50,6 +50,15 @@ def test_every_complete_protocol_finds_the_exact_optimum(seeds: int) -> None:
             assert read_result(result_json(outcome)).cost == outcome.cost
 
 
+@pytest.mark.parametrize("runtime", [Runtime.PROCESSES, Runtime.NETWORK])
+def test_robots_with_processes_count_the_same(runtime: Runtime) -> None:
+    for seed in (0, 5):  # functions, and a utility
+        team = random_costs_team(seed)
+        best = best_cost(team)
+        outcome = solve(team, Options(protocol="adopt", runtime=runtime))
+        assert (None if outcome.cost is None else Fraction(outcome.cost)) == best
+
+
 @pytest.mark.parametrize("protocol", ["dsa", "mgm", "mgm2", "maxsum"])
 def test_incomplete_protocols_tell_what_their_answer_costs(protocol: str) -> None:
     for seed in range(10):

@@ -1,0 +1,283 @@
+"""Global constraints of XCSP 2.1, as predicates: `allDifferent`, `weightedSum`, `cumulative`, `element`, `diff2`.
+
+Syntax: Roussel and Lecoutre, "XML representation of constraint networks: format XCSP 2.1" (arXiv 0902.2362), and the
+manual of FRODO, which writes the operator of `cumulative` and intervals in `element`.
+"""
+
+from __future__ import annotations
+
+import itertools
+import re
+from collections.abc import Callable, Iterator, Sequence
+from typing import NoReturn
+
+from lxml import etree
+
+from robochoc.formats.diagnostics import MistakeError, shortened
+from robochoc.formats.dialects.xcsp21.instance import Formula
+from robochoc.formats.dialects.xcsp21.numbers import integer, is_integer
+from robochoc.model.constraint import Predicate
+from robochoc.model.expression import Apply, Constant, Expression, Name
+
+Term = str | int
+
+MAX_TERMS = 500
+"""The maximum number of variables and constants of a global constraint."""
+MAX_BOXES = 100
+"""The maximum number of tasks or rectangles: each is compared with each."""
+
+_TOKEN = re.compile(r"[][{}]|<\w+>|[^][{}<\s]+")
+_COMPARISONS = ("eq", "ne", "ge", "gt", "le", "lt")
+_ZERO = Constant(0)
+
+
+def expand(name: str, element: etree._Element, scope: Sequence[str]) -> list[Formula]:
+    """Return what a global constraint says, as predicates.
+
+    Args:
+        name: Its name, without `global:`.
+        element: The constraint.
+        scope: The variables of its scope.
+
+    Raises:
+        MistakeError: if it is of another kind, or its parameters are not as they should be.
+    """
+    if name not in _EXPANSIONS:
+        known = " ".join(_EXPANSIONS)
+        raise MistakeError(f"the global constraint '{shortened(name)}'", f"known are {known}: state it by others")
+    tokens = _Tokens(element.find("parameters"), name)
+    formulas = list(_EXPANSIONS[name](tokens, scope))
+    tokens.end()
+    return formulas
+
+
+class _Tokens:
+    """The parameters of a global constraint, word by word. A child element `<eq/>` is the word `<eq>`."""
+
+    def __init__(self, element: etree._Element | None, name: str) -> None:
+        self.name = name
+        text = ""
+        if element is not None:
+            text = element.text or ""
+            for child in element:
+                text += f" <{child.tag}> {child.tail or ''}"
+        self._words = _TOKEN.findall(text)
+        self._next = 0
+        if len(self._words) > 10 * MAX_TERMS:
+            raise MistakeError(f"global:{name} has too many parameters", f"{MAX_TERMS} variables are allowed: split it")
+
+    def __bool__(self) -> bool:
+        return self._next < len(self._words)
+
+    @property
+    def peek(self) -> str:
+        return self._words[self._next] if self else ""
+
+    def take(self) -> str:
+        word = self.peek
+        self._next += 1
+        return word
+
+    def want(self, word: str) -> None:
+        if self.peek != word:
+            self.wrong(word)
+        self._next += 1
+
+    def term(self) -> Term:
+        word = self.take()
+        if not word or word[0] in "[]{}<":
+            self._next -= 1
+            self.wrong("a variable or an integer")
+        return integer(word) if is_integer(word) else word
+
+    def terms(self, opening: str, closing: str) -> list[Term]:
+        """Return what stands between two brackets."""
+        self.want(opening)
+        found = []
+        while self.peek != closing:
+            found.append(self.term())
+        self.want(closing)
+        return found
+
+    def comparison(self, allowed: Sequence[str]) -> str:
+        word = self.take()[1:-1]
+        if word not in allowed:
+            self._next -= 1
+            self.wrong(" or ".join(f"<{one}/>" for one in allowed))
+        return word
+
+    def end(self) -> None:
+        if self:
+            self.wrong("the end")
+
+    def wrong(self, wanted: str) -> NoReturn:
+        there = shortened(self.peek) or "the end"
+        raise MistakeError(f"in the parameters of global:{self.name}: '{there}' where {wanted} should stand", "mend it")
+
+
+class _Body:
+    """An expression over terms, whose variables become formal parameters."""
+
+    def __init__(self) -> None:
+        self._formals: dict[str, str] = {}
+
+    def of(self, term: Term) -> Expression:
+        if isinstance(term, int):
+            return Constant(term)
+        return Name(self._formals.setdefault(term, f"X{len(self._formals)}"))
+
+    def formula(self, name: str, body: Expression) -> Formula:
+        return Formula(Predicate(name, tuple(self._formals.values()), body), tuple(self._formals))
+
+
+def _all_different(tokens: _Tokens, scope: Sequence[str]) -> Iterator[Formula]:
+    """Yield one predicate for each pair: protocols and filters for two robots take these."""
+    terms = tokens.terms("[", "]") if tokens else list(scope)
+    if len(terms) > MAX_TERMS:
+        raise MistakeError(f"global:allDifferent over {len(terms)} terms", f"{MAX_TERMS} are allowed: split it")
+    for one, other in itertools.combinations(terms, 2):
+        body = _Body()
+        yield body.formula("different", Apply("ne", (body.of(one), body.of(other))))
+
+
+def _weighted_sum(tokens: _Tokens, _scope: Sequence[str]) -> Iterator[Formula]:
+    body = _Body()
+    tokens.want("[")
+    products = []
+    while tokens.peek != "]":
+        tokens.want("{")
+        weight, term = tokens.term(), tokens.term()
+        tokens.want("}")
+        products.append(body.of(term) if weight == 1 else Apply("mul", (body.of(weight), body.of(term))))
+    tokens.want("]")
+    operator = tokens.comparison(_COMPARISONS)
+    yield body.formula("weightedSum", Apply(operator, (_sum(products), body.of(tokens.term()))))
+
+
+def _element(tokens: _Tokens, _scope: Sequence[str]) -> Iterator[Formula]:
+    """The index counts from 1. FRODO's intervals stand for any value in them."""
+    body = _Body()
+    index = tokens.term()
+    items: list[Expression | tuple[int, int]] = []
+    tokens.want("[")
+    while tokens.peek != "]":
+        first, dots, last = tokens.peek.partition("..")
+        if dots:
+            tokens.take()
+            items.append((integer(first), integer(last)))
+        else:
+            items.append(body.of(tokens.term()))
+    tokens.want("]")
+    value = body.of(tokens.term())
+    cases = []
+    for number, item in enumerate(items, 1):
+        same = (
+            Apply("and", (Apply("ge", (value, Constant(item[0]))), Apply("le", (value, Constant(item[1])))))
+            if isinstance(item, tuple)
+            else Apply("eq", (value, item))
+        )
+        cases.append(Apply("and", (Apply("eq", (body.of(index), Constant(number))), same)))
+    yield body.formula(tokens.name, _joined("or", cases) if cases else Apply("ne", (_ZERO, _ZERO)))
+
+
+def _cumulative(tokens: _Tokens, _scope: Sequence[str]) -> Iterator[Formula]:
+    """Yield one predicate a task: when it begins, the heights of all that run do not exceed the limit.
+
+    A task is `{origin duration height}` or, as in XCSP 2.1, `{origin duration end height}`, one of which may be `nil`.
+    """
+    tasks = []
+    tokens.want("[")
+    while tokens.peek != "]":
+        tasks.append(tokens.terms("{", "}"))
+    tokens.want("]")
+    _few(tasks, tokens.name)
+    operator = tokens.comparison(("le", "eq")) if tokens.peek.startswith("<") else "le"
+    limit = tokens.term()
+    peaks = []
+    for task in tasks:
+        body = _Body()
+        yield from _end_given(tokens, task)
+        load = _sum([_load(body, other, _times(tokens, body, task)[0], tokens) for other in tasks])
+        yield body.formula("cumulative", Apply("le", (load, body.of(limit))))
+    if operator == "eq":  # the limit is reached
+        body = _Body()
+        for task in tasks:
+            load = _sum([_load(body, other, _times(tokens, body, task)[0], tokens) for other in tasks])
+            peaks.append(Apply("eq", (load, body.of(limit))))
+        yield body.formula("cumulative", _joined("or", peaks))
+
+
+def _times(tokens: _Tokens, body: _Body, task: list[Term]) -> tuple[Expression, Expression]:
+    """Return the origin and the end of a task."""
+    match task:
+        case [origin, duration, _]:
+            return body.of(origin), Apply("add", (body.of(origin), body.of(duration)))
+        case ["nil", duration, end, _]:
+            return Apply("sub", (body.of(end), body.of(duration))), body.of(end)
+        case [origin, "nil", end, _]:
+            return body.of(origin), body.of(end)
+        case [origin, duration, _, _]:
+            return body.of(origin), Apply("add", (body.of(origin), body.of(duration)))
+        case _:
+            shown = " ".join(map(str, task))
+            raise MistakeError(f"the task '{shortened(shown)}' of global:{tokens.name}", "{origin duration height}")
+
+
+def _end_given(tokens: _Tokens, task: list[Term]) -> Iterator[Formula]:
+    """Yield that a task ends when its origin and duration say, where all three are given."""
+    if len(task) == 4 and "nil" not in task:  # noqa: PLR2004 - XCSP 2.1's four terms
+        body = _Body()
+        yield body.formula("ends", Apply("eq", (_times(tokens, body, task)[1], body.of(task[2]))))
+
+
+def _load(body: _Body, task: list[Term], now: Expression, tokens: _Tokens) -> Expression:
+    begin, end = _times(tokens, body, task)
+    runs = Apply("and", (Apply("le", (begin, now)), Apply("lt", (now, end))))
+    return Apply("if", (runs, body.of(task[-1]), _ZERO))
+
+
+def _diff2(tokens: _Tokens, _scope: Sequence[str]) -> Iterator[Formula]:
+    """Yield one predicate for each pair of rectangles: one lies beside the other. An empty one is nowhere."""
+    rectangles = []
+    tokens.want("[")
+    while tokens.peek != "]":
+        tokens.want("[")
+        rectangle = [*tokens.terms("{", "}"), *tokens.terms("{", "}")]
+        tokens.want("]")
+        if len(rectangle) != 4:  # noqa: PLR2004 - two dimensions
+            raise MistakeError("a rectangle of global:diff2 without two origins and two sizes", "[{x y} {dx dy}]")
+        rectangles.append(rectangle)
+    tokens.want("]")
+    _few(rectangles, tokens.name)
+    for one, other in itertools.combinations(rectangles, 2):
+        body = _Body()
+        sides = [
+            Apply("le", (Apply("add", (body.of(left[axis]), body.of(left[axis + 2]))), body.of(right[axis])))
+            for left, right in ((one, other), (other, one))
+            for axis in (0, 1)
+        ]
+        sides += [Apply("le", (body.of(box[axis]), _ZERO)) for box in (one, other) for axis in (2, 3)]
+        yield body.formula("diff2", Apply("or", tuple(sides)))
+
+
+def _few(boxes: Sequence[object], name: str) -> None:
+    if len(boxes) > MAX_BOXES:
+        raise MistakeError(f"global:{name} over {len(boxes)} of them", f"{MAX_BOXES} are allowed: split it")
+
+
+def _sum(terms: Sequence[Expression]) -> Expression:
+    return _joined("add", terms) if terms else _ZERO
+
+
+def _joined(operator: str, terms: Sequence[Expression]) -> Expression:
+    return terms[0] if len(terms) == 1 else Apply(operator, tuple(terms))
+
+
+_EXPANSIONS: dict[str, Callable[[_Tokens, Sequence[str]], Iterator[Formula]]] = {
+    "allDifferent": _all_different,
+    "weightedSum": _weighted_sum,
+    "element": _element,
+    "elementFast": _element,
+    "cumulative": _cumulative,
+    "diff2": _diff2,
+}

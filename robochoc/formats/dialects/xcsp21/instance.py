@@ -1,0 +1,112 @@
+"""An instance of XCSP 2.1 with agents, as data: the names of its file, and exact costs."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from decimal import Decimal
+from pathlib import Path
+from typing import NoReturn
+
+from robochoc.formats.diagnostics import Diagnostic, InvalidInputError, encodable
+from robochoc.formats.dialects.dialect import Note
+from robochoc.model.constraint import Function, Predicate
+
+Price = Decimal | float
+"""A cost: exact, or `INFINITE` for what is forbidden."""
+
+
+@dataclass(frozen=True)
+class Table:
+    """A relation: the cost of each tuple, and of those that are not listed."""
+
+    name: str
+    arity: int
+    costs: Mapping[tuple[int, ...], Price]
+    default: Price
+
+
+@dataclass(frozen=True)
+class Sides:
+    """A relation with two costs a tuple: one for the agent of each variable (ADCOP)."""
+
+    first: Table
+    second: Table
+
+
+@dataclass(frozen=True)
+class Formula:
+    """A predicate or function, and what it is applied to: variables by their names in the file, and integers.
+
+    Attributes:
+        definition: The predicate or function.
+        terms: Its actual parameters.
+        cost: What breaking a predicate costs. None: it may not be broken.
+    """
+
+    definition: Predicate | Function
+    terms: tuple[str | int, ...]
+    cost: Decimal | None = None
+
+
+@dataclass(frozen=True)
+class ForeignVariable:
+    """A variable: its domain, and its owner, if it has one."""
+
+    name: str
+    domain: str
+    ranges: tuple[range, ...]
+    owner: str
+    line: int
+
+
+@dataclass(frozen=True)
+class ForeignConstraint:
+    """A constraint: the agent that alone knows it, if there is one, and what it says."""
+
+    name: str
+    scope: tuple[str, ...]
+    content: Table | Sides | Formula
+    knower: str
+    file: str
+    line: int
+
+
+@dataclass
+class Instance:
+    """The contents of a file, or of all files of a problem.
+
+    Attributes:
+        file: The path of the file.
+        name: The name of the problem.
+        maximize: Whether the costs are utilities.
+        agents: The agents, the highest first.
+        self_agent: The agent whose file it is, where each has its own.
+        variables: The variables, by their names.
+        constraints: The constraints.
+        constant: What is added to all costs.
+        costs_from: Costs of at least so much forbid. None: none do.
+        ids: The agents by their `id`.
+        type: The kind of problem that the file states.
+        constraint_model: How much agents know of constraints that do not say it: TKC or PKC.
+        notes: What has been mapped.
+    """
+
+    file: Path
+    name: str = ""
+    maximize: bool = False
+    agents: list[str] = field(default_factory=list)
+    self_agent: str = ""
+    variables: dict[str, ForeignVariable] = field(default_factory=dict)
+    constraints: list[ForeignConstraint] = field(default_factory=list)
+    constant: Decimal = Decimal(0)
+    costs_from: Decimal | None = None
+    ids: dict[str, str] = field(default_factory=dict)
+    type: str = ""
+    constraint_model: str = ""
+    notes: list[Note] = field(default_factory=list)
+
+
+def refuse(file: Path | str, line: int, message: str, hint: str) -> NoReturn:
+    """Raise `InvalidInputError` with one message."""
+    raise InvalidInputError([Diagnostic(encodable(str(file)), line, message, hint)])

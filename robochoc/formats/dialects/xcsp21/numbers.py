@@ -1,0 +1,106 @@
+"""Words of XCSP 2.1's texts: integers, ranges, costs, tuples. Digits are counted before Python reads them."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+from decimal import Decimal
+
+from robochoc.formats.definitions import MAX_TUPLES, MAX_VALUES
+from robochoc.formats.diagnostics import MistakeError, shortened
+from robochoc.formats.dialects.xcsp21.instance import Price
+from robochoc.model.constraint import INFINITE
+from robochoc.model.cost_units import MAX_PLACES
+
+_INTEGER = re.compile(r"[+-]?[0-9]{1,18}")
+_RANGE = re.compile(r"([+-]?[0-9]{1,18})\.\.([+-]?[0-9]{1,18})")
+_COST = re.compile(r"[+-]?(?:[0-9]{1,40}(?:\.[0-9]{0,40})?|\.[0-9]{1,40})(?:[eE][+-]?[0-9]{1,2})?")
+_INFINITY = re.compile(r"([+-]?)inf(?:inity)?", re.IGNORECASE)
+_DIGITS = 18
+
+
+def is_integer(word: str) -> bool:
+    """Return whether `word` is an integer that is read here."""
+    return _INTEGER.fullmatch(word) is not None
+
+
+def integer(word: str) -> int:
+    """Return the integer that `word` is. Raises `MistakeError`."""
+    if not is_integer(word):
+        if _COST.fullmatch(word) or _INFINITY.fullmatch(word):
+            raise MistakeError(f"the value {shortened(word)} is no integer", "domains here are integers: scale them")
+        raise MistakeError(f"'{shortened(word)}' is no integer", "at most 18 digits, and a sign")
+    return int(word)
+
+
+def ranges(text: str) -> tuple[range, ...]:
+    """Return the ranges in a domain's text, ascending; values may stand in any order. Raises `MistakeError`."""
+    found = sorted(map(_range, text.split()), key=lambda part: part.start)
+    if sum(part.stop - part.start for part in found) > MAX_VALUES:
+        raise MistakeError(f"a domain of more than {MAX_VALUES} values", "make it smaller")
+    apart: list[range] = []
+    for part in found:
+        if apart and part.start <= apart[-1].stop:
+            apart[-1] = range(apart[-1].start, max(apart[-1].stop, part.stop))
+        else:
+            apart.append(part)
+    return tuple(apart)
+
+
+def _range(word: str) -> range:
+    match = _RANGE.fullmatch(word)
+    if match is None:
+        value = integer(word)
+        return range(value, value + 1)
+    first, last = int(match[1]), int(match[2])
+    if first > last:
+        raise MistakeError(f"the range {word} is empty", f"write {last}..{first}")
+    return range(first, last + 1)
+
+
+def finite_cost(word: str) -> Decimal:
+    """Return the cost that `word` is. Raises `MistakeError`."""
+    if not _COST.fullmatch(word):
+        raise MistakeError(f"'{shortened(word)}' is no cost", "a number, 'infinity' or '-infinity'")
+    cost = Decimal(word).normalize()
+    if not cost:
+        return Decimal(0)
+    digits, exponent = len(cost.as_tuple().digits), int(cost.as_tuple().exponent)
+    if -exponent > MAX_PLACES:
+        raise MistakeError(f"the cost {shortened(word)} has {-exponent} decimal places", f"{MAX_PLACES} are allowed")
+    if digits + exponent > _DIGITS:
+        raise MistakeError(f"the cost {shortened(word)} is too large", f"at most {_DIGITS} digits")
+    return cost
+
+
+class CostReader:
+    """Reads costs: what is infinite, or as large as `infinity` or the file's `bound` says, forbids."""
+
+    def __init__(self, *, maximize: bool, infinity: int | None, bound: Decimal | None = None) -> None:
+        self._maximize = maximize
+        stated = [Decimal(one) for one in (infinity, bound) if one is not None]
+        self._infinity = min(stated) if stated else None
+
+    def cost(self, word: str) -> Price:
+        """Return the cost that `word` is. Raises `MistakeError`."""
+        infinite = _INFINITY.fullmatch(word)
+        if infinite:
+            if (infinite[1] == "-") != self._maximize:
+                what, good = ("utilities", "-infinity") if self._maximize else ("costs", "infinity")
+                raise MistakeError(f"{word} among {what}", f"'{good}' forbids; nothing is infinitely good")
+            return INFINITE
+        cost = finite_cost(word)
+        if self._infinity is not None and (-cost if self._maximize else cost) >= self._infinity:
+            return INFINITE
+        return cost
+
+
+def split_tuples(text: str) -> Iterator[tuple[str, str]]:
+    """Yield the cost's text, empty where none is written, and the values' of each tuple in a relation's text."""
+    parts = text.split("|")
+    if len(parts) > MAX_TUPLES + 1:
+        raise MistakeError(f"a relation of more than {MAX_TUPLES} tuples", "split it")
+    for part in parts:
+        cost, _, values = part.rpartition(":")
+        if part.strip():
+            yield cost.strip(), values

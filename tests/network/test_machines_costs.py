@@ -1,0 +1,56 @@
+"""Costs that people have, across machines: robots count in integers, and the master tells the user's numbers."""
+
+from __future__ import annotations
+
+from decimal import Decimal
+
+from robochoc.model.assembly import assemble
+from robochoc.model.expression import Type, parse
+from robochoc.model.problem import (
+    Constraint,
+    CostUnits,
+    Domain,
+    Function,
+    ProblemKind,
+    Relation,
+    Semantics,
+    Team,
+    Variable,
+)
+from tests.support.deployments import Deployment, ended, one_line, written
+
+VALUES = Domain("D", (range(3),))
+
+
+def team_with(definition: Relation | Function) -> Team:
+    return assemble(
+        "utilities",
+        {"RA": [Variable("A", VALUES)], "RB": [Variable("B", VALUES)]},
+        [Constraint("C", definition, ("A", "B"), ("A", "B"))],
+        kind=ProblemKind.DISWCSP,
+        costs=CostUnits(maximize=True, places=2, constant=-5),
+    )
+
+
+def test_a_utility_in_decimals_across_machines(site: Deployment) -> None:
+    utility = Relation("R", 2, Semantics.SOFT, ((0, 1), (1, 2), (2, 2)), (-75, 250, 125), -1000)
+    files = written(team_with(utility), site)
+    tokens = site.enrol("--team", files)
+    master = site.master("--team", files, "--protocol", "syncbb", "--json")
+    robots = site.robots(files, tokens)
+    assert master.status() == 0, master.errors
+    ended(robots)
+    told = master.object
+    assert (told["verdict"], told["assignment"]) == ("optimal", {"A": 1, "B": 2})
+    assert Decimal(str(told["cost"])) == Decimal("2.45")
+
+
+def test_a_function_without_bounds_is_refused_where_domains_are_not_known(site: Deployment) -> None:
+    product = Function("f", ("X", "Y"), parse("mul(X,Y)", ("X", "Y"), Type.INTEGER))
+    files = written(team_with(product), site)
+    tokens = site.enrol("--team", files)
+    site.master("--team", files, "--protocol", "syncbb")
+    robot = site.robot(files / "RB.xml", "--token", tokens["RB"])
+    assert robot.status() == 2, robot.errors
+    assert "nothing bounds the cost of C" in one_line(robot)
+    assert "max(0, min(..., 100))" in one_line(robot)
