@@ -43,7 +43,9 @@ def post_objective(objectives: etree._Element, posting: Posting) -> bool:
 
 def _bounded_by(worst: Apply, posting: Posting) -> Expression:
     """Return a variable that is no better than any argument of `worst`, and in the best solution equal to it."""
-    values = {value for member in worst.arguments for value in posting.domain(member)}
+    values: set[int] = set()
+    for member in worst.arguments:
+        values.update(posting.values_of(member))
     bound = posting.add_variable("objective", values)
     for member in worst.arguments:
         posting.post(compare("le" if worst.operator == "max" else "ge", member, bound))

@@ -23,6 +23,7 @@ from robochoc.formats.dialects.xcsp3.terms import (
 )
 from robochoc.formats.dialects.xcsp3.variables import Variables
 from robochoc.model.expression import Apply, Constant, Expression, Name, UndefinedValueError, evaluate, names
+from robochoc.model.expression.bounds import Interval, bounds
 from robochoc.model.problem import Constraint, Definition, Function, Predicate, Relation, Semantics
 
 MAX_CONSTRAINTS = 500_000
@@ -120,6 +121,16 @@ class Posting:
                 return self._values(name)
             case _:
                 raise MistakeError("an expression where a variable or an integer should stand", "use a variable")
+
+    def values_of(self, expression: Expression) -> Sequence[int]:
+        """Return integers among which all values of `expression` are. Raises `MistakeError` for too many."""
+        if not isinstance(expression, Apply):
+            return self.domain(expression)
+        limits = {name: Interval(min(self._values(name)), max(self._values(name))) for name in names(expression)}
+        low, high = bounds(expression, limits)
+        if high - low >= MAX_VALUES:
+            raise MistakeError(f"an expression from {low:,} to {high:,}", f"{MAX_VALUES:,} values are supported")
+        return range(int(low), int(high) + 1)
 
     def is_symbolic(self, name: str) -> bool:
         """Return whether the values of our variable `name` are symbols."""
@@ -252,7 +263,7 @@ class Posting:
 
 def in_words(number: int) -> str:
     """Return a number as it may stand in a message, however large it is."""
-    return f"{number:,}" if number < 10**15 else f"10^{int(number.bit_length() * 0.30103)}"  # noqa: PLR2004
+    return f"{number:,}" if number < 10**15 else f"10^{int(number.bit_length() * 0.30103)}"
 
 
 def renamed(expression: Expression, names_for: Mapping[str, str]) -> Expression:
