@@ -3,9 +3,14 @@
 Names:
     load: Reads a team's files, and returns a `Problem`.
     Problem: A problem, which `solve()` solves on this machine.
-    Outcome: What `solve()` returns.
+    Model: A problem that is made in Python, with operators.
+    all_different, allowed, forbidden, costs, function, element, cumulative, minimum, maximum, if_then_else, all_of,
+        any_of: Constraints and costs of a model that no operator makes.
+    ModelError: What a model says that cannot be.
+    Outcome: What a run comes to; `Solution`, which `solve()` returns, is one.
     Verdict: The answer to a problem: solution, optimal, no solution, unknown.
     AgentsContainer: The master or robots on one of several machines.
+    journal: Journals of runs; `journal.rows(path)` are for pandas or polars.
 
 Example:
     >>> import robochoc
@@ -17,22 +22,80 @@ from __future__ import annotations
 
 TYPE_CHECKING = False  # to import `typing` would delay the handling of signals (cli/main.py)
 if TYPE_CHECKING:
+    from robochoc import journal
     from robochoc.api import AgentsContainer, Problem, load
     from robochoc.model.outcome import Outcome, Verdict
+    from robochoc.modelling.functions import (
+        all_different,
+        allowed,
+        costs,
+        cumulative,
+        element,
+        forbidden,
+        function,
+        if_then_else,
+        maximum,
+        minimum,
+    )
+    from robochoc.modelling.model import Model
+    from robochoc.modelling.places import ModelError
+    from robochoc.modelling.solution import Solution
+    from robochoc.modelling.terms import all_of, any_of
 
-__all__ = ["AgentsContainer", "Outcome", "Problem", "Verdict", "__version__", "load"]
+__all__ = [
+    "AgentsContainer",
+    "Model",
+    "ModelError",
+    "Outcome",
+    "Problem",
+    "Solution",
+    "Verdict",
+    "__version__",
+    "all_different",
+    "all_of",
+    "allowed",
+    "any_of",
+    "costs",
+    "cumulative",
+    "element",
+    "forbidden",
+    "function",
+    "if_then_else",
+    "journal",
+    "load",
+    "maximum",
+    "minimum",
+]
 
 __version__ = "0.1.0"
+
+_FUNCTIONS = "all_different allowed costs cumulative element forbidden function if_then_else maximum minimum"
+_PLACES = {
+    **dict.fromkeys(("AgentsContainer", "Problem", "load"), "robochoc.api"),
+    **dict.fromkeys(("Outcome", "Verdict"), "robochoc.model.outcome"),
+    **dict.fromkeys(_FUNCTIONS.split(), "robochoc.modelling.functions"),
+    **dict.fromkeys(("all_of", "any_of"), "robochoc.modelling.terms"),
+    "Model": "robochoc.modelling.model",
+    "ModelError": "robochoc.modelling.places",
+    "Solution": "robochoc.modelling.solution",
+}
 
 
 def __getattr__(name: str) -> object:
     """Import what is asked for: the command line starts faster without it."""
-    if name in {"AgentsContainer", "Problem", "load"}:
-        from robochoc import api  # noqa: PLC0415 - start-up
+    import importlib  # noqa: PLC0415 - start-up
 
-        return getattr(api, name)
-    if name in {"Outcome", "Verdict"}:
-        from robochoc.model import outcome  # noqa: PLC0415 - start-up
+    if name in _PLACES:
+        return getattr(importlib.import_module(_PLACES[name]), name)
+    if name == "journal":
+        return importlib.import_module("robochoc.journal")
+    import difflib  # noqa: PLC0415 - only mistakes need it
 
-        return getattr(outcome, name)
-    raise AttributeError(f"module 'robochoc' has no attribute {name!r}")
+    near = difflib.get_close_matches(name, __all__, 1)
+    hint = f"; did you mean {near[0]!r}?" if near and not name.startswith("_") else ""
+    raise AttributeError(f"module 'robochoc' has no attribute {name!r}{hint}")
+
+
+def __dir__() -> list[str]:
+    """Return the names of the library."""
+    return list(__all__)

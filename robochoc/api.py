@@ -17,14 +17,10 @@ from typing import TYPE_CHECKING, Any
 
 from robochoc.formats import check_team, read_robot, read_team
 from robochoc.journal.events import Observer
-from robochoc.model.orders import Order
 from robochoc.model.outcome import Outcome
 from robochoc.model.problem import Team
-from robochoc.run.defaults import default_protocol
-from robochoc.run.options import Options, Runtime, Withdrawal
-from robochoc.run.orchestrator import solve
-from robochoc.run.registry import UnknownProtocolError, installed_protocols, installed_spelling
-from robochoc.run.scenario import Environment
+from robochoc.modelling.solving import Solvable
+from robochoc.run.registry import UnknownProtocolError, installed_protocols
 
 if TYPE_CHECKING:
     from robochoc.communication.network.robot import Ending
@@ -33,8 +29,8 @@ if TYPE_CHECKING:
 _MASTER, _AGENT = "Master", "Agent"
 
 
-@dataclass(frozen=True)
-class Problem:
+@dataclass(frozen=True, repr=False)
+class Problem(Solvable):
     """A constraint problem that a team of robots can solve.
 
     Attributes:
@@ -49,58 +45,12 @@ class Problem:
     def __post_init__(self) -> None:
         check_team(self.team)
 
-    def solve(
-        self,
-        protocol: str | None = None,
-        runtime: str = Runtime.PROCESSES,
-        *,
-        order: str | None = None,
-        withdraw: str | None = None,
-        settings: Mapping[str, object] = {},
-        observer: Observer | None = None,
-        environment: Environment | None = None,
-        **options: Any,  # noqa: ANN401 - the other fields of `Options`, by their names
-    ) -> Outcome:
-        """Let the robots solve the problem together.
+    def _team_to_solve(self) -> Team:
+        return self.team
 
-        The runtime `processes` starts processes. A program that uses it calls this below `if __name__ == "__main__":`.
-
-        Args:
-            protocol: The name of the protocol, in any case. None: the default protocol for the kind of problem.
-            runtime: `processes`, `simulator` or `network`.
-            order: The name of a priority order, such as `dom-deg`. None: the order of the files.
-            withdraw: Which robots may withdraw if there is no solution for all: `minimum` or `maximal`. None: none may.
-            settings: Settings of the protocol, by name.
-            observer: It is called with every event of the run.
-            environment: It gets each answer, and returns what changes next.
-            **options: Other fields of `robochoc.run.options.Options`, such as `seed` or `timeout`.
-
-        Returns:
-            The outcome: a verdict, the assignment, its cost, and what the run took.
-
-        Raises:
-            UnsupportedError: if problem, protocol, runtime and options do not go together.
-            RobotsLostError: if robots were lost, and the options do not say how to go on.
-            RefutedError: if the checker refutes the answer.
-            ValueError: if an option has a value that is not allowed.
-            TypeError: if there is no such option.
-
-        Example:
-            >>> import robochoc
-            >>> problem = robochoc.load("instances/queens3d-4")
-            >>> outcome = problem.solve("abt", runtime="simulator", withdraw="minimum")
-            >>> len(outcome.assignment)
-            10
-        """
-        asked = Options(
-            protocol=installed_spelling(protocol) if protocol else default_protocol(self.team.kind),
-            runtime=Runtime(runtime),
-            order=Order(order) if order else None,
-            withdraw=Withdrawal(withdraw) if withdraw else None,
-            settings={name: str(value) for name, value in settings.items()},
-            **options,
-        )
-        return solve(self.team, asked, observer=observer, environment=environment)
+    def __repr__(self) -> str:
+        constraints = sum(1 for _ in self.team.constraints())
+        return f"<problem {self.team.name}: {len(self.team.robots)} robots, {constraints} constraints>"
 
 
 def load(path: Path | str) -> Problem:

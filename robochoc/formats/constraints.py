@@ -18,6 +18,7 @@ from robochoc.formats.rules import (
     check_shared,
     refuse_private_part,
 )
+from robochoc.formats.symbols import check_kinds
 from robochoc.formats.xml import attribute, line
 from robochoc.model.problem import INFINITE, Constraint, ConstraintModel, CostUnits, Definition, ProblemKind, Term
 
@@ -37,6 +38,8 @@ class Context:
     own: Collection[str]
     """The robot's own variables."""
     definitions: Mapping[str, Definition | None]
+    symbolic: Mapping[str, bool]
+    """For each own variable, whether its values are symbols."""
 
 
 def read_private(element: etree._Element, context: Context) -> Constraint | None:
@@ -70,6 +73,7 @@ def _read(element: etree._Element, context: Context, model: ConstraintModel | No
     price = read_cost(cost, context.units) if cost else INFINITE
     constraint = Constraint(attribute(element, "name"), definition, scope, parameters, model, price, line(element))
     check_constraint(constraint, context.kind, context.units)
+    check_kinds(constraint, context.symbolic)
     _check_arity(attribute(element, "arity"), constraint)
     return constraint
 

@@ -11,7 +11,17 @@ from functools import lru_cache
 
 from robochoc.formats.diagnostics import MistakeError, shortened
 from robochoc.formats.names import BEYOND, check_cost, check_integer, check_word, digits, in_short
-from robochoc.model.expression import Apply, Constant, Expression, ExpressionError, Name, Type, parse, text
+from robochoc.model.expression import (
+    Apply,
+    Constant,
+    Expression,
+    ExpressionError,
+    Name,
+    SymbolNames,
+    Type,
+    parse,
+    text,
+)
 from robochoc.model.expression.parser import MAX_DEPTH, MAX_NODES
 from robochoc.model.problem import Domain, Function, Predicate, ProblemKind, Relation, Semantics, Term, Topic
 
@@ -109,16 +119,15 @@ def _check_tuples(relation: Relation) -> None:
             seen.add(values)
 
 
-def check_predicate(predicate: Predicate) -> None:
-    """Raise `MistakeError` unless it is a Boolean expression over its parameters, and nothing else."""
-    check_formal(predicate.parameters)
-    check_expression(f"predicate {shortened(predicate.name)}", predicate.body, predicate.parameters, Type.BOOLEAN)
+def check_stated(definition: Predicate | Function, table: Sequence[str] = ()) -> None:
+    """Raise `MistakeError` unless it is an expression over its parameters, and nothing else.
 
-
-def check_function(function: Function) -> None:
-    """Raise `MistakeError` unless it is an integer expression over its parameters, and nothing else."""
-    check_formal(function.parameters)
-    check_expression(f"function {shortened(function.name)}", function.body, function.parameters, Type.INTEGER)
+    That of a predicate is Boolean, that of a function an integer. Symbols are in the `table`.
+    """
+    wanted = Type.BOOLEAN if isinstance(definition, Predicate) else Type.INTEGER
+    check_formal(definition.parameters)
+    what = f"{type(definition).__name__.lower()} {shortened(definition.name)}"
+    check_expression(what, definition.body, definition.parameters, wanted, (definition.symbolic, table))
 
 
 def check_formal(names: Sequence[str]) -> None:
@@ -132,24 +141,37 @@ def check_formal(names: Sequence[str]) -> None:
         seen.add(name)
 
 
-def check_topic(topic: Topic, own: Collection[str]) -> None:
-    """Raise `MistakeError` unless `topic` says where to by integer expressions over the `own` variables."""
+def check_topic(topic: Topic, own: Collection[str], symbolic: Sequence[str] = ()) -> None:
+    """Raise `MistakeError` unless `topic` says where to by integer expressions over the `own` variables.
+
+    Those that are `symbolic` are no integers.
+    """
     check_word(topic.name)
     check_word(topic.type)
     for axis, expression in (("x", topic.x), ("y", topic.y), ("z", topic.z)):
         if expression is not None:
-            check_expression(f"{axis} of the topic", expression, tuple(own), Type.INTEGER)
+            check_expression(f"{axis} of the topic", expression, tuple(own), Type.INTEGER, (symbolic, ()))
 
 
-def check_expression(what: str, expression: Expression, names: Sequence[str], wanted: Type) -> None:
+def check_expression(
+    what: str,
+    expression: Expression,
+    names: Sequence[str],
+    wanted: Type,
+    symbols: tuple[Sequence[str], Sequence[str]] = ((), ()),
+) -> None:
     """Raise `MistakeError` unless `expression` is what its own text says: the parser's rules are the only ones.
 
-    `what` is of this expression, over `names`, which should yield a `wanted` value.
+    `what` is of this expression, over `names`, which should yield a `wanted` value. `symbols` are those names that
+    stand for symbols, and the table of symbols.
     """
     try:
         _check_size(expression)
-        written = text(expression)
-        again = parsed(written, tuple(names), wanted)
+        written = text(expression, *symbols)
+        if symbols[0]:
+            again = parse(written, names, wanted, SymbolNames(symbols[0], symbols[1].index))
+        else:
+            again = parsed(written, tuple(names), wanted)
     except ExpressionError as error:
         raise expression_mistake(what, error) from None
     if again != expression:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Callable
 
 from lxml import etree
 
@@ -14,12 +15,14 @@ from robochoc.formats.definitions import (
     check_tuple_count,
 )
 from robochoc.formats.diagnostics import MistakeError, shortened
+from robochoc.formats.symbols import SymbolTable, codes_of
 from robochoc.formats.xml import attribute
 from robochoc.model.problem import INFINITE, CostUnits, Domain, Relation, Semantics
 
 __all__ = ["MAX_VALUES", "check_count", "integer", "read_domain", "read_relation"]
 
 _INTEGER = re.compile(r"[+-]?[0-9]{1,18}")
+_NUMERIC = re.compile(r"[-+.0-9]+$")
 _RANGE = re.compile(r"([+-]?[0-9]{1,18})(?:\.\.([+-]?[0-9]{1,18}))?")
 
 
@@ -37,14 +40,17 @@ def check_count(element: etree._Element, name: str, found: int) -> None:
         raise MistakeError(f"{name} is {given}, but there are {found}", f'write {name}="{found}" or leave it out')
 
 
-def read_domain(element: etree._Element) -> Domain:
-    """Return a domain from XCSP ranges, `1..4 7 9..12`, as ascending ranges that do not touch.
+def read_domain(element: etree._Element, table: SymbolTable) -> Domain:
+    """Return a domain from XCSP ranges, `1..4 7 9..12`, as ascending ranges that do not touch; or from symbols.
 
-    Raises `MistakeError`.
+    The symbols of a symbolic domain are those of the `table` so far. Raises `MistakeError`.
     """
-    name = attribute(element, "name")
-    ranges = sorted(map(_range, (element.text or "").split()), key=lambda part: part.start)
-    domain = Domain(name, tuple(ranges))
+    name, words = attribute(element, "name"), (element.text or "").split()
+    if attribute(element, "type") == "symbolic":
+        codes = codes_of(words, table)
+        domain = Domain(name, tuple(range(code, code + 1) for code in codes), table.names)
+    else:
+        domain = Domain(name, tuple(sorted(map(_range, words), key=lambda part: part.start)))
     check_domain(domain)
     check_count(element, "nbValues", len(domain))
     return domain
@@ -61,10 +67,11 @@ def _range(word: str) -> range:
     return range(first, last + 1)
 
 
-def read_relation(element: etree._Element, units: CostUnits) -> Relation:
+def read_relation(element: etree._Element, units: CostUnits, code: Callable[[str], int]) -> Relation:
     """Return a relation from its tuples, `1 2|2 3` or, where soft, `5:1 2|3:2 2`; costs count in `units`.
 
-    A cost holds for the tuples that follow, until the next one. Raises `MistakeError`.
+    A cost holds for the tuples that follow, until the next one. `code` returns the code of a symbol. Raises
+    `MistakeError`.
     """
     semantics = Semantics(attribute(element, "semantics"))
     words = [part for part in (element.text or "").split("|") if part.strip()]
@@ -72,13 +79,26 @@ def read_relation(element: etree._Element, units: CostUnits) -> Relation:
     costs: list[float] = []
     if semantics is Semantics.SOFT:
         words, costs = _priced(words, units)
-    tuples = [tuple([integer(value) for value in word.split()]) for word in words]
+    rows = [word.split() for word in words]
+    symbolic = tuple(place for place, word in enumerate(rows[0] if rows else ()) if not _NUMERIC.match(word))
+    tuples = [_values(row, symbolic, code) for row in rows]
     check_count(element, "nbTuples", len(tuples))
     name, arity = attribute(element, "name"), _arity(element, tuples)
     default = _default_cost(attribute(element, "defaultCost"), semantics, units)
-    relation = Relation(name, arity, semantics, tuple(tuples), tuple(costs), default)
+    relation = Relation(name, arity, semantics, tuple(tuples), tuple(costs), default, symbolic)
     check_relation(relation)
     return relation
+
+
+def _values(row: list[str], symbolic: tuple[int, ...], code: Callable[[str], int]) -> tuple[int, ...]:
+    """Return a tuple's values; in `symbolic` columns the codes of symbols."""
+    if not symbolic:
+        return tuple([integer(word) for word in row])
+    for place in symbolic:
+        if place < len(row) and _NUMERIC.match(row[place]):
+            message = f"'{shortened(row[place])}' in a column of symbols"
+            raise MistakeError(message, "a column holds symbols or integers, as the first tuple does")
+    return tuple([code(word) if place in symbolic else integer(word) for place, word in enumerate(row)])
 
 
 def _priced(words: list[str], units: CostUnits) -> tuple[list[str], list[float]]:

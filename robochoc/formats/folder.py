@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
+from types import MappingProxyType
 
 from robochoc.formats.diagnostics import Diagnostic, InvalidInputError
+from robochoc.formats.dialects.names_file import NAMES_FILE
 from robochoc.formats.robot import robot_in
 from robochoc.formats.validation import check_writable
 from robochoc.formats.writer import robot_xml
@@ -15,13 +18,17 @@ _SURELY_READ = 1024 * 1024
 """Bytes of a file that meets no limit of its reader, if the robot is valid."""
 
 
-def write_team(team: Team, folder: Path, *, replace: bool = False) -> None:
+def write_team(
+    team: Team, folder: Path, *, replace: bool = False, beside: Mapping[str, bytes] = MappingProxyType({})
+) -> None:
     """Write one XML file per robot into `folder`, which is then complete, or not there at all.
 
     Args:
         team: A valid team.
         folder: The folder to be written.
-        replace: Whether a folder of a team that is there already is replaced: one with XML files only.
+        replace: Whether a folder of a team that is there already is replaced: one with XML files only, and those that
+            an import writes.
+        beside: The contents of other files that are written there, by their names.
 
     Raises:
         InvalidInputError: if the team is invalid, files cannot express it, or the folder is there and is not replaced.
@@ -42,6 +49,8 @@ def write_team(team: Team, folder: Path, *, replace: bool = False) -> None:
         new.mkdir()
         for name, content in files.items():
             (new / f"{name}.xml").write_bytes(content)
+        for name, content in beside.items():
+            (new / name).write_bytes(content)
         if folder.exists():
             folder.rename(old)
         new.rename(folder)
@@ -65,12 +74,16 @@ def _may_replace(folder: Path, *, replace: bool) -> None:
         raise _refusal(folder, "it exists already", "choose another folder with -o, or replace it with --force")
     if folder.is_symlink() or not folder.is_dir() or folder.resolve() == Path(folder.resolve().anchor):
         raise _refusal(folder, "it is no folder, and is not replaced", "choose another folder with -o")
-    if foreign := sorted(entry.name for entry in folder.iterdir() if entry.suffix != ".xml" or not entry.is_file()):
+    if foreign := sorted(entry.name for entry in folder.iterdir() if not _is_ours(entry)):
         raise _refusal(
             folder,
             f"it holds {foreign[0]!r}, which is no robot's file, and is not replaced",
             "choose another folder with -o, or remove it yourself",
         )
+
+
+def _is_ours(entry: Path) -> bool:
+    return entry.is_file() and (entry.suffix == ".xml" or entry.name == NAMES_FILE)
 
 
 def _refusal(folder: Path, message: str, hint: str) -> InvalidInputError:

@@ -9,10 +9,9 @@ from robochoc.formats.costs import check_units
 from robochoc.formats.definitions import (
     PREDEFINED,
     check_domain,
-    check_function,
-    check_predicate,
     check_relation,
     check_semantics,
+    check_stated,
     check_topic,
     refuse_function,
     refuse_predefined,
@@ -33,13 +32,19 @@ from robochoc.formats.rules import (
     refuse_private_part,
     repeated_neighbours,
 )
+from robochoc.formats.symbols import (
+    check_kinds,
+    check_one_table,
+    check_symbolic_definition,
+    check_symbolic_domain,
+    kinds_of,
+)
 from robochoc.model.problem import (
     Constraint,
     ConstraintModel,
     Definition,
     Domain,
     Function,
-    Predicate,
     Relation,
     Robot,
 )
@@ -56,6 +61,8 @@ class Objects:
         self._wrong: list[Defined] = []
         """The definitions of the robot in hand that are wrong. In a file, equal ones are written once."""
         self._found: list[Diagnostic] = []
+        self._table: tuple[str, ...] = ()
+        """The symbols of the robot in hand."""
 
     def mistakes(self, robot: Robot) -> list[Diagnostic]:
         """Return what is wrong with `robot` by itself: nothing of its neighbours is looked at."""
@@ -72,6 +79,7 @@ class Objects:
         """Return what is wrong with a constraint that `robot` is to share from now on."""
         self._found, self._wrong = [], []
         own = dict.fromkeys(variable.name for variable in robot.variables)
+        self._table = robot.symbol_table
         self._shared(constraint, own, robot, ObjectLocations(robot.name))
         return self._found
 
@@ -93,6 +101,8 @@ class Objects:
             check_weight(robot.weight)
         with self._at(places.robot):
             check_units(robot.costs, robot.kind)
+            check_one_table(robot)
+        self._table = robot.symbol_table
         yield from self._variables(robot, places)
         if not own:
             return  # whatever else is wrong may follow from it
@@ -129,10 +139,11 @@ class Objects:
             yield
 
     def _topics(self, robot: Robot, own: Collection[str], places: ObjectLocations) -> Iterator[None]:
+        symbolic = [one.name for one in robot.variables if one.domain.symbols]
         seen: set[str] = set()
         for topic in robot.topics:
             with self._at(places.part, "topic", topic.name):
-                check_topic(topic, own)
+                check_topic(topic, own, symbolic)
                 check_unique("topic", topic.name, seen)
             seen.add(topic.name)
             yield
@@ -183,6 +194,7 @@ class Objects:
             refuse_function(robot.kind)
         if right:
             check_constraint(constraint, robot.kind, robot.costs)
+            check_kinds(constraint, kinds_of([robot]))
         return right
 
     def _defined(self, thing: Defined, places: ObjectLocations) -> bool:
@@ -194,7 +206,7 @@ class Objects:
 
     def _is_right(self, thing: Defined, places: ObjectLocations) -> bool:
         try:
-            _check_defined(thing)
+            _check_defined(thing, self._table)
         except MistakeError as mistake:
             if thing not in self._wrong:
                 place = places.part(type(thing).__name__.lower(), thing.name)
@@ -215,21 +227,21 @@ class Objects:
         self._found.append(place.mistake(message, hint))
 
 
-def _check_defined(thing: Defined) -> None:
+def _check_defined(thing: Defined, table: tuple[str, ...]) -> None:
     check_word(thing.name)
     if isinstance(thing, Domain):
         check_domain(thing)
+        if thing.symbols:
+            check_symbolic_domain(thing)
         return
     if PREDEFINED.get(thing.name) == thing:
         return
     refuse_predefined(thing.name)
-    match thing:
-        case Relation():
-            check_relation(thing)
-        case Predicate():
-            check_predicate(thing)
-        case Function():
-            check_function(thing)
+    if isinstance(thing, Relation):
+        check_relation(thing)
+    check_symbolic_definition(thing, table)
+    if not isinstance(thing, Relation):
+        check_stated(thing, table)
 
 
 def repeated_robots(robots: Iterable[Robot]) -> Iterator[Diagnostic]:

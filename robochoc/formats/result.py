@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from decimal import Decimal
+from types import MappingProxyType
 from typing import Any
 
 import msgspec
@@ -74,6 +76,7 @@ class _Form(msgspec.Struct, omit_defaults=True):
     channel: str | None = None
     claimed_by: str | None = None
     checked: _CheckedForm | None = None
+    names: dict[str, str] = {}
 
 
 _SAME = (
@@ -86,8 +89,13 @@ _SAME = (
 _ENCODER = msgspec.json.Encoder(decimal_format="number")
 
 
-def result_json(outcome: Outcome) -> bytes:
-    """Return `outcome` as one line of JSON, without the line's end."""
+def result_json(outcome: Outcome, names: Mapping[str, str] = MappingProxyType({})) -> bytes:
+    """Return `outcome` as one line of JSON, without the line's end.
+
+    Args:
+        outcome: The outcome.
+        names: What robots and variables are called elsewhere, by the names in `outcome`.
+    """
     same: dict[str, Any] = {name: getattr(outcome, name) for name in _SAME}
     form = _Form(
         **same,
@@ -96,6 +104,7 @@ def result_json(outcome: Outcome) -> bytes:
         epochs=[_epoch(epoch) for epoch in outcome.epochs],
         metrics=_metrics(outcome.metrics),
         checked=_CheckedForm(*outcome.checked) if outcome.checked else None,
+        names=dict(names),
     )
     return _ENCODER.encode(form)
 

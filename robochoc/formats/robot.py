@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Collection, Iterator, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -28,6 +28,7 @@ from robochoc.formats.names import check_robot_name, check_unique
 from robochoc.formats.repair import without_schema_errors
 from robochoc.formats.rules import NEIGHBOURS_ONCE, check_shown_variables, refuse_nothing_to_decide, repeated_neighbours
 from robochoc.formats.schema import SchemaError, schema_for
+from robochoc.formats.symbols import SymbolTable
 from robochoc.formats.team_members import TeamMember
 from robochoc.formats.xml import attribute, line, parsed_xml, read_xml
 from robochoc.model.problem import (
@@ -44,6 +45,7 @@ from robochoc.model.problem import (
     Topic,
     Variable,
 )
+from robochoc.model.symbols import with_table
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -52,6 +54,10 @@ class RobotFile(TeamMember):
 
     context: Context
     """The names that constraints of a scenario can refer to."""
+
+    def with_table(self, names: tuple[str, ...]) -> RobotFile:
+        """Return the file with `names` as the table of symbols."""
+        return replace(self, robot=with_table(self.robot, names)) if names else self
 
     def in_places(self, places: int) -> RobotFile:
         """Return the file with costs counted in units of so many decimal places, or more than now.
@@ -82,14 +88,19 @@ def read_robot(path: Path | str) -> Robot:
     Raises:
         InvalidInputError: with all mistakes of the file.
     """
-    return read_robot_file(Path(path)).robot
+    table = SymbolTable()
+    return with_table(read_robot_file(Path(path), table).robot, table.names)
 
 
-def read_robot_file(path: Path) -> RobotFile:
-    """Return the robot in the XML file `path`, with what the team has to check. Raises `InvalidInputError`."""
+def read_robot_file(path: Path, table: SymbolTable) -> RobotFile:
+    """Return the robot in the XML file `path`, with what the team has to check.
+
+    Its symbols go into the `table`, which may grow as long as other files are read: `with_table` says it at the end.
+    Raises `InvalidInputError`.
+    """
     _check_name(path.stem, path)
     try:
-        return _Reader(path, read_xml(path, "instance")).whole()
+        return _Reader(path, read_xml(path, "instance"), table).whole()
     except SchemaError as refused:
         raise InvalidInputError([*refused.diagnostics, *_other_mistakes(path, refused)]) from None
 
@@ -104,7 +115,8 @@ def robot_in(content: bytes, name: str) -> Robot:
     """
     path = Path(f"{name}.xml")
     _check_name(name, path)
-    return _Reader(path, parsed_xml(content, path, "instance")).whole().robot
+    table = SymbolTable()
+    return with_table(_Reader(path, parsed_xml(content, path, "instance"), table).whole().robot, table.names)
 
 
 def _other_mistakes(path: Path, refused: SchemaError) -> list[Diagnostic]:
@@ -116,7 +128,7 @@ def _other_mistakes(path: Path, refused: SchemaError) -> list[Diagnostic]:
         return []
     lines = {mistake.line for mistake in refused.diagnostics}
     try:
-        _Reader(path, tree).whole()
+        _Reader(path, tree, SymbolTable()).whole()
     except InvalidInputError as invalid:
         return [mistake for mistake in invalid.diagnostics if mistake.line not in lines]
     return []
@@ -133,7 +145,8 @@ def _check_name(name: str, path: Path) -> None:
 class _Reader:
     """Walks through one `instance`, which the schema has found valid; every mistake goes into one report."""
 
-    def __init__(self, path: Path, instance: etree._Element) -> None:
+    def __init__(self, path: Path, instance: etree._Element, table: SymbolTable) -> None:
+        self._table = table
         self._name = path.stem
         self._instance = instance
         self._report = DiagnosticCollector(str(path))
@@ -143,10 +156,11 @@ class _Reader:
         presentation = next(self._instance.iterchildren("presentation"))
         kind = ProblemKind(attribute(presentation, "type"))
         variables = self._variables(self._domains())
-        topics = self._topics()
+        symbolic = {one.name: bool(one.domain.symbols) for one in variables}
+        topics = self._topics([name for name, is_symbol in symbolic.items() if is_symbol])
         model = ConstraintModel(attribute(presentation, "constraintModel") or ConstraintModel.TKC)
         units = self._units(presentation, kind)
-        context = Context(kind, units, model, self._own, self._definitions(kind, units))
+        context = Context(kind, units, model, self._own, self._definitions(kind, units), symbolic)
         private = self._constraints(self._instance, context, read_private)
         copies: dict[str, tuple[Constraint, ...]] = {}
         parents = tuple(self._parents(context))
@@ -175,7 +189,7 @@ class _Reader:
             with self._report.at(line(element)):
                 check_unique("domain", attribute(element, "name"), domains)
                 domains[attribute(element, "name")] = None
-                domains[attribute(element, "name")] = read_domain(element)
+                domains[attribute(element, "name")] = read_domain(element, self._table)
         return domains
 
     def _variables(self, domains: Mapping[str, Domain | None]) -> tuple[Variable, ...]:
@@ -196,11 +210,11 @@ class _Reader:
             self._report.finish()  # whatever else is wrong may follow from it
         return tuple(variables)
 
-    def _topics(self) -> tuple[Topic, ...]:
+    def _topics(self, symbolic: Collection[str]) -> tuple[Topic, ...]:
         topics: dict[str, Topic] = {}
         for element in self._elements("topics", "topic", "nbTopics"):
             with self._report.at(line(element)):
-                topic = read_topic(element, self._own)
+                topic = read_topic(element, self._own, symbolic)
                 check_unique("topic", topic.name, topics)
                 topics[topic.name] = topic
         return tuple(topics.values())
@@ -215,7 +229,7 @@ class _Reader:
     def _definitions(self, kind: ProblemKind, units: CostUnits) -> dict[str, Definition | None]:
         definitions: dict[str, Definition | None] = {}
         for element in self._elements("relations", "relation", "nbRelations"):
-            self._define(element, lambda one: read_relation(one, units), definitions)
+            self._define(element, lambda one, code: read_relation(one, units, code), definitions)
             with self._report.at(line(element)):
                 check_semantics(Semantics(attribute(element, "semantics")), kind)
         for element in self._elements("predicates", "predicate", "nbPredicates"):
@@ -229,7 +243,7 @@ class _Reader:
     def _define(
         self,
         element: etree._Element,
-        read: Callable[[etree._Element], Definition],
+        read: Callable[[etree._Element, Callable[[str], int]], Definition],
         definitions: dict[str, Definition | None],
     ) -> None:
         name = attribute(element, "name")
@@ -237,7 +251,8 @@ class _Reader:
             check_unique("definition", name, definitions)
             definitions[name] = None
             refuse_predefined(name)
-            definitions[name] = read(element)
+            place = self._report.file, line(element)
+            definitions[name] = read(element, lambda word: self._table.mentioned(word, *place))
 
     def _constraints(
         self,

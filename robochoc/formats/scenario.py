@@ -13,6 +13,7 @@ from lxml import etree
 from robochoc.formats.constraints import Context, read_shared
 from robochoc.formats.costs import places_used
 from robochoc.formats.diagnostics import Diagnostic, DiagnosticCollector, InvalidInputError, MistakeError, shortened
+from robochoc.formats.extension import integer
 from robochoc.formats.robot import RobotFile, read_robot_file
 from robochoc.formats.rules import (
     NOBODY_LEFT,
@@ -20,6 +21,7 @@ from robochoc.formats.rules import (
     check_added_robot,
     check_constraint_of_added_robot,
 )
+from robochoc.formats.symbols import SymbolTable, check_kinds, kinds_of
 from robochoc.formats.xml import attribute, line, read_xml
 from robochoc.model.change import apply_changes
 from robochoc.model.problem import (
@@ -46,13 +48,15 @@ def has_scenario(folder: Path) -> bool:
     return os.path.lexists(folder / SCENARIO)
 
 
-def read_scenario(folder: Path, team: Team | None, files: Mapping[str, RobotFile]) -> tuple[ScenarioEvent, ...]:
+def read_scenario(
+    folder: Path, team: Team | None, files: Mapping[str, RobotFile], table: SymbolTable
+) -> tuple[ScenarioEvent, ...]:
     """Return the events of the scenario in `folder`, each of which the team as it stands then can take.
 
     `team` is None when the robots' `files` have mistakes: then only the scenario's own mistakes are looked for. Files
-    of added robots lie in the folder or below. Raises `InvalidInputError`.
+    of added robots lie in the folder or below. Symbols go into the `table`. Raises `InvalidInputError`.
     """
-    return _Reader(folder, team, files).events()
+    return _Reader(folder, team, files, table).events()
 
 
 def places_of_scenario(folder: Path) -> int:
@@ -65,7 +69,7 @@ def places_of_scenario(folder: Path) -> int:
     for element in root.iter("add_agent"):
         with suppress(InvalidInputError, MistakeError):
             path = _inside(folder, attribute(element, "file"))
-            places = max(places, read_robot_file(path).robot.costs.places)
+            places = max(places, read_robot_file(path, SymbolTable()).robot.costs.places)
     return places
 
 
@@ -76,8 +80,9 @@ class _Reader:
     that: one mistake is reported once.
     """
 
-    def __init__(self, folder: Path, team: Team | None, files: Mapping[str, RobotFile]) -> None:
+    def __init__(self, folder: Path, team: Team | None, files: Mapping[str, RobotFile], table: SymbolTable) -> None:
         self._folder = folder
+        self._table = table
         self._path = folder / SCENARIO
         self._team = team
         self._contexts: dict[str, Context] = {name: file.context for name, file in files.items()}
@@ -124,7 +129,29 @@ class _Reader:
             if robot:
                 yield line(element), AddAgent(robot)
         else:
-            yield line(element), _change(element)
+            yield line(element), self._change(element)
+
+    def _change(self, element: etree._Element) -> Change:
+        """Return what an element says that needs no other file."""
+        match element.tag:
+            case "remove_agent":
+                return RemoveAgent(attribute(element, "name"))
+            case "remove_value":
+                return RemoveValue(attribute(element, "variable"), self._value(element))
+            case "add_value":
+                return AddValue(attribute(element, "variable"), self._value(element))
+            case _:
+                return RemoveConstraint(*(attribute(element, name) for name in ("agent", "parent", "name")))
+
+    def _value(self, element: etree._Element) -> int:
+        """Return an integer, or the code of a symbol, as the variable's domain takes it. Raises `MistakeError`."""
+        variable, word = attribute(element, "variable"), attribute(element, "value")
+        if self._team is None:
+            return 0  # nothing is known of the variable
+        known = self._team.variables.get(variable)
+        if known and known.domain.symbols:
+            return self._table.declared(word)
+        return integer(word)
 
     def _added(self, name: str) -> Robot | None:
         """Return the robot in the file `name`; None: it has mistakes, which are reported with that file's lines."""
@@ -136,7 +163,7 @@ class _Reader:
         own = Path(name).stem
         there_already = self._team is not None and own in self._team
         try:
-            file = read_robot_file(self._folder / name).in_places(self._places)
+            file = read_robot_file(self._folder / name, self._table).in_places(self._places)
             if not there_already:
                 _refuse_parts(file)
         except InvalidInputError as invalid:
@@ -167,6 +194,8 @@ class _Reader:
 
     def _apply(self, change: Change, place: int) -> None:
         """Change the team. Raises `MistakeError` where it cannot take that."""
+        if self._team is not None and isinstance(change, AddConstraint):
+            check_kinds(change.constraint, kinds_of(self._team.robots))
         while self._team is not None:
             try:
                 self._team = apply_changes(self._team, [change])
@@ -189,19 +218,6 @@ class _Reader:
     def _excused(self, bad: ChangeError) -> bool:
         """Return whether `bad` may only follow from a mistake that was reported already."""
         return bool(bad.missing) and (self._unread or bad.missing in self._missed)
-
-
-def _change(element: etree._Element) -> Change:
-    """Return what an element says that needs no other file."""
-    match element.tag:
-        case "remove_agent":
-            return RemoveAgent(attribute(element, "name"))
-        case "remove_value":
-            return RemoveValue(attribute(element, "variable"), int(attribute(element, "value")))
-        case "add_value":
-            return AddValue(attribute(element, "variable"), int(attribute(element, "value")))
-        case _:
-            return RemoveConstraint(*(attribute(element, name) for name in ("agent", "parent", "name")))
 
 
 def _inside(folder: Path, name: str) -> Path:

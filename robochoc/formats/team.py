@@ -10,10 +10,12 @@ from pathlib import Path
 from robochoc.formats.diagnostics import Diagnostic, InvalidInputError, encodable
 from robochoc.formats.robot import RobotFile, read_robot_file
 from robochoc.formats.scenario import SCENARIO, has_scenario, places_of_scenario, read_scenario
+from robochoc.formats.symbols import SymbolTable
 from robochoc.formats.team_members import TeamMembers
 from robochoc.formats.validation import check_between_robots, note_valid
 from robochoc.model.priorities import natural_key, priority_order
 from robochoc.model.problem import ProblemKind, Robot, Team
+from robochoc.model.symbols import with_table_everywhere
 
 _NEXT_STEP = "give a folder with one XML file per robot; 'robochoc generate queens3d --n 4' writes one"
 
@@ -47,24 +49,28 @@ def read_team(folder: Path | str) -> Team:
     if not paths:
         raise _invalid(folder, "there is no robot here: no XML file", _NEXT_STEP)
     found: list[Diagnostic] = []
+    table = SymbolTable()
     files: dict[str, RobotFile] = {}
     for path in paths:
         try:
-            files[path.stem] = read_robot_file(path)
+            files[path.stem] = read_robot_file(path, table)
         except InvalidInputError as invalid:
             found.extend(invalid.diagnostics)
-    files = _in_one_unit(folder, files, found)
+    files = {name: file.with_table(table.names) for name, file in _in_one_unit(folder, files, found).items()}
     members = TeamMembers(files, frozenset(path.stem for path in paths) - files.keys())
     found.extend(check_between_robots(members))
     team = None if found else _whole(folder, members)
     if has_scenario(folder):
         try:
-            scenario = read_scenario(folder, team, files)
+            scenario = read_scenario(folder, team, files, table)
             team = team and replace(team, scenario=scenario)
         except InvalidInputError as invalid:
             found.extend(invalid.diagnostics)
+    if not found:
+        found.extend(table.undeclared())
     if team is None or found:
         raise InvalidInputError(found)
+    team = with_table_everywhere(team, table.names)
     note_valid(team)
     return team
 

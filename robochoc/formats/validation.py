@@ -36,6 +36,7 @@ from robochoc.formats.rules import (
     check_constraint_of_added_robot,
 )
 from robochoc.formats.scopes import misplaced_constraints, misplaced_parts, missing_shown_variables
+from robochoc.formats.symbols import check_kinds, different_tables, kinds_of, mistyped_constraints
 from robochoc.formats.team_members import TeamMember, TeamMembers
 from robochoc.model.change import apply_changes
 from robochoc.model.priorities import priority_order
@@ -162,6 +163,8 @@ def _between(members: TeamMembers) -> Iterator[Diagnostic]:
     yield from mixed_kinds(members)
     yield from mixed_costs(members)
     yield from shared_variables(members)
+    yield from different_tables(members)
+    yield from mistyped_constraints(members)
     scopes = list(misplaced_constraints(members))
     yield from scopes
     yield from misplaced_parts(members)
@@ -257,6 +260,15 @@ def _robots(team: Team, event: ScenarioEvent = _NOTHING) -> dict[str, Robot]:
     return {robot.name: robot for robot in (*team.robots, *coming)}
 
 
+def _check_symbol(variable: str, value: int, robots: Mapping[str, Robot]) -> None:
+    """Raise `MistakeError` where a symbolic variable is to have a value, or to lose one, that stands for no symbol."""
+    for robot in robots.values():
+        for one in robot.variables:
+            if one.name == variable and one.domain.symbols and not 0 <= value < len(one.domain.symbols):
+                message = f"the value {value} of '{shortened(variable)}' is no symbol"
+                raise MistakeError(message, f"there are {len(one.domain.symbols)}, with the codes 0, 1, ...")
+
+
 def _check_same_places(robot: Robot, robots: Mapping[str, Robot]) -> None:
     """Raise `MistakeError` unless a robot that joins counts costs in the unit of those that are there."""
     for other in robots.values():
@@ -277,10 +289,12 @@ def _of_the_change(robots: Mapping[str, Robot], change: Change, place: Location)
                     check_constraint_of_added_robot(constraint)
             case AddConstraint(agent, _, constraint):
                 check_added_constraint(constraint)
+                check_kinds(constraint, kinds_of(robots.values()))
                 if agent in robots:
                     yield from Objects().mistakes_of_constraint(constraint, robots[agent])
-            case AddValue(_, value) | RemoveValue(_, value):
+            case AddValue(variable, value) | RemoveValue(variable, value):
                 check_integer(value)
+                _check_symbol(variable, value, robots)
             case _:
                 pass
     except MistakeError as mistake:

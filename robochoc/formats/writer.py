@@ -27,6 +27,9 @@ from robochoc.model.problem import (
     Topic,
 )
 
+_TABLE = "symbols"
+"""The name of the domain that lists all symbols of the team."""
+
 
 def robot_xml(robot: Robot) -> bytes:
     """Return `robot` as the content of its XML file: what `read_robot` reads back.
@@ -65,10 +68,20 @@ def _write_units(presentation: etree._Element, units: CostUnits) -> None:
 
 def _write_domains(instance: etree._Element, robot: Robot) -> None:
     domains = _by_name(variable.domain for variable in robot.variables)
-    section = etree.SubElement(instance, "domains", nbDomains=str(len(domains)))
+    table = robot.symbol_table
+    section = etree.SubElement(instance, "domains", nbDomains=str(len(domains) + bool(table)))
+    if table:  # no variable has it: it says which code each symbol has, so that every file of the team says the same
+        name = next(
+            name for number in itertools.count(1) if (name := _TABLE + f".{number}" * (number > 1)) not in domains
+        )
+        etree.SubElement(section, "domain", name=name, type="symbolic").text = " ".join(table)
     for domain in domains.values():
         element = etree.SubElement(section, "domain", name=domain.name, nbValues=str(len(domain)))
-        element.text = " ".join(map(_range, domain.ranges))
+        if domain.symbols:
+            element.set("type", "symbolic")
+            element.text = " ".join(str(domain.label(value)) for value in domain)
+        else:
+            element.text = " ".join(map(_range, domain.ranges))
 
 
 def _range(part: range) -> str:
@@ -94,38 +107,46 @@ def _write_definitions(instance: etree._Element, robot: Robot) -> None:
     definitions = _by_name(constraint.definition for constraint in constraints)
     relations = [one for one in definitions.values() if isinstance(one, Relation)]
     predicates = [one for one in definitions.values() if isinstance(one, Predicate) and one != PREDEFINED.get(one.name)]
+    table = robot.symbol_table
     functions = [one for one in definitions.values() if isinstance(one, Function)]
     if relations:
         section = etree.SubElement(instance, "relations", nbRelations=str(len(relations)))
         for relation in relations:
-            _write_relation(section, relation, robot.costs)
+            _write_relation(section, relation, robot)
     if predicates:
         section = etree.SubElement(instance, "predicates", nbPredicates=str(len(predicates)))
         for predicate in predicates:
-            _write_expression(etree.SubElement(section, "predicate", name=predicate.name), predicate)
+            _write_expression(etree.SubElement(section, "predicate", name=predicate.name), predicate, table)
     if functions:
         section = etree.SubElement(instance, "functions", nbFunctions=str(len(functions)))
         for function in functions:
             element = etree.SubElement(section, "function", name=function.name)
             element.set("return", "int")
-            _write_expression(element, function)
+            _write_expression(element, function, table)
 
 
-def _write_relation(section: etree._Element, relation: Relation, units: CostUnits) -> None:
+def _write_relation(section: etree._Element, relation: Relation, robot: Robot) -> None:
+    units, table = robot.costs, robot.symbol_table
     element = etree.SubElement(section, "relation", name=relation.name, arity=str(relation.arity))
     element.set("nbTuples", str(len(relation.tuples)))
     element.set("semantics", relation.semantics)
-    tuples = [" ".join(map(str, values)) for values in relation.tuples]
+    tuples = [
+        " ".join(table[value] if place in relation.symbolic else str(value) for place, value in enumerate(values))
+        if relation.symbolic
+        else " ".join(map(str, values))
+        for values in relation.tuples
+    ]
     if relation.semantics is Semantics.SOFT:
         element.set("defaultCost", cost_text(relation.default_cost, units))
         tuples = [f"{cost_text(cost, units)}:{values}" for cost, values in zip(relation.costs, tuples, strict=True)]
     element.text = "|".join(tuples)
 
 
-def _write_expression(element: etree._Element, definition: Predicate | Function) -> None:
-    etree.SubElement(element, "parameters").text = " ".join(f"int {name}" for name in definition.parameters)
+def _write_expression(element: etree._Element, definition: Predicate | Function, table: Sequence[str]) -> None:
+    kinds = {name: "symbol" if name in definition.symbolic else "int" for name in definition.parameters}
+    etree.SubElement(element, "parameters").text = " ".join(f"{kind} {name}" for name, kind in kinds.items())
     expression = etree.SubElement(element, "expression")
-    etree.SubElement(expression, "functional").text = text(definition.body)
+    etree.SubElement(expression, "functional").text = text(definition.body, definition.symbolic, table)
 
 
 def _write_constraints(holder: etree._Element, constraints: Sequence[Constraint], units: CostUnits) -> None:

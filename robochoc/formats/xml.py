@@ -66,7 +66,7 @@ def read_tree(path: Path, most: int) -> etree._Element:
 
 def parsed_xml(content: bytes, path: Path, root: str) -> etree._Element:
     """Return the root element of `content`, as `read_xml` does for a file at `path`. The content is not trusted."""
-    tree = parsed_tree(content, path)
+    tree = parsed_tree(content, path, MAX_BYTES)
     if tree.tag != root:
         what = f"the root element is <{etree.QName(tree).localname}>"
         if tree.tag.endswith(f"}}{root}"):
@@ -79,7 +79,7 @@ def parsed_xml(content: bytes, path: Path, root: str) -> etree._Element:
     return tree
 
 
-def parsed_tree(content: bytes, path: Path, most: int = MAX_BYTES) -> etree._Element:
+def parsed_tree(content: bytes, path: Path, most: int) -> etree._Element:
     """Return the root element of `content`, which is not trusted: no entities, no DTD, at most `most` bytes.
 
     Raises:

@@ -19,7 +19,7 @@ from robochoc.formats.names import is_name
 from robochoc.journal.events import Given
 from robochoc.model.cost_units import PLAIN_COSTS, Cost, CostUnits
 from robochoc.model.costs import flat_units
-from robochoc.model.problem import INFINITE, Constraint, Domain, Relation, Robot, Team, Variable
+from robochoc.model.problem import INFINITE, Constraint, Relation, Robot, Team, Variable
 from robochoc.solver.agent_problem import DEFAULT_PARAMETERS, RunParameters
 from robochoc.solver.explanation import Invalidated
 
@@ -143,7 +143,7 @@ def _as_given(robot: Robot, shown: tuple[str, ...], empty: Collection[str]) -> R
 def _with_domain(robot: Robot, names: Collection[str], ranges: tuple[range, ...]) -> tuple[Variable, ...]:
     """Return the variables of `robot`, those in `names` with the domain `ranges`."""
     return tuple(
-        replace(variable, domain=Domain(variable.domain.name, ranges)) if variable.name in names else variable
+        replace(variable, domain=replace(variable.domain, ranges=ranges)) if variable.name in names else variable
         for variable in robot.variables
     )
 

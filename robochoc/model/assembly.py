@@ -14,6 +14,7 @@ from robochoc.model.constraint import Constraint, ConstraintModel, Variable
 from robochoc.model.cost_units import PLAIN_COSTS, CostUnits
 from robochoc.model.priorities import priority_order
 from robochoc.model.problem import Child, Parent, ProblemKind, Robot, Team, Topic
+from robochoc.model.symbols import with_marked_symbols, with_table_everywhere
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -45,6 +46,8 @@ def assemble(
 ) -> Team:
     """Return the team in which robots own `variables` and share `constraints`.
 
+    Which parameters of definitions are symbols follows from the domains.
+
     Args:
         name: The team's name.
         variables: The variables of each robot, by its name; the robots are in priority order, the highest first.
@@ -57,11 +60,12 @@ def assemble(
     Raises:
         ValueError: if a constraint has a variable that no robot owns.
     """
+    symbolic = {one.name: one.domain.symbols for own in variables.values() for one in own if one.domain.symbols}
     links = _Links(variables)
-    for constraint in constraints:
+    for constraint in with_marked_symbols(constraints, symbolic):
         links.add(constraint)
     for robot, parts in extras.parts.items():
-        for part in parts:
+        for part in with_marked_symbols(parts, symbolic):
             links.add_part(robot, part)
     for one, other in extras.links:
         links.link(one, other)
@@ -80,7 +84,7 @@ def assemble(
         )
         for number, (robot, own) in enumerate(variables.items())
     )
-    return Team(name, robots)
+    return with_table_everywhere(Team(name, robots), next(iter(symbolic.values()), ()))
 
 
 class _Links:

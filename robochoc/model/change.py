@@ -212,21 +212,24 @@ def _less(team: Team, variable: str, value: int) -> Domain:
     domain = _domain(team, variable)
     if value not in domain:
         ranges = (f"{part[0]}..{part[-1]}" if len(part) > 1 else f"{part[0]}" for part in domain.ranges)
-        hint = f"its domain is {shortened(' '.join(ranges))}" if domain.ranges else "its domain is empty"
-        raise ChangeError(f"{quoted(variable)} has no value {value}", hint)
+        held = map(str, map(domain.label, domain)) if domain.symbols else ranges
+        hint = f"its domain is {shortened(' '.join(held))}" if domain.ranges else "its domain is empty"
+        raise ChangeError(f"{quoted(variable)} has no value {domain.label(value)}", hint)
     parts: list[range] = []
     for part in domain.ranges:
         pieces = (range(part.start, value), range(value + 1, part.stop)) if value in part else (part,)
         parts += [piece for piece in pieces if piece]
-    return Domain(domain.name, tuple(parts))
+    return replace(domain, ranges=tuple(parts))
 
 
 def _more(team: Team, variable: str, value: int) -> Domain:
     domain = _domain(team, variable)
     if value in domain:
-        raise ChangeError(f"{quoted(variable)} has the value {value} already", "add one that it does not have")
+        raise ChangeError(
+            f"{quoted(variable)} has the value {domain.label(value)} already", "add one that it does not have"
+        )
     ranges = sorted((*domain.ranges, range(value, value + 1)), key=lambda part: part.start)
-    return Domain(domain.name, tuple(ranges))
+    return replace(domain, ranges=tuple(ranges))
 
 
 def _domain(team: Team, variable: str) -> Domain:

@@ -75,7 +75,7 @@ class Domain:
 
     def label(self, value: int) -> int | str:
         """Return `value` as its user wrote it: its name where the domain is symbolic."""
-        return self.symbols[value] if self.symbols else value
+        return self.symbols[value] if 0 <= value < len(self.symbols) else value
 
 
 @dataclass(frozen=True)
@@ -97,6 +97,7 @@ class Relation:
         tuples: The tuples.
         costs: The cost of each tuple. Empty unless the semantics is `soft`.
         default_cost: The cost of the tuples that a soft relation does not list.
+        symbolic: The columns that hold symbols.
     """
 
     name: str
@@ -105,6 +106,7 @@ class Relation:
     tuples: tuple[tuple[int, ...], ...]
     costs: tuple[float, ...] = ()
     default_cost: float = 0
+    symbolic: tuple[int, ...] = ()
 
     @cached_property
     def _listed(self) -> dict[tuple[int, ...], float]:
@@ -128,11 +130,15 @@ class Relation:
 
 @dataclass(frozen=True)
 class Predicate:
-    """A constraint's definition in intension: a Boolean expression over formal integer `parameters`."""
+    """A constraint's definition in intension: a Boolean expression over formal `parameters`.
+
+    They are integers; those in `symbolic` are symbols, and so are constants that they are compared with.
+    """
 
     name: str
     parameters: tuple[str, ...]
     body: Expression
+    symbolic: tuple[str, ...] = ()
 
     def holds(self, arguments: Sequence[int]) -> bool:
         """Return whether the body is true for `arguments`. An undefined body (division by zero) is false."""
@@ -146,12 +152,14 @@ class Predicate:
 class Function:
     """A constraint's definition in intension whose value is its cost: an integer expression over `parameters`.
 
-    The value counts whole units of the user (`CostUnits.places` does not move its point).
+    The value counts whole units of the user (`CostUnits.places` does not move its point). As in a predicate, parameters
+    in `symbolic` are symbols.
     """
 
     name: str
     parameters: tuple[str, ...]
     body: Expression
+    symbolic: tuple[str, ...] = ()
 
     def cost(self, arguments: Sequence[int]) -> float:
         """Return the cost of `arguments`. Where the body is undefined (division by zero) it is `INFINITE`."""

@@ -131,6 +131,7 @@ class Robot:
             partially known constraint.
         weight: How much its withdrawal counts: one robot of weight 3 as much as three of weight 1.
         costs: The unit of its costs, and whether their sum is minimised or maximised, as its file says.
+        symbols: The names of the team's symbols, where no domain of its own says them.
         told_in: Of a robot with normalised costs (`model/costs.py`): the units in which its costs are told to the user.
     """
 
@@ -145,12 +146,18 @@ class Robot:
     shown: tuple[str, ...] = ()
     weight: int = 1
     costs: CostUnits = PLAIN_COSTS
+    symbols: tuple[str, ...] = ()
     told_in: CostUnits = PLAIN_COSTS
 
     @cached_property
     def shared(self) -> tuple[Constraint, ...]:
         """The shared constraints that this robot holds: those in whose scopes it is the lowest robot."""
         return tuple(constraint for parent in self.parents for constraint in parent.constraints)
+
+    @cached_property
+    def symbol_table(self) -> tuple[str, ...]:
+        """The names of the team's symbols, as far as this robot knows: the value 2 stands for the one at place 2."""
+        return next((one.domain.symbols for one in self.variables if one.domain.symbols), self.symbols)
 
     @cached_property
     def interface(self) -> tuple[str, ...]:

@@ -18,12 +18,12 @@ from robochoc.formats import write_team
 from robochoc.generators.queens3d import queens3d
 from robochoc.sniffer.viewer import Viewer
 from tests.support.faults import PROGRAM, Run, running
-from tests.support.limits import wait_until
+from tests.support.limits import HANG_S, wait_until
 from tests.support.program import ROOT, robochoc_within
 from tests.support.sniffer_server import journal_of, run_events
 
 pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="looks into /proc")
-LONG = ("--timeout", "60")
+LONG = ("--timeout", "3600")
 
 
 @pytest.fixture(scope="module")
@@ -43,7 +43,7 @@ def url_of(run: Run) -> str:
 
 
 def about(url: str) -> dict[str, object]:
-    with urlopen(f"{url}about", timeout=20) as answer:  # noqa: S310 - our own server
+    with urlopen(f"{url}about", timeout=HANG_S) as answer:  # noqa: S310 - our own server
         found: dict[str, object] = json.load(answer)
     return found
 
@@ -72,7 +72,7 @@ shown = sys.argv[1]
 file = Path(shown.removeprefix("file://"))
 modes = [stat.S_IMODE(path.stat().st_mode) for path in (file, file.parent)]
 url = re.search(r'url=(http://[^"]+)"', file.read_text())[1]
-urlopen(url + "about", timeout=20).close()
+urlopen(url + "about", timeout={hang_s}).close()
 Path({told!r} + ".part").write_text(json.dumps([sys.argv, dict(os.environ), modes, url]))
 Path({told!r} + ".part").rename({told!r})
 """
@@ -83,7 +83,7 @@ def test_no_process_shows_the_secret_address_to_others(
     command: str, teams: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     program, browser = tmp_path / "browser", tmp_path / "what the browser was told"
-    program.write_text(BROWSER.format(python=sys.executable, told=str(browser)))
+    program.write_text(BROWSER.format(python=sys.executable, told=str(browser), hang_s=HANG_S))
     program.chmod(0o700)
     (tmp_path / "tmp").mkdir()
     monkeypatch.setenv("BROWSER", str(program))

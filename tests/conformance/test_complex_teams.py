@@ -25,6 +25,7 @@ from robochoc.solver.domain import CompiledDomain, compile_domain
 from robochoc.verification.checker import violations
 from tests.support.brute_force import solutions
 from tests.support.complex_problems import random_complex_team
+from tests.support.limits import HANG_S
 from tests.support.loose_problems import any_order, loosened
 from tests.support.random_options import random_schedule
 from tests.support.solver_networks import brute_force, compiled_by_brute_force
@@ -105,7 +106,7 @@ def test_processes_agree_with_brute_force(teams: int) -> None:
     with AceProcess() as solver:
         for _ in range(teams):
             team = loosened(random_complex_team(chance), chance)
-            outcome = solve(team, Options(timeout=60, cache=False, order=any_order(team, chance)), solver=solver)
+            outcome = solve(team, Options(timeout=HANG_S, cache=False, order=any_order(team, chance)), solver=solver)
             assert outcome.verdict is (Verdict.SOLUTION if any(solutions(team)) else Verdict.NO_SOLUTION)
 
 

@@ -17,6 +17,7 @@ from robochoc.run.registry import protocol_named, protocol_names
 from robochoc.verification.checker import violations
 from tests.support.brute_force import solutions
 from tests.support.examples import examples
+from tests.support.limits import HANG_S
 from tests.support.loose_problems import any_order, loosened, minimum_cost
 from tests.support.problems import ON_ONE_MACHINE, random_team
 from tests.support.random_options import MAX_MESSAGES, random_options
@@ -90,7 +91,7 @@ def test_processes_agree_with_brute_force(protocol: str, batch: int) -> None:
     chance = Random(f"processes {protocol} {batch}")
     for _ in range(part_of(25 if batch else 3, protocol, batch)):
         team = team_for(protocol, chance)
-        agrees(team, Options(protocol=protocol, order=any_order(team, chance), timeout=60))
+        agrees(team, Options(protocol=protocol, order=any_order(team, chance), timeout=HANG_S))
 
 
 @pytest.mark.parametrize("batch", [0, pytest.param(1, marks=pytest.mark.slow)])
@@ -103,7 +104,7 @@ def test_withdrawing_leaves_a_placement_that_nobody_could_join(runtime: Runtime,
         if next(solutions(team), None):
             continue
         wanted -= 1
-        outcome = solve(team, Options(runtime=runtime, withdraw=Withdrawal.MAXIMAL, timeout=60))
+        outcome = solve(team, Options(runtime=runtime, withdraw=Withdrawal.MAXIMAL, timeout=HANG_S))
         assert outcome.verdict is Verdict.SOLUTION
         assert outcome.withdrawn
         assert not joinable(team, outcome)

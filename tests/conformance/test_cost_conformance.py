@@ -15,6 +15,7 @@ from robochoc.run.registry import protocol_named, protocol_names
 from robochoc.solver.ace import AceProcess
 from robochoc.solver.encoding import UnsupportedError
 from tests.support.cost_problems import minimum_withdrawal, random_complex_cost_team, random_cost_team
+from tests.support.limits import HANG_S
 from tests.support.loose_problems import any_order, loosened, minimum_cost
 from tests.support.problems import ON_ONE_MACHINE, random_team
 from tests.support.random_options import MAX_MESSAGES, on_runtime, random_options
@@ -76,7 +77,7 @@ def test_the_least_cost_is_found_in_processes(protocol: str, batch: int, warm: A
     chance = Random(f"costs processes {protocol} {batch}")
     for _ in range(16 if batch else 2):
         team = team_for(protocol, chance)
-        agrees(team, Options(protocol=protocol, order=any_order(team, chance), timeout=60), warm)
+        agrees(team, Options(protocol=protocol, order=any_order(team, chance), timeout=HANG_S), warm)
 
 
 @pytest.mark.parametrize("protocol", INCOMPLETE)

@@ -31,6 +31,7 @@ from robochoc.model.problem import (
 from robochoc.run import Options, Runtime, solve
 from robochoc.run.registry import protocol_named, protocol_names
 from tests.support.brute_force import solutions
+from tests.support.limits import HANG_S
 from tests.support.loose_problems import loosened
 from tests.support.problems import ON_ONE_MACHINE, random_team, team_of
 from tests.support.random_changes import random_changing_team, stages
@@ -86,7 +87,7 @@ def test_any_protocol_begins_anew_after_each_change(protocol: str, batch: int) -
 def test_processes_go_through_epochs_as_well(protocol: str, batch: int) -> None:
     chance = Random(f"processes {protocol} {batch}")
     for _ in range(12 if batch else 1):
-        agrees(random_changing_team(chance, 6), Options(protocol=protocol, timeout=60))
+        agrees(random_changing_team(chance, 6), Options(protocol=protocol, timeout=HANG_S))
 
 
 def test_epochs_follow_an_order_that_is_asked_for() -> None:
@@ -161,7 +162,7 @@ def test_an_event_in_mid_run_ends_the_epoch_without_a_verdict() -> None:
     team = team_of(dict.fromkeys("ABCDEFGHI", range(1, 8)), constraints)
     team = replace(team, scenario=(ScenarioEvent(leave, after=8),))
     for runtime in ON_ONE_MACHINE:
-        first, second = solve(team, replace(SIMULATED, runtime=runtime, timeout=60)).epochs
+        first, second = solve(team, replace(SIMULATED, runtime=runtime, timeout=HANG_S)).epochs
         assert first.verdict is Verdict.UNKNOWN
         assert sum(first.metrics.messages.values()) >= 8
         assert second.verdict is Verdict.SOLUTION

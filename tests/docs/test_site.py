@@ -12,6 +12,7 @@ import pytest
 
 from robochoc.run.registry import installed_protocols
 from tests.support.browser_pages import watched_page
+from tests.support.limits import HANG_S
 from tests.support.program import ROOT
 
 if TYPE_CHECKING:
@@ -50,7 +51,7 @@ def test_search_works_from_files_and_asks_for_nothing_elsewhere(site: Path, brow
     with watched_page(browser, viewport={"width": 1280, "height": 800}) as (page, complaints, asked):
         page.goto((site / "index.html").as_uri())
         page.fill("input.md-search__input", "nogood")
-        page.wait_for_selector(".md-search-result__article", timeout=60_000)
+        page.wait_for_selector(".md-search-result__article", timeout=HANG_S * 1000)
         assert not [address for address in asked if not address.startswith(("file:", "data:"))]
         assert not complaints
 

@@ -39,6 +39,13 @@ def test_no_test_imports_another() -> None:
     assert found == []
 
 
+def test_limits_for_what_hangs_are_set_in_one_place() -> None:
+    """`tests/support/limits.py`. A `timeout` of few seconds is over in some test; one of many is such a limit."""
+    limit = re.compile(r"\btimeout=[0-9_]{2}")
+    found = [path for path in (ROOT / "tests").rglob("*.py") if limit.search(path.read_text())]
+    assert found == []
+
+
 @pytest.mark.parametrize("path", SOURCES, ids=lambda path: str(path.relative_to(ROOT)))
 def test_untrusted_bytes_reach_neither_eval_nor_pickle(path: Path) -> None:
     """But for what a parent tells the process that it has started, which `multiprocessing` pickles as well."""

@@ -14,7 +14,7 @@ from robochoc.cli.group import cli
 from robochoc.journal.journal import read_journal
 from tests.support.deployments import PAIR, TRIANGLE, Deployment, Program, ended, one_line, written
 from tests.support.journal_entries import entries_of
-from tests.support.limits import wait_until
+from tests.support.limits import HANG_S, wait_until
 
 OBSERVER = ("--role", "observer")
 SNIFFER = (*OBSERVER, "--may", "sniff")
@@ -117,7 +117,7 @@ def test_a_master_that_is_killed_and_the_page_stays(site: Deployment) -> None:
     assert robot.hurried_status() == 4
     url = re.search(r"http://127\S+/", sniffer.errors)
     assert url
-    with urlopen(f"{url[0]}about", timeout=30) as answer:  # noqa: S310 - our own server
+    with urlopen(f"{url[0]}about", timeout=HANG_S) as answer:  # noqa: S310 - our own server
         assert b'"network"' in answer.read()
     sniffer.strike(signal.SIGINT)
     assert sniffer.status() == 4

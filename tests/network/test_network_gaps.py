@@ -76,7 +76,7 @@ def test_an_observers_gap_is_its_own(tmp_path: Path) -> None:
 
 
 def test_a_robots_gap_is_its_loss(tmp_path: Path) -> None:
-    with watched(tmp_path, NetworkSettings(survive=True, patience_s=2)) as run, run.transport("RX3") as transport:
+    with watched(tmp_path, NetworkSettings(survive=True, patience_s=HANG_S)) as run, run.transport("RX3") as transport:
         put_with_a_gap(transport, MASTER, b"anything")
         result = run.wait_for_result()
     assert result.lost == {"RX3": f"{FAR - 3:,} frames of it were lost for good on the way to the master"}

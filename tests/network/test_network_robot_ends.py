@@ -117,8 +117,8 @@ def copies(sender: str, *records: SharedRecord, number: int = 1) -> FrameArrived
 @pytest.mark.parametrize(
     ("told", "why"),
     [
-        ([copies("RC", copy(body="ne(X,"))], "the predicate 'p'"),
-        ([copies("RC", copy(body="(" * 9000))], "the predicate 'p'"),
+        ([copies("RC", copy(body="ne(X,"))], "the definition 'p'"),
+        ([copies("RC", copy(body="(" * 9000))], "the definition 'p'"),
         ([copies("RC", copy(scope=("B", "B", "C")))], "3 arguments where 2"),
         ([copies("RC", copy(scope=("B", "Z")))], "RC holds 'C' over variables that it cannot"),
         ([copies("RC", copy(scope=("A", "C")))], "RC holds 'C' over variables that it cannot"),

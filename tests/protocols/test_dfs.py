@@ -26,6 +26,7 @@ from robochoc.solver.agent_problem import agent_problems
 from robochoc.solver.compiled import LocalProblem
 from tests.support.agents import replies
 from tests.support.examples import count, examples
+from tests.support.limits import HANG_S
 from tests.support.problems import team_of
 
 
@@ -211,7 +212,7 @@ def test_unconnected_parts_have_a_root_each() -> None:
 @pytest.mark.parametrize("seed", range(3))
 def test_processes_build_the_same_tree(seed: int) -> None:
     team = random_graph(Random(f"processes {seed}"))
-    outcome = solve(team, Options(protocol="adopt", runtime=Runtime.PROCESSES, timeout=60))
+    outcome = solve(team, Options(protocol="adopt", runtime=Runtime.PROCESSES, timeout=HANG_S))
     assert outcome.tree == expected(team)
 
 

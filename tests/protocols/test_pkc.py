@@ -25,6 +25,7 @@ from tests.support.agents import replies
 from tests.support.brute_force import solutions
 from tests.support.complex_problems import complex_team, random_complex_team
 from tests.support.examples import count
+from tests.support.limits import HANG_S
 from tests.support.pkc_bytes import changed_elsewhere, nothing_hidden, restated, run, watched
 from tests.support.pkc_problems import (
     SECRETS,
@@ -245,5 +246,5 @@ def test_the_example_is_solved() -> None:
     team = read_team(SECRETS)
     assert {model.model for model in pkc_parts(team).values()} == {ConstraintModel.PKC}
     for runtime in ON_ONE_MACHINE:
-        outcome = solve(team, Options(protocol="abt", runtime=runtime, timeout=60))
+        outcome = solve(team, Options(protocol="abt", runtime=runtime, timeout=HANG_S))
         assert (outcome.verdict, outcome.verified) == (Verdict.SOLUTION, True)

@@ -12,6 +12,7 @@ from pathlib import Path
 import pytest
 
 from tests.support.debian_ros import SYSTEM_PYTHON, Core, install, lines, until
+from tests.support.limits import HANG_S
 from tests.support.program import PROGRAM, ROOT
 
 pytestmark = [pytest.mark.slow, pytest.mark.timeout(300)]
@@ -104,7 +105,9 @@ def written(folder: Path, text: str) -> str:
 
 def solve(*words: str, env: dict[str, str] | None = None) -> str:
     """What is said on stderr."""
-    done = subprocess.run([PROGRAM, "solve", *words], env=env, capture_output=True, text=True, timeout=120, check=False)
+    done = subprocess.run(
+        [PROGRAM, "solve", *words], env=env, capture_output=True, text=True, timeout=HANG_S, check=False
+    )
     assert done.returncode == 0, done.stderr
     return done.stderr
 
@@ -117,13 +120,13 @@ def waypoints() -> list[str]:
 def test_debian_accepts_our_bags(tmp_path: Path) -> None:
     bag = tmp_path / "run.bag"
     solve(*QUEENS, "--ros", f"rosbag:{bag}")
-    info = subprocess.run(["rosbag", "info", str(bag)], capture_output=True, text=True, timeout=60, check=False)
+    info = subprocess.run(["rosbag", "info", str(bag)], capture_output=True, text=True, timeout=HANG_S, check=False)
     assert (info.returncode, info.stderr) == (0, "")
     assert "messages:    16\n" in info.stdout
     assert "geometry_msgs/PoseStamped [d3812c3cbc69362b77dc0b19b345f8f5]" in info.stdout
     for topic in waypoints():
         assert f"{topic}   1 msg     : geometry_msgs/PoseStamped\n" in info.stdout
-    check = subprocess.run(["rosbag", "check", str(bag)], capture_output=True, text=True, timeout=60, check=False)
+    check = subprocess.run(["rosbag", "check", str(bag)], capture_output=True, text=True, timeout=HANG_S, check=False)
     assert (check.returncode, check.stderr) == (0, "")
     assert "missing" not in check.stdout
 
@@ -142,10 +145,10 @@ def test_a_subscriber_receives_every_waypoint(
     bag = tmp_path / "run.bag"
     said = solve(*team, "--ros", "rospy", "--ros", f"rosbag:{bag}", "--frame", "hall", env=core.env)
     assert not [line for line in said.splitlines() if "waypoints" not in line]
-    told, errors = listener.communicate("enough\n", timeout=60)
+    told, errors = listener.communicate("enough\n", timeout=HANG_S)
     assert errors == ""
     read = subprocess.run(
-        [SYSTEM_PYTHON, written(tmp_path, READER), str(bag)], capture_output=True, text=True, timeout=60, check=True
+        [SYSTEM_PYTHON, written(tmp_path, READER), str(bag)], capture_output=True, text=True, timeout=HANG_S, check=True
     )
     heard, recorded = lines(told), lines(read.stdout)
     for topic in topics:
@@ -168,7 +171,7 @@ def test_one_that_stands_still_does_not_keep_us(core: Core, tmp_path: Path) -> N
     assert publisher.stdout.readline() == "began\n"
     listener.send_signal(signal.SIGSTOP)
     began = time.monotonic()
-    said, errors = publisher.communicate(timeout=60)
+    said, errors = publisher.communicate(timeout=HANG_S)
     assert "a subscriber has read nothing for 10 s; see `rostopic info` for who it is" in said
     assert (publisher.returncode, errors) == (0, "")
     assert time.monotonic() - began < 40
@@ -180,7 +183,7 @@ def test_the_master_dies(tmp_path: Path) -> None:
         assert publisher.stdout is not None
         assert publisher.stdout.readline() == "began\n"
         core.end()
-        said, errors = publisher.communicate(timeout=60)
+        said, errors = publisher.communicate(timeout=HANG_S)
     assert "no ROS master answers" in said
     assert (publisher.returncode, errors) == (0, "")
 
@@ -191,10 +194,10 @@ def test_reports_reach_us(core: Core, tmp_path: Path) -> None:
     assert source.stdout.readline() == '"ready"\n'
     (tmp_path / "reporter.py").write_text(REPORTER, encoding="utf-8")
     reporter = core.program(str(tmp_path / "reporter.py"), python=SYSTEM_PYTHON)
-    assert reporter.communicate(timeout=60) == ("", "")
+    assert reporter.communicate(timeout=HANG_S) == ("", "")
     said = core.rostopic("pub", "-1", "/drone1_1/out_of_order", "std_msgs/String", "data: 'motor 2'")
     assert said.returncode == 0
-    heard, errors = source.communicate(timeout=60)
+    heard, errors = source.communicate(timeout=HANG_S)
     assert errors == ""
     battery, blocked, broken = lines(heard)
     assert battery[1] == "sensor_msgs/BatteryState"
@@ -212,7 +215,7 @@ def test_a_report_over_ros_changes_the_problem(core: Core) -> None:
     assert until(lambda: "/nose/out_of_order" in core.rostopic("list", "-s").stdout, 60)
     said = core.rostopic("pub", "-1", "/nose/out_of_order", "std_msgs/String", "data: 'motor 2'")
     assert said.returncode == 0
-    result, errors = program.communicate(timeout=120)
+    result, errors = program.communicate(timeout=HANG_S)
     assert (program.returncode, errors) == (0, "")
     first, second = json.loads(result)["epochs"]
     assert "nose" in first["assignment"]

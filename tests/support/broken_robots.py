@@ -96,7 +96,7 @@ DEFINITIONS = [
     case("an empty predicate", [predicate("")], (R2, "<functional", "where a term should stand")),
     case("deep expressions", [predicate("abs(" * 9000 + "X" + ")" * 9000)], (R2, "<functional", "nested too deeply")),
     case("a long expression", [predicate("ne(X,Y)" + " " * 70_000)], (R2, "<functional", "65536 are allowed")),
-    case("Python for an expression", [predicate("__import__('os')")], (R2, "<functional", "unexpected character")),
+    case("Python for an expression", [predicate("__import__('os')")], (R2, "<functional", "unknown operator")),
     case("a topic over another's variable", [(R3, 'z="V3"', 'z="V1"')], (R3, "<topic ", ("z of the topic", "'V1'"))),
     case("a topic of a Boolean", [(R3, 'z="V3"', 'z="eq(V3,1)"')], (R3, "<topic ", "should be integer")),
 ]

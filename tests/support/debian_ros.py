@@ -18,6 +18,7 @@ import pytest
 
 from robochoc.ros.live.rospy_node import RospySink
 from robochoc.ros.sink import SinkError
+from tests.support.limits import HANG_S
 from tests.support.program import ROOT
 
 PACKAGES = (
@@ -89,7 +90,7 @@ class Core:
         if self.process.poll() is None:
             self.process.send_signal(signal.SIGINT)
             try:
-                self.process.wait(20)
+                self.process.wait(HANG_S)
             except subprocess.TimeoutExpired:
                 self.process.kill()
         assert until(lambda: not self.running(), 20), self.running()
@@ -109,7 +110,7 @@ class Core:
     def rostopic(self, *words: str) -> subprocess.CompletedProcess[str]:
         """Run Debian's own tool."""
         return subprocess.run(
-            ["rostopic", *words], env=self.env, capture_output=True, text=True, timeout=60, check=False
+            ["rostopic", *words], env=self.env, capture_output=True, text=True, timeout=HANG_S, check=False
         )
 
     def program(self, *words: str, python: str = sys.executable) -> subprocess.Popen[str]:

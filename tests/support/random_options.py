@@ -7,6 +7,7 @@ from random import Random
 
 from robochoc.model.problem import Team
 from robochoc.run import Options, Runtime, ScheduleName
+from tests.support.limits import HANG_S
 from tests.support.loose_problems import any_order
 
 MAX_MESSAGES = 3000
@@ -26,7 +27,7 @@ def random_schedule(chance: Random) -> Options:
         schedule=schedule,
         delay=chance.choice((0, 3, 20, 200)) if schedule is ScheduleName.CONCURRENT else 0,
         seed=chance.getrandbits(32),
-        timeout=60,
+        timeout=HANG_S,
     )
 
 

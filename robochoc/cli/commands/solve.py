@@ -16,7 +16,8 @@ from robochoc.cli.options.local_problems import local_options
 from robochoc.cli.options.order import GIVEN, ORDER_NAME, order_for
 from robochoc.cli.options.order import NAMES as ORDERS
 from robochoc.cli.options.pages import html_option, serve_option
-from robochoc.cli.options.paths import TeamFolder, refuse_same_places, teams_at
+from robochoc.cli.options.paths import refuse_same_places, teams_at
+from robochoc.cli.options.problems import Problem, ReadProblem, read_problem
 from robochoc.cli.options.recording import journal_option, recording, shown_and_flushed
 from robochoc.cli.options.ros import (
     flight_options,
@@ -70,7 +71,7 @@ _SECTIONS: Sections = {
 
 
 @click.command(cls=SolveCommand, sections=_SECTIONS)
-@click.argument("paths", nargs=-1, required=True, type=TeamFolder(), metavar="PATH ...")
+@click.argument("paths", nargs=-1, required=True, type=Problem(), metavar="PATH ...")
 @protocol_option(central=True)
 @settings_option
 @click.option(
@@ -186,7 +187,7 @@ def solve(
     explain: bool,
     **settings: Any,  # noqa: ANN401 - the other options
 ) -> None:
-    """Solve all teams in the folders PATH and below; every solution is checked against all constraints.
+    """Solve all teams in the folders PATH and below, or files that 'robochoc import' reads; solutions are checked.
 
     \b
     robochoc solve instances/queens3d-4 --withdraw --html out/page.html
@@ -198,7 +199,7 @@ def solve(
     options = options_of(settings, environment=bool(ros.situation))
     wanted = Wanted(settings["protocol"], settings["order"], as_json=as_json, explain=explain, ros=ros)
     products = Products(html, journal, serve, watching(settings["sniff"], open_browser=settings["open_browser"]))
-    folders = teams_at(paths)
+    folders = teams_at(paths, foreign=True)
     refuse_same_places(
         {"--html": html, "--journal": journal},
         given,
@@ -253,9 +254,8 @@ class _RecordedRun(NamedTuple):
 
 def _recorded(folder: Path, options: Options, products: Products, wanted: Wanted, watch: Watch) -> _RecordedRun:
     """Solve the team in `folder`, with a journal and a closed loop where they are asked for, and print the outcome."""
-    from robochoc.formats import read_team
-
-    team = read_team(folder)
+    problem = read_problem(folder)
+    team = problem.team
     check_chosen(products.watching, team)
     protocol = wanted.protocol or default_protocol(team.kind)
     options = replace(options, protocol=protocol, order=order_for(team, wanted.order))
@@ -267,7 +267,7 @@ def _recorded(folder: Path, options: Options, products: Products, wanted: Wanted
     ):
         outcome = _run(team, options, recorder, loop)
         team = loop.team if loop else team
-        _tell(team, outcome, wanted)
+        _tell(problem._replace(team=team), outcome, wanted)
         if loop and loop.mission is None:  # the run knew nothing of it
             loop.publish(outcome)
         flight = flight_told(loop, wanted.ros, quiet=wanted.as_json)
@@ -321,15 +321,24 @@ def _objective(team: Team, options: Options) -> Callable[[], Objective] | None:
     return lambda: Objective(counted, withdrawal_cost(counted) if fewest else None)
 
 
-def _tell(team: Team, outcome: Outcome, wanted: Wanted) -> None:
+def _tell(problem: ReadProblem, outcome: Outcome, wanted: Wanted) -> None:
+    """Print the outcome, in the original names if the problem was imported.
+
+    In JSON a team's folder keeps its own names, with the others beside.
+    """
+    from robochoc.model.original_names import renamed_outcome, renamed_team
+
+    names = {} if problem.team.dynamic else problem.names
     if wanted.as_json:
         from robochoc.formats.result import result_json
 
-        click.echo(result_json(outcome))
+        shown = result_json(renamed_outcome(outcome, names)) if problem.foreign else result_json(outcome, names)
+        click.echo(shown)
     else:
         from robochoc.cli.reports.outcome import outcome_report
 
-        click.echo(outcome_report(team, outcome))
+        outcome = renamed_outcome(outcome, names)
+        click.echo(outcome_report(renamed_team(problem.team, names), outcome))
         if wanted.explain:
             from robochoc.cli.reports.pseudo_tree import tree_text
 

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 
-from robochoc.cli.options.paths import InputPath
+from robochoc.cli.options.paths import InputPath, foreign_files_told
+from robochoc.cli.options.problems import read_problem
 from robochoc.cli.reports.failures import INVALID
 
 if TYPE_CHECKING:
@@ -23,7 +25,8 @@ def validate(context: click.Context, paths: tuple[Path, ...], *, as_json: bool) 
     """Check all teams in the folders PATH and below (default: instances/), or single robots' files.
 
     Checked are the XML, the schema, the meaning of each file, and the team as a whole. All errors of all files are
-    printed at once, with file and line. The exit status is 1 if there are any.
+    printed at once, with file and line. The exit status is 1 if there are any. A file of another tool is read as
+    'robochoc import' reads it.
     """
     from robochoc.formats import InvalidInputError, find_teams
 
@@ -32,7 +35,7 @@ def validate(context: click.Context, paths: tuple[Path, ...], *, as_json: bool) 
         try:
             found = [path] if path.is_file() else find_teams(path)
         except InvalidInputError as invalid:
-            reports.append(_invalid(path, invalid))
+            reports.append(_invalid(path, invalid, foreign_files_told(path)))
         else:
             reports.extend(_report(place) for place in found)
     for report in reports:
@@ -43,18 +46,23 @@ def validate(context: click.Context, paths: tuple[Path, ...], *, as_json: bool) 
 
 def _report(place: Path) -> dict[str, Any]:
     """The validation of one team, or of one robot's file."""
-    from robochoc.formats import InvalidInputError, encodable, read_robot, read_team
+    from robochoc.formats import InvalidInputError, encodable, read_robot
+    from robochoc.formats.dialects.registry import recognise
 
+    dialect = recognise(place)
     try:
-        if place.is_file():
+        if place.is_file() and dialect is None:
             robots: tuple[Robot, ...] = (read_robot(place),)
             events = 0
         else:
-            team = read_team(place)
+            team = read_problem(place).team
             robots, events = team.robots, len(team.scenario)
     except InvalidInputError as invalid:
         return _invalid(place, invalid)
-    return {"path": encodable(str(place)), "valid": True, **_sizes(robots), "events": events, "errors": []}
+    report = {"path": encodable(str(place)), "valid": True, **_sizes(robots), "events": events, "errors": []}
+    if dialect:
+        report |= {"format": dialect.name, "title": dialect.title}
+    return report
 
 
 def _sizes(robots: tuple[Robot, ...]) -> dict[str, int]:
@@ -67,7 +75,7 @@ def _sizes(robots: tuple[Robot, ...]) -> dict[str, int]:
     }
 
 
-def _invalid(place: Path, invalid: InvalidInputError) -> dict[str, Any]:
+def _invalid(place: Path, invalid: InvalidInputError, more: Sequence[str] = ()) -> dict[str, Any]:
     from robochoc.formats import encodable
 
     errors = [
@@ -80,6 +88,7 @@ def _invalid(place: Path, invalid: InvalidInputError) -> dict[str, Any]:
         }
         for one in invalid.diagnostics
     ]
+    errors += [{"file": encodable(str(place)), "line": 0, "message": told, "hint": "", "text": told} for told in more]
     return {"path": encodable(str(place)), "valid": False, "errors": errors}
 
 
@@ -99,8 +108,10 @@ def _print(report: dict[str, Any]) -> None:
             for what in ("robots", "variables", "constraints", "events")
             if what != "events" or report[what]
         )
-        alone = "" if Path(report["path"]).is_dir() else " by itself"
+        alone = "" if Path(report["path"]).is_dir() or "format" in report else " by itself"
         click.echo(f"{path}: {counts}: ok{alone}")
+        if "format" in report:
+            click.echo(f"  it is {report['title']}: 'robochoc solve' takes it, 'robochoc import' makes a team of it")
         return
     errors = report["errors"]
     click.echo(f"{path}: {len(errors)} error{'s' * (len(errors) != 1)}")

@@ -18,6 +18,9 @@ if TYPE_CHECKING:
 
 PathLike = str | os.PathLike[str]
 
+_LOOKED_AT = 20
+"""The maximum number of files of a folder that are looked at, when no team is found there."""
+
 
 class InputPath(click.Path):
     """A path to read. Not the empty one, which an unset shell variable leaves: it would mean everything here."""
@@ -111,20 +114,40 @@ def _named(files: Mapping[str, Path | None]) -> Iterator[Place]:
                 yield resolved(path), f"{what} {path}"
 
 
-def teams_at(paths: Iterable[Path]) -> list[Path]:
+def foreign_files_told(path: Path) -> list[str]:
+    """Return a line that says which command imports what is at `path`; none where no tool's file is there."""
+    from robochoc.formats.dialects.registry import recognise
+
+    try:
+        files = [path] if path.is_file() else sorted(entry for entry in path.iterdir() if entry.is_file())[:_LOOKED_AT]
+    except OSError:
+        return []
+    for file in files:
+        if dialect := recognise(file):
+            return [f"{file}: is {dialect.title}; 'robochoc import {path} -o FOLDER' makes a team of it"]
+    return []
+
+
+def teams_at(paths: Iterable[Path], *, foreign: bool = False) -> list[Path]:
     """Return the folders of all teams at `paths` or below, each once.
+
+    With `foreign`, files of other tools are teams, too.
 
     Raises `Failure`, which names every path without a team: nothing is done by half.
     """
     from robochoc.formats import InvalidInputError, find_teams
+    from robochoc.formats.dialects.registry import recognise
 
     folders: dict[Path, None] = {}
     wrong = []
     for path in paths:
         try:
-            folders.update(dict.fromkeys(find_teams(path)))
+            if foreign and path.is_file() and recognise(path):
+                folders[path] = None
+            else:
+                folders.update(dict.fromkeys(find_teams(path)))
         except InvalidInputError as invalid:
-            wrong.append(str(invalid))
+            wrong += [str(invalid), *foreign_files_told(path)]
     if wrong:
         raise Failure(INVALID, "\n".join(wrong))
     return list(folders)

@@ -44,7 +44,7 @@ def dialects() -> Iterator[Dialect]:
 
 def recognise(path: Path) -> Dialect | None:
     """Return the dialect that the file at `path` is in. None: it is in none, or is no file that can be read."""
-    beginning = _beginning(path)
+    beginning = beginning_of(path)
     if beginning is None:
         return None
     return next((dialect for dialect in dialects() if dialect.recognises(path, beginning)), None)
@@ -75,7 +75,7 @@ def read_foreign(paths: Sequence[Path], options: ImportOptions, name: str | None
     return found[0].read(paths, options)
 
 
-def _beginning(path: Path) -> bytes | None:
+def beginning_of(path: Path) -> bytes | None:
     """Return the first bytes of a regular file; None where there is none. A FIFO is not waited for."""
     try:
         descriptor = os.open(path, os.O_RDONLY | getattr(os, "O_NONBLOCK", 0))

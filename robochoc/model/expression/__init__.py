@@ -9,7 +9,7 @@ All arguments of an operator are evaluated, whatever the others are; only `if` c
 
 from robochoc.model.expression.closures import compile_expression
 from robochoc.model.expression.operators import ALIASES, OPERATORS, evaluate
-from robochoc.model.expression.parser import ExpressionError, parse
+from robochoc.model.expression.parser import ExpressionError, SymbolNames, parse
 from robochoc.model.expression.tree import Apply, Constant, Expression, Name, Type, UndefinedValueError, names, text
 
 __all__ = [
@@ -20,6 +20,7 @@ __all__ = [
     "Expression",
     "ExpressionError",
     "Name",
+    "SymbolNames",
     "Type",
     "UndefinedValueError",
     "compile_expression",

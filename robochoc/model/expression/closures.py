@@ -11,6 +11,8 @@ from collections.abc import Callable, Sequence
 
 from robochoc.model.expression.tree import BOUND, Apply, Constant, Expression, Name, UndefinedValueError
 
+_TWO = 2
+
 Closure = Callable[[Sequence[int]], int]
 
 
@@ -60,6 +62,13 @@ def _mul(*factors: Closure) -> Closure:
     return product
 
 
+def _same(*terms: Closure) -> Closure:
+    if len(terms) == _TWO:
+        left, right = terms
+        return lambda values: 1 if left(values) == right(values) else 0
+    return lambda values: 1 if len({term(values) for term in terms}) == 1 else 0
+
+
 def _div(left: Closure, right: Closure) -> Closure:
     def quotient(values: Sequence[int]) -> int:
         dividend, divisor = left(values), right(values)
@@ -99,6 +108,7 @@ def _pow(left: Closure, right: Closure) -> Closure:
 _CLOSURES: dict[str, Callable[..., Closure]] = {
     "neg": lambda x: lambda values: _within(-x(values)),
     "abs": lambda x: lambda values: _within(abs(x(values))),
+    "sqr": lambda x: lambda values: _within(x(values) ** 2),
     "add": _add,
     "sub": lambda x, y: lambda values: _within(x(values) - y(values)),
     "mul": _mul,
@@ -108,7 +118,8 @@ _CLOSURES: dict[str, Callable[..., Closure]] = {
     "min": lambda *terms: lambda values: min([term(values) for term in terms]),
     "max": lambda *terms: lambda values: max([term(values) for term in terms]),
     "dist": lambda x, y: lambda values: _within(abs(x(values) - y(values))),
-    "eq": lambda x, y: lambda values: 1 if x(values) == y(values) else 0,
+    "eq": _same,
+    "in": lambda x, *members: lambda values: int(x(values) in [member(values) for member in members]),
     "ne": lambda x, y: lambda values: 1 if x(values) != y(values) else 0,
     "lt": lambda x, y: lambda values: 1 if x(values) < y(values) else 0,
     "le": lambda x, y: lambda values: 1 if x(values) <= y(values) else 0,
@@ -117,6 +128,7 @@ _CLOSURES: dict[str, Callable[..., Closure]] = {
     "not": lambda x: lambda values: 1 - x(values),
     "and": lambda *terms: lambda values: 1 if all([term(values) for term in terms]) else 0,  # noqa: C419 - all of them
     "or": lambda *terms: lambda values: 1 if any([term(values) for term in terms]) else 0,  # noqa: C419 - all of them
-    "xor": lambda x, y: lambda values: 1 if x(values) != y(values) else 0,
-    "iff": lambda x, y: lambda values: 1 if x(values) == y(values) else 0,
+    "xor": lambda *terms: lambda values: sum([term(values) for term in terms]) % 2,
+    "iff": _same,
+    "imp": lambda x, y: lambda values: max(1 - x(values), y(values)),
 }

@@ -38,6 +38,10 @@ def _power(base: int, exponent: int) -> int:
     return int(base**exponent)
 
 
+def _all_equal(first: int, *others: int) -> bool:
+    return all(other == first for other in others)
+
+
 class Operator(NamedTuple):
     """A row of the table: types of the arguments and of the result, and the meaning that `evaluate` computes."""
 
@@ -45,9 +49,11 @@ class Operator(NamedTuple):
     gives: Type
     meaning: Callable[..., int]
     variadic: bool = False
-    """Two or more arguments: `meaning` folds them from the left."""
+    """Two or more arguments: `meaning` folds them from the left, unless it takes them `whole`."""
     infix: str = ""
     """The sign whose two operands it takes as its own when they are its only argument: `minus(i-j)`."""
+    whole: bool = False
+    """`meaning` takes all arguments at once."""
 
 
 _I, _B = Type.INTEGER, Type.BOOLEAN
@@ -55,6 +61,7 @@ _I, _B = Type.INTEGER, Type.BOOLEAN
 OPERATORS: dict[str, Operator] = {
     "neg": Operator((_I,), _I, arithmetic.neg),
     "abs": Operator((_I,), _I, abs),
+    "sqr": Operator((_I,), _I, lambda x: x * x),
     "add": Operator((_I, _I), _I, arithmetic.add, variadic=True, infix="+"),
     "sub": Operator((_I, _I), _I, arithmetic.sub, infix="-"),
     "mul": Operator((_I, _I), _I, arithmetic.mul, variadic=True, infix="*"),
@@ -64,17 +71,19 @@ OPERATORS: dict[str, Operator] = {
     "min": Operator((_I, _I), _I, min, variadic=True),
     "max": Operator((_I, _I), _I, max, variadic=True),
     "dist": Operator((_I, _I), _I, lambda x, y: abs(x - y), infix="-"),
-    "eq": Operator((_I, _I), _B, arithmetic.eq),
+    "eq": Operator((_I, _I), _B, _all_equal, variadic=True, whole=True),
     "ne": Operator((_I, _I), _B, arithmetic.ne),
     "lt": Operator((_I, _I), _B, arithmetic.lt),
     "le": Operator((_I, _I), _B, arithmetic.le),
     "gt": Operator((_I, _I), _B, arithmetic.gt),
     "ge": Operator((_I, _I), _B, arithmetic.ge),
+    "in": Operator((_I, _I), _B, lambda x, *members: x in members, variadic=True, whole=True),
     "not": Operator((_B,), _B, arithmetic.not_),
     "and": Operator((_B, _B), _B, arithmetic.and_, variadic=True),
     "or": Operator((_B, _B), _B, arithmetic.or_, variadic=True),
-    "xor": Operator((_B, _B), _B, arithmetic.xor),
-    "iff": Operator((_B, _B), _B, arithmetic.eq),
+    "xor": Operator((_B, _B), _B, arithmetic.xor, variadic=True),
+    "iff": Operator((_B, _B), _B, _all_equal, variadic=True, whole=True),
+    "imp": Operator((_B, _B), _B, lambda condition, consequence: not condition or consequence),
     "if": Operator((_B, _I, _I), _I, lambda condition, then, otherwise: then if condition else otherwise),
 }
 ALIASES = {"neq": "ne", "minus": "sub", "plus": "add"}
@@ -101,6 +110,6 @@ def evaluate(expression: Expression, environment: Mapping[str, int]) -> int:
         case Apply(operator, arguments):
             values = [evaluate(argument, environment) for argument in arguments]
             meaning = OPERATORS[operator].meaning
-            if len(values) == 1:
+            if len(values) == 1 or OPERATORS[operator].whole:
                 return _bounded(int(meaning(*values)))
             return reduce(lambda left, right: _bounded(int(meaning(left, right))), values)

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import itertools
 import re
-from collections.abc import Collection, Sequence
+from collections.abc import Callable, Collection, Iterator, Sequence
+from dataclasses import dataclass
 from typing import NamedTuple
 
 from robochoc.model.expression.operators import ALIASES, OPERATORS, Operator
-from robochoc.model.expression.tree import Apply, Constant, Expression, Name, Type, text
+from robochoc.model.expression.tree import SYMBOLIC, Apply, Constant, Expression, Name, Type, text
 
 MAX_TEXT = 64 * 1024
 MAX_DEPTH = 64
@@ -26,7 +27,20 @@ class ExpressionError(ValueError):
         self.hint = hint
 
 
-def parse(text: str, names: Collection[str], wanted: Type) -> Expression:
+@dataclass(frozen=True)
+class SymbolNames:
+    """What an expression may say of symbols.
+
+    Attributes:
+        names: The names of the expression that stand for symbols.
+        code: Returns the code of a symbol by its name. Raises `ValueError`, which says why, for what is none.
+    """
+
+    names: Collection[str]
+    code: Callable[[str], int]
+
+
+def parse(text: str, names: Collection[str], wanted: Type, symbols: SymbolNames | None = None) -> Expression:
     """Read a functional expression over `names`.
 
     This is XCSP 2.1's functional form, and what Figure 2 writes besides: an argument list in parentheses of its own,
@@ -36,6 +50,8 @@ def parse(text: str, names: Collection[str], wanted: Type) -> Expression:
         text: The text.
         names: The names that may occur in it.
         wanted: The type of its value.
+        symbols: Which of `names` stand for symbols, if any; then other words are names of symbols, and so is
+            everything in quotes, `'red'`. Only eq, ne and in compare symbols.
 
     Raises:
         ExpressionError: if the text is no such expression. It says where, and what to do.
@@ -44,7 +60,7 @@ def parse(text: str, names: Collection[str], wanted: Type) -> Expression:
         raise ExpressionError(
             f"the expression has {len(text)} characters", MAX_TEXT, f"{MAX_TEXT} are allowed: split the predicate"
         )
-    return _Parser(text, names).whole(wanted)
+    return _Parser(text, names, symbols).whole(wanted)
 
 
 class _Token(NamedTuple):
@@ -64,15 +80,16 @@ class _Parsed(NamedTuple):
     operands: tuple[_Parsed, ...] = ()
 
 
-_TOKEN = re.compile(r"\s*(?:([A-Za-z_][A-Za-z0-9_.]*|[0-9]+|[-+*(),])|(\S))")
+_TOKEN = re.compile(r"\s*(?:([A-Za-z_][A-Za-z0-9_.]*|[0-9]+|[-+*(),]|'[^'\s]+')|(\S))")
 _INFIX = {operator.infix: name for name, operator in OPERATORS.items() if operator.infix and name != "dist"}
 
 
 class _Parser:
     """Recursive descent: sum = product {+- product}; product = atom {* atom}; atom = integer, name, call or (sum)."""
 
-    def __init__(self, text: str, names: Collection[str]) -> None:
+    def __init__(self, text: str, names: Collection[str], symbols: SymbolNames | None = None) -> None:
         self._names = names
+        self._symbols = symbols
         self._tokens = _tokens(text)
         self._closing = _parentheses(self._tokens)
         self._next = 0
@@ -130,14 +147,34 @@ class _Parser:
                 f"{what} where a term should stand", token.position, "add an integer, a name or a call"
             )
         if self._peek().text == "(":
-            return self._call(token, level)
+            return self._set(token, level) if token.text == "set" else self._call(token, level)
+        if self._symbols and token.text not in self._names:
+            return self._symbol(token, self._symbols)
         if token.text not in self._names:
             known = f"known are {_listed(self._names)}" if self._names else "none is known here"
             raise ExpressionError(
                 f"unknown name '{_shortened(token.text)}'", token.position, _nearest(token.text, self._names) or known
             )
         self._count(token.position)
-        return _Parsed(Name(token.text), Type.INTEGER, token.position)
+        is_symbol = self._symbols is not None and token.text in self._symbols.names
+        return _Parsed(Name(token.text), Type.SYMBOL if is_symbol else Type.INTEGER, token.position)
+
+    def _symbol(self, token: _Token, symbols: SymbolNames) -> _Parsed:
+        self._count(token.position)
+        try:
+            code = symbols.code(token.text.strip("'"))
+        except ValueError as error:
+            raise ExpressionError(str(error), token.position, _nearest(token.text, self._names)) from None
+        return _Parsed(Constant(code), Type.SYMBOL, token.position)
+
+    def _set(self, name: _Token, level: int) -> _Parsed:
+        members = self._arguments(level)
+        if not members:
+            raise ExpressionError("a set without members", name.position, "write set(1, 2)")
+        for member in members[1:]:
+            _check_type(member, members[0].type, "a member of the set")
+        parsed = self._applied("in", members, name.position)
+        return parsed._replace(type=Type.SET, operands=members)
 
     def _parenthesised(self, level: int) -> _Parsed:
         parsed = self._sum(level + 1)
@@ -173,13 +210,28 @@ class _Parser:
             raise ExpressionError(f"unknown operator '{_shortened(name.text)}'", name.position, hint)
         operator = OPERATORS[resolved]
         arguments = self._arguments(level)
+        if resolved == "in":
+            return self._membership(name, arguments)
         if len(arguments) == 1 < len(operator.takes):
             arguments = _operands(name, operator, arguments[0])
         _check_arity(name, operator, len(arguments))
-        wanted = itertools.chain(operator.takes, itertools.repeat(operator.takes[-1]))
+        wanted: Iterator[Type]
+        if resolved in SYMBOLIC and any(argument.type is Type.SYMBOL for argument in arguments):
+            wanted = itertools.repeat(Type.SYMBOL)
+        else:
+            wanted = itertools.chain(operator.takes, itertools.repeat(operator.takes[-1]))
         for number, (argument, type_) in enumerate(zip(arguments, wanted, strict=False), start=1):
             _check_type(argument, type_, f"argument {number} of '{name.text}'")
         return self._applied(resolved, arguments, name.position)
+
+    def _membership(self, name: _Token, arguments: tuple[_Parsed, ...]) -> _Parsed:
+        """Return `in(x, set(1, 2))`, whose set is written into it."""
+        if len(arguments) != 2:  # noqa: PLR2004 - a term and a set
+            raise ExpressionError(f"'in' takes 2 arguments, not {len(arguments)}", name.position, "in(X, set(1, 2))")
+        term, members = arguments
+        _check_type(members, Type.SET, "argument 2 of 'in'")
+        _check_type(term, members.operands[0].type, "argument 1 of 'in'")
+        return self._applied("in", (term, *members.operands), name.position)
 
     def _arguments(self, level: int) -> tuple[_Parsed, ...]:
         """Return the arguments of a function. A second pair of parentheses around them is ignored."""
@@ -289,9 +341,20 @@ def _takes(operator: Operator) -> str:
 def _check_type(parsed: _Parsed, wanted: Type, what: str) -> None:
     if parsed.type is wanted:
         return
-    hint = "compare it: eq ne lt le gt ge" if wanted is Type.BOOLEAN else "make a number of it: if(..., 1, 0)"
+    hint = _TYPE_HINTS.get((wanted, parsed.type), "compare it: eq ne lt le gt ge")
     shown = _shortened(text(parsed.expression))
     raise ExpressionError(f"{what} should be {wanted}, and '{shown}' is {parsed.type}", parsed.position, hint)
+
+
+_TYPE_HINTS = {
+    (Type.INTEGER, Type.BOOLEAN): "make a number of it: if(..., 1, 0)",
+    (Type.INTEGER, Type.SYMBOL): "only eq, ne and in take symbols",
+    (Type.BOOLEAN, Type.SYMBOL): "compare it: eq ne in",
+    (Type.SYMBOL, Type.INTEGER): "compare symbols with symbols",
+    (Type.SYMBOL, Type.BOOLEAN): "compare symbols with symbols",
+    **{(Type.SET, other): "write in(X, set(1, 2))" for other in Type},
+    **{(other, Type.SET): "a set is for in(X, set(1, 2))" for other in Type},
+}
 
 
 def _too_deep(position: int) -> ExpressionError:

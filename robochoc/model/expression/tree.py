@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
 
@@ -11,10 +11,12 @@ BOUND = 2**63
 
 
 class Type(StrEnum):
-    """The type of an expression's value. Names (formal parameters, variables) are integers."""
+    """The type of an expression's value. Names (formal parameters, variables) are integers, or symbols."""
 
     INTEGER = "integer"
     BOOLEAN = "Boolean"
+    SYMBOL = "a symbol"
+    SET = "a set"
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,15 +48,38 @@ class UndefinedValueError(ArithmeticError):
     """The expression has no value here: a division by zero, a negative exponent, or a result out of bounds."""
 
 
-def text(expression: Expression) -> str:
-    """Return `expression` in XCSP 2.1's functional form, which `parse` reads back: `ne(abs(sub(X,Y)),1)`."""
+SYMBOLIC = ("eq", "ne", "in")
+"""The operators that compare symbols."""
+
+
+def text(expression: Expression, symbolic: Collection[str] = (), symbols: Sequence[str] = ()) -> str:
+    """Return `expression` in XCSP 2.1's functional form, which `parse` reads back: `ne(abs(sub(X,Y)),1)`.
+
+    Args:
+        expression: The expression.
+        symbolic: Its names that stand for symbols. What they are compared with is written as a symbol, `eq(X,'red')`.
+        symbols: The symbols, by their codes; a code that has none is written as it is.
+    """
     match expression:
         case Constant(value):
             return str(value)
         case Name(name):
             return name
         case Apply(operator, arguments):
-            return f"{operator}({','.join(text(argument) for argument in arguments)})"
+            named = bool(symbolic) and operator in SYMBOLIC and any(_is_in(one, symbolic) for one in arguments)
+            written = [
+                f"'{symbols[one.value]}'"
+                if named and isinstance(one, Constant) and 0 <= one.value < len(symbols)
+                else text(one, symbolic, symbols)
+                for one in arguments
+            ]
+            if operator == "in":
+                return f"in({written[0]},set({','.join(written[1:])}))"
+            return f"{operator}({','.join(written)})"
+
+
+def _is_in(expression: Expression, names: Collection[str]) -> bool:
+    return isinstance(expression, Name) and expression.name in names
 
 
 def names(expression: Expression) -> tuple[str, ...]:

@@ -13,6 +13,7 @@ from robochoc.model.outcome import Verdict
 from robochoc.model.problem import Constraint
 from robochoc.run import Options, Runtime, Withdrawal, solve
 from robochoc.verification.checker import needlessly_withdrawn, violations
+from tests.support.limits import HANG_S
 from tests.support.program import ROOT
 
 FIGURE_2 = ROOT / "tests" / "data" / "figure2" / "Robot3.1.xml"
@@ -116,7 +117,7 @@ def test_four_has_no_solution_and_some_can_fly(model: QueensModel, runtime: Runt
 @pytest.mark.parametrize(("model", "most"), [("planar", 10), ("full", 7)])
 def test_of_four_it_is_proven_how_many_can_fly(protocol: str, model: str, most: int, runtime: Runtime) -> None:
     """Whether the fewest are told after it has been found that not all can, or at once."""
-    options = Options(protocol=protocol, runtime=runtime, withdraw=Withdrawal.MINIMUM, timeout=60)
+    options = Options(protocol=protocol, runtime=runtime, withdraw=Withdrawal.MINIMUM, timeout=HANG_S)
     outcome = solve(queens3d(4, model), options)
     assert outcome.verdict is Verdict.OPTIMAL
     assert outcome.verified
@@ -133,7 +134,7 @@ def test_seven_has_a_solution_in_planar_and_none_in_full(runtime: Runtime) -> No
 @pytest.mark.slow
 @pytest.mark.parametrize("model", list(QueensModel))
 def test_the_flagship_121_robots_in_121_processes(model: QueensModel) -> None:
-    outcome = solve(queens3d(11, model), Options(timeout=100))
+    outcome = solve(queens3d(11, model), Options(timeout=HANG_S))
     assert outcome.verdict is Verdict.SOLUTION
     assert len(outcome.assignment) == 121
     assert outcome.verified

@@ -12,6 +12,7 @@ from robochoc.generators.queens3d import queens3d
 from robochoc.model.outcome import Metrics, Outcome, Verdict
 from robochoc.run import Options, Runtime, solve
 from tests.support.flights import scene_of
+from tests.support.limits import HANG_S
 from tests.support.problems import ON_ONE_MACHINE
 from tests.support.program import robochoc_within
 
@@ -49,7 +50,7 @@ def test_a_team_of_rows_is_written_and_read_back(tmp_path: Path) -> None:
     ],
 )
 def test_rows_reach_the_verdict_that_cells_reach(n: int, model: str, verdict: Verdict, runtime: Runtime) -> None:
-    outcome = solve(queens3d(n, model, "rows"), Options(runtime=runtime, timeout=90))
+    outcome = solve(queens3d(n, model, "rows"), Options(runtime=runtime, timeout=HANG_S))
     assert outcome.verdict is verdict
     assert outcome.verified is (verdict is Verdict.SOLUTION)
     assert (outcome.metrics.memory > 0) is (runtime is Runtime.PROCESSES)

@@ -40,6 +40,7 @@ from robochoc.solver.ace import AceProcess
 from robochoc.solver.agent_problem import RunParameters
 from robochoc.solver.compiled_team import CompiledTeam
 from tests.support.golden import odd_team
+from tests.support.limits import HANG_S
 from tests.support.problems import random_team
 from tests.support.program import ROOT
 from tests.support.replays import (
@@ -99,7 +100,7 @@ def test_what_was_recorded_in_processes_is_said_again(protocol: str, warm: AcePr
 
 
 def test_a_network_of_processes_is_one_more_runtime() -> None:
-    journal = recorded(queens3d(2), Options(protocol="abt", runtime=Runtime.NETWORK, timeout=60))
+    journal = recorded(queens3d(2), Options(protocol="abt", runtime=Runtime.NETWORK, timeout=HANG_S))
     assert identical(replay(journal))
 
 

@@ -20,6 +20,7 @@ from robochoc.model.problem import Team
 from robochoc.model.team_edits import without_robots
 from robochoc.run import Options, Runtime, solve
 from tests.support.faults import PROGRAM, Run, running
+from tests.support.limits import HANG_S
 
 pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="looks into /proc")
 
@@ -39,7 +40,7 @@ def folders(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
 
 
 def solving(folder: Path, *options: str) -> list[str]:
-    return [PROGRAM, "solve", str(folder), "--timeout", "60", "--json", *options]
+    return [PROGRAM, "solve", str(folder), "--timeout", str(HANG_S), "--json", *options]
 
 
 def kill_some(run: Run, chance: random.Random, within_s: float) -> int:
@@ -142,5 +143,5 @@ def test_a_spare_whose_file_is_gone_stays_out(folders: dict[str, Path], tmp_path
 
 
 def test_an_outcome_without_losses_has_no_epochs() -> None:
-    outcome: Outcome = solve(TEAMS["queens3d-4"], Options(timeout=60))
+    outcome: Outcome = solve(TEAMS["queens3d-4"], Options(timeout=HANG_S))
     assert outcome.epochs == ()

@@ -20,6 +20,7 @@ from robochoc.solver.central import CentralAnswer, CentralSolver
 from robochoc.verification.checker import violations
 from tests.support.brute_force import solutions
 from tests.support.complex_problems import random_complex_team
+from tests.support.limits import HANG_S
 from tests.support.problems import random_team, shuffled
 from tests.support.small_teams import graph_team
 from tests.support.solver_networks import compiled_by_brute_force
@@ -33,7 +34,7 @@ def test_robots_solve_in_the_order_they_are_given() -> None:
     for seed in range(80):
         team = random_team(chance)
         order = chance.choice([*Order, tuple(shuffled(chance, team))])
-        outcome = solve(team, replace(SIMULATED, order=order, seed=seed, timeout=30))
+        outcome = solve(team, replace(SIMULATED, order=order, seed=seed, timeout=HANG_S))
         truth = next(solutions(team), None)
         assert outcome.verdict is (Verdict.NO_SOLUTION if truth is None else Verdict.SOLUTION), (team, order)
         seen.add(outcome.verdict)

@@ -22,6 +22,7 @@ from robochoc.solver.ace import AceProcess
 from robochoc.solver.cache import SolutionCache
 from robochoc.solver.compile import Compilation, CompiledFrom, Compiler
 from robochoc.solver.encoding import Codes, Network, Table
+from tests.support.limits import HANG_S
 from tests.support.program import ROOT, robochoc_within
 from tests.support.solver_networks import SMALL_NETWORK, SMALL_SOLUTIONS
 
@@ -276,7 +277,7 @@ def test_processes_that_write_at_the_same_time_leave_one_whole_file(cache: Solut
             writer.stdin.flush()
     finally:
         for writer in writers:
-            writer.communicate(timeout=30)
+            writer.communicate(timeout=HANG_S)
     assert [writer.returncode for writer in writers] == [0, 0]
     assert [path.name for path in cache.folder.iterdir()] == [f"{cache.key(SMALL_NETWORK)}.solutions"]
     assert cache.get(SMALL_NETWORK) == SMALL_SOLUTIONS

@@ -1,0 +1,48 @@
+"""`names.json` in a team's folder: what its robots and variables were called in the files of another tool."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import TypedDict
+
+from robochoc.formats.diagnostics import Diagnostic, InvalidInputError, encodable
+from robochoc.formats.dialects.dialect import Imported
+
+NAMES_FILE = "names.json"
+MAX_BYTES = 64 * 1024 * 1024
+
+
+class _Told(TypedDict):
+    dialect: str
+    names: dict[str, str]
+
+
+def names_json(imported: Imported) -> bytes:
+    """Return the content of the file: the dialect, and original names by the team's where they differ."""
+    import msgspec  # noqa: PLC0415 - start-up
+
+    told = {"dialect": imported.dialect, "names": dict(imported.names)}
+    return msgspec.json.format(msgspec.json.encode(told)) + b"\n"
+
+
+def original_names(folder: Path) -> Mapping[str, str]:
+    """Return the original names that stand in `folder`; none where it has no such file.
+
+    Raises:
+        InvalidInputError: if the file is there, and is not as `names_json` writes it.
+    """
+    import msgspec  # noqa: PLC0415 - start-up
+
+    path = folder / NAMES_FILE
+    if not path.is_file():
+        return {}
+    try:
+        with path.open("rb") as file:
+            told = msgspec.json.decode(file.read(MAX_BYTES), type=_Told)
+    except (msgspec.MsgspecError, UnicodeDecodeError, RecursionError):
+        hint = "import the problem again, or delete the file"
+        raise InvalidInputError(
+            [Diagnostic(encodable(str(path)), 0, "does not hold the original names of a team", hint)]
+        ) from None
+    return told["names"]

@@ -1,0 +1,199 @@
+"""Symbols in files: their names, the table of their codes, and who may be compared with whom.
+
+docs/reference/format.md, "Symbols".
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
+
+from robochoc.formats.definitions import MAX_VALUES, PREDEFINED
+from robochoc.formats.diagnostics import Diagnostic, MistakeError, shortened, suggestion
+from robochoc.formats.names import check_word
+from robochoc.formats.team_members import TeamMembers
+from robochoc.model.problem import Constraint, Definition, Domain, Relation, Robot
+from robochoc.model.symbols import EITHER
+
+MAX_SYMBOL = 100
+"""The maximum length of a symbol's name."""
+
+_SYMBOL = re.compile(rf"[^\s|:'\"<>&]{{1,{MAX_SYMBOL}}}")
+_NUMBER = re.compile(r"[-+.0-9]+")
+
+
+class SymbolTable:
+    """The symbols of a team's files in the order in which they appear: the place of a symbol is its code."""
+
+    def __init__(self) -> None:
+        self._codes: dict[str, int] = {}
+        self._declared: set[str] = set()
+        self._mentioned: dict[str, tuple[str, int]] = {}
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """All symbols so far, by their codes."""
+        return tuple(self._codes)
+
+    def declared(self, word: str) -> int:
+        """Return the code of a symbol that stands in a domain. Raises `MistakeError`."""
+        code = self._code(word)
+        self._declared.add(word)
+        return code
+
+    def mentioned(self, word: str, file: str, line: int) -> int:
+        """Return the code of a symbol that stands elsewhere, in that `line` of a file. Raises `MistakeError`."""
+        code = self._code(word)
+        self._mentioned.setdefault(word, (file, line))
+        return code
+
+    def undeclared(self) -> Iterator[Diagnostic]:
+        """Yield the symbols that stand in no domain of any file."""
+        for word, (file, line) in self._mentioned.items():
+            if word not in self._declared:
+                hint = suggestion(word, sorted(self._declared), "symbols")
+                yield Diagnostic(file, line, f"no domain of the team has the symbol '{shortened(word)}'", hint)
+
+    def _code(self, word: str) -> int:
+        code = self._codes.get(word)
+        if code is None:
+            check_symbol(word)
+            if len(self._codes) == MAX_VALUES:
+                raise MistakeError(f"more than {MAX_VALUES} symbols", "use fewer")
+            code = self._codes[word] = len(self._codes)
+        return code
+
+
+def check_symbol(word: str) -> None:
+    """Raise `MistakeError` unless `word` can be a symbol."""
+    if not _SYMBOL.fullmatch(word) or _NUMBER.fullmatch(word):
+        hint = f"expected a name of at most {MAX_SYMBOL} characters: no number, no blank, none of | : ' \" < > &"
+        raise MistakeError(f"'{shortened(word)}' cannot be a symbol", hint)
+    check_word(word)
+
+
+def check_symbolic_domain(domain: Domain) -> None:
+    """Raise `MistakeError` unless the values of a domain that was built in Python are codes of its symbols."""
+    check_table(domain.symbols)
+    for part in domain.ranges:
+        if part.start < 0 or part.stop > len(domain.symbols):
+            wrong = part.start if part.start < 0 else part.stop - 1
+            message = f"the value {wrong} of domain {shortened(domain.name)} is no symbol"
+            raise MistakeError(message, f"there are {len(domain.symbols)}, with the codes 0, 1, ...")
+
+
+def check_table(names: Sequence[str]) -> None:
+    """Raise `MistakeError` unless `names` can be the symbols of a team."""
+    if len(names) > MAX_VALUES:
+        raise MistakeError(f"more than {MAX_VALUES} symbols", "use fewer")
+    for word in names:
+        check_symbol(word)
+    if len(set(names)) < len(names):
+        raise MistakeError("a symbol stands twice in the table of symbols", "each has one code")
+
+
+def check_one_table(robot: Robot) -> None:
+    """Raise `MistakeError` where symbols of a robot have different codes in its domains, or none."""
+    tables = [one.domain.symbols for one in robot.variables if one.domain.symbols]
+    tables += [robot.symbols] if robot.symbols else []
+    if any(table != tables[0] for table in tables[1:]):
+        message = "its symbolic domains have different symbols"
+        raise MistakeError(message, "all domains of a team have one table; their ranges say which are in which domain")
+    check_table(robot.symbols)
+
+
+def check_symbolic_definition(definition: Definition, table: Sequence[str]) -> None:
+    """Raise `MistakeError` unless what a definition says of symbols is in the `table`."""
+    if not isinstance(definition, Relation):
+        unknown = [name for name in definition.symbolic if name not in definition.parameters]
+        if unknown:
+            message = f"'{shortened(unknown[0])}' is to be a symbol, and no parameter"
+            raise MistakeError(message, "`symbolic` lists parameters")
+        return
+    for column in definition.symbolic:
+        if not 0 <= column < definition.arity:
+            raise MistakeError(f"column {column} is to hold symbols", f"there are {definition.arity}, from 0 on")
+        for values in definition.tuples:
+            if not 0 <= values[column] < len(table):
+                message = f"the value {values[column]} in column {column} is no symbol"
+                raise MistakeError(message, "see `Robot.symbols`: the value is the place of a name there")
+
+
+def check_kinds(constraint: Constraint, symbolic: Mapping[str, bool]) -> None:
+    """Raise `MistakeError` where a constraint takes a symbol for an integer, or an integer for a symbol.
+
+    Args:
+        constraint: The constraint.
+        symbolic: For each known variable, whether its values are symbols.
+    """
+    kinds = _kinds(constraint.definition)
+    if len(kinds) != len(constraint.parameters):
+        return  # another mistake
+    given = [False if isinstance(term, int) else symbolic.get(term) for term in constraint.parameters]
+    for term, wanted, kind in zip(constraint.parameters, kinds, given, strict=True):
+        if None not in {wanted, kind} and wanted is not kind:
+            name = shortened(constraint.definition.name)
+            message = f"{name} takes {_SAID[bool(wanted)]} where '{term}' stands, and that is {_SAID[bool(kind)]}"
+            raise MistakeError(message, "write symbol X or int X among its parameters, as its arguments are")
+    loose = {
+        kind: term for term, wanted, kind in zip(constraint.parameters, kinds, given, strict=True) if wanted is None
+    }
+    if loose.keys() >= {True, False}:
+        message = f"'{loose[True]}' is a symbol, and '{loose[False]}' an integer"
+        raise MistakeError(message, "symbols are compared with symbols; name one in an expression: eq(X, 'red')")
+
+
+def mistyped_constraints(members: TeamMembers) -> Iterator[Diagnostic]:
+    """Yield constraints that take another robot's symbols for integers, or its integers for symbols."""
+    if not any(robot.symbol_table for robot in members.robots):
+        return
+    symbolic = kinds_of(members.robots)
+    for robot in members.robots:
+        parts = [part for child in robot.children for part in (*child.constraints, *child.copies)]
+        for constraint in (*robot.shared, *parts):
+            try:
+                check_kinds(constraint, symbolic)
+            except MistakeError as mistake:
+                place = members.files[robot.name].places.constraint(constraint)
+                yield place.mistake(mistake.message, mistake.hint)
+
+
+def different_tables(members: TeamMembers) -> Iterator[Diagnostic]:
+    """Yield robots, built in Python, whose symbols have other codes than those of the first that has any."""
+    first: Robot | None = None
+    for robot in members.robots:
+        if robot.symbol_table:
+            first = first or robot
+            if robot.symbol_table != first.symbol_table:
+                message = f"its symbols differ from those of '{first.name}'"
+                hint = "all symbolic domains of a team have one table; their ranges say which are in which domain"
+                yield members.place(robot.name).mistake(message, hint)
+
+
+def kinds_of(robots: Iterable[Robot]) -> dict[str, bool]:
+    """Return for each variable of `robots` whether its values are symbols."""
+    return {one.name: bool(one.domain.symbols) for robot in robots for one in robot.variables}
+
+
+_SAID = {True: "a symbol", False: "an integer"}
+
+
+def _kinds(definition: Definition) -> list[bool | None]:
+    """Return for each parameter whether it is a symbol; None where it may be one or not."""
+    if isinstance(definition, Relation):
+        known = bool(definition.tuples or definition.symbolic)
+        return [place in definition.symbolic if known else None for place in range(definition.arity)]
+    if definition.name in EITHER and PREDEFINED[definition.name] == definition:
+        return [None, None]
+    return [name in definition.symbolic for name in definition.parameters]
+
+
+def codes_of(words: Collection[str], table: SymbolTable) -> list[int]:
+    """Return the codes of the symbols of a domain, in ascending order. Raises `MistakeError`."""
+    codes: set[int] = set()
+    for word in words:
+        code = table.declared(word)
+        if code in codes:
+            raise MistakeError(f"the symbol '{shortened(word)}' stands twice in the domain", "name it once")
+        codes.add(code)
+    return sorted(codes)

@@ -1,0 +1,70 @@
+"""Journals as rows and columns of plain values, for pandas, polars and the like."""
+
+from __future__ import annotations
+
+import warnings
+from pathlib import Path
+from typing import Any
+
+import msgspec
+
+from robochoc.journal.events import AnyEvent, Began, actor
+from robochoc.journal.reader import read_journal
+
+COLUMNS = (
+    *("run", "epoch", "event", "t", "robot", "other", "type", "content", "bytes", "clock", "checks", "cost"),
+    *("assignment", "verdict"),
+)
+"""The keys of every row, in this order."""
+
+Row = dict[str, Any]
+"""What happened: by key a text, a number, or None where an event of that kind has no such thing."""
+
+
+def rows(path: Path | str) -> list[Row]:
+    """Return the events of a journal, one row each, in their order.
+
+    All rows have the same keys: the number of the `run` and its `epoch`, the kind of `event` (`Sent`, `Received`,
+    `Settled`, `Decided`, ...), its time `t`, the `robot` that did it, the `other` robot of a message, the message's
+    `type`, its `content` and an `assignment` as JSON text, `bytes`, `clock` (NCCCs), `checks`, `cost`, `verdict`.
+    A warning says where a journal is damaged; the rows are those before.
+
+    Args:
+        path: The journal's file, as `--journal` writes it.
+
+    Raises:
+        JournalError: if it is no journal.
+        OSError: if it cannot be read.
+    """
+    journal = read_journal(Path(path).read_bytes())
+    if journal.damage:
+        warnings.warn(f"{path}: {journal.damage}", stacklevel=2)
+    found, run, epoch = [], -1, 0
+    for event in journal.events:
+        if isinstance(event, Began):
+            run += 1
+            epoch = event.epoch if isinstance(event.epoch, int) else 0
+        found.append(_row(event, max(run, 0), epoch))
+    return found
+
+
+def by_column(path: Path | str) -> dict[str, list[Any]]:
+    """Return the same as `rows`, column by column."""
+    found = rows(path)
+    return {name: [row[name] for row in found] for name in COLUMNS}
+
+
+def _row(event: AnyEvent, run: int, epoch: int) -> Row:
+    said: dict[str, Any] = msgspec.structs.asdict(event)
+    robot = actor(event) or said.get("robot")
+    pair = [said[side] for side in ("sender", "receiver") if side in said]
+    row: Row = dict.fromkeys(COLUMNS)
+    row.update(
+        (name, said[name]) for name in ("t", "type", "bytes", "clock", "checks", "cost", "verdict") if name in said
+    )
+    row.update(run=run, epoch=epoch, event=type(event).__name__, robot=robot)
+    row.update(other=next((name for name in pair if name != robot), robot if pair else None))
+    for name in ("content", "assignment"):
+        if name in said:
+            row[name] = msgspec.json.encode(said[name]).decode()
+    return row

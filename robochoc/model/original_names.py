@@ -1,0 +1,73 @@
+"""Results in the names that a problem had in the files of another tool."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import replace
+
+from robochoc.model.outcome import EpochOutcome, Outcome, PseudoTreeNode
+from robochoc.model.problem import Team
+
+
+def renamed_outcome(outcome: Outcome, names: Mapping[str, str]) -> Outcome:
+    """Return `outcome` with the original `names` of robots and variables, which are given by those of the team."""
+    if not names:
+        return outcome
+    return replace(
+        outcome,
+        assignment=_by(outcome.assignment, names),
+        withdrawn=_all(outcome.withdrawn, names),
+        lost=_all(outcome.lost, names),
+        witness=_one(outcome.witness, names),
+        claimed_by=_one(outcome.claimed_by, names),
+        tree=_tree(outcome.tree, names),
+        epochs=tuple(_epoch(epoch, names) for epoch in outcome.epochs),
+    )
+
+
+def renamed_team(team: Team, names: Mapping[str, str]) -> Team:
+    """Return `team` for reports: its robots and variables have their original `names`, and no links."""
+    if not names:
+        return team
+    robots = tuple(
+        replace(
+            robot,
+            name=names.get(robot.name, robot.name),
+            variables=tuple(replace(one, name=names.get(one.name, one.name)) for one in robot.variables),
+            private=(),
+            parents=(),
+            children=(),
+        )
+        for robot in team.robots
+    )
+    return replace(team, robots=robots, scenario=())
+
+
+def _epoch(epoch: EpochOutcome, names: Mapping[str, str]) -> EpochOutcome:
+    return replace(
+        epoch,
+        robots=_all(epoch.robots, names),
+        assignment=_by(epoch.assignment, names),
+        witness=_one(epoch.witness, names),
+        lost=_all(epoch.lost, names),
+        tree=_tree(epoch.tree, names),
+    )
+
+
+def _tree(tree: Mapping[str, PseudoTreeNode], names: Mapping[str, str]) -> dict[str, PseudoTreeNode]:
+    return {
+        names.get(name, name): PseudoTreeNode(_one(node.parent, names), _all(node.pseudo_parents, names))
+        for name, node in tree.items()
+    }
+
+
+def _by(assignment: Mapping[str, int], names: Mapping[str, str]) -> dict[str, int]:
+    return {names.get(name, name): value for name, value in assignment.items()}
+
+
+def _all(words: Iterable[str], names: Mapping[str, str]) -> tuple[str, ...]:
+    return tuple(names.get(word, word) for word in words)
+
+
+def _one(word: str | None, names: Mapping[str, str]) -> str | None:
+    return None if word is None else names.get(word, word)

@@ -1,0 +1,87 @@
+"""Symbols: names that stand where integers do. Inside they are codes, the places in one table of the whole team."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterable, Mapping
+from dataclasses import replace
+
+from robochoc.model.constraint import Constraint, Definition, Domain, Predicate, Relation
+from robochoc.model.expression import Apply, Name
+from robochoc.model.problem import AddAgent, Change, Robot, Team
+
+EITHER = ("eq", "ne", "neq")
+"""The names of predefined predicates that compare integers, or symbols."""
+
+
+def symbol_table(robots: Iterable[Robot]) -> tuple[str, ...]:
+    """Return the names of a team's symbols; empty where there are none."""
+    return next((robot.symbol_table for robot in robots if robot.symbol_table), ())
+
+
+def symbols_of(team: Team) -> dict[str, tuple[str, ...]]:
+    """Return the symbols of the variables of `team` whose values stand for symbols."""
+    return {name: one.domain.symbols for name, one in team.variables.items() if one.domain.symbols}
+
+
+def with_marked_symbols(constraints: Iterable[Constraint], symbolic: Collection[str]) -> list[Constraint]:
+    """Return `constraints`, whose definitions say which of their parameters or columns are symbols.
+
+    Args:
+        constraints: The constraints.
+        symbolic: The variables whose domains are symbolic.
+    """
+    known: dict[tuple[int, tuple[int, ...]], tuple[Definition, Definition]] = {}
+    marked = []
+    for constraint in constraints:
+        places = tuple(place for place, term in enumerate(constraint.parameters) if term in symbolic)
+        if places:
+            definition = constraint.definition
+            made = known.setdefault((id(definition), places), (definition, _marked(definition, places)))[1]
+            constraint = replace(constraint, definition=made)  # noqa: PLW2901 - the same constraint
+        marked.append(constraint)
+    return marked
+
+
+def with_table(robot: Robot, names: tuple[str, ...]) -> Robot:
+    """Return `robot`, whose symbolic domains have the table `names`; the robot itself where it has no such domain."""
+    if not names:
+        return robot
+    domains: dict[int, Domain] = {}
+    for variable in robot.variables:
+        if variable.domain.symbols and id(variable.domain) not in domains:
+            domains[id(variable.domain)] = replace(variable.domain, symbols=names)
+    variables = tuple(replace(one, domain=domains.get(id(one.domain), one.domain)) for one in robot.variables)
+    return replace(robot, variables=variables, symbols=() if domains else names)
+
+
+def with_table_everywhere(team: Team, names: tuple[str, ...]) -> Team:
+    """Return `team` with the table `names` of symbols, the robots that its scenario adds included."""
+
+    def of(change: Change) -> Change:
+        return AddAgent(with_table(change.robot, names)) if isinstance(change, AddAgent) else change
+
+    if not names:
+        return team
+    events = tuple(replace(event, changes=tuple(map(of, event.changes))) for event in team.scenario)
+    return replace(team, robots=tuple(with_table(robot, names) for robot in team.robots), scenario=events)
+
+
+def labelled(assignment: Mapping[str, int], symbols: Mapping[str, tuple[str, ...]]) -> dict[str, int | str]:
+    """Return `assignment` as users write it: symbols by their names."""
+    return {name: symbols[name][value] if name in symbols else value for name, value in assignment.items()}
+
+
+def _marked(definition: Definition, places: tuple[int, ...]) -> Definition:
+    if isinstance(definition, Relation):
+        return replace(definition, symbolic=places) if definition.tuples else definition
+    if _takes_either(definition):
+        return definition
+    return replace(definition, symbolic=tuple(definition.parameters[place] for place in places))
+
+
+def _takes_either(definition: Definition) -> bool:
+    match definition:
+        case Predicate(name=name, parameters=(one, other), body=Apply("eq" | "ne", (Name(left), Name(right)))):
+            return name in EITHER and (left, right) == (one, other)
+        case _:
+            return False

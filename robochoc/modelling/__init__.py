@@ -1,0 +1,1 @@
+"""Models in Python: a problem in a few lines, from which the robots' knowledge follows (`robochoc.Model`)."""

@@ -1,0 +1,210 @@
+"""From a model to the team of its robots: units of costs, names, who holds what, and what changes over time."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+from robochoc.model.assembly import Extras, assemble
+from robochoc.model.constraint import Constraint, Domain
+from robochoc.model.constraint import Variable as TeamVariable
+from robochoc.model.cost_units import PLAIN_COSTS, CostUnits
+from robochoc.model.priorities import priority_order
+from robochoc.model.problem import (
+    AddAgent,
+    AddConstraint,
+    Change,
+    ProblemKind,
+    RemoveConstraint,
+    Robot,
+    ScenarioEvent,
+    Team,
+)
+from robochoc.modelling.drafts import Definitions, Draft, costs_of
+from robochoc.modelling.events import Event, Removal
+from robochoc.modelling.given import changes_in_finer_units, in_finer_units
+from robochoc.modelling.numbers import places_of
+from robochoc.modelling.places import ModelError, did_you_mean
+from robochoc.modelling.robots import ModelRobot
+from robochoc.modelling.rules import Rule
+
+if TYPE_CHECKING:
+    from robochoc.modelling.model import Model
+
+
+def built(model: Model, order: Sequence[str] | None = None) -> Team:
+    """Return the team of a model.
+
+    Args:
+        model: The model.
+        order: The robots in priority order. None: as their priorities say.
+
+    Raises:
+        ModelError: if no team can be so.
+    """
+    return _Builder(model, order).team()
+
+
+def saved_order(team: Team) -> tuple[str, ...]:
+    """Return the order of the robots of `team` that its files say: that of the links, then that of the names."""
+    return priority_order({robot.name: [parent.name for parent in robot.parents] for robot in team.robots})
+
+
+class _Builder:
+    """What is needed to build one team."""
+
+    def __init__(self, model: Model, order: Sequence[str] | None) -> None:
+        self._model = model
+        given = model.given
+        self._robots = [robot for robot in model.robots.values() if robot.joins is None]
+        if not self._robots:
+            raise ModelError("the model has no robot", "add one: model.robot(name)")
+        rank = {name: place for place, name in enumerate(order or ())}
+        self._robots.sort(key=lambda robot: rank.get(robot.name, 0) if order else -robot.priority)
+        self._drafts = [draft for rule in model.constraints for draft in rule.drafts()]
+        costs, constant = costs_of(model.objective, model.free_prefix("cost"))
+        constant += model.constant
+        self._drafts += costs
+        self._parts = {robot.name: [d for rule in robot.parts for d in rule.drafts()] for robot in self._robots}
+        self._added = {
+            rule: list(rule.drafts()) for event in model.events for rule in event.steps if isinstance(rule, Rule)
+        }
+        every = [*self._drafts, *(draft for found in (*self._parts.values(), *self._added.values()) for draft in found)]
+        soft = model.maximized is not None or any(draft.soft for draft in every)
+        self._kind = (
+            ProblemKind.DISWCSP if soft or (given and given.kind is ProblemKind.DISWCSP) else ProblemKind.DISCSP
+        )
+        known = given.units if given else PLAIN_COSTS
+        places = max([known.places, places_of(constant), *(draft.places for draft in every)])
+        self._finer = 10 ** (places - known.places)
+        total = int(constant * 10**places) + known.constant * self._finer
+        self._units = CostUnits(bool(model.maximized), places, total)
+        self._definitions = Definitions(given.definitions if given else ())
+        self._domains: dict[tuple[tuple[range, ...], tuple[str, ...]], str] = {}
+        self._symbols = model.symbols.all
+
+    def team(self) -> Team:
+        """Return the team with its scenario."""
+        given = self._model.given
+        constraints = [self._finished(draft) for draft in self._drafts]
+        parts = {name: [self._finished(draft) for draft in drafts] for name, drafts in self._parts.items()}
+        if given:
+            constraints = [*(in_finer_units(one, self._finer) for one in given.constraints), *constraints]
+            for name, raw in given.parts.items():
+                parts[name] = [*(in_finer_units(one, self._finer) for one in raw), *parts[name]]
+        team = assemble(
+            self._model.name,
+            {robot.name: self._variables(robot) for robot in self._robots},
+            constraints,
+            kind=self._kind,
+            costs=self._units,
+            extras=Extras(
+                links=given.links if given else (),
+                topics={robot.name: robot.topics for robot in self._robots},
+                weights={robot.name: robot.weight for robot in self._robots},
+                parts=parts,
+            ),
+        )
+        return replace(team, scenario=self._scenario(team))
+
+    def _finished(self, draft: Draft) -> Constraint:
+        return self._definitions.constraint(draft, self._units.places, -1 if self._units.maximize else 1)
+
+    def _variables(self, robot: ModelRobot) -> list[TeamVariable]:
+        if not robot.variables:
+            raise ModelError(f"{robot.name} has no variable", "a robot decides about one at least", robot.place)
+        found = []
+        for variable in robot.variables.values():
+            symbols = self._symbols if variable.codes.symbolic else ()
+            key = variable.codes.ranges, symbols
+            name = variable.domain_name or self._domains.setdefault(key, f"D{len(self._domains) + 1}")
+            found.append(TeamVariable(variable.name, Domain(name, variable.codes.ranges, symbols)))
+        return found
+
+    def _scenario(self, team: Team) -> tuple[ScenarioEvent, ...]:
+        given = self._model.given
+        events = [
+            replace(event, changes=changes_in_finer_units(event.changes, self._finer))
+            for event in (given.events if given else ())
+        ]
+        order = [*team.order, *(c.robot.name for event in events for c in event.changes if isinstance(c, AddAgent))]
+        held = {
+            (one.name, robot.name, parent.name)
+            for robot in team.robots
+            for parent in robot.parents
+            for one in parent.constraints
+        }
+        held |= {(part.name, child.name, robot.name) for robot in team.robots for child in robot.children
+                 for part in child.constraints}  # fmt: skip
+        changing = _Changing(self, order, held)
+        return (*events, *(ScenarioEvent(tuple(changing.changes(event)), event.after) for event in self._model.events))
+
+    def finished_rule(self, rule: Rule) -> list[Constraint]:
+        """Return what a constraint becomes that an event adds."""
+        return [self._finished(draft) for draft in self._added[rule]]
+
+    def joining(self, robot: ModelRobot, order: Sequence[str], constraints: Iterable[Constraint]) -> Robot:
+        """Return a robot that joins after those in `order`, with its constraints."""
+        everybody = {name: self._variables(self._model.robots[name]) for name in order if name in self._model.robots}
+        everybody[robot.name] = self._variables(robot)
+        extras = Extras(topics={robot.name: robot.topics}, weights={robot.name: robot.weight})
+        costs = replace(self._units, constant=0)
+        team = assemble("", everybody, constraints, kind=self._kind, costs=costs, extras=extras)
+        return replace(team[robot.name], children=())
+
+    def owners(self, constraint: Constraint, order: Sequence[str]) -> list[str]:
+        """Return the robots of a constraint's scope, the highest first."""
+        owners = {self._model.variables[name].owner for name in constraint.variables}
+        return [name for name in order if name in owners]
+
+
+class _Changing:
+    """The robots and the constraints between them, while events happen."""
+
+    def __init__(self, builder: _Builder, order: list[str], held: set[tuple[str, str, str]]) -> None:
+        self._builder = builder
+        self._order = order
+        self._held = held
+
+    def changes(self, event: Event) -> Iterable[Change]:
+        """Yield the changes of an event."""
+        new = {robot.name: list[Constraint]() for robot in event.steps if isinstance(robot, ModelRobot)}
+        self._order += new
+        added: dict[Rule, list[AddConstraint]] = {}
+        for rule in (step for step in event.steps if isinstance(step, Rule)):
+            added[rule] = self._added(rule, new)
+        for step in event.steps:
+            if isinstance(step, ModelRobot):
+                before = self._order[: self._order.index(step.name)]
+                yield AddAgent(self._builder.joining(step, before, new[step.name]))
+            elif isinstance(step, Rule):
+                yield from added[step]
+            elif isinstance(step, Removal):
+                yield from self._removed(step)
+            else:
+                yield step
+
+    def _added(self, rule: Rule, new: dict[str, list[Constraint]]) -> list[AddConstraint]:
+        """Return the constraints that two robots get; those of robots that join go with them."""
+        found = []
+        for constraint in self._builder.finished_rule(rule):
+            *others, lowest = self._builder.owners(constraint, self._order)
+            if lowest in new:
+                new[lowest].append(constraint)
+            elif not others:
+                hint = "an event adds constraints between robots, and values of one"
+                raise ModelError(f"the constraint {rule.name} is over variables of {lowest} alone", hint, rule.place)
+            else:
+                found.append(AddConstraint(lowest, others[-1], constraint))
+            self._held |= {(rule.name, lowest, above) for above in others[-1:]}
+        return found
+
+    def _removed(self, removal: Removal) -> Iterable[RemoveConstraint]:
+        found = sorted(one for one in self._held if one[0] == removal.name)
+        if not found:
+            hint = did_you_mean(removal.name, {one[0] for one in self._held}, "an event removes those between robots")
+            raise ModelError(f"robots share no constraint {removal.name!r} at that time", hint, removal.place)
+        self._held.difference_update(found)
+        for name, agent, parent in found:
+            yield RemoveConstraint(agent, parent, name)

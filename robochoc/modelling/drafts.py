@@ -1,0 +1,252 @@
+"""Constraints before the unit of the team's costs is known: what a condition or a sum of costs becomes."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from fractions import Fraction
+
+from robochoc.formats.definitions import PREDEFINED
+from robochoc.model.constraint import INFINITE, Constraint, Definition, Function, Predicate, Relation, Semantics
+from robochoc.model.constraint import Term as Actual
+from robochoc.model.expression import Apply, Constant, Expression, Name
+from robochoc.modelling.meanings import UndefinedTermError
+from robochoc.modelling.numbers import Exact, exact, places_of
+from robochoc.modelling.places import ModelError, Place
+from robochoc.modelling.rules import check_constant
+from robochoc.modelling.tables import Price, Row, commonest, listed_rows, prices, truths
+from robochoc.modelling.terms import Applied, Linear, Tabled, Term, Variable
+from robochoc.modelling.translation import Translator, UntranslatableError, may_be_undefined
+
+
+@dataclass(frozen=True)
+class Draft:
+    """A constraint to be.
+
+    Attributes:
+        name: Its name.
+        scope: Its variables.
+        place: Where it was made.
+        body: The expression of a condition or of a cost, over `X0`, `X1`, ... for the variables.
+        rows: The rows of a table, where it is one.
+        semantics: What the rows mean. None: `body` is a condition, or its value the cost.
+        is_cost: Whether the value of `body` is a cost.
+        cost: What breaking a condition costs. None: it is hard.
+        default: What rows of a soft table cost that it does not list.
+        is_penalty: Whether the costs of a soft table are what breaking a condition costs: they count against a sum
+            that is maximised.
+    """
+
+    name: str
+    scope: tuple[Variable, ...]
+    place: Place
+    body: Expression | None = None
+    rows: Mapping[Row, Price] = field(default_factory=dict)
+    semantics: Semantics | None = None
+    is_cost: bool = False
+    cost: Exact | None = None
+    default: Price = 0
+    is_penalty: bool = False
+
+    @property
+    def soft(self) -> bool:
+        """Whether it has costs."""
+        return self.is_cost or self.cost is not None or self.semantics is Semantics.SOFT
+
+    @property
+    def places(self) -> int:
+        """How many decimal places its costs have. Raises `ModelError`: too many."""
+        found = [one for one in {*self.rows.values(), self.default, self.cost or 0} if not isinstance(one, float)]
+        return max(places_of(one, self.place) for one in found) if self.soft else 0
+
+
+def conditions(term: Term, name: str, place: Place) -> Iterator[Draft]:
+    """Yield what says that `term` holds: for a conjunction each of its parts, for `all_different` each pair."""
+    if isinstance(term, Applied) and term.operator == "and":
+        for part in term.arguments:
+            yield from conditions(part, name, place)
+    elif isinstance(term, Applied) and term.operator == "different":
+        for number, one in enumerate(term.arguments):
+            for other in term.arguments[:number]:
+                yield from conditions(Applied("ne", other, one), name, place)
+    elif not term.variables:
+        check_constant(term, place)
+    elif draft := _condition(term, name, place):
+        yield draft
+
+
+def soft_condition(term: Term, cost: Exact, name: str, place: Place) -> Draft:
+    """Return what says that it costs something where `term` does not hold."""
+    body = _body(term)
+    if body is not None and (cost >= 0 or not may_be_undefined(body)):  # where it is undefined, it is broken as well
+        return Draft(name, term.variables, place, body, cost=cost)
+    holds, fails = truths(term, place)
+    few = len(fails) <= len(holds)
+    rows = dict.fromkeys(fails, cost) if few else dict.fromkeys(holds, 0)
+    default = 0 if few else cost
+    return Draft(name, term.variables, place, rows=rows, semantics=Semantics.SOFT, default=default, is_penalty=True)
+
+
+def costs_of(parts: Iterable[tuple[Exact, Term, Place]], name: str) -> tuple[list[Draft], Exact]:
+    """Return what a weighted sum of terms costs: one draft for all terms over the same variables, and a constant."""
+    groups: dict[frozenset[str], list[tuple[Exact, Term, Place]]] = {}
+    constant: Exact = 0
+    for factor, term, place in parts:
+        if term.variables:
+            groups.setdefault(frozenset(one.name for one in term.variables), []).append((factor, term, place))
+        else:
+            constant += factor * _constant(term, place)
+    return [_sum(group, f"{name}{number}") for number, group in enumerate(groups.values(), 1)], constant
+
+
+def split(term: Term, place: Place) -> tuple[list[tuple[Exact, Term, Place]], Exact]:
+    """Return the terms of a sum with their factors, and its constant."""
+    if isinstance(term, Linear):
+        return [(factor, one, place) for factor, one in term.parts], term.constant
+    return [(1, term, place)], 0
+
+
+def _constant(term: Term, place: Place) -> Exact:
+    try:
+        return exact(term.value({}))
+    except UndefinedTermError:
+        raise ModelError(f"{term!r} has no value: a division by zero", "", place) from None
+
+
+def _sum(group: Sequence[tuple[Exact, Term, Place]], name: str) -> Draft:
+    parts = [(factor, term) for factor, term, _ in group]
+    place = group[0][2]
+    whole = Linear(tuple(parts))
+    scope = whole.variables
+    if len(parts) == 1:
+        factor, table = parts[0]
+        if isinstance(table, Tabled) and (rows := listed_rows(table)) is not None:
+            priced = {row: _scaled(value, factor) for row, value in rows.items()}
+            return _table(name, scope, place, priced, _scaled(table.default, factor))
+    try:
+        scaled = Translator(_formals(scope)).whole_number(whole)
+    except UntranslatableError:
+        scaled = None
+    if scaled is not None and scaled.divisor == 1:
+        return Draft(name, scope, place, scaled.expression, is_cost=True)
+    found = prices(parts, scope, place)
+    return _table(name, scope, place, found, commonest(found))
+
+
+def _table(name: str, scope: tuple[Variable, ...], place: Place, rows: Mapping[Row, Price], default: Price) -> Draft:
+    listed = {row: price for row, price in rows.items() if price != default}
+    return Draft(name, scope, place, rows=listed, semantics=Semantics.SOFT, default=default)
+
+
+def _scaled(value: object, factor: Exact) -> Price:
+    return math.inf if isinstance(value, float) and math.isinf(value) else exact(exact(value) * factor)
+
+
+def _condition(term: Term, name: str, place: Place) -> Draft | None:
+    """Return a hard constraint. None: it always holds."""
+    if isinstance(term, Tabled) and (listed := listed_rows(term)) is not None:
+        rows = dict.fromkeys((row for row, value in listed.items() if value is not term.default), 0)
+        semantics = Semantics.CONFLICTS if term.default else Semantics.SUPPORTS
+        return Draft(name, term.variables, place, rows=rows, semantics=semantics)
+    body = _body(term)
+    if body is not None:
+        return Draft(name, term.variables, place, body)
+    holds, fails = truths(term, place)
+    if not fails:
+        return None
+    if len(fails) <= len(holds):
+        return Draft(name, term.variables, place, rows=dict.fromkeys(fails, 0), semantics=Semantics.CONFLICTS)
+    return Draft(name, term.variables, place, rows=dict.fromkeys(holds, 0), semantics=Semantics.SUPPORTS)
+
+
+def _body(term: Term) -> Expression | None:
+    try:
+        return Translator(_formals(term.variables)).whole_condition(term)
+    except UntranslatableError:
+        return None
+
+
+def _formals(scope: Sequence[Variable]) -> dict[Variable, str]:
+    return {variable: f"X{number}" for number, variable in enumerate(scope)}
+
+
+class Definitions:
+    """Names for definitions: the same one for the same, and none that is taken."""
+
+    def __init__(self, taken: Iterable[str]) -> None:
+        self._taken = set(taken)
+        self._known: dict[Definition, Definition] = {}
+        self._numbers = {"P": 0, "F": 0, "R": 0}
+
+    def constraint(self, draft: Draft, places: int, sign: int) -> Constraint:
+        """Return the constraint of a draft, with costs in units of `places` decimal places.
+
+        Args:
+            draft: The draft.
+            places: The decimal places of the team's costs.
+            sign: -1 where the sum is maximised, in which what is broken counts against it.
+        """
+        unit = 10**places
+        names = tuple(variable.name for variable in draft.scope)
+        if draft.body is None:
+            relation = self._named("R", _relation(draft, unit, sign))
+            return Constraint(draft.name, relation, names, names)
+        formals = tuple(f"X{number}" for number in range(len(names)))
+        if draft.is_cost:
+            return Constraint(draft.name, self._named("F", Function("", formals, draft.body)), names, names)
+        cost = INFINITE if draft.cost is None else int(draft.cost * unit) * sign
+        actual = _predefined(draft.body, dict(zip(formals, names, strict=True)))
+        if actual:
+            predicate, terms = actual
+            return Constraint(draft.name, predicate, terms, terms, cost=cost)
+        own = self._named("P", Predicate("", formals, draft.body))
+        return Constraint(draft.name, own, names, names, cost=cost)
+
+    def _named(self, letter: str, definition: Definition) -> Definition:
+        if definition not in self._known:
+            while (name := f"{letter}{self._numbers[letter] + 1}") in self._taken:
+                self._numbers[letter] += 1
+            self._numbers[letter] += 1
+            self._known[definition] = _called(definition, name)
+        return self._known[definition]
+
+
+def _called(definition: Definition, name: str) -> Definition:
+    match definition:
+        case Relation(arity=arity, semantics=semantics, tuples=tuples, costs=costs, default_cost=default):
+            return Relation(name, arity, semantics, tuples, costs, default)
+        case Predicate(parameters=parameters, body=body):
+            return Predicate(name, parameters, body)
+        case Function(parameters=parameters, body=body):
+            return Function(name, parameters, body)
+
+
+def _relation(draft: Draft, unit: int, sign: int) -> Relation:
+    semantics = draft.semantics or Semantics.SUPPORTS
+    rows = tuple(sorted(draft.rows))
+    if semantics is not Semantics.SOFT:
+        return Relation("", len(draft.scope), semantics, rows)
+    penalty = sign if draft.is_penalty else 1
+    costs = tuple(_units(draft.rows[row], unit * penalty) for row in rows)
+    return Relation("", len(draft.scope), semantics, rows, costs, _units(draft.default, unit * penalty))
+
+
+def _units(price: Price, factor: int) -> float:
+    return INFINITE if isinstance(price, float) else int(Fraction(price) * factor)
+
+
+def _predefined(body: Expression, names: Mapping[str, str]) -> tuple[Predicate, tuple[Actual, ...]] | None:
+    """Return the predefined predicate that compares two terms, and these. None: the body is something else."""
+    if not isinstance(body, Apply) or body.operator not in PREDEFINED:
+        return None
+    terms: list[Actual] = []
+    for one in body.arguments:
+        match one:
+            case Name(name):
+                terms.append(names[name])
+            case Constant(value):
+                terms.append(value)
+            case _:
+                return None
+    return (PREDEFINED[body.operator], tuple(terms)) if len({*terms}) == len(terms) else None

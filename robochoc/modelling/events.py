@@ -1,0 +1,80 @@
+"""Events of a model: what changes over time (docs/reference/format.md, "Changes over time")."""
+
+from __future__ import annotations
+
+from collections.abc import Hashable
+from typing import TYPE_CHECKING
+
+from robochoc.model.problem import AddValue, RemoveAgent, RemoveValue
+from robochoc.modelling.places import ModelError, ModelTypeError, Place, UnknownNameError, did_you_mean, here
+from robochoc.modelling.robots import ModelRobot, check_robot
+from robochoc.modelling.rules import Rule
+from robochoc.modelling.terms import Variable
+
+if TYPE_CHECKING:
+    from robochoc.modelling.model import Model
+
+
+class Removal:
+    """The removal of a constraint, by its name, in a line of the user's."""
+
+    def __init__(self, name: str, place: Place) -> None:
+        self.name, self.place = name, place
+
+
+Step = RemoveAgent | RemoveValue | AddValue | ModelRobot | Rule | Removal
+"""A change of an event, as a model keeps it."""
+
+
+class Event:
+    """Changes that happen together. `Model.after_solution` and `Model.after_messages` make it."""
+
+    def __init__(self, model: Model, after: int | None, place: Place) -> None:
+        self.after, self.place = after, place
+        self.steps: list[Step] = []
+        self._model = model
+
+    def __repr__(self) -> str:
+        return f"<event with {len(self.steps)} changes>"
+
+    def remove_robot(self, robot: ModelRobot | str) -> None:
+        """Remove a robot, with its variables and every constraint that it shares."""
+        name = robot.name if isinstance(robot, ModelRobot) else robot
+        if name not in self._model.robots:
+            raise UnknownNameError(f"there is no robot {name!r}", did_you_mean(name, self._model.robots))
+        self._add(RemoveAgent(name))
+
+    def robot(self, name: str, *, weight: int = 1) -> ModelRobot:
+        """Add a robot. It takes the lowest priority; constraints with it are added by this event's `add`."""
+        made = self._model.add_robot(check_robot(name, self._model.robots, weight), 0, weight, here())
+        made.joins = self
+        self._add(made)
+        return made
+
+    def remove_value(self, variable: Variable, value: object) -> None:
+        """Remove a value of a variable's domain."""
+        code = variable.codes.code(value)
+        if code is None:
+            raise ModelError(f"{variable!r} has no value {value!r}", did_you_mean(value, variable.domain[:1000]))
+        self._add(RemoveValue(variable.name, code))
+
+    def add_value(self, variable: Variable, value: Hashable) -> None:
+        """Add a value to a variable's domain."""
+        variable.codes, code = variable.codes.with_value(value, self._model.symbols)
+        self._add(AddValue(variable.name, code))
+
+    def add(self, *constraints: object, cost: object = None, name: str | None = None) -> Rule:
+        """Add constraints, each between variables of several robots. See `Model.add`."""
+        rule = self._model.rule(constraints, cost, name, event=self)
+        self._add(rule)
+        return rule
+
+    def remove_constraint(self, constraint: Rule | str) -> None:
+        """Remove a constraint between robots: what `add` returned, or its name."""
+        if not isinstance(constraint, (Rule, str)):
+            raise ModelTypeError(f"{constraint!r} is no constraint that was added", "give what add() returned")
+        self._add(Removal(constraint.name if isinstance(constraint, Rule) else constraint, here()))
+
+    def _add(self, step: Step) -> None:
+        self.steps.append(step)
+        self._model.changed()

@@ -1,0 +1,109 @@
+"""Teams that are there already, as what a model begins with."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
+
+from robochoc.model.constraint import INFINITE, Constraint, Function, Predicate, Relation
+from robochoc.model.constraint import Variable as TeamVariable
+from robochoc.model.cost_units import CostUnits, common_units
+from robochoc.model.problem import AddConstraint, Change, ConstraintModel, ProblemKind, ScenarioEvent, Team
+from robochoc.modelling.codes import NUMBER, Codes, Symbols, kind_of
+from robochoc.modelling.places import Place
+from robochoc.modelling.terms import Variable
+
+
+@dataclass(frozen=True)
+class Given:
+    """What a team says beside its robots' names and variables.
+
+    Attributes:
+        kind: The kind of problem.
+        units: The units of its costs.
+        constraints: Its constraints but the partially known ones.
+        parts: The parts of partially known constraints, by the robot that knows them.
+        links: Pairs of neighbours, the parent first.
+        events: Its scenario.
+    """
+
+    kind: ProblemKind
+    units: CostUnits
+    constraints: Sequence[Constraint]
+    parts: Mapping[str, Sequence[Constraint]]
+    links: Sequence[tuple[str, str]]
+    events: Sequence[ScenarioEvent]
+
+    @property
+    def names(self) -> set[str]:
+        """The names of its constraints."""
+        return {one.name for one in self._all}
+
+    @property
+    def definitions(self) -> set[str]:
+        """The names of its relations, predicates and functions."""
+        return {one.definition.name for one in self._all}
+
+    @property
+    def _all(self) -> Iterable[Constraint]:
+        added = [c.constraint for event in self.events for c in event.changes if isinstance(c, AddConstraint)]
+        return [*self.constraints, *(one for parts in self.parts.values() for one in parts), *added]
+
+
+def given_by(team: Team) -> Given:
+    """Return what `team` says."""
+    units = common_units(robot.costs for robot in team.robots)
+    constraints: list[Constraint] = []
+    parts: dict[str, list[Constraint]] = {}
+    for robot in team.robots:
+        finer = 10 ** (units.places - robot.costs.places)
+        held = [*robot.private, *robot.shared, *(one for child in robot.children for one in child.constraints)]
+        for one in (in_finer_units(constraint, finer) for constraint in held):
+            if one.model is ConstraintModel.PKC:
+                parts.setdefault(robot.name, []).append(one)
+            else:
+                constraints.append(one)
+    links = [(parent.name, robot.name) for robot in team.robots for parent in robot.parents]
+    return Given(team.kind, units, constraints, parts, links, team.scenario)
+
+
+def given_variable(variable: TeamVariable, owner: str, symbols: Symbols, place: Place) -> Variable:
+    """Return a variable of a team as one of a model."""
+    domain = variable.domain
+    for symbol in domain.symbols:
+        symbols.add(symbol)
+    codes = Codes(NUMBER, domain.ranges)
+    if domain.symbols:
+        codes = Codes(kind_of(""), domain.ranges, told={value: domain.symbols[value] for value in domain})
+    made = Variable(variable.name, codes, owner, place)
+    made.domain_name = domain.name
+    return made
+
+
+def in_finer_units(constraint: Constraint, factor: int) -> Constraint:
+    """Return `constraint`, whose costs are counted in a unit that is so many times finer."""
+    if factor == 1:
+        return constraint
+    match constraint.definition:
+        case Relation() as relation:
+            costs = tuple(_times(cost, factor) for cost in relation.costs)
+            finer = replace(relation, costs=costs, default_cost=_times(relation.default_cost, factor))
+            return replace(constraint, definition=finer)
+        case Predicate():
+            return replace(constraint, cost=_times(constraint.cost, factor))
+        case Function():
+            return constraint
+
+
+def changes_in_finer_units(changes: Iterable[Change], factor: int) -> tuple[Change, ...]:
+    """Return `changes`; constraints that they add have costs in a finer unit. Robots that they add name their own."""
+    return tuple(
+        replace(change, constraint=in_finer_units(change.constraint, factor))
+        if isinstance(change, AddConstraint)
+        else change
+        for change in changes
+    )
+
+
+def _times(cost: float, factor: int) -> float:
+    return cost if cost == INFINITE else cost * factor

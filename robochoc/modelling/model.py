@@ -1,0 +1,234 @@
+"""`robochoc.Model`: a problem for a team of robots, in Python.
+
+    >>> import robochoc
+    >>> model = robochoc.Model("charging")
+    >>> slots = [model.robot(f"drone{i}").variable("slot", range(1, 4)) for i in range(3)]
+    >>> model.add(robochoc.all_different(slots))
+    <C1: all_different(drone0.slot, drone1.slot, drone2.slot)>
+    >>> model.minimize(sum(abs(slot - 2) for slot in slots))
+    >>> outcome = model.solve("dpop", runtime="simulator")
+    >>> outcome.cost
+    2
+
+Robots know what their own file would say. Who shares what with whom, and who is whose parent, follows.
+"""
+
+from __future__ import annotations
+
+import itertools
+from pathlib import Path
+from typing import Self
+
+from robochoc.formats import read_team, write_team
+from robochoc.model.cost_units import PLAIN_COSTS
+from robochoc.model.outcome import Outcome
+from robochoc.model.problem import Team
+from robochoc.modelling.building import built, saved_order
+from robochoc.modelling.codes import Symbols
+from robochoc.modelling.drafts import split
+from robochoc.modelling.events import Event
+from robochoc.modelling.given import Given, given_by, given_variable
+from robochoc.modelling.numbers import Exact
+from robochoc.modelling.places import ModelError, Place, UnknownNameError, did_you_mean, here
+from robochoc.modelling.robots import ModelRobot, check_robot
+from robochoc.modelling.rules import Rule, check_owned, conditions_in, exact_or_none
+from robochoc.modelling.solution import Solution
+from robochoc.modelling.solving import Solvable
+from robochoc.modelling.terms import Term, Variable, all_of, number
+
+
+class Model(Solvable):
+    """A problem that is made in Python: robots with variables, constraints, costs, and what changes over time.
+
+    Attributes:
+        name: Its name, that of its team.
+        robots: The robots, by name.
+        variables: The variables of all robots, by their names in the team.
+        constraints: What was added, in order.
+    """
+
+    def __init__(self, name: str = "model") -> None:
+        self.name = name
+        self.robots: dict[str, ModelRobot] = {}
+        self.variables: dict[str, Variable] = {}
+        self.constraints: list[Rule] = []
+        self.symbols = Symbols()
+        self.events: list[Event] = []
+        self.objective: list[tuple[Exact, Term, Place]] = []
+        self.constant: Exact = 0
+        self.maximized: bool | None = None
+        self.given: Given | None = None
+        self._team: Team | None = None
+        self._names = (f"C{number}" for number in itertools.count(1))
+
+    @classmethod
+    def load(cls, folder: Path | str) -> Model:
+        """Return the model of the team whose files are in `folder`. More can be added to it.
+
+        Raises:
+            InvalidInputError: if the files are invalid.
+        """
+        return cls.of(read_team(Path(folder)))
+
+    @classmethod
+    def of(cls, team: Team) -> Model:
+        """Return the model of a team. More can be added to it."""
+        model = cls(team.name)
+        model.given = given_by(team)
+        units = model.given.units
+        model.maximized = units.maximize if units != PLAIN_COSTS else None
+        place = here()
+        for robot in team.robots:
+            added = model.add_robot(robot.name, 0, robot.weight, place)
+            added.topics += robot.topics
+            for variable in robot.variables:
+                made = given_variable(variable, robot.name, model.symbols, place)
+                added.variables[variable.name] = model.variables[variable.name] = made
+        return model
+
+    def robot(self, name: str, *, priority: float = 0, weight: int = 1) -> ModelRobot:
+        """Add a robot.
+
+        Args:
+            name: Its name.
+            priority: Robots with a higher one come first; of equal ones, those that were made first.
+            weight: How much its withdrawal counts: one robot of weight 3 as much as three of weight 1.
+
+        Raises:
+            ModelError: if there is one of that name, or it cannot be a name.
+        """
+        return self.add_robot(check_robot(name, self.robots, weight), priority, weight, here())
+
+    def add_robot(self, name: str, priority: float, weight: int, place: Place) -> ModelRobot:
+        """Add a robot of a name that is free. See `robot`."""
+        self.robots[name] = ModelRobot(self, name, priority, weight, place)
+        self.changed()
+        return self.robots[name]
+
+    def __getitem__(self, name: str) -> Variable:
+        """Return the variable that is called `name` in the team, such as `drone3.slot`."""
+        if name not in self.variables:
+            raise UnknownNameError(f"there is no variable {name!r}", did_you_mean(name, self.variables))
+        return self.variables[name]
+
+    def add(self, *constraints: object, cost: object = None, name: str | None = None) -> Rule:
+        """Add constraints. Those over variables of one robot are private: no other robot learns them.
+
+        Args:
+            *constraints: Conditions, or lists of them.
+            cost: What it costs if they do not all hold. It counts against a sum that is
+                maximised. None: they must hold.
+            name: A name, by which an event can remove them.
+
+        Returns:
+            The constraint, under one name.
+
+        Raises:
+            ModelError: if they are no conditions over variables of this model.
+        """
+        rule = self.rule(constraints, cost, name)
+        self.constraints.append(rule)
+        self.changed()
+        return rule
+
+    def __iadd__(self, constraints: object) -> Self:
+        """Add constraints, as `add` does."""
+        self.add(constraints)
+        return self
+
+    def minimize(self, costs: object) -> None:
+        """Minimise a sum of terms: robots pay for the terms over their variables.
+
+        Terms over the same variables become one cost. Said again, the sums add up. Integers, `Decimal` and `Fraction`
+        count exactly; a float counts as it is written, 0.1 as one tenth.
+
+        Raises:
+            ModelError: if it is no number, or another sum of the model is maximised.
+        """
+        self._optimize(costs, maximize=False)
+
+    def maximize(self, utilities: object) -> None:
+        """Maximise a sum of terms. See `minimize`; costs of soft constraints count against it."""
+        self._optimize(utilities, maximize=True)
+
+    def _optimize(self, given: object, *, maximize: bool) -> None:
+        place = here()
+        if self.maximized not in {None, maximize}:
+            words = ("minimised", "maximised")
+            raise ModelError(
+                f"a sum is {words[maximize]} here, and another one is {words[not maximize]}",
+                "write the costs of one with the other sign",
+            )
+        term = number(given)
+        check_owned(term, self.variables, place)
+        parts, constant = split(term, place)
+        self.objective += parts
+        self.constant += constant
+        self.maximized = maximize
+        self.changed()
+
+    def rule(self, constraints: object, cost: object, name: str | None, event: object = None) -> Rule:
+        """Return a constraint, which is not added yet."""
+        place = here()
+        term = all_of(conditions_in(constraints, place))
+        check_owned(term, self.variables, place, event)
+        return Rule(name or self._free_name(), term, exact_or_none(cost), place)
+
+    def free_prefix(self, prefix: str) -> str:
+        """Return `prefix`, or something like it, with which no name of a constraint begins."""
+        taken = {rule.name for rule in self.constraints} | (self.given.names if self.given else set())
+        while any(name.startswith(prefix) for name in taken):
+            prefix += "_"
+        return prefix
+
+    def _free_name(self) -> str:
+        taken = {rule.name for rule in self.constraints} | (self.given.names if self.given else set())
+        return next(name for name in self._names if name not in taken)
+
+    def after_solution(self) -> Event:
+        """Add an event: what changes once the problem before it is solved."""
+        return self._event(None)
+
+    def after_messages(self, count: int) -> Event:
+        """Add an event: what changes after so many messages, or once the problem before it is solved."""
+        return self._event(count)
+
+    def _event(self, after: int | None) -> Event:
+        self.events.append(Event(self, after, here()))
+        self.changed()
+        return self.events[-1]
+
+    def changed(self) -> None:
+        """Forget the team: the model has changed."""
+        self._team = None
+
+    @property
+    def team(self) -> Team:
+        """The team, as it stands now. Raises `ModelError` for what no team can be."""
+        if self._team is None:
+            self._team = built(self)
+        return self._team
+
+    def save(self, folder: Path | str, *, replace: bool = False) -> None:
+        """Write the robots' files, and `scenario.xml` if something changes over time: all of them, or none.
+
+        Args:
+            folder: The folder to be written. Its name is that of the team when it is read.
+            replace: Whether a team that is there already is replaced.
+
+        Raises:
+            ModelError: if the model has a mistake.
+            InvalidInputError: if files cannot say it, or the folder is there and is not replaced.
+            OSError: if it cannot be written.
+        """
+        write_team(built(self, saved_order(self.team)), Path(folder), replace=replace)
+
+    def _team_to_solve(self) -> Team:
+        return self.team
+
+    def _solution(self, outcome: Outcome, team: Team) -> Solution:
+        return Solution.of(outcome, team, dict(self.variables))
+
+    def __repr__(self) -> str:
+        sizes = f"{len(self.robots)} robots, {len(self.variables)} variables, {len(self.constraints)} constraints"
+        return f"<model {self.name}: {sizes}>"

@@ -1,0 +1,1 @@
+"""How teams, models, outcomes and scenes show themselves in notebooks: HTML that needs nothing else."""

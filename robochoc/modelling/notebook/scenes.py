@@ -1,0 +1,54 @@
+"""The scene of an outcome, as a page of its own or inside of a notebook's."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from robochoc.flight.mission import mission_of
+from robochoc.flight.preview import preview_of
+from robochoc.model.outcome import Outcome
+from robochoc.model.problem import Team
+from robochoc.modelling.notebook.pages import framed
+from robochoc.view.page import scene_page
+from robochoc.view.scene import scene_of
+
+
+class ScenePage:
+    """A scene: the drones, and how they fly to where the team has decided. In a notebook it shows itself.
+
+    Attributes:
+        html: The page, which needs nothing else.
+        height: Its height in a notebook, in pixels.
+    """
+
+    def __init__(self, outcome: Outcome, team: Team | None, *, height: int = 520) -> None:
+        """Fly an outcome in calm air, and draw it.
+
+        Args:
+            outcome: What was decided.
+            team: The team as its files have it, before its scenario.
+            height: The height in a notebook, in pixels.
+        """
+        preview = preview_of(mission_of(outcome, team))
+        weighted = None if team is None else any(robot.weight != 1 for robot in team.robots)
+        scene = scene_of(
+            outcome,
+            mission_of(outcome, team),
+            preview.flown,
+            flown_mission=preview.mission,
+            why_not=preview.why_not,
+            weighted=weighted,
+        )
+        self.html = scene_page(scene).decode()
+        self.height = height
+        self._title = scene.title
+
+    def save(self, path: Path | str) -> None:
+        """Write the page to a file."""
+        Path(path).write_text(self.html, encoding="utf-8")
+
+    def __repr__(self) -> str:
+        return f"<scene of {self._title}: {len(self.html):,} characters>"
+
+    def _repr_html_(self) -> str:
+        return framed(self.html, self.height)

@@ -1,0 +1,47 @@
+"""Tables in HTML. All texts may come from foreign files: they are escaped."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from html import escape
+
+from robochoc.view.label import printable
+
+MAX_ROWS = 40
+"""The maximum number of rows of a table; of the others their number is told."""
+MAX_TEXT = 200
+"""The maximum number of characters in a cell."""
+
+_CELL = "text-align:left;vertical-align:top;padding:.15rem .6rem"
+
+
+def text(value: object) -> str:
+    """Return any text as HTML, cut where it is too long."""
+    shown = printable(str(value))
+    return escape(shown if len(shown) <= MAX_TEXT else f"{shown[: MAX_TEXT - 1]}…")
+
+
+def heading(words: str, details: str = "") -> str:
+    """Return a line that says what is shown."""
+    more = f' <span style="opacity:.7">{text(details)}</span>' if details else ""
+    return f'<p style="margin:.3rem 0"><b>{text(words)}</b>{more}</p>'
+
+
+def table(titles: Sequence[str], rows: Iterable[Sequence[object]]) -> str:
+    """Return a table with a title for each column. Nothing where there are no rows."""
+    listed = list(rows)
+    if not listed:
+        return ""
+    head = "".join(f'<th style="{_CELL}">{text(title)}</th>' for title in titles)
+    body = "".join(map(_row, listed[:MAX_ROWS]))
+    more = len(listed) - MAX_ROWS
+    rest = f'<p style="opacity:.7;margin:.2rem 0">... and {more:,} more</p>' if more > 0 else ""
+    return f'<table style="margin:.3rem 0"><thead><tr>{head}</tr></thead><tbody>{body}</tbody></table>{rest}'
+
+
+def _row(cells: Sequence[object]) -> str:
+    return f"<tr>{''.join(map(_cell, cells))}</tr>"
+
+
+def _cell(value: object) -> str:
+    return f'<td style="{_CELL}">{text(value)}</td>'

@@ -1,0 +1,88 @@
+"""What a model keeps of what users add to it: constraints, terms of the objective, parts, and their lines."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from robochoc.modelling.meanings import UndefinedTermError
+from robochoc.modelling.numbers import Exact, exact
+from robochoc.modelling.places import ModelError, ModelTypeError, Place
+from robochoc.modelling.terms import Term, Variable, condition
+
+if TYPE_CHECKING:
+    from robochoc.modelling.drafts import Draft
+
+
+@dataclass(frozen=True, eq=False)
+class Rule:
+    """A constraint of a model: what `Model.add` returns.
+
+    Attributes:
+        name: Its name.
+        term: The condition.
+        cost: What it costs to break it. None: it must hold.
+        place: The line that added it.
+    """
+
+    name: str
+    term: Term
+    cost: Exact | None
+    place: Place
+
+    def __repr__(self) -> str:
+        return f"<{self.name}: {self.term!r}{'' if self.cost is None else f', cost {self.cost}'}>"
+
+    def drafts(self) -> Iterator[Draft]:
+        """Yield what it becomes."""
+        from robochoc.modelling.drafts import conditions, soft_condition  # noqa: PLC0415 - they need the formats
+
+        if self.cost is None:
+            yield from conditions(self.term, self.name, self.place)
+        else:
+            yield soft_condition(self.term, self.cost, self.name, self.place)
+
+
+def conditions_in(given: object, place: Place) -> list[Term]:
+    """Return the conditions that a user adds at once: one, or a list of them, which may hold lists.
+
+    Raises:
+        ModelError: if one is no condition, or false whatever the values.
+    """
+    if isinstance(given, Iterable) and not isinstance(given, (Term, str)):
+        return [term for one in given for term in conditions_in(one, place)]
+    if not isinstance(given, (Term, bool)):
+        raise ModelTypeError(f"{given!r} is no condition", "compare terms: x != y", place)
+    term = condition(given)
+    if term.variables:
+        return [term]
+    check_constant(term, place)
+    return []
+
+
+def check_constant(term: Term, place: Place) -> None:
+    """Raise `ModelError` for a condition that depends on nothing and is false."""
+    try:
+        holds = bool(term.value({}))
+    except UndefinedTermError:
+        holds = False
+    if not holds:
+        raise ModelError("this constraint is False whatever the values are", "compare variables of the model", place)
+
+
+def check_owned(term: Term, known: dict[str, Variable], place: Place, event: object = None) -> None:
+    """Raise `ModelError` unless the variables of `term` are in this model, and there at that time."""
+    for variable in term.variables:
+        if known.get(variable.name) is not variable:
+            raise ModelError(
+                f"{variable!r}, made at {variable.place}, is no variable of this model", "use variables of one", place
+            )
+        if variable.joins is not None and event is None:
+            hint = "add constraints with it to the event: event.add(...)"
+            raise ModelError(f"{variable.owner}, made at {variable.place}, joins later", hint, place)
+
+
+def exact_or_none(cost: object) -> Exact | None:
+    """Return the cost of breaking a constraint; None: it must hold."""
+    return None if cost is None else exact(cost)

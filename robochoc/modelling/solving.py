@@ -1,0 +1,172 @@
+"""`solve`, for problems from files and from Python: the options of a run by name, with hints where one is wrong."""
+
+from __future__ import annotations
+
+import inspect
+from collections.abc import Iterable, Mapping, Sequence
+from enum import StrEnum
+from typing import TYPE_CHECKING, Never, TypeVar
+
+from robochoc.journal.events import Observer
+from robochoc.model.orders import Order
+from robochoc.model.outcome import Outcome
+from robochoc.model.problem import Team
+from robochoc.modelling.places import did_you_mean
+from robochoc.modelling.solution import Solution
+from robochoc.run.defaults import default_protocol
+from robochoc.run.options import OnLoss, Options, Runtime, ScheduleName, Withdrawal
+from robochoc.run.orchestrator import solve
+from robochoc.run.registry import installed_spelling
+from robochoc.run.scenario import Environment
+from robochoc.solver.compile import Limits
+
+if TYPE_CHECKING:
+    from robochoc.communication.kill_schedule import Kill
+    from robochoc.communication.simulator.channel import ChannelModel
+
+NO_LIMITS = Limits()
+"""The default limits on the compilation of domains."""
+_Choice = TypeVar("_Choice", bound=StrEnum)
+
+
+class Solvable:
+    """What a team of robots can solve: it has a team."""
+
+    def solve(  # noqa: PLR0913 - options of a run, by their names
+        self,
+        protocol: str | None = None,
+        runtime: str = Runtime.PROCESSES,
+        *,
+        order: str | Sequence[str] | None = None,
+        withdraw: str | None = None,
+        settings: Mapping[str, object] = {},
+        observer: Observer | None = None,
+        environment: Environment | None = None,
+        seed: int = 0,
+        timeout: float | None = None,
+        messages: int | None = None,
+        verify: bool = False,
+        count: bool = False,
+        cache: bool = True,
+        local: Limits = NO_LIMITS,
+        schedule: str = ScheduleName.CONCURRENT,
+        delay: int = 0,
+        channel: ChannelModel | None = None,
+        on_loss: str | None = None,
+        spares: int = 0,
+        patience: float | None = None,
+        kill: Sequence[Kill] = (),
+        filters: Sequence[str] = (),
+        **unknown: Never,
+    ) -> Solution:
+        """Let the robots solve the problem together.
+
+        The runtime `processes` starts processes. A program that uses it calls this below `if __name__ == "__main__":`.
+
+        Args:
+            protocol: The name of the protocol, in any case. None: the default protocol for the kind of problem.
+            runtime: `processes`, `simulator` or `network`.
+            order: The name of a priority order, such as `dom-deg`, or the names of all robots, the highest priority
+                first. None: the order of the team.
+            withdraw: Which robots may withdraw if there is no solution for all: `minimum` or `maximal`. None: none may.
+            settings: Settings of the protocol, by name.
+            observer: It is called with every event of the run.
+            environment: It gets each answer, and returns what changes next.
+            seed: The seed of the simulator, of the order `random`, and of protocols that draw lots.
+            timeout: A limit on wall-clock time, in seconds. None: no limit.
+            messages: A limit on the number of messages. None: no limit.
+            verify: Whether the central solver checks a `no-solution` or a minimum cost that robots have found.
+            count: Whether the central solver counts all solutions.
+            cache: Whether solutions of local problems are kept in the user's cache folder.
+            local: Limits on the compilation of each robot's domain.
+            schedule: How the simulator orders events: `concurrent` or `random`.
+            delay: The longest delay of a message in the simulator, in constraint checks.
+            channel: A channel model: the simulator counts seconds of computing and radio.
+            on_loss: What the loss of a robot means: `fail` or `withdraw`. None: the run fails, unless there are
+                `spares`.
+            spares: How many robots that are lost come back.
+            patience: A robot whose process is stopped for so many seconds is lost. None: it is waited for.
+            kill: Robots whose processes are killed, and when.
+            filters: The names of the channel filters that messages on a network go through, in this order.
+            **unknown: There are no other options.
+
+        Returns:
+            The solution: a verdict, the values, their cost, and what the run took.
+
+        Raises:
+            UnsupportedError: if problem, protocol, runtime and options do not go together.
+            RobotsLostError: if robots were lost, and the options do not say how to go on.
+            RefutedError: if the checker refutes the answer.
+            ValueError: if an option has a value that is not allowed.
+            TypeError: if there is no such option.
+
+        Example:
+            >>> import robochoc
+            >>> problem = robochoc.load("instances/queens3d-4")
+            >>> outcome = problem.solve("abt", runtime="simulator", withdraw="minimum")
+            >>> len(outcome.assignment)
+            10
+        """
+        _refuse(unknown)
+        team = self._team_to_solve()
+        options = Options(
+            protocol=installed_spelling(protocol) if protocol else default_protocol(team.kind),
+            runtime=_choice("runtime", Runtime, runtime),
+            seed=seed,
+            timeout=timeout,
+            withdraw=None if withdraw is None else _choice("withdraw", Withdrawal, withdraw),
+            schedule=_choice("schedule", ScheduleName, schedule),
+            delay=delay,
+            local=local,
+            cache=cache,
+            count=count,
+            verify=verify,
+            order=_order(order, team),
+            messages=messages,
+            on_loss=None if on_loss is None else _choice("on_loss", OnLoss, on_loss),
+            spares=spares,
+            patience=patience,
+            channel=channel,
+            settings={name: str(value) for name, value in settings.items()},
+            filters=tuple(filters),
+            kill=tuple(kill),
+        )
+        return self._solution(solve(team, options, observer=observer, environment=environment), team)
+
+    def _repr_html_(self) -> str:
+        from robochoc.modelling.notebook.pages import team_html  # noqa: PLC0415 - notebooks only
+
+        return team_html(self._team_to_solve())
+
+    def _team_to_solve(self) -> Team:
+        raise NotImplementedError
+
+    def _solution(self, outcome: Outcome, team: Team) -> Solution:
+        return Solution.of(outcome, team)
+
+
+def _refuse(unknown: Iterable[str]) -> None:
+    """Raise `TypeError` for options that there are not."""
+    for name in unknown:
+        known = [one for one in inspect.signature(Solvable.solve).parameters if one not in {"self", "unknown"}]
+        hint = did_you_mean(name, known, f"there are {', '.join(known)}")
+        raise TypeError(f"solve() has no option {name!r}; {hint}")
+
+
+def _choice(name: str, choices: type[_Choice], given: str) -> _Choice:
+    """Return the member of an enumeration. Raises `ValueError` with those that there are."""
+    try:
+        return choices(given)
+    except ValueError:
+        known = [str(one) for one in choices]
+        hint = did_you_mean(given, known, f"expected {', '.join(known)}")
+        raise ValueError(f"{name}={given!r} is not allowed; {hint}") from None
+
+
+def _order(order: str | Sequence[str] | None, team: Team) -> Order | tuple[str, ...] | None:
+    if order is None or isinstance(order, str):
+        return None if order is None else _choice("order", Order, order)
+    for name in order:
+        if name not in team:
+            raise ValueError(f"order: there is no robot {name!r}; {did_you_mean(name, team.order, 'name all robots')}")
+    return tuple(order)

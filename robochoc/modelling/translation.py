@@ -1,0 +1,222 @@
+"""Terms in the language of files: expressions over integers (docs/reference/format.md, "Functional expressions").
+
+A number that need not be an integer becomes an integer expression and what it is to be divided by, so nothing is
+rounded. `//` and `%` round down in Python and toward zero in files: the rest is made right by `mod`.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from fractions import Fraction
+from typing import NamedTuple
+
+from robochoc.model.expression import Apply, Expression, Name
+from robochoc.model.expression import Constant as Integer
+from robochoc.model.expression.bounds import Interval, bounds
+from robochoc.modelling.codes import BOOLEAN, NUMBER
+from robochoc.modelling.numbers import exact
+from robochoc.modelling.terms import Applied, Constant, Linear, Term, Variable
+
+MAX_SIZE = 5_000
+"""The maximum number of operators and terms of an expression: nested quotients double it each time."""
+MAX_LEVELS = 60
+"""The maximum depth of an expression."""
+
+
+class UntranslatableError(Exception):
+    """No expression says the same: the term has to become a table."""
+
+
+class Scaled(NamedTuple):
+    """A number: the value of an integer expression, divided by `divisor` (1 or more)."""
+
+    expression: Expression
+    divisor: int = 1
+
+
+class Translator:
+    """Translates terms over variables, whose values have `names` in the expression."""
+
+    def __init__(self, names: Mapping[Variable, str]) -> None:
+        self._names = names
+        self._limits = {name: _interval(variable) for variable, name in names.items()}
+
+    def whole_condition(self, term: Term) -> Expression:
+        """Return a Boolean expression of a size that files can hold. Raises `UntranslatableError`."""
+        return _of_some_size(self.condition(term))
+
+    def whole_number(self, term: Term) -> Scaled:
+        """Return a number whose expression has such a size. Raises `UntranslatableError`."""
+        found = self.number(term)
+        return found._replace(expression=_of_some_size(found.expression))
+
+    def condition(self, term: Term) -> Expression:
+        """Return a Boolean expression. Raises `UntranslatableError`."""
+        match term:
+            case Constant(given=given):
+                return Apply("eq", (Integer(int(bool(given))), Integer(1)))
+            case Variable(kind=kind) if kind == BOOLEAN:
+                return Apply("eq", (Name(self._names[term]), Integer(1)))
+            case Applied(operator="and" | "or" | "not" | "xor" as operator, arguments=arguments):
+                return Apply(operator, tuple(map(self.condition, arguments)))
+            case Applied(operator="implies", arguments=(one, other)):
+                return Apply("or", (Apply("not", (self.condition(one),)), self.condition(other)))
+            case Applied(operator="different", arguments=arguments):
+                pairs = [("ne", one, other) for n, one in enumerate(arguments) for other in arguments[:n]]
+                found = tuple(self._comparison(*pair) for pair in pairs)
+                return found[0] if len(found) == 1 else Apply("and", found)
+            case Applied(operator=operator, arguments=(one, other)) if operator in _COMPARISONS:
+                return self._comparison(operator, one, other)
+            case _:
+                raise UntranslatableError
+
+    def number(self, term: Term) -> Scaled:
+        """Return a number. Raises `UntranslatableError`."""
+        match term:
+            case Constant(given=given):
+                value = Fraction(exact(given))
+                return Scaled(Integer(value.numerator), value.denominator)
+            case Variable(kind=kind) if kind in {NUMBER, BOOLEAN}:
+                return Scaled(Name(self._names[term]), term.codes.scale)
+            case Linear(parts=parts, constant=constant):
+                return self._sum([(factor, self.number(one)) for factor, one in parts], Fraction(constant))
+            case Applied(kind=kind) if kind == BOOLEAN:
+                return Scaled(Apply("if", (self.condition(term), Integer(1), Integer(0))))
+            case Applied(operator=operator, arguments=arguments):
+                return self._applied(operator, arguments)
+            case _:
+                raise UntranslatableError
+
+    def _applied(self, operator: str, arguments: Sequence[Term]) -> Scaled:
+        if operator == "if":
+            test, *chosen = arguments
+            branches, divisor = _together(map(self.number, chosen))
+            return Scaled(Apply("if", (self.condition(test), *branches)), divisor)
+        numbers = [self.number(one) for one in arguments]
+        match operator:
+            case "abs" | "min" | "max":
+                found, divisor = _together(numbers)
+                return Scaled(Apply(operator, tuple(found)), divisor)
+            case "mul":
+                factors = tuple(one.expression for one in numbers)
+                return Scaled(Apply("mul", factors), math.prod(one.divisor for one in numbers))
+            case "floordiv" | "mod":
+                return self._division(operator, numbers)
+            case "element":
+                return self._element(*numbers)
+            case _:
+                return self._power(*numbers)
+
+    def _sum(self, parts: list[tuple[int | Fraction, Scaled]], constant: Fraction) -> Scaled:
+        factors = [Fraction(factor) / number.divisor for factor, number in parts]
+        divisor = math.lcm(constant.denominator, *(factor.denominator for factor in factors))
+        whole = [int(factor * divisor) for factor in factors]
+        terms = [(factor, number.expression) for factor, (_, number) in zip(whole, parts, strict=True) if factor]
+        rest = int(constant * divisor)
+        if not terms:
+            return Scaled(Integer(rest), divisor)
+        match terms:
+            case [(1, one), (-1, other)] | [(-1, other), (1, one)] if not rest:
+                return Scaled(Apply("sub", (one, other)), divisor)
+            case [(1, one)] if rest:
+                return Scaled(Apply("add" if rest > 0 else "sub", (one, Integer(abs(rest)))), divisor)
+            case [(-1, one)] if rest:
+                return Scaled(Apply("sub", (Integer(rest), one)), divisor)
+        found = [_times(factor, expression) for factor, expression in terms]
+        found += [Integer(rest)] if rest else []
+        return Scaled(found[0] if len(found) == 1 else Apply("add", tuple(found)), divisor)
+
+    def _division(self, operator: str, numbers: Sequence[Scaled]) -> Scaled:
+        """Return the quotient rounded down, or the remainder, which has the divisor's sign."""
+        (left, right), divisor = _together(numbers)
+        down = self._bounds(left).low >= 0 and self._bounds(right).low > 0
+        rest = Apply("mod", (left, right))
+        if not down:
+            rest = Apply("mod", (Apply("add", (rest, right)), right))
+        if operator == "mod":
+            return Scaled(rest, divisor)
+        return Scaled(Apply("div", (left if down else Apply("sub", (left, rest)), right)))
+
+    def _element(self, index: Scaled, *array: Scaled) -> Scaled:
+        if index.divisor != 1:
+            raise UntranslatableError
+        found, divisor = _together(array)
+        place = index.expression
+        chosen = [Apply("if", (Apply("eq", (place, Integer(n))), one, Integer(0))) for n, one in enumerate(found)]
+        low, high = self._bounds(place)
+        if low < 0 or high >= len(found):
+            inside = Apply("and", (Apply("ge", (place, Integer(0))), Apply("lt", (place, Integer(len(found))))))
+            undefined = Apply("div", (Integer(1), Integer(0)))
+            chosen.append(Apply("if", (inside, Integer(0), undefined)))
+        return Scaled(chosen[0] if len(chosen) == 1 else Apply("add", tuple(chosen)), divisor)
+
+    def _power(self, base: Scaled, exponent: Scaled) -> Scaled:
+        if base.divisor != 1 or exponent.divisor != 1 or self._bounds(exponent.expression).low < 0:
+            raise UntranslatableError
+        return Scaled(Apply("pow", (base.expression, exponent.expression)))
+
+    def _comparison(self, operator: str, one: Term, other: Term) -> Expression:
+        if isinstance(one, Variable) and isinstance(other, Variable) and one.codes.symbolic:
+            return Apply(operator, (Name(self._names[one]), Name(self._names[other])))
+        found, _ = _together((self.number(one), self.number(other)))
+        return Apply(operator, tuple(found))
+
+    def _bounds(self, expression: Expression) -> Interval:
+        return bounds(expression, self._limits)
+
+
+_COMPARISONS = {"eq", "ne", "lt", "le", "gt", "ge"}
+
+
+def _interval(variable: Variable) -> Interval:
+    return Interval(*variable.codes.ends)
+
+
+def _together(numbers: Sequence[Scaled] | map[Scaled]) -> tuple[list[Expression], int]:
+    """Return expressions of one divisor, and that."""
+    found = list(numbers)
+    divisor = math.lcm(*(one.divisor for one in found))
+    return [_times(divisor // one.divisor, one.expression) for one in found], divisor
+
+
+def _times(factor: int, expression: Expression) -> Expression:
+    match factor, expression:
+        case 1, _:
+            return expression
+        case _, Integer(value):
+            return Integer(factor * value)
+        case -1, _:
+            return Apply("neg", (expression,))
+        case _:
+            return Apply("mul", (Integer(factor), expression))
+
+
+def _of_some_size(expression: Expression) -> Expression:
+    """Return `expression`, if it is not too large. Raises `UntranslatableError`. What is shared is looked at once."""
+    known: dict[int, tuple[int, int]] = {}
+
+    def size(one: Expression) -> tuple[int, int]:
+        if not isinstance(one, Apply):
+            return 1, 1
+        if id(one) not in known:
+            parts = [size(argument) for argument in one.arguments]
+            known[id(one)] = 1 + sum(count for count, _ in parts), 1 + max(depth for _, depth in parts)
+        return known[id(one)]
+
+    count, depth = size(expression)
+    if count > MAX_SIZE or depth > MAX_LEVELS:
+        raise UntranslatableError
+    return expression
+
+
+def may_be_undefined(expression: Expression) -> bool:
+    """Return whether an expression divides, or has a power: it may have no value."""
+    waiting = [expression]
+    while waiting:
+        one = waiting.pop()
+        if isinstance(one, Apply):
+            if one.operator in {"div", "mod", "pow"}:
+                return True
+            waiting += one.arguments
+    return False
