@@ -147,7 +147,7 @@ def test_a_second_solver_that_disagrees_refutes(monkeypatch: pytest.MonkeyPatch)
 
 def test_costs_beyond_its_integers_are_refused() -> None:
     domain = Domain("D", (range(3),))
-    huge = Relation("R", 1, Semantics.SOFT, ((0,), (1,)), (10**17, 1), 0)
+    huge = Relation("R", 1, Semantics.SOFT, ((0,), (1,)), (10**17, 1), 3)
     other = Function("F", ("X",), Name("X"))
     constraints = tuple(Constraint("C", one, ("V1",), ("V1",), model=None) for one in (huge, other))
     team = Team("huge", (Robot("R1", (Variable("V1", domain),), ProblemKind.DISWCSP, constraints),))
