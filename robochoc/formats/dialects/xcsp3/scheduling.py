@@ -56,8 +56,13 @@ def cumulative(element: Element, posting: Posting) -> None:
     condition = posting.condition(element.text("condition"))
     if condition.operator not in {"lt", "le"}:
         raise MistakeError(f"<cumulative> with {condition.operator} has no counterpart", "write (le,10)")
+    post_tasks(list(map(Task, starts, lengths, heights)), condition, posting)
+
+
+def post_tasks(every_task: Sequence[Task], condition: Condition, posting: Posting) -> None:
+    """Post that what the tasks that run at one time need, together, meets `condition`: at most something."""
     nothing = Constant(0)
-    tasks = [task for task in map(Task, starts, lengths, heights) if nothing not in (task.length, task.height)]
+    tasks = [task for task in every_task if nothing not in (task.length, task.height)]
     covers = _covers(tasks, condition)
     if covers is None:
         for task in tasks:

@@ -133,7 +133,7 @@ def element(element: Element, posting: Posting) -> None:
         raise MistakeError("an element of a given rank has no counterpart", "leave rank out")
     start = integer(element.attribute("startIndex", "list") or "0")
     index = posting.term(element.text("index"))
-    _choose(posting, [index], {(start + place,): member for place, member in enumerate(members)}, condition)
+    choose(posting, [index], {(start + place,): member for place, member in enumerate(members)}, condition)
 
 
 def _element_of_matrix(element: Element, posting: Posting, condition: Condition) -> None:
@@ -146,10 +146,10 @@ def _element_of_matrix(element: Element, posting: Posting, condition: Condition)
     cells: dict[Row, Expression] = {
         (down + i, across + j): member for i, row in enumerate(rows) for j, member in enumerate(row)
     }
-    _choose(posting, indexes, cells, condition)
+    choose(posting, indexes, cells, condition)
 
 
-def _choose(
+def choose(
     posting: Posting, indexes: Sequence[Expression], cells: Mapping[Row, Expression], condition: Condition
 ) -> None:
     """Post `condition` on the cell that `indexes` choose: a table where all cells are integers, else cell by cell."""
