@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from lxml import etree
 
@@ -11,6 +11,7 @@ from robochoc.formats.costs import read_cost
 from robochoc.formats.definitions import PREDEFINED
 from robochoc.formats.diagnostics import MistakeError, shortened, suggestion
 from robochoc.formats.extension import integer
+from robochoc.formats.global_constraints import is_global, read_global, variables_of
 from robochoc.formats.names import is_name
 from robochoc.formats.rules import (
     check_constraint,
@@ -65,8 +66,16 @@ def _read(element: etree._Element, context: Context, model: ConstraintModel | No
     """Return the constraint, or None where its definition has a mistake of its own. Raises `MistakeError`."""
     scope = _terms(element.get("scope") or "")
     given = element.find("parameters")
-    parameters = scope if given is None else _terms(given.text or "")
-    definition = _definition(attribute(element, "reference"), context)
+    reference = attribute(element, "reference")
+    definition: Definition | None
+    if is_global(reference):
+        definition, parameters = read_global(reference, given, scope), variables_of(given, scope)
+        if any(context.symbolic.get(str(term)) for term in parameters) and reference == "global:allDifferent":
+            definition = replace(definition, symbolic=definition.parameters)
+    else:
+        _refuse_elements(given)
+        parameters = scope if given is None else _terms(given.text or "")
+        definition = _definition(reference, context)
     if not definition:
         return None
     cost = attribute(element, "cost")
@@ -76,6 +85,12 @@ def _read(element: etree._Element, context: Context, model: ConstraintModel | No
     check_kinds(constraint, context.symbolic)
     _check_arity(attribute(element, "arity"), constraint)
     return constraint
+
+
+def _refuse_elements(parameters: etree._Element | None) -> None:
+    for child in () if parameters is None else parameters:
+        message = f"<{child.tag}/> in the parameters of a constraint that is not global"
+        raise MistakeError(message, "write variables and integers")
 
 
 def _terms(text: str) -> tuple[Term, ...]:

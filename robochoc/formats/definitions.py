@@ -63,6 +63,8 @@ def refuse_predefined(name: str) -> None:
     """Raise `MistakeError` when a definition of one's own would be called `name`, and that means something else."""
     if name in PREDEFINED:
         raise MistakeError(f"'{shortened(name)}' is a predefined predicate", "give your own another name")
+    if name.startswith("global:"):
+        raise MistakeError(f"'{shortened(name)}' is the name of a global constraint", "give your own another name")
 
 
 def check_semantics(semantics: Semantics, kind: ProblemKind) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping
 from pathlib import Path
 from types import MappingProxyType
@@ -9,9 +10,10 @@ from types import MappingProxyType
 from robochoc.formats.diagnostics import Diagnostic, InvalidInputError
 from robochoc.formats.dialects.names_file import NAMES_FILE
 from robochoc.formats.robot import robot_in
+from robochoc.formats.scenario import SCENARIO
+from robochoc.formats.scenario_writer import team_files
 from robochoc.formats.validation import check_writable
-from robochoc.formats.writer import robot_xml
-from robochoc.model.problem import Robot, Team
+from robochoc.model.problem import Team
 from robochoc.system.files import resolved
 
 _SURELY_READ = 1024 * 1024
@@ -21,7 +23,7 @@ _SURELY_READ = 1024 * 1024
 def write_team(
     team: Team, folder: Path, *, replace: bool = False, beside: Mapping[str, bytes] = MappingProxyType({})
 ) -> None:
-    """Write one XML file per robot into `folder`, which is then complete, or not there at all.
+    """Write one XML file per robot into `folder`, and its scenario: it is then complete, or not there at all.
 
     Args:
         team: A valid team.
@@ -38,7 +40,9 @@ def write_team(
     import shutil  # noqa: PLC0415 - the same
 
     check_writable(team)
-    files = {robot.name: _file(robot) for robot in team.robots}
+    files = team_files(team)
+    for path, content in files.items():
+        _check_size(path, content)
     if folder.exists() or folder.is_symlink():
         _may_replace(folder, replace=replace)
     folder = resolved(folder)
@@ -47,10 +51,9 @@ def write_team(
     old = new.with_suffix(".old")
     try:
         new.mkdir()
-        for name, content in files.items():
-            (new / f"{name}.xml").write_bytes(content)
-        for name, content in beside.items():
-            (new / name).write_bytes(content)
+        for path, content in {**files, **beside}.items():
+            (new / path).parent.mkdir(exist_ok=True)
+            (new / path).write_bytes(content)
         if folder.exists():
             folder.rename(old)
         new.rename(folder)
@@ -61,12 +64,10 @@ def write_team(
             shutil.rmtree(rest, ignore_errors=True)
 
 
-def _file(robot: Robot) -> bytes:
-    """Return the robot's file. Raises `InvalidInputError` when no reader would take it: it may be too large."""
-    content = robot_xml(robot)
-    if len(content) > _SURELY_READ:
-        robot_in(content, robot.name)
-    return content
+def _check_size(path: str, content: bytes) -> None:
+    """Raise `InvalidInputError` when no reader would take a robot's file: it may be too large."""
+    if len(content) > _SURELY_READ and path != SCENARIO:
+        robot_in(content, Path(path).stem)
 
 
 def _may_replace(folder: Path, *, replace: bool) -> None:
@@ -83,6 +84,8 @@ def _may_replace(folder: Path, *, replace: bool) -> None:
 
 
 def _is_ours(entry: Path) -> bool:
+    if entry.is_dir() and not entry.is_symlink() and re.fullmatch(r"late\d*", entry.name):
+        return all(_is_ours(below) for below in entry.iterdir())
     return entry.is_file() and (entry.suffix == ".xml" or entry.name == NAMES_FILE)
 
 

@@ -8,7 +8,7 @@ from itertools import count
 from typing import TypeVar
 
 from robochoc.formats.definitions import PREDEFINED
-from robochoc.model.problem import Constraint, Definition, Domain, Robot
+from robochoc.model.problem import Constraint, Definition, Domain, GlobalPredicate, Robot
 
 
 def with_names_apart(robot: Robot) -> Robot:
@@ -17,7 +17,9 @@ def with_names_apart(robot: Robot) -> Robot:
     The first keeps its name, the others of that name are called NAME.2, NAME.3, ...
     """
     domains = _names(variable.domain for variable in robot.variables)
-    definitions = _names((constraint.definition for constraint in _constraints(robot)), PREDEFINED)
+    definitions = _names(
+        (one.definition for one in _constraints(robot) if not isinstance(one.definition, GlobalPredicate)), PREDEFINED
+    )
     if domains is None and definitions is None:
         return robot
     return _renamed(robot, domains or {}, definitions or {})

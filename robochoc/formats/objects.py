@@ -18,6 +18,7 @@ from robochoc.formats.definitions import (
 )
 from robochoc.formats.diagnostics import MAX_PER_FILE, Diagnostic, MistakeError, shortened
 from robochoc.formats.field_types import AS_BUILT, FieldTypeError, check_field_types
+from robochoc.formats.global_constraints import check_global
 from robochoc.formats.locations import Location, ObjectLocations
 from robochoc.formats.names import check_name, check_robot_name, check_unique, check_weight, check_word
 from robochoc.formats.rules import (
@@ -45,6 +46,7 @@ from robochoc.model.problem import (
     Definition,
     Domain,
     Function,
+    GlobalPredicate,
     Relation,
     Robot,
 )
@@ -235,6 +237,9 @@ def _check_defined(thing: Defined, table: tuple[str, ...]) -> None:
             check_symbolic_domain(thing)
         return
     if PREDEFINED.get(thing.name) == thing:
+        return
+    if isinstance(thing, GlobalPredicate):
+        check_global(thing)
         return
     refuse_predefined(thing.name)
     if isinstance(thing, Relation):

@@ -35,7 +35,7 @@ class _EpochForm(msgspec.Struct, omit_defaults=True):
     verdict: Verdict
     opened_by: str
     robots: list[str]
-    assignment: dict[str, int]
+    assignment: dict[str, int | str]
     cost: int | Decimal | None
     messages: int
     bytes: int
@@ -59,7 +59,7 @@ class _Form(msgspec.Struct, omit_defaults=True):
     runtime: str
     seed: int
     verdict: Verdict
-    assignment: dict[str, int]
+    assignment: dict[str, int | str]
     cost: int | Decimal | None
     withdrawn: list[str]
     epochs: list[_EpochForm]
@@ -80,7 +80,7 @@ class _Form(msgspec.Struct, omit_defaults=True):
 
 
 _SAME = (
-    *("team", "protocol", "runtime", "seed", "verdict", "assignment", "cost", "verified", "count", "reason", "order"),
+    *("team", "protocol", "runtime", "seed", "verdict", "cost", "verified", "count", "reason", "order"),
     *("bound", "placed_by", "tree", "confirmed", "channel", "claimed_by"),
 )
 """The fields that are the same in an outcome and in its JSON form."""
@@ -99,9 +99,10 @@ def result_json(outcome: Outcome, names: Mapping[str, str] = MappingProxyType({}
     same: dict[str, Any] = {name: getattr(outcome, name) for name in _SAME}
     form = _Form(
         **same,
+        assignment=outcome.labelled(outcome.assignment),
         withdrawn=list(outcome.withdrawn),
         lost=list(outcome.lost),
-        epochs=[_epoch(epoch) for epoch in outcome.epochs],
+        epochs=[_epoch(epoch, outcome) for epoch in outcome.epochs],
         metrics=_metrics(outcome.metrics),
         checked=_CheckedForm(*outcome.checked) if outcome.checked else None,
         names=dict(names),
@@ -124,13 +125,13 @@ def _metrics(spent: Metrics) -> _MetricsForm:
     )
 
 
-def _epoch(epoch: EpochOutcome) -> _EpochForm:
+def _epoch(epoch: EpochOutcome, outcome: Outcome) -> _EpochForm:
     spent = epoch.metrics
     return _EpochForm(
         verdict=epoch.verdict,
         opened_by=epoch.opened_by,
         robots=list(epoch.robots),
-        assignment=epoch.assignment,
+        assignment=outcome.labelled(epoch.assignment),
         cost=epoch.cost,
         messages=sum(spent.messages.values()),
         bytes=spent.bytes,
@@ -144,14 +145,32 @@ def _epoch(epoch: EpochOutcome) -> _EpochForm:
     )
 
 
-def _epoch_of(form: _EpochForm) -> EpochOutcome:
+class _Symbols:
+    """The names that stand for values in a JSON result. It says no codes: there they get some of its own."""
+
+    def __init__(self) -> None:
+        self.codes: dict[str, int] = {}
+        self.variables: dict[str, None] = {}
+
+    def values(self, assignment: dict[str, int | str]) -> dict[str, int]:
+        """Return an assignment in codes."""
+        return {name: self._value(name, value) for name, value in assignment.items()}
+
+    def _value(self, name: str, value: int | str) -> int:
+        if isinstance(value, int):
+            return value
+        self.variables[name] = None
+        return self.codes.setdefault(value, len(self.codes))
+
+
+def _epoch_of(form: _EpochForm, symbols: _Symbols) -> EpochOutcome:
     counts = form.bytes, form.ncccs, form.checks, form.wall_s
     metrics = Metrics({"messages": form.messages}, *counts, simulated_s=form.simulated_s or 0.0)
     return EpochOutcome(
         verdict=form.verdict,
         robots=tuple(form.robots),
         opened_by=form.opened_by,
-        assignment=form.assignment,
+        assignment=symbols.values(form.assignment),
         cost=form.cost,
         metrics=metrics,
         verified=form.verified,
@@ -171,11 +190,17 @@ def read_result(content: bytes) -> Outcome:
     except msgspec.MsgspecError as error:
         raise ResultError(describe_decode_error(error, _Form)) from error
     same: dict[str, Any] = {name: getattr(form, name) for name in _SAME}
+    symbols = _Symbols()
+    assignment = symbols.values(form.assignment)
+    epochs = tuple(_epoch_of(epoch, symbols) for epoch in form.epochs)
     return Outcome(
         **same,
+        assignment=assignment,
+        symbols=tuple(symbols.codes),
+        symbolic=tuple(symbols.variables),
         withdrawn=tuple(form.withdrawn),
         lost=tuple(form.lost),
-        epochs=tuple(map(_epoch_of, form.epochs)),
+        epochs=epochs,
         metrics=_metrics_of(form.metrics),
         checked=CheckCounts(form.checked.by_both, form.checked.by_owner) if form.checked else None,
     )

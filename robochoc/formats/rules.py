@@ -22,6 +22,7 @@ from robochoc.model.problem import (
     ConstraintModel,
     Definition,
     Function,
+    GlobalPredicate,
     Parent,
     Predicate,
     ProblemKind,
@@ -121,6 +122,8 @@ def _check_application(definition: Definition, scope: tuple[Term, ...], paramete
             f"parameters '{shown(parameters)}' differ from the scope '{shown(scope)}'",
             "a relation's tuples follow the scope: leave the parameters out",
         )
+    if isinstance(definition, GlobalPredicate) and not all(isinstance(term, str) for term in parameters):
+        raise MistakeError(f"{definition.name} about an integer", "write the integer into its form")
     takes = definition.arity if isinstance(definition, Relation) else len(definition.parameters)
     if len(parameters) != takes:
         raise MistakeError(

@@ -70,7 +70,7 @@ def check_team(team: Team) -> None:
 def check_writable(team: Team) -> None:
     """Raise `InvalidInputError` unless `team` is valid, and robots' files can say all of it.
 
-    They have no order but the links', no scenario, and do not say what changes have left of a variable's neighbours.
+    They have no order but the links', and do not say what changes have left of a variable's neighbours.
     """
     check_team(team)
     found = [
@@ -83,9 +83,6 @@ def check_writable(team: Team) -> None:
         for robot in team.robots
         if robot.shown
     ]
-    if team.scenario:
-        place = Location(f"team {shortened(team.name)}")
-        found.append(place.mistake("its scenario is no robot's", "write it as scenario.xml, and the team without it"))
     if found:
         raise InvalidInputError(_numbered(found))
     by_links = priority_order({robot.name: [parent.name for parent in robot.parents] for robot in team.robots})

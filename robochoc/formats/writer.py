@@ -10,6 +10,7 @@ from lxml import etree
 
 from robochoc.formats.costs import cost_text, scale_text
 from robochoc.formats.definitions import PREDEFINED
+from robochoc.formats.global_constraints import write_global
 from robochoc.formats.labels import with_names_apart
 from robochoc.model.expression import text
 from robochoc.model.problem import (
@@ -19,6 +20,7 @@ from robochoc.model.problem import (
     Definition,
     Domain,
     Function,
+    GlobalPredicate,
     Predicate,
     Relation,
     Robot,
@@ -104,7 +106,7 @@ def _write_topics(instance: etree._Element, topics: Sequence[Topic]) -> None:
 def _write_definitions(instance: etree._Element, robot: Robot) -> None:
     parts = itertools.chain.from_iterable(child.constraints for child in robot.children)
     constraints = itertools.chain(robot.private, robot.shared, parts)
-    definitions = _by_name(constraint.definition for constraint in constraints)
+    definitions = _by_name(one.definition for one in constraints if not isinstance(one.definition, GlobalPredicate))
     relations = [one for one in definitions.values() if isinstance(one, Relation)]
     predicates = [one for one in definitions.values() if isinstance(one, Predicate) and one != PREDEFINED.get(one.name)]
     table = robot.symbol_table
@@ -162,7 +164,10 @@ def _write_constraints(holder: etree._Element, constraints: Sequence[Constraint]
         element.set("scope", _terms(constraint.scope))
         if constraint.cost != INFINITE:
             element.set("cost", cost_text(constraint.cost, units))
-        if not isinstance(constraint.definition, Relation):
+        if isinstance(constraint.definition, GlobalPredicate):
+            parameters = etree.SubElement(element, "parameters")
+            write_global(parameters, constraint.definition, constraint.parameters)
+        elif not isinstance(constraint.definition, Relation):
             etree.SubElement(element, "parameters").text = _terms(constraint.parameters)
 
 

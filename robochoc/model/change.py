@@ -87,23 +87,28 @@ def apply_possible_changes(team: Team, changes: Iterable[Change]) -> tuple[Team,
     return team, taken
 
 
-def describe_change(change: Change) -> str:
-    """Return `change` in a few words."""
+def describe_change(change: Change, team: Team) -> str:
+    """Return `change` in a few words; values are told as the variables of `team` have them."""
     match change:
         case RemoveAgent(name):
             return f"-{name}"
         case AddAgent(robot):
             return f"+{robot.name}"
         case RemoveValue(variable, value):
-            return f"{variable} without {value}"
+            return f"{variable} without {_label(team, variable, value)}"
         case AddValue(variable, value):
-            return f"{variable} with {value}"
+            return f"{variable} with {_label(team, variable, value)}"
         case AddConstraint(agent, parent, constraint):
             return f"+{constraint.name} ({parent}, {agent})"
         case RemoveConstraint(agent, parent, name):
             return f"-{name} ({parent}, {agent})"
         case never:
             assert_never(never)
+
+
+def _label(team: Team, variable: str, value: int) -> int | str:
+    known = team.variables.get(variable)
+    return known.domain.label(value) if known else value
 
 
 def affected_robots(team: Team, change: Change) -> set[str]:

@@ -149,6 +149,17 @@ class Predicate:
 
 
 @dataclass(frozen=True)
+class GlobalPredicate(Predicate):
+    """A global constraint of XCSP 2.1; its body is what it says (`formats/global_constraints.py` makes both).
+
+    Attributes:
+        form: Its parameters as they are written, formal ones for variables: `[ { 1 X0 } { -1 X1 } ] <le/> 3`.
+    """
+
+    form: str = ""
+
+
+@dataclass(frozen=True)
 class Function:
     """A constraint's definition in intension whose value is its cost: an integer expression over `parameters`.
 

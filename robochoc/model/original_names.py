@@ -22,6 +22,7 @@ def renamed_outcome(outcome: Outcome, names: Mapping[str, str]) -> Outcome:
         claimed_by=_one(outcome.claimed_by, names),
         tree=_tree(outcome.tree, names),
         epochs=tuple(_epoch(epoch, names) for epoch in outcome.epochs),
+        symbolic=_all(outcome.symbolic, names),
     )
 
 

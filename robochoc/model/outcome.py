@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from enum import StrEnum
 from typing import NamedTuple
@@ -161,6 +162,8 @@ class Outcome:
         claimed_by: Across machines: the robot whose claim the verdict rests on, as it cannot be checked; or
             `ALL_ROBOTS`.
         checked: Across machines: how many constraints were checked, and by whom.
+        symbols: The names of the team's symbols, if it has any: the value 2 stands for the one at place 2.
+        symbolic: The variables whose values stand for symbols.
     """
 
     team: str
@@ -187,6 +190,16 @@ class Outcome:
     placed_by: str | None = None
     claimed_by: str | None = None
     checked: CheckCounts | None = None
+    symbols: tuple[str, ...] = ()
+    symbolic: tuple[str, ...] = ()
+
+    def labelled(self, assignment: Mapping[str, int]) -> dict[str, int | str]:
+        """Return `assignment`, of this outcome or of one of its epochs, with symbols by their names."""
+        named = set(self.symbolic)
+        return {
+            name: self.symbols[value] if name in named and 0 <= value < len(self.symbols) else value
+            for name, value in assignment.items()
+        }
 
     @property
     def ruled_out(self) -> str | None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable, Mapping
+from collections.abc import Collection, Iterable
 from dataclasses import replace
 
 from robochoc.model.constraint import Constraint, Definition, Domain, Predicate, Relation
@@ -18,9 +18,11 @@ def symbol_table(robots: Iterable[Robot]) -> tuple[str, ...]:
     return next((robot.symbol_table for robot in robots if robot.symbol_table), ())
 
 
-def symbols_of(team: Team) -> dict[str, tuple[str, ...]]:
-    """Return the symbols of the variables of `team` whose values stand for symbols."""
-    return {name: one.domain.symbols for name, one in team.variables.items() if one.domain.symbols}
+def symbolic_variables(team: Team) -> tuple[str, ...]:
+    """Return the variables of `team`, and of robots that its scenario adds, whose values stand for symbols."""
+    changes = [change for event in team.scenario for change in event.changes]
+    robots = [*team.robots, *(change.robot for change in changes if isinstance(change, AddAgent))]
+    return tuple(dict.fromkeys(one.name for robot in robots for one in robot.variables if one.domain.symbols))
 
 
 def with_marked_symbols(constraints: Iterable[Constraint], symbolic: Collection[str]) -> list[Constraint]:
@@ -64,11 +66,6 @@ def with_table_everywhere(team: Team, names: tuple[str, ...]) -> Team:
         return team
     events = tuple(replace(event, changes=tuple(map(of, event.changes))) for event in team.scenario)
     return replace(team, robots=tuple(with_table(robot, names) for robot in team.robots), scenario=events)
-
-
-def labelled(assignment: Mapping[str, int], symbols: Mapping[str, tuple[str, ...]]) -> dict[str, int | str]:
-    """Return `assignment` as users write it: symbols by their names."""
-    return {name: symbols[name][value] if name in symbols else value for name, value in assignment.items()}
 
 
 def _marked(definition: Definition, places: tuple[int, ...]) -> Definition:

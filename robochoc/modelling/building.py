@@ -21,6 +21,7 @@ from robochoc.model.problem import (
     ScenarioEvent,
     Team,
 )
+from robochoc.model.symbols import symbol_table, with_marked_symbols, with_table_everywhere
 from robochoc.modelling.drafts import Definitions, Draft, costs_of
 from robochoc.modelling.events import Event, Removal
 from robochoc.modelling.given import changes_in_finer_units, in_finer_units
@@ -66,7 +67,7 @@ class _Builder:
         costs, constant = costs_of(model.objective, model.free_prefix("cost"))
         constant += model.constant
         self._drafts += costs
-        self._parts = {robot.name: [d for rule in robot.parts for d in rule.drafts()] for robot in self._robots}
+        self._parts = {robot.name: self._parts_of(robot) for robot in self._robots}
         self._added = {
             rule: list(rule.drafts()) for event in model.events for rule in event.steps if isinstance(rule, Rule)
         }
@@ -83,6 +84,20 @@ class _Builder:
         self._definitions = Definitions(given.definitions if given else ())
         self._domains: dict[tuple[tuple[range, ...], tuple[str, ...]], str] = {}
         self._symbols = model.symbols.all
+
+    def _parts_of(self, robot: ModelRobot) -> list[Draft]:
+        """Return a robot's parts of what it shares. What they say of its own variables alone becomes private."""
+        found = []
+        for draft in (one for rule in robot.parts for one in rule.drafts()):
+            owners = {variable.owner for variable in draft.scope}
+            if owners == {robot.name}:
+                self._drafts.append(draft)
+            elif robot.name in owners:
+                found.append(draft)
+            else:
+                message = f"the part that {robot.name} knows says something of {' and '.join(owners)} alone"
+                raise ModelError(message, "that is its own constraint: Model.add", draft.place)
+        return found
 
     def team(self) -> Team:
         """Return the team with its scenario."""
@@ -106,7 +121,8 @@ class _Builder:
                 parts=parts,
             ),
         )
-        return replace(team, scenario=self._scenario(team))
+        whole = replace(team, scenario=self._scenario(team))
+        return with_table_everywhere(whole, symbol_table(team.robots)) if self._model.events else whole
 
     def _finished(self, draft: Draft) -> Constraint:
         return self._definitions.constraint(draft, self._units.places, -1 if self._units.maximize else 1)
@@ -142,7 +158,8 @@ class _Builder:
 
     def finished_rule(self, rule: Rule) -> list[Constraint]:
         """Return what a constraint becomes that an event adds."""
-        return [self._finished(draft) for draft in self._added[rule]]
+        symbolic = [variable.name for variable in self._model.variables.values() if variable.codes.symbolic]
+        return with_marked_symbols([self._finished(draft) for draft in self._added[rule]], symbolic)
 
     def joining(self, robot: ModelRobot, order: Sequence[str], constraints: Iterable[Constraint]) -> Robot:
         """Return a robot that joins after those in `order`, with its constraints."""

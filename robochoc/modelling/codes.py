@@ -16,7 +16,9 @@ from fractions import Fraction
 from functools import cached_property
 from typing import NamedTuple
 
+from robochoc.formats.diagnostics import MistakeError
 from robochoc.formats.names import BEYOND
+from robochoc.formats.symbols import check_symbol
 from robochoc.model.ranges import merge_ranges
 from robochoc.modelling.numbers import exact, is_number
 from robochoc.modelling.places import ModelError, ModelTypeError, Place
@@ -149,8 +151,8 @@ class Symbols:
     def _word(self, kind: Kind, value: object) -> str:
         """Return a symbol for a value: a text or a member's name where it can be one, else something like it."""
         text = value.name if isinstance(value, Enum) else str(value)
-        word = text if _WORD.fullmatch(text) else "_".join(re.findall(r"[A-Za-z0-9.]+", text))[:80]
-        word = word if _WORD.fullmatch(word) else f"v{word}"
+        word = text if _is_symbol(text) else "_".join(re.findall(r"[A-Za-z0-9.]+", text))[:80]
+        word = word if _is_symbol(word) else f"v{word}"
         taken = {given for (other, _), given in self._words.items() if other == kind}
         free, number = word, 1
         while free in taken or (number > 1 and free in self._codes):
@@ -159,7 +161,12 @@ class Symbols:
         return free
 
 
-_WORD = re.compile(r"[A-Za-z][A-Za-z0-9_.]*")
+def _is_symbol(word: str) -> bool:
+    try:
+        check_symbol(word)
+    except MistakeError:
+        return False
+    return True
 
 
 def codes_of(domain: object, symbols: Symbols, place: Place) -> Codes:

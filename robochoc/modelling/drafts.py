@@ -82,7 +82,7 @@ def soft_condition(term: Term, cost: Exact, name: str, place: Place) -> Draft:
     if body is not None and (cost >= 0 or not may_be_undefined(body)):  # where it is undefined, it is broken as well
         return Draft(name, term.variables, place, body, cost=cost)
     holds, fails = truths(term, place)
-    few = len(fails) <= len(holds)
+    few = 0 < len(fails) <= len(holds) or not holds
     rows = dict.fromkeys(fails, cost) if few else dict.fromkeys(holds, 0)
     default = 0 if few else cost
     return Draft(name, term.variables, place, rows=rows, semantics=Semantics.SOFT, default=default, is_penalty=True)
@@ -136,6 +136,7 @@ def _sum(group: Sequence[tuple[Exact, Term, Place]], name: str) -> Draft:
 
 def _table(name: str, scope: tuple[Variable, ...], place: Place, rows: Mapping[Row, Price], default: Price) -> Draft:
     listed = {row: price for row, price in rows.items() if price != default}
+    listed = listed or {_first_row(scope): default}  # files tell from the rows which columns hold symbols
     return Draft(name, scope, place, rows=listed, semantics=Semantics.SOFT, default=default)
 
 
@@ -146,18 +147,37 @@ def _scaled(value: object, factor: Exact) -> Price:
 def _condition(term: Term, name: str, place: Place) -> Draft | None:
     """Return a hard constraint. None: it always holds."""
     if isinstance(term, Tabled) and (listed := listed_rows(term)) is not None:
-        rows = dict.fromkeys((row for row, value in listed.items() if value is not term.default), 0)
-        semantics = Semantics.CONFLICTS if term.default else Semantics.SUPPORTS
-        return Draft(name, term.variables, place, rows=rows, semantics=semantics)
+        return _listed(term, listed, name, place)
     body = _body(term)
     if body is not None:
         return Draft(name, term.variables, place, body)
     holds, fails = truths(term, place)
     if not fails:
         return None
-    if len(fails) <= len(holds):
-        return Draft(name, term.variables, place, rows=dict.fromkeys(fails, 0), semantics=Semantics.CONFLICTS)
-    return Draft(name, term.variables, place, rows=dict.fromkeys(holds, 0), semantics=Semantics.SUPPORTS)
+    if not holds:
+        return _never(name, term.variables[0], place)
+    few = len(fails) <= len(holds)
+    semantics = Semantics.CONFLICTS if few else Semantics.SUPPORTS
+    return Draft(name, term.variables, place, rows=dict.fromkeys(fails if few else holds, 0), semantics=semantics)
+
+
+def _listed(term: Tabled, listed: Mapping[Row, object], name: str, place: Place) -> Draft | None:
+    """Return what a table of allowed or forbidden rows becomes. None: it forbids nothing."""
+    rows = dict.fromkeys((row for row, value in listed.items() if value is not term.default), 0)
+    if not rows:
+        return None if term.default else _never(name, term.variables[0], place)
+    semantics = Semantics.CONFLICTS if term.default else Semantics.SUPPORTS
+    return Draft(name, term.variables, place, rows=rows, semantics=semantics)
+
+
+def _never(name: str, variable: Variable, place: Place) -> Draft:
+    """Return what no value of a variable satisfies."""
+    rows: dict[Row, Price] = dict.fromkeys([(code,) for code in variable.codes.ever], 0)
+    return Draft(name, (variable,), place, rows=rows, semantics=Semantics.CONFLICTS)
+
+
+def _first_row(scope: Sequence[Variable]) -> Row:
+    return tuple(variable.codes.ever[0] for variable in scope)
 
 
 def _body(term: Term) -> Expression | None:

@@ -78,14 +78,19 @@ def cumulative(
     return all_of(peaks)
 
 
-def allowed(terms: object, rows: Iterable[Sequence[object]]) -> Term:
-    """Return the condition that the values of `terms` are one of `rows`."""
+def allowed(terms: object, rows: Iterable[object]) -> Term:
+    """Return the condition that the values of `terms` are one of `rows`.
+
+    Args:
+        terms: The terms, or one.
+        rows: Tuples of values; of one term, values.
+    """
     scope = _scope(terms)
     return Tabled(scope, dict.fromkeys(_rows(scope, rows), True), default=False)
 
 
-def forbidden(terms: object, rows: Iterable[Sequence[object]]) -> Term:
-    """Return the condition that the values of `terms` are none of `rows`."""
+def forbidden(terms: object, rows: Iterable[object]) -> Term:
+    """Return the condition that the values of `terms` are none of `rows`. See `allowed`."""
     scope = _scope(terms)
     return Tabled(scope, dict.fromkeys(_rows(scope, rows), False), default=True)
 

@@ -100,7 +100,7 @@ class Solution(Outcome):
         if name in self.variables:
             return self.variables[name].codes.value(value)
         known = self.problem.variables.get(name) if self.problem else None
-        return known.domain.label(value) if known and isinstance(value, int) else value
+        return known.domain.label(value) if known else value
 
     def _why(self, name: str) -> str:
         if not self.assignment:

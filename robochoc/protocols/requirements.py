@@ -10,6 +10,7 @@ from collections.abc import Mapping
 
 from robochoc.model.problem import ConstraintModel, Robot
 from robochoc.protocols.traits import Traits
+from robochoc.solver.encoding import is_soft
 
 _TWO = 2
 
@@ -24,6 +25,8 @@ def unmet_requirement(robot: Robot, traits: Traits, owners: Mapping[str, str]) -
     """
     held_for_children = (constraint for child in robot.children for constraint in child.constraints)
     for constraint in (*robot.shared, *held_for_children):
+        if constraint.model is ConstraintModel.PKC and is_soft(constraint) and not traits.asymmetric:
+            return f"{robot.name} has costs of its own for a partially known constraint (PKC, {constraint.name})"
         if constraint.model is ConstraintModel.PKC and not traits.partially_known:
             return f"{robot.name} shares a partially known constraint (PKC, {constraint.name})"
         if not traits.n_ary and len({owners.get(variable) for variable in constraint.variables}) > _TWO:

@@ -25,6 +25,7 @@ class Traits:
         costs: It minimises costs (a DisWCSP).
         n_ary: Constraints may be over more than two robots.
         partially_known: It takes partially known constraints (PKC).
+        asymmetric: Their parts may cost something: each side pays what its own part says, and the sum is minimised.
         shared_scopes: Every robot of a constraint's scope knows the constraint, because the order of the robots changes
             during the search. Otherwise only the lowest robot of the scope knows it.
         writes_to_non_neighbours: Its robots also write to robots that they share no constraint with. Where they do not,
@@ -44,6 +45,7 @@ class Traits:
     costs: bool = False
     n_ary: bool = True
     partially_known: bool = False
+    asymmetric: bool = False
     shared_scopes: bool = False
     writes_to_non_neighbours: bool = True
     tree: bool = False

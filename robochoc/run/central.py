@@ -62,7 +62,7 @@ def _opened_by(team: Team, number: int) -> str:
     """Return in a few words what has opened the epoch of this `number`."""
     if not number:
         return "the start"
-    return ", ".join(map(describe_change, team.scenario[number - 1].changes)) or "nothing"
+    return ", ".join(describe_change(change, team) for change in team.scenario[number - 1].changes) or "nothing"
 
 
 def _decide(solver: TeamSolver, team: Team, options: Options) -> _Decision:

@@ -31,7 +31,7 @@ from robochoc.verification.objective import withdrawal_cost
 
 LARGEST = 2**62
 """Costs that add up to more are refused: a message holds integers of 64 bits."""
-CENTRAL_TRAITS = Traits(partially_known=True, costs=True)
+CENTRAL_TRAITS = Traits(partially_known=True, asymmetric=True, costs=True)
 """The problems that the central solver supports."""
 
 

@@ -12,6 +12,7 @@ from robochoc.model.costs import UnboundedCostError, normalized
 from robochoc.model.orders import OrderError
 from robochoc.model.outcome import Outcome, Verdict
 from robochoc.model.problem import Team
+from robochoc.model.symbols import symbol_table, symbolic_variables
 from robochoc.run.compatibility import (
     CENTRAL_TRAITS,
     UnfitProtocolError,
@@ -130,4 +131,6 @@ def _header(team: Team, options: Options) -> Outcome:
         verdict=Verdict.UNKNOWN,
         order="listed" if isinstance(options.order, tuple) else options.order,
         channel=options.channel.name if options.channel else None,
+        symbols=symbol_table(team.robots),
+        symbolic=symbolic_variables(team),
     )

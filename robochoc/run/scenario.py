@@ -187,7 +187,11 @@ class ScenarioRun:
         """Return in a few words what of `event` can still happen."""
         out = set(self.withdrawn)
         changes = apply_possible_changes(self._full, event.changes)[1] if self._has_added_events else event.changes
-        words = [describe_change(change) for change in changes if out.isdisjoint(affected_robots(self._full, change))]
+        words = [
+            describe_change(change, self._full)
+            for change in changes
+            if out.isdisjoint(affected_robots(self._full, change))
+        ]
         return ", ".join(words) or "nothing"
 
     def _apply(self, event: ScenarioEvent) -> Collection[str]:

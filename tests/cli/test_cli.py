@@ -20,7 +20,7 @@ from robochoc.model.problem import Constraint, ConstraintModel, Relation, Robot,
 from tests.support.broken import CASES
 from tests.support.broken_case import Broken
 from tests.support.problems import team_of
-from tests.support.program import ROOT, on_a_terminal, robochoc, robochoc_within
+from tests.support.program import ROOT, on_a_terminal, robochoc, robochoc_within, unmeasured
 
 RESULT_KEYS = {
     "team", "protocol", "runtime", "seed", "verdict", "assignment", "cost", "withdrawn", "epochs", "metrics",
@@ -337,7 +337,9 @@ def test_the_help_of_commands_imports_nothing_heavy() -> None:
         "for name in COMMANDS: cli.get_command(Context(cli), name).get_help(Context(cli))\n"
         "print(*sys.modules)"
     )
-    modules = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout.split()
+    command = [sys.executable, "-c", code]
+    done = subprocess.run(command, capture_output=True, text=True, check=True, env=unmeasured())
+    modules = done.stdout.split()
     assert {f"robochoc.cli.commands.{name}" for name in COMMANDS} <= {*modules}
     heavy = {"numpy", "meshcat", "lxml", "msgspec", "multiprocessing", "tornado", "pycsp3", "zenoh"}
     assert not heavy & set(modules)

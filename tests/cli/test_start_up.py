@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import os
 import subprocess
 import sys
 from pathlib import Path
 
 import pytest
 
-from tests.support.program import ROOT
+from tests.support.program import ROOT, unmeasured
 
 HEAVY = {
     "numpy", "meshcat", "tornado", "zenoh", "cryptography", "pycsp3", "jpype", "importlib.metadata", "tomllib",
@@ -18,7 +17,7 @@ HEAVY = {
     "robochoc.communication.network", "robochoc.view", "robochoc.ros", "robochoc.replay",
 }  # fmt: skip
 """What a run of ABT in a pipe has no use for."""
-HERE = {**os.environ, "PYTHONPATH": str(ROOT)}
+HERE = {**unmeasured(), "PYTHONPATH": str(ROOT)}
 
 
 def imported(*words: str) -> set[str]:
@@ -30,7 +29,7 @@ def imported(*words: str) -> set[str]:
         "except SystemExit as ending: assert not ending.code, ending.code\n"
         "print(*sys.modules, file=sys.stderr)"
     )
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True, env=unmeasured())
     return HEAVY & set(done.stderr.split())
 
 
@@ -50,7 +49,7 @@ def test_help_imports_no_command() -> None:
         "try: main()\n"
         "except SystemExit: print(*(n for n in sys.modules if n.startswith('robochoc.')), file=sys.stderr)"
     )
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True, env=unmeasured())
     assert set(done.stderr.split()) == {"robochoc.cli", "robochoc.cli.main", "robochoc.cli.group"}
 
 

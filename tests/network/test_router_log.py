@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import socket
 from collections.abc import Iterator
+from contextlib import closing
 from itertools import pairwise
 
 import pytest
@@ -12,8 +13,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from robochoc.authority.admission import InMemoryAuthority
+from robochoc.communication.network import router
 from robochoc.communication.network.router import Log, Refusal, Router
 from tests.support.examples import examples
+from tests.support.ports import free_endpoint
 
 NO_RULE = "no rule of the Authority allows it"
 ACCESS = "rx-0 ThreadId(07) zenoh::net::routing::interceptor::access_control:"
@@ -133,3 +136,12 @@ def test_every_single_cut_tells_the_same() -> None:
 
 def test_line_by_line_tells_the_same() -> None:
     assert read_in(LOG.splitlines(keepends=True)) == TOLD
+
+
+def test_a_router_that_does_not_come_is_given_up_and_said_to_be_late(monkeypatch: pytest.MonkeyPatch) -> None:
+    """As on a machine that is far too busy. That is another thing than one that cannot listen."""
+    monkeypatch.setattr(router, "_PROCESS", "json.tool")  # it waits for the end of what it reads, and says nothing
+    monkeypatch.setattr(router, "START_S", 0.0)
+    late = Router(free_endpoint(), IDENTITY, None, 1000)
+    with closing(late), pytest.raises(router.RouterError, match="it was not ready after 0 s"):
+        late.open({"A": ()})

@@ -23,6 +23,7 @@ from robochoc.ros.recordings.mcap_file import NAMES
 from robochoc.ros.recordings.types import types_of
 from robochoc.ros.sink import SinkError
 from robochoc.ros.sinks import UnknownSinkError, UnknownSourceError, open_sink, open_source
+from tests.support.program import unmeasured
 from tests.support.ros_recordings import (
     FILES,
     NOW,
@@ -224,7 +225,8 @@ try:
 except SinkError as failed:
     print(failed)
 """
-    done = subprocess.run([sys.executable, "-W", "error", "-c", program], capture_output=True, text=True, check=True)
+    command = [sys.executable, "-W", "error", "-c", program]
+    done = subprocess.run(command, capture_output=True, text=True, check=True, env=unmeasured())
     assert done.stdout == f"{text.split(':')[1]}: File too large\n"
     assert not done.stderr
     assert not [*Path().iterdir()]

@@ -18,6 +18,11 @@ PROGRAM = str(Path(sys.executable).parent / "robochoc")
 ROOT = Path(__file__).parents[2]
 
 
+def unmeasured() -> dict[str, str]:
+    """Return the environment for a process whose imports or files a test counts: without those of `make coverage`."""
+    return {name: value for name, value in os.environ.items() if not name.startswith("COVERAGE_PROCESS_")}
+
+
 def robochoc(*words: object, folder: Path | None = None) -> subprocess.CompletedProcess[str]:
     """Run the program; no run prints a traceback."""
     done = subprocess.run(

@@ -26,7 +26,8 @@ def outcome_report(team: Team, outcome: Outcome) -> str:
     lines = [f"{on_one_line(outcome.team)}: {_verdict(team, outcome)}", *_epochs(outcome)]
     team = team_after_events(team, outcome.events)
     if outcome.assignment:
-        lines += _board(team, outcome.assignment) or _list(team, outcome.assignment)
+        values = outcome.labelled(outcome.assignment)
+        lines += _board(team, values) or _list(team, values)
     if outcome.withdrawn_alive:
         lines += [
             f"  {len(outcome.withdrawn_alive)} withdrawn{_weight(team, outcome)}:",
@@ -185,7 +186,7 @@ def _simulated(outcome: Outcome) -> str:
     return f"; {f'{seconds:,.2f} s' if seconds >= 1 else f'{seconds * 1000:,.2f} ms'} simulated ({outcome.channel})"
 
 
-def _board(team: Team, assignment: Mapping[str, int]) -> list[str]:
+def _board(team: Team, assignment: Mapping[str, int | str]) -> list[str]:
     """Return a board, if variables are named for cells (`V3.1`) and it is not too wide."""
     cells = {}
     for name in team.variables:
@@ -201,7 +202,7 @@ def _board(team: Team, assignment: Mapping[str, int]) -> list[str]:
     return [head, *(f"  {row:>10}" + "".join(f"{cells[row, column]:>{width}}" for column in columns) for row in rows)]
 
 
-def _list(team: Team, assignment: Mapping[str, int]) -> list[str]:
+def _list(team: Team, assignment: Mapping[str, int | str]) -> list[str]:
     owners = sorted({team.owner[name] for name in assignment}, key=natural_key)
     own = {owner: [variable.name for variable in team[owner].variables] for owner in owners}
     values = {owner: ", ".join(f"{name} = {assignment[name]}" for name in names) for owner, names in own.items()}

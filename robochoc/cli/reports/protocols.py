@@ -87,6 +87,7 @@ def _in_a_line(traits: Traits) -> str:
         "one robot acts at a time" if traits.synchronous else "robots act at the same time",
         "constraints between any number of robots" if traits.n_ary else "constraints between two robots",
         *(["partially known ones too"] if traits.partially_known else []),
+        *(["whose parts may cost"] if traits.asymmetric else []),
         *(["goes on when the problem changes"] if traits.dynamic else []),
         *([f"use when: {traits.use_when}"] if traits.use_when else []),
         *([f"keeps private: {traits.privacy}"] if traits.privacy else []),
@@ -115,6 +116,7 @@ def _central_solver() -> Row:
         paper="no protocol: ACE decides all files merged",
         costs=True,
         partially_known=True,
+        asymmetric=True,
         privacy="none",
         use_when="to check an answer or to count solutions, without robots",
     )

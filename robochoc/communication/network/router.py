@@ -23,8 +23,8 @@ from robochoc.communication.network.access import access_control, yielding
 from robochoc.communication.network.framing import MASTER
 from robochoc.communication.network.transport import encoded
 
-START_S = 10.0
-"""The longest wait until the router listens, in seconds."""
+START_S = 60.0
+"""The longest wait until the router listens, in seconds. To start Python takes seconds where all cores are busy."""
 _PROCESS = "robochoc.communication.network.router_process"
 _READY = "listening"
 _LOG = "warn"
@@ -91,6 +91,7 @@ class Router:
         self._scratch = scratch
         self._process: subprocess.Popen[bytes] | None = None
         self._reader: threading.Thread | None = None
+        self._was_late = False
 
     def open(self, reach: Mapping[str, Sequence[str]], sniffers: Collection[str] | None = None) -> None:
         """Listen, with these rules (see `access_control`) instead of those before. Raises `RouterError`."""
@@ -160,10 +161,12 @@ class Router:
                 said.append(line)
         finally:
             watch.cancel()
-        why = b"; ".join(line.strip() for line in said[-2:]).decode(errors="replace") or "it ended without a word"
+        silence = f"it was not ready after {START_S:g} s" if self._was_late else "it ended without a word"
+        why = b"; ".join(line.strip() for line in said[-2:]).decode(errors="replace") or silence
         raise RouterError(f"cannot listen on {self.endpoint}: {why}")
 
     def _give_up(self) -> None:
+        self._was_late = True
         if self._process:
             self._process.kill()
 

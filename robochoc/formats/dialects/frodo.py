@@ -14,7 +14,7 @@ from lxml import etree
 from robochoc.formats.dialects.dialect import Dialect, Imported, ImportOptions
 from robochoc.formats.dialects.xcsp21.frodo_file import frodo_file
 from robochoc.formats.dialects.xcsp21.instance import Instance
-from robochoc.formats.dialects.xcsp21.merging import check_complete, merged
+from robochoc.formats.dialects.xcsp21.merging import merged
 from robochoc.formats.dialects.xcsp21.reader import PUBLIC, read_instance
 from robochoc.formats.dialects.xcsp21.recognition import Beginning
 from robochoc.formats.dialects.xcsp21.team import as_team
@@ -38,7 +38,6 @@ def _is_part(_path: Path, beginning: bytes) -> bool:
 
 def _read(paths: Sequence[Path], options: ImportOptions) -> Imported:
     instances = [read_instance(path, options, _knower) for path in paths]
-    check_complete(instances)
     whole = merged(instances)
     whole.name = paths[0].stem if len(paths) == 1 else paths[0].absolute().parent.name
     return as_team(whole, NAME, options)

@@ -22,6 +22,7 @@ def merged(instances: Sequence[Instance]) -> Instance:
     whole = replace(instances[0], self_agent="", agents=[], variables={}, constraints=[], notes=[])
     if len(instances) > 1:
         _check_members(instances)
+    _check_complete(instances)
     known: dict[tuple[str, frozenset[str]], ForeignConstraint] = {}
     for one in instances:
         whole.agents += [name for name in one.agents if name not in whole.agents]
@@ -68,7 +69,7 @@ def _check_members(instances: Sequence[Instance]) -> None:
             refuse(one.file, 0, f"does not maximize or minimize as {instances[0].file} does", "let them agree")
 
 
-def check_complete(instances: Sequence[Instance]) -> None:
+def _check_complete(instances: Sequence[Instance]) -> None:
     """Raise `InvalidInputError` when an agent has variables, and its file is not there."""
     selves = {one.self_agent for one in instances if one.self_agent}
     if not selves:

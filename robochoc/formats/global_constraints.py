@@ -1,0 +1,305 @@
+"""Global constraints as XCSP 2.1 writes them: `allDifferent`, `weightedSum`, `element`, `cumulative`.
+
+What they say is an expression, their body; how they were written is kept beside it. Roussel and Lecoutre, "XML
+Representation of Constraint Networks: Format XCSP 2.1", 2009; docs/reference/format.md, "Global constraints".
+"""
+
+from __future__ import annotations
+
+import itertools
+import re
+from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
+
+from lxml import etree
+
+from robochoc.formats.diagnostics import MistakeError, shortened
+from robochoc.formats.names import is_name
+from robochoc.model.constraint import GlobalPredicate, Term
+from robochoc.model.expression import Apply, Constant, Expression, Name
+from robochoc.model.expression.parser import MAX_NODES
+
+PREFIX = "global:"
+"""What references to global constraints begin with."""
+
+_WORD = re.compile(r"[][{}]|<[a-z]+/>|[^][{}<>\s]+")
+_INTEGER = re.compile(r"[+-]?[0-9]{1,18}")
+_COMPARISONS = ("eq", "ne", "ge", "gt", "le", "lt")
+_NIL = "<nil/>"
+_SPLIT = "split it into several"
+
+
+def read_global(reference: str, parameters: etree._Element | None, scope: Sequence[Term]) -> GlobalPredicate:
+    """Return the global constraint that stands in a file, about formal parameters. Raises `MistakeError`.
+
+    Args:
+        reference: Its name, with `global:`.
+        parameters: The element of its parameters; None: all of the `scope`, which allDifferent takes.
+        scope: The terms of the constraint's scope.
+    """
+    text = "" if parameters is None else parameters.text or ""
+    for child in () if parameters is None else parameters:
+        text += f" <{child.tag}/> {child.tail or ''}"
+    words = _WORD.findall(text)
+    if parameters is None and reference == f"{PREFIX}allDifferent":
+        words = ["[", *map(str, scope), "]"]
+    formals: dict[str, str] = {}
+    form = [formals.setdefault(word, f"X{len(formals)}") if is_name(word) else word for word in words]
+    return _expanded(reference, form)
+
+
+def variables_of(parameters: etree._Element | None, scope: Sequence[Term]) -> tuple[Term, ...]:
+    """Return the variables in the parameters of a global constraint, in the order of its formal parameters."""
+    if parameters is None:
+        return tuple(dict.fromkeys(term for term in scope if isinstance(term, str)))
+    text = " ".join([parameters.text or "", *(child.tail or "" for child in parameters)])
+    return tuple(dict.fromkeys(word for word in _WORD.findall(text) if is_name(word)))
+
+
+def write_global(element: etree._Element, predicate: GlobalPredicate, terms: Sequence[Term]) -> None:
+    """Write how a global constraint is about `terms`, which its formal parameters receive, into `element`."""
+    actual = dict(zip(predicate.parameters, map(str, terms), strict=True))
+    text, last = "", None
+    for word in predicate.form.split():
+        if word.startswith("<"):
+            _append(element, last, text)
+            last, text = etree.SubElement(element, word[1:-2]), ""
+        else:
+            text += f"{actual.get(word, word)} "
+    _append(element, last, text)
+
+
+def check_global(predicate: GlobalPredicate) -> None:
+    """Raise `MistakeError` unless the body of a global constraint is what its form says."""
+    form: object = predicate.form
+    made = _expanded(predicate.name, form.split() if isinstance(form, str) else [])
+    if (made.parameters, made.body) != (predicate.parameters, predicate.body):
+        raise MistakeError(f"{shortened(predicate.name)} says something else than its form", "make it by `read_form`")
+    if predicate.symbolic and predicate.name != f"{PREFIX}allDifferent":
+        raise MistakeError(f"{shortened(predicate.name)} over symbols", "only allDifferent takes them")
+
+
+def read_form(reference: str, form: str) -> GlobalPredicate:
+    """Return a global constraint about formal parameters `X0`, `X1`, ... from its `form`: `[ X0 X1 X2 ]`.
+
+    Args:
+        reference: Its name, with `global:`.
+        form: Its parameters as XCSP 2.1 writes them, formal ones for variables, in the order of their numbers.
+
+    Raises:
+        MistakeError: if it is of another kind, or its parameters are not as they should be.
+    """
+    return _expanded(reference, _WORD.findall(form))
+
+
+def is_global(reference: str) -> bool:
+    """Return whether a constraint's `reference` is to a global constraint."""
+    return reference.startswith(PREFIX)
+
+
+def _append(element: etree._Element, last: etree._Element | None, text: str) -> None:
+    if last is None:
+        element.text = text.strip()
+    else:
+        last.tail = f" {text.strip()}" if text else None
+
+
+def _expanded(reference: str, form: Sequence[str]) -> GlobalPredicate:
+    kind = reference.removeprefix(PREFIX)
+    if kind not in _KINDS or not is_global(reference):
+        known = " ".join(PREFIX + one for one in _KINDS)
+        raise MistakeError(f"the global constraint '{shortened(reference)}' is not known", f"known are {known}")
+    if len(form) > MAX_NODES:
+        raise MistakeError(f"{reference} has {len(form)} words", f"{MAX_NODES} are allowed: {_SPLIT}")
+    words = _Words(reference, form)
+    body = _KINDS[kind](words)
+    words.end()
+    names = tuple(dict.fromkeys(word for word in form if is_name(word)))
+    return GlobalPredicate(reference, names, body, form=" ".join(form))
+
+
+class _Words:
+    """The words of a form, one after the other."""
+
+    def __init__(self, reference: str, words: Sequence[str]) -> None:
+        self._reference = reference
+        self._words = words
+        self._next = 0
+
+    def at(self, word: str) -> bool:
+        """Return whether `word` comes next."""
+        return self._next < len(self._words) and self._words[self._next] == word
+
+    def skip(self, word: str) -> bool:
+        """Go behind `word`, if it comes next."""
+        found = self.at(word)
+        self._next += found
+        return found
+
+    def want(self, word: str) -> None:
+        if not self.skip(word):
+            raise self.wrong(f"'{word}'")
+
+    def term(self) -> Expression:
+        """Return a variable or an integer."""
+        word = self._words[self._next] if self._next < len(self._words) else ""
+        if is_name(word):
+            self._next += 1
+            return Name(word)
+        if not _INTEGER.fullmatch(word):
+            raise self.wrong("a variable or an integer")
+        self._next += 1
+        return Constant(int(word))
+
+    def listed(self, opening: str, one: Callable[[], Expression], closing: str) -> Iterator[Expression]:
+        """Yield each `one` between brackets."""
+        self.want(opening)
+        while not self.skip(closing):
+            yield one()
+
+    def comparison(self, allowed: Collection[str]) -> str:
+        for word in allowed:
+            if self.skip(f"<{word}/>"):
+                return word
+        raise self.wrong(" or ".join(f"<{word}/>" for word in allowed))
+
+    def few(self, number: int, most: int) -> None:
+        """Raise `MistakeError` where there are so many that the expression would be too long."""
+        if number > most:
+            raise MistakeError(f"{self._reference} over {number} of them", f"{most} are allowed: {_SPLIT}")
+
+    def end(self) -> None:
+        if self._next < len(self._words):
+            raise self.wrong("the end")
+
+    def wrong(self, wanted: str) -> MistakeError:
+        """Return the mistake that the next word is not what is `wanted`."""
+        there = f"'{shortened(self._words[self._next])}'" if self._next < len(self._words) else "the end"
+        hint = f"write {_EXAMPLES[self._reference.removeprefix(PREFIX)]}"
+        return MistakeError(f"the parameters of {self._reference}: {there} where {wanted} should stand", hint)
+
+
+def _all_different(words: _Words) -> Expression:
+    terms = list(words.listed("[", words.term, "]"))
+    if len(terms) <= 1:
+        raise words.wrong("a list of two terms or more")
+    words.few(len(terms), 80)
+    return _joined("and", [Apply("ne", pair) for pair in itertools.combinations(terms, 2)])
+
+
+def _weighted_sum(words: _Words) -> Expression:
+    def product() -> Expression:
+        words.want("{")
+        weight, term = words.term(), words.term()
+        words.want("}")
+        if not isinstance(weight, Constant):
+            raise words.wrong("an integer before each variable")
+        return term if weight.value == 1 else Apply("mul", (weight, term))
+
+    products = list(words.listed("[", product, "]"))
+    words.few(len(products), 2000)
+    if not products:
+        raise words.wrong("a list of {weight variable}")
+    operator = words.comparison(_COMPARISONS)
+    return Apply(operator, (_joined("add", products), words.term()))
+
+
+def _element(words: _Words) -> Expression:
+    """The index counts from 1."""
+    outer = words.skip("[")
+    index = words.term()
+    items = list(words.listed("[", words.term, "]"))
+    words.few(len(items), 1000)
+    if not items:
+        raise words.wrong("a list of one term or more")
+    value = words.term()
+    if outer:
+        words.want("]")
+    cases = [
+        Apply("and", (Apply("eq", (index, Constant(place))), Apply("eq", (item, value))))
+        for place, item in enumerate(items, start=1)
+    ]
+    return _joined("or", cases)
+
+
+class _Task:
+    """A task of cumulative: two of origin, duration and end, or all; and its height."""
+
+    def __init__(self, words: _Words) -> None:
+        words.want("{")
+        given = [None if words.skip(_NIL) else words.term()]
+        while not words.skip("}"):
+            given.append(None if words.skip(_NIL) else words.term())
+        origin, duration, end, height = self._parts(given, words)
+        self.conditions = [Apply("ge", (part, Constant(0))) for part in (duration, height) if isinstance(part, Name)]
+        """What must hold of the task by itself."""
+        for part in (duration, height):
+            if isinstance(part, Constant) and part.value < 0:
+                raise words.wrong("tasks with durations and heights of 0 or more")
+        if origin and duration and end:
+            self.conditions.append(Apply("eq", (Apply("add", (origin, duration)), end)))
+        self.begin = origin or Apply("sub", (_there(end), _there(duration)))
+        self.end = end or Apply("add", (_there(origin), _there(duration)))
+        if origin and end and not duration:
+            self.conditions.append(Apply("le", (origin, end)))
+        self.height = height
+
+    @staticmethod
+    def _parts(
+        given: list[Expression | None], words: _Words
+    ) -> tuple[Expression | None, Expression | None, Expression | None, Expression]:
+        match given:
+            case [origin, duration, height] if origin and duration and height:
+                return origin, duration, None, height
+            case [origin, duration, end, height] if height and [origin, duration, end].count(None) <= 1:
+                return origin, duration, end, height
+            case _:
+                raise words.wrong(
+                    "{origin duration height} or {origin duration end height}, in which one may be <nil/>,"
+                )
+
+    def load(self, now: Expression) -> Expression:
+        """Return what the task takes at the time `now`."""
+        runs = Apply("and", (Apply("le", (self.begin, now)), Apply("lt", (now, self.end))))
+        return Apply("if", (runs, self.height, Constant(0)))
+
+
+def _cumulative(words: _Words) -> Expression:
+    """The load grows only where a task begins, so it is compared with the limit there."""
+    words.want("[")
+    tasks = []
+    while not words.skip("]"):
+        tasks.append(_Task(words))
+        words.few(len(tasks), 25)
+    if not tasks:
+        raise words.wrong("a task")
+    words.skip("<le/>")
+    limit = words.term()
+    conditions: list[Expression] = [one for task in tasks for one in task.conditions]
+    conditions += [Apply("le", (_joined("add", [other.load(task.begin) for other in tasks]), limit)) for task in tasks]
+    return _joined("and", conditions)
+
+
+def _there(part: Expression | None) -> Expression:
+    if part is None:
+        raise ValueError("a task has two of origin, duration and end")
+    return part
+
+
+def _joined(operator: str, terms: Iterable[Expression]) -> Expression:
+    several = tuple(terms)
+    return several[0] if len(several) == 1 else Apply(operator, several)
+
+
+_KINDS: dict[str, Callable[[_Words], Expression]] = {
+    "allDifferent": _all_different,
+    "weightedSum": _weighted_sum,
+    "element": _element,
+    "cumulative": _cumulative,
+}
+_EXAMPLES = {
+    "allDifferent": "[ V0 V1 V2 ]",
+    "weightedSum": "[ {1 V0} {-1 V1} ] <le/> 3",
+    "element": "V0 [ 5 V1 7 ] V2: the first counts, from 1",
+    "cumulative": "[ {V0 2 1} {V1 2 <nil/> 1} ] <le/> 1",
+}
+__all__ = ["check_global", "is_global", "read_form", "read_global", "variables_of", "write_global"]

@@ -1,0 +1,154 @@
+"""`robochoc import` and `export`, and files of other tools in `validate` and `solve`."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+
+from robochoc.cli.options.problems import READ, WRITTEN
+from robochoc.formats import read_team
+from robochoc.formats.dialects.registry import NAMES
+from tests.support.program import robochoc_within
+
+FRODO = """<instance><presentation name="p" format="XCSP 2.1_FRODO" maximize="{maximize}"/>
+  <agents><agent name="r-1"/><agent name="r-2"/></agents><domains><domain name="d">1..3</domain></domains>
+  <variables><variable name="x#1" domain="d" agent="r-1"/><variable name="x#2" domain="d" agent="r-2"/></variables>
+  <relations><relation name="r" semantics="soft" arity="2" defaultCost="{default}">0.5: 1 2|2 1 | 2: 3 1</relation>
+  </relations><constraints><constraint name="c" scope="x#1 x#2" reference="r"/></constraints></instance>"""
+
+
+@pytest.fixture
+def problem(tmp_path: Path) -> Path:
+    path = tmp_path / "problem.xml"
+    path.write_text(FRODO.format(maximize="false", default="infinity"))
+    return path
+
+
+def test_names_of_formats() -> None:
+    assert {*READ, *WRITTEN} == {*NAMES}
+
+
+def test_import_tells_what_it_changed(problem: Path, tmp_path: Path) -> None:
+    team, report = tmp_path / "team", tmp_path / "report.json"
+    done = robochoc_within("import", problem, "-o", team, "--report", report)
+    assert done.returncode == 0, done.stderr
+    assert f"{team}: 2 robots, 2 variables, 1 constraints, from frodo; next: robochoc solve {team}" in done.stdout
+    assert "  renamed: r-1 is r_1\n" in done.stdout
+    assert "  renamed: and 1 more" in done.stdout
+    assert "  scale: costs are decimals" in done.stdout
+    (entry,) = json.loads(report.read_text())
+    assert (entry["imported"], entry["format"], entry["type"]) == (True, "frodo", "DisWCSP")
+    assert entry["names"] == {"r_1": "r-1", "r_2": "r-2", "x_1": "x#1", "x_2": "x#2"}
+    assert {note["kind"] for note in entry["notes"]} == {"renamed", "scale"}
+    assert read_team(team).order == ("r_1", "r_2")
+    listed = robochoc_within("import", problem, "-o", tmp_path / "other", "--report", "-")
+    assert json.loads(listed.stdout)[0]["names"] == entry["names"]
+
+
+def test_import_replaces_nothing_unless_told(problem: Path, tmp_path: Path) -> None:
+    team = tmp_path / "team"
+    assert robochoc_within("import", problem, "-o", team).returncode == 0
+    again = robochoc_within("import", problem, "-o", team)
+    assert (again.returncode, "it exists already" in again.stderr) == (1, True)
+    assert robochoc_within("import", problem, "-o", team, "--force", "--order", "lexicographic").returncode == 0
+    (team / "notes.txt").write_text("mine")
+    other = robochoc_within("import", problem, "-o", team, "--force")
+    assert "it holds 'notes.txt'" in other.stderr
+
+
+def test_import_of_a_folder_makes_a_team_of_each_problem(problem: Path, tmp_path: Path) -> None:
+    folder, teams = tmp_path / "problems", tmp_path / "teams"
+    (folder / "below").mkdir(parents=True)
+    (folder / "one.xml").write_text(problem.read_text())
+    (folder / "one.xcsp").write_text(problem.read_text())
+    (folder / "broken.xml").write_text(problem.read_text().replace("0.5: 1", "0.5: x"))
+    (folder / "notes.txt").write_text("no problem")
+    for name in ("r-1", "r-2"):
+        (folder / "below" / f"{name}.xml").write_text(
+            problem.read_text().replace("<agents>", f'<agents self="{name}">')
+        )
+    done = robochoc_within("import", folder, "-o", teams)
+    assert done.returncode == 1
+    assert done.stdout.endswith("3 of 4 problems imported\n")
+    assert "broken.xml:4: 'x' is no integer" in done.stderr
+    assert sorted(str(path.relative_to(teams)) for path in teams.rglob("names.json")) == [
+        "below/names.json",
+        "one-xml/names.json",
+        "one/names.json",
+    ]
+    assert "is of no format" not in done.stderr
+    nothing = robochoc_within("import", teams, "-o", tmp_path / "more")
+    assert "no file here is of a format that is read" in nothing.stderr
+
+
+def test_wrong_usage(problem: Path, tmp_path: Path) -> None:
+    mixed = robochoc_within("import", problem, tmp_path, "-o", tmp_path / "team")
+    assert (mixed.returncode, "Give the files of one problem, or folders." in mixed.stderr) == (2, True)
+    pattern = robochoc_within("import", problem, "--owner", "(", "-o", tmp_path / "team")
+    assert (pattern.returncode, "is no regular expression" in pattern.stderr) == (2, True)
+    unknown = tmp_path / "notes.txt"
+    unknown.write_text("notes")
+    told = robochoc_within("import", unknown, "-o", tmp_path / "team")
+    assert (told.returncode, "is of no format that is read here" in told.stderr) == (1, True)
+
+
+@pytest.mark.parametrize(("maximize", "cost"), [("false", 0.5), ("true", 2.0)])
+def test_solve_takes_the_file_and_tells_original_names(maximize: str, cost: float, problem: Path) -> None:
+    default = "infinity" if maximize == "false" else "-infinity"
+    problem.write_text(FRODO.format(maximize=maximize, default=default))
+    words = ["solve", problem, "--protocol", "dpop", "--runtime", "simulator"]
+    done = robochoc_within(*words, "--json")
+    assert done.returncode == 0, done.stderr
+    told = json.loads(done.stdout)
+    assert (told["verdict"], told["cost"], {*told["assignment"]}) == ("optimal", cost, {"x#1", "x#2"})
+    assert "names" not in told
+    assert "r-1: x#1 = " in robochoc_within(*words).stdout
+
+
+def test_solve_of_an_imported_team_tells_both_names(problem: Path, tmp_path: Path) -> None:
+    team = tmp_path / "team"
+    assert robochoc_within("import", problem, "-o", team).returncode == 0
+    words = ["solve", team, "--protocol", "dpop", "--runtime", "simulator"]
+    told = json.loads(robochoc_within(*words, "--json").stdout)
+    assert ({*told["assignment"]}, told["names"]["x_1"]) == ({"x_1", "x_2"}, "x#1")
+    assert "r-1: x#1 = " in robochoc_within(*words).stdout
+
+
+def test_validate_says_what_a_file_is(problem: Path) -> None:
+    done = robochoc_within("validate", problem)
+    assert done.returncode == 0
+    assert "2 robots, 2 variables, 1 constraint: ok\n  it is FRODO's XCSP 2.1: 'robochoc solve' takes it" in done.stdout
+    told = json.loads(robochoc_within("validate", problem, "--json").stdout)
+    assert (told["valid"], told["format"]) == (True, "frodo")
+    folder = robochoc_within("validate", problem.parent)
+    assert folder.returncode == 1
+    assert f"is FRODO's XCSP 2.1, and no file of a robot (robochoc import {problem.parent} -o FOLDER)" in folder.stdout
+    solved = robochoc_within("solve", problem.parent)
+    assert "is FRODO's XCSP 2.1, and no file of a robot" in solved.stderr
+    problem.rename(problem.with_suffix(".xcsp"))
+    hidden = robochoc_within("solve", problem.parent)
+    assert f"'robochoc import {problem.parent} -o FOLDER' makes a team of it" in hidden.stderr
+    assert "makes a team of it" in robochoc_within("validate", problem.parent).stdout
+    wrong = problem.with_suffix(".xcsp")
+    wrong.write_text(wrong.read_text().replace("3 1", "3 x"))
+    assert "problem.xcsp:4: 'x' is no integer" in robochoc_within("validate", wrong).stdout
+
+
+@pytest.mark.parametrize("kind", WRITTEN)
+def test_export_in_every_format(kind: str, four: Path) -> None:
+    done = robochoc_within("export", four, "--format", kind)
+    if f"this version does not write {kind}" in done.stderr:
+        pytest.skip(done.stderr)
+    assert done.returncode == 0, done.stderr
+    assert "V1.1" in done.stdout or kind == "wcsp"
+
+
+def test_export_goes_to_a_file(problem: Path, tmp_path: Path) -> None:
+    out = tmp_path / "team.dot"
+    done = robochoc_within("export", problem, "--format", "dot", "-o", out)
+    assert done.stdout == f"{out}: {out.stat().st_size:,} bytes, 2 variables\n"
+    assert '"r_1" -- "r_2" [style=bold];' in out.read_text()
+    refused = robochoc_within("export", problem, "--format", "xdiscsp")
+    assert (refused.returncode, "integer costs of 0 or more, and c has 0.5" in refused.stderr) == (2, True)

@@ -1,0 +1,170 @@
+"""What a model refuses: one message, which names the line of the user's program and what was meant."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from enum import Enum
+from pathlib import Path
+
+import pytest
+
+import robochoc
+from robochoc.model.problem import Team
+from robochoc.modelling.places import ModelTypeError, UnknownNameError
+from robochoc.modelling.terms import Variable
+
+
+class Color(Enum):
+    RED = 1
+    GREEN = 2
+
+
+class Shape(Enum):
+    RED = 1
+
+
+class Made:
+    """A model with variables of all kinds."""
+
+    def __init__(self) -> None:
+        self.model = robochoc.Model("made")
+        self.a, self.b = self.model.robot("a"), self.model.robot("b")
+        self.x, self.y = self.a.variable("x", range(3)), self.b.variable("y", range(3))
+        self.color, self.shape = self.a.variable("color", Color), self.b.variable("shape", Shape)
+        self.mode = self.a.variable("mode", ["fast", "slow"])
+        self.on = self.a.boolean("on")
+        self.large = [self.b.variable(f"l{n}", range(100)) for n in range(3)]
+
+
+def stranger() -> Variable:
+    return robochoc.Model().robot("a").variable("x", range(3))
+
+
+def _both_ways(made: Made) -> None:
+    made.model.minimize(made.x)
+    made.model.maximize(made.y)
+
+
+def _built(made: Made, mistake: Callable[[Made], object]) -> Team:
+    """Make a mistake, and build the team, where some are seen."""
+    mistake(made)
+    return made.model.team
+
+
+MISTAKES: list[tuple[Callable[[Made], object], str]] = [
+    (lambda m: bool(m.x == m.y), "has no truth value yet"),
+    (lambda m: 1 < m.x < 3, "1 < x < 3"),
+    (lambda m: m.x in [m.y, 3], ".is_in"),
+    (lambda m: min(m.x, m.y), "minimum"),
+    (lambda m: list(m.x), "no list"),
+    (lambda m: m.color != m.shape, "they are never equal"),
+    (lambda m: m.color == m.mode, "a Color, and a.mode is a text"),
+    (lambda m: m.color == "RED", "never equal"),
+    (lambda m: m.mode == "fats", "did you mean 'fast'"),
+    (lambda m: m.color + 1, "no number"),
+    (lambda m: m.color < m.color, "== and != alone"),
+    (lambda m: m.x & m.y, "no condition"),
+    (lambda m: m.x + "1", "no number"),
+    (lambda m: m.x / m.y, "//"),
+    (lambda m: m.x / 0, "division by zero"),
+    (lambda m: m.model.add(m.x), "no condition"),
+    (lambda m: m.model.add(m.x is m.y), "False whatever"),
+    (lambda m: m.model.add("x != y"), "no condition"),
+    (lambda m: m.model.add(stranger() == 1), "no variable of this model"),
+    (lambda m: m.model.minimize(m.color), "no number"),
+    (_both_ways, "minimised"),
+    (lambda m: m.model.minimize(m.x / 3), "9 decimal places"),
+    (lambda m: m.model.robot("a"), "already"),
+    (lambda m: m.model.robot("a b"), "cannot be a robot's name"),
+    (lambda m: m.model.robot("scenario"), "cannot be a robot's name"),
+    (lambda m: m.model.robot("c", weight=0), "no weight"),
+    (lambda m: m.model.robot("c"), "c has no variable"),
+    (lambda m: m.a.variable("x", range(2)), "already"),
+    (lambda m: m.a.variable("2 x", range(2)), "cannot be a variable's name"),
+    (lambda m: m.a.variable("v", []), "without values"),
+    (lambda m: m.a.variable("v", [1, "a"]), "of one kind"),
+    (lambda m: m.a.variable("v", [[1], [2]]), "can change"),
+    (lambda m: m.a.variable("v", [1, 1]), "stands twice"),
+    (lambda m: m.a.variable("v", "red green"), "['red', 'green']"),
+    (lambda m: m.a.variable("v", 3), "no domain"),
+    (lambda m: m.a.variable("v", range(10**9)), "more than 100,000"),
+    (lambda m: m.a.variable("v", [10**18]), "18 digits"),
+    (lambda m: m.model["a.xx"], "did you mean 'a.x'"),
+    (lambda m: m.a["xx"], "a has no variable 'xx'"),
+    (lambda m: m.a.knows(m.x == 1), "Model.add"),
+    (lambda m: m.b.knows(m.x + m.y == 1, m.x == 1), "of a alone"),
+    (lambda m: m.a.topic("t", x=m.y), "no variable of a"),
+    (lambda m: m.a.topic("t", x=m.x / 2), "no file can say"),
+    (lambda m: robochoc.all_different(m.x, m.color), "a number"),
+    (lambda m: robochoc.allowed([m.x, m.y], [(1, 2, 3)]), "3 values, and there are 2 terms"),
+    (lambda m: robochoc.allowed([m.x, m.mode], [(1, "fats")]), "did you mean 'fast'"),
+    (lambda m: robochoc.costs(m.x, {1: "much"}), "no cost"),
+    (lambda m: robochoc.element([], m.x), "without elements"),
+    (lambda m: robochoc.cumulative([m.x], [1, 2], [1], 1), "2 durations"),
+    (lambda m: m.model.add(robochoc.function(lambda x: x, m.x)), "no truth value"),
+    (lambda m: m.model.add(robochoc.function(lambda x: {}[x], m.x)), "KeyError"),
+    (lambda m: m.model.minimize(robochoc.function(str, m.x)), "no number"),
+    (lambda m: m.model.add(robochoc.function(max, *m.large) == 3), "1,000,000 combinations"),
+    (lambda m: m.model.after_solution().remove_robot("c"), "no robot 'c'"),
+    (lambda m: m.model.after_solution().remove_value(m.x, 7), "no value 7"),
+    (lambda m: m.model.after_solution().add_value(m.x, "7"), "a text"),
+    (lambda m: m.model.after_solution().remove_constraint("C9"), "no constraint 'C9'"),
+    (lambda m: m.model.after_solution().add(m.x == 1), "of a alone"),
+    (lambda m: m.model.add(m.model.after_solution().robot("late").variable("v", [1]) == 1), "event.add"),
+    (lambda _: robochoc.Model().team, "no robot"),
+]
+
+
+@pytest.mark.parametrize(("mistake", "says"), MISTAKES, ids=[says for _, says in MISTAKES])
+def test_a_mistake_is_told_with_its_line(mistake: Callable[[Made], object], says: str) -> None:
+    made = Made()
+    with pytest.raises(robochoc.ModelError) as refused:
+        _built(made, mistake)
+    assert says in str(refused.value)
+    file, _, rest = str(refused.value).partition(":")
+    assert Path(file).name == Path(__file__).name
+    assert int(rest.partition(":")[0]) > 0
+    assert "\n" not in str(refused.value)
+
+
+def test_mistakes_have_the_type_that_python_gives_such_ones() -> None:
+    made = Made()
+    with pytest.raises(TypeError):
+        bool(made.x)
+    with pytest.raises(KeyError):
+        made.model["nobody"]
+    assert issubclass(ModelTypeError, ValueError)
+    assert issubclass(UnknownNameError, ValueError)
+
+
+def test_variables_are_keys() -> None:
+    made = Made()
+    where = {made.x: 1, made.y: 2}
+    assert where[made.y] == 2
+    assert made.x in {made.x, made.y}
+    assert stranger() not in where
+
+
+def test_names_of_the_library_are_listed_and_guessed() -> None:
+    assert {"Model", "load", "all_different", "journal"} <= {*dir(robochoc)}
+    assert all(getattr(robochoc, name) is not None for name in dir(robochoc))
+    with pytest.raises(AttributeError, match="did you mean 'all_different'"):
+        _ = robochoc.all_diferent
+
+
+OPTIONS: list[tuple[dict[str, object], type[Exception], str]] = [
+    ({"timout": 3}, TypeError, "did you mean 'timeout'"),
+    ({"runtime": "simulater"}, ValueError, "did you mean 'simulator'"),
+    ({"order": "dom-dge"}, ValueError, "did you mean 'dom-deg'"),
+    ({"order": ["a", "bb"]}, ValueError, "no robot 'bb'"),
+    ({"withdraw": "some"}, ValueError, "expected minimum, maximal"),
+    ({"on_loss": "withdrw"}, ValueError, "did you mean 'withdraw'"),
+    ({"schedule": "rndom"}, ValueError, "did you mean 'random'"),
+    ({"protocol": "dpopp"}, LookupError, "did you mean 'dpop'"),
+]
+
+
+@pytest.mark.parametrize(("options", "kind", "says"), OPTIONS, ids=[says for *_, says in OPTIONS])
+def test_options_that_there_are_not_are_guessed(options: dict[str, object], kind: type[Exception], says: str) -> None:
+    with pytest.raises(kind, match=says):
+        Made().model.solve(**options)  # type: ignore[arg-type]

@@ -1,0 +1,115 @@
+"""Models and teams: from files and back, with what changes over time."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from decimal import Decimal
+from pathlib import Path
+
+import pytest
+
+import robochoc
+from robochoc.formats import InvalidInputError, read_team
+from robochoc.model.problem import Robot, Team
+from tests.support.program import ROOT
+
+TEAMS = ["docs/examples/" + name for name in ("arm", "hangar", "patrol", "rescue", "secrets")]
+
+
+def plain(team: Team) -> list[Robot]:
+    """Return the robots of a team, whose children come in the order of their names."""
+    return [replace(one, children=tuple(sorted(one.children, key=lambda c: c.name))) for one in team.robots]
+
+
+def changing() -> tuple[robochoc.Model, list[str]]:
+    """Return a model whose robots leave, come and change, and what opens its epochs."""
+    model = robochoc.Model("rescue")
+    a, b, c = (model.robot(name) for name in "abc")
+    x, y, z = (robot.variable("level", range(1, 4)) for robot in (a, b, c))
+    mode = b.variable("mode", ["fast", "slow"])
+    model.add(x != y)
+    model.add(y != z, name="yz")
+    model.after_solution().remove_robot(a)
+    coming = model.after_solution()
+    spare = coming.robot("spare", weight=2)
+    level = spare.variable("level", range(1, 4))
+    coming.add(level != y, level >= 2, (mode == "fast").implies(level == 3))
+    coming.add(abs(y - z) >= 2, name="apart")
+    closing = model.after_messages(20)
+    closing.remove_value(y, 3)
+    closing.remove_constraint("yz")
+    closing.add_value(z, 5)
+    closing.add_value(mode, "off")
+    closing.add((mode == "off") | (z != 5))
+    model.after_solution().remove_constraint("apart")
+    opened = ["the start", "-a", "+spare, +apart (b, c)"]
+    opened.append("b.level without 3, -yz (b, c), c.level with 5, b.mode with 2, +C3 (b, c)")
+    return model, [*opened, "-apart (b, c)"]
+
+
+@pytest.mark.parametrize("name", TEAMS)
+def test_a_team_is_the_same_as_a_model_and_saved(name: str, tmp_path: Path) -> None:
+    team = read_team(ROOT / name)
+    model = robochoc.Model.load(ROOT / name)
+    assert plain(model.team) == plain(team)
+    assert model.team.scenario == team.scenario
+    model.save(tmp_path / team.name)
+    again = read_team(tmp_path / team.name)
+    assert plain(again) == plain(team)
+    assert again.scenario == team.scenario
+
+
+def test_a_loaded_team_is_solved_and_extended() -> None:
+    model = robochoc.Model.load(ROOT / "docs/examples/patrol")
+    assert model.solve("dpop", runtime="simulator").cost == 6
+    lead, south = model["lead"], model["south"]
+    model.add(lead + south >= 5, name="high")
+    model.minimize(Decimal("0.25") * lead)
+    extra = model.robot("Extra").variable("level", ["up", "down"])
+    model.add((extra == "up").implies(south == 3))
+    told = model.solve("dpop", runtime="simulator")
+    assert told.cost == model.solve("central").cost
+    assert told[lead] + told[south] >= 5  # type: ignore[operator]
+
+
+def test_events_happen_and_are_saved(tmp_path: Path) -> None:
+    model, opened = changing()
+    told = model.solve("dynabt", runtime="simulator")
+    assert [epoch.opened_by for epoch in told.epochs] == opened
+    assert [epoch.verdict for epoch in told.epochs] == ["solution"] * 5
+    assert told.verified
+    model.save(tmp_path / "rescue")
+    loaded = robochoc.Model.load(tmp_path / "rescue")
+    assert loaded.team.scenario == read_team(tmp_path / "rescue").scenario
+    again = loaded.solve("dynabt", runtime="simulator")
+    assert [epoch.opened_by for epoch in again.epochs] == opened
+    loaded.after_solution().remove_robot("c")
+    assert loaded.solve("dynabt", runtime="simulator").epochs[-1].opened_by == "-c"
+    loaded.save(tmp_path / "rescue", replace=True)
+    assert len(read_team(tmp_path / "rescue").scenario) == 5
+
+
+def test_nothing_half_written_is_left(tmp_path: Path) -> None:
+    model, _ = changing()
+    model.save(tmp_path / "team")
+    before = {path: path.read_bytes() for path in (tmp_path / "team").rglob("*.xml")}
+    with pytest.raises(InvalidInputError, match="exists already"):
+        model.save(tmp_path / "team")
+    model.robot("empty")
+    with pytest.raises(robochoc.ModelError, match="empty has no variable"):
+        model.save(tmp_path / "team", replace=True)
+    assert {path: path.read_bytes() for path in (tmp_path / "team").rglob("*.xml")} == before
+    assert [path.name for path in tmp_path.iterdir()] == ["team"]
+
+
+def test_values_of_files_are_integers_and_symbols(tmp_path: Path) -> None:
+    model = robochoc.Model("kinds")
+    x = model.robot("a").variable("x", ["red", "green"])
+    y = model.robot("b").variable("y", [Decimal("0.5"), Decimal("1.5")])
+    model.add(x == "green")
+    model.maximize(y - 0.1)
+    model.save(tmp_path / "kinds")
+    told = robochoc.Model.load(tmp_path / "kinds").solve("dpop", runtime="simulator")
+    assert told.values == {"a.x": "green", "b.y": 3}
+    assert told.cost == Decimal("1.4")
+    assert robochoc.load(tmp_path / "kinds").solve("dpop", runtime="simulator")["a.x"] == "green"
