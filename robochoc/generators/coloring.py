@@ -1,23 +1,51 @@
-"""Graph colouring with too few colours: as few neighbours as possible are to have the same one.
+"""Graph colouring: hard, soft (as few neighbours as possible have the same colour), or weighted.
 
-The usual first benchmark of protocols that minimise (Modi et al., "Adopt", AIJ 161, 2005; Zhang et al., "Distributed
-stochastic search and distributed breakout", AIJ 161, 2005): each constraint that is broken costs 1. The graph has a
-given mean degree, and every such graph is as likely as any other.
+* `soft` is the usual first benchmark of protocols that minimise (Modi et al., "Adopt", AIJ 161, 2005; Zhang et al.,
+  "Distributed stochastic search and distributed breakout", AIJ 161, 2005): each constraint that is broken costs 1.
+* `weighted`: the weight of an edge, an integer or decimal drawn from 1 unit to a maximum, is what it costs to give its
+  ends the same colour (Koljonen, Alava, Peltomaki and Tirkkonen, "Distributed generalized graph coloring", SASO 2010).
+* `hard` is a DisCSP: neighbours must have different colours.
+
+The graph has a given mean degree, and every such graph is as likely as any other; or it is any of
+`generators/graphs.py`.
 """
 
 from __future__ import annotations
 
-from random import Random
+from dataclasses import replace
+from enum import StrEnum
 
 from robochoc.formats import PREDEFINED
-from robochoc.generators.random_csp import MAX_AGENTS, MAX_VALUES, random_graph, team_of_edges
-from robochoc.model.problem import Constraint, ProblemKind, Team
+from robochoc.generators.draws import MAX_AGENTS, MAX_COST, MAX_VALUES, check_bounds, check_places, seeded
+from robochoc.generators.draws import uniform as any_of
+from robochoc.generators.graphs import Graph, uniform
+from robochoc.generators.random_csp import places_told, team_of_edges
+from robochoc.model.cost_units import PLAIN_COSTS, CostUnits
+from robochoc.model.problem import INFINITE, Constraint, ProblemKind, Team
 
 
-def coloring(agents: int, colors: int, degree: float, seed: int = 0, *, connected: bool = False) -> Team:
+class Conflicts(StrEnum):
+    """What neighbours of the same colour cost."""
+
+    SOFT = "soft"
+    WEIGHTED = "weighted"
+    HARD = "hard"
+
+
+def coloring(
+    agents: int,
+    colors: int,
+    degree: float,
+    seed: int = 0,
+    *,
+    connected: bool = False,
+    conflicts: Conflicts | str = Conflicts.SOFT,
+    max_cost: int = 10,
+    places: int = 0,
+) -> Team:
     """Return the graph colouring problem of `agents` robots with `degree` neighbours on average that `seed` stands for.
 
-    `Robot3` owns `V3`. Two neighbours of the same colour cost 1.
+    `Robot3` owns `V3`. Two neighbours of the same colour cost 1, or as `conflicts` says.
 
     Args:
         agents: The number of robots.
@@ -25,21 +53,56 @@ def coloring(agents: int, colors: int, degree: float, seed: int = 0, *, connecte
         degree: The average number of neighbours.
         seed: The same seed makes the same problem on every machine.
         connected: Whether graphs are drawn until one is connected.
+        conflicts: What neighbours of the same colour cost: 1, a random weight, or they are forbidden.
+        max_cost: The maximum weight.
+        places: The decimal places of weights.
 
     Raises:
         ValueError: if there is no such graph. The text says which number to change.
     """
-    for what, number, most in (("agents", agents, MAX_AGENTS), ("colors", colors, MAX_VALUES)):
-        if not 1 <= number <= most:
-            raise ValueError(f"{what} is {number}; it must be from 1 to {most}")
+    check_bounds({"agents": (agents, 1, MAX_AGENTS), "colors": (colors, 1, MAX_VALUES)})
     if not 0 <= degree <= agents - 1:
         raise ValueError(f"degree is {degree}; among {agents} robots it must be from 0 to {agents - 1}")
-    chance = Random(seed)  # noqa: S311 - a problem, not a secret
-    edges = random_graph(chance, agents, round(agents * degree / 2), connected=connected)
-    scopes = {(higher, lower): (f"V{higher}", f"V{lower}") for higher, lower in edges}
-    constraints = {
-        edge: Constraint(f"C{edge[0]}.{edge[1]}", PREDEFINED["ne"], scope, scope, cost=1)
-        for edge, scope in scopes.items()
+    graph = uniform(agents, round(agents * degree / 2), str(float(degree)), connected=connected)
+    return coloring_of(graph, colors, seed, conflicts=conflicts, max_cost=max_cost, places=places)
+
+
+def coloring_of(
+    graph: Graph,
+    colors: int,
+    seed: int = 0,
+    *,
+    conflicts: Conflicts | str = Conflicts.SOFT,
+    max_cost: int = 10,
+    places: int = 0,
+) -> Team:
+    """Return the problem of colouring `graph`; all else is as in `coloring`.
+
+    Raises:
+        ValueError: if a number is out of its bounds. The text says which.
+    """
+    conflicts = Conflicts(conflicts)
+    check_bounds({"colors": (colors, 1, MAX_VALUES), "max-cost": (max_cost, 1, MAX_COST)})
+    check_places(places)
+    chance = seeded(seed)
+    edges = graph.draw(chance)
+    soft = {
+        (higher, lower): Constraint(f"C{higher}.{lower}", PREDEFINED["ne"], scope, scope, cost=1)
+        for higher, lower in edges
+        for scope in ((f"V{higher}", f"V{lower}"),)
     }
-    name = f"coloring-{agents}-{colors}-{float(degree)}-{seed}{'-connected' * connected}"
-    return team_of_edges(name, agents, colors, constraints, ProblemKind.DISWCSP)
+    told, units = "", PLAIN_COSTS
+    match conflicts:
+        case Conflicts.SOFT:
+            constraints = soft
+        case Conflicts.HARD:
+            told = "-hard"
+            constraints = {edge: replace(one, cost=INFINITE) for edge, one in soft.items()}
+        case Conflicts.WEIGHTED:
+            units = CostUnits(places=places)
+            told = f"-weighted{max_cost}{places_told(units)}"
+            most = max_cost * 10**places
+            constraints = {edge: replace(one, cost=any_of(chance, 1, most)) for edge, one in soft.items()}
+    kind = ProblemKind.DISCSP if conflicts is Conflicts.HARD else ProblemKind.DISWCSP
+    name = f"coloring-{graph.agents}-{colors}-{graph.label}{told}-{seed}{graph.suffix}"
+    return team_of_edges(name, graph.agents, colors, constraints, kind, units)

@@ -1,0 +1,24 @@
+"""`robochoc generate`: problems of known families, as folders of XML files."""
+
+from __future__ import annotations
+
+import click
+
+from robochoc.cli.commands.generate.binary import coloring, ising, random_problem
+from robochoc.cli.commands.generate.missions import grid_sensors, meetings, sensors, tasks, tracking
+from robochoc.cli.commands.generate.queens import queens3d
+
+__all__ = ["generate"]
+
+
+@click.group()
+def generate() -> None:
+    """Write a team of a problem family as a folder of XML files.
+
+    Each seed stands for one team, the same on every machine. docs/guides/generate.md has the families, their sizes and
+    papers.
+    """
+
+
+for family in (coloring, grid_sensors, ising, meetings, queens3d, random_problem, sensors, tasks, tracking):
+    generate.add_command(family)

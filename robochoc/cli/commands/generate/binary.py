@@ -1,0 +1,150 @@
+"""`robochoc generate random`, `coloring` and `ising`: problems on graphs, a robot a node."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from robochoc.cli.options.generated import GRAPH, OUTPUT, graph_of, graph_options, number, seed_option, team_written
+from robochoc.cli.options.sections import COMMON, SectionedCommand
+
+if TYPE_CHECKING:
+    from robochoc.model.problem import Team
+
+MAX_COST = 1_000_000
+places_option = number("--places", "Decimal places of costs.", least=0, most=9, default=0)
+
+
+@click.command(
+    "random",
+    cls=SectionedCommand,
+    sections={
+        COMMON: ("--agents", "--domain", "--density", "--tightness", "--graph"),
+        "Graph": GRAPH,
+        "Costs": ("--max-cost", "--places", "--maximize"),
+        "Output": OUTPUT,
+    },
+    short_help="Model B: random binary constraints, on a graph of your choice.",
+)
+@graph_options
+@number("--domain", "Number of values of each variable.")
+@click.option("--density", type=float, metavar="P", help="random: fraction of pairs of robots with a constraint.")
+@click.option(
+    "--tightness",
+    type=float,
+    metavar="P",
+    help="Fraction of pairs of values that a constraint forbids, 0 to 1.  [default: 0 with --max-cost, else required]",
+)
+@click.option(
+    "--max-cost",
+    type=click.IntRange(0, MAX_COST),
+    metavar="COST",
+    help="Make a DisWCSP: each allowed pair of values has a cost, uniform from 0 to COST.",
+)
+@places_option
+@click.option("--maximize", is_flag=True, help="With --max-cost: costs are utilities, whose sum is maximised.")
+@seed_option
+@team_written("random-AGENTS-DOMAIN-GRAPH-TIGHTNESS[-costMAX]-SEED[-connected]")
+def random_problem(places: int, *, maximize: bool, **problem: Any) -> Team:  # noqa: ANN401 - `random_csp`'s own
+    """Uniform random problems (Model B; Prosser 1996, Gent et al. 2001), the usual benchmark of protocols.
+
+    Exactly the given fractions of pairs are drawn. Robot3 has the variable V3. At --agents 20 --domain 10 --density
+    0.2, the problems are hardest at --tightness 0.65, where about half of them have a solution.
+
+    With --max-cost, allowed pairs have costs, whose sum is to be minimised.
+
+    \b
+    robochoc generate random --agents 20 --domain 10 --density 0.2 --tightness 0.6
+    robochoc generate random --agents 10 --domain 5 --density 0.4 --max-cost 100
+    robochoc generate random --agents 30 --domain 3 --graph scale-free --max-cost 9 --places 2
+    robochoc generate random --domain 4 --graph town.graphml --tightness 0.3
+    """  # noqa: D301 - \\b is how click is told to leave the lines as they are
+    from robochoc.generators.random_csp import random_csp, random_on
+    from robochoc.model.cost_units import CostUnits
+
+    if problem["tightness"] is None and problem["max_cost"] is None:
+        raise click.UsageError("Missing option '--tightness' (without --max-cost).")
+    if problem["max_cost"] is None and (places or maximize):
+        raise click.UsageError("--places and --maximize are about costs: give --max-cost, too.")
+    problem["tightness"] = problem["tightness"] or 0
+    problem["costs"] = CostUnits(maximize, places)
+    graph = graph_of(problem, "density")
+    return random_csp(**problem) if graph is None else random_on(graph, **problem)
+
+
+@click.command(
+    cls=SectionedCommand,
+    sections={
+        COMMON: ("--agents", "--colors", "--degree", "--graph"),
+        "Graph": GRAPH,
+        "Costs": ("--conflicts", "--max-cost", "--places"),
+        "Output": OUTPUT,
+    },
+    short_help="Graph colouring: hard, soft or weighted.",
+)
+@graph_options
+@number("--colors", "Number of values of each variable.", default=3)
+@click.option("--degree", type=float, metavar="D", help="random: average number of neighbours.")
+@click.option(
+    "--conflicts",
+    type=click.Choice(["soft", "weighted", "hard"]),
+    default="soft",
+    show_default=True,
+    help="Neighbours of the same colour cost 1, cost a random weight of their own, or are forbidden.",
+)
+@number("--max-cost", "weighted: weights are uniform up to this.", most=MAX_COST, default=10)
+@places_option
+@seed_option
+@team_written("coloring-AGENTS-COLORS-GRAPH-SEED[-connected]")
+def coloring(**problem: Any) -> Team:  # noqa: ANN401 - `coloring`'s own
+    """Graph colouring: two neighbours of the same colour cost 1.
+
+    The random graph is uniform among those with exactly AGENTS x DEGREE / 2 edges. Robot3 has the variable V3.
+
+    \b
+    robochoc generate coloring --agents 15 --degree 4
+    robochoc generate coloring --agents 16 --graph grid --colors 2 --conflicts hard
+    robochoc generate coloring --agents 20 --graph small-world --conflicts weighted --max-cost 100
+    """  # noqa: D301 - \\b is how click is told to leave the lines as they are
+    from robochoc.generators.coloring import coloring as graph_to_color
+    from robochoc.generators.coloring import coloring_of
+
+    graph = graph_of(problem, "degree")
+    return graph_to_color(**problem) if graph is None else coloring_of(graph, **problem)
+
+
+@click.command(short_help="Ising models: spins on a torus, real couplings.")
+@number("--rows", "Number of rows.", least=2)
+@number("--columns", "Number of columns.", least=2)
+@click.option(
+    "--coupling",
+    default=1.6,
+    show_default=True,
+    type=click.FloatRange(0, MAX_COST),
+    metavar="B",
+    help="Couplings are uniform from -B to B.",
+)
+@click.option(
+    "--field",
+    default=0.05,
+    show_default=True,
+    type=click.FloatRange(0, MAX_COST),
+    metavar="R",
+    help="Fields are uniform from -R to R.",
+)
+@number("--places", "Decimal places of couplings and fields.", least=0, most=9, default=3)
+@seed_option
+@team_written("ising-ROWSxCOLUMNS-B-R-SEED")
+def ising(**problem: Any) -> Team:  # noqa: ANN401 - `ising`'s own
+    """Ising models on a torus (Cerquides et al. 2018): spins 0 and 1, with a field each and four neighbours.
+
+    Costs are decimals, also negative ones; the sum is minimised. Robot2.3 has the variable V2.3.
+
+    \b
+    robochoc generate ising --rows 3 --columns 4
+    robochoc generate ising --rows 10 --columns 10 --coupling 1 --places 6
+    """  # noqa: D301 - \\b is how click is told to leave the lines as they are
+    from robochoc.generators.ising import ising as spins
+
+    return spins(**problem)

@@ -1,0 +1,209 @@
+"""Options that families of `robochoc generate` share, and the writing of what they make."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import wraps
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from robochoc.cli.options.paths import InputPath
+from robochoc.cli.reports.failures import invalid_input_fails
+
+if TYPE_CHECKING:
+    from robochoc.generators.graphs import Graph
+    from robochoc.model.problem import Team
+
+MAX = 1000
+Options = dict[str, Any]
+Command = Callable[..., None]
+
+
+def number(name: str, text: str, *, least: int = 1, most: int = MAX, default: int | None = None) -> Callable[..., Any]:
+    """Return an option that takes an integer; required unless it has a default."""
+    return click.option(
+        name,
+        required=default is None,
+        default=default,
+        show_default=default is not None,
+        type=click.IntRange(least, most),
+        metavar="N",
+        help=text,
+    )
+
+
+def share(name: str, text: str, default: float) -> Callable[..., Any]:
+    """Return an option that takes a share or a probability."""
+    return click.option(
+        name, default=default, show_default=True, type=click.FloatRange(0, 1), metavar="P", help=f"{text}, 0 to 1."
+    )
+
+
+seed_option = click.option(
+    "--seed", type=click.IntRange(0), default=0, show_default=True, metavar="N", help="Random seed."
+)
+
+
+def team_written(folder: str) -> Callable[[Callable[..., Team]], Command]:
+    """Return a decorator: the command makes a team, which is written to a folder of -o, or called after the team.
+
+    `folder` is how the help calls that. Numbers that do not fit together (`ValueError`) are wrong usage.
+    """
+
+    def decorate(make: Callable[..., Team]) -> Command:
+        @click.option(
+            "-o", "--output", type=InputPath(), metavar="DIR", help=f"Folder to write.  [default: instances/{folder}]"
+        )
+        @click.option("--force", is_flag=True, help="Replace the folder if it exists.")
+        @invalid_input_fails
+        @wraps(make)
+        def command(output: Path | None, *, force: bool, **problem: Any) -> None:  # noqa: ANN401 - `make`'s own
+            write(lambda: make(**problem), output, replace=force)
+
+        return command
+
+    return decorate
+
+
+def write(make: Callable[[], Team], output: Path | None, *, replace: bool) -> None:
+    """Write what `make` makes; numbers that do not fit together are wrong usage."""
+    from robochoc.formats import InvalidInputError, write_team
+
+    try:
+        team = make()
+    except InvalidInputError:
+        raise
+    except ValueError as error:
+        raise click.UsageError(str(error)) from None
+    folder = output or Path("instances") / team.name
+    write_team(team, folder, replace=replace)
+    constraints = sum(len(robot.shared) for robot in team.robots)
+    click.echo(f"{folder}: {len(team.robots)} robots, {constraints} constraints; next: robochoc solve {folder}")
+
+
+OUTPUT = ("--seed", "-o", "--force", "--help")
+"""The last section of a family's help."""
+GRAPH = ("--connected", "--links", "--neighbours", "--rewiring", "--rows", "--torus")
+"""The section on graphs."""
+
+KINDS = ("random", "scale-free", "small-world", "grid", "tree")
+
+
+@dataclass(frozen=True)
+class _Belongs:
+    """An option of some kinds of graphs alone."""
+
+    name: str
+    kinds: tuple[str, ...]
+
+
+_OWN = {
+    "links": _Belongs("--links", ("scale-free",)),
+    "neighbours": _Belongs("--neighbours", ("small-world",)),
+    "rewiring": _Belongs("--rewiring", ("small-world",)),
+    "rows": _Belongs("--rows", ("grid",)),
+    "torus": _Belongs("--torus", ("grid",)),
+    "connected": _Belongs("--connected", ("random", "small-world")),
+}
+
+
+def graph_options(command: Command) -> Command:
+    """Add the options of constraint graphs, which `graph_of` takes out again."""
+    for option in reversed(
+        (
+            click.option("--agents", type=click.IntRange(1, MAX), metavar="N", help="Number of robots."),
+            click.option(
+                "--graph",
+                default="random",
+                show_default=True,
+                metavar="KIND",
+                help=f"Constraint graph: {', '.join(KINDS)}, or a file that networkx reads (GraphML, GEXF, GML,"
+                " edge list).",
+            ),
+            click.option("--connected", is_flag=True, help="random, small-world: draw graphs until one is connected."),
+            click.option(
+                "--links", type=click.IntRange(1), metavar="N", help="scale-free: links of a new node.  [default: 2]"
+            ),
+            click.option(
+                "--neighbours", type=click.IntRange(2), metavar="N", help="small-world: nearest nodes.  [default: 4]"
+            ),
+            click.option(
+                "--rewiring", type=float, metavar="P", help="small-world: share of edges moved.  [default: 0.1]"
+            ),
+            click.option(
+                "--rows", type=click.IntRange(1), metavar="N", help="grid: rows.  [default: nearest to a square]"
+            ),
+            click.option("--torus", is_flag=True, help="grid: the borders meet."),
+        )
+    ):
+        command = option(command)
+    return command
+
+
+def graph_of(options: Options, density: str) -> Graph | None:
+    """Take the options of graphs out of `options`, and return the graph; None: a random one, of a given `density`.
+
+    For that one `options` keep the number of robots, the density and whether it is connected.
+
+    Raises:
+        click.UsageError: if an option is missing, or has nothing to say about this graph.
+        ValueError: if numbers do not fit together.
+    """
+    name = options.pop("graph")
+    kind = name if name in KINDS else "file"
+    given = {key: options.pop(key) for key in _OWN}
+    for key, option in _OWN.items():
+        if given[key] not in {None, False} and kind not in option.kinds:
+            raise click.UsageError(f"{option.name} is for --graph {' or '.join(option.kinds)}, not for {name}.")
+    if kind == "file":
+        return _of_file(name, options, density)
+    if options["agents"] is None:
+        raise click.UsageError("Missing option '--agents'.")
+    if kind == "random":
+        if options[density] is None:
+            raise click.UsageError(f"Missing option '--{density}' (without --graph).")
+        options["connected"] = given["connected"]
+        return None
+    _refuse_density(density, options, name)
+    return _drawn(kind, options.pop("agents"), given)
+
+
+def _refuse_density(density: str, options: Options, name: str) -> None:
+    if options.pop(density) is not None:
+        raise click.UsageError(f"--{density} is for --graph random; of {name} it follows from the other options.")
+
+
+def _drawn(kind: str, agents: int, given: Options) -> Graph:
+    from robochoc.generators import graphs
+
+    match kind:
+        case "scale-free":
+            return graphs.scale_free(agents, given["links"] or 2)
+        case "small-world":
+            rewiring = 0.1 if given["rewiring"] is None else given["rewiring"]
+            return graphs.small_world(agents, given["neighbours"] or 4, rewiring, connected=given["connected"])
+        case "grid":
+            rows = given["rows"] or graphs.nearest_to_a_square(agents)
+            if agents % rows:
+                raise click.UsageError(f"{agents} robots do not fill {rows} rows; change --agents or --rows.")
+            return graphs.grid(rows, agents // rows, torus=given["torus"])
+        case _:
+            return graphs.tree(agents)
+
+
+def _of_file(name: str, options: Options, density: str) -> Graph:
+    from robochoc.generators.graph_files import read_graph
+
+    if not Path(name).exists():
+        import difflib
+
+        near = difflib.get_close_matches(name, KINDS, 1)
+        hint = f" Did you mean {near[0]!r}?" if near else ""
+        raise click.UsageError(f"--graph {name!r} is none of {', '.join(KINDS)}, and no file.{hint}")
+    _refuse_density(density, options, name)
+    if options.pop("agents") is not None:
+        raise click.UsageError("--agents follows from the graph in the file; leave it out.")
+    return read_graph(Path(name))

@@ -1,0 +1,89 @@
+"""What all families draw with, and the bounds of what they draw.
+
+A seed makes the same problem on every machine and with every version of Python: of `random.Random` only the seeding by
+an integer and `random()` are used, which Python's documentation promises to keep. Costs are integers of a stated unit
+from the start, so nothing is rounded later.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping
+from decimal import Decimal
+from random import Random
+
+from robochoc.model.cost_units import MAX_PLACES
+from robochoc.model.expression import Apply, Constant, Expression
+from robochoc.model.problem import Constraint
+
+MAX_AGENTS = 1000
+MAX_VALUES = 1000
+MAX_COST = 1_000_000
+MAX_CONSTRAINTS = 200_000
+"""The maximum of a whole team."""
+
+
+def seeded(seed: int) -> Random:
+    """Return the source of chance that `seed` stands for."""
+    return Random(seed)  # noqa: S311 - a problem, not a secret
+
+
+def uniform(chance: Random, least: int, most: int) -> int:
+    """Return an integer from `least` to `most`, each as likely as any other."""
+    return least + int(chance.random() * (most - least + 1))
+
+
+def some(chance: Random, size: int, count: int) -> list[int]:
+    """Return `count` different numbers below `size`, in ascending order; each choice is as likely as any other."""
+    return sorted(_drawn(chance, size, count))
+
+
+def _drawn(chance: Random, size: int, count: int) -> Iterator[int]:
+    """Yield the first steps of the Fisher-Yates shuffle of all numbers below `size`. Only moved numbers are stored."""
+    moved: dict[int, int] = {}
+    for left in range(size, size - count, -1):
+        place = int(chance.random() * left)
+        yield moved.get(place, place)
+        moved[place] = moved.get(left - 1, left - 1)
+
+
+def check_bounds(numbers: Mapping[str, tuple[float, float, float]]) -> None:
+    """Raise `ValueError` for the first of `numbers` (value, least, most), by name, that is out of its bounds."""
+    for what, (number, least, most) in numbers.items():
+        if not least <= number <= most:
+            raise ValueError(f"{what} is {number}; it must be from {least} to {most}")
+
+
+def in_units(number: float, places: int) -> int:
+    """Return `number`, as it is written in decimals, in units of 10**-places: rounded, halves to the even one."""
+    return round(Decimal(str(number)).scaleb(places))
+
+
+def check_places(places: int) -> None:
+    """Raise `ValueError` unless costs can have so many decimal places."""
+    check_bounds({"places": (places, 0, MAX_PLACES)})
+
+
+def bounded(constraints: Iterable[Constraint]) -> list[Constraint]:
+    """Return all of `constraints`.
+
+    Raises:
+        ValueError: if there are more than `MAX_CONSTRAINTS`.
+    """
+    kept: list[Constraint] = []
+    for constraint in constraints:
+        if len(kept) == MAX_CONSTRAINTS:
+            raise ValueError(f"the team would have more than {MAX_CONSTRAINTS:,} constraints; ask for a smaller one")
+        kept.append(constraint)
+    return kept
+
+
+def total(terms: Iterable[Expression]) -> Expression:
+    """Return the sum of integer `terms`: their number is free, that of the arguments of `add` is not."""
+    given = tuple(terms)
+    match given:
+        case ():
+            return Constant(0)
+        case (only,):
+            return only
+        case _:
+            return Apply("add", given)

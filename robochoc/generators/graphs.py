@@ -1,0 +1,235 @@
+"""Constraint graphs: uniform, scale-free, small worlds, grids, trees, and those of a file.
+
+Each is drawn here and not by networkx, whose generators may draw otherwise from one version to the next.
+
+* `uniform`: exactly so many edges, every such graph as likely as any other (Model B; `random_csp`).
+* `scale_free`: Barabasi and Albert, "Emergence of scaling in random networks", Science 286 (1999).
+* `small_world`: Watts and Strogatz, "Collective dynamics of 'small-world' networks", Nature 393 (1998).
+* `grid`: four neighbours each; as a torus, the borders meet. Ising models live on it (`generators/ising.py`).
+* `tree`: every tree with numbered nodes as likely as any other, by its Pruefer sequence (Cayley's n**(n-2) trees).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Collection, Iterable
+from dataclasses import dataclass
+from enum import StrEnum
+from math import isqrt
+from random import Random
+
+from robochoc.generators.draws import MAX_AGENTS, check_bounds, some
+
+MAX_GRAPH_DRAWS = 1000
+"""The maximum number of graphs that are drawn to find a connected one."""
+
+Edge = tuple[int, int]
+"""Numbers of two robots, from 1, the smaller one first."""
+
+
+class GraphKind(StrEnum):
+    """The graphs that are drawn."""
+
+    RANDOM = "random"
+    SCALE_FREE = "scale-free"
+    SMALL_WORLD = "small-world"
+    GRID = "grid"
+    TREE = "tree"
+
+
+@dataclass(frozen=True)
+class Graph:
+    """A graph to be drawn.
+
+    Attributes:
+        agents: The number of nodes.
+        label: What it is called in a team's name.
+        draw: Returns its edges, in ascending order.
+        suffix: What ends the name of a team on it.
+    """
+
+    agents: int
+    label: str
+    draw: Callable[[Random], list[Edge]]
+    suffix: str = ""
+
+
+def uniform(agents: int, edges: int, label: str, *, connected: bool = False) -> Graph:
+    """Return a graph of exactly so many `edges`, each choice as likely as any other; `connected`: drawn until it is."""
+
+    def draw(chance: Random) -> list[Edge]:
+        return random_graph(chance, agents, edges, connected=connected)
+
+    return Graph(agents, label, draw, "-connected" * connected)
+
+
+def scale_free(agents: int, links: int = 2) -> Graph:
+    """Return a scale-free graph, of links * (agents - links) edges. It is connected.
+
+    The first node after `links` lone ones is linked to them; each later one is linked to `links` of those there, each
+    as likely as it has links.
+
+    Raises:
+        ValueError: if `links` is not from 1 to agents - 1.
+    """
+    check_bounds({"agents": (agents, 2, MAX_AGENTS), "links": (links, 1, agents - 1)})
+
+    def draw(chance: Random) -> list[Edge]:
+        edges = []
+        ends: list[int] = []
+        """Every node as often as it has links."""
+        chosen: Collection[int] = range(1, links + 1)
+        for new in range(links + 1, agents + 1):
+            edges += [(old, new) for old in chosen]
+            ends += [*sorted(chosen), *[new] * links]
+            chosen = set()
+            while len(chosen) < links:
+                chosen.add(ends[int(chance.random() * len(ends))])
+        return sorted(edges)
+
+    return Graph(agents, f"scale-free{links}", draw)
+
+
+def small_world(agents: int, neighbours: int = 4, rewiring: float = 0.1, *, connected: bool = False) -> Graph:
+    """Return a small world of agents * neighbours / 2 edges.
+
+    It is a ring in which each node is linked to its `neighbours` nearest ones; the far end of each edge is then moved,
+    with the probability `rewiring`, to a node that the near end is not yet linked to.
+
+    Args:
+        agents: The number of nodes.
+        neighbours: The number of nearest nodes; even.
+        rewiring: A probability: 0 leaves the ring.
+        connected: Whether graphs are drawn until one is connected.
+
+    Raises:
+        ValueError: if `neighbours` is odd, or there are not so many others.
+    """
+    check_bounds({"agents": (agents, 3, MAX_AGENTS), "neighbours": (neighbours, 2, agents - 1)})
+    check_bounds({"rewiring": (rewiring, 0, 1)})
+    if neighbours % 2:
+        raise ValueError(f"neighbours is {neighbours}; it must be even: as many on either side of the ring")
+
+    def draw(chance: Random) -> list[Edge]:
+        return _until_connected(lambda: _rewired_ring(chance, agents, neighbours, rewiring), agents, connected)
+
+    return Graph(agents, f"small-world{neighbours}-{float(rewiring)}", draw, "-connected" * connected)
+
+
+def _rewired_ring(chance: Random, agents: int, neighbours: int, rewiring: float) -> list[Edge]:
+    near: list[set[int]] = [set() for _ in range(agents)]
+    rings = [(node, (node + far) % agents) for far in range(1, neighbours // 2 + 1) for node in range(agents)]
+    for node, other in rings:
+        near[node].add(other)
+        near[other].add(node)
+    for node, other in rings:
+        if chance.random() < rewiring and len(near[node]) < agents - 1:
+            free = [one for one in range(agents) if one != node and one not in near[node]]
+            new = free[int(chance.random() * len(free))]
+            near[node].remove(other)
+            near[other].remove(node)
+            near[node].add(new)
+            near[new].add(node)
+    return [(node + 1, other + 1) for node in range(agents) for other in sorted(near[node]) if node < other]
+
+
+def grid(rows: int, columns: int, *, torus: bool = False) -> Graph:
+    """Return a grid, numbered row by row. In a `torus` the last row is next to the first one, and so are columns."""
+    check_bounds({"rows": (rows, 1, MAX_AGENTS), "columns": (columns, 1, MAX_AGENTS)})
+    check_bounds({"agents": (rows * columns, 1, MAX_AGENTS)})
+    edges = grid_edges(rows, columns, torus=torus)
+    return Graph(rows * columns, f"{'torus' if torus else 'grid'}{rows}x{columns}", lambda _: list(edges))
+
+
+def grid_edges(rows: int, columns: int, *, torus: bool) -> list[Edge]:
+    """Return the edges of a grid whose nodes are numbered row by row, in ascending order."""
+    edges = set()
+    for row in range(rows):
+        for column in range(columns):
+            for down, right in ((row + 1, column), (row, column + 1)):
+                if torus or (down < rows and right < columns):
+                    one, other = row * columns + column, down % rows * columns + right % columns
+                    edges.add((min(one, other) + 1, max(one, other) + 1))
+    return sorted(edge for edge in edges if edge[0] != edge[1])
+
+
+def nearest_to_a_square(agents: int) -> int:
+    """Return the number of rows, at most that of columns, of the grid of so many nodes that is nearest to a square."""
+    return next(rows for rows in range(isqrt(agents), 0, -1) if agents % rows == 0)
+
+
+def tree(agents: int) -> Graph:
+    """Return a tree: agents - 1 edges."""
+    check_bounds({"agents": (agents, 1, MAX_AGENTS)})
+
+    def draw(chance: Random) -> list[Edge]:
+        sequence = [int(chance.random() * agents) + 1 for _ in range(agents - 2)]
+        return _tree_of(sequence, agents)
+
+    return Graph(agents, "tree", draw)
+
+
+def _tree_of(sequence: list[int], agents: int) -> list[Edge]:
+    """Return the tree of a Pruefer sequence."""
+    missing = [0] * (agents + 1)
+    """The number of times that each node is still to come in the sequence."""
+    for node in sequence:
+        missing[node] += 1
+    edges = []
+    waiting = {node for node in range(1, agents + 1) if not missing[node]}
+    for node in sequence:
+        leaf = min(waiting)
+        waiting.remove(leaf)
+        edges.append((min(leaf, node), max(leaf, node)))
+        missing[node] -= 1
+        if not missing[node]:
+            waiting.add(node)
+    if agents > 1:
+        one, other = sorted(waiting)
+        edges.append((one, other))
+    return sorted(edges)
+
+
+def random_graph(chance: Random, agents: int, count: int, *, connected: bool = False) -> list[Edge]:
+    """Return `count` pairs of robots, in ascending order, each choice as likely as any other; see `random_csp`."""
+    if connected and count < agents - 1:
+        raise ValueError(
+            f"a connected graph of {agents} robots needs {agents - 1} constraints, and the density makes {count}"
+        )
+    return _until_connected(lambda: _edges(chance, agents, count), agents, connected)
+
+
+def _edges(chance: Random, agents: int, count: int) -> list[Edge]:
+    """Return `count` pairs of robots, in ascending order."""
+    chosen = set(some(chance, agents * (agents - 1) // 2, count))
+    pairs = ((higher, lower) for higher in range(1, agents) for lower in range(higher + 1, agents + 1))
+    return [pair for place, pair in enumerate(pairs) if place in chosen]
+
+
+def _until_connected(draw: Callable[[], list[Edge]], agents: int, wanted: bool) -> list[Edge]:  # noqa: FBT001 - a fact
+    """Return the first graph that links all robots, or, if that is not `wanted`, the first one.
+
+    Raises `ValueError` when that is in vain.
+    """
+    for _ in range(MAX_GRAPH_DRAWS):
+        edges = draw()
+        if not wanted or links_all(edges, agents):
+            return edges
+    raise ValueError(
+        f"none of {MAX_GRAPH_DRAWS:,} graphs of {agents} robots and {len(edges)} constraints was connected;"
+        " raise the density"
+    )
+
+
+def links_all(edges: Iterable[Edge], agents: int) -> bool:
+    """Return whether `edges` connect all robots."""
+    near: dict[int, list[int]] = {number: [] for number in range(1, agents + 1)}
+    for one, other in edges:
+        near[one].append(other)
+        near[other].append(one)
+    met = {1}
+    waiting = [1]
+    while waiting:
+        new = [number for number in near[waiting.pop()] if number not in met]
+        met.update(new)
+        waiting += new
+    return len(met) == agents

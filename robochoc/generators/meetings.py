@@ -1,0 +1,217 @@
+"""Meetings: a distributed multi-event scheduling problem (DiMES), with events as variables, or private ones.
+
+Maheswaran, Tambe, Bowring, Pearce and Varakantham, "Taking DCOP to the real world: efficient complete solutions for
+distributed multi-event scheduling", AAMAS 2004. Persons value their time: each slot that stays free is worth something
+to them, and so is each of their meetings, for each slot that it takes. A meeting needs all its participants at the same
+time, in as many slots in a row as it is long; nobody is in two at once. It need not take place. To be maximised is the
+sum over all meetings that do: for each participant and slot, the meeting's value less that of the slot.
+
+Two models of the paper, with the same maximum:
+
+* `peav` (private events as variables): a robot is a person, with a variable for each of its meetings: the slot in which
+  it starts, or 0 where it does not take place. What meetings and slots are worth stays private. Participants of a
+  meeting have equal values.
+* `eav` (events as variables): a robot is a meeting with one variable. What it is worth is the sum over its
+  participants. Meetings that share one do not overlap.
+
+Where preferences do not count, all meetings must take place, and the problem is a DisCSP.
+"""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from enum import StrEnum
+from random import Random
+from typing import assert_never
+
+from robochoc.formats import PREDEFINED
+from robochoc.generators.draws import MAX_AGENTS, MAX_COST, MAX_VALUES, bounded, check_bounds, seeded, some, uniform
+from robochoc.model.assembly import assemble
+from robochoc.model.cost_units import PLAIN_COSTS, CostUnits
+from robochoc.model.expression import Type, parse
+from robochoc.model.problem import Constraint, Domain, Predicate, ProblemKind, Relation, Semantics, Team, Variable
+
+_TERMS = ("X", "Y", "i", "j")
+ONE_AFTER_THE_OTHER = Predicate(
+    "apart", _TERMS, parse("or(eq(X, 0), eq(Y, 0), ge(Y, add(X, i)), ge(X, add(Y, j)))", _TERMS, Type.BOOLEAN)
+)
+"""Meetings that start in the slots X and Y, i and j slots long, do not overlap; 0: it does not take place."""
+
+
+class MeetingsModel(StrEnum):
+    """What a variable is: a meeting of a person, or a meeting."""
+
+    PEAV = "peav"
+    EAV = "eav"
+
+
+@dataclass(frozen=True)
+class Meeting:
+    """A meeting: its number, its participants with what it is worth to each in each slot, and its length."""
+
+    number: int
+    worth: Mapping[int, int]
+    length: int
+
+
+@dataclass(frozen=True)
+class Meetings:
+    """A problem of meetings, as its persons know it.
+
+    Attributes:
+        slots: The number of slots, which are numbered from 1.
+        free: By person: what each slot is worth if it stays free.
+        meetings: The meetings.
+    """
+
+    slots: int
+    free: Mapping[int, Sequence[int]]
+    meetings: Sequence[Meeting]
+
+    def starts(self, meeting: Meeting) -> range:
+        """Return the slots in which `meeting` can start."""
+        return range(1, self.slots - meeting.length + 2)
+
+    def worth(self, meeting: Meeting, person: int, start: int) -> int:
+        """Return what it is worth to a participant that `meeting` begins in the slot `start`."""
+        lost = sum(self.free[person][start - 1 : start - 1 + meeting.length])
+        return meeting.worth[person] * meeting.length - lost
+
+
+def meetings(
+    agents: int,
+    meetings: int,
+    participants: int,
+    slots: int,
+    seed: int = 0,
+    *,
+    max_length: int = 1,
+    max_value: int | None = 10,
+    model: MeetingsModel | str = MeetingsModel.PEAV,
+) -> Team:
+    """Return the problem of scheduling `meetings` of so many `participants` each that `seed` stands for.
+
+    In `peav`, `Robot3` is a person, and `V3.2` is its part in meeting 2; who takes part in none is no robot. In `eav`,
+    `Meeting2` owns `V2`.
+
+    Args:
+        agents: The number of persons.
+        meetings: The number of meetings.
+        participants: The number of persons in each meeting, any choice as likely as any other.
+        slots: The number of time slots.
+        seed: The same seed makes the same problem on every machine, and the same one in both models.
+        max_length: Meetings take from 1 to so many slots.
+        max_value: A meeting's slot is worth from 1 to so much to a participant; a free one from 0. None: preferences
+            do not count, and all meetings must take place.
+        model: What a variable is.
+
+    Raises:
+        ValueError: if a number is out of its bounds. The text says which.
+    """
+    model = MeetingsModel(model)
+    check_bounds({"agents": (agents, 1, MAX_AGENTS), "meetings": (meetings, 1, MAX_AGENTS)})
+    check_bounds({"participants": (participants, 1, agents), "slots": (slots, 1, MAX_VALUES)})
+    preferences = max_value is not None
+    most = 1 if max_value is None else max_value
+    check_bounds({"max-length": (max_length, 1, slots), "max-value": (most, 1, MAX_COST)})
+    problem = drawn_meetings(seeded(seed), (agents, meetings, participants, slots), max_length, most)
+    match model:
+        case MeetingsModel.PEAV:
+            variables, constraints = _peav(problem, preferences=preferences)
+        case MeetingsModel.EAV:
+            variables, constraints = _eav(problem, preferences=preferences)
+        case never:
+            assert_never(never)
+    told = f"-{max_length}-{max_value}" if preferences else f"-{max_length}-required"
+    return assemble(
+        f"meetings-{model}-{agents}-{meetings}-{participants}-{slots}{told}-{seed}",
+        variables,
+        bounded(constraints),
+        kind=ProblemKind.DISWCSP if preferences else ProblemKind.DISCSP,
+        costs=CostUnits(maximize=True) if preferences else PLAIN_COSTS,
+    )
+
+
+def drawn_meetings(chance: Random, sizes: tuple[int, int, int, int], max_length: int, max_value: int) -> Meetings:
+    """Return random meetings; `sizes` are the numbers of persons, meetings, participants and slots."""
+    agents, count, participants, slots = sizes
+    free = {person: [uniform(chance, 0, max_value) for _ in range(slots)] for person in range(1, agents + 1)}
+    held = []
+    for number in range(1, count + 1):
+        length = uniform(chance, 1, max_length)
+        persons = [place + 1 for place in some(chance, agents, participants)]
+        held.append(Meeting(number, {person: uniform(chance, 1, max_value) for person in persons}, length))
+    return Meetings(slots, free, held)
+
+
+_Parts = tuple[dict[str, list[Variable]], Iterator[Constraint]]
+"""The variables of each robot, and the constraints."""
+
+
+def _peav(problem: Meetings, *, preferences: bool) -> _Parts:
+    variables: dict[str, list[Variable]] = {}
+    for person in sorted({person for meeting in problem.meetings for person in meeting.worth}):
+        variables[f"Robot{person}"] = [
+            Variable(f"V{person}.{meeting.number}", _starts(problem, meeting, preferences=preferences))
+            for meeting in problem.meetings
+            if person in meeting.worth
+        ]
+
+    def constraints() -> Iterator[Constraint]:
+        for meeting in problem.meetings:
+            for person in meeting.worth:
+                if preferences:
+                    worth = {start: problem.worth(meeting, person, start) for start in problem.starts(meeting)}
+                    yield _worth(f"{person}.{meeting.number}", worth)
+            for pair in itertools.combinations(meeting.worth, 2):
+                scope = tuple(f"V{person}.{meeting.number}" for person in pair)
+                yield Constraint(f"M{meeting.number}", PREDEFINED["eq"], scope, scope)
+        for one, other, shared in _rivals(problem):
+            for person in shared:
+                yield _apart((f"V{person}.{one.number}", f"V{person}.{other.number}"), one, other)
+
+    return variables, constraints()
+
+
+def _eav(problem: Meetings, *, preferences: bool) -> _Parts:
+    variables = {
+        f"Meeting{meeting.number}": [Variable(f"V{meeting.number}", _starts(problem, meeting, preferences=preferences))]
+        for meeting in problem.meetings
+    }
+
+    def constraints() -> Iterator[Constraint]:
+        for meeting in problem.meetings:
+            if preferences:
+                starts = problem.starts(meeting)
+                worth = {at: sum(problem.worth(meeting, one, at) for one in meeting.worth) for at in starts}
+                yield _worth(str(meeting.number), worth)
+        for one, other, _ in _rivals(problem):
+            yield _apart((f"V{one.number}", f"V{other.number}"), one, other)
+
+    return variables, constraints()
+
+
+def _starts(problem: Meetings, meeting: Meeting, *, preferences: bool) -> Domain:
+    """Return the slots in which `meeting` can start, and 0 where it need not take place."""
+    starts = problem.starts(meeting)
+    return Domain(f"Length{meeting.length}", (range(0 if preferences else 1, starts.stop),))
+
+
+def _rivals(problem: Meetings) -> Iterator[tuple[Meeting, Meeting, list[int]]]:
+    """Yield all pairs of meetings that share participants, with these."""
+    for one, other in itertools.combinations(problem.meetings, 2):
+        shared = [person for person in one.worth if person in other.worth]
+        if shared:
+            yield one, other, shared
+
+
+def _worth(name: str, worth: Mapping[int, int]) -> Constraint:
+    relation = Relation(f"U{name}", 1, Semantics.SOFT, tuple((start,) for start in worth), tuple(worth.values()))
+    return Constraint(f"U{name}", relation, (f"V{name}",), (f"V{name}",))
+
+
+def _apart(names: tuple[str, str], one: Meeting, other: Meeting) -> Constraint:
+    terms = (*names, one.length, other.length)
+    return Constraint("apart", ONE_AFTER_THE_OTHER, terms, terms)

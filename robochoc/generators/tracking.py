@@ -1,0 +1,151 @@
+"""Target tracking by mobile sensors: robots choose where to stand, targets ask to be covered.
+
+One step of DCOP_MST: Zivan, Yedidsion, Okamoto, Glinton and Sycara, "Distributed constraint optimization for teams of
+mobile sensing agents", JAAMAS 29 (2015); first in Zivan, Glinton and Sycara, "Distributed constraint optimization for
+large teams of mobile sensing agents", IAT 2009. A robot's variable is its cell in the field; it can get as far as its
+mobility. A target has a requirement; robots that stand within the sensing range cover it, each as far as it is
+credible. What is left uncovered is the cost, whose sum is minimised: for each target one function over all robots that
+can get near enough.
+
+Cells are numbered row by row from 0; distances are Euclid's between cells.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from math import prod
+from random import Random
+
+from robochoc.generators.draws import MAX_AGENTS, bounded, check_bounds, seeded, some, total, uniform
+from robochoc.model.assembly import assemble
+from robochoc.model.cost_units import CostUnits
+from robochoc.model.expression import Apply, Constant, Expression, Name
+from robochoc.model.problem import Constraint, Domain, Function, ProblemKind, Team, Variable
+
+MAX_SIDE = 100
+MAX_REQUIREMENT = 1000
+MAX_COMBINATIONS = 1_000_000
+"""The maximum number of ways in which the robots near a target can stand."""
+
+
+@dataclass(frozen=True)
+class Field:
+    """Where all are, and what robots can do.
+
+    Attributes:
+        side: The number of rows, and of columns.
+        starts: The cell of each robot, at first.
+        credibility: How much of a requirement each robot covers.
+        targets: The cell of each target.
+        mobility: How far robots get.
+        sensing: How far they see.
+    """
+
+    side: int
+    starts: list[int]
+    credibility: list[int]
+    targets: list[int]
+    mobility: int
+    sensing: int
+
+    def near(self, one: int, other: int, distance: int) -> bool:
+        """Return whether two cells are at most so far apart."""
+        (i, j), (k, m) = divmod(one, self.side), divmod(other, self.side)
+        return (i - k) ** 2 + (j - m) ** 2 <= distance**2
+
+    def cells(self, robot: int) -> list[int]:
+        """Return the cells that a robot can get to."""
+        return [cell for cell in range(self.side**2) if self.near(cell, self.starts[robot], self.mobility)]
+
+
+def tracking(
+    agents: int,
+    targets: int,
+    side: int,
+    seed: int = 0,
+    *,
+    mobility: int = 1,
+    sensing: int = 2,
+    requirement: int = 100,
+    credibility: int = 30,
+) -> Team:
+    """Return the problem of tracking `targets` in a field of side x side cells that `seed` stands for.
+
+    `Robot3` owns `V3`. All start in different cells, and targets are in different ones.
+
+    Args:
+        agents: The number of robots.
+        targets: The number of targets.
+        side: The number of rows and columns of the field.
+        seed: The same seed makes the same problem on every machine.
+        mobility: How many cells away a robot can go.
+        sensing: How many cells away a robot sees a target.
+        requirement: How much of each target is to be covered.
+        credibility: Robots cover from 1 to so much of a target, each number as likely as any other.
+
+    Raises:
+        ValueError: if a number is out of its bounds, or too many robots can get near one target. The text says which.
+    """
+    check_bounds({"side": (side, 1, MAX_SIDE), "agents": (agents, 1, min(MAX_AGENTS, side**2))})
+    check_bounds({"targets": (targets, 1, side**2), "mobility": (mobility, 0, side), "sensing": (sensing, 0, side)})
+    check_bounds({"requirement": (requirement, 1, MAX_REQUIREMENT), "credibility": (credibility, 1, MAX_REQUIREMENT)})
+    field = drawn_field(seeded(seed), (agents, targets, side), credibility, mobility, sensing)
+    cells = [field.cells(robot) for robot in range(agents)]
+    lost = 0
+    constraints = []
+    for number, target in enumerate(field.targets, 1):
+        near = [robot for robot in range(agents) if any(field.near(cell, target, sensing) for cell in cells[robot])]
+        if prod(len(cells[robot]) for robot in near) > MAX_COMBINATIONS:
+            raise ValueError(
+                f"{len(near)} robots can get near target {number}, in more than {MAX_COMBINATIONS:,} ways;"
+                " take fewer robots, a larger side, or less mobility or sensing"
+            )
+        if near:
+            constraints.append(_uncovered(number, field, near, requirement))
+        else:
+            lost += requirement
+    numbers = f"{mobility}-{sensing}-{requirement}-{credibility}"
+    return assemble(
+        f"tracking-{agents}-{targets}-{side}x{side}-{numbers}-{seed}",
+        {
+            f"Robot{robot + 1}": [Variable(f"V{robot + 1}", Domain(f"Cells{robot + 1}", tuple(_ranges(one))))]
+            for robot, one in enumerate(cells)
+        },
+        bounded(constraints),
+        kind=ProblemKind.DISWCSP,
+        costs=CostUnits(constant=lost),
+    )
+
+
+def drawn_field(chance: Random, numbers: tuple[int, int, int], credibility: int, mobility: int, sensing: int) -> Field:
+    """Return a random field; `numbers` are those of robots and targets, and of the rows."""
+    agents, targets, side = numbers
+    starts = some(chance, side**2, agents)
+    credible = [uniform(chance, 1, credibility) for _ in range(agents)]
+    return Field(side, starts, credible, some(chance, side**2, targets), mobility, sensing)
+
+
+def _uncovered(number: int, field: Field, near: list[int], requirement: int) -> Constraint:
+    """Return the function of the cells of the robots `near`: what is left of a target's requirement."""
+    row, column = divmod(field.targets[number - 1], field.side)
+    covered = (
+        Apply("if", (_sees(Name(f"X{robot + 1}"), row, column, field), Constant(field.credibility[robot]), Constant(0)))
+        for robot in near
+    )
+    body = Apply("max", (Constant(0), Apply("sub", (Constant(requirement), total(covered)))))
+    scope = tuple(f"V{robot + 1}" for robot in near)
+    function = Function(f"uncovered{number}", tuple(f"X{robot + 1}" for robot in near), body)
+    return Constraint(f"Target{number}", function, scope, scope)
+
+
+def _sees(cell: Expression, row: int, column: int, field: Field) -> Expression:
+    """Return that `cell` is within the sensing range of the cell in that row and column."""
+    side = Constant(field.side)
+    away = [Apply("sub", (Apply(name, (cell, side)), Constant(at))) for name, at in (("div", row), ("mod", column))]
+    squares = Apply("add", tuple(Apply("mul", (one, one)) for one in away))
+    return Apply("le", (squares, Constant(field.sensing**2)))
+
+
+def _ranges(cells: list[int]) -> Iterator[range]:
+    return (range(cell, cell + 1) for cell in cells)
