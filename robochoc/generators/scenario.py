@@ -85,7 +85,8 @@ def random_scenario(
     check_bounds({"events": (events, 1, MAX_EVENTS), "rate": (rate, 0, 1)})
     if team.scenario:
         raise ValueError(f"{team.name} has a scenario already; take a team without one")
-    wanted = list(dict.fromkeys(map(Kind, kinds))) or list(Kind)
+    named = set(map(Kind, kinds))
+    wanted = [kind for kind in Kind if kind in named] or list(Kind)
     shared = sum(len(robot.shared) for robot in team.robots)
     changes = max(1, round(rate * shared))
     check_bounds({"changes of all events": (events * changes, 1, MAX_CONSTRAINTS)})

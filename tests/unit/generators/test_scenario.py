@@ -39,7 +39,31 @@ def test_a_team_can_take_its_scenario(team: Team, events: int, rate: float, seed
     changing = random_scenario(team, events, rate, seed)
     check_team(changing)
     shared = sum(len(robot.shared) for robot in team.robots)
-    assert [len(event.changes) for event in changing.scenario] == [
+    assert [len(event.changes) for event in changing.scenario] == [max(1, round(rate * shared))] * events
+    assert changing == random_scenario(team, events, rate, seed)
+    now = team
+    for event in changing.scenario:
+        for change in event.changes:
+            now = apply_changes(now, [change])
+            assert len(now.robots) > 1
+            assert all(len(variable.domain) for variable in now.variables.values())
+
+
+@pytest.mark.parametrize("kind", Kind)
+def test_kinds_of_changes(kind: Kind) -> None:
+    opposite = {"remove-": "add-", "add-": "remove-"}
+    start = next(word for word in opposite if kind.startswith(word))
+    both = {kind, Kind(kind.replace(start, opposite[start]))}
+    changing = random_scenario(random_csp(6, 3, 0.6, 0.3, 2), 8, 0.2, 5, kinds=both)
+    said = {type(change).__name__ for event in changing.scenario for change in event.changes}
+    assert said == {"".join(word.capitalize() for word in one.split("-")) for one in both}
+
+
+def test_a_seed_is_one_scenario_everywhere() -> None:
+    """Fixed for good: who publishes figures names seeds."""
+    changing = random_scenario(random_csp(5, 3, 0.6, 0.3, 2), 4, 0.4, 2)
+    assert changing.name == "random-5-3-0.6-0.3-2-events4-0.4-2"
+    assert [[describe_change(change, changing) for change in event.changes] for event in changing.scenario] == [
         ["+Late1", "V1 without 3"],
         ["-Robot5", "V1 with 3"],
         ["+Added2 (Robot1, Robot3)", "-C3.5 (Robot3, Late1)"],
