@@ -43,7 +43,7 @@ def changing() -> tuple[robochoc.Model, list[str]]:
     closing.add((mode == "off") | (z != 5))
     model.after_solution().remove_constraint("apart")
     opened = ["the start", "-a", "+spare, +apart (b, c)"]
-    opened.append("b.level without 3, -yz (b, c), c.level with 5, b.mode with 2, +C3 (b, c)")
+    opened.append("b.level without 3, -yz (b, c), c.level with 5, b.mode with off, +C3 (b, c)")
     return model, [*opened, "-apart (b, c)"]
 
 

@@ -1,0 +1,23 @@
+"""toulbar2's `.cfn`."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+from robochoc.formats.dialects.dialect import Dialect, Imported, ImportOptions
+from robochoc.formats.dialects.toulbar2.cfn_reader import read as read_text
+from robochoc.formats.dialects.toulbar2.text import has_suffix, read_with
+
+
+def recognises(path: Path, beginning: bytes) -> bool:
+    """Return whether a file is toulbar2's, by its name and its first sign."""
+    return has_suffix(path, ".cfn") and beginning.lstrip()[:1] in (b"{", b"[", b"#", b"\x1f", b"\xfd")
+
+
+def read(paths: Sequence[Path], options: ImportOptions) -> Imported:
+    """Return the problem in a file. Raises `InvalidInputError`."""
+    return read_with(paths, options, read_text)
+
+
+DIALECT = Dialect("cfn", "toulbar2's cfn", recognises, read)

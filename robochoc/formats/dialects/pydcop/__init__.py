@@ -1,0 +1,21 @@
+"""pyDCOP's YAML (https://github.com/Orange-OpenSource/pyDcop): problems, distributions and scenarios."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from robochoc.formats.dialects.dialect import Dialect
+from robochoc.formats.dialects.pydcop.parts import sections
+from robochoc.formats.dialects.pydcop.reader import read
+
+_SECTIONS = {"domains", "variables", "constraints", "objective", "distribution", "events", "agents", "replica_dist"}
+
+
+def recognises(path: Path, beginning: bytes) -> bool:
+    """Return whether a file is pyDCOP's: it is called YAML, and has one of the sections."""
+    if path.suffix.lower() not in (".yaml", ".yml"):
+        return False
+    return bool(sections(beginning.decode("utf-8", "replace").lstrip("\ufeff")) & _SECTIONS)
+
+
+DIALECT = Dialect("pydcop", "pyDCOP's YAML", recognises, read)

@@ -1,0 +1,215 @@
+"""Constraints of pyDCOP's files: functions and tables, as costs of tuples, predicates or functions of ours."""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from fractions import Fraction
+from pathlib import Path
+
+from robochoc.formats.definitions import MAX_TUPLES
+from robochoc.formats.diagnostics import MistakeError, shortened, suggestion
+from robochoc.formats.dialects.pydcop.domains import Values
+from robochoc.formats.dialects.pydcop.outside import functions_of
+from robochoc.formats.dialects.pydcop.python_function import PythonFunction
+from robochoc.formats.dialects.pydcop.python_values import Value
+from robochoc.formats.dialects.pydcop.translation import Known, Violated, translated
+from robochoc.formats.dialects.pydcop.yaml_tree import Node, Scalar, shown
+from robochoc.formats.dialects.tables import Amount, CostTable, forbidding
+from robochoc.model.expression import Expression
+from robochoc.model.expression.bounds import Interval, bounds
+
+MAX_CELLS = 5_000_000
+"""The maximum number of tuples of all tables that functions make."""
+
+
+@dataclass(frozen=True)
+class Costs:
+    """What a constraint of the file costs.
+
+    Attributes:
+        name: Its name.
+        scope: Its variables.
+        what: Its costs: a table, a predicate, or an expression over X0, X1, ...
+        line: Where it stands.
+    """
+
+    name: str
+    scope: tuple[str, ...]
+    what: CostTable | Violated | Expression
+    line: int
+
+
+@dataclass
+class ConstraintReader:
+    """Reads the constraints of one problem.
+
+    Attributes:
+        values: The values of each variable.
+        fixed: The values of external variables.
+        infinity: Costs of at least so much forbid.
+        maximize: Whether costs are maximised.
+        folder: Where Python files stand. None: they may not be executed.
+        incomplete: The constraints whose tables leave tuples out.
+    """
+
+    values: Mapping[str, Values]
+    fixed: Mapping[str, Scalar]
+    infinity: int | None
+    maximize: bool
+    folder: Path | None
+    incomplete: list[str] = field(default_factory=list)
+    _cells: int = 0
+    _sources: dict[str, Mapping[str, Callable[..., Value]]] = field(default_factory=dict)
+
+    def read(self, name: str, node: Node) -> Costs:
+        """Return the constraint in `node`. Raises `MistakeError`."""
+        if node.entries is None:
+            raise MistakeError("is no mapping", "write type: and function:, or variables: and values:")
+        kind = node.entries.get("type")
+        match kind.scalar if kind else None:
+            case "intention":
+                return self._intention(name, node.entries, node.line)
+            case "extensional":
+                return self._extensional(name, node.entries, node.line)
+            case None:
+                raise MistakeError("has no type", "write type: intention, or type: extensional")
+            case other:
+                raise MistakeError(f"is of the type '{shortened(str(other))}'", "intention and extensional are known")
+
+    def function(self, name: str, node: Node, variables: Sequence[str], sources: Node | None = None) -> Costs:
+        """Return the costs that the function in `node` says for some of `variables`."""
+        if isinstance(node.scalar, (bool, int, Fraction, float)):
+            return Costs(name, (), CostTable(name, {}, self._amount(node.scalar), 1), node.line)
+        if not isinstance(node.scalar, str):
+            raise MistakeError("has no function", "write function: and a Python expression", node.line)
+        function = PythonFunction(node.scalar, variables, self.fixed, self._outside(sources))
+        known = {one: Known(self.values[one].domain, self.values[one].kind) for one in function.scope}
+        simple = translated(function.body, function.scope, known, self.fixed) if len(function.scope) > 1 else None
+        if simple is not None and self._is_bounded(simple, function.scope):
+            if isinstance(simple, Violated):
+                simple = Violated(simple.body, self._amount(simple.cost))
+            return Costs(name, function.scope, simple, node.line)
+        return Costs(name, function.scope, self._tabulated(name, function), node.line)
+
+    def _intention(self, name: str, entries: Mapping[Scalar, Node], line: int) -> Costs:
+        function = entries.get("function")
+        if function is None:
+            raise MistakeError("has no function", "write function: and a Python expression", line)
+        return self.function(name, function, tuple(self.values), entries.get("source"))
+
+    def _outside(self, node: Node | None) -> Mapping[str, Callable[..., Value]]:
+        if node is None:
+            return {}
+        if self.folder is None:
+            what = f"would execute the Python file '{shortened(str(node.scalar))}'"
+            raise MistakeError(what, "import it with --allow-code if you trust it", node.line)
+        path = str(node.scalar)
+        if path not in self._sources:
+            self._sources[path] = functions_of(self.folder / path)
+        return self._sources[path]
+
+    def _is_bounded(self, simple: Violated | Expression, scope: Sequence[str]) -> bool:
+        """Return whether no cost of an expression can reach the infinity."""
+        if isinstance(simple, Violated) or self.infinity is None:
+            return True
+        limits = {}
+        for place, one in enumerate(scope):
+            ranges = self.values[one].domain.ranges
+            limits[f"X{place}"] = Interval(ranges[0][0], ranges[-1][-1])
+        low, high = bounds(simple, limits)
+        return -low < self.infinity if self.maximize else high < self.infinity
+
+    def _tabulated(self, name: str, function: PythonFunction) -> CostTable:
+        size = self._size(function.scope)
+        self._cells += size
+        if size > MAX_TUPLES or self._cells > MAX_CELLS:
+            what = f"has a function of {size} combinations of values"
+            hint = (
+                f"tables have at most {MAX_TUPLES}, all together {MAX_CELLS}; functions of integers with + - * abs min"
+                " max, comparisons and conditions need none"
+            )
+            raise MistakeError(what, hint)
+        rows = {}
+        scalars = [self.values[one].scalars for one in function.scope]
+        for codes in itertools.product(*scalars):
+            arguments = {one: known[code] for one, known, code in zip(function.scope, scalars, codes, strict=True)}
+            value = function.value(arguments)
+            if not isinstance(value, (int, Fraction, float)):
+                raise MistakeError(f"has a function that gives {value!r:.40}", "costs are numbers")
+            rows[codes] = self._amount(value)
+        if not function.scope:
+            return CostTable(name, {}, rows[()], 1)
+        return CostTable(name, rows, 0, size)
+
+    def _extensional(self, name: str, entries: Mapping[Scalar, Node], line: int) -> Costs:
+        scope = self._scope(entries.get("variables"), line)
+        values = entries.get("values")
+        if values is None or values.entries is None:
+            raise MistakeError("has no values", "write values: and, below, COST: v w | v w", line)
+        rows: dict[tuple[int, ...], Amount] = {}
+        for cost, node in values.entries.items():
+            if not isinstance(cost, (int, Fraction, float)):
+                what = f"has the cost '{shortened(str(cost))}', which is no number"
+                raise MistakeError(what, "write COST: v w | v w", values.keys.get(cost, node.line))
+            amount = self._amount(cost)
+            for codes in self._tuples(scope, node):
+                rows[codes] = amount
+        default = entries.get("default")
+        if default is None or default.scalar is None:
+            amount = math.inf
+            if len(rows) < self._size(scope):
+                self.incomplete.append(name)
+        elif isinstance(default.scalar, (int, Fraction, float)):
+            amount = self._amount(default.scalar)
+        else:
+            raise MistakeError("has a default that is no number", "write default: 100", default.line)
+        return Costs(name, scope, CostTable(name, rows, amount, self._size(scope)), line)
+
+    def _scope(self, node: Node | None, line: int) -> tuple[str, ...]:
+        parts = [node] if node and node.is_scalar else (node.items if node else None)
+        if not parts:
+            raise MistakeError("has no variables", "write variables: [v1, v2]", line)
+        scope = tuple(str(one.scalar).strip() for one in parts)
+        for one in scope:
+            if one not in self.values:
+                what = f"has the unknown variable '{shortened(one)}'"
+                raise MistakeError(what, suggestion(one, list(self.values), "variables"), line)
+        if len(set(scope)) < len(scope):
+            raise MistakeError("has a variable twice in its scope", "name each once", line)
+        return scope
+
+    def _tuples(self, scope: Sequence[str], node: Node) -> Iterator[tuple[int, ...]]:
+        codes = [self.values[one].codes for one in scope]
+        for place, words in _tuple_words(scope, node):
+            if len(words) != len(scope):
+                what = f"has the tuple '{shortened(' '.join(words))}' of {len(words)} values instead of {len(scope)}"
+                raise MistakeError(what, "separate values by blanks, and tuples by '|'", place)
+            try:
+                yield tuple([known[one] for known, one in zip(codes, words, strict=True)])
+            except KeyError as error:
+                bad = str(error.args[0])
+                where = next(one for one, known, given in zip(scope, codes, words, strict=True) if given not in known)
+                what = f"has the value '{shortened(bad)}', which {shortened(where)} has not"
+                raise MistakeError(what, suggestion(bad, list(self.values[where].codes), "values"), place) from None
+
+    def _amount(self, amount: Amount) -> Amount:
+        return forbidding(int(amount) if isinstance(amount, bool) else amount, self.infinity, maximize=self.maximize)
+
+    def _size(self, scope: Sequence[str]) -> int:
+        return math.prod(len(self.values[one].scalars) for one in scope)
+
+
+def _tuple_words(scope: Sequence[str], node: Node) -> Iterator[tuple[int, list[str]]]:
+    """Yield the tuples that follow a cost, as words, and their lines."""
+    for one in node.items if node.items is not None else [node]:
+        if not one.is_scalar:
+            raise MistakeError("has a list or a mapping where tuples should stand", "write v w | v w", one.line)
+        if isinstance(one.scalar, str) and len(scope) == 1:
+            yield from ((one.line, [part.strip()]) for part in one.scalar.split("|"))
+        elif isinstance(one.scalar, str):
+            yield from ((one.line, part.split()) for part in one.scalar.split("|"))
+        else:
+            yield one.line, [shown(one.scalar)]

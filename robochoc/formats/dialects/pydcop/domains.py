@@ -1,0 +1,121 @@
+"""Domains of pyDCOP's files: integers stay integers, all other values get names."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from functools import cached_property
+
+from robochoc.formats.definitions import MAX_VALUES, check_domain
+from robochoc.formats.diagnostics import MistakeError, shortened
+from robochoc.formats.dialects.dialect import Names
+from robochoc.formats.dialects.pydcop.yaml_tree import Node, Scalar, shown
+from robochoc.formats.dialects.tables import word
+from robochoc.formats.names import check_integer
+from robochoc.model.constraint import Domain
+
+
+@dataclass(frozen=True)
+class Values:
+    """The values of a domain, as the file has them, and as integers.
+
+    Attributes:
+        domain: The domain here.
+        scalars: The values of the file, by the integers here.
+    """
+
+    domain: Domain
+    scalars: Mapping[int, Scalar]
+
+    @cached_property
+    def codes(self) -> dict[str, int]:
+        """The integers here, by the words that tables of the file use: what Python's `str` says of the values."""
+        return {shown(value): code for code, value in self.scalars.items()}
+
+    @property
+    def kind(self) -> type | None:
+        """The type of all values. None: they are of several."""
+        kinds = {type(value) for value in self.scalars.values()}
+        return kinds.pop() if len(kinds) == 1 else None
+
+
+class Domains:
+    """The domains of a problem. All symbols are known before the first domain is made."""
+
+    def __init__(self, nodes: Mapping[str, Node]) -> None:
+        """Read domains, by their names. Raises `MistakeError`."""
+        scalars = {name: _scalars(name, node) for name, node in nodes.items()}
+        self._symbols = Names()
+        symbolic = {name for name, values in scalars.items() if not _are_integers(values)}
+        labels = dict.fromkeys(self._label(value) for name in scalars if name in symbolic for value in scalars[name])
+        self._places = {label: place for place, label in enumerate(labels)}
+        self.all = {
+            name: self._named(name, values) if name in symbolic else _numbers(name, values, nodes[name].line)
+            for name, values in scalars.items()
+        }
+
+    @property
+    def renamed(self) -> Iterable[tuple[str, str]]:
+        """Return symbols that have other names here, with their originals."""
+        return self._symbols.changed.items()
+
+    def _label(self, value: Scalar) -> str:
+        return self._symbols.of(shown(value))
+
+    def _named(self, name: str, values: Iterable[Scalar]) -> Values:
+        scalars = {self._places[self._label(value)]: value for value in values}
+        ranges = tuple(range(code, code + 1) for code in sorted(scalars))
+        return Values(Domain(word(name), ranges, tuple(self._places)), scalars)
+
+
+def _numbers(name: str, values: Iterable[Scalar], line: int) -> Values:
+    numbers = sorted({value for value in values if isinstance(value, int)})
+    domain = Domain(word(name), tuple(range(value, value + 1) for value in numbers))
+    try:
+        check_domain(domain)
+    except MistakeError as mistake:
+        raise MistakeError(mistake.message, mistake.hint, line) from None
+    return Values(domain, {value: value for value in numbers})
+
+
+def _are_integers(values: Iterable[Scalar]) -> bool:
+    return all(isinstance(value, int) and not isinstance(value, bool) for value in values)
+
+
+def _scalars(name: str, node: Node) -> list[Scalar]:
+    values = (node.entries or {}).get("values")
+    if values is None or not values.items:
+        raise MistakeError(f"the domain '{shortened(name)}' has no values", "write values: [R, G] or [0..4]", node.line)
+    for one in values.items:
+        if not one.is_scalar:
+            raise MistakeError("a list or a mapping as a value of a domain", "values are numbers and names", one.line)
+    found = [one.scalar for one in values.items]
+    if len(found) == 1 and isinstance(found[0], str) and ".." in found[0]:
+        return list(_range(found[0], values.line))
+    if len(found) > MAX_VALUES:
+        raise MistakeError(f"domain {shortened(name)} has more than {MAX_VALUES} values", "make it smaller", node.line)
+    seen: dict[str, Scalar] = {}
+    for value, one in zip(found, values.items, strict=True):
+        known = seen.setdefault(shown(value), value)
+        if type(known) is not type(value):
+            what = f"the domain '{shortened(name)}' has two values that are both written {shortened(shown(value))}"
+            raise MistakeError(what, "give one of them another name", one.line)
+    return found
+
+
+def _range(text: str, line: int) -> range:
+    first, _, last = text.partition("..")
+    try:
+        ends = int(first), int(last)
+    except ValueError:
+        raise MistakeError(f"'{shortened(text)}' is no range", "write two integers: [0..4]", line) from None
+    try:
+        check_integer(ends[0])
+        check_integer(ends[1])
+    except MistakeError as mistake:
+        raise MistakeError(mistake.message, mistake.hint, line) from None
+    found = range(ends[0], ends[1] + 1)
+    if not 0 < ends[1] - ends[0] + 1 <= MAX_VALUES:
+        what = "is empty" if ends[1] < ends[0] else f"has more than {MAX_VALUES} values"
+        raise MistakeError(f"the range {shortened(text)} {what}", "make it smaller or larger", line)
+    return found

@@ -1,0 +1,83 @@
+"""pyDCOP's scenarios: robots that leave."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterator, Mapping
+
+from robochoc.formats.diagnostics import MistakeError, shortened, suggestion
+from robochoc.formats.dialects.dialect import Names, Note
+from robochoc.formats.dialects.pydcop.hosting import text_of
+from robochoc.formats.dialects.pydcop.yaml_tree import Document, Node, Scalar
+from robochoc.model.problem import RemoveAgent, ScenarioEvent, Team
+
+
+def read_scenario(
+    document: Document, team: Team, names: Names, agents: Collection[str], notes: list[Note]
+) -> tuple[ScenarioEvent, ...]:
+    """Return the events of a scenario.
+
+    Args:
+        document: The file.
+        team: The team at its start.
+        names: The names of robots, for those of agents.
+        agents: All agents of the problem, also those without variables.
+        notes: What is left out is noted here.
+
+    Raises:
+        MistakeError: if it is none.
+    """
+    there, events, delays, left_out = {robot.name for robot in team.robots}, [], 0, 0
+    root = document.root.entries or {}
+    listed = root.get("events")
+    if listed is None or listed.items is None:
+        raise MistakeError("has no events", "write events: and a list of them", document.root.line)
+    notes += [Note("repeated", f"{shortened(key)} stands twice; the later one counts") for _, key in document.repeated]
+    for event in listed.items:
+        entries = event.entries or {}
+        delays += "delay" in entries
+        changes: list[RemoveAgent] = []
+        for action in _actions(entries, event):
+            robot = _leaving(action, names, agents)
+            if robot is None:
+                left_out += 1
+            elif robot in there:
+                there.remove(robot)
+                changes.append(RemoveAgent(robot))
+        if not there:
+            raise MistakeError("removes the last robot", "let one robot stay", event.line)
+        if changes:
+            events.append(ScenarioEvent(tuple(changes)))
+    notes += _notes(len(events), delays, left_out)
+    return tuple(events)
+
+
+def _notes(events: int, delays: int, left_out: int) -> Iterator[Note]:
+    if events:
+        text = "with pyDCOP other agents take the variables of one that leaves; here they leave with their robot"
+        yield Note("scenario", text)
+    if delays:
+        yield Note("scenario", f"{delays} delays in seconds: an event happens when the problem before is solved")
+    if left_out:
+        yield Note("dropped", f"{left_out} actions that remove no agent, which pyDCOP passes over, too")
+
+
+def _actions(entries: Mapping[Scalar, Node], event: Node) -> list[Node]:
+    actions = entries.get("actions")
+    if actions is None:
+        if "delay" not in entries:
+            raise MistakeError("an event has neither delay nor actions", "write actions: or delay:", event.line)
+        return []
+    return actions.items or []
+
+
+def _leaving(action: Node, names: Names, agents: Collection[str]) -> str | None:
+    """Return the robot that an action removes. None: it does something else."""
+    entries = action.entries or {}
+    kind, agent = entries.get("type"), entries.get("agent")
+    if kind is None or kind.scalar != "remove_agent":
+        return None
+    name = text_of(agent.scalar if agent else None, action.line)
+    if name not in agents:
+        what = f"removes the agent '{shortened(name)}', which the problem has not"
+        raise MistakeError(what, suggestion(name, agents, "agents"), action.line)
+    return names.of(name)

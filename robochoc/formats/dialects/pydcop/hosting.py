@@ -1,0 +1,116 @@
+"""Who owns which variable of a pyDCOP problem: distribution, hints, or the order of both."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+
+from robochoc.formats.diagnostics import MistakeError, shortened, suggestion
+from robochoc.formats.dialects.dialect import Note
+from robochoc.formats.dialects.owners import owners_by
+from robochoc.formats.dialects.pydcop.yaml_tree import Node, Scalar
+
+
+@dataclass
+class Hosting:
+    """The variables that each agent owns.
+
+    Attributes:
+        agents: The agents, in the order of the file.
+        variables: The variables, likewise.
+        constraints: Names that may be hosted, too, and have no owner here.
+        owners: The agent of each variable.
+        notes: What was decided here.
+    """
+
+    agents: list[str]
+    variables: Sequence[str]
+    constraints: Collection[str]
+    owners: dict[str, str] = field(default_factory=dict)
+    notes: list[Note] = field(default_factory=list)
+
+    def by_pattern(self, pattern: str) -> None:
+        """Let variables belong together that `pattern` finds the same in: its first group, or all of its match."""
+        self.owners = owners_by(pattern, self.variables)
+        self.agents = list(dict.fromkeys(self.owners.values()))
+
+    def by_agent(self, node: Node, what: str) -> None:
+        """Take the owners from a mapping of agents to what they host. Those that are known stay."""
+        if node.entries is None:
+            raise MistakeError(f"the {what} is no mapping", "write AGENT: [VARIABLE, VARIABLE]", node.line)
+        found: dict[str, str] = {}
+        for agent, hosted in _named(node.entries):
+            if agent not in self.agents:
+                message = f"the {what} names the agent '{shortened(agent)}', which the problem has not"
+                raise MistakeError(message, suggestion(agent, self.agents, "agents"), hosted.line)
+            for name in _names(hosted):
+                if name in self.variables:
+                    if found.setdefault(name, agent) != agent:
+                        message = f"the {what} gives '{shortened(name)}' to {shortened(found[name])} and to {agent}"
+                        raise MistakeError(message, "let one of them have it", hosted.line)
+                elif name not in self.constraints and what != "distribution":
+                    message = f"the {what} names '{shortened(name)}', which is no variable and no constraint"
+                    raise MistakeError(message, suggestion(name, list(self.variables), "variables"), hosted.line)
+        for name, agent in found.items():
+            self.owners.setdefault(name, agent)
+
+    def rest(self) -> None:
+        """Give what nobody owns to the agents that own least, in their order; without agents, each gets its own."""
+        left = [name for name in self.variables if name not in self.owners]
+        if not left:
+            return
+        if not self.agents:
+            self.agents = list(self.variables)
+            self.owners.update((name, name) for name in left)
+            self.notes.append(Note("owner", "there are no agents: each variable is a robot's of its own"))
+            return
+        load = dict.fromkeys(self.agents, 0)
+        for agent in self.owners.values():
+            load[agent] += 1
+        for name in left:
+            agent = min(load, key=load.__getitem__)
+            self.owners[name] = agent
+            load[agent] += 1
+        text = f"the file says no owner of {len(left)} variables: agents that had least took them, in their order"
+        self.notes.append(Note("owner", text))
+
+    def robots(self) -> dict[str, list[str]]:
+        """Return the variables of each agent that owns some. The others are left out, and noted."""
+        owned: dict[str, list[str]] = {agent: [] for agent in self.agents}
+        for name in self.variables:
+            owned[self.owners[name]].append(name)
+        idle = [agent for agent, names in owned.items() if not names]
+        if idle:
+            self.notes.append(Note("dropped", f"agents that own no variable: {shortened(' '.join(idle))}"))
+        return {agent: names for agent, names in owned.items() if names}
+
+
+def agent_names(node: Node | None) -> list[str]:
+    """Return the agents that `node` lists, or maps to what is known of them."""
+    if node is None or (node.is_scalar and node.scalar is None):
+        return []
+    if node.entries is not None:
+        return [name for name, _ in _named(node.entries)]
+    return list(dict.fromkeys(_names(node)))
+
+
+def _named(entries: Mapping[Scalar, Node]) -> Iterator[tuple[str, Node]]:
+    for key, node in entries.items():
+        yield text_of(key, node.line), node
+
+
+def _names(node: Node) -> Iterator[str]:
+    if node.is_scalar and node.scalar is None:
+        return
+    for one in node.items if node.items is not None else [node]:
+        yield text_of(one.scalar, one.line)
+
+
+def text_of(key: Scalar, line: int) -> str:
+    """Return a name. Raises `MistakeError` unless it is one: YAML takes `no` and `on` for truth values."""
+    if isinstance(key, int) and not isinstance(key, bool):
+        return str(key)
+    if not isinstance(key, str) or not key:
+        what = f"'{shortened(str(key))}' where a name should stand"
+        raise MistakeError(what, "YAML takes yes, no, on, off, true and false for truth values: write quotes", line)
+    return key

@@ -1,0 +1,124 @@
+"""The files of one problem: parts that belong together, a distribution, a scenario."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+
+from robochoc.formats.diagnostics import Diagnostic, InvalidInputError, MistakeError, encodable
+from robochoc.formats.dialects.pydcop.yaml_tree import MAX_BYTES, Document, read_yaml
+
+_SECTION = re.compile(r"^([a-z_]+)[ \t]*:", re.MULTILINE)
+_PROBLEM = {"domains", "variables", "constraints", "agents", "objective", "external_variables", "distribution_hints"}
+
+
+@dataclass(frozen=True)
+class Part:
+    """Files that are read as one text.
+
+    Attributes:
+        files: Each with the number of lines before it.
+        text: The text.
+    """
+
+    files: tuple[tuple[Path, int], ...]
+    text: str
+
+    def document(self) -> Document:
+        """Return the document in the files."""
+        with self.blamed():
+            return read_yaml(self.text)
+
+    @contextmanager
+    def blamed(self) -> Iterator[None]:
+        """Turn a `MistakeError` raised inside into an `InvalidInputError` with the file and its line."""
+        try:
+            yield
+        except MistakeError as mistake:
+            path, line = self.place(mistake.line)
+            raise InvalidInputError([Diagnostic(path, line, mistake.message, mistake.hint)]) from None
+
+    def place(self, line: int) -> tuple[str, int]:
+        """Return the file that `line` of the text stands in, and the line there."""
+        found, before = next(((path, start) for path, start in reversed(self.files) if start < line), self.files[0])
+        return encodable(str(found)), max(0, line - before)
+
+
+@dataclass(frozen=True)
+class Parts:
+    """The files of a problem.
+
+    Attributes:
+        problem: The problem: several files count as one.
+        distribution: Who hosts what.
+        scenario: What happens.
+    """
+
+    problem: Part
+    distribution: Part | None
+    scenario: Part | None
+
+
+def sections(text: str) -> set[str]:
+    """Return the names at the beginning of lines."""
+    return set(_SECTION.findall(text))
+
+
+def read_parts(paths: Sequence[Path]) -> Parts:
+    """Return the files at `paths` in their parts. Raises `InvalidInputError`."""
+    texts: dict[str, list[tuple[Path, str]]] = {"problem": [], "distribution": [], "scenario": []}
+    total = 0
+    for path in paths:
+        text = _text(path)
+        total += len(text)
+        if total > MAX_BYTES:
+            raise _invalid(path, f"makes more than {MAX_BYTES // 2**20} MiB", "import a smaller problem")
+        texts[_kind(text)].append((path, text))
+    if not texts["problem"]:
+        raise _invalid(paths[0], "is no problem", "name the file with its variables and constraints, too")
+    for kind in ("distribution", "scenario"):
+        if len(texts[kind]) > 1:
+            raise _invalid(texts[kind][1][0], f"is a second {kind}", "name one")
+    return Parts(
+        _joined(texts["problem"]),
+        _joined(texts["distribution"]) if texts["distribution"] else None,
+        _joined(texts["scenario"]) if texts["scenario"] else None,
+    )
+
+
+def _kind(text: str) -> str:
+    names = sections(text)
+    if not names & _PROBLEM:
+        if "events" in names:
+            return "scenario"
+        if "distribution" in names:
+            return "distribution"
+    return "problem"
+
+
+def _joined(texts: Sequence[tuple[Path, str]]) -> Part:
+    files, lines, parts = [], 0, []
+    for path, text in texts:
+        ended = text if text.endswith("\n") else f"{text}\n"
+        files.append((path, lines))
+        parts.append(ended)
+        lines += ended.count("\n")
+    return Part(tuple(files), "".join(parts))
+
+
+def _text(path: Path) -> str:
+    try:
+        content = path.read_bytes()
+    except OSError as error:
+        raise _invalid(path, f"cannot be read: {error.strerror}", "check the path and its permissions") from None
+    try:
+        return content.decode("utf-8-sig")
+    except UnicodeDecodeError:
+        raise _invalid(path, "is not UTF-8", "save it in UTF-8") from None
+
+
+def _invalid(path: Path, message: str, hint: str) -> InvalidInputError:
+    return InvalidInputError([Diagnostic(encodable(str(path)), 0, message, hint)])

@@ -1,0 +1,375 @@
+"""Functions of pyDCOP's files: Python's syntax, parsed by `ast`, interpreted here, and never executed.
+
+What is allowed is listed (`_Compiler`); all else is refused by its name. Numbers are exact (`python_values`).
+"""
+
+from __future__ import annotations
+
+import ast
+import warnings
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from types import MappingProxyType
+from typing import NoReturn
+
+from robochoc.formats.diagnostics import MistakeError, shortened, suggestion
+from robochoc.formats.dialects.pydcop.python_values import (
+    ARITHMETIC,
+    COMPARISONS,
+    FUNCTIONS,
+    SIGNS,
+    NoValueError,
+    Value,
+    bounded,
+    items,
+    literal,
+    number,
+)
+
+MAX_LENGTH = 1_000_000
+"""The maximum number of characters of a function."""
+MAX_NODES = 50_000
+"""The maximum number of its operators and terms."""
+MAX_DEPTH = 300
+"""The maximum depth of its nesting."""
+MAX_STEPS = 5_000_000
+"""The maximum number of steps of all loops of a function, for all arguments together."""
+
+Outside = Callable[..., Value]
+"""A function that is called by its name."""
+
+_Names = dict[str, Value]
+_Closure = Callable[[_Names], Value]
+_Statement = Callable[[_Names], "Value | _Nothing"]
+
+
+class _Nothing:
+    """What a statement gives that is no `return`."""
+
+
+_GOES_ON = _Nothing()
+
+
+class PythonFunction:
+    """A function of a problem's variables.
+
+    Attributes:
+        scope: The variables in it, in the order in which they appear.
+        body: Its statements; one expression for an expression.
+    """
+
+    def __init__(
+        self,
+        source: str,
+        variables: Collection[str],
+        fixed: Mapping[str, Value] = MappingProxyType({}),
+        outside: Mapping[str, Outside] = MappingProxyType({}),
+    ) -> None:
+        """Read a function, as pyDCOP does: an expression, or statements with `return`.
+
+        Args:
+            source: The text.
+            variables: The names that variables have.
+            fixed: Names that stand for values.
+            outside: Functions of a Python file, which the text calls `source.NAME`. They are executed.
+
+        Raises:
+            MistakeError: if it is no Python, is too long, or has what is not allowed.
+        """
+        self.body = _parsed(source)
+        names = [node for node in _nodes(self.body) if isinstance(node, ast.Name)]
+        stored = {node.id for node in names if isinstance(node.ctx, ast.Store)}
+        loaded = [node.id for node in names]
+        self.scope = tuple(dict.fromkeys(name for name in loaded if name in variables and name not in stored))
+        compiler = _Compiler(
+            {*variables, *stored}, {name: fixed[name] for name in fixed if name not in stored}, outside
+        )
+        self._run: _Statement = (
+            compiler.expression(self.body[0].value)
+            if len(self.body) == 1 and isinstance(self.body[0], ast.Expr)
+            else compiler.block(self.body)
+        )
+
+    def value(self, arguments: Mapping[str, Value]) -> Value:
+        """Return what the function gives for `arguments`.
+
+        Raises:
+            MistakeError: if it gives nothing, as for a division by zero.
+        """
+        try:
+            result = self._run(dict(arguments))
+        except NoValueError as error:
+            self._refuse(str(error), arguments)
+        except (ArithmeticError, TypeError, LookupError, ValueError) as error:
+            self._refuse(f"{type(error).__name__}: {error}", arguments)
+        if isinstance(result, _Nothing) or result is None:
+            self._refuse("it returns nothing", arguments)
+        return result
+
+    def _refuse(self, why: str, arguments: Mapping[str, Value]) -> NoReturn:
+        where = ", ".join(f"{name}={arguments[name]!s:.20}" for name in self.scope)
+        what = f"the function has no value{f' at {where}' if where else ''}: {shortened(why)}"
+        raise MistakeError(what, "a function has a value for all values of its variables")
+
+
+def _parsed(source: str) -> list[ast.stmt]:
+    if len(source) > MAX_LENGTH:
+        raise MistakeError("a function is too long", f"{MAX_LENGTH} characters are allowed")
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")  # of the user's text: "\d" in a string
+            body = ast.parse(source.lstrip()).body
+    except SyntaxError as error:
+        what = f"the function is no Python: {error.msg}, in its line {error.lineno}"
+        raise MistakeError(what, "write an expression, or lines with a return") from None
+    except (ValueError, RecursionError, MemoryError):
+        raise MistakeError("the function is no Python, or is nested too deeply", "write a shorter one") from None
+    _check_size(body)
+    returns = any(isinstance(node, ast.Return) for node in _nodes(body))
+    if not returns and not (len(body) == 1 and isinstance(body[0], ast.Expr)):
+        raise MistakeError("the function returns nothing", "write one expression, or lines with a return")
+    return body
+
+
+def _check_size(body: Sequence[ast.stmt]) -> None:
+    waiting: list[tuple[ast.AST, int]] = [(one, 1) for one in body]
+    count = 0
+    while waiting:
+        node, depth = waiting.pop()
+        count += 1
+        if count > MAX_NODES or depth > MAX_DEPTH:
+            what = "nested too deeply" if depth > MAX_DEPTH else "too long"
+            raise MistakeError(f"the function is {what}", "write a shorter one")
+        waiting += [(child, depth + 1) for child in ast.iter_child_nodes(node)]
+
+
+def _nodes(body: Sequence[ast.AST]) -> Iterator[ast.AST]:
+    """Yield all nodes, in the order of the text."""
+    waiting = list(reversed(body))
+    while waiting:
+        node = waiting.pop()
+        yield node
+        waiting += reversed(list(ast.iter_child_nodes(node)))
+
+
+class _Compiler:
+    """Makes closures of trees. Each kind of node that is allowed has its line here."""
+
+    def __init__(self, known: Collection[str], fixed: Mapping[str, Value], outside: Mapping[str, Outside]) -> None:
+        self._known = known
+        self._fixed = fixed
+        self._outside = outside
+        self._steps = MAX_STEPS
+
+    def block(self, body: Sequence[ast.stmt]) -> _Statement:
+        """Return statements that run one after the other, until one returns."""
+        parts = [self._statement(one) for one in body]
+
+        def run(names: _Names) -> Value | _Nothing:
+            for part in parts:
+                result = part(names)
+                if result is not _GOES_ON:
+                    return result
+            return _GOES_ON
+
+        return run
+
+    def _statement(self, node: ast.stmt) -> _Statement:  # noqa: PLR0911 - one for each kind of statement
+        match node:
+            case ast.Return(value=ast.expr() as value):
+                return self.expression(value)
+            case ast.Pass() | ast.Expr(value=ast.Constant()):
+                return lambda _: _GOES_ON
+            case ast.If(test=test, body=body, orelse=otherwise):
+                condition, then, other = self.expression(test), self.block(body), self.block(otherwise)
+                return lambda names: then(names) if condition(names) else other(names)
+            case ast.Assign(targets=[ast.Name(id=name)], value=value):
+                return _assignment(name, self.expression(value))
+            case ast.AnnAssign(target=ast.Name(id=name), value=ast.expr() as value):
+                return _assignment(name, self.expression(value))
+            case ast.AugAssign(target=ast.Name(id=name), op=op, value=value):
+                changed = ast.BinOp(ast.Name(name, ast.Load()), op, value)
+                return _assignment(name, self.expression(ast.copy_location(changed, node)))
+            case ast.For(target=ast.Name(id=name), iter=over, body=body, orelse=[]):
+                return self._loop(name, self.expression(over), self.block(body))
+            case _:
+                pass
+        return _refuse(node)
+
+    def _loop(self, name: str, over: _Closure, body: _Statement) -> _Statement:
+        def run(names: _Names) -> Value | _Nothing:
+            for one in items(over(names)):
+                self._step()
+                names[name] = one
+                result = body(names)
+                if result is not _GOES_ON:
+                    return result
+            return _GOES_ON
+
+        return run
+
+    def expression(self, node: ast.expr) -> _Closure:  # noqa: C901, PLR0911, PLR0912 - one case for each kind of node
+        """Return what computes an expression."""
+        match node:
+            case ast.Constant(value=value):
+                return self._constant(node, value)
+            case ast.Name(id=name):
+                return self._name(name)
+            case ast.BinOp(left=left, op=op, right=right) if type(op) in ARITHMETIC:
+                return _of_two(ARITHMETIC[type(op)], self.expression(left), self.expression(right))
+            case ast.UnaryOp(op=ast.Not(), operand=operand):
+                denied = self.expression(operand)
+                return lambda names: not denied(names)
+            case ast.UnaryOp(op=op, operand=operand) if type(op) in SIGNS:
+                sign, signed = SIGNS[type(op)], self.expression(operand)
+                return lambda names: sign(number(signed(names)))
+            case ast.BoolOp(op=op, values=values):
+                return _of_truth([self.expression(one) for one in values], is_and=isinstance(op, ast.And))
+            case ast.Compare(left=left, ops=ops, comparators=others):
+                return self._comparison(left, ops, others)
+            case ast.IfExp(test=test, body=body, orelse=otherwise):
+                condition, then, other = map(self.expression, (test, body, otherwise))
+                return lambda names: then(names) if condition(names) else other(names)
+            case ast.Call(func=ast.Name(id=name), args=arguments, keywords=[]):
+                return self._call(name, FUNCTIONS, arguments)
+            case ast.Call(func=ast.Attribute(value=ast.Name(id="source"), attr=name), args=arguments, keywords=[]) if (
+                self._outside
+            ):
+                return self._call(name, self._outside, arguments)
+            case ast.Tuple(elts=parts) | ast.List(elts=parts) | ast.Set(elts=parts):
+                made = [self.expression(one) for one in parts]
+                return lambda names: tuple([one(names) for one in made])
+            case ast.Dict(keys=keys, values=values) if None not in keys:
+                pairs = [
+                    (self.expression(key), self.expression(one)) for key, one in zip(keys, values, strict=True) if key
+                ]
+                return lambda names: {key(names): one(names) for key, one in pairs}
+            case ast.Subscript(value=value, slice=index) if not isinstance(index, ast.Slice):
+                holder, place = self.expression(value), self.expression(index)
+                return lambda names: _item(holder(names), place(names))
+            case ast.GeneratorExp(elt=part, generators=[loop]) | ast.ListComp(elt=part, generators=[loop]):
+                return self._comprehension(part, loop)
+            case _:
+                pass
+        return _refuse(node)
+
+    def _constant(self, node: ast.expr, value: object) -> _Closure:
+        try:
+            made = literal(value)
+        except NoValueError:
+            _refuse(node)
+        return lambda _: made
+
+    def _name(self, name: str) -> _Closure:
+        if name in self._fixed:
+            value = self._fixed[name]
+            return lambda _: value
+        if name not in self._known:
+            if name in FUNCTIONS:
+                raise MistakeError(f"the function '{name}' is not called", "write its arguments in parentheses")
+            hint = suggestion(name, sorted(self._known), "variables")
+            raise MistakeError(f"the function has '{shortened(name)}', which is no variable", hint)
+        return lambda names: names[name]
+
+    def _call(self, name: str, functions: Mapping[str, Outside], arguments: Sequence[ast.expr]) -> _Closure:
+        called = functions.get(name)
+        if called is None:
+            allowed = f"these are allowed: {shortened(' '.join(functions))}"
+            raise MistakeError(f"the function calls '{shortened(name)}'", allowed)
+        if any(isinstance(one, ast.Starred) for one in arguments):
+            _refuse(arguments[0])
+        made = [self.expression(one) for one in arguments]
+
+        def call(names: _Names) -> Value:
+            result = bounded(called(*[one(names) for one in made]))
+            self._step(len(result) if isinstance(result, tuple) else 0)
+            return result
+
+        return call
+
+    def _comparison(self, left: ast.expr, ops: Sequence[ast.cmpop], others: Sequence[ast.expr]) -> _Closure:
+        first = self.expression(left)
+        rest = [(COMPARISONS[type(op)], self.expression(other)) for op, other in zip(ops, others, strict=True)]
+
+        def compare(names: _Names) -> Value:
+            before = first(names)
+            for says, other in rest:
+                after = other(names)
+                if not says(before, after):
+                    return False
+                before = after
+            return True
+
+        return compare
+
+    def _comprehension(self, part: ast.expr, loop: ast.comprehension) -> _Closure:
+        if not isinstance(loop.target, ast.Name) or loop.is_async:
+            _refuse(loop.target)
+        name, over, made = loop.target.id, self.expression(loop.iter), self.expression(part)
+        conditions = [self.expression(one) for one in loop.ifs]
+
+        def collect(names: _Names) -> Value:
+            inner = dict(names)
+            found = []
+            for one in items(over(names)):
+                self._step()
+                inner[name] = one
+                if all(condition(inner) for condition in conditions):
+                    found.append(made(inner))
+            return tuple(found)
+
+        return collect
+
+    def _step(self, number: int = 1) -> None:
+        self._steps -= number
+        if self._steps < 0:
+            raise NoValueError("its loops take too many steps")
+
+
+def _assignment(name: str, value: _Closure) -> _Statement:
+    def assign(names: _Names) -> _Nothing:
+        names[name] = value(names)
+        return _GOES_ON
+
+    return assign
+
+
+def _of_two(meaning: Callable[..., Value], left: _Closure, right: _Closure) -> _Closure:
+    return lambda names: bounded(meaning(number(left(names)), number(right(names))))
+
+
+def _of_truth(parts: Sequence[_Closure], *, is_and: bool) -> _Closure:
+    """Return what `and` or `or` gives: the first value that decides, or the last."""
+
+    def decide(names: _Names) -> Value:
+        value: Value = None
+        for part in parts:
+            value = part(names)
+            if bool(value) != is_and:
+                return value
+        return value
+
+    return decide
+
+
+def _item(holder: Value, place: Value) -> Value:
+    if isinstance(holder, dict):
+        return holder[place]
+    if isinstance(holder, (tuple, str)) and isinstance(place, int):
+        return holder[place]
+    raise NoValueError("only lists, texts and dictionaries have items")
+
+
+def _refuse(node: ast.AST) -> NoReturn:
+    what = type(node).__name__
+    match node:
+        case ast.Attribute(attr=attribute) | ast.Call(func=ast.Attribute(attr=attribute)):
+            what = f"the attribute '.{shortened(attribute)}'"
+        case ast.Import() | ast.ImportFrom():
+            what = "an import"
+        case ast.Call():
+            what = "a call of this form"
+        case _:
+            pass
+    line = getattr(node, "lineno", 1)
+    hint = "arithmetic, comparisons, conditions, lists and loops over them are allowed, and a few functions"
+    raise MistakeError(f"the function has {what}, in its line {line}, which is not allowed", hint)

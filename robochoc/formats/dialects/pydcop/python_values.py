@@ -1,0 +1,182 @@
+"""What Python's operators and a few of its functions do with the values of pyDCOP's functions: exactly, and bounded.
+
+Numbers are integers and fractions: `0.1 + 0.2` is 0.3 here. Only infinities are floats.
+"""
+
+from __future__ import annotations
+
+import ast
+import math
+import operator
+import re
+from collections.abc import Callable
+from fractions import Fraction
+
+Value = None | bool | int | Fraction | float | str | tuple["Value", ...] | dict["Value", "Value"]
+"""What an expression is worth."""
+
+MAX_BITS = 1024
+"""The maximum size of a number, and of its denominator."""
+MAX_ITEMS = 100_000
+"""The maximum length of a range."""
+
+_DECIMAL = re.compile(r"\s*[+-]?[0-9]{1,18}(\.[0-9]{1,18})?\s*")
+_PLACES = 18
+
+
+class NoValueError(Exception):
+    """The function has no value for these arguments; says why."""
+
+
+def number(value: Value) -> int | Fraction | float:
+    """Return `value`. Raises `NoValueError` unless it is a number."""
+    if isinstance(value, (int, Fraction, float)):
+        return value
+    raise NoValueError(f"{_shown(value)} is no number")
+
+
+def bounded(value: Value) -> Value:
+    """Return `value`. Raises `NoValueError` for a number that is too large, and for what is none at all."""
+    if isinstance(value, Fraction):
+        large = value.numerator.bit_length() > MAX_BITS or value.denominator.bit_length() > MAX_BITS
+    elif isinstance(value, float):
+        large = math.isnan(value)
+    else:
+        large = isinstance(value, int) and value.bit_length() > MAX_BITS
+    if large:
+        raise NoValueError("a number is too large")
+    return value
+
+
+def literal(value: object) -> Value:
+    """Return a constant of the source as a value; a float as the decimal that it shows. Raises `NoValueError`."""
+    if isinstance(value, float):
+        return value if math.isinf(value) else Fraction(repr(value))
+    if value is None or isinstance(value, (int, str)):
+        return bounded(value)
+    raise NoValueError(f"the constant {value!r:.60}")
+
+
+def divided(left: Fraction | float, right: Fraction | float) -> Value:
+    """Return the quotient, exactly."""
+    if isinstance(left, float) or isinstance(right, float):
+        return float(left) / float(right)
+    return Fraction(left) / Fraction(right)
+
+
+def power(base: Fraction | float, exponent: Fraction | float) -> Value:
+    """Return the power. It is bounded before it is computed. Roots are floats, as Python has them."""
+    if isinstance(base, float) or isinstance(exponent, float):
+        raise NoValueError("a power of infinity")
+    if exponent != int(exponent):
+        if base < 0:
+            raise NoValueError("a root of a negative number")
+        return Fraction(repr(float(base) ** float(exponent)))
+    size = max(Fraction(base).numerator.bit_length(), Fraction(base).denominator.bit_length())
+    if abs(exponent) > MAX_BITS or size * abs(exponent) > 2 * MAX_BITS:
+        raise NoValueError("a power is too large")
+    whole = int(exponent)
+    return base**whole if whole >= 0 else Fraction(base) ** whole
+
+
+ARITHMETIC: dict[type[ast.operator], Callable[..., Value]] = {
+    ast.Add: operator.add,
+    ast.Sub: operator.sub,
+    ast.Mult: operator.mul,
+    ast.Div: divided,
+    ast.FloorDiv: operator.floordiv,
+    ast.Mod: operator.mod,
+    ast.Pow: power,
+    ast.BitAnd: operator.and_,
+    ast.BitOr: operator.or_,
+    ast.BitXor: operator.xor,
+}
+"""What two numbers make."""
+SIGNS: dict[type[ast.unaryop], Callable[..., Value]] = {ast.USub: operator.neg, ast.UAdd: operator.pos}
+"""What a sign makes of a number."""
+COMPARISONS: dict[type[ast.cmpop], Callable[..., bool]] = {
+    ast.Eq: operator.eq,
+    ast.NotEq: operator.ne,
+    ast.Lt: operator.lt,
+    ast.LtE: operator.le,
+    ast.Gt: operator.gt,
+    ast.GtE: operator.ge,
+    ast.In: lambda one, many: one in many,
+    ast.NotIn: lambda one, many: one not in many,
+    ast.Is: operator.eq,
+    ast.IsNot: operator.ne,
+}
+"""What two values say. `is` compares as `==` does: values of domains are equal or not."""
+
+
+def _round(value: Value, places: Value = None) -> Value:
+    rounded = number(value)
+    if places is None:
+        return round(rounded)
+    if not isinstance(places, int) or abs(places) > _PLACES:
+        raise NoValueError("round takes at most 18 places")
+    return round(Fraction(rounded), places)
+
+
+def _int(value: Value) -> Value:
+    if isinstance(value, str):
+        if not _DECIMAL.fullmatch(value) or "." in value:
+            raise NoValueError(f"{_shown(value)} is no integer")
+        return int(value)
+    return int(number(value))
+
+
+def _float(value: Value) -> Value:
+    if not isinstance(value, str):
+        return number(value)
+    if value.strip().lower().removeprefix("+") in ("inf", "infinity"):
+        return math.inf
+    if value.strip().lower() in ("-inf", "-infinity"):
+        return -math.inf
+    if not _DECIMAL.fullmatch(value):
+        raise NoValueError(f"{_shown(value)} is no number")
+    return Fraction(value)
+
+
+def _range(*ends: Value) -> Value:
+    if not all(isinstance(end, int) for end in ends):
+        raise NoValueError("range takes integers")
+    values = range(*[int(number(end)) for end in ends])
+    if len(values) > MAX_ITEMS:
+        raise NoValueError("a range is too long")
+    return tuple(values)
+
+
+def _power(base: Value, exponent: Value) -> Value:
+    return power(number(base), number(exponent))
+
+
+FUNCTIONS: dict[str, Callable[..., Value]] = {
+    "abs": lambda value: abs(number(value)),
+    "all": all,
+    "any": any,
+    "bool": bool,
+    "float": _float,
+    "int": _int,
+    "len": len,
+    "max": max,
+    "min": min,
+    "pow": _power,
+    "range": _range,
+    "round": _round,
+    "sum": lambda values: sum(map(number, values)),
+}
+"""Python's functions that may be called."""
+
+
+def items(value: Value) -> tuple[Value, ...]:
+    """Return what a loop over `value` goes through. Raises `NoValueError` unless it is a list or a text."""
+    if isinstance(value, tuple):
+        return value
+    if isinstance(value, (str, dict)):
+        return tuple(value)
+    raise NoValueError(f"{_shown(value)} is no list")
+
+
+def _shown(value: Value) -> str:
+    return f"{value!r:.40}" if not isinstance(value, Fraction) else str(float(value))

@@ -1,0 +1,323 @@
+"""pyDCOP's YAML as a team (its documentation: "File formats")."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import replace
+from fractions import Fraction
+from pathlib import Path
+
+from robochoc.formats.definitions import PREDEFINED
+from robochoc.formats.diagnostics import MistakeError, shortened, suggestion
+from robochoc.formats.dialects.dialect import Imported, ImportOptions, Names, Note, notes_on_names
+from robochoc.formats.dialects.pydcop.constraints import ConstraintReader, Costs
+from robochoc.formats.dialects.pydcop.domains import Domains, Values
+from robochoc.formats.dialects.pydcop.events import read_scenario
+from robochoc.formats.dialects.pydcop.hosting import Hosting, agent_names, text_of
+from robochoc.formats.dialects.pydcop.parts import Part, Parts, read_parts
+from robochoc.formats.dialects.pydcop.translation import Violated
+from robochoc.formats.dialects.pydcop.yaml_tree import Node, Scalar
+from robochoc.formats.dialects.tables import CostTable, Scale, definition_name, relation, word
+from robochoc.model.assembly import assemble
+from robochoc.model.constraint import (
+    INFINITE,
+    Constraint,
+    ConstraintModel,
+    Function,
+    Predicate,
+    Relation,
+    Semantics,
+    Variable,
+)
+from robochoc.model.cost_units import CostUnits
+from robochoc.model.expression import Apply, Expression, Name
+from robochoc.model.problem import ProblemKind, ScenarioEvent, Team
+
+_SECTIONS = {
+    "name", "objective", "description", "domains", "variables", "external_variables", "constraints", "agents",
+    "distribution_hints", "distribution", "infinity", "inputs",
+}  # fmt: skip
+_DROPPED = {
+    "routes": "routes between agents",
+    "hosting_costs": "costs of hosting",
+    "events": "the events in the problem's own file: give a scenario its own",
+    "replica_dist": "replicas",
+}
+
+
+def read(paths: Sequence[Path], options: ImportOptions) -> Imported:
+    """Return the problem in pyDCOP's files `paths`.
+
+    Raises:
+        InvalidInputError: with the first mistake.
+    """
+    parts = read_parts(paths)
+    with parts.problem.blamed():
+        return _Reader(parts, options).imported()
+
+
+class _Reader:
+    def __init__(self, parts: Parts, options: ImportOptions) -> None:
+        self._parts = parts
+        self._options = options
+        self._document = parts.problem.document()
+        self._root = _entries(self._document.root, "the problem")
+        self._notes: list[Note] = []
+        self._variable_names, self._robot_names = Names(), Names()
+
+    def imported(self) -> Imported:
+        """Return the problem. Raises `MistakeError`."""
+        self._note_what_is_left_out()
+        maximize = self._maximize()
+        nodes = dict(_section(self._root, "variables"))
+        if not nodes:
+            raise MistakeError("has no variables", "write variables: and, below, NAME: {domain: NAME}")
+        domains = Domains(dict(_section(self._root, "domains")))
+        self._notes += notes_on_names(list(domains.renamed))
+        values = {name: _values(name, node, domains) for name, node in nodes.items()}
+        reader = ConstraintReader(values, self._external(domains), self._infinity(), maximize, self._folder())
+        costs = list(self._costs(reader, nodes))
+        if reader.incomplete:
+            text = f"tuples that a table without default leaves out are forbidden: {_some(reader.incomplete)}"
+            self._notes.append(Note("default", text))
+        robots = self._robots(list(values))
+        team = self._team(values, costs, robots, maximize=maximize)
+        team = replace(team, scenario=self._scenario(team))
+        changed = {**self._variable_names.changed, **self._robot_names.changed}
+        self._notes += notes_on_names(list(changed.items()))
+        return Imported(team, "pydcop", changed, tuple(self._notes))
+
+    def _note_what_is_left_out(self) -> None:
+        for line, repeated in self._document.repeated:
+            path, number = self._parts.problem.place(line)
+            self._notes.append(
+                Note("repeated", f"{path}:{number}: {shortened(repeated)} stands twice; the later one counts")
+            )
+        for key in self._root:
+            name = str(key)
+            if name in _DROPPED or name not in _SECTIONS:
+                self._notes.append(Note("dropped", _DROPPED.get(name, f"the section {shortened(name)}")))
+
+    def _maximize(self) -> bool:
+        node = self._root.get("objective")
+        if node is None or node.scalar not in ("min", "max"):
+            raise MistakeError("has no objective", "write objective: min, or objective: max", node.line if node else 0)
+        return node.scalar == "max"
+
+    def _infinity(self) -> int | None:
+        """Return the infinity of the options, or the one that an exported file names."""
+        node = self._root.get("infinity")
+        if self._options.infinity is not None or node is None:
+            return self._options.infinity
+        if isinstance(node.scalar, bool) or not isinstance(node.scalar, int) or node.scalar < 1:
+            raise MistakeError("has an infinity that is no number", "write infinity: 10000", node.line)
+        self._notes.append(Note("infinity", f"costs from {node.scalar} on forbid, as the file says"))
+        return node.scalar
+
+    def _folder(self) -> Path | None:
+        return self._parts.problem.files[0][0].parent if self._options.allow_code else None
+
+    def _external(self, domains: Domains) -> dict[str, Scalar]:
+        fixed: dict[str, Scalar] = {}
+        for name, node in _section(self._root, "external_variables"):
+            values, initial = _values(name, node, domains), (node.entries or {}).get("initial_value")
+            if initial is None or initial.scalar not in values.scalars.values():
+                what = f"the external variable '{shortened(name)}' has no initial_value of its domain"
+                raise MistakeError(what, "write initial_value: and a value of its domain", node.line)
+            fixed[name] = initial.scalar
+        if fixed:
+            self._notes.append(Note("external", f"external variables keep their initial values: {_some(fixed)}"))
+        return fixed
+
+    def _costs(self, reader: ConstraintReader, variables: Mapping[str, Node]) -> Iterator[Costs]:
+        parts: dict[str, list[str]] = {"noise_level": [], "initial_value": [], "partial": []}
+        for name, node in variables.items():
+            entries = _entries(node, f"the variable '{shortened(name)}'")
+            for part, found in parts.items():
+                if part in entries:
+                    found.append(name)
+            if function := entries.get("cost_function"):
+                with _named(f"the cost_function of {shortened(name)}", function.line):
+                    yield reader.function(f"cost_{name}", function, (name,))
+        for name, node in _section(self._root, "constraints"):
+            if node.entries and "partial" in node.entries:
+                parts["partial"].append(name)
+            with _named(f"the constraint {shortened(name)}", node.line):
+                yield reader.read(name, node)
+        for part, found in parts.items():
+            if found:
+                self._notes.append(Note("dropped", f"{part} of {_some(found)}"))
+
+    def _robots(self, variables: Sequence[str]) -> dict[str, list[str]]:
+        constraints = [name for name, _ in _section(self._root, "constraints")]
+        hosting = Hosting(agent_names(self._root.get("agents")), variables, constraints)
+        hints = self._root.get("distribution_hints")
+        if self._options.owner is not None:
+            hosting.by_pattern(self._options.owner)
+        elif self._parts.distribution is not None:
+            root = self._parts.distribution.document().root
+            with self._parts.distribution.blamed():
+                hosting.by_agent(_entries(root, "the distribution")["distribution"], "distribution")
+        elif "distribution" in self._root:
+            hosting.by_agent(self._root["distribution"], "distribution")
+        if self._options.owner is None and hints and hints.entries and "must_host" in hints.entries:
+            hosting.by_agent(hints.entries["must_host"], "must_host")
+        hosting.rest()
+        robots = hosting.robots()
+        self._notes += hosting.notes
+        return robots
+
+    def _team(
+        self,
+        values: Mapping[str, Values],
+        costs: Sequence[Costs],
+        robots: Mapping[str, Sequence[str]],
+        *,
+        maximize: bool,
+    ) -> Team:
+        scale = Scale(_amounts(costs))
+        if scale.rounds:
+            text = f"some costs have more than {scale.places} decimal places, and were rounded to that many"
+            self._notes.append(Note("rounded", text))
+        places = self._variable_names
+        variables = {
+            self._robot_names.of(agent): [Variable(places.of(name), values[name].domain) for name in names]
+            for agent, names in robots.items()
+        }
+        maker = _Maker(places, scale)
+        constraints = [made for one in costs if (made := maker.constraint(one)) is not None]
+        name = self._options.name or self._name()
+        if not maker.constant and not any(map(_is_soft, constraints)):
+            return assemble(name, variables, constraints)
+        units = CostUnits(maximize, scale.places, maker.constant)
+        return assemble(name, variables, constraints, kind=ProblemKind.DISWCSP, costs=units)
+
+    def _name(self) -> str:
+        node = self._root.get("name")
+        found = str(node.scalar) if node and node.scalar is not None else self._parts.problem.files[0][0].stem
+        return re.sub(r"[^A-Za-z0-9_.-]+", "_", found)[:100].strip("._-") or "team"
+
+    def _scenario(self, team: Team) -> tuple[ScenarioEvent, ...]:
+        part: Part | None = self._parts.scenario
+        if part is None:
+            return ()
+        with part.blamed():
+            return read_scenario(part.document(), team, self._robot_names, self._agents(), self._notes)
+
+    def _agents(self) -> Collection[str]:
+        return agent_names(self._root.get("agents"))
+
+
+class _Maker:
+    """Makes constraints of costs. Equal predicates and functions are one object."""
+
+    def __init__(self, names: Names, scale: Scale) -> None:
+        self._names = names
+        self._scale = scale
+        self._made: dict[tuple[str, Expression], Predicate | Function] = {}
+        self.constant = 0
+
+    def constraint(self, costs: Costs) -> Constraint | None:
+        """Return a constraint. None: it is a constant, which has been added. Raises `MistakeError`."""
+        scope = tuple(map(self._names.of, costs.scope))
+        name = word(costs.name)
+        with _named(f"the constraint {shortened(costs.name)}", costs.line):
+            match costs.what:
+                case CostTable() as table:
+                    made = relation(table, len(scope), self._scale)
+                    if isinstance(made, int):
+                        self.constant += made
+                        return None
+                    if not scope:
+                        raise MistakeError("forbids everything", "delete it, and the problem has a solution")
+                    return Constraint(name, made, scope, scope, ConstraintModel.TKC, line=costs.line)
+                case Violated(body, cost):
+                    predicate = self._predicate(name, scope, body)
+                    units = self._scale.units(cost)
+                    return Constraint(name, predicate, scope, scope, ConstraintModel.TKC, units, costs.line)
+                case body:
+                    function = self._definition(Function, name, scope, body)
+                    return Constraint(name, function, scope, scope, ConstraintModel.TKC, line=costs.line)
+
+    def _predicate(self, name: str, scope: Sequence[str], body: Expression) -> Predicate | Function:
+        for known in PREDEFINED.values():
+            if _on_xs(known.body) == body and len(scope) == len(known.parameters):
+                return known
+        return self._definition(Predicate, name, scope, body)
+
+    def _definition(
+        self, kind: type[Predicate | Function], name: str, scope: Sequence[str], body: Expression
+    ) -> Predicate | Function:
+        key = (f"{kind.__name__} {len(scope)}", body)
+        if key not in self._made:
+            self._made[key] = kind(definition_name(name), tuple(f"X{place}" for place in range(len(scope))), body)
+        return self._made[key]
+
+
+def _on_xs(body: Expression) -> Expression:
+    """Return a predefined predicate's body over X0 and X1."""
+    match body:
+        case Apply(operator, (Name("X"), Name("Y"))):
+            return Apply(operator, (Name("X0"), Name("X1")))
+        case _:
+            return body
+
+
+def _amounts(costs: Iterable[Costs]) -> Iterator[int | Fraction | float]:
+    for one in costs:
+        match one.what:
+            case CostTable() as table:
+                yield from table.amounts()
+            case Violated(_, cost):
+                yield cost
+            case _:
+                pass
+
+
+def _is_soft(constraint: Constraint) -> bool:
+    match constraint.definition:
+        case Relation(semantics=semantics):
+            return semantics is Semantics.SOFT
+        case Predicate():
+            return constraint.cost != INFINITE
+        case Function():
+            return True
+
+
+def _values(name: str, node: Node, domains: Domains) -> Values:
+    domain = _entries(node, f"the variable '{shortened(name)}'").get("domain")
+    wanted = str(domain.scalar) if domain is not None else ""
+    if wanted not in domains.all:
+        what = f"the variable '{shortened(name)}' has no domain that is known"
+        raise MistakeError(what, suggestion(wanted, list(domains.all), "domains"), node.line)
+    return domains.all[wanted]
+
+
+def _section(root: Mapping[Scalar, Node], name: str) -> Iterator[tuple[str, Node]]:
+    node = root.get(name)
+    if node is None or (node.is_scalar and node.scalar is None):
+        return
+    for key, one in _entries(node, name).items():
+        yield text_of(key, one.line), one
+
+
+def _entries(node: Node, what: str) -> Mapping[Scalar, Node]:
+    if node.entries is None:
+        raise MistakeError(f"{what} is no mapping", "write NAME: VALUE, one a line", node.line)
+    return node.entries
+
+
+@contextmanager
+def _named(what: str, line: int) -> Iterator[None]:
+    """Say of a `MistakeError` raised inside what it is about, and where that stands."""
+    try:
+        yield
+    except MistakeError as mistake:
+        raise MistakeError(f"{what}: {mistake.message}", mistake.hint, mistake.line or line) from None
+
+
+def _some(names: Collection[str]) -> str:
+    first = list(names)[:5]
+    return f"{' '.join(map(shortened, first))}{f' and {len(names) - 5} more' if len(names) > 5 else ''}"  # noqa: PLR2004

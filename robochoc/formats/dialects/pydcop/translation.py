@@ -1,0 +1,207 @@
+"""Functions of pyDCOP's files as predicates and functions of ours, where they are simple: cheaper than tables."""
+
+from __future__ import annotations
+
+import ast
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from fractions import Fraction
+from typing import NamedTuple
+
+from robochoc.formats.dialects.pydcop.python_values import NoValueError, Value, literal
+from robochoc.formats.dialects.tables import Amount
+from robochoc.model.constraint import Domain
+from robochoc.model.expression import Apply, Constant, Expression, Name
+from robochoc.model.expression.bounds import Interval, bounds
+from robochoc.model.expression.parser import MAX_DEPTH
+
+_LARGEST = 2**62
+"""No result on the way may lie beyond it: ours are undefined from 2**63 on, Python's are not."""
+_MAX_PARTS = 1000
+_DENIAL = {"eq": "ne", "ne": "eq", "lt": "ge", "ge": "lt", "gt": "le", "le": "gt"}
+_ARITHMETIC = {ast.Add: "add", ast.Sub: "sub", ast.Mult: "mul"}
+_COMPARISONS = {ast.Eq: "eq", ast.NotEq: "ne", ast.Lt: "lt", ast.LtE: "le", ast.Gt: "gt", ast.GtE: "ge"}
+_CALLS = {"abs": (1, 1), "min": (2, 99), "max": (2, 99)}
+
+
+@dataclass(frozen=True)
+class Known:
+    """What is known of a variable: its domain here, and the kind of its values in the file.
+
+    Attributes:
+        domain: Its domain.
+        kind: The type of all its values. None: they are of several.
+    """
+
+    domain: Domain
+    kind: type | None
+
+
+class Violated(NamedTuple):
+    """A predicate, and what it costs where it does not hold."""
+
+    body: Expression
+    cost: Amount
+
+
+class _NotSimpleError(Exception):
+    """It has no counterpart here."""
+
+
+def translated(
+    body: Sequence[ast.stmt], scope: Sequence[str], variables: Mapping[str, Known], fixed: Mapping[str, Value]
+) -> Violated | Expression | None:
+    """Return what the statements of a function say, over formal parameters X0, X1, ... in the order of `scope`.
+
+    Returns:
+        A predicate and its cost, or an expression whose value is the cost. None: a table must say it.
+    """
+    try:
+        return _Translator(scope, variables, fixed).cost(_as_expression(body))
+    except (_NotSimpleError, NoValueError):
+        return None
+
+
+def _as_expression(body: Sequence[ast.stmt]) -> ast.expr:
+    """Return one expression for statements that only choose what to return."""
+    match body:
+        case [ast.Expr(value=value)] | [ast.Return(value=ast.expr() as value), *_]:
+            return value
+        case [ast.If(test=test, body=then, orelse=otherwise), *rest]:
+            return ast.IfExp(test, _as_expression(then), _as_expression([*otherwise, *rest]))
+        case _:
+            raise _NotSimpleError
+
+
+class _Translator:
+    def __init__(self, scope: Sequence[str], variables: Mapping[str, Known], fixed: Mapping[str, Value]) -> None:
+        self._fixed = fixed
+        self._variables = variables
+        self._formal = {name: f"X{place}" for place, name in enumerate(scope)}
+        self._limits: dict[str, Interval] = {}
+        for name, formal in self._formal.items():
+            ranges = variables[name].domain.ranges
+            self._limits[formal] = Interval(ranges[0][0], ranges[-1][-1])
+        self._parts = 0
+
+    def cost(self, node: ast.expr) -> Violated | Expression:
+        """Return a predicate with its cost where one of two costs is 0, and an integer expression otherwise."""
+        match node:
+            case ast.IfExp(test=test, body=then, orelse=otherwise):
+                first, second = _amount(then), _amount(otherwise)
+                if first == 0 and second is not None:
+                    return Violated(self.boolean(test), second)
+                if second == 0 and first is not None:
+                    return Violated(_denied(self.boolean(test)), first)
+            case _:
+                pass
+        return self.integer(node)
+
+    def integer(self, node: ast.expr) -> Expression:  # noqa: C901, PLR0911, PLR0912 - one case for each kind of node
+        """Return an integer expression. Booleans count 0 and 1, as in Python."""
+        match node:
+            case ast.Constant(value=bool(value)):
+                return Constant(int(value))
+            case ast.Constant(value=int(value)):
+                return self._made(Constant(value))
+            case ast.UnaryOp(op=ast.USub(), operand=ast.Constant(value=int(value))):
+                return self._made(Constant(-value))
+            case ast.Name(id=name) if type(fixed := self._fixed.get(name)) is int:
+                return self._made(Constant(int(fixed)))
+            case ast.Name(id=name) if self._kind(name) is int:
+                return self._made(Name(self._formal[name]))
+            case ast.UnaryOp(op=ast.USub(), operand=operand):
+                return self._apply("neg", [operand])
+            case ast.UnaryOp(op=ast.UAdd(), operand=operand):
+                return self.integer(operand)
+            case ast.BinOp(left=left, op=op, right=right) if type(op) in _ARITHMETIC:
+                return self._apply(_ARITHMETIC[type(op)], [left, right])
+            case ast.Call(func=ast.Name(id=name), args=arguments, keywords=[]) if name in _CALLS:
+                least, most = _CALLS[name]
+                if least <= len(arguments) <= most:
+                    return self._apply(name, arguments)
+            case ast.IfExp(test=test, body=then, orelse=otherwise):
+                return self._chosen(self.boolean(test), self.integer(then), self.integer(otherwise))
+            case ast.Compare() | ast.UnaryOp(op=ast.Not()):
+                return self._chosen(self.boolean(node), Constant(1), Constant(0))
+            case _:
+                pass
+        raise _NotSimpleError
+
+    def boolean(self, node: ast.expr) -> Expression:
+        """Return a Boolean expression."""
+        match node:
+            case ast.Compare(left=left, ops=ops, comparators=others):
+                terms = [left, *others]
+                parts = [self._compared(*three) for three in zip(ops, terms, others, strict=False)]
+                return parts[0] if len(parts) == 1 else self._made(Apply("and", tuple(parts)))
+            case ast.BoolOp(op=op, values=values):
+                name = "and" if isinstance(op, ast.And) else "or"
+                return self._made(Apply(name, tuple([self.boolean(one) for one in values])))
+            case ast.UnaryOp(op=ast.Not(), operand=operand):
+                return _denied(self.boolean(operand))
+            case _:
+                raise _NotSimpleError
+
+    def _compared(self, op: ast.cmpop, left: ast.expr, right: ast.expr) -> Expression:
+        name = _COMPARISONS.get(type(op))
+        if name is None:
+            raise _NotSimpleError
+        match left, right:
+            case ast.Name(id=one), ast.Name(id=other) if name in ("eq", "ne") and self._alike(one, other):
+                return self._made(Apply(name, (Name(self._formal[one]), Name(self._formal[other]))))
+            case _:
+                return self._made(Apply(name, (self.integer(left), self.integer(right))))
+
+    def _alike(self, one: str, other: str) -> bool:
+        """Return whether equal codes of two variables are equal values."""
+        kind = self._kind(one)
+        return kind is not None and kind is self._kind(other)
+
+    def _kind(self, name: str) -> type | None:
+        return self._variables[name].kind if name in self._formal else None
+
+    def _apply(self, operator: str, arguments: Sequence[ast.expr]) -> Expression:
+        made = [self.integer(one) for one in arguments]
+        if operator in ("add", "mul") and isinstance(made[0], Apply) and made[0].operator == operator:
+            made = [*made[0].arguments, *made[1:]]  # a long sum is one sum, not a deep tree
+        return self._made(Apply(operator, tuple(made)))
+
+    def _chosen(self, condition: Expression, then: Expression, otherwise: Expression) -> Expression:
+        return self._made(Apply("if", (condition, then, otherwise)))
+
+    def _made(self, expression: Expression) -> Expression:
+        """Return `expression`. Raises `_NotSimpleError` where it is too long or its value too large."""
+        self._parts += 1
+        low, high = bounds(expression, self._limits)
+        if self._parts > _MAX_PARTS or low < -_LARGEST or high > _LARGEST or _depth(expression) > MAX_DEPTH // 2:
+            raise _NotSimpleError
+        return expression
+
+
+def _depth(expression: Expression) -> int:
+    return 1 + max(map(_depth, expression.arguments), default=0) if isinstance(expression, Apply) else 1
+
+
+def _amount(node: ast.expr) -> Amount | None:
+    """Return the number that `node` is. None: it is none."""
+    match node:
+        case ast.Constant(value=value):
+            amount: Value = literal(value)
+            return amount if isinstance(amount, (int, Fraction)) else None
+        case ast.UnaryOp(op=ast.USub(), operand=operand):
+            amount = _amount(operand)
+            return None if amount is None else -amount
+        case ast.Call(func=ast.Name(id="float"), args=[ast.Constant(value="inf")], keywords=[]):
+            return float("inf")
+        case _:
+            return None
+
+
+def _denied(expression: Expression) -> Expression:
+    match expression:
+        case Apply("not", (inner,)):
+            return inner
+        case Apply(operator, arguments) if operator in _DENIAL:
+            return Apply(_DENIAL[operator], arguments)
+    return Apply("not", (expression,))

@@ -1,0 +1,126 @@
+"""Exact costs of other tools as integers in a team's unit, and tables of them as relations."""
+
+from __future__ import annotations
+
+import math
+import re
+from collections import Counter
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from fractions import Fraction
+
+from robochoc.formats.definitions import MAX_TUPLES, PREDEFINED
+from robochoc.formats.diagnostics import MistakeError, shortened
+from robochoc.formats.names import BEYOND
+from robochoc.model.constraint import INFINITE, Relation, Semantics
+from robochoc.model.cost_units import MAX_PLACES
+
+Amount = int | Fraction | float
+"""A cost as it was written, exactly; the only float is `INFINITE`, which forbids."""
+
+
+@dataclass(frozen=True)
+class CostTable:
+    """The costs of the values of some variables.
+
+    Attributes:
+        name: Its name.
+        rows: The costs of some tuples.
+        default: The cost of all others.
+        size: The number of all tuples.
+    """
+
+    name: str
+    rows: Mapping[tuple[int, ...], Amount]
+    default: Amount
+    size: int
+
+    def amounts(self) -> Iterable[Amount]:
+        """Return the costs that occur."""
+        return {*self.rows.values()} | ({self.default} if len(self.rows) < self.size else set())
+
+    @property
+    def least(self) -> Amount:
+        """The least cost."""
+        return min(self.amounts(), default=INFINITE)
+
+
+class Scale:
+    """The decimal places that some costs need, at most nine; costs that need more are rounded."""
+
+    def __init__(self, amounts: Iterable[Amount]) -> None:
+        needed = [decimal_places(amount) for amount in amounts if isinstance(amount, Fraction)]
+        self.rounds = any(places is None or places > MAX_PLACES for places in needed)
+        self.places = MAX_PLACES if self.rounds else max((places or 0 for places in needed), default=0)
+
+    def units(self, amount: Amount) -> float:
+        """Return `amount` as an integer number of units. Raises `MistakeError` where that is too large."""
+        if amount == INFINITE:
+            return INFINITE
+        whole: int = round(Fraction(amount) * 10**self.places)
+        if not -BEYOND < whole < BEYOND:
+            what = f"a cost of {shortened(str(int(amount)))} with {self.places} decimal places"
+            raise MistakeError(what, "costs have at most 18 digits, decimal places included")
+        return whole
+
+
+def decimal_places(number: Fraction) -> int | None:
+    """Return how many decimal places `number` has. None: it has no end."""
+    rest, twos, fives = number.denominator, 0, 0
+    while rest % 2 == 0:
+        rest, twos = rest // 2, twos + 1
+    while rest % 5 == 0:
+        rest, fives = rest // 5, fives + 1
+    return max(twos, fives) if rest == 1 else None
+
+
+def relation(table: CostTable, arity: int, scale: Scale) -> Relation | int:
+    """Return `table` as a relation, as short as it goes; an integer where all costs are this one, and not infinite.
+
+    Raises:
+        MistakeError: if a cost or the table is too large.
+    """
+    rows = {values: scale.units(cost) for values, cost in table.rows.items()}
+    default = scale.units(table.default)
+    if len(rows) == table.size and rows:
+        default = Counter(rows.values()).most_common(1)[0][0]
+    listed = {values: cost for values, cost in rows.items() if cost != default}
+    if not listed and default != INFINITE:
+        return int(default)
+    if len(listed) > MAX_TUPLES:
+        raise MistakeError(f"{len(listed)} tuples are more than {MAX_TUPLES}", "make domains or scopes smaller")
+    name = definition_name(table.name)
+    if {*listed.values(), default} <= {0, INFINITE}:
+        semantics = Semantics.CONFLICTS if default == 0 else Semantics.SUPPORTS
+        return Relation(name, arity, semantics, tuple(listed))
+    return Relation(name, arity, Semantics.SOFT, tuple(listed), tuple(listed.values()), default)
+
+
+def word(name: str) -> str:
+    """Return `name` as it can stand as a constraint's: without blanks and signs that no XML file can hold."""
+    return re.sub(r"[^!-~\u00a1-\ud7ff\ue000-\ufffd]", "_", name) or "_"
+
+
+def definition_name(name: str) -> str:
+    """Return `name` as it can stand as a relation's, a predicate's or a function's."""
+    plain = word(name)
+    return f"{plain}_" if plain in PREDEFINED or plain.startswith("global:") else plain
+
+
+def forbidding(amount: Amount, infinity: int | None, *, maximize: bool) -> Amount:
+    """Return `amount`, or `INFINITE` where it forbids.
+
+    Args:
+        amount: A cost as it was written; it may be an infinity of either sign.
+        infinity: Costs of at least so much forbid, or of at most minus so much when maximising. None: only infinities.
+        maximize: Whether costs are maximised.
+
+    Raises:
+        MistakeError: for the infinity that would be the best of all costs.
+    """
+    bad = -amount if maximize else amount
+    if bad == -math.inf:
+        raise MistakeError(
+            f"the cost {'infinity' if maximize else '-infinity'}", "only what forbids can be infinite: write a number"
+        )
+    return INFINITE if bad == math.inf or (infinity is not None and bad >= infinity) else amount

@@ -1,0 +1,263 @@
+"""toulbar2's `.cfn`: JSON with fewer signs (toulbar2's documentation, "CFN format").
+
+Quotes, commas and colons only separate; braces and brackets are the same; without tags the order says what is what.
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+import re
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+from fractions import Fraction
+
+from robochoc.formats.definitions import MAX_TUPLES, MAX_VALUES
+from robochoc.formats.diagnostics import shortened, suggestion
+from robochoc.formats.dialects.dialect import Imported, ImportOptions, Note
+from robochoc.formats.dialects.tables import Amount, CostTable
+from robochoc.formats.dialects.toulbar2.network import CostFunction, Network, imported
+from robochoc.formats.dialects.toulbar2.text import Reader, Words
+from robochoc.model.constraint import INFINITE
+
+_TOKEN = re.compile(r'[{}\[\]]|[^{}\[\]\s":,]+')
+
+
+def read(text: str, stem: str, options: ImportOptions) -> Imported:
+    """Return the problem in the `text` of a file. Raises `MistakeError`."""
+    network = _CfnReader(Reader(_words(text)), stem).network()
+    return imported(network, options, "cfn")
+
+
+def _words(text: str) -> Words:
+    for number, line in enumerate(text.split("\n"), 1):
+        if not line.startswith("#"):
+            for match in _TOKEN.finditer(line.split("//", 1)[0]):
+                yield number, match[0]
+
+
+class _CfnReader:
+    def __init__(self, reader: Reader, stem: str) -> None:
+        self._in = reader
+        self._stem = stem
+        self._tagged = False
+        self._variables: dict[str, int | tuple[str, ...]] = {}
+        self._names: list[str] = []
+        self._known: dict[str, int] = {}
+        self._tables: dict[str, CostTable] = {}
+        self._functions: list[CostFunction] = []
+        self._shared: list[tuple[int, str]] = []
+        self._places = 0
+        self._truncated = False
+
+    def network(self) -> Network:
+        """Return the network in the file. Raises `MistakeError`."""
+        name, bound, maximize = self._header()
+        self._read_variables()
+        self._tag("functions")
+        self._open("the functions")
+        while (word := self._in.more()) is not None and not _closes(word):
+            self._read_function(word)
+        for place, wanted in self._shared:
+            self._functions[place] = self._sharing(self._functions[place], wanted)
+        notes: tuple[Note, ...] = ()
+        if self._truncated:
+            text = f"costs are cut to the {self._places} decimal places of mustbe, as toulbar2 does"
+            notes = (Note("truncated", text),)
+        return Network(_title(name, self._stem), self._variables, self._functions, bound, maximize, notes)
+
+    def _header(self) -> tuple[str, Amount, bool]:
+        self._open("the problem")
+        word = self._in.word("'problem'")
+        if word == "problem":
+            self._tagged = True
+            word = self._in.word("'{'")
+        if not _opens(word):
+            self._in.refuse(f"'{shortened(word)}' where '{{' should stand", 'write { "problem": { "name": ...')
+        self._tag("name")
+        name = self._in.word("the problem's name")
+        self._tag("mustbe")
+        word = self._in.word("the bound")
+        if word[0] not in "<>" or word[1:] == "inf":
+            self._in.refuse(f"the bound '{shortened(word)}'", "write <100.00 to minimise, or >-100.00 to maximise")
+        self._places = len(word.partition(".")[2])
+        bound = self._in.amount(word[1:])
+        self._close("the problem")
+        return name, bound, word[0] == ">"
+
+    def _read_variables(self) -> None:
+        self._tag("variables")
+        self._open("the variables")
+        while not _closes(word := self._in.word("a variable")):
+            if _opens(word) or word[0].isdigit() or word[0] == "-":
+                name = f"x{len(self._names)}"
+            else:
+                name, word = word, self._in.word("a domain")
+            if name in self._variables:
+                self._in.refuse(f"a second variable '{shortened(name)}'", "names are unique: rename one of them")
+            self._variables[name] = self._domain(word)
+            self._known[name] = len(self._names)
+            self._names.append(name)
+        if not self._names:
+            self._in.refuse("there are no variables", 'write "variables": {"x": 2}')
+
+    def _domain(self, word: str) -> int | tuple[str, ...]:
+        if not _opens(word):
+            size = abs(self._in.as_integer(word, "a domain or its size"))
+            if not 0 < size <= MAX_VALUES:
+                self._in.refuse(f"a domain of {size} values", f"from 1 to {MAX_VALUES}")
+            return size
+        values: dict[str, None] = {}
+        while not _closes(one := self._in.word("a value")):
+            if one in values or _opens(one):
+                self._in.refuse(f"'{shortened(one)}' where another value should stand", "name each value once")
+            values[one] = None
+        if not values:
+            self._in.refuse("a domain without values", "write [a b c], or how many there are")
+        return tuple(values)
+
+    def _read_function(self, word: str) -> None:
+        name = f"f{len(self._functions)}"
+        if not _opens(word):
+            name = word
+            self._open(f"the function {shortened(name)}")
+        line = self._in.line
+        self._tag("scope")
+        scope = self._scope()
+        default, word = self._default()
+        sized = math.prod(self._size(place) for place in scope)
+        if self._tagged and word == "type":
+            self._refuse_type(self._in.word("a type"))
+        if self._tagged:
+            if word != "costs":
+                self._in.refuse(f"'{shortened(word)}' where 'costs' should stand", 'write "costs": [...]')
+            word = self._in.word("costs")
+        if _opens(word):
+            rows = self._dense(scope, sized) if default is None else self._sparse(scope, default)
+            table = CostTable(name, rows, default or 0, sized)
+        else:
+            self._shared.append((len(self._functions), word))
+            table = CostTable(name, {}, 0, sized)
+        self._functions.append(CostFunction(scope, table, line))
+        self._tables.setdefault(name, table)
+        closing = self._in.word("'}'")
+        if _opens(closing) and not self._tagged:
+            self._refuse_type(word)
+        if not _closes(closing):
+            self._in.refuse(f"'{shortened(closing)}' where the function should end", "close it")
+
+    def _default(self) -> tuple[Amount | None, str]:
+        """Return the default cost, if there is one, and the word behind it."""
+        word = self._in.word("costs")
+        if self._tagged and word == "defaultcost":
+            return self._cost(self._in.word("a cost")), self._in.word("'costs'")
+        if not self._tagged and (word[0] in "0123456789-+." or word == "inf"):
+            return self._cost(word), self._in.word("costs")
+        return None, word
+
+    def _scope(self) -> tuple[int, ...]:
+        self._open("the scope")
+        scope: list[int] = []
+        while not _closes(word := self._in.word("a variable")):
+            counted = word[0].isdigit()
+            place = self._in.as_integer(word, "a variable") if counted else self._known.get(word, -1)
+            if not 0 <= place < len(self._names):
+                self._in.refuse(
+                    f"the scope has '{shortened(word)}', which is no variable",
+                    suggestion(word, self._names, "variables"),
+                )
+            if place in scope:
+                self._in.refuse(f"the scope has '{shortened(word)}' twice", "name each variable once")
+            scope.append(place)
+        return tuple(scope)
+
+    def _dense(self, scope: Sequence[int], size: int) -> dict[tuple[int, ...], Amount]:
+        """Return the costs of all tuples, which stand in lexicographic order."""
+        if size > MAX_TUPLES:
+            self._in.refuse(f"a function of {size} tuples", f"at most {MAX_TUPLES} are read")
+        rows: dict[tuple[int, ...], Amount] = {}
+        for values in itertools.product(*[range(self._size(place)) for place in scope]):
+            word = self._in.word("a cost")
+            if _closes(word):
+                self._in.refuse(f"{len(rows)} costs instead of {size}", "write one for each tuple")
+            rows[values] = self._cost(word)
+        if not _closes(self._in.word("']'")):
+            self._in.refuse(f"more than {size} costs", "write one for each tuple")
+        return rows
+
+    def _sparse(self, scope: Sequence[int], default: Amount) -> dict[tuple[int, ...], Amount]:
+        rows: dict[tuple[int, ...], Amount] = {}
+        while not _closes(word := self._in.word("a tuple")):
+            if not scope:
+                self._in.refuse("a default cost and another one", "a constant has one cost")
+            values = [self._value(scope[0], word)]
+            values += [self._value(place, self._in.word("a value")) for place in scope[1:]]
+            cost = self._cost(self._in.word("a cost"))
+            if rows.get(tuple(values), default) != default:
+                self._in.refuse("a tuple that stands twice", "delete one of them")
+            rows[tuple(values)] = cost
+            if len(rows) > MAX_TUPLES:
+                self._in.refuse(f"a function of more than {MAX_TUPLES} tuples", "make it smaller")
+        return rows
+
+    def _value(self, place: int, word: str) -> int:
+        domain = self._variables[self._names[place]]
+        if word[0].isdigit():
+            number = self._in.as_integer(word, "a value")
+        elif isinstance(domain, int):
+            number = int(word[1:]) if re.fullmatch(r"v[0-9]{1,9}", word) else -1
+        else:
+            number = domain.index(word) if word in domain else -1
+        if not 0 <= number < self._size(place):
+            what = f"the value '{shortened(word)}', which {shortened(self._names[place])} has not"
+            self._in.refuse(what, "values are named, or counted from 0 on")
+        return number
+
+    def _size(self, place: int) -> int:
+        domain = self._variables[self._names[place]]
+        return domain if isinstance(domain, int) else len(domain)
+
+    def _cost(self, word: str) -> Amount:
+        """Return a cost, cut to the places of `mustbe`."""
+        amount = self._in.amount(word)
+        if not isinstance(amount, Fraction) or amount == INFINITE:
+            return amount
+        cut = Fraction(math.trunc(amount * 10**self._places), 10**self._places)
+        self._truncated |= cut != amount
+        return cut
+
+    def _sharing(self, function: CostFunction, wanted: str) -> CostFunction:
+        self._in.line = function.line
+        table = self._tables.get(wanted)
+        if table is None:
+            self._in.refuse(f"the costs of '{shortened(wanted)}', which is no function", "write costs: [...]")
+        if table.size != function.table.size or {len(values) for values in table.rows} - {len(function.scope)}:
+            self._in.refuse(f"the costs of '{shortened(wanted)}', which has other domains", "write costs: [...]")
+        return replace(function, table=replace(table, name=function.table.name))
+
+    def _refuse_type(self, name: str) -> Iterator[None]:
+        self._in.refuse(f"the global cost function '{shortened(name)}'", "only tables of costs are read")
+
+    def _tag(self, wanted: str) -> None:
+        if self._tagged and (word := self._in.word(f"'{wanted}'")) != wanted:
+            self._in.refuse(f"'{shortened(word)}' where '{wanted}' should stand", "tags stand in their order")
+
+    def _open(self, what: str) -> None:
+        if not _opens(word := self._in.word("'{'")):
+            self._in.refuse(f"'{shortened(word)}' where {what} should begin", "write { or [")
+
+    def _close(self, what: str) -> None:
+        if not _closes(word := self._in.word("'}'")):
+            self._in.refuse(f"'{shortened(word)}' where {what} should end", "write } or ]")
+
+
+def _title(name: str, stem: str) -> str:
+    return re.sub(r"[^A-Za-z0-9_.-]+", "_", name)[:100].strip("._-") or stem
+
+
+def _opens(word: str) -> bool:
+    return word in ("{", "[")
+
+
+def _closes(word: str) -> bool:
+    return word in ("}", "]")

@@ -1,0 +1,176 @@
+"""A cost function network, whichever format it is in, and the team that it makes."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from fractions import Fraction
+
+from robochoc.formats.definitions import check_domain
+from robochoc.formats.diagnostics import MistakeError
+from robochoc.formats.dialects.dialect import Imported, ImportOptions, Names, Note, notes_on_names
+from robochoc.formats.dialects.owners import owners_by
+from robochoc.formats.dialects.tables import Amount, CostTable, Scale, forbidding, relation, word
+from robochoc.model.assembly import assemble
+from robochoc.model.constraint import INFINITE, Constraint, ConstraintModel, Domain, Relation, Semantics, Variable
+from robochoc.model.cost_units import CostUnits
+from robochoc.model.problem import ProblemKind
+
+
+@dataclass(frozen=True)
+class CostFunction:
+    """A cost function: its variables by their places, and the costs of tuples of places of values."""
+
+    scope: tuple[int, ...]
+    table: CostTable
+    line: int
+
+
+@dataclass(frozen=True)
+class Network:
+    """A cost function network.
+
+    Attributes:
+        name: Its name.
+        variables: Its variables by name: how many values each has, or their names.
+        functions: Its cost functions. A scope may be empty.
+        bound: All costs are below it; above, when maximising.
+        maximize: Whether costs are maximised.
+        notes: What reading it has changed.
+    """
+
+    name: str
+    variables: Mapping[str, int | tuple[str, ...]]
+    functions: Sequence[CostFunction]
+    bound: Amount
+    maximize: bool = False
+    notes: tuple[Note, ...] = ()
+
+
+def imported(network: Network, options: ImportOptions, dialect: str) -> Imported:
+    """Return `network` as a team. Raises `MistakeError`."""
+    names, robots, symbols = Names(), Names(), Names()
+    codes, domains = _domains(network, symbols)
+    owners = owners_by(options.owner, network.variables) if options.owner is not None else {}
+    variables: dict[str, list[Variable]] = {}
+    for name in network.variables:
+        variables.setdefault(robots.of(owners.get(name, name)), []).append(Variable(names.of(name), domains[name]))
+    functions = list(_forbidding(network, options.infinity))
+    scale = Scale(amount for one in functions for amount in one.table.amounts())
+    places, constant, constraints = list(network.variables), 0, []
+    for one in functions:
+        made = _relation(one, scale, [codes[places[place]] for place in one.scope])
+        if isinstance(made, int):
+            constant += made
+        else:
+            scope = tuple(names.of(places[place]) for place in one.scope)
+            name = word(one.table.name)
+            constraints.append(Constraint(name, made, scope, scope, ConstraintModel.TKC, line=one.line))
+    notes = [*network.notes, *_notes(network, functions, scale)]
+    notes += notes_on_names([*names.changed.items(), *symbols.changed.items()])
+    if options.owner is None:
+        notes.append(Note("owner", "the format knows no owners: each variable is a robot's of its own"))
+    title = options.name or network.name
+    if constant or any(_is_soft(one) for one in constraints):
+        units = CostUnits(network.maximize, scale.places, constant)
+        team = assemble(title, variables, constraints, kind=ProblemKind.DISWCSP, costs=units)
+    else:
+        team = assemble(title, variables, constraints)
+    return Imported(team, dialect, {**names.changed, **robots.changed}, tuple(notes))
+
+
+def _is_soft(constraint: Constraint) -> bool:
+    return isinstance(constraint.definition, Relation) and constraint.definition.semantics is Semantics.SOFT
+
+
+def _domains(network: Network, symbols: Names) -> tuple[dict[str, Sequence[int]], dict[str, Domain]]:
+    """Return the integers of each variable's values, in the order of the file, and its domain."""
+    named = {
+        symbols.of(one): None for values in network.variables.values() if not isinstance(values, int) for one in values
+    }
+    places = {name: place for place, name in enumerate(named)}
+    codes: dict[str, Sequence[int]] = {}
+    domains = {}
+    for name, values in network.variables.items():
+        title = f"D_{word(name)}"
+        if isinstance(values, int):
+            codes[name] = range(values)
+            domains[name] = Domain(title, (range(values),))
+        else:
+            codes[name] = [places[symbols.of(one)] for one in values]
+            domains[name] = Domain(title, tuple(range(one, one + 1) for one in sorted(codes[name])), tuple(places))
+        check_domain(domains[name])
+    return codes, domains
+
+
+def _relation(function: CostFunction, scale: Scale, codes: Sequence[Sequence[int]]) -> Relation | int:
+    rows = {
+        tuple([known[place] for known, place in zip(codes, values, strict=True)]): cost
+        for values, cost in function.table.rows.items()
+    }
+    try:
+        made = relation(replace(function.table, rows=rows), len(function.scope), scale)
+    except MistakeError as mistake:
+        raise MistakeError(mistake.message, mistake.hint, function.line) from None
+    if not isinstance(made, int) and not function.scope:
+        what = "the constant forbids everything"
+        raise MistakeError(what, "delete it, and the problem has a solution", function.line)
+    return made
+
+
+def _forbidding(network: Network, infinity: int | None) -> Iterator[CostFunction]:
+    """Yield the functions; what no solution below the bound can have is forbidden in them.
+
+    A tuple is, if even with the least cost of all other functions the sum reaches the bound.
+    """
+    sign = -1 if network.maximize else 1
+
+    def told(amount: Amount) -> Amount:
+        return forbidding(amount, infinity, maximize=network.maximize) if abs(amount) != INFINITE else INFINITE
+
+    functions = [_changed(one, told) for one in network.functions]
+    least = [min((_signed(cost, sign) for cost in one.table.amounts()), default=0) for one in functions]
+    if INFINITE in least:
+        yield from functions
+        return
+    if abs(network.bound) == INFINITE:
+        yield from functions
+        return
+    room = sign * Fraction(network.bound) - sum(Fraction(low) for low in least)
+    for one, low in zip(functions, least, strict=True):
+        limit = room + Fraction(low)
+
+        def cut(amount: Amount, limit: Fraction = limit) -> Amount:
+            return INFINITE if _signed(amount, sign) >= limit else amount
+
+        yield one if not one.scope else _changed(one, cut)
+
+
+def _signed(amount: Amount, sign: int) -> Amount:
+    return amount if amount == INFINITE else sign * amount
+
+
+def _changed(function: CostFunction, change: object) -> CostFunction:
+    if not callable(change):
+        raise TypeError
+    known = {amount: change(amount) for amount in {*function.table.rows.values(), function.table.default}}
+    rows = {values: known[cost] for values, cost in function.table.rows.items()}
+    return replace(function, table=replace(function.table, rows=rows, default=known[function.table.default]))
+
+
+def _notes(network: Network, functions: Iterable[CostFunction], scale: Scale) -> Iterator[Note]:
+    if scale.rounds:
+        yield Note("rounded", f"some costs have more than {scale.places} decimal places, and were rounded to that many")
+    sign = -1 if network.maximize else 1
+    most: Amount = 0
+    for one in functions:
+        finite = [sign * amount for amount in one.table.amounts() if amount != INFINITE]
+        most += max(finite, default=0)
+    if most >= sign * network.bound:
+        side = "above" if network.maximize else "below"
+        bound = float(network.bound) if not math.isinf(network.bound) else "inf"
+        text = (
+            f"toulbar2 accepts only sums {side} {bound:g}; here what reaches it is a solution, too, and its cost tells"
+        )
+        yield Note("bound", text)

@@ -1,0 +1,117 @@
+"""toulbar2's `.wcsp`: numbers in a row (toulbar2's documentation, "wcsp format")."""
+
+from __future__ import annotations
+
+import math
+import re
+from dataclasses import replace
+
+from robochoc.formats.definitions import MAX_TUPLES, MAX_VALUES
+from robochoc.formats.diagnostics import shortened
+from robochoc.formats.dialects.dialect import Imported, ImportOptions, Note
+from robochoc.formats.dialects.tables import Amount, CostTable
+from robochoc.formats.dialects.toulbar2.network import CostFunction, Network, imported
+from robochoc.formats.dialects.toulbar2.text import Reader, Words
+
+MAX_VARIABLES = 1_000_000
+"""The maximum number of variables and of cost functions."""
+
+
+def read(text: str, stem: str, options: ImportOptions) -> Imported:
+    """Return the problem in the `text` of a file. Raises `MistakeError`."""
+    return imported(_WcspReader(Reader(_words(text)), stem).network(), options, "wcsp")
+
+
+def _words(text: str) -> Words:
+    for number, line in enumerate(text.split("\n"), 1):
+        for word in line.split():
+            yield number, word
+
+
+class _WcspReader:
+    def __init__(self, reader: Reader, stem: str) -> None:
+        self._in = reader
+        self._stem = stem
+        self._sizes: list[int] = []
+        self._shared: list[CostTable] = []
+
+    def network(self) -> Network:
+        """Return the network in the file. Raises `MistakeError`."""
+        name = re.sub(r"[^A-Za-z0-9_.-]+", "_", self._in.word("the name"))[:100].strip("._-")
+        count = self._count("the number of variables")
+        self._in.integer("the maximum size of a domain")
+        functions = self._count("the number of cost functions")
+        bound = self._in.integer("the upper bound")
+        if count < 1:
+            self._in.refuse("there are no variables", "a problem has one or more")
+        for _ in range(count):
+            size = abs(self._in.integer("the size of a domain"))
+            if not 0 < size <= MAX_VALUES:
+                self._in.refuse(f"a domain of {size} values", f"from 1 to {MAX_VALUES}")
+            self._sizes.append(size)
+        found: list[CostFunction] = []
+        notes: tuple[Note, ...] = ()
+        for number in range(functions):
+            word = self._in.more()
+            if word is None:
+                text = f"the file announces {functions} cost functions, and has {number}"
+                notes = (Note("count", text),)
+                break
+            found.append(self._function(self._in.as_integer(word, "the arity of a function"), number))
+        variables: dict[str, int | tuple[str, ...]] = {f"x{place}": size for place, size in enumerate(self._sizes)}
+        return Network(name or self._stem, variables, found, bound, notes=notes)
+
+    def _count(self, what: str) -> int:
+        number = self._in.integer(what)
+        if not 0 <= number <= MAX_VARIABLES:
+            self._in.refuse(f"{what} is {number}", f"from 0 to {MAX_VARIABLES}")
+        return number
+
+    def _function(self, arity: int, number: int) -> CostFunction:
+        line, shared = self._in.line, arity < 0
+        scope = tuple(self._place() for _ in range(min(abs(arity), len(self._sizes) + 1)))
+        if len(set(scope)) < abs(arity):
+            self._in.refuse(f"the scope '{shortened(' '.join(map(str, scope)))}'", "name each variable once")
+        default = self._in.integer("a default cost")
+        if default == -1:
+            name = self._in.word("the name of a function")
+            self._in.refuse(f"the named cost function '{shortened(name)}'", "only tables of costs are read")
+        table = self._table(f"f{number}", scope, default)
+        if shared:
+            self._shared.append(table)
+        return CostFunction(scope, table, line)
+
+    def _table(self, name: str, scope: tuple[int, ...], default: int) -> CostTable:
+        size = math.prod(self._sizes[place] for place in scope)
+        count = self._in.integer("the number of tuples")
+        if count < 0:
+            if -count > len(self._shared):
+                self._in.refuse(f"the shared function {-count}, which is not there yet", "shared ones count from 1")
+            table = self._shared[-count - 1]
+            if table.size != size or {len(values) for values in table.rows} - {len(scope)}:
+                self._in.refuse(f"the shared function {-count}, which has other domains", "write the tuples")
+            return replace(table, name=name)
+        if count > MAX_TUPLES:
+            self._in.refuse(f"a function of {count} tuples", f"at most {MAX_TUPLES} are read")
+        rows: dict[tuple[int, ...], Amount] = {}
+        for _ in range(count):
+            values = tuple([self._value(place) for place in scope])
+            rows[values] = self._cost(self._in.integer("a cost"))
+        return CostTable(name, rows, self._cost(default), size)
+
+    def _place(self) -> int:
+        place = self._in.integer("a variable")
+        if not 0 <= place < len(self._sizes):
+            self._in.refuse(f"the variable {place}", f"variables count from 0 to {len(self._sizes) - 1}")
+        return place
+
+    def _value(self, place: int) -> int:
+        value = self._in.integer("a value")
+        if not 0 <= value < self._sizes[place]:
+            self._in.refuse(f"the value {value} of the variable {place}", f"it has {self._sizes[place]}, from 0 on")
+        return value
+
+    def _cost(self, cost: int) -> int:
+        if cost < 0:
+            self._in.refuse(f"the cost {cost}", "costs are 0 or more")
+        return cost
