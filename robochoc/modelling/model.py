@@ -19,7 +19,7 @@ import itertools
 from pathlib import Path
 from typing import Self
 
-from robochoc.formats import read_team, write_team
+from robochoc.formats import InvalidInputError, read_team, write_team
 from robochoc.model.cost_units import PLAIN_COSTS
 from robochoc.model.outcome import Outcome
 from robochoc.model.problem import Team
@@ -229,7 +229,7 @@ class Model(Solvable):
 
         try:
             team = self.team
-        except ModelError as unfinished:
+        except (ModelError, InvalidInputError) as unfinished:
             return heading(repr(self), str(unfinished))
         coded = {name: one.domain for name, one in self.variables.items() if one.codes.told is not None}
         return team_html(team, coded)

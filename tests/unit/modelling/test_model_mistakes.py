@@ -111,6 +111,7 @@ MISTAKES: list[tuple[Callable[[Made], object], str]] = [
     (lambda m: m.model.after_solution().remove_constraint("C9"), "no constraint 'C9'"),
     (lambda m: m.model.after_solution().add(m.x == 1), "of a alone"),
     (lambda m: m.model.add(m.model.after_solution().robot("late").variable("v", [1]) == 1), "event.add"),
+    (lambda m: m.model.add(abs(m.x * 10**19 - m.y) > 3, name="huge"), "20 digits"),
     (lambda _: robochoc.Model().team, "no robot"),
 ]
 
