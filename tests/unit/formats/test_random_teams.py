@@ -119,7 +119,7 @@ def price(team: Team, assignment: dict[str, int]) -> float:
     )
 
 
-@count("seeds", 40, 3000)
+@count("seeds", 40, 1000)
 def test_what_is_written_is_read_back(seeds: int, tmp_path_factory: pytest.TempPathFactory) -> None:
     for seed in range(seeds):
         team = random_team(seed)
@@ -132,7 +132,7 @@ def test_what_is_written_is_read_back(seeds: int, tmp_path_factory: pytest.TempP
             assert robot_in(robot_xml(robot), robot.name) == robot, seed
 
 
-@count("seeds", 25, 1500)
+@count("seeds", 25, 400)
 def test_it_costs_the_same_when_normalised_and_recorded(seeds: int) -> None:
     for seed in range(seeds):
         team = random_team(seed)

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import inspect
 from collections.abc import Callable
+from dataclasses import fields
 from enum import Enum
 from pathlib import Path
 
@@ -12,6 +14,7 @@ import robochoc
 from robochoc.model.problem import Team
 from robochoc.modelling.places import ModelTypeError, UnknownNameError
 from robochoc.modelling.terms import Variable
+from robochoc.run.options import Options
 
 
 class Color(Enum):
@@ -153,6 +156,11 @@ def test_names_of_the_library_are_listed_and_guessed() -> None:
         _ = robochoc.all_diferent
 
 
+def test_every_option_of_a_run_has_its_name() -> None:
+    named = {*inspect.signature(robochoc.Problem.solve).parameters}
+    assert {one.name for one in fields(Options)} <= named
+
+
 OPTIONS: list[tuple[dict[str, object], type[Exception], str]] = [
     ({"timout": 3}, TypeError, "did you mean 'timeout'"),
     ({"runtime": "simulater"}, ValueError, "did you mean 'simulator'"),
@@ -160,6 +168,7 @@ OPTIONS: list[tuple[dict[str, object], type[Exception], str]] = [
     ({"order": ["a", "bb"]}, ValueError, "no robot 'bb'"),
     ({"withdraw": "some"}, ValueError, "expected minimum, maximal"),
     ({"on_loss": "withdrw"}, ValueError, "did you mean 'withdraw'"),
+    ({"central_with": "ortool"}, ValueError, "did you mean 'ortools'"),
     ({"schedule": "rndom"}, ValueError, "did you mean 'random'"),
     ({"protocol": "dpopp"}, LookupError, "did you mean 'dpop'"),
 ]
