@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 from fractions import Fraction
 from pathlib import Path
 from random import Random
@@ -14,6 +15,7 @@ from robochoc.formats.diagnostics import InvalidInputError
 from robochoc.formats.dialects.dialect import Imported, ImportOptions
 from robochoc.formats.dialects.registry import recognise
 from robochoc.formats.dialects.xcsp3 import DIALECT
+from robochoc.model.cost_units import CostUnits
 from robochoc.model.costs import normalized, told_cost
 from robochoc.model.problem import Team
 from robochoc.solver.central import CentralSolver
@@ -324,3 +326,28 @@ def test_teams_written_and_read_again_have_the_same_optimum(batch: int, tmp_path
             assert told_cost(again, second.cost) == first.cost == cost_of(first.assignment, list(team.constraints())), (
                 seed
             )
+
+
+def with_units(team: Team, chance: Random) -> Team:
+    """`team` with decimals, a constant, and perhaps maximised."""
+    units = CostUnits(maximize=chance.random() < 0.5, places=chance.choice((0, 2)), constant=0)
+    robots = [replace(robot, costs=units) for robot in team.robots]
+    robots[0] = replace(robots[0], costs=replace(units, constant=chance.randint(-30, 30)))
+    return replace(team, robots=tuple(robots))
+
+
+@pytest.mark.parametrize("batch", [0, *(pytest.param(one, marks=pytest.mark.slow) for one in range(1, 11))])
+def test_units_directions_and_constants_are_written(batch: int, tmp_path: Path) -> None:
+    assert DIALECT.write is not None
+    for seed in range(3 * batch, 3 * batch + 3):
+        chance = Random(seed)
+        team = with_units(random_cost_team(chance), chance)
+        ((name, document),) = DIALECT.write(team).items()
+        (tmp_path / name).write_bytes(document)
+        again = normalized(DIALECT.read([tmp_path / name], ImportOptions()).team)
+        small = normalized(team)
+        first, second = CentralSolver().solve(small), CentralSolver().solve(again)
+        assert first.verdict is second.verdict, seed
+        if first.cost is not None and second.cost is not None:
+            scale = 10**small.told_in.places
+            assert told_cost(again, second.cost) == told_cost(small, first.cost) * scale, seed
