@@ -6,6 +6,7 @@ Names:
     Model: A problem that is made in Python, with operators.
     all_different, allowed, forbidden, costs, function, element, cumulative, minimum, maximum, if_then_else, all_of,
         any_of: Constraints and costs of a model that no operator makes.
+    from_cpmpy: Splits a CPMpy model over robots (the extra `cpmpy`).
     ModelError: What a model says that cannot be.
     Outcome: What a run comes to; `Solution`, which `solve()` returns, is one.
     Verdict: The answer to a problem: solution, optimal, no solution, unknown.
@@ -25,6 +26,7 @@ if TYPE_CHECKING:
     from robochoc import journal
     from robochoc.api import AgentsContainer, Problem, load
     from robochoc.model.outcome import Outcome, Verdict
+    from robochoc.modelling.cpmpy_models import from_cpmpy
     from robochoc.modelling.functions import (
         all_different,
         allowed,
@@ -59,6 +61,7 @@ __all__ = [
     "cumulative",
     "element",
     "forbidden",
+    "from_cpmpy",
     "function",
     "if_then_else",
     "journal",
@@ -75,6 +78,7 @@ _PLACES = {
     **dict.fromkeys(("Outcome", "Verdict"), "robochoc.model.outcome"),
     **dict.fromkeys(_FUNCTIONS.split(), "robochoc.modelling.functions"),
     **dict.fromkeys(("all_of", "any_of"), "robochoc.modelling.terms"),
+    "from_cpmpy": "robochoc.modelling.cpmpy_models",
     "Model": "robochoc.modelling.model",
     "ModelError": "robochoc.modelling.places",
     "Solution": "robochoc.modelling.solution",

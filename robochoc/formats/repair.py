@@ -11,7 +11,7 @@ import re
 from lxml import etree
 from lxml.etree import _Element
 
-from robochoc.formats.schema import entries
+from robochoc.formats.schema import refused_by
 
 _REMOVABLE = {"constraint", "topic", "agent"}
 _ROUNDS = 2
@@ -26,13 +26,14 @@ _TEXT = "Character content"
 def without_schema_errors(tree: etree._Element, schema: etree.XMLSchema) -> etree._Element | None:
     """Return `tree` without what `schema` refuses. None: that would take away too much. `tree` itself is changed."""
     for _ in range(_ROUNDS):
-        if schema.validate(tree):
+        mistakes = refused_by(schema, tree)
+        if not mistakes:
             return tree
         document = tree.getroottree()
-        refused = [(_element(document, entry.path), entry.message) for entry in entries(schema.error_log)]
+        refused = [(_element(document, mistake.path), mistake.message) for mistake in mistakes]
         if not all(element is not None and _repair(element, message) for element, message in refused):
             return None
-    return tree if schema.validate(tree) else None
+    return None if refused_by(schema, tree) else tree
 
 
 def _element(document: etree._ElementTree, path: str | None) -> etree._Element | None:

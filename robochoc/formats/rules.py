@@ -27,7 +27,6 @@ from robochoc.model.problem import (
     Predicate,
     ProblemKind,
     Relation,
-    Robot,
     Term,
 )
 
@@ -179,13 +178,6 @@ def check_added_constraint(constraint: Constraint) -> None:
     if constraint.model is ConstraintModel.PKC:
         message = "a partially known constraint (PKC) in a scenario"
         raise MistakeError(message, 'each side would need its part: write model="TKC"')
-
-
-def check_added_robot(robot: Robot) -> None:
-    """Raise `MistakeError` for what a robot that a scenario adds brings to the costs of the whole team."""
-    if robot.costs.constant:
-        message = "a constant cost of a robot that a scenario adds"
-        raise MistakeError(message, "write it into the presentation of a robot of the start")
 
 
 def check_constraint_of_added_robot(constraint: Constraint) -> None:

@@ -18,7 +18,6 @@ from robochoc.formats.robot import RobotFile, read_robot_file
 from robochoc.formats.rules import (
     NOBODY_LEFT,
     check_added_constraint,
-    check_added_robot,
     check_constraint_of_added_robot,
 )
 from robochoc.formats.symbols import SymbolTable, check_kinds, kinds_of
@@ -165,7 +164,7 @@ class _Reader:
         try:
             file = read_robot_file(self._folder / name, self._table).in_places(self._places)
             if not there_already:
-                _refuse_parts(file)
+                _refuse_parts(file.robot)
         except InvalidInputError as invalid:
             self._elsewhere += invalid.diagnostics
             self._unread = True
@@ -232,12 +231,10 @@ def _inside(folder: Path, name: str) -> Path:
     return path
 
 
-def _refuse_parts(file: RobotFile) -> None:
-    """Raise `InvalidInputError` where an added robot brings what only robots of the start can have."""
-    report = DiagnosticCollector(file.robot.file)
-    with report.at(file.places.robot().line):
-        check_added_robot(file.robot)
-    for constraint in file.robot.shared:
+def _refuse_parts(robot: Robot) -> None:
+    """Raise `InvalidInputError` where an added robot brings its part of partially known constraints."""
+    report = DiagnosticCollector(robot.file)
+    for constraint in robot.shared:
         with report.at(constraint.line):
             check_constraint_of_added_robot(constraint)
     report.finish()

@@ -6,12 +6,19 @@ import re
 from collections.abc import Iterable
 from functools import cache
 from pathlib import Path
+from threading import Lock
 from typing import Protocol, cast
 
 from lxml import etree
 
 from robochoc.formats.diagnostics import Diagnostic, DiagnosticCollector, InvalidInputError, shortened
 
+_LIBXML2 = Lock()
+"""Held by who uses a schema: robots of one machine may read their files in threads.
+
+libxml2 prepares the types of all schemas while it compiles the first one: two threads that do so at a time spoil each
+other's memory. And lxml gives a schema one log of errors, whoever asks.
+"""
 _SCHEMAS = {"instance": "robot.xsd", "scenario": "scenario.xsd"}
 _OPTIONAL = {"topics", "relations", "predicates", "functions", "constraints"}
 """The optional elements among those that libxml2 names where one is missing."""
@@ -88,18 +95,26 @@ def schema_for(root: str) -> etree.XMLSchema:
     """
     name, here = _SCHEMAS[root], Path(__file__).resolve()
     inside, outside = here.parents[1] / "xsd" / name, here.parents[2] / "xsd" / name
-    return etree.XMLSchema(file=str(inside if inside.is_file() else outside))
+    with _LIBXML2:
+        return etree.XMLSchema(file=str(inside if inside.is_file() else outside))
+
+
+def refused_by(schema: etree.XMLSchema, tree: etree._Element) -> list[LogEntry]:
+    """Return what `schema` refuses in `tree`; nothing: it is valid."""
+    with _LIBXML2:
+        return [] if schema.validate(tree) else entries(schema.error_log)
 
 
 def check_schema(tree: etree._Element, file: str, schema: etree.XMLSchema) -> None:
     """Raise `SchemaError` unless `tree`, read from `file`, is valid."""
-    if schema.validate(tree):
+    refused = refused_by(schema, tree)
+    if not refused:
         return
     import difflib  # noqa: PLC0415 - start-up: only mistakes need it
 
     report = DiagnosticCollector(file)
     unknown: dict[str | None, list[str]] = {}
-    for entry in entries(schema.error_log):
+    for entry in refused:
         parts = _parts(entry)
         if difflib.get_close_matches(parts["missing"], unknown.get(entry.path, [])):
             continue  # one slip of the pen is one mistake: `typ` is unknown, and so `type` is missing

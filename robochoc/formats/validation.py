@@ -32,7 +32,6 @@ from robochoc.formats.objects import Objects, repeated_robots
 from robochoc.formats.rules import (
     NOBODY_LEFT,
     check_added_constraint,
-    check_added_robot,
     check_constraint_of_added_robot,
 )
 from robochoc.formats.scopes import misplaced_constraints, misplaced_parts, missing_shown_variables
@@ -280,7 +279,6 @@ def _of_the_change(robots: Mapping[str, Robot], change: Change, place: Location)
         match change:
             case AddAgent(robot):
                 yield from Objects().mistakes(robot)
-                check_added_robot(robot)
                 _check_same_places(robot, robots)
                 for constraint in robot.shared:
                     check_constraint_of_added_robot(constraint)

@@ -225,7 +225,7 @@ def _with_predicate(constraint: Constraint, predicate: Predicate, cost: int) -> 
     if cost >= 0:
         return replace(constraint, cost=cost)
     body = Apply("if", (predicate.body, Constant(-cost), Constant(0)))
-    function = Function(predicate.name, predicate.parameters, body, predicate.symbolic)
+    function = Function(predicate.name.removeprefix("global:"), predicate.parameters, body, predicate.symbolic)
     return replace(constraint, definition=function, cost=INFINITE, offset=cost)
 
 

@@ -111,6 +111,8 @@ class EpochOutcome:
     confirmed: bool = False
 
 
+CENTRAL_SOLVER = "the central solver"
+"""The name of ACE, and of what is done before it is asked, in `confirmed_by`."""
 ALL_ROBOTS = "all robots"
 """The `claimed_by` of a verdict that any one of the robots could have made untrue. No robot has such a name."""
 
@@ -153,6 +155,7 @@ class Outcome:
             withdrawal, on the weight of the withdrawn robots. None: not known.
         tree: The pseudo-tree that the robots have built, if their protocol builds one.
         confirmed: Whether the central solver was asked, and has found the same `no-solution` or the same minimum cost.
+        confirmed_by: The names of the solvers that have found the same, on the machine of the run.
         epochs: The epochs, if there were several.
         channel: The name of the channel model, if time was simulated by one.
         placed_by: The protocol of the withdrawal, if it is not the one that was asked for.
@@ -181,6 +184,7 @@ class Outcome:
     bound: Cost | None = None
     tree: dict[str, PseudoTreeNode] = field(default_factory=dict)
     confirmed: bool = False
+    confirmed_by: tuple[str, ...] = ()
     epochs: tuple[EpochOutcome, ...] = ()
     channel: str | None = None
     placed_by: str | None = None

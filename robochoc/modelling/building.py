@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
+from robochoc.formats import InvalidInputError, check_team
 from robochoc.model.assembly import Extras, assemble
 from robochoc.model.constraint import Constraint, Domain
 from robochoc.model.constraint import Variable as TeamVariable
@@ -26,7 +28,7 @@ from robochoc.modelling.drafts import Definitions, Draft, costs_of
 from robochoc.modelling.events import Event, Removal
 from robochoc.modelling.given import changes_in_finer_units, in_finer_units
 from robochoc.modelling.numbers import places_of
-from robochoc.modelling.places import ModelError, did_you_mean
+from robochoc.modelling.places import ModelError, Place, did_you_mean
 from robochoc.modelling.robots import ModelRobot
 from robochoc.modelling.rules import Rule
 
@@ -43,8 +45,15 @@ def built(model: Model, order: Sequence[str] | None = None) -> Team:
 
     Raises:
         ModelError: if no team can be so.
+        InvalidInputError: if that is nothing that one line of the program has made.
     """
-    return _Builder(model, order).team()
+    builder = _Builder(model, order)
+    team = builder.team()
+    try:
+        check_team(team)
+    except InvalidInputError as invalid:
+        raise builder.located(invalid) from None
+    return team
 
 
 def saved_order(team: Team) -> tuple[str, ...]:
@@ -84,6 +93,7 @@ class _Builder:
         self._definitions = Definitions(given.definitions if given else ())
         self._domains: dict[tuple[tuple[range, ...], tuple[str, ...]], str] = {}
         self._symbols = model.symbols.all
+        self._places: dict[str, Place] = {}
 
     def _parts_of(self, robot: ModelRobot) -> list[Draft]:
         """Return a robot's parts of what it shares. What they say of its own variables alone becomes private."""
@@ -125,7 +135,18 @@ class _Builder:
         return with_table_everywhere(whole, symbol_table(team.robots)) if self._model.events else whole
 
     def _finished(self, draft: Draft) -> Constraint:
-        return self._definitions.constraint(draft, self._units.places, -1 if self._units.maximize else 1)
+        made = self._definitions.constraint(draft, self._units.places, -1 if self._units.maximize else 1)
+        for name in (made.name, made.definition.name):
+            self._places.setdefault(name, draft.place)
+        return made
+
+    def located(self, invalid: InvalidInputError) -> Exception:
+        """Return the first mistake of a team with the line that made it; `invalid` itself where none is known."""
+        for mistake in invalid.diagnostics:
+            named = re.search(r"\b(?:constraint|predicate|relation|function) (\S+?)(?: |$)", mistake.file)
+            if named and named[1] in self._places:
+                return ModelError(f"{mistake.file}: {mistake.message}", mistake.hint, self._places[named[1]])
+        return invalid
 
     def _variables(self, robot: ModelRobot) -> list[TeamVariable]:
         if not robot.variables:

@@ -217,7 +217,8 @@ class Definitions:
             return Constraint(draft.name, self._named("F", Function("", formals, draft.body)), names, names)
         cost = INFINITE if draft.cost is None else int(draft.cost * unit) * sign
         actual = _predefined(draft.body, dict(zip(formals, names, strict=True)))
-        if actual:
+        names_symbol = any(variable.codes.symbolic for variable in draft.scope) and len(names) == 1
+        if actual and not names_symbol:  # a scope has no symbols
             predicate, terms = actual
             return Constraint(draft.name, predicate, terms, terms, cost=cost)
         own = self._named("P", Predicate("", formals, draft.body))

@@ -19,7 +19,7 @@ import itertools
 from pathlib import Path
 from typing import Self
 
-from robochoc.formats import read_team, write_team
+from robochoc.formats import InvalidInputError, read_team, write_team
 from robochoc.model.cost_units import PLAIN_COSTS
 from robochoc.model.outcome import Outcome
 from robochoc.model.problem import Team
@@ -222,6 +222,17 @@ class Model(Solvable):
             OSError: if it cannot be written.
         """
         write_team(built(self, saved_order(self.team)), Path(folder), replace=replace)
+
+    def _repr_html_(self) -> str:
+        from robochoc.modelling.notebook.pages import team_html  # noqa: PLC0415 - notebooks only
+        from robochoc.modelling.notebook.tables import heading  # noqa: PLC0415 - the same
+
+        try:
+            team = self.team
+        except (ModelError, InvalidInputError) as unfinished:
+            return heading(repr(self), str(unfinished))
+        coded = {name: one.domain for name, one in self.variables.items() if one.codes.told is not None}
+        return team_html(team, coded)
 
     def _team_to_solve(self) -> Team:
         return self.team

@@ -14,7 +14,7 @@ from robochoc.model.problem import Team
 from robochoc.modelling.places import did_you_mean
 from robochoc.modelling.solution import Solution
 from robochoc.run.defaults import default_protocol
-from robochoc.run.options import OnLoss, Options, Runtime, ScheduleName, Withdrawal
+from robochoc.run.options import CentralSolverName, OnLoss, Options, Runtime, ScheduleName, Withdrawal
 from robochoc.run.orchestrator import solve
 from robochoc.run.registry import installed_spelling
 from robochoc.run.scenario import Environment
@@ -47,6 +47,7 @@ class Solvable:
         messages: int | None = None,
         verify: bool = False,
         count: bool = False,
+        central_with: str = CentralSolverName.ACE,
         cache: bool = True,
         local: Limits = NO_LIMITS,
         schedule: str = ScheduleName.CONCURRENT,
@@ -77,6 +78,7 @@ class Solvable:
             messages: A limit on the number of messages. None: no limit.
             verify: Whether the central solver checks a `no-solution` or a minimum cost that robots have found.
             count: Whether the central solver counts all solutions.
+            central_with: Who decides with the protocol `central`: `ace` or `ortools`.
             cache: Whether solutions of local problems are kept in the user's cache folder.
             local: Limits on the compilation of each robot's domain.
             schedule: How the simulator orders events: `concurrent` or `random`.
@@ -120,6 +122,7 @@ class Solvable:
             local=local,
             cache=cache,
             count=count,
+            central_with=_choice("central_with", CentralSolverName, central_with),
             verify=verify,
             order=_order(order, team),
             messages=messages,

@@ -201,11 +201,26 @@ class Constant(Term):
 
 
 class Linear(Term):
-    """A weighted sum: `parts` are pairs of a factor and a term."""
+    """A weighted sum: pairs of a factor and a term, and a constant.
 
-    def __init__(self, parts: tuple[tuple[Exact, Term], ...], constant: Exact = 0) -> None:
-        self.parts, self.constant = parts, constant
-        self.arguments = tuple(term for _, term in parts)
+    A long `sum(...)` makes one for each of its terms, so what equal terms add up to is computed when it is asked for.
+    """
+
+    def __init__(self, pairs: tuple[tuple[Exact, Term], ...], constant: Exact = 0) -> None:
+        self.pairs, self.constant = pairs, constant
+
+    @cached_property
+    def parts(self) -> tuple[tuple[Exact, Term], ...]:
+        """The factor of each distinct term."""
+        merged: dict[Term, Exact] = {}
+        for factor, term in self.pairs:
+            merged[term] = merged.get(term, 0) + factor
+        return tuple((factor, term) for term, factor in merged.items() if factor)
+
+    @cached_property
+    def arguments(self) -> tuple[Term, ...]:  # type: ignore[override] # it is computed once
+        """The distinct terms."""
+        return tuple(term for _, term in self.parts)
 
     def value(self, values: Values) -> object:
         """Return its value."""
@@ -313,21 +328,18 @@ def condition(value: object) -> Term:
 
 def linear(parts: Iterable[tuple[Exact, Term]]) -> Term:
     """Return a sum of terms times factors; sums in it are merged into one."""
-    merged: dict[Term, Exact] = {}
+    pairs: tuple[tuple[Exact, Term], ...] = ()
     constant: Exact = 0
     for factor, term in parts:
         match number(term):
             case Constant(given=given):
                 constant += factor * exact(given)
-                continue
-            case Linear(parts=inner, constant=more):
+            case Linear(pairs=inner, constant=more):
                 constant += factor * more
-                found = inner
+                pairs += inner if factor == 1 else tuple((factor * times, one) for times, one in inner)
             case other:
-                found = ((1, other),)
-        for times, one in found:
-            merged[one] = merged.get(one, 0) + factor * times
-    return Linear(tuple((factor, term) for term, factor in merged.items() if factor), constant)
+                pairs += ((factor, other),)
+    return Linear(pairs, constant)
 
 
 def _leaves(term: Term) -> Iterator[Variable]:

@@ -157,10 +157,20 @@ class Translator:
         return Scaled(Apply("pow", (base.expression, exponent.expression)))
 
     def _comparison(self, operator: str, one: Term, other: Term) -> Expression:
-        if isinstance(one, Variable) and isinstance(other, Variable) and one.codes.symbolic:
-            return Apply(operator, (Name(self._names[one]), Name(self._names[other])))
+        symbolic = next((side for side in (one, other) if isinstance(side, Variable) and side.codes.symbolic), None)
+        if symbolic is not None:
+            return Apply(operator, (self._symbol(one, symbolic), self._symbol(other, symbolic)))
         found, _ = _together((self.number(one), self.number(other)))
         return Apply(operator, tuple(found))
+
+    def _symbol(self, term: Term, variable: Variable) -> Expression:
+        """Return a symbol that is compared with `variable`. Raises `UntranslatableError`."""
+        if isinstance(term, Variable):
+            return Name(self._names[term])
+        code = variable.codes.code(term.given) if isinstance(term, Constant) else None
+        if code is None:
+            raise UntranslatableError
+        return Integer(code)
 
     def _bounds(self, expression: Expression) -> Interval:
         return bounds(expression, self._limits)

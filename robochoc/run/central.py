@@ -15,7 +15,7 @@ from robochoc.run.context import RunContext
 from robochoc.run.evaluation import Answer, check_assignment
 from robochoc.run.incumbent import robots_without_values
 from robochoc.run.options import CENTRAL, Options, Withdrawal
-from robochoc.solver.central import CentralAnswer, CentralSolver
+from robochoc.solver.central import CentralAnswer, TeamSolver
 from robochoc.solver.failures import SolverLostError
 from robochoc.verification.checker import assignment_cost
 from robochoc.verification.objective import withdrawal_cost
@@ -46,7 +46,7 @@ def solve_centrally(team: Team, context: RunContext, header: Outcome) -> Outcome
     options = context.options
     last = len(team.scenario)
     with AceProcess(always=options.local.always_ace) as warm:
-        solver = context.central_solver(warm)
+        solver = context.deciding_solver(warm)
         decisions = [_decide(solver, team_after_events(team, number), options) for number in range(last + 1)]
     answer, solutions = decisions[-1]
     epochs = tuple(
@@ -65,7 +65,7 @@ def _opened_by(team: Team, number: int) -> str:
     return ", ".join(describe_change(change, team) for change in team.scenario[number - 1].changes) or "nothing"
 
 
-def _decide(solver: CentralSolver, team: Team, options: Options) -> _Decision:
+def _decide(solver: TeamSolver, team: Team, options: Options) -> _Decision:
     """Decide one epoch, and check what was found."""
     began = time.monotonic()
     solutions = None
@@ -79,7 +79,7 @@ def _decide(solver: CentralSolver, team: Team, options: Options) -> _Decision:
     return _Decision(replace(answer, metrics=Metrics(wall_s=time.monotonic() - began)), solutions)
 
 
-def _answer(solver: CentralSolver, team: Team, options: Options) -> Answer:
+def _answer(solver: TeamSolver, team: Team, options: Options) -> Answer:
     """Return the solver's answer; as few robots as possible withdraw, if that is asked for and necessary."""
     price = None
     found = None

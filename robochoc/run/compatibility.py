@@ -25,7 +25,7 @@ from robochoc.protocols.protocol import Protocol
 from robochoc.protocols.requirements import unmet_requirement
 from robochoc.protocols.settings import SettingsError, settings_of
 from robochoc.protocols.traits import Traits
-from robochoc.run.options import CENTRAL, OnLoss, Options, Runtime, ScheduleName, Withdrawal
+from robochoc.run.options import CENTRAL, CentralSolverName, OnLoss, Options, Runtime, ScheduleName, Withdrawal
 from robochoc.solver.encoding import UnsupportedError
 from robochoc.verification.objective import withdrawal_cost
 
@@ -113,6 +113,16 @@ OPTION_RULES = (
         "--withdraw minimum",
     ),
     OptionRule(lambda o: o.count and o.protocol != CENTRAL, "--count is for --protocol central"),
+    OptionRule(
+        lambda o: o.central_with != CentralSolverName.ACE and o.protocol != CENTRAL,
+        "--with says who decides one model of all files",
+        "add --protocol central",
+    ),
+    OptionRule(
+        lambda o: o.central_with == CentralSolverName.ORTOOLS and o.count,
+        "--count is of ACE's solutions; OR-Tools does not count",
+        "drop --with",
+    ),
     OptionRule(
         lambda o: o.count and o.withdraw is not None,
         "--count is of solutions for all robots; --withdraw asks who can do without",

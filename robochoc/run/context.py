@@ -10,13 +10,14 @@ from typing import TYPE_CHECKING
 from robochoc.communication.kill_schedule import KillSchedule
 from robochoc.communication.run_result import Progress
 from robochoc.journal.events import Observer
-from robochoc.run.options import Options
+from robochoc.run.options import CentralSolverName, Options
 from robochoc.solver.cache import SolutionCache
 from robochoc.solver.team_compiler import TeamCompiler
 
 if TYPE_CHECKING:
     from robochoc.solver.ace import AceProcess
-    from robochoc.solver.central import CentralSolver
+    from robochoc.solver.central import CentralSolver, TeamSolver
+    from robochoc.solver.cp_sat import CpSatSolver
 
 
 class RunContext:
@@ -54,6 +55,24 @@ class RunContext:
     def team_compiler(self) -> TeamCompiler:
         """Return a compiler of the robots' domains."""
         return TeamCompiler(self.options.local, self.cache, self.deadline, self.solver, self.show_stage)
+
+    def deciding_solver(self, warm: AceProcess) -> TeamSolver:
+        """Return the solver that decides the merged problem; ACE is `warm` unless the run has one."""
+        if self.options.central_with == CentralSolverName.ORTOOLS:
+            return self.cp_sat_solver()
+        return self.central_solver(warm)
+
+    def cp_sat_solver(self) -> CpSatSolver:
+        """Return OR-Tools as a central solver of this run."""
+        from robochoc.solver.cp_sat import CpSatSolver  # noqa: PLC0415 - start-up: seldom asked for
+
+        return CpSatSolver(self.deadline, partial(self.show_stage, "OR-Tools decides the whole team"))
+
+    def second_opinions(self) -> list[TeamSolver]:
+        """Return the solvers that check what robots have proven: the central solver, and OR-Tools where it is."""
+        from robochoc.solver.cp_sat import is_installed  # noqa: PLC0415 - start-up: seldom asked for
+
+        return [self.central_solver(), *([self.cp_sat_solver()] if is_installed() else [])]
 
     def central_solver(self, warm: AceProcess | None = None) -> CentralSolver:
         """Return a central solver of this run; it uses the constraint solver `warm` unless the run has one."""

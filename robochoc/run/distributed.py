@@ -68,9 +68,9 @@ class Deployment(ABC):
     def remove(self, lost: Mapping[str, str]) -> None:
         """Go on without robots that were lost; `lost` maps their names to the reasons."""
 
-    def confirm(self, phase: Phase, answer: Answer) -> bool:  # noqa: ARG002 - an implementation needs them
-        """Return whether the central solver agrees. Raises `RefutedError` where it found something else."""
-        return False
+    def confirm(self, phase: Phase, answer: Answer) -> tuple[str, ...]:  # noqa: ARG002 - an implementation needs them
+        """Return the central solvers that agree. Raises `RefutedError` where one found something else."""
+        return ()
 
     @property
     def unsettled(self) -> str:
@@ -92,10 +92,9 @@ class Deployment(ABC):
         """Return the answer of `search`, confirmed by the central solver if that is asked for."""
         answer = evaluate_search(phase, search, self.kind, self.told)
         if answer.verdict is Verdict.NO_SOLUTION:
-            sure = self.confirm(phase, answer)
-            return replace(answer, verified=sure, confirmed=sure)
+            return answer.confirmed_as(self.confirm(phase, answer))
         if answer.verdict is Verdict.OPTIMAL:
-            return replace(answer, confirmed=self.confirm(phase, answer))
+            return answer.confirmed_as(self.confirm(phase, answer))
         return answer
 
     def why_unknown(self, phase: Phase, answer: Answer) -> str | None:

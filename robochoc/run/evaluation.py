@@ -65,10 +65,17 @@ class Answer:
     tree: dict[str, PseudoTreeNode] = field(default_factory=dict)
     verified: bool = False
     confirmed: bool = False
+    confirmed_by: tuple[str, ...] = ()
     checked: CheckCounts | None = None
     reason: str | None = None
     epochs: tuple[EpochOutcome, ...] = ()
     ended: bool = False
+
+    def confirmed_as(self, solvers: tuple[str, ...]) -> Answer:
+        """Return this answer, with which central `solvers` agree: that there is no solution, nothing else shows."""
+        sure = bool(solvers)
+        verified = sure if self.verdict is Verdict.NO_SOLUTION else self.verified
+        return replace(self, verified=verified, confirmed=sure, confirmed_by=solvers)
 
     def then(self, second: Answer) -> Answer:
         """Return the answer of two phases: that of the `second`, with what both have cost."""
@@ -113,6 +120,7 @@ class Answer:
             bound=self.bound,
             tree=self.tree,
             confirmed=self.confirmed,
+            confirmed_by=self.confirmed_by,
             epochs=self.epochs,
             checked=self.checked,
         )

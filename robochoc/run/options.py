@@ -57,6 +57,13 @@ class OnLoss(StrEnum):
     WITHDRAW = "withdraw"
 
 
+class CentralSolverName(StrEnum):
+    """The solver of the merged problem: ACE, or CP-SAT of OR-Tools."""
+
+    ACE = "ace"
+    ORTOOLS = "ortools"
+
+
 @dataclass(frozen=True)
 class Options:
     """The options of a run. `run/compatibility.py` decides which of them can be combined.
@@ -72,7 +79,9 @@ class Options:
         local: Limits on the compilation of each robot's domain.
         cache: Whether solutions of local problems are kept in the user's cache folder.
         count: Whether the central solver counts all solutions.
-        verify: Whether the central solver checks a `no-solution` or a minimum cost that robots have found.
+        central_with: Which solver decides the merged problem, where there are no robots.
+        verify: Whether the central solver checks a `no-solution` or a minimum cost that robots have found; where
+            OR-Tools is installed, it is asked as well.
         order: The total priority order of the robots, by name or as their names (None: that of the files).
         messages: A limit on the number of messages (None: no limit).
         on_loss: What the loss of a robot means (None: the run fails, unless there are `spares`).
@@ -95,6 +104,7 @@ class Options:
     local: Limits = field(default_factory=Limits)
     cache: bool = True
     count: bool = False
+    central_with: CentralSolverName = CentralSolverName.ACE
     verify: bool = False
     order: Order | tuple[str, ...] | None = None
     messages: int | None = None

@@ -107,10 +107,10 @@ class ThisMachine(Deployment):
             result = session.search(self.left_s(), self.options.messages)
         return Search(result, partial(check_with_files, phase, result, self._scenario.team, epoch.compiled))
 
-    def confirm(self, phase: Phase, answer: Answer) -> bool:
+    def confirm(self, phase: Phase, answer: Answer) -> tuple[str, ...]:
         """See `Deployment.confirm`."""
         if not self.options.verify:
-            return False
+            return ()
         from robochoc.verification.second_opinion import total_cost  # noqa: PLC0415 - start-up: seldom asked for
 
         cost = phase.parameters.withdrawal_cost
@@ -133,8 +133,8 @@ class ThisMachine(Deployment):
         try:
             compiled = scenario.compiled()
         except NoLocalSolutionError as alone:
-            sure = self._confirmed(alone.robot)
-            return Answer(Verdict.NO_SOLUTION, witness=alone.robot, verified=sure, confirmed=sure, reason=str(alone))
+            answer = Answer(Verdict.NO_SOLUTION, witness=alone.robot, reason=str(alone))
+            return answer.confirmed_as(self._confirmed(alone.robot))
         with self._session(phase, compiled) as session:
             for epoch in scenario.epochs(session, partial(self._start_events.report, phase.protocol, session=session)):
                 answer, lost = self._answer_of(phase, epoch), epoch.result.lost
@@ -182,12 +182,12 @@ class ThisMachine(Deployment):
 
     def _confirmed(
         self, alone: str | None = None, *, total: float = INFINITE, withdrawal_cost: float | None = None
-    ) -> bool:
-        """Return whether the central solver agrees, if it is asked. For the arguments see `confirmed`."""
+    ) -> tuple[str, ...]:
+        """Return the central solvers that agree, if they are asked. For the arguments see `confirmed`."""
         if not self.options.verify:
-            return False
+            return ()
         from robochoc.verification.second_opinion import confirmed  # noqa: PLC0415 - start-up: seldom asked for
 
         cost = None if withdrawal_cost is None else int(withdrawal_cost)
-        solver = self._context.central_solver()
-        return confirmed(solver, self._scenario.team, self.options.protocol, alone, total=total, withdrawal_cost=cost)
+        solvers, team = self._context.second_opinions(), self._scenario.team
+        return confirmed(solvers, team, self.options.protocol, alone, total=total, withdrawal_cost=cost)

@@ -13,8 +13,9 @@ import time
 from collections.abc import Callable
 from contextlib import ExitStack
 from dataclasses import dataclass, field
+from typing import Protocol
 
-from robochoc.model.outcome import Verdict
+from robochoc.model.outcome import CENTRAL_SOLVER, Verdict
 from robochoc.model.problem import ProblemKind, Team
 from robochoc.solver.ace import AceProcess
 from robochoc.solver.ace_messages import Strategy
@@ -72,12 +73,25 @@ class _Wanted:
         return ("static", "default") if self.in_order else ("default", "static")
 
 
+class TeamSolver(Protocol):
+    """What decides whole teams: `CentralSolver`, and `CpSatSolver` (`solver/cp_sat.py`)."""
+
+    @property
+    def name(self) -> str:
+        """Its name in messages."""
+
+    def solve(self, team: Team, *, count: bool = False, withdrawal_cost: int | None = None) -> CentralAnswer:
+        """See `CentralSolver.solve`."""
+
+
 class CentralSolver:
     """Decides teams, small ones by enumeration, others by ACE (with `always_ace` all).
 
     `deadline` is on the monotonic clock; `progress` is called while ACE works. A `solver` that is warm may be lent;
     it is left running, and says itself whether small tasks go to ACE.
     """
+
+    name = CENTRAL_SOLVER
 
     def __init__(
         self,

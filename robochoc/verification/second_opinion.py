@@ -2,27 +2,27 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 from robochoc.model.outcome import Verdict
 from robochoc.model.problem import INFINITE, Team
-from robochoc.solver.central import CentralAnswer, CentralSolver
+from robochoc.solver.central import CentralAnswer, TeamSolver
 from robochoc.verification.checker import RefutedError, assignment_cost, has_local_solution
 
 
 def confirmed(
-    solver: CentralSolver,
+    solvers: Sequence[TeamSolver],
     team: Team,
     protocol: str,
     alone: str | None = None,
     *,
     total: float = INFINITE,
     withdrawal_cost: int | None = None,
-) -> bool:
-    """Return whether the central solver agrees with a protocol.
+) -> tuple[str, ...]:
+    """Return the names of the central solvers that agree with a protocol.
 
     Args:
-        solver: the central solver.
+        solvers: the central solvers, the first of which has to be there.
         team: the team as its files have it.
         protocol: the protocol's name.
         alone: a robot that has no local solution. The checker looks at it as well, as the central solver and the
@@ -31,18 +31,22 @@ def confirmed(
         withdrawal_cost: the withdrawal cost of a robot of weight 1 (None: no robot may withdraw).
 
     Returns:
-        Whether it agrees; false if it has not come to an end.
+        Those that agree; a solver that has not come to an end does not.
 
     Raises:
-        RefutedError: when it has found something else.
+        RefutedError: when one has found something else.
     """
-    opinion = solver.solve(team, withdrawal_cost=withdrawal_cost)
-    against = contradiction(opinion, total)
-    if against or (alone is not None and has_local_solution(team[alone])):
-        claim = "no solution" if total == INFINITE else f"a solution of the least cost, {total:,}"
-        found = f"{team.name} has {claim}, and the central solver has found {against or 'one'}"
-        raise RefutedError(f"{protocol} says that {found}")
-    return opinion.verdict is not Verdict.UNKNOWN
+    agreeing = []
+    for solver in solvers:
+        opinion = solver.solve(team, withdrawal_cost=withdrawal_cost)
+        against = contradiction(opinion, total)
+        if against or (alone is not None and has_local_solution(team[alone])):
+            claim = "no solution" if total == INFINITE else f"a solution of the least cost, {total:,}"
+            found = f"{team.name} has {claim}, and {solver.name} has found {against or 'one'}"
+            raise RefutedError(f"{protocol} says that {found}")
+        if opinion.verdict is not Verdict.UNKNOWN:
+            agreeing.append(solver.name)
+    return tuple(agreeing)
 
 
 def contradiction(opinion: CentralAnswer, total: float) -> str | None:

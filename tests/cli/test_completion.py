@@ -8,7 +8,6 @@ import subprocess
 import sys
 from pathlib import Path
 
-import click
 import pytest
 from click.shell_completion import ShellComplete
 from click.testing import CliRunner
@@ -63,10 +62,15 @@ def test_all_commands_and_protocols_are_completed() -> None:
 
 
 def test_folders_of_teams_are_completed_by_the_shell() -> None:
-    command = cli.get_command(click.Context(cli), "solve")
-    assert command is not None
-    found = ShellComplete(cli, {}, "robochoc", VARIABLE).get_completions(["solve"], "inst")
+    found = ShellComplete(cli, {}, "robochoc", VARIABLE).get_completions(["compile"], "inst")
     assert [(one.type, one.value) for one in found] == [("dir", "inst")]
+
+
+def test_files_of_other_tools_are_completed_by_the_shell() -> None:
+    found = ShellComplete(cli, {}, "robochoc", VARIABLE).get_completions(["solve"], "prob")
+    assert [(one.type, one.value) for one in found] == [("file", "prob")]
+    formats = ShellComplete(cli, {}, "robochoc", VARIABLE).get_completions(["export", "--format"], "p")
+    assert [one.value for one in formats] == ["pydcop"]
 
 
 @pytest.mark.skipif(shutil.which("bash") is None, reason="there is no bash")

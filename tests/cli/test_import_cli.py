@@ -34,7 +34,7 @@ def test_import_tells_what_it_changed(problem: Path, tmp_path: Path) -> None:
     team, report = tmp_path / "team", tmp_path / "report.json"
     done = robochoc_within("import", problem, "-o", team, "--report", report)
     assert done.returncode == 0, done.stderr
-    assert f"{team}: 2 robots, 2 variables, 1 constraints, from frodo; next: robochoc solve {team}" in done.stdout
+    assert f"{team}: 2 robots, 2 variables, 1 constraint, from frodo; next: robochoc solve {team}" in done.stdout
     assert "  renamed: r-1 is r_1\n" in done.stdout
     assert "  renamed: and 1 more" in done.stdout
     assert "  scale: costs are decimals" in done.stdout

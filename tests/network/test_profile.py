@@ -32,7 +32,7 @@ from robochoc.communication.network.profile import (
 )
 from robochoc.formats import read_team
 from robochoc.formats.extension import MAX_VALUES
-from robochoc.model.problem import Domain, ProblemKind, Robot, Team
+from robochoc.model.problem import Domain, ProblemKind, Robot, Team, Variable
 from robochoc.model.team_edits import without_robots
 from robochoc.protocols.traits import Traits
 from robochoc.solver.agent_problem import DEFAULT_PARAMETERS, AgentProblem, RunParameters, agent_problems
@@ -304,3 +304,23 @@ def test_only_robots_that_are_there_are_held_against_each_other() -> None:
     del profiles["A"]
     assert not list(profile_contradictions(profiles))
     assert missing(profiles) == {"A"}
+
+
+def test_robots_that_count_symbols_differently_are_no_team() -> None:
+    upper = Profile("A", ProblemKind.DISCSP, (), ("B",), {"X": ((0, 1),)}, {}, 1, 0, (), symbols="1")
+    lower = Profile("B", ProblemKind.DISCSP, ("A",), (), {"Y": ((0, 1),)}, {}, 1, 0, (), symbols="1")
+    other = msgspec.structs.replace(lower, symbols="2")
+    none = msgspec.structs.replace(lower, symbols="")
+    assert list(profile_contradictions({"A": upper, "B": lower})) == []
+    assert list(profile_contradictions({"A": upper, "B": none})) == []
+    (told,) = profile_contradictions({"A": upper, "B": other})
+    assert told.startswith("the symbols of A and B have different codes")
+
+
+def test_a_profile_says_which_symbols_a_robot_counts() -> None:
+    def digest(*symbols: str) -> str:
+        own = (Variable("X", Domain("D", (range(1),), symbols)),)
+        return profile_of(Robot("A", own)).symbols
+
+    assert digest() == ""
+    assert digest("red", "green") == digest("red", "green") != digest("green", "red")

@@ -169,7 +169,8 @@ def _tell(entry: dict[str, Any]) -> None:
     if not entry["imported"]:
         Failure(INVALID, "\n".join(entry["errors"])).show()
         return
-    counts = f"{entry['robots']} robots, {entry['variables']} variables, {entry['constraints']} constraints"
+    sizes = {what: entry[what] for what in ("robots", "variables", "constraints")}
+    counts = ", ".join(f"{number:,} {what if number != 1 else what[:-1]}" for what, number in sizes.items())
     folder = on_one_line(entry["team"])
     click.echo(f"{folder}: {counts}, from {entry['format']}; next: robochoc solve {folder}")
     kinds: dict[str, list[str]] = {}

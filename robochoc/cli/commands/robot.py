@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -63,8 +63,8 @@ def robot(
     """  # noqa: D301 - \\b is how click is told to leave the lines as they are
     with network_failures_told(file):
         with _stages(file.stem) as show_stage:
-            ending, published = _run(file, place, (identity, token), given, show_stage)
-        _print_ending(file.stem, ending, published, as_json=as_json)
+            ending, values, published = _run(file, place, (identity, token), given, show_stage)
+        _print_ending(file.stem, ending, values, published, as_json=as_json)
     context.exit(LIMIT if ending.why.startswith("unknown") else 0)
 
 
@@ -91,7 +91,7 @@ def _run(
     credentials: tuple[Path | None, str | None],
     given: dict[str, Any],
     show_stage: Callable[[str], None],
-) -> tuple[Ending, list[str]]:
+) -> tuple[Ending, dict[str, int | str], list[str]]:
     """Run the robot of `file`, and publish its decision.
 
     Args:
@@ -102,7 +102,8 @@ def _run(
         show_stage: Shows the stage of the run.
 
     Returns:
-        How the run ended for the robot, and a line for each place where its decision was published.
+        How the run ended for the robot, its values with symbols by their names, and a line for each place where its
+        decision was published.
 
     Raises:
         Failure: when the run could not be completed.
@@ -124,19 +125,23 @@ def _run(
             ending = join(itself, place, identity, settings, compiler)
         if ending.failed:
             raise Failure(LOST, f"{file.stem}: {ending.why}")
-        return ending, publish(ending.why, ending.assignment)
+        domains = {variable.name: variable.domain for variable in itself.variables}
+        values = {name: domains[name].label(value) for name, value in ending.assignment.items()}
+        return ending, values, publish(ending.why, ending.assignment)
 
 
-def _print_ending(name: str, ending: Ending, published: Sequence[str], *, as_json: bool) -> None:
+def _print_ending(
+    name: str, ending: Ending, values: Mapping[str, int | str], published: Sequence[str], *, as_json: bool
+) -> None:
     from robochoc.system.plain_text import on_one_line
 
     if as_json:
         import msgspec
 
-        result = {"robot": name, "outcome": ending.why, "assignment": ending.assignment}
+        result = {"robot": name, "outcome": ending.why, "assignment": values}
         click.echo(msgspec.json.encode(result).decode())
         return
-    decision = ", ".join(f"{variable} = {value}" for variable, value in ending.assignment.items())
+    decision = ", ".join(f"{variable} = {value}" for variable, value in values.items())
     click.echo(on_one_line(f"{name}: {ending.why}; {decision or 'no value'}"))
     for line in published:
         click.echo(line, err=True)

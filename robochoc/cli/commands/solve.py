@@ -60,7 +60,7 @@ _SECTIONS: Sections = {
         "--protocol", "--runtime", "--timeout", "--withdraw", "--verify", "--seed",
         "--json", "--html", "--journal", "--sniff", "--help",
     ),
-    "Search": ("--order", "--set", "--messages", "--count"),
+    "Search": ("--order", "--set", "--messages", "--count", "--with"),
     "Losses of robots (processes and network)": ("--on-loss", "--spare", "--patience", "--kill"),
     "Messages on their way": ("--schedule", "--delay", "--channel", "--filter"),
     "Robots with several variables": ("--local-solutions", "--local-timeout", "--ace", "--no-cache"),
@@ -146,7 +146,20 @@ _SECTIONS: Sections = {
 @filter_option
 @click.option("--explain", is_flag=True, help="Print the pseudo-tree, if the robots have built one.")
 @click.option("--count", is_flag=True, help="With --protocol central: count all solutions.")
-@click.option("--verify", is_flag=True, help="Confirm a no-solution or an optimum by the central solver.")
+@click.option(
+    "--with",
+    "central_with",
+    type=click.Choice(["ace", "ortools"], case_sensitive=False),
+    default="ace",
+    show_default=True,
+    metavar="NAME",
+    help="With --protocol central: the solver, ace or ortools (CP-SAT; an extra).",
+)
+@click.option(
+    "--verify",
+    is_flag=True,
+    help="Confirm a no-solution or an optimum by the central solver, and by OR-Tools.",
+)
 @local_options
 @ros_options
 @situation_options

@@ -214,7 +214,7 @@ def options_of(arguments: dict[str, Any], *, environment: bool) -> Options:
 
 
 def _take_options(arguments: dict[str, Any]) -> Options:
-    from robochoc.run.options import OnLoss, Options, Runtime, ScheduleName, Withdrawal
+    from robochoc.run.options import CentralSolverName, OnLoss, Options, Runtime, ScheduleName, Withdrawal
 
     with failures_told("--channel"):
         channel = channel_for(arguments.pop("channel"))
@@ -231,6 +231,7 @@ def _take_options(arguments: dict[str, Any]) -> Options:
         schedule=ScheduleName(arguments.pop("schedule")),
         withdraw=Withdrawal(withdraw) if withdraw else None,
         on_loss=OnLoss(on_loss) if on_loss else None,
+        central_with=CentralSolverName(arguments.pop("central_with")),
         channel=channel,
         **{name: arguments.pop(name) for name in _SAME_NAMES},
     )

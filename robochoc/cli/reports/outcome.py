@@ -11,7 +11,7 @@ from robochoc.formats.diagnostics import shortened
 from robochoc.model.change import team_after_events
 from robochoc.model.cost_units import Cost
 from robochoc.model.headline import describe_outcome
-from robochoc.model.outcome import ALL_ROBOTS, Metrics, Outcome, Verdict
+from robochoc.model.outcome import ALL_ROBOTS, CENTRAL_SOLVER, Metrics, Outcome, Verdict
 from robochoc.model.priorities import natural_key
 from robochoc.model.problem import ProblemKind, Team
 
@@ -77,13 +77,13 @@ def _verdict(team: Team, outcome: Outcome) -> str:
     """Return what happened, in a few words, then why, and how it was checked."""
     why = outcome.reason if outcome.reason and not outcome.epochs else outcome.ruled_out
     because = f" ({why})" if why else ""
-    confirmed = ", confirmed centrally" * outcome.confirmed
+    confirmed = _confirmed(outcome)
     left = " for the robots that are left" if outcome.lost else ""
     weighted = bool(_weight(team, outcome))
     headline = describe_outcome(outcome, len(team.robots), weighted=weighted)
     match outcome.verdict:
         case Verdict.NO_SOLUTION:
-            return f"no solution{left}{because}{', confirmed centrally' * outcome.verified}"
+            return f"no solution{left}{because}{confirmed or ', confirmed centrally' * outcome.verified}"
         case Verdict.UNKNOWN:
             return f"unknown: {outcome.reason or 'a limit was reached before a verdict'}{_so_far(team, outcome)}"
         case _ if outcome.count is not None:
@@ -93,6 +93,14 @@ def _verdict(team: Team, outcome: Outcome) -> str:
         case Verdict.SOLUTION | Verdict.OPTIMAL:
             whole = f"no solution{left or ' for the whole team'}{because}"
             return f"{headline}; {whole}; {_checked(outcome)}{confirmed}{_trusted(outcome)}"
+
+
+def _confirmed(outcome: Outcome) -> str:
+    """Return who has found the same, besides the robots."""
+    if not outcome.confirmed:
+        return ""
+    solvers = ["centrally" if name == CENTRAL_SOLVER else f"by {name}" for name in outcome.confirmed_by]
+    return f", confirmed {' and '.join(solvers) or 'centrally'}"
 
 
 def _checked(outcome: Outcome) -> str:

@@ -6,6 +6,7 @@ works out what all robots know anyway: the priority order, the interfaces, the d
 
 from __future__ import annotations
 
+import hashlib
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 
@@ -46,7 +47,8 @@ class Profile(msgspec.Struct, frozen=True, array_like=True):
     this robot's parts of partially known constraints look at; `wants` are the others' variables in the constraints that
     it holds towards its parents. `max_cost` is the most that the constraints it holds can
     charge together, short of being broken. `topics` are where it publishes its decision. `told_in` are its cost units:
-    whether the sum is maximised, the decimal places, and a constant.
+    whether the sum is maximised, the decimal places, and a constant. `symbols` is a digest of the names of the team's
+    symbols, in the order of their codes; empty where it knows of none.
     """
 
     name: str
@@ -60,6 +62,7 @@ class Profile(msgspec.Struct, frozen=True, array_like=True):
     topics: tuple[str, ...]
     wants: tuple[str, ...] = ()
     told_in: tuple[bool, int, int] = (False, 0, 0)
+    symbols: str = ""
 
     @property
     def units(self) -> CostUnits:
@@ -96,7 +99,12 @@ def profile_of(robot: Robot) -> Profile:
         topics=tuple(topic.name for topic in robot.topics),
         wants=tuple(dict.fromkeys(name for one in robot.shared for name in one.variables if name not in own)),
         told_in=(units.maximize, units.places, units.constant),
+        symbols=_digest(robot.symbol_table),
     )
+
+
+def _digest(symbols: Sequence[str]) -> str:
+    return hashlib.sha256("\n".join(symbols).encode()).hexdigest() if symbols else ""
 
 
 def ranges_of(domain: Domain) -> Ranges:
@@ -168,6 +176,7 @@ def profile_contradictions(profiles: Mapping[str, Profile]) -> Iterator[str]:
     if len(kinds) > 1:
         yield f"{' and '.join(f'{name} is a {kind}' for kind, name in kinds.items())}: a team is one or the other"
     yield from _differing_units(profiles)
+    yield from _differing_symbols(profiles)
     try:
         priority_order({profile.name: profile.parents for profile in profiles.values()})
     except CycleError as cycle:
@@ -178,6 +187,16 @@ def _differing_units(profiles: Mapping[str, Profile]) -> Iterator[str]:
     units = {profile.told_in[:2]: profile.name for profile in profiles.values()}
     if len(units) > 1:
         yield f"the costs of {' and '.join(units.values())} differ in objective or scale: write both into every file"
+
+
+def _differing_symbols(profiles: Mapping[str, Profile]) -> Iterator[str]:
+    names = {profile.symbols: profile.name for profile in profiles.values() if profile.symbols}
+    if len(names) > 1:
+        who = " and ".join(list(names.values())[:2])
+        yield (
+            f"the symbols of {who} have different codes: list all symbols of the team in the first domain of every"
+            " file, as robochoc does where it writes them"
+        )
 
 
 def missing(profiles: Mapping[str, Profile]) -> set[str]:

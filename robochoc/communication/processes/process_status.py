@@ -9,7 +9,7 @@ from enum import Enum, auto
 from multiprocessing.process import BaseProcess
 from pathlib import Path
 
-_EXIT_CODE_S = 1.0
+_EXIT_CODE_S, _DYING_S = 1.0, 60.0
 _EXIT_CODE_POLL_S = 0.001
 _PENDING_SIGNALS = re.compile(r"^SigPnd:\s*([0-9a-f]+)$", re.MULTILINE)
 _STOPPED = re.compile(r"^State:\s*T\b", re.MULTILINE)
@@ -51,11 +51,15 @@ def is_computing(pid: int | None) -> bool:
 
 
 def describe_end(process: BaseProcess) -> str:
-    """Return in words how `process` ended. Its sentinel is ready; the exit code follows a moment later."""
-    deadline = time.monotonic() + _EXIT_CODE_S
+    """Return in words how `process` ended. Its sentinel is ready; the exit code follows a moment later.
+
+    Where all cores are busy, that moment can be seconds for a process with a high `nice` value.
+    """
+    began = time.monotonic()
     # Not `join`, whose time limit ends with the sentinel: a process can close all its files and live on.
     while (code := process.exitcode) is None:
-        if time.monotonic() > deadline:
+        dying = process_status(process.pid) is ProcessStatus.DYING
+        if time.monotonic() - began > (_DYING_S if dying else _EXIT_CODE_S):
             return "its process cannot be reached any more"
         time.sleep(_EXIT_CODE_POLL_S)
     if code < 0:

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
+from enum import Enum
 from html import escape
 from typing import TYPE_CHECKING
 
@@ -21,8 +22,13 @@ if TYPE_CHECKING:
 _MAX_RANGES = 12
 
 
-def team_html(team: Team) -> str:
-    """Return a team: its robots with their variables, its constraints, and the constraint graph."""
+def team_html(team: Team, told: Mapping[str, Iterable[object]] = {}) -> str:
+    """Return a team: its robots with their variables, its constraints, and the constraint graph.
+
+    Args:
+        team: The team.
+        told: The values of variables as their user wrote them, where these are not what files hold.
+    """
     constraints = list(_constraints(team))
     sizes = f"{len(team.robots)} robots, {len(team.variables)} variables, {len(constraints)} constraints"
     aim = ""
@@ -30,7 +36,9 @@ def team_html(team: Team) -> str:
         aim = ", maximised" if team.robots[0].costs.maximize else ", minimised"
     events = f", {len(team.scenario)} events" if team.scenario else ""
     robots = [
-        (robot.name, variable.name, _domain(variable.domain)) for robot in team.robots for variable in robot.variables
+        (robot.name, variable.name, _values(told[variable.name]) if variable.name in told else _domain(variable.domain))
+        for robot in team.robots
+        for variable in robot.variables
     ]
     columns = 5 if team.kind is ProblemKind.DISWCSP else 4
     parts = (
@@ -67,7 +75,7 @@ def solution_html(solution: Solution) -> str:
         ),
         table(
             ("robot", "variable", "value"),
-            [(owner.get(name, ""), name, value) for name, value in solution.values.items()],
+            [(owner.get(name, ""), name, _values([value])) for name, value in solution.values.items()],
         ),
         table(("withdrawn",), [(name,) for name in solution.withdrawn]),
         table(("epoch", "opened by", "robots", "verdict", "cost"), epochs),
@@ -126,6 +134,11 @@ def _cost(constraint: Constraint, units: CostUnits) -> str:
     if constraint.cost == INFINITE:
         return "must hold"
     return str(CostUnits(places=units.places).told(constraint.cost))
+
+
+def _values(values: Iterable[object]) -> str:
+    """Return users' values; members of an `Enum` by their names."""
+    return ", ".join(value.name if isinstance(value, Enum) else str(value) for value in values)
 
 
 def _domain(domain: Domain) -> str:

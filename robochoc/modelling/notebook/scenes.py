@@ -48,7 +48,7 @@ class ScenePage:
         Path(path).write_text(self.html, encoding="utf-8")
 
     def __repr__(self) -> str:
-        return f"<scene of {self._title}: {len(self.html):,} characters>"
+        return f"<scene of {self._title}>"
 
     def _repr_html_(self) -> str:
         return framed(self.html, self.height)

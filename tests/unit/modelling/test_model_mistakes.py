@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import inspect
 from collections.abc import Callable
+from dataclasses import fields
 from enum import Enum
 from pathlib import Path
 
@@ -12,6 +14,7 @@ import robochoc
 from robochoc.model.problem import Team
 from robochoc.modelling.places import ModelTypeError, UnknownNameError
 from robochoc.modelling.terms import Variable
+from robochoc.run.options import Options
 
 
 class Color(Enum):
@@ -111,6 +114,7 @@ MISTAKES: list[tuple[Callable[[Made], object], str]] = [
     (lambda m: m.model.after_solution().remove_constraint("C9"), "no constraint 'C9'"),
     (lambda m: m.model.after_solution().add(m.x == 1), "of a alone"),
     (lambda m: m.model.add(m.model.after_solution().robot("late").variable("v", [1]) == 1), "event.add"),
+    (lambda m: m.model.add(abs(m.x * 10**19 - m.y) > 3, name="huge"), "20 digits"),
     (lambda _: robochoc.Model().team, "no robot"),
 ]
 
@@ -152,6 +156,11 @@ def test_names_of_the_library_are_listed_and_guessed() -> None:
         _ = robochoc.all_diferent
 
 
+def test_every_option_of_a_run_has_its_name() -> None:
+    named = {*inspect.signature(robochoc.Problem.solve).parameters}
+    assert {one.name for one in fields(Options)} <= named
+
+
 OPTIONS: list[tuple[dict[str, object], type[Exception], str]] = [
     ({"timout": 3}, TypeError, "did you mean 'timeout'"),
     ({"runtime": "simulater"}, ValueError, "did you mean 'simulator'"),
@@ -159,6 +168,7 @@ OPTIONS: list[tuple[dict[str, object], type[Exception], str]] = [
     ({"order": ["a", "bb"]}, ValueError, "no robot 'bb'"),
     ({"withdraw": "some"}, ValueError, "expected minimum, maximal"),
     ({"on_loss": "withdrw"}, ValueError, "did you mean 'withdraw'"),
+    ({"central_with": "ortool"}, ValueError, "did you mean 'ortools'"),
     ({"schedule": "rndom"}, ValueError, "did you mean 'random'"),
     ({"protocol": "dpopp"}, LookupError, "did you mean 'dpop'"),
 ]

@@ -40,7 +40,8 @@ class Document:
             if not len(section) and section.tag in {"relations", "predicates", "functions"}:
                 self.root.remove(section)
             else:
-                section.set(f"nb{str(section.tag).capitalize()}", str(len(section)))
+                number_of = sum(1 for _ in section.iterchildren(tag=etree.Element))
+                section.set(f"nb{str(section.tag).capitalize()}", str(number_of))
         body = etree.tostring(self.root, pretty_print=True, encoding="unicode")
         return f'<?xml version="1.0" encoding="UTF-8"?>\n{body}'.encode()
 

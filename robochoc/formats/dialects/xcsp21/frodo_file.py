@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping
 from decimal import Decimal
 
@@ -9,12 +10,22 @@ from lxml import etree
 
 from robochoc.formats.dialects.xcsp21.document import Document, number
 from robochoc.formats.dialects.xcsp21.flat import MAX_LISTED, FlatTeam, Held, Rows, plain
-from robochoc.model.constraint import INFINITE, Function, Predicate, Relation
+from robochoc.formats.global_constraints import PREFIX, write_global
+from robochoc.model.constraint import INFINITE, Function, GlobalPredicate, Predicate, Relation
 from robochoc.model.expression import Apply, Constant
 from robochoc.model.problem import Team
 from robochoc.solver.encoding import UnsupportedError
 
 FORMAT = "XCSP 2.1_FRODO"
+
+_TERM = r"(?:X\d+|-?\d+)"
+_FORMS = {
+    "allDifferent": re.compile(rf"\[ (?:{_TERM} )+\]"),
+    "weightedSum": re.compile(rf"\[ (?:{{ -?\d+ {_TERM} }} )+\] <[a-z]+/> -?\d+"),
+    "element": re.compile(rf"X\d+ \[ (?:{_TERM} )+\] {_TERM}"),
+    "cumulative": re.compile(rf"\[ (?:{{ {_TERM} {_TERM} {_TERM} }} )+\] <le/> {_TERM}"),
+}
+"""How FRODO reads the parameters of each."""
 
 
 def frodo_file(team: Team) -> Mapping[str, bytes]:
@@ -57,12 +68,23 @@ class _Writer:
     def _add(self, one: Held) -> None:
         known_to = {"agent": one.robot.name} if one.private_part else {}
         definition = one.constraint.definition
+        if isinstance(definition, GlobalPredicate) and self._as_global(one, definition, known_to):
+            return
         if isinstance(definition, Relation) or not self._in_intension(one, known_to):
             rows = self._flat.rows(one)
             if rows is None:
                 what = f"{one.constraint.name} is too large for a relation, and {definition.name} has no counterpart"
                 raise UnsupportedError(f"{self._flat.title}: {what}")
             self._listed(one.constraint.name, rows, known_to)
+
+    def _as_global(self, one: Held, predicate: GlobalPredicate, known_to: Mapping[str, str]) -> bool:
+        """Write a global constraint that FRODO has in this form; return whether it was done."""
+        if one.constraint.cost != INFINITE or not _FORMS[predicate.name.removeprefix(PREFIX)].fullmatch(predicate.form):
+            return False
+        scope = one.constraint.variables
+        element = self._document.constraint(one.constraint.name, scope, predicate.name, **known_to)
+        write_global(etree.SubElement(element, "parameters"), predicate, one.constraint.parameters)
+        return True
 
     def _in_intension(self, one: Held, known_to: Mapping[str, str]) -> bool:
         """Write a predicate or function as such; return whether it was done."""

@@ -1,7 +1,7 @@
-"""Global constraints of XCSP 2.1, as predicates: `allDifferent`, `weightedSum`, `cumulative`, `element`, `diff2`.
+"""Global constraints of XCSP 2.1: those that are the same here, and others as predicates.
 
 Syntax: Roussel and Lecoutre, "XML representation of constraint networks: format XCSP 2.1" (arXiv 0902.2362), and the
-manual of FRODO, which writes the operator of `cumulative` and intervals in `element`.
+manual of FRODO, which has `diff2`, and intervals in `element`.
 """
 
 from __future__ import annotations
@@ -16,6 +16,7 @@ from lxml import etree
 from robochoc.formats.diagnostics import MistakeError, shortened
 from robochoc.formats.dialects.xcsp21.instance import Formula
 from robochoc.formats.dialects.xcsp21.numbers import integer, is_integer
+from robochoc.formats.global_constraints import PREFIX, read_form
 from robochoc.model.constraint import Predicate
 from robochoc.model.expression import Apply, Constant, Expression, Name
 
@@ -24,10 +25,9 @@ Term = str | int
 MAX_TERMS = 500
 """The maximum number of variables and constants of a global constraint."""
 MAX_BOXES = 100
-"""The maximum number of tasks or rectangles: each is compared with each."""
+"""The maximum number of rectangles: each is compared with each."""
 
 _TOKEN = re.compile(r"[][{}]|<\w+>|[^][{}<\s]+")
-_COMPARISONS = ("eq", "ne", "ge", "gt", "le", "lt")
 _ZERO = Constant(0)
 
 
@@ -49,6 +49,19 @@ def expand(name: str, element: etree._Element, scope: Sequence[str]) -> list[For
     formulas = list(_EXPANSIONS[name](tokens, scope))
     tokens.end()
     return formulas
+
+
+def _as_it_is(tokens: _Tokens, _scope: Sequence[str]) -> Iterator[Formula]:
+    """Yield a constraint that is the same here."""
+    formals: dict[str, str] = {}
+    form = []
+    for word in tokens.rest():
+        if word[0] in "[]{}<" or is_integer(word):
+            form.append(f"{word[:-1]}/>" if word[0] == "<" else word)
+        else:
+            form.append(formals.setdefault(word, f"X{len(formals)}"))
+    kind = "element" if tokens.name == "elementFast" else tokens.name
+    yield Formula(read_form(f"{PREFIX}{kind}", " ".join(form)), tuple(formals))
 
 
 class _Tokens:
@@ -78,6 +91,16 @@ class _Tokens:
         self._next += 1
         return word
 
+    def has(self, part: str) -> bool:
+        """Return whether a word has that part."""
+        return any(part in word for word in self._words)
+
+    def rest(self) -> list[str]:
+        """Return all words that are left."""
+        words = self._words[self._next :]
+        self._next = len(self._words)
+        return words
+
     def want(self, word: str) -> None:
         if self.peek != word:
             self.wrong(word)
@@ -98,13 +121,6 @@ class _Tokens:
             found.append(self.term())
         self.want(closing)
         return found
-
-    def comparison(self, allowed: Sequence[str]) -> str:
-        word = self.take()[1:-1]
-        if word not in allowed:
-            self._next -= 1
-            self.wrong(" or ".join(f"<{one}/>" for one in allowed))
-        return word
 
     def end(self) -> None:
         if self:
@@ -140,22 +156,11 @@ def _all_different(tokens: _Tokens, scope: Sequence[str]) -> Iterator[Formula]:
         yield body.formula("different", Apply("ne", (body.of(one), body.of(other))))
 
 
-def _weighted_sum(tokens: _Tokens, _scope: Sequence[str]) -> Iterator[Formula]:
-    body = _Body()
-    tokens.want("[")
-    products = []
-    while tokens.peek != "]":
-        tokens.want("{")
-        weight, term = tokens.term(), tokens.term()
-        tokens.want("}")
-        products.append(body.of(term) if weight == 1 else Apply("mul", (body.of(weight), body.of(term))))
-    tokens.want("]")
-    operator = tokens.comparison(_COMPARISONS)
-    yield body.formula("weightedSum", Apply(operator, (_sum(products), body.of(tokens.term()))))
-
-
-def _element(tokens: _Tokens, _scope: Sequence[str]) -> Iterator[Formula]:
+def _element(tokens: _Tokens, scope: Sequence[str]) -> Iterator[Formula]:
     """The index counts from 1. FRODO's intervals stand for any value in them."""
+    if not tokens.has(".."):
+        yield from _as_it_is(tokens, scope)
+        return
     body = _Body()
     index = tokens.term()
     items: list[Expression | tuple[int, int]] = []
@@ -178,62 +183,6 @@ def _element(tokens: _Tokens, _scope: Sequence[str]) -> Iterator[Formula]:
         )
         cases.append(Apply("and", (Apply("eq", (body.of(index), Constant(number))), same)))
     yield body.formula(tokens.name, _joined("or", cases) if cases else Apply("ne", (_ZERO, _ZERO)))
-
-
-def _cumulative(tokens: _Tokens, _scope: Sequence[str]) -> Iterator[Formula]:
-    """Yield one predicate a task: when it begins, the heights of all that run do not exceed the limit.
-
-    A task is `{origin duration height}` or, as in XCSP 2.1, `{origin duration end height}`, one of which may be `nil`.
-    """
-    tasks = []
-    tokens.want("[")
-    while tokens.peek != "]":
-        tasks.append(tokens.terms("{", "}"))
-    tokens.want("]")
-    _few(tasks, tokens.name)
-    operator = tokens.comparison(("le", "eq")) if tokens.peek.startswith("<") else "le"
-    limit = tokens.term()
-    peaks = []
-    for task in tasks:
-        body = _Body()
-        yield from _end_given(tokens, task)
-        load = _sum([_load(body, other, _times(tokens, body, task)[0], tokens) for other in tasks])
-        yield body.formula("cumulative", Apply("le", (load, body.of(limit))))
-    if operator == "eq":  # the limit is reached
-        body = _Body()
-        for task in tasks:
-            load = _sum([_load(body, other, _times(tokens, body, task)[0], tokens) for other in tasks])
-            peaks.append(Apply("eq", (load, body.of(limit))))
-        yield body.formula("cumulative", _joined("or", peaks))
-
-
-def _times(tokens: _Tokens, body: _Body, task: list[Term]) -> tuple[Expression, Expression]:
-    """Return the origin and the end of a task."""
-    match task:
-        case [origin, duration, _]:
-            return body.of(origin), Apply("add", (body.of(origin), body.of(duration)))
-        case ["nil", duration, end, _]:
-            return Apply("sub", (body.of(end), body.of(duration))), body.of(end)
-        case [origin, "nil", end, _]:
-            return body.of(origin), body.of(end)
-        case [origin, duration, _, _]:
-            return body.of(origin), Apply("add", (body.of(origin), body.of(duration)))
-        case _:
-            shown = " ".join(map(str, task))
-            raise MistakeError(f"the task '{shortened(shown)}' of global:{tokens.name}", "{origin duration height}")
-
-
-def _end_given(tokens: _Tokens, task: list[Term]) -> Iterator[Formula]:
-    """Yield that a task ends when its origin and duration say, where all three are given."""
-    if len(task) == 4 and "nil" not in task:  # noqa: PLR2004 - XCSP 2.1's four terms
-        body = _Body()
-        yield body.formula("ends", Apply("eq", (_times(tokens, body, task)[1], body.of(task[2]))))
-
-
-def _load(body: _Body, task: list[Term], now: Expression, tokens: _Tokens) -> Expression:
-    begin, end = _times(tokens, body, task)
-    runs = Apply("and", (Apply("le", (begin, now)), Apply("lt", (now, end))))
-    return Apply("if", (runs, body.of(task[-1]), _ZERO))
 
 
 def _diff2(tokens: _Tokens, _scope: Sequence[str]) -> Iterator[Formula]:
@@ -265,19 +214,15 @@ def _few(boxes: Sequence[object], name: str) -> None:
         raise MistakeError(f"global:{name} over {len(boxes)} of them", f"{MAX_BOXES} are allowed: split it")
 
 
-def _sum(terms: Sequence[Expression]) -> Expression:
-    return _joined("add", terms) if terms else _ZERO
-
-
 def _joined(operator: str, terms: Sequence[Expression]) -> Expression:
     return terms[0] if len(terms) == 1 else Apply(operator, tuple(terms))
 
 
 _EXPANSIONS: dict[str, Callable[[_Tokens, Sequence[str]], Iterator[Formula]]] = {
     "allDifferent": _all_different,
-    "weightedSum": _weighted_sum,
+    "weightedSum": _as_it_is,
     "element": _element,
     "elementFast": _element,
-    "cumulative": _cumulative,
+    "cumulative": _as_it_is,
     "diff2": _diff2,
 }

@@ -26,6 +26,7 @@ from robochoc.model.constraint import (
     Constraint,
     Domain,
     Function,
+    GlobalPredicate,
     Predicate,
     Relation,
     Semantics,
@@ -210,6 +211,8 @@ class _Definitions:
 
     def formula(self, definition: Predicate | Function) -> Predicate | Function:
         """Return `definition` under a name that no other has."""
+        if isinstance(definition, GlobalPredicate):
+            return definition
         if definition not in self._formulas:
             self._formulas[definition] = replace(definition, name=self._free(definition.name, definition))
         return self._formulas[definition]

@@ -9,6 +9,7 @@ from pathlib import Path
 import pytest
 
 from robochoc.formats import InvalidInputError, check_team
+from robochoc.formats.dialects.registry import dialect_called
 from tests.support.foreign_problems import imported
 
 NAMES = "V0 V1 V2 V3"
@@ -53,11 +54,14 @@ CASES: list[tuple[str, str, Test]] = [
         "[ {V0 2 1} {V1 1 2} {V2 V3 1} ] <le/> 2",
         lambda a, b, c, d: peak([(a, 2, 1), (b, 1, 2), (c, d, 1)]) <= 2,
     ),
-    ("cumulative", "[ {V0 2 1} {V1 1 2} ] <eq/> 3", lambda a, b, *_: peak([(a, 2, 1), (b, 1, 2)]) == 3),
-    ("cumulative", "[ {V0 2 nil 1} {V1 nil V2 1} ] 1", lambda a, b, c, _: peak([(a, 2, 1), (b, c - b, 1)]) <= 1),
     (
         "cumulative",
-        "[ {V0 1 V1 1} {nil 1 V2 1} ] 1",
+        "[ {V0 2 <nil/> 1} {V1 <nil/> V2 1} ] 1",
+        lambda a, b, c, _: b <= c and peak([(a, 2, 1), (b, c - b, 1)]) <= 1,
+    ),
+    (
+        "cumulative",
+        "[ {V0 1 V1 1} {<nil/> 1 V2 1} ] 1",
         lambda a, b, c, _: b == a + 1 and (a, 0) != (c - 1, 1) and a != c - 1,
     ),
     ("diff2", "[ [{V0 V1} {2 1}] [{1 1} {V2 V3}] ]", apart),
@@ -76,15 +80,34 @@ def test_it_allows_what_its_definition_allows(kind: str, parameters: str, allows
 
 
 @pytest.mark.parametrize(
+    ("kind", "parameters"),
+    [
+        ("weightedSum", "[ {1 V0} {-2 V1} ] <le/> 2"),
+        ("element", "V0 [ V1 2 V2 ] V3"),
+        ("cumulative", "[ {V0 2 1} {V1 V2 V3} ] <le/> 2"),
+    ],
+)
+def test_what_frodo_has_too_is_exported_as_it_was(kind: str, parameters: str, tmp_path: Path) -> None:
+    team = imported(text_of(kind, parameters), tmp_path).team
+    dialect = dialect_called("frodo")
+    assert dialect
+    assert dialect.write
+    (content,) = dialect.write(team).values()
+    assert f'reference="global:{kind}"' in content.decode()
+    again = imported(content.decode(), tmp_path).team
+    assert list(again.constraints()) == list(team.constraints())
+
+
+@pytest.mark.parametrize(
     ("kind", "parameters", "message"),
     [
-        ("weightedSum", "[ {1 V0} ] <foo/> 3", "'<foo>' where <eq/> or <ne/>"),
-        ("weightedSum", "[ {1 V0 ] <eq/> 3", "']' where } should stand"),
+        ("weightedSum", "[ {1 V0} ] <foo/> 3", "'<foo/>' where <eq/> or <ne/>"),
+        ("weightedSum", "[ {1 V0 ] <eq/> 3", "']' where '}' should stand"),
         ("weightedSum", "[ {1 V9} ] <eq/> 3", "'V9' is no variable"),
-        ("element", "V0 [ 1 2", "'the end' where a variable or an integer should stand"),
+        ("element", "V0 [ 1 2", "the end where a variable or an integer should stand"),
         ("allDifferent", "[ V0 V1 ] V2", "'V2' where the end should stand"),
-        ("cumulative", "[ {V0 1} ] 1", "the task 'V0 1' of global:cumulative"),
-        ("cumulative", "[" + "{V0 1 1}" * 101 + "] 1", "global:cumulative over 101 of them"),
+        ("cumulative", "[ {V0 1} ] 1", "{origin duration end height}, in which one may be <nil/>"),
+        ("cumulative", "[" + "{V0 1 1}" * 101 + "] 1", "global:cumulative over 26 of them"),
         ("allDifferent", "[" + " V0" * 501 + "]", "global:allDifferent over 501 terms"),
         ("allDifferent", "[" + " V0" * 9000 + "]", "global:allDifferent has too many parameters"),
     ],

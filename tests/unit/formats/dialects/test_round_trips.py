@@ -9,6 +9,8 @@ from random import Random
 from robochoc.formats import check_team
 from robochoc.formats.dialects.dialect import ImportOptions
 from robochoc.formats.dialects.registry import dialect_called, read_foreign, recognise
+from robochoc.model.assembly import assemble
+from robochoc.model.constraint import Constraint, Domain, Relation, Semantics, Variable
 from robochoc.model.problem import Team
 from tests.support.examples import count
 from tests.support.foreign_problems import optimum, random_problem
@@ -28,6 +30,21 @@ def test_xdiscsp_there_and_back(rounds: int, tmp_path: Path) -> None:
     for _ in range(rounds):
         problem, team = random_problem(chance, plain=True)
         assert _there_and_back("xdiscsp", team, tmp_path) == problem.optimum() == optimum(team)
+
+
+def test_names_of_values_stand_in_a_comment(tmp_path: Path) -> None:
+    colours = ("red", "green", "blue--")
+    domain = Domain("colours", (range(2),), colours)
+    scope = ("x", "y")
+    relation = Relation("differ", 2, Semantics.CONFLICTS, ((0, 0), (1, 1)))
+    team = assemble("t", {name: [Variable(name, domain)] for name in scope}, [Constraint("c", relation, scope, scope)])
+    dialect = dialect_called("frodo")
+    assert dialect
+    assert dialect.write
+    (content,) = dialect.write(team).values()
+    assert b"<!-- colours: 0 is red, 1 is green -->" in content
+    assert b'nbDomains="1"' in content
+    assert _there_and_back("frodo", team, tmp_path) == 0
 
 
 def _there_and_back(name: str, team: Team, folder: Path) -> Fraction | None:

@@ -1,0 +1,79 @@
+"""`robochoc generate scenario`."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+
+from robochoc.cli.options.generated import seed_option
+from robochoc.cli.options.paths import InputPath, TeamFolder
+from robochoc.cli.reports.failures import invalid_input_fails
+
+KINDS = ("remove-value", "add-value", "remove-constraint", "add-constraint", "remove-agent", "add-agent")
+
+
+@click.command(short_help="A random scenario for a team: what changes over time.")
+@click.argument("team", type=TeamFolder())
+@click.option("--events", required=True, type=click.IntRange(1, 1000), metavar="N", help="Number of events.")
+@click.option(
+    "--rate",
+    default=0.1,
+    show_default=True,
+    type=click.FloatRange(0, 1),
+    metavar="R",
+    help="Changes in an event, as a share of the team's shared constraints; at least one.",
+)
+@click.option(
+    "--kinds", multiple=True, type=click.Choice(KINDS), help="Kind of changes; may be given again.  [default: all]"
+)
+@click.option(
+    "--after",
+    type=click.IntRange(1, 1_000_000),
+    metavar="N",
+    help="Events happen after N messages.  [default: when the problem before is solved]",
+)
+@seed_option
+@click.option(
+    "-o",
+    "--output",
+    type=InputPath(),
+    metavar="DIR",
+    help="Folder to write.  [default: instances/TEAM-eventsN-RATE[-KINDS]-SEED]",
+)
+@click.option("--force", is_flag=True, help="Replace the folder if it exists; it may be that of the team.")
+@invalid_input_fails
+def scenario(
+    team: Path,
+    events: int,
+    rate: float,
+    kinds: tuple[str, ...],
+    after: int | None,
+    seed: int,
+    output: Path | None,
+    *,
+    force: bool,
+) -> None:
+    """Write a copy of a team with a random scenario: constraints, values and robots come and go.
+
+    Each event is one that the team as it is then can take. What has gone may come back.
+
+    \b
+    robochoc generate scenario instances/queens3d-4 --events 5
+    robochoc generate scenario out/random --events 10 --rate 0.05 --kinds add-constraint --kinds remove-constraint
+    """  # noqa: D301 - \\b is how click is told to leave the lines as they are
+    from robochoc.formats import read_team, write_team
+    from robochoc.generators.scenario import random_scenario
+
+    try:
+        changing = random_scenario(read_team(team), events, rate, seed, kinds=kinds, after=after)
+    except ValueError as error:
+        from robochoc.formats import InvalidInputError
+
+        if isinstance(error, InvalidInputError):
+            raise
+        raise click.UsageError(str(error)) from None
+    folder = output or Path("instances") / changing.name
+    write_team(changing, folder, replace=force)
+    changes = sum(len(event.changes) for event in changing.scenario)
+    click.echo(f"{folder}: {events} events, {changes} changes; next: robochoc solve {folder}")

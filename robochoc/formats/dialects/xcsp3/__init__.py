@@ -1,0 +1,20 @@
+"""XCSP3 (https://xcsp.org): instances of CSP and COP in the competition's format, read and written."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from robochoc.formats.dialects.dialect import Dialect
+from robochoc.formats.dialects.xcsp3.document import recognises
+from robochoc.formats.dialects.xcsp3.reader import NAME, read
+from robochoc.model.problem import Team
+
+
+def write(team: Team) -> Mapping[str, bytes]:
+    """Return the team's problem as one XCSP3 file. See `robochoc.formats.xcsp3`."""
+    from robochoc.formats.xcsp3 import xcsp3  # noqa: PLC0415 - start-up: the solver's process writes it
+
+    return {f"{team.name}.xml": xcsp3(team)}
+
+
+DIALECT = Dialect(NAME, "XCSP3", recognises, read, write)

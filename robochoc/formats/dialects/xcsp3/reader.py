@@ -1,0 +1,234 @@
+"""Reads XCSP3 instances: variables, constraints with their groups and slides, and the objective."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from lxml import etree
+
+from robochoc.formats.definitions import MAX_VALUES
+from robochoc.formats.diagnostics import DiagnosticCollector, MistakeError, encodable, shortened
+from robochoc.formats.dialects.dialect import Imported, ImportOptions, Names, Note
+from robochoc.formats.dialects.xcsp3 import kinds, scheduling, tables
+from robochoc.formats.dialects.xcsp3.document import attribute, content, invalid, line, read_document
+from robochoc.formats.dialects.xcsp3.objective import post_objective
+from robochoc.formats.dialects.xcsp3.posting import Posting, in_words
+from robochoc.formats.dialects.xcsp3.template import Element, slide_scopes
+from robochoc.formats.dialects.xcsp3.variables import Variables, domain_of, read_variables
+from robochoc.model.assembly import assemble
+from robochoc.model.cost_units import CostUnits
+from robochoc.model.problem import Domain, ProblemKind, Variable
+
+NAME = "xcsp3"
+
+Kind = Callable[[Element, Posting], None]
+
+KINDS: Mapping[str, Kind] = {
+    "intension": kinds.intension,
+    "allDifferent": kinds.all_different,
+    "allEqual": kinds.all_equal,
+    "ordered": kinds.ordered,
+    "lex": kinds.lex,
+    "sum": kinds.sum_of,
+    "count": kinds.count,
+    "nValues": kinds.n_values,
+    "cardinality": kinds.cardinality,
+    "minimum": kinds.extremum("min"),
+    "maximum": kinds.extremum("max"),
+    "channel": kinds.channel,
+    "instantiation": kinds.instantiation,
+    "clause": kinds.clause,
+    "precedence": kinds.precedence,
+    "knapsack": kinds.knapsack,
+    "binPacking": kinds.bin_packing,
+    "element": tables.element,
+    "regular": tables.regular,
+    "mdd": tables.mdd,
+    "circuit": tables.circuit,
+    "noOverlap": scheduling.no_overlap,
+    "cumulative": scheduling.cumulative,
+}
+"""What is read of XCSP3-core, besides `extension`; other kinds are refused by name."""
+
+_SYMBOLIC = {"intension", "extension", "allDifferent", "allEqual", "instantiation"}
+_WIDE = 4_000_000
+"""A constraint with more combinations of values than these is told: the central solver makes tables of no more."""
+
+
+def read(paths: Sequence[Path], options: ImportOptions) -> Imported:
+    """Return the problem in an XCSP3 file.
+
+    Args:
+        paths: The file.
+        options: `owner` says which variables belong to one robot; without it each has a robot of its own.
+
+    Raises:
+        InvalidInputError: with what is wrong, or has no counterpart, each with its line.
+    """
+    if len(paths) != 1:
+        raise invalid(paths[0], 0, f"{len(paths)} files", "an XCSP3 instance is one file: import them one by one")
+    (path,) = paths
+    root = read_document(path)
+    mistakes = DiagnosticCollector(encodable(str(path)))
+    variables = read_variables(root.find("variables"), mistakes)
+    mistakes.finish()
+    if not variables.domains:
+        raise invalid(path, line(root), "has no variables", "expected <variables> with <var> or <array>")
+    ids = _names(variables)
+    symbols = {symbol: number for number, symbol in enumerate(variables.symbols)}
+    domains = {name: domain_of(values, symbols, f"d_{ids[name]}") for name, values in variables.domains.items()}
+    with mistakes.at(line(root)):
+        if sum(map(len, domains.values())) > 10 * MAX_VALUES:
+            raise MistakeError(f"domains with more than {10 * MAX_VALUES:,} values together", "make them smaller")
+    mistakes.finish()
+    posting = Posting(variables, {name: tuple(domain) for name, domain in domains.items()}, symbols, ids)
+    constraints = root.find("constraints")
+    if constraints is not None:
+        _Reader(posting, mistakes).read(constraints)
+    objectives = root.find("objectives")
+    maximize = False
+    if objectives is not None and len(objectives):
+        with mistakes.at(posting.line):
+            maximize = post_objective(objectives, posting)
+    mistakes.finish()
+    own = {name: Variable(ids[name], domains[name]) for name in variables.domains}
+    robots = _robots(own, options.owner, path)
+    _add_extra(robots, posting)
+    team = assemble(
+        _team_name(path, options),
+        robots,
+        [*posting.constraints, *posting.costs],
+        kind=ProblemKind.DISWCSP if attribute(root, "type") == "COP" else ProblemKind.DISCSP,
+        costs=CostUnits(maximize, 0, posting.constant),
+    )
+    changed = {ours: theirs for theirs, ours in ids.items() if ours != theirs}
+    return Imported(team, NAME, changed, tuple(_notes(posting, root, changed)))
+
+
+@dataclass
+class _Reader:
+    """Reads constraints, in blocks, groups and slides."""
+
+    posting: Posting
+    mistakes: DiagnosticCollector
+    _extensions: tables.Extensions = field(default_factory=tables.Extensions)
+
+    def read(self, parent: etree._Element) -> None:
+        """Read all constraints in `parent`."""
+        for child in parent:
+            with self.mistakes.at(line(child)):
+                match child.tag:
+                    case "block":
+                        self.read(child)
+                    case "group":
+                        self._group(child)
+                    case "slide":
+                        self._slide(child)
+                    case _:
+                        self._post(Element(child, self.posting.variables))
+
+    def _group(self, group: etree._Element) -> None:
+        arguments = group.findall("args")
+        template = self._template(group, len(group) - len(arguments))
+        for one in arguments:
+            words = list(self.posting.variables.named(content(one)))
+            self._post(Element(template.xml, template.variables, words))
+
+    def _slide(self, slide: etree._Element) -> None:
+        template = self._template(slide, len(slide) - len(slide.findall("list")))
+        for words in slide_scopes(slide, self.posting.variables, template.arity):
+            self._post(Element(template.xml, template.variables, words))
+
+    def _template(self, parent: etree._Element, number: int) -> Element:
+        if number != 1:
+            raise MistakeError(f"<{parent.tag}> with {number} constraints", "one template is expected")
+        (template,) = (child for child in parent if child.tag not in {"args", "list"})
+        return Element(template, self.posting.variables, [])
+
+    def _post(self, element: Element) -> None:
+        kind = KINDS.get(element.kind, self._extensions if element.kind == "extension" else None)
+        if kind is None:
+            hint = f"of XCSP3, {' '.join(sorted([*KINDS, 'extension']))} are read"
+            raise MistakeError(f"the constraint <{shortened(element.kind)}> has no counterpart", hint)
+        element.check()
+        self.posting.line = line(element.xml)
+        self.posting.title = attribute(element.xml, "id") or element.kind
+        before = len(self.posting.constraints)
+        kind(element, self.posting)
+        if element.kind not in _SYMBOLIC and self.posting.symbols:
+            self._refuse_symbols(element.kind, before)
+
+    def _refuse_symbols(self, kind: str, before: int) -> None:
+        for constraint in self.posting.constraints[before:]:
+            for name in constraint.variables:
+                if self.posting.is_symbolic(name):
+                    raise MistakeError(f"<{kind}> over symbols has no counterpart", "write it as a table")
+
+
+def _names(variables: Variables) -> dict[str, str]:
+    """Return our name of each variable: `x_1_2` for `x[1][2]`, unless that is another one's."""
+    names = Names()
+    plain = {name: names.of(name) for name in variables.domains if "[" not in name}
+    for name in variables.domains:
+        if "[" in name:
+            pretty = re.sub(r"[\[\]]+", "_", name).strip("_")
+            plain[name] = names.of(pretty if pretty not in variables.domains else name)
+    found = {name: plain[name] for name in variables.domains}
+    if len(set(found.values())) < len(found):  # `a_1[2]` and `a[1][2]`
+        exact = Names()
+        return {name: exact.of(name) for name in variables.domains}
+    return found
+
+
+def _robots(own: Mapping[str, Variable], owner: str | None, path: Path) -> dict[str, list[Variable]]:
+    """Return the variables of each robot, by its name."""
+    try:
+        pattern = re.compile(owner) if owner is not None else None
+    except re.error as error:
+        raise invalid(path, 0, f"--owner {owner} is no regular expression: {error}", "write x\\[(\\d+)\\]") from None
+    names = Names()
+    robots: dict[str, list[Variable]] = {}
+    for original, variable in own.items():
+        match = pattern.search(original) if pattern else None
+        if pattern and not match:
+            raise invalid(path, 0, f"--owner {owner} fits no part of '{original}'", "let it fit all variables")
+        word = variable.name if match is None else match[1] if match.re.groups and match[1] else match[0]
+        robots.setdefault(names.of(word if word[:1].isalpha() else f"r{word}"), []).append(variable)
+    return robots
+
+
+def _add_extra(robots: dict[str, list[Variable]], posting: Posting) -> None:
+    """Give variables that the instance has not to a robot of their own, the last."""
+    for name, values in posting.extra.items():
+        robot = name
+        while robot in robots:
+            robot += "_"
+        domain = Domain(f"d_{name}", tuple(range(value, value + 1) for value in values))
+        robots[robot] = [Variable(name, domain)]
+
+
+def _team_name(path: Path, options: ImportOptions) -> str:
+    return options.name or path.name.removesuffix(".xml")
+
+
+def _notes(posting: Posting, root: etree._Element, changed: Mapping[str, str]) -> list[Note]:
+    notes = [Note("renamed", f"{original} is {name}") for name, original in changed.items()]
+    notes += [
+        Note("auxiliary", f"{name} is a further variable: the bound that the objective minimises or maximises")
+        for name in posting.extra
+    ]
+    if root.find("annotations") is not None:
+        notes.append(Note("annotations", "advice to solvers is left out"))
+    wide = [one for one in posting.constraints if posting.size(one.variables) > _WIDE]
+    notes += [
+        Note(
+            "wide",
+            f"line {one.line}: {one.name} is over {len(one.variables)} variables with"
+            f" {in_words(posting.size(one.variables))} combinations of values; only local search takes that",
+        )
+        for one in wide[:100]
+    ]
+    return notes

@@ -1,0 +1,153 @@
+"""The constraint kinds of XCSP3-core about tasks in time: cumulative and noOverlap."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Iterator, Sequence
+from typing import NamedTuple
+
+from robochoc.formats.diagnostics import MistakeError
+from robochoc.formats.dialects.xcsp3.kinds import as_integers, items
+from robochoc.formats.dialects.xcsp3.posting import Posting
+from robochoc.formats.dialects.xcsp3.template import Element
+from robochoc.formats.dialects.xcsp3.terms import Condition, as_integer, compare, every, plus, some, times, total
+from robochoc.model.expression import Constant, Expression
+
+MAX_COVERS = 5_000
+"""The maximum number of sets of tasks that are too much together."""
+
+
+class Task(NamedTuple):
+    """A task: when it begins, how long it takes, and how much it needs."""
+
+    start: Expression
+    length: Expression
+    height: Expression
+
+
+def no_overlap(element: Element, posting: Posting) -> None:
+    """Tasks, or boxes, do not overlap."""
+    origins, lengths = (_points(element, child, posting) for child in ("origins", "lengths"))
+    if len(origins) != len(lengths):
+        raise MistakeError(f"{len(origins)} origins, but {len(lengths)} lengths", "write one for each")
+    spared = element.attribute("zeroIgnored") != "false"
+    for one, other in itertools.combinations(zip(origins, lengths, strict=True), 2):
+        apart = []
+        for (x, y), (long, wide) in zip(
+            zip(one[0], other[0], strict=True), zip(one[1], other[1], strict=True), strict=True
+        ):
+            apart += [compare("le", plus(x, long), y), compare("le", plus(y, wide), x)]
+        apart += [_is_zero(side) for side in (*one[1], *other[1]) if spared and _may_be_zero(side, posting)]
+        posting.post(some(apart))
+
+
+def cumulative(element: Element, posting: Posting) -> None:
+    """At no time do tasks need more than there is."""
+    starts, lengths, heights = (
+        as_integers(items(element.words(child), posting)) for child in ("origins", "lengths", "heights")
+    )
+    if not len(starts) == len(lengths) == len(heights):
+        raise MistakeError("different numbers of origins, lengths and heights", "write one of each for a task")
+    if element.has("ends"):
+        for start, length, end in zip(starts, lengths, as_integers(items(element.words("ends"), posting)), strict=True):
+            posting.post(compare("eq", plus(start, length), end))
+    if any(min(posting.domain(one), default=0) < 0 for one in (*lengths, *heights)):
+        raise MistakeError("tasks with negative lengths or heights have no counterpart", "they are 0 or more")
+    condition = posting.condition(element.text("condition"))
+    if condition.operator not in {"lt", "le"}:
+        raise MistakeError(f"<cumulative> with {condition.operator} has no counterpart", "write (le,10)")
+    post_tasks(list(map(Task, starts, lengths, heights)), condition, posting)
+
+
+def post_tasks(every_task: Sequence[Task], condition: Condition, posting: Posting) -> None:
+    """Post that what the tasks that run at one time need, together, meets `condition`: at most something."""
+    nothing = Constant(0)
+    tasks = [task for task in every_task if nothing not in (task.length, task.height)]
+    covers = _covers(tasks, condition)
+    if covers is None:
+        for task in tasks:
+            posting.post(_load_at(task, tasks, condition, posting))
+        return
+    for cover in covers:
+        pairs = itertools.combinations(cover, 2)
+        posting.post(some([part for one, other in pairs for part in _apart(one, other)] + _absent(cover, posting)))
+
+
+def _absent(cover: Sequence[Task], posting: Posting) -> list[Expression]:
+    return [_is_zero(task.length) for task in cover if _may_be_zero(task.length, posting)]
+
+
+def _apart(one: Task, other: Task) -> list[Expression]:
+    return [
+        compare("le", plus(one.start, one.length), other.start),
+        compare("le", plus(other.start, other.length), one.start),
+    ]
+
+
+def _covers(tasks: Sequence[Task], condition: Condition) -> list[tuple[Task, ...]] | None:
+    """Return the smallest sets of tasks that are too much together; None where there are many, or heights vary.
+
+    Tasks that overlap in pairs overlap all at one time, so that in each set two must be apart.
+    """
+    if condition.with_constant(0) is None or not all(isinstance(task.height, Constant) for task in tasks):
+        return None
+    found: list[tuple[Task, ...]] = []
+    try:
+        found.extend(_minimal(sorted(tasks, key=_height, reverse=True), condition))
+    except _TooManyError:
+        return None
+    return found
+
+
+class _TooManyError(Exception):
+    """There are too many sets of tasks."""
+
+
+def _minimal(tasks: Sequence[Task], condition: Condition) -> Iterator[tuple[Task, ...]]:
+    """Yield the minimal sets that violate `condition`; `tasks` are from the highest to the lowest."""
+    steps = 0
+    waiting: list[tuple[tuple[Task, ...], int, int]] = [((), 0, 0)]
+    while waiting:
+        chosen, height, following = waiting.pop()
+        for place in range(following, len(tasks)):
+            steps += 1
+            if steps > 20 * MAX_COVERS:
+                raise _TooManyError
+            together, sum_of_heights = (*chosen, tasks[place]), height + _height(tasks[place])
+            # the last is the lowest: the set is minimal, as without it nothing is violated
+            if not condition.with_constant(sum_of_heights):
+                yield together
+            else:
+                waiting.append((together, sum_of_heights, place + 1))
+
+
+def _height(task: Task) -> int:
+    return task.height.value if isinstance(task.height, Constant) else 0
+
+
+def _load_at(task: Task, tasks: Sequence[Task], condition: Condition, posting: Posting) -> Expression:
+    """Return that when `task` begins, those that run do not need too much."""
+    running = [task.height]
+    for other in tasks:
+        if other is not task:
+            runs = every(
+                [compare("le", other.start, task.start), compare("lt", task.start, plus(other.start, other.length))]
+            )
+            running.append(times(other.height, as_integer(runs)))
+    unused = [_is_zero(task.length)] if _may_be_zero(task.length, posting) else []
+    return some([*unused, condition.on(total(running))])
+
+
+def _is_zero(length: Expression) -> Expression:
+    return compare("eq", length, Constant(0))
+
+
+def _may_be_zero(length: Expression, posting: Posting) -> bool:
+    return 0 in posting.domain(length)
+
+
+def _points(element: Element, child: str, posting: Posting) -> list[list[Expression]]:
+    """Return the coordinates of tasks, which have several where one of the two lists is one of lists."""
+    if any(element.text(name).startswith("(") for name in ("origins", "lengths")):
+        return [as_integers(posting.term(word) for word in row) for row in element.matrix(child)]
+    return [[member] for member in as_integers(items(element.words(child), posting))]

@@ -1,0 +1,260 @@
+"""The constraint kinds of XCSP3-core that are tables, or become such: extension, element, regular, mdd, circuit."""
+
+from __future__ import annotations
+
+import itertools
+import math
+import re
+from collections import defaultdict
+from collections.abc import Iterator, Mapping, Sequence
+
+from robochoc.formats.definitions import MAX_TUPLES
+from robochoc.formats.diagnostics import MistakeError, shortened
+from robochoc.formats.dialects.xcsp3.kinds import as_integers, items, rows_of
+from robochoc.formats.dialects.xcsp3.posting import Item, Posting
+from robochoc.formats.dialects.xcsp3.template import Element
+from robochoc.formats.dialects.xcsp3.terms import Condition, compare, every, inside, integer, some, span
+from robochoc.model.expression import Apply, Constant, Expression
+
+MAX_WRITTEN_OUT = 100_000
+"""The maximum number of tuples that a table with `*` is written out to; with more it becomes an expression."""
+MAX_CASES = 9_000
+"""The maximum number of tuples of a table with `*` that is not written out."""
+
+Row = tuple[int, ...]
+Arcs = Mapping[str, Mapping[int, set[str]]]
+"""From a state, by a value, to other states."""
+
+
+class Extensions:
+    """Reads `<extension>`; constraints of one group share their table."""
+
+    def __init__(self) -> None:
+        self._tables: dict[object, tuple[Row, ...] | None] = {}
+
+    def __call__(self, element: Element, posting: Posting) -> None:
+        """Post a table of allowed or of forbidden tuples."""
+        if element.attribute("type") not in {"", "ordinary", "starred", "extension"}:
+            raise MistakeError("a hybrid table has no counterpart", "write ordinary tuples")
+        allowed = element.has("supports")
+        scope = items(element.words("list"), posting)
+        xml = element.xml.find("supports" if allowed else "conflicts")
+        text = element.text("supports" if allowed else "conflicts")
+        wild = "*" in text or ".." in text
+        key = id(xml), tuple(tuple(posting.domain(item)) for item in scope) if wild else len(scope)
+        if key not in self._tables:
+            try:
+                self._tables[key] = tuple(_rows(text, scope, posting))
+            except _TooWideError:
+                self._tables[key] = None
+        table = self._tables[key]
+        if table is None:
+            _post_cases(text, scope, posting, allowed=allowed)
+            return
+        posting.post_table(scope, table, allowed=allowed)
+
+
+class _TooWideError(Exception):
+    """A table with `*` has too many tuples when it is written out."""
+
+
+def _rows(text: str, scope: Sequence[Item], posting: Posting) -> Iterator[Row]:
+    """Yield the tuples in a text; `*` is any value of its variable, `1..3` each of three."""
+    if not text.startswith("("):
+        for word in text.split():
+            yield from ((value,) for value in _cell(word, scope[0], posting))
+        return
+    number = "[+-]?[0-9]{1,18}"
+    plain = "".join(text.split())
+    if re.fullmatch(rf"(?>\({number}(?:,{number}){{{len(scope) - 1}}}\))++", plain):
+        flat = list(map(int, plain[1:-1].replace(")(", ",").split(",")))
+        yield from zip(*(flat[place :: len(scope)] for place in range(len(scope))), strict=True)
+        return
+    made = 0
+    for words in _cells(text, scope):
+        cells = [_cell(word, item, posting) for word, item in zip(words, scope, strict=True)]
+        made += math.prod(map(len, cells))
+        if made > MAX_WRITTEN_OUT and any(len(cell) != 1 for cell in cells):
+            raise _TooWideError
+        yield from itertools.product(*cells)
+
+
+def _cells(text: str, scope: Sequence[Item]) -> Iterator[list[str]]:
+    """Yield the words of each tuple. Raises `MistakeError`."""
+    squeezed = "".join(text.split())
+    for row in squeezed.removeprefix("(").removesuffix(")").split(")("):
+        words = row.split(",")
+        if len(words) != len(scope):
+            raise MistakeError(f"the tuple ({shortened(row)}) of {len(words)}", f"{len(scope)} values are expected")
+        yield words
+
+
+def _post_cases(text: str, scope: Sequence[Item], posting: Posting, *, allowed: bool) -> None:
+    """Post a table with `*` as it stands: one of its tuples fits, or none of them."""
+    cases = []
+    for words in _cells(text, scope):
+        cells = zip(words, as_integers(scope), strict=True)
+        cases.append(every([inside(item, _cell(word, item, posting)) for word, item in cells if word != "*"]))
+        if len(cases) > MAX_CASES:
+            raise MistakeError(f"a table with * of more than {MAX_CASES:,} tuples", "write it without")
+    if allowed:
+        posting.post(some(cases))
+        return
+    for case in cases:
+        posting.post(Apply("not", (case,)))
+
+
+def _cell(word: str, item: Item, posting: Posting) -> Sequence[int]:
+    if word == "*":
+        return posting.domain(item)
+    if word in posting.symbols:
+        return (posting.symbols[word],)
+    if ".." in word:
+        values = span(word)
+        return [value for value in posting.domain(item) if value in values]
+    return (integer(word),)
+
+
+def element(element: Element, posting: Posting) -> None:
+    """A condition on the member of a list, or of a matrix, that an index chooses."""
+    condition = (
+        posting.condition(element.text("condition"))
+        if element.has("condition")
+        else Condition("eq", posting.term(element.text("value")))
+    )
+    if element.has("matrix"):
+        _element_of_matrix(element, posting, condition)
+        return
+    members = as_integers(items(element.words("list"), posting))
+    if not element.has("index"):
+        posting.post(some([condition.on(member) for member in members]))
+        return
+    if element.attribute("rank", "index") not in {"", "any"}:
+        raise MistakeError("an element of a given rank has no counterpart", "leave rank out")
+    start = integer(element.attribute("startIndex", "list") or "0")
+    index = posting.term(element.text("index"))
+    choose(posting, [index], {(start + place,): member for place, member in enumerate(members)}, condition)
+
+
+def _element_of_matrix(element: Element, posting: Posting, condition: Condition) -> None:
+    rows = [as_integers(posting.term(word) for word in row) for row in element.matrix("matrix")]
+    down = integer(element.attribute("startRowIndex", "matrix") or "0")
+    across = integer(element.attribute("startColIndex", "matrix") or "0")
+    indexes = items(element.words("index"), posting)
+    if len(indexes) != 2:  # noqa: PLR2004 - of row and column
+        raise MistakeError("a matrix without two indexes", "write <index> i j </index>")
+    cells: dict[Row, Expression] = {
+        (down + i, across + j): member for i, row in enumerate(rows) for j, member in enumerate(row)
+    }
+    choose(posting, indexes, cells, condition)
+
+
+def choose(
+    posting: Posting, indexes: Sequence[Expression], cells: Mapping[Row, Expression], condition: Condition
+) -> None:
+    """Post `condition` on the cell that `indexes` choose: a table where all cells are integers, else cell by cell."""
+    if all(isinstance(cell, Constant) for cell in cells.values()):
+        operand = condition.operand
+        others = [] if isinstance(operand, tuple | Constant) else [operand]
+        known = [set(posting.domain(index)) for index in indexes]
+        rows: list[Row] = []
+        for place, cell in cells.items():
+            if not all(value in some_values for value, some_values in zip(place, known, strict=True)):
+                continue
+            value = cell.value if isinstance(cell, Constant) else 0
+            for row in itertools.product(*(posting.domain(other) for other in others)):
+                fixed = Condition(condition.operator, Constant(row[0])) if others else condition
+                if fixed.with_constant(value):
+                    rows.append((*place, *row))
+            if len(rows) > MAX_TUPLES:
+                raise MistakeError(f"an <element> of more than {MAX_TUPLES:,} tuples", "split it")
+        posting.post_table([*indexes, *others], rows, allowed=True)
+        return
+    for axis, index in enumerate(indexes):
+        posting.post(inside(index, {where[axis] for where in cells}))
+    for where, chosen in cells.items():
+        elsewhere = [compare("ne", index, Constant(number)) for index, number in zip(indexes, where, strict=True)]
+        posting.post(some([*elsewhere, condition.on(chosen)]))
+
+
+def regular(element: Element, posting: Posting) -> None:
+    """A list is a word that an automaton accepts."""
+    final = set(element.text("final").split())
+    _walk(element, posting, element.text("start"), final)
+
+
+def mdd(element: Element, posting: Posting) -> None:
+    """A list is a path through a decision diagram, from its root to its end."""
+    arcs = _arcs(element)
+    reached = {state for by_value in arcs.values() for states in by_value.values() for state in states}
+    roots, ends = set(arcs) - reached, reached - set(arcs)
+    if len(roots) != 1 or not ends:
+        raise MistakeError("a decision diagram without one root", "expected one, and an end")
+    _walk(element, posting, roots.pop(), ends)
+
+
+def _arcs(element: Element) -> Arcs:
+    arcs: dict[str, dict[int, set[str]]] = defaultdict(lambda: defaultdict(set))
+    for row in rows_of(element.text("transitions")):
+        if len(row) != 3:  # noqa: PLR2004 - from, value, to
+            raise MistakeError(f"the transition ({shortened(','.join(row))})", "write (state,value,state)")
+        for value in span(row[1]):
+            arcs[row[0]][value].add(row[2])
+    return arcs
+
+
+def _walk(element: Element, posting: Posting, start: str, final: set[str]) -> None:
+    """Post the words that lead from `start` to a state in `final`, as a table."""
+    arcs = _arcs(element)
+    scope = items(element.words("list"), posting)
+    domains = [set(posting.domain(item)) for item in scope]
+    useful = [final]
+    for domain in reversed(domains):
+        useful.append({s for s in arcs if any(v in domain and t & useful[-1] for v, t in arcs[s].items())})
+    useful.reverse()
+    words: dict[Row, set[str]] = {(): {start} & useful[0]}
+    for step, domain in enumerate(domains):
+        longer: dict[Row, set[str]] = {}
+        for word, states in words.items():
+            for state in states:
+                for value, targets in arcs[state].items() if state in arcs else ():
+                    going = targets & useful[step + 1]
+                    if value in domain and going:
+                        longer.setdefault((*word, value), set()).update(going)
+            if len(longer) > MAX_WRITTEN_OUT:
+                kind = element.kind
+                raise MistakeError(f"<{kind}> has more than {MAX_WRITTEN_OUT:,} words", "it becomes a table: split it")
+        words = longer
+    posting.post_table(scope, [word for word, states in words.items() if states], allowed=True)
+
+
+def circuit(element: Element, posting: Posting) -> None:
+    """The values of a list are successors: all places but those that follow themselves lie on one circle."""
+    if element.attribute("startIndex", "list") not in {"", "0"}:
+        raise MistakeError("a circuit with another startIndex than 0", "count from 0")
+    scope = items(element.whole(), posting)
+    size = posting.condition(f"(eq,{element.text('size')})") if element.has("size") else None
+    if size is not None and not isinstance(size.operand, Constant):
+        raise MistakeError("a circuit of a variable size has no counterpart", "give its size as an integer")
+
+    def holds(row: Sequence[int]) -> bool:
+        length = _circle(row)
+        return length > 1 and (size is None or bool(size.with_constant(length)))
+
+    for one, other in itertools.combinations(as_integers(scope), 2):
+        posting.post(compare("ne", one, other))
+    posting.post_tried(element.kind, scope, holds)
+
+
+def _circle(successors: Sequence[int]) -> int:
+    """Return the length of the one circle among `successors`; 0 where there is none, or several."""
+    places = range(len(successors))
+    moving = [place for place in places if successors[place] != place]
+    if not moving or any(value not in places for value in successors):
+        return 0
+    seen: list[int] = []
+    place = moving[0]
+    while place not in seen:
+        seen.append(place)
+        place = successors[place]
+    return len(seen) if place == moving[0] and len(seen) == len(moving) else 0

@@ -1,0 +1,380 @@
+"""XCSP3's functional expressions as ours, and conditions such as `(le,10)`.
+
+XCSP3 (Boussemart, Lecoutre, Audemard, Piette, "XCSP3-core", arXiv 2009.00514) knows no Booleans: 0 is false, anything
+else is true. Ours have types, so that conversions are put between them.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Collection, Iterable, Sequence
+from dataclasses import dataclass
+from functools import lru_cache, reduce
+
+from robochoc.formats.diagnostics import MistakeError, shortened
+from robochoc.model.expression import OPERATORS, Apply, Constant, Expression, Type
+
+MAX_TEXT = 1_000_000
+"""The maximum length of the text of an expression."""
+MAX_DEPTH = 50
+"""The maximum depth of an expression."""
+
+TRUE: Expression = Apply("eq", (Constant(0), Constant(0)))
+FALSE: Expression = Apply("ne", (Constant(0), Constant(0)))
+
+_TOKEN = re.compile(r"\s*([A-Za-z_][A-Za-z0-9_]*(?:\[[0-9]{1,9}\])*|[+-]?[0-9]{1,18}(?![0-9.])|%[0-9]{1,6}|[(),])")
+_INTEGER = re.compile(r"[+-]?[0-9]{1,18}")
+_RANGE = re.compile(r"([+-]?[0-9]{1,18})\.\.([+-]?[0-9]{1,18})")
+_CONDITION = re.compile(r"\(\s*([a-z]+)\s*,\s*(.*?)\s*\)", re.DOTALL)
+
+_INVERSE = {"lt": "gt", "le": "ge", "gt": "lt", "ge": "le", "eq": "eq", "ne": "ne"}
+RELATIONS = frozenset(_INVERSE)
+"""The operators of conditions and ordered constraints."""
+
+
+@dataclass(frozen=True, slots=True)
+class Leaf:
+    """A name, an integer or a parameter `%0` in an expression, as it is written."""
+
+    text: str
+
+
+@dataclass(frozen=True, slots=True)
+class Call:
+    """An operator with its arguments, as they are written."""
+
+    operator: str
+    arguments: tuple[Tree, ...]
+
+
+Tree = Leaf | Call
+Resolve = Callable[[str], tuple[Expression, bool]]
+"""Returns what a leaf stands for, and whether that is symbolic: a symbol, or a variable over symbols."""
+
+
+def type_of(expression: Expression) -> Type:
+    """Return the type of the value of `expression`."""
+    return OPERATORS[expression.operator].gives if isinstance(expression, Apply) else Type.INTEGER
+
+
+def as_integer(expression: Expression) -> Expression:
+    """Return `expression` as an integer: 1 where it is true."""
+    if type_of(expression) is Type.INTEGER:
+        return expression
+    return Apply("if", (expression, Constant(1), Constant(0)))
+
+
+def as_boolean(expression: Expression) -> Expression:
+    """Return `expression` as a Boolean: true unless it is 0."""
+    if type_of(expression) is Type.BOOLEAN:
+        return expression
+    if isinstance(expression, Apply) and expression.operator == "if":
+        condition, then, otherwise = expression.arguments
+        if then == Constant(1) and otherwise == Constant(0):
+            return condition
+    return Apply("ne", (expression, Constant(0)))
+
+
+def every(parts: Sequence[Expression]) -> Expression:
+    """Return the conjunction of Booleans."""
+    return FALSE if FALSE in parts else _fold("and", [part for part in parts if part != TRUE], TRUE)
+
+
+def some(parts: Sequence[Expression]) -> Expression:
+    """Return the disjunction of Booleans."""
+    return TRUE if TRUE in parts else _fold("or", [part for part in parts if part != FALSE], FALSE)
+
+
+def total(parts: Sequence[Expression]) -> Expression:
+    """Return the sum of integers."""
+    return _fold("add", [part for part in parts if part != Constant(0)], Constant(0))
+
+
+def times(factor: Expression, expression: Expression) -> Expression:
+    """Return the product of two integers."""
+    if Constant(0) in (factor, expression):
+        return Constant(0)
+    if isinstance(factor, Constant) and isinstance(expression, Constant):
+        return Constant(factor.value * expression.value)
+    if factor == Constant(1):
+        return expression
+    return factor if expression == Constant(1) else Apply("mul", (factor, expression))
+
+
+def plus(one: Expression, other: Expression) -> Expression:
+    """Return the sum of two integers."""
+    if isinstance(one, Constant) and isinstance(other, Constant):
+        return Constant(one.value + other.value)
+    return total((one, other))
+
+
+def compare(operator: str, left: Expression, right: Expression) -> Expression:
+    """Return a comparison of two integers."""
+    return Apply(operator, (left, right))
+
+
+def inside(expression: Expression, values: Collection[int]) -> Expression:
+    """Return that `expression` is one of `values`."""
+    runs: list[tuple[int, int]] = []
+    for value in sorted(set(values)):
+        if runs and runs[-1][1] == value - 1:
+            runs[-1] = runs[-1][0], value
+        else:
+            runs.append((value, value))
+    return some([_between(expression, low, high) for low, high in runs])
+
+
+@dataclass(frozen=True)
+class Condition:
+    """A comparison with something: `(le,10)`, `(eq,x)`, `(in,1..3)`, `(notin,{1,2})`."""
+
+    operator: str
+    operand: Expression | tuple[int, ...]
+
+    def on(self, expression: Expression) -> Expression:
+        """Return that the condition holds for the integer `expression`."""
+        if isinstance(self.operand, tuple):
+            found = inside(expression, self.operand)
+            return found if self.operator == "in" else Apply("not", (found,))
+        return compare(self.operator, expression, self.operand)
+
+    def with_constant(self, value: int) -> bool | None:
+        """Return whether it holds for `value`; None where that depends on variables."""
+        if isinstance(self.operand, tuple):
+            return (value in self.operand) == (self.operator == "in")
+        if not isinstance(self.operand, Constant):
+            return None
+        return bool(OPERATORS[self.operator].meaning(value, self.operand.value))
+
+
+def read_condition(text: str, term: Callable[[str], Expression], max_values: int) -> Condition:
+    """Return the condition in a text.
+
+    Args:
+        text: The text.
+        term: Returns the variable or integer that a word stands for.
+        max_values: The maximum number of values of a set.
+
+    Raises:
+        MistakeError: if it is none.
+    """
+    match = _CONDITION.fullmatch(text)
+    if match and match[1] in RELATIONS:
+        return Condition(match[1], term(match[2]))
+    if match and match[1] in {"in", "notin"}:
+        return Condition(match[1], tuple(_values(match[2], max_values)))
+    raise MistakeError(f"'{shortened(text)}' is no condition", "write (le,10), (eq,x) or (in,1..3)")
+
+
+def words_of(text: str) -> list[str]:
+    """Return the words of a list; an expression is one, whatever blanks are in it."""
+    if "(" not in text:
+        return text.split()
+    words, depth, begun = [], 0, ""
+    for piece in text.split():
+        depth += piece.count("(") - piece.count(")")
+        begun += piece
+        if depth <= 0:
+            words.append(begun)
+            begun = ""
+    return [*words, begun] if begun else words
+
+
+def integer(text: str) -> int:
+    """Return the integer in a text. Raises `MistakeError`."""
+    if not _INTEGER.fullmatch(text):
+        raise MistakeError(f"'{shortened(text)}' is no integer", "at most 18 digits, and a sign")
+    return int(text)
+
+
+def span(text: str) -> range:
+    """Return the integers in `4` or `1..4`. Raises `MistakeError`."""
+    match = _RANGE.fullmatch(text)
+    if not match:
+        value = integer(text)
+        return range(value, value + 1)
+    first, last = int(match[1]), int(match[2])
+    if first > last:
+        raise MistakeError(f"the range {text} is empty", f"write {last}..{first}")
+    return range(first, last + 1)
+
+
+@lru_cache(maxsize=4096)
+def read_tree(text: str) -> Tree:
+    """Return the functional expression in a text, as it is written.
+
+    Raises:
+        MistakeError: if it is none.
+    """
+    if len(text) > MAX_TEXT:
+        raise MistakeError(f"an expression of {len(text):,} characters", f"{MAX_TEXT:,} are allowed")
+    tokens: list[str] = []
+    place = 0
+    stripped = text.rstrip()
+    while place < len(stripped):
+        match = _TOKEN.match(stripped, place)
+        if not match:
+            raise _unreadable(text, stripped[place:])
+        tokens.append(match[1])
+        place = match.end()
+    tree, after = _tree(tokens, 0, 1, text)
+    if after != len(tokens):
+        raise _unreadable(text, tokens[after])
+    return tree
+
+
+def resolved(tree: Tree, resolve: Resolve, max_values: int) -> Expression:
+    """Return `tree` as an expression of ours.
+
+    Raises:
+        MistakeError: if it has an operator that has no counterpart, or wrong arguments.
+    """
+    return _resolved(tree, resolve, max_values)[0]
+
+
+def _resolved(tree: Tree, resolve: Resolve, max_values: int) -> tuple[Expression, bool]:
+    if isinstance(tree, Leaf):
+        return resolve(tree.text)
+    if tree.operator in {"in", "notin"}:
+        return _membership(tree, resolve, max_values), False
+    found = [_resolved(argument, resolve, max_values) for argument in tree.arguments]
+    symbolic = [is_symbolic for _, is_symbolic in found]
+    if any(symbolic) and (tree.operator not in {"eq", "ne"} or not all(symbolic)):
+        raise MistakeError(
+            f"{tree.operator} of symbols", "of symbols, only eq, ne and in among themselves are supported"
+        )
+    return _applied(tree.operator, [expression for expression, _ in found]), False
+
+
+def _membership(tree: Call, resolve: Resolve, max_values: int) -> Expression:
+    if len(tree.arguments) != 2 or not isinstance(tree.arguments[1], Call) or tree.arguments[1].operator != "set":  # noqa: PLR2004
+        raise MistakeError(f"{tree.operator} without a set", "write in(x,set(1,2))")
+    what, is_symbolic = _resolved(tree.arguments[0], resolve, max_values)
+    members = [_resolved(member, resolve, max_values) for member in tree.arguments[1].arguments]
+    if any(symbol is not is_symbolic for _, symbol in members):
+        raise MistakeError("a set of symbols and integers", "write values of one kind")
+    value = as_integer(what)
+    constants = [member.value for member, _ in members if isinstance(member, Constant)]
+    others = [compare("eq", value, as_integer(member)) for member, _ in members if not isinstance(member, Constant)]
+    found = some([inside(value, constants), *others])
+    return found if tree.operator == "in" else Apply("not", (found,))
+
+
+def _applied(operator: str, arguments: list[Expression]) -> Expression:
+    """Return XCSP3's `operator`, applied. Raises `MistakeError`."""
+    least, most, make = _MEANINGS.get(operator, (0, -1, None))
+    if make is None:
+        raise MistakeError(f"the operator '{shortened(operator)}' has no counterpart", "write it otherwise")
+    if not least <= len(arguments) <= most:
+        raise MistakeError(f"{operator} with {len(arguments)} arguments", "see XCSP3-core, 'intension'")
+    return make(arguments)
+
+
+_MANY = 10**9
+
+
+def _plain(operator: str) -> Callable[[list[Expression]], Expression]:
+    return lambda parts: Apply(operator, tuple(as_integer(part) for part in parts))
+
+
+def _variadic(operator: str) -> Callable[[list[Expression]], Expression]:
+    apply = _plain(operator)
+    return lambda parts: apply(parts) if len(parts) > 1 else as_integer(parts[0])
+
+
+def _equal(parts: list[Expression]) -> Expression:
+    first, *others = parts
+    return every([_same(first, other) for other in others])
+
+
+def _same(one: Expression, other: Expression) -> Expression:
+    if type_of(one) is Type.BOOLEAN and type_of(other) is Type.BOOLEAN:
+        return Apply("iff", (one, other))
+    return Apply("eq", (as_integer(one), as_integer(other)))
+
+
+def _unequal(parts: list[Expression]) -> Expression:
+    one, other = parts
+    if type_of(one) is Type.BOOLEAN and type_of(other) is Type.BOOLEAN:
+        return Apply("xor", (one, other))
+    return Apply("ne", (as_integer(one), as_integer(other)))
+
+
+def _exclusive(parts: list[Expression]) -> Expression:
+    return reduce(lambda one, other: Apply("xor", (one, other)), [as_boolean(part) for part in parts])
+
+
+def _chosen(parts: list[Expression]) -> Expression:
+    condition, then, otherwise = parts
+    return Apply("if", (as_boolean(condition), as_integer(then), as_integer(otherwise)))
+
+
+def _square(parts: list[Expression]) -> Expression:
+    return Apply("mul", (as_integer(parts[0]), as_integer(parts[0])))
+
+
+_MEANINGS: dict[str, tuple[int, int, Callable[[list[Expression]], Expression] | None]] = {
+    **{name: (1, 1, _plain(name)) for name in ("neg", "abs")},
+    **{name: (2, 2, _plain(name)) for name in ("sub", "div", "mod", "pow", "dist", "lt", "le", "gt", "ge")},
+    **{name: (1, _MANY, _variadic(name)) for name in ("add", "mul", "min", "max")},
+    "sqr": (1, 1, _square),
+    "eq": (2, _MANY, _equal),
+    "ne": (2, 2, _unequal),
+    "not": (1, 1, lambda parts: Apply("not", (as_boolean(parts[0]),))),
+    "and": (1, _MANY, lambda parts: every([as_boolean(part) for part in parts])),
+    "or": (1, _MANY, lambda parts: some([as_boolean(part) for part in parts])),
+    "xor": (1, _MANY, _exclusive),
+    "iff": (2, _MANY, lambda parts: _equal([as_boolean(part) for part in parts])),
+    "imp": (2, 2, lambda parts: some([Apply("not", (as_boolean(parts[0]),)), as_boolean(parts[1])])),
+    "if": (3, 3, _chosen),
+}
+"""The least and the greatest number of arguments, and what is made of them."""
+
+
+def _fold(operator: str, parts: list[Expression], nothing: Expression) -> Expression:
+    if not parts:
+        return nothing
+    return parts[0] if len(parts) == 1 else Apply(operator, tuple(parts))
+
+
+def _between(expression: Expression, low: int, high: int) -> Expression:
+    if low == high:
+        return compare("eq", expression, Constant(low))
+    return every([compare("ge", expression, Constant(low)), compare("le", expression, Constant(high))])
+
+
+def _values(text: str, max_values: int) -> Iterable[int]:
+    if text.startswith("{") and text.endswith("}"):
+        return [integer(word.strip()) for word in text[1:-1].split(",") if word.strip()]
+    values = span(text)
+    if len(values) > max_values:
+        raise MistakeError(f"the set {shortened(text)} has {len(values):,} values", f"{max_values:,} are allowed")
+    return values
+
+
+def _tree(tokens: Sequence[str], place: int, depth: int, text: str) -> tuple[Tree, int]:
+    if depth > MAX_DEPTH:
+        raise MistakeError("an expression that is nested too deeply", f"{MAX_DEPTH} levels are allowed")
+    if place >= len(tokens) or tokens[place] in "(),":
+        raise _unreadable(text, tokens[place] if place < len(tokens) else "its end")
+    word = tokens[place]
+    place += 1
+    if place >= len(tokens) or tokens[place] != "(":
+        return Leaf(word), place
+    arguments: list[Tree] = []
+    place += 1
+    if place < len(tokens) and tokens[place] == ")":
+        return Call(word, ()), place + 1
+    while True:
+        argument, place = _tree(tokens, place, depth + 1, text)
+        arguments.append(argument)
+        if place >= len(tokens) or tokens[place] not in ",)":
+            raise _unreadable(text, tokens[place] if place < len(tokens) else "its end")
+        place += 1
+        if tokens[place - 1] == ")":
+            return Call(word, tuple(arguments)), place
+
+
+def _unreadable(text: str, where: str) -> MistakeError:
+    what = f"'{shortened(text)}' is no expression: see '{shortened(where)}'"
+    return MistakeError(what, "write operators, integers and names of variables: le(add(x,y[0]),10)")

@@ -1,0 +1,269 @@
+"""Random scenarios: a sequence of events in which constraints, values and robots of a team come and go.
+
+A dynamic problem is a sequence of problems, each from the one before by such changes (Verfaillie and Schiex, "Solution
+reuse in dynamic constraint satisfaction problems", AAAI 1994; of distributed optimisation: Yeoh, Varakantham, Sun and
+Koenig, "Incremental DCOP search algorithms for solving dynamic DCOPs", AAMAS 2011). The rate is the number of changes
+in an event, as a share of the team's shared constraints.
+
+What has gone may come back: values, constraints, and robots under their old names. Where nothing has gone, a variable
+gets a value of another one's domain, two robots get a constraint like one that others share, and a robot comes that is
+like one that is there: with such variables, and such constraints with the same robots. A domain keeps a value at least,
+and a team two robots.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import replace
+from enum import StrEnum
+from itertools import count
+from random import Random
+from typing import TypeVar
+
+from robochoc.generators.draws import MAX_CONSTRAINTS, check_bounds, seeded
+from robochoc.model.change import apply_changes
+from robochoc.model.problem import (
+    AddAgent,
+    AddConstraint,
+    AddValue,
+    Change,
+    Constraint,
+    ConstraintModel,
+    Parent,
+    RemoveAgent,
+    RemoveConstraint,
+    RemoveValue,
+    Robot,
+    ScenarioEvent,
+    Team,
+    Variable,
+)
+from robochoc.model.team_edits import ChangeError
+
+MAX_EVENTS = 1000
+MAX_TRIES = 100
+"""The maximum number of kinds and places that are tried for one change."""
+MIN_ROBOTS = 2
+
+_One = TypeVar("_One")
+
+
+class Kind(StrEnum):
+    """The kinds of changes."""
+
+    REMOVE_VALUE = "remove-value"
+    ADD_VALUE = "add-value"
+    REMOVE_CONSTRAINT = "remove-constraint"
+    ADD_CONSTRAINT = "add-constraint"
+    REMOVE_AGENT = "remove-agent"
+    ADD_AGENT = "add-agent"
+
+
+def random_scenario(
+    team: Team,
+    events: int,
+    rate: float,
+    seed: int = 0,
+    *,
+    kinds: Iterable[Kind | str] = tuple(Kind),
+    after: int | None = None,
+) -> Team:
+    """Return `team` with a random scenario that it can take.
+
+    Args:
+        team: A team without a scenario.
+        events: The number of events.
+        rate: The changes in each event, as a share of the team's shared constraints, more than 0 and at most 1; it is
+            at least one change.
+        seed: The same seed makes the same scenario of the same team on every machine.
+        kinds: The kinds of changes, each as likely as any other.
+        after: The number of messages after which an event happens. None: when the problem before it is solved.
+
+    Raises:
+        ValueError: if the team has a scenario, a number is out of its bounds, or no change of these kinds is possible.
+    """
+    check_bounds({"events": (events, 1, MAX_EVENTS), "rate": (rate, 0, 1)})
+    if team.scenario:
+        raise ValueError(f"{team.name} has a scenario already; take a team without one")
+    named = set(map(Kind, kinds))
+    wanted = [kind for kind in Kind if kind in named] or list(Kind)
+    shared = sum(len(robot.shared) for robot in team.robots)
+    changes = max(1, round(rate * shared))
+    check_bounds({"changes of all events": (events * changes, 1, MAX_CONSTRAINTS)})
+    author = _Author(seeded(seed), team, wanted)
+    written = tuple(ScenarioEvent(tuple(author.change() for _ in range(changes)), after) for _ in range(events))
+    told = "" if set(wanted) == set(Kind) else "-" + "-".join(wanted)
+    name = f"{team.name}-events{events}-{float(rate)}{told}-{seed}"
+    return replace(team, name=name, scenario=written)
+
+
+class _Author:
+    """Writes one change after the other, and keeps what has gone."""
+
+    def __init__(self, chance: Random, team: Team, kinds: Sequence[Kind]) -> None:
+        self._chance = chance
+        self._team = team
+        self._kinds = kinds
+        self._values: list[tuple[str, int]] = []
+        self._constraints: list[Constraint] = []
+        self._robots: list[tuple[Robot, list[Constraint]]] = []
+        self._numbers = count(1)
+        self._make: Mapping[Kind, Callable[[], Change | None]] = {
+            Kind.REMOVE_VALUE: self._remove_value,
+            Kind.ADD_VALUE: self._add_value,
+            Kind.REMOVE_CONSTRAINT: self._remove_constraint,
+            Kind.ADD_CONSTRAINT: self._add_constraint,
+            Kind.REMOVE_AGENT: self._remove_agent,
+            Kind.ADD_AGENT: self._add_agent,
+        }
+
+    def change(self) -> Change:
+        """Return a change that the team as it is then can take."""
+        for _ in range(MAX_TRIES):
+            change = self._make[self._one(self._kinds)]()
+            if change is None:
+                continue
+            try:
+                after = apply_changes(self._team, [change])
+            except ChangeError:
+                continue
+            self._note(change)
+            self._team = after
+            return change
+        raise ValueError(f"the team can take no more changes of the kinds {', '.join(self._kinds)}; name more kinds")
+
+    def _one(self, things: Sequence[_One]) -> _One:
+        return things[int(self._chance.random() * len(things))]
+
+    def _note(self, change: Change) -> None:
+        """Keep what `change` takes away, and forget what it brings back."""
+        match change:
+            case RemoveValue(variable, value):
+                self._values.append((variable, value))
+            case AddValue(variable, value):
+                self._values = [one for one in self._values if one != (variable, value)]
+            case RemoveConstraint(agent, parent, name):
+                self._constraints += [one for one in _under(self._team, agent, parent) if one.name == name]
+            case AddConstraint(constraint=constraint):
+                self._constraints = [one for one in self._constraints if one != constraint]
+            case RemoveAgent(name):
+                self._robots.append((self._team[name], _constraints_of(self._team, name)))
+            case AddAgent(robot):
+                self._robots = [one for one in self._robots if one[0].name != robot.name]
+
+    def _remove_value(self) -> Change | None:
+        several = [one for one in self._team.variables.values() if len(one.domain) > 1]
+        if not several:
+            return None
+        variable = self._one(several)
+        return RemoveValue(variable.name, self._one(list(variable.domain)))
+
+    def _add_value(self) -> Change | None:
+        gone = [one for one in self._values if one[0] in self._team.variables]
+        if gone:
+            return AddValue(*self._one(gone))
+        variable = self._one(list(self._team.variables.values()))
+        known = {
+            value
+            for other in self._team.variables.values()
+            if other.domain.symbols == variable.domain.symbols
+            for value in other.domain
+        }
+        new = sorted(known.difference(variable.domain))
+        return AddValue(variable.name, self._one(new)) if new else None
+
+    def _remove_constraint(self) -> Change | None:
+        held = [
+            (robot.name, parent.name, one.name)
+            for robot in self._team.robots
+            for parent in robot.parents
+            for one in parent.constraints
+        ]
+        return RemoveConstraint(*self._one(held)) if held else None
+
+    def _add_constraint(self) -> Change | None:
+        there = self._team.owner
+        gone = [one for one in self._constraints if _known(one) and all(name in there for name in one.variables)]
+        if gone:
+            return self._added(self._one(gone))
+        like = [one for robot in self._team.robots for one in robot.shared if _known(one) and len(one.variables) == 2]  # noqa: PLR2004 - a pair
+        names = list(self._team.variables)
+        one, other = self._one(names), self._one(names)
+        if not like or there[one] == there[other]:
+            return None
+        old = self._one(like)
+        terms = dict(zip(old.variables, (one, other), strict=True))
+        return self._added(replace(_renamed(old, terms), name=f"Added{next(self._numbers)}", line=0))
+
+    def _added(self, constraint: Constraint) -> AddConstraint:
+        """Return the change that gives `constraint` to the lowest robot of its scope, under the next."""
+        rank = {name: place for place, name in enumerate(self._team.order)}
+        owners = sorted({self._team.owner[name] for name in constraint.variables}, key=rank.__getitem__)
+        return AddConstraint(owners[-1], owners[-2], constraint)
+
+    def _remove_agent(self) -> Change | None:
+        return RemoveAgent(self._one(self._team.order)) if len(self._team.robots) > MIN_ROBOTS else None
+
+    def _add_agent(self) -> Change | None:
+        gone = [one for one in self._robots if one[0].name not in self._team]
+        if gone:
+            return AddAgent(self._joining(*self._one(gone)))
+        model = self._one(self._team.robots)
+        number = next(self._numbers)
+        terms = {own.name: f"Late{number}.{place}" for place, own in enumerate(model.variables, 1)}
+        constraints = [_renamed(one, terms) for one in _constraints_of(self._team, model.name)]
+        variables = tuple(Variable(terms[own.name], own.domain) for own in model.variables)
+        return AddAgent(
+            self._joining(replace(model, name=f"Late{number}", variables=variables, topics=()), constraints)
+        )
+
+    def _joining(self, robot: Robot, constraints: Iterable[Constraint]) -> Robot:
+        """Return `robot` as the lowest one, which holds those of `constraints` whose other robots are there."""
+        own = {variable.name for variable in robot.variables}
+        rank = {name: place for place, name in enumerate(self._team.order)}
+        private, under = list[Constraint](), dict[str, list[Constraint]]()
+        for one in constraints:
+            others = [name for name in one.variables if name not in own]
+            if not others:
+                private.append(one)
+            elif _known(one) and all(name in self._team.owner for name in others):
+                owners = sorted({self._team.owner[name] for name in others}, key=rank.__getitem__)
+                for owner in owners:
+                    under.setdefault(owner, [])
+                under[owners[-1]].append(one)
+        return replace(
+            robot,
+            private=tuple(private),
+            parents=tuple(Parent(name, tuple(under[name])) for name in sorted(under, key=rank.__getitem__)),
+            children=(),
+            shown=(),
+            file="",
+            costs=replace(robot.costs, constant=0),
+        )
+
+
+def _known(constraint: Constraint) -> bool:
+    """Return whether a scenario can bring it: no partially known one."""
+    return constraint.model is not ConstraintModel.PKC
+
+
+def _under(team: Team, agent: str, parent: str) -> Iterator[Constraint]:
+    for one in team[agent].parents:
+        if one.name == parent:
+            yield from one.constraints
+
+
+def _constraints_of(team: Team, name: str) -> list[Constraint]:
+    """Return the private constraints of a robot, and all that it shares."""
+    own = {variable.name for variable in team[name].variables}
+    shared = (one for robot in team.robots for one in robot.shared)
+    return [*team[name].private, *(one for one in shared if not own.isdisjoint(one.variables))]
+
+
+def _renamed(constraint: Constraint, terms: Mapping[str, str]) -> Constraint:
+    """Return `constraint` over other variables."""
+    scope, parameters = (
+        tuple(terms.get(term, term) if isinstance(term, str) else term for term in part)
+        for part in (constraint.scope, constraint.parameters)
+    )
+    return replace(constraint, scope=scope, parameters=parameters)

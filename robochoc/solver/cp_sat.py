@@ -1,0 +1,205 @@
+"""OR-Tools as a second central solver: CP-SAT decides the whole team's problem, in a process of its own.
+
+It gets the tables over codes that ACE gets too (`solver/encoding.py`, `solver/weighted.py`), and shares nothing else
+with it: no cliques, no symmetries, no enumeration. Costs are codes whose sum is bounded by
+`weighted.MAX_TOTAL_COST`, far below 64 bits.
+"""
+
+from __future__ import annotations
+
+import importlib.util
+import select
+import socket
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Sequence
+from types import TracebackType
+from typing import Self
+
+import msgspec
+
+from robochoc.model.outcome import Verdict
+from robochoc.model.problem import ProblemKind, Team
+from robochoc.solver.central import CentralAnswer
+from robochoc.solver.cp_sat_messages import LENGTH, CpSatAnswer, CpSatFailed, CpSatTable, CpSatTask, FromCpSat
+from robochoc.solver.encoding import Network, UnsupportedError
+from robochoc.solver.failures import SolverLostError, SolverMissingError
+from robochoc.solver.weighted import (
+    WeightedComponent,
+    components_with_withdrawal,
+    constant_costs,
+    weighted_components,
+)
+
+NAME = "OR-Tools"
+INSTALL = "pip install 'robochoc[ortools]'"
+LAST_WORDS_S = 2.0
+"""How long after its time CP-SAT may take to say what it has found, in seconds."""
+_TICK_S = 0.2
+_CHUNK = 1 << 20
+
+
+def is_installed() -> bool:
+    """Return whether OR-Tools is there. It is not imported."""
+    return importlib.util.find_spec("ortools") is not None
+
+
+class CpSatSolver:
+    """Decides teams by CP-SAT. Its process ends with each task; as a context, it is kept for the next one.
+
+    `deadline` is on the monotonic clock; `progress` is called while it searches.
+    """
+
+    name = NAME
+
+    def __init__(self, deadline: float | None = None, progress: Callable[[], None] | None = None) -> None:
+        self._deadline = deadline
+        self._progress = progress
+        self._process: subprocess.Popen[bytes] | None = None
+        self._socket: socket.socket | None = None
+        self._kept = False
+
+    def __enter__(self) -> Self:
+        self._kept = True
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self._kept = False
+        self.close()
+
+    @property
+    def pid(self) -> int | None:
+        """The process, while there is one."""
+        return self._process.pid if self._process else None
+
+    def solve(self, team: Team, *, count: bool = False, withdrawal_cost: int | None = None) -> CentralAnswer:
+        """Solve `team`. For the arguments, the answer and the errors see `CentralSolver.solve`.
+
+        Raises:
+            SolverMissingError: if OR-Tools is not installed.
+            SolverLostError: if its process died.
+            UnsupportedError: if a constraint or its costs are too large, or solutions are to be counted.
+        """
+        if count:
+            raise UnsupportedError("OR-Tools counts no solutions here; ACE does")
+        if not is_installed():
+            raise SolverMissingError(f"OR-Tools is not installed; say: {INSTALL}")
+        try:
+            return self._solve(team, withdrawal_cost)
+        finally:
+            if not self._kept:
+                self.close()
+
+    def close(self) -> None:
+        """End the process."""
+        if self._process is not None:
+            self._process.kill()
+            self._process.wait()
+            self._process = None
+        if self._socket is not None:
+            self._socket.close()
+            self._socket = None
+
+    def _solve(self, team: Team, withdrawal_cost: int | None) -> CentralAnswer:
+        if withdrawal_cost is None:
+            parts = weighted_components(team.variables.values(), list(team.constraints()))
+        else:
+            parts = components_with_withdrawal(team, withdrawal_cost)
+        cost = bound = constant_costs(team)
+        assignment: dict[str, int] | None = {}
+        proven = True
+        for part in sorted(parts, key=lambda part: len(part.network.domains)):
+            found = self._cheapest(part)
+            if found.codes is None and found.proven:
+                return CentralAnswer(Verdict.NO_SOLUTION)
+            proven = proven and found.proven
+            bound += part.base + part.unit * found.bound
+            if found.codes is None or assignment is None:
+                assignment = None
+                continue
+            cost += part.cost(found.codes)
+            assignment.update(part.decoded(found.codes))
+        has_costs = withdrawal_cost is not None or team.kind is ProblemKind.DISWCSP
+        if assignment is None:
+            return CentralAnswer(Verdict.UNKNOWN, bound=bound if has_costs else None)
+        assignment = {name: assignment[name] for name in team.variables if name in assignment}
+        if not has_costs:
+            return CentralAnswer(Verdict.SOLUTION, assignment)
+        return CentralAnswer(Verdict.OPTIMAL if proven else Verdict.UNKNOWN, assignment, cost=cost, bound=bound)
+
+    def _cheapest(self, part: WeightedComponent) -> CpSatAnswer:
+        """Return CP-SAT's answer to one component."""
+        network = part.network
+        if not all(network.domains):
+            return CpSatAnswer(None, proven=True)
+        left = None if self._deadline is None else self._deadline - time.monotonic()
+        if left is not None and left <= 0:
+            return CpSatAnswer(None, proven=False)
+        return self._asked(_task(network, part.costs, left))
+
+    # The process
+
+    def _asked(self, task: CpSatTask) -> CpSatAnswer:
+        connection = self._socket or self._start()
+        body = msgspec.msgpack.encode(task)
+        try:
+            connection.sendall(LENGTH.pack(len(body)) + body)
+            word = self._hear(connection)
+        except OSError as error:
+            self.close()
+            raise SolverLostError(f"the process of OR-Tools was lost ({error})") from None
+        if isinstance(word, CpSatFailed):
+            self.close()
+            if word.missing:
+                raise SolverMissingError(f"OR-Tools cannot be used ({word.why}); say: {INSTALL}")
+            raise SolverLostError(f"OR-Tools failed: {word.why}")
+        if word is None:
+            self.close()
+            return CpSatAnswer(None, proven=False)
+        return word
+
+    def _start(self) -> socket.socket:
+        ours, theirs = socket.socketpair()
+        try:
+            self._process = subprocess.Popen(  # noqa: S603 - our own module
+                [sys.executable, "-P", "-m", "robochoc.solver.cp_sat_process", str(theirs.fileno())],
+                stdin=subprocess.DEVNULL,
+                stdout=subprocess.DEVNULL,
+                stderr=subprocess.DEVNULL,
+                pass_fds=(theirs.fileno(),),
+            )
+        except BaseException:
+            ours.close()
+            raise
+        finally:
+            theirs.close()
+        self._socket = ours
+        return ours
+
+    def _hear(self, connection: socket.socket) -> FromCpSat | None:
+        """Return the answer; None when the time is over. Raises `OSError` where the process died."""
+        buffer = bytearray()
+        end = None if self._deadline is None else self._deadline + LAST_WORDS_S
+        while True:
+            if len(buffer) >= LENGTH.size and len(buffer) == LENGTH.size + LENGTH.unpack_from(buffer)[0]:
+                word: FromCpSat = msgspec.msgpack.decode(bytes(buffer[LENGTH.size :]), type=FromCpSat)
+                return word
+            left = _TICK_S if end is None else min(_TICK_S, end - time.monotonic())
+            if left <= 0:
+                return None
+            if not select.select([connection], [], [], left)[0]:
+                if self._progress:
+                    self._progress()
+                continue
+            chunk = connection.recv(_CHUNK)
+            if not chunk:
+                raise OSError("it has hung up")
+            buffer += chunk
+
+
+def _task(network: Network, costs: Sequence[int], seconds: float | None) -> CpSatTask:
+    tables = tuple(CpSatTable(table.scope, table.allowed, table.rows) for table in network.tables)
+    return CpSatTask(network.domains, tables, tuple(costs), seconds)

@@ -1,0 +1,47 @@
+"""The messages between the process of OR-Tools and its parent: msgpack, each after its length."""
+
+from __future__ import annotations
+
+import struct
+
+import msgspec
+
+LENGTH = struct.Struct("!Q")
+
+
+class CpSatTable(msgspec.Struct, frozen=True, array_like=True):
+    """A table: the code tuples `rows`, that the variables at the places `scope` may have, or may not."""
+
+    scope: tuple[int, ...]
+    allowed: bool
+    rows: tuple[tuple[int, ...], ...]
+
+
+class CpSatTask(msgspec.Struct, frozen=True, array_like=True, tag=True):
+    """Find one solution; with `costs`, one whose codes at these places sum up to the least.
+
+    `domains` holds each variable's codes, `seconds` the time (None: any).
+    """
+
+    domains: tuple[tuple[int, ...], ...]
+    tables: tuple[CpSatTable, ...]
+    costs: tuple[int, ...] = ()
+    seconds: float | None = None
+
+
+class CpSatAnswer(msgspec.Struct, frozen=True, array_like=True, tag=True):
+    """The codes of a solution, if one was found; whether nothing is better (or there is none); a bound on its cost."""
+
+    codes: tuple[int, ...] | None
+    proven: bool
+    bound: int = 0
+
+
+class CpSatFailed(msgspec.Struct, frozen=True, array_like=True, tag=True):
+    """It went wrong; `missing`: because OR-Tools is not there."""
+
+    why: str
+    missing: bool = False
+
+
+FromCpSat = CpSatAnswer | CpSatFailed

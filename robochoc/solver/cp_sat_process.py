@@ -1,0 +1,104 @@
+"""The process of OR-Tools: CP-SAT (https://developers.google.com/optimization/cp/cp_solver) solves tables of codes.
+
+Started by `solver/cp_sat.py`, never imported by anything else: a search in native code hears no signal and keeps its
+memory, and a process can be ended.
+
+    python -m robochoc.solver.cp_sat_process SOCKET
+"""
+
+from __future__ import annotations
+
+import math
+import os
+import queue
+import signal
+import socket
+import sys
+import threading
+import time
+from io import BufferedRWPair
+
+import msgspec
+
+from robochoc.solver.cp_sat_messages import LENGTH, CpSatAnswer, CpSatFailed, CpSatTask, FromCpSat
+from robochoc.system.orphans import signal_when_orphaned
+
+WORKERS = 1
+"""One thread: what is measured is a search, and robots beside it need the other cores."""
+
+
+def main() -> None:
+    """Serve the parent's tasks until it hangs up."""
+    signal_when_orphaned(signal.SIGKILL)
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    stream = socket.socket(fileno=int(sys.argv[1])).makefile("rwb")
+    tasks: queue.SimpleQueue[CpSatTask] = queue.SimpleQueue()
+    threading.Thread(target=_listen, args=(stream, tasks), daemon=True).start()
+    while True:
+        _say(stream, _answer(tasks.get()))
+
+
+def _listen(stream: BufferedRWPair, tasks: queue.SimpleQueue[CpSatTask]) -> None:
+    """Hear tasks. End the process when the parent hangs up, also during a search."""
+    decoder = msgspec.msgpack.Decoder(CpSatTask)
+    while len(head := stream.read(LENGTH.size)) == LENGTH.size:
+        tasks.put(decoder.decode(stream.read(LENGTH.unpack(head)[0])))
+    os._exit(0)
+
+
+def _say(stream: BufferedRWPair, word: FromCpSat) -> None:
+    body = msgspec.msgpack.encode(word)
+    stream.write(LENGTH.pack(len(body)) + body)
+    stream.flush()
+
+
+def _answer(task: CpSatTask) -> FromCpSat:
+    try:
+        return _solve(task)
+    except ImportError as error:
+        return CpSatFailed(str(error), missing=True)
+    except Exception as error:  # noqa: BLE001 - whatever it was, the parent has to know
+        return CpSatFailed(f"{type(error).__name__}: {error}")
+
+
+def _solve(task: CpSatTask) -> CpSatAnswer:
+    """Return the answer of CP-SAT. Its model holds domains, tables and a sum: nothing that computes with values."""
+    began = time.monotonic()
+    from ortools.sat.python import cp_model  # noqa: PLC0415 - here, so that its absence can be told
+
+    model = cp_model.CpModel()
+    variables = [
+        model.new_int_var_from_domain(cp_model.Domain.from_values(list(codes)), f"x{place}")
+        for place, codes in enumerate(task.domains)
+    ]
+    for table in task.tables:
+        scope = [variables[place] for place in table.scope]
+        if table.allowed and not table.rows:
+            return CpSatAnswer(None, proven=True)
+        if table.allowed:
+            model.add_allowed_assignments(scope, table.rows)
+        else:
+            model.add_forbidden_assignments(scope, table.rows)
+    if task.costs:
+        model.minimize(cp_model.LinearExpr.sum([variables[place] for place in task.costs]))
+    solver = cp_model.CpSolver()
+    solver.parameters.num_workers = WORKERS
+    solver.parameters.random_seed = 0
+    solver.parameters.catch_sigint_signal = False
+    if task.seconds is not None:
+        solver.parameters.max_time_in_seconds = max(0.01, task.seconds - (time.monotonic() - began))
+    status = solver.solve(model)
+    bound = math.ceil(solver.best_objective_bound - 1e-6) if task.costs else 0
+    if status == cp_model.OPTIMAL or (status == cp_model.FEASIBLE and not task.costs):
+        return CpSatAnswer(tuple(solver.value(variable) for variable in variables), proven=True, bound=bound)
+    if status == cp_model.FEASIBLE:
+        return CpSatAnswer(tuple(solver.value(variable) for variable in variables), proven=False, bound=bound)
+    if status == cp_model.INFEASIBLE:
+        return CpSatAnswer(None, proven=True)
+    if status == cp_model.UNKNOWN:
+        return CpSatAnswer(None, proven=False)
+    raise ValueError(f"CP-SAT refuses the model: {model.validate()}")
+
+
+if __name__ == "__main__":
+    main()
