@@ -71,7 +71,7 @@ def given_variable(variable: TeamVariable, owner: str, symbols: Symbols, place: 
     """Return a variable of a team as one of a model."""
     domain = variable.domain
     for symbol in domain.symbols:
-        symbols.add(symbol)
+        symbols.code(symbol)
     codes = Codes(NUMBER, domain.ranges)
     if domain.symbols:
         codes = Codes(kind_of(""), domain.ranges, told={value: domain.symbols[value] for value in domain})

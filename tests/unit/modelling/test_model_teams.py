@@ -113,3 +113,12 @@ def test_values_of_files_are_integers_and_symbols(tmp_path: Path) -> None:
     assert told.values == {"a.x": "green", "b.y": 3}
     assert told.cost == Decimal("1.4")
     assert robochoc.load(tmp_path / "kinds").solve("dpop", runtime="simulator")["a.x"] == "green"
+
+
+def test_symbols_that_are_there_already_are_not_taken_for_new_texts() -> None:
+    model = robochoc.Model("first")
+    model.robot("a").variable("x", ["v1_2", "other"])
+    more = robochoc.Model.of(model.team)
+    new = more.robot("b").variable("y", ["1 2", "other"])
+    more.add(new != more["a.x"], more["a.x"] == "v1_2", new != "other")
+    assert more.solve("abt", runtime="simulator").values == {"a.x": "v1_2", "b.y": "1 2"}
