@@ -10,7 +10,7 @@ from collections import defaultdict
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
-from robochoc.model.constraint import Constraint, ConstraintModel, Variable
+from robochoc.model.constraint import Constraint, ConstraintModel, Relation, Semantics, Variable
 from robochoc.model.cost_units import PLAIN_COSTS, CostUnits
 from robochoc.model.priorities import priority_order
 from robochoc.model.problem import Child, Parent, ProblemKind, Robot, Team, Topic
@@ -67,6 +67,8 @@ def assemble(
     for robot, parts in extras.parts.items():
         for part in with_marked_symbols(parts, symbolic):
             links.add_part(robot, part)
+    for robot, part in links.missing_parts():
+        links.add_part(robot, *with_marked_symbols([part], symbolic))
     for one, other in extras.links:
         links.link(one, other)
     links.place()
@@ -98,6 +100,7 @@ class _Links:
         self._parents: dict[str, set[str]] = {robot: set() for robot in variables}
         self._shown: dict[tuple[str, str], set[str]] = defaultdict(set)
         self._with: dict[tuple[str, str], list[Constraint]] = defaultdict(list)
+        self._parts: dict[tuple[str, frozenset[str]], Constraint] = {}
         self.private: dict[str, list[Constraint]] = defaultdict(list)
 
     def add(self, constraint: Constraint) -> None:
@@ -115,9 +118,23 @@ class _Links:
     def add_part(self, robot: str, part: Constraint) -> None:
         """Give `robot` its part of a partially known constraint."""
         (other,) = self._owners(part) - {robot}
+        self._parts.setdefault((robot, frozenset(part.variables)), part)
         self._with[robot, other].append(replace(part, model=ConstraintModel.PKC))
         self.link(robot, other)
         self._show(part, max(robot, other, key=self._rank.__getitem__))
+
+    def missing_parts(self) -> list[tuple[str, Constraint]]:
+        """Return the robots that hold no part of a partially known constraint of theirs, each with one that allows all.
+
+        Both robots of such a constraint have a part of it in their files.
+        """
+        missing = []
+        for (robot, scope), part in self._parts.items():
+            (other,) = self._owners(part) - {robot}
+            if (other, scope) not in self._parts:
+                anything = Relation(f"anything{len(scope)}", len(scope), Semantics.CONFLICTS, ())
+                missing.append((other, Constraint(part.name, anything, part.variables, part.variables)))
+        return missing
 
     def link(self, one: str, other: str) -> None:
         """Make the two neighbours."""

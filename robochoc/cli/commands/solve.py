@@ -151,15 +151,10 @@ _SECTIONS: Sections = {
     "central_with",
     type=click.Choice(["ace", "ortools"], case_sensitive=False),
     default="ace",
-    show_default=True,
     metavar="NAME",
-    help="With --protocol central: the solver, ace or ortools (CP-SAT; an extra).",
+    help="--protocol central: ace (default) or ortools.",
 )
-@click.option(
-    "--verify",
-    is_flag=True,
-    help="Confirm a no-solution or an optimum by the central solver, and by OR-Tools.",
-)
+@click.option("--verify", is_flag=True, help="Confirm a no-solution or an optimum centrally.")
 @local_options
 @ros_options
 @situation_options

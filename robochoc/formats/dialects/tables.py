@@ -90,6 +90,8 @@ def relation(table: CostTable, arity: int, scale: Scale) -> Relation | int:
     if len(listed) > MAX_TUPLES:
         raise MistakeError(f"{len(listed)} tuples are more than {MAX_TUPLES}", "make domains or scopes smaller")
     name = definition_name(table.name)
+    if not listed:  # everything is forbidden: the first variable says so for all
+        return Relation(name, min(1, arity), Semantics.SUPPORTS, ())
     if {*listed.values(), default} <= {0, INFINITE}:
         semantics = Semantics.CONFLICTS if default == 0 else Semantics.SUPPORTS
         return Relation(name, arity, semantics, tuple(listed))

@@ -8,6 +8,7 @@ from pathlib import Path
 from robochoc.formats.dialects.dialect import Dialect, Imported, ImportOptions
 from robochoc.formats.dialects.toulbar2.text import has_suffix, read_with
 from robochoc.formats.dialects.toulbar2.wcsp_reader import read as read_text
+from robochoc.formats.dialects.toulbar2.writer import wcsp
 
 
 def recognises(path: Path, beginning: bytes) -> bool:
@@ -20,4 +21,4 @@ def read(paths: Sequence[Path], options: ImportOptions) -> Imported:
     return read_with(paths, options, read_text)
 
 
-DIALECT = Dialect("wcsp", "toulbar2's wcsp", recognises, read)
+DIALECT = Dialect("wcsp", "toulbar2's wcsp", recognises, read, wcsp)

@@ -7,6 +7,7 @@ from pathlib import Path
 from robochoc.formats.dialects.dialect import Dialect
 from robochoc.formats.dialects.pydcop.parts import sections
 from robochoc.formats.dialects.pydcop.reader import read
+from robochoc.formats.dialects.pydcop.writer import written
 
 _SECTIONS = {"domains", "variables", "constraints", "objective", "distribution", "events", "agents", "replica_dist"}
 
@@ -18,4 +19,4 @@ def recognises(path: Path, beginning: bytes) -> bool:
     return bool(sections(beginning.decode("utf-8", "replace").lstrip("\ufeff")) & _SECTIONS)
 
 
-DIALECT = Dialect("pydcop", "pyDCOP's YAML", recognises, read)
+DIALECT = Dialect("pydcop", "pyDCOP's YAML", recognises, read, written)

@@ -232,6 +232,7 @@ class _Maker:
                         return None
                     if not scope:
                         raise MistakeError("forbids everything", "delete it, and the problem has a solution")
+                    scope = scope[: made.arity]
                     return Constraint(name, made, scope, scope, ConstraintModel.TKC, line=costs.line)
                 case Violated(body, cost):
                     predicate = self._predicate(name, scope, body)

@@ -64,7 +64,7 @@ def imported(network: Network, options: ImportOptions, dialect: str) -> Imported
         if isinstance(made, int):
             constant += made
         else:
-            scope = tuple(names.of(places[place]) for place in one.scope)
+            scope = tuple(names.of(places[place]) for place in one.scope[: made.arity])
             name = word(one.table.name)
             constraints.append(Constraint(name, made, scope, scope, ConstraintModel.TKC, line=one.line))
     notes = [*network.notes, *_notes(network, functions, scale)]

@@ -78,7 +78,6 @@ class _Import:
         for one in instance.constraints:
             for knower, constraint in self._held(one):
                 (parts[self._names.of(knower)] if knower else constraints).append(constraint)
-        self._add_other_sides(parts)
         weighted = self._weighted()
         team = assemble(
             self._options.name or instance.name or instance.file.stem,
@@ -177,17 +176,6 @@ class _Import:
         self._notes.append(Note("partially known", f"{one.name} is known to {one.knower} alone (PKC)"))
         return one.knower
 
-    def _add_other_sides(self, parts: dict[str, list[Constraint]]) -> None:
-        """Give the other robot of each partially known constraint a part that allows everything, if it has none."""
-        owner = {self._names.of(name): self._names.of(agent) for name, agent in self._owner.items()}
-        known = {(robot, frozenset(part.variables)) for robot, held in parts.items() for part in held}
-        for robot, pair in sorted(known, key=lambda one: (one[0], sorted(one[1]))):
-            ((other, _),) = ((owner[name], name) for name in pair if owner[name] != robot)
-            if (other, pair) not in known:
-                part = next(part for part in parts[robot] if set(part.variables) == pair)
-                nothing = self._definitions.nothing(len(part.scope))
-                parts[other].append(Constraint(part.name, nothing, part.scope, part.scope))
-
     def _constraint(self, one: ForeignConstraint, content: Table | Formula) -> Constraint:
         scope = self._terms(one.scope)
         if isinstance(content, Table):
@@ -222,10 +210,6 @@ class _Definitions:
         if id(table) not in self._relations:
             self._relations[id(table)] = table, self._relation(table, arity)
         return self._relations[id(table)][1]
-
-    def nothing(self, arity: int) -> Relation:
-        """Return a relation that allows everything."""
-        return Relation(self._free(f"anything_{arity}", arity), arity, Semantics.CONFLICTS, ())
 
     def _relation(self, table: Table, arity: int) -> Relation:
         name = self._free(table.name, table)

@@ -38,10 +38,9 @@ class Extensions:
             raise MistakeError("a hybrid table has no counterpart", "write ordinary tuples")
         allowed = element.has("supports")
         scope = items(element.words("list"), posting)
-        xml = element.xml.find("supports" if allowed else "conflicts")
         text = element.text("supports" if allowed else "conflicts")
         wild = "*" in text or ".." in text
-        key = id(xml), tuple(tuple(posting.domain(item)) for item in scope) if wild else len(scope)
+        key = text, tuple(tuple(posting.domain(item)) for item in scope) if wild else len(scope)
         if key not in self._tables:
             try:
                 self._tables[key] = tuple(_rows(text, scope, posting))

@@ -1,0 +1,119 @@
+"""Teams as toulbar2's `.cfn` and `.wcsp`."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from fractions import Fraction
+
+from robochoc.formats.dialects.exported import Exported, decimal, exported, magnitude, maximises
+from robochoc.formats.dialects.tables import Amount, Scale
+from robochoc.model.constraint import INFINITE, Domain
+from robochoc.model.problem import Team
+from robochoc.solver.encoding import UnsupportedError
+
+
+def cfn(team: Team) -> Mapping[str, bytes]:
+    """Return the `.cfn` of `team`. Its bound is one that no finite sum reaches.
+
+    Raises:
+        UnsupportedError: if a constraint is too large for a table, or the team changes over time.
+    """
+    tables, constant = _network(team)
+    return {f"{team.name}.cfn": ("\n".join(_cfn(team, tables, constant)) + "\n").encode()}
+
+
+def wcsp(team: Team) -> Mapping[str, bytes]:
+    """Return the `.wcsp` of `team`, without any names.
+
+    Raises:
+        UnsupportedError: if a cost is negative or no integer, costs are maximised, a constraint is too large for a
+            table, or the team changes over time.
+    """
+    tables, constant = _network(team)
+    amounts = [constant, *[amount for one in tables for amount in one.table.amounts()]]
+    if maximises(team) or any(amount < 0 or (amount != INFINITE and Fraction(amount) % 1) for amount in amounts):
+        raise UnsupportedError("a wcsp has integer costs of 0 or more that are minimised; a cfn can say this one")
+    return {f"{team.name}.wcsp": ("\n".join(_wcsp(team, tables, constant)) + "\n").encode()}
+
+
+def _network(team: Team) -> tuple[list[Exported], Fraction]:
+    if team.scenario:
+        raise UnsupportedError("toulbar2's formats have no scenario")
+    return exported(team)
+
+
+def _cfn(team: Team, tables: list[Exported], constant: Fraction) -> Iterator[str]:
+    places = Scale([constant, *[amount for one in tables for amount in one.table.amounts()]]).places
+    bound = magnitude(tables, constant)
+    mustbe = f">{decimal(-bound, places)}" if maximises(team) else f"<{decimal(bound, places)}"
+    names = {name: _names(variable.domain) for name, variable in team.variables.items()}
+    yield "{"
+    yield f'  "problem": {{"name": "{team.name}", "mustbe": "{mustbe}"}},'
+    yield '  "variables": {'
+    yield ",\n".join(f'    "{name}": {_cfn_domain(team.variables[name].domain, names[name])}' for name in names)
+    yield "  },"
+    yield '  "functions": {'
+    functions = [f'    "constant": {{"scope": [], "costs": [{decimal(constant, places)}]}}'] if constant else []
+    for number, one in enumerate(tables):
+        scope = ", ".join(f'"{name}"' for name in one.scope)
+        costs = ", ".join(
+            ", ".join([*(f'"{names[name][value]}"' for name, value in zip(one.scope, values, strict=True)), told])
+            for values, told in ((values, _cost(cost, places)) for values, cost in one.table.rows.items())
+        )
+        default = _cost(one.table.default, places)
+        functions.append(f'    "f{number}": {{"scope": [{scope}], "defaultcost": {default}, "costs": [{costs}]}}')
+    yield ",\n".join(functions)
+    yield "  }"
+    yield "}"
+
+
+def _cost(cost: Amount, places: int) -> str:
+    return '"inf"' if cost == INFINITE else decimal(cost, places)
+
+
+def _counted(domain: Domain) -> bool:
+    """Return whether the values are 0, 1, ..., which need no names."""
+    return not domain.symbols and len(domain.ranges) == 1 and domain.ranges[0].start == 0
+
+
+def _names(domain: Domain) -> dict[int, str]:
+    """Return what the values are called: names begin with no digit and no sign."""
+    if _counted(domain):
+        return {value: str(value) for value in domain}
+    names = {}
+    for value in domain:
+        label = str(domain.label(value)) if domain.symbols else f"{'m' if value < 0 else 'v'}{abs(value)}"
+        plain = "".join(sign if sign.isalnum() or sign in "_.-" else "_" for sign in label)
+        names[value] = plain if plain[0].isalpha() or plain[0] == "_" else f"v{plain}"
+    if len(set(names.values())) < len(names):
+        names = {value: f"{name}_{number}" for number, (value, name) in enumerate(names.items())}
+    return names
+
+
+def _cfn_domain(domain: Domain, names: Mapping[int, str]) -> str:
+    if _counted(domain):
+        return str(len(domain))
+    return f"[{', '.join(f'{chr(34)}{name}{chr(34)}' for name in names.values())}]"
+
+
+def _wcsp(team: Team, tables: list[Exported], constant: Fraction) -> Iterator[str]:
+    place = {name: number for number, name in enumerate(team.variables)}
+    codes = {
+        name: {value: code for code, value in enumerate(variable.domain)} for name, variable in team.variables.items()
+    }
+    bound = magnitude(tables, constant)
+    sizes = [len(variable.domain) for variable in team.variables.values()]
+    yield f"{team.name} {len(sizes)} {max(sizes)} {len(tables) + (1 if constant else 0)} {bound}"
+    yield " ".join(map(str, sizes))
+    if constant:
+        yield f"0 {constant} 0"
+    for one in tables:
+        scope = " ".join(str(place[name]) for name in one.scope)
+        yield f"{len(one.scope)} {scope} {_whole(one.table.default, bound)} {len(one.table.rows)}"
+        for values, cost in one.table.rows.items():
+            coded = " ".join(str(codes[name][value]) for name, value in zip(one.scope, values, strict=True))
+            yield f"{coded} {_whole(cost, bound)}"
+
+
+def _whole(cost: Amount, bound: int) -> int:
+    return bound if cost == INFINITE else int(cost)

@@ -1,0 +1,149 @@
+"""pyDCOP's YAML, with its oddities, and what it must not do."""
+
+from __future__ import annotations
+
+import json
+from fractions import Fraction
+from pathlib import Path
+
+import pytest
+
+from robochoc.formats import InvalidInputError, check_team
+from robochoc.formats.dialects.dialect import ImportOptions
+from robochoc.formats.dialects.registry import read_foreign
+from robochoc.model.problem import RemoveAgent
+from tests.support.foreign_problems import imported, optimum
+
+HEAD = """name: small
+objective: min
+domains:
+  colours: {values: [R, G]}
+  few: {values: [0..2]}
+  odd: {values: [0.5, yes]}
+variables:
+  x: {domain: few}
+  y: {domain: few}
+  c: {domain: colours, cost_function: -0.25 if c == 'G' else 0.5, noise_level: 0.2}
+agents: [a1, a2]
+constraints:
+"""
+
+
+def constraint(text: str) -> str:
+    written = text if text.startswith("|") else json.dumps(text)
+    return f"{HEAD}  k:\n    type: intention\n    function: {written}\n"
+
+
+@pytest.mark.parametrize(
+    ("function", "best"),
+    [
+        ("0 if x != y else 10", 0),
+        ("abs(x - y) + 2 * (x + y) - 3", -3),
+        ("0.1 * x + 0.2 * y - 0.3", Fraction(-3, 10)),
+        ("(0 if x + y == 3 else 1) + round(2.5)", 2),
+        ("x ** 2 - max(x, y, 1) if c == 'R' else 5", -2),
+        ("sum([v * 2 for v in [x, y] if v > 0]) - len('ab')", -2),
+        ("{'R': 7, 'G': x}[c]", 0),
+        ("1 / (x + 1)", Fraction(333333333, 10**9)),
+        ("|\n      b = 4\n      if x == 2:\n        b = b - y\n      return b", 2),
+        ("|\n      t = 0\n      for i in range(x):\n        t += i - 1\n      return t", -1),
+    ],
+)
+def test_functions_are_worth_what_python_says_but_exactly(function: str, best: Fraction, tmp_path: Path) -> None:
+    team = imported(constraint(function), tmp_path, "a.yaml").team
+    check_team(team)
+    assert optimum(team) == best + (Fraction(1, 2) if function.startswith("x **") else Fraction(-1, 4))
+
+
+def test_tables_owners_and_notes(tmp_path: Path) -> None:
+    text = f"""{HEAD}  t:
+    type: extensional
+    variables: [c, x]
+    default: 1
+    values: {{-1.5: R 0 | G 2, 10000: G 0}}
+  u:
+    type: extensional
+    variables: x
+    values: {{2: 0 | 1, .inf: 2}}
+distribution_hints: {{must_host: {{a2: [x]}}}}
+"""
+    found = imported(text, tmp_path, "a.yaml", infinity=10000)
+    check_team(found.team)
+    assert found.team.owner == {"y": "a1", "x": "a2", "c": "a1"}
+    assert optimum(found.team) == Fraction(1, 2) - Fraction(3, 2) + 2
+    assert {note.kind for note in found.notes} == {"owner", "dropped", "renamed"}
+
+
+def test_hard_constraints_alone_are_a_discsp(tmp_path: Path) -> None:
+    text = constraint("10000 if x == y else 0").replace(", cost_function: -0.25 if c == 'G' else 0.5", "")
+    assert imported(text, tmp_path, "a.yaml", infinity=10000).team.kind == "DisCSP"
+
+
+def test_distribution_and_scenario_are_files_of_their_own(tmp_path: Path) -> None:
+    (tmp_path / "a.yaml").write_text(constraint("x * y"))
+    (tmp_path / "d.yaml").write_text("distribution: {a1: [x], a2: [y, c, k]}\n")
+    (tmp_path / "s.yaml").write_text(
+        "events:\n- {id: w, delay: 3}\n- {id: e, actions: [{type: remove_agent, agent: a2}]}\n"
+    )
+    found = read_foreign([tmp_path / name for name in ("a.yaml", "d.yaml", "s.yaml")], ImportOptions())
+    assert found.team.owner == {"x": "a1", "y": "a2", "c": "a2"}
+    assert [event.changes for event in found.team.scenario] == [(RemoveAgent("a2"),)]
+
+
+@pytest.mark.parametrize(
+    ("function", "message"),
+    [
+        ("__import__('os').system('true') + x", "the attribute '.system'"),
+        ("eval('x')", "calls 'eval'"),
+        ("x.__class__", "the attribute '.__class__'"),
+        ("(lambda: x)()", "a call of this form"),
+        ("9 ** 9 ** 9 ** 9 + x", "a power is too large"),
+        ("|\n      import os\n      return x", "an import"),
+        ("|\n      while x:\n        pass\n      return x", "While"),
+        ("sum([i for i in range(100000) if sum([j for j in range(100000)])]) + x", "too many steps"),
+        ("'a' * 10 ** 9 + x", "is no number"),
+        (f"{'(' * 500}x{')' * 500}", "function"),
+        ("x / 0 + y", "has no value at x=0, y=0: ZeroDivisionError"),
+        ("z + x", "'z', which is no variable"),
+    ],
+)
+def test_functions_that_are_refused(function: str, message: str, tmp_path: Path) -> None:
+    with pytest.raises(InvalidInputError) as error:
+        imported(constraint(function), tmp_path, "a.yaml")
+    assert len(error.value.diagnostics) == 1
+    assert message in str(error.value)
+
+
+LAUGHS = "a: &a [x,x,x,x,x,x,x,x,x]\n" + "".join(
+    f"{after}: &{after} [{','.join([f'*{before}'] * 9)}]\n"
+    for before, after in zip("abcdefgh", "bcdefghi", strict=True)
+)
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        (f"name: x\nobjective: min\n{LAUGHS}", "counting what aliases repeat"),
+        ("variables: !!python/object/apply:os.system [x]\n", "the tag "),
+        ("variables: !!binary aGk=\n", "the tag "),
+        (f"variables: {'[' * 5000}", "nested"),
+        ("variables: *nowhere\n", "alias"),
+        ("variables: {x: {domain: d}\n", "is not YAML"),
+        ("objective: best\nvariables: {}\n", "no objective"),
+        ("objective: min\nvariables: {no: {domain: d}}\n", "where a name should stand"),
+        ("objective: min\ndomains: {d: {values: [0..999999999]}}\nvariables: {x: {domain: d}}\n", "100000"),
+    ],
+)
+def test_files_that_are_refused(text: str, message: str, tmp_path: Path) -> None:
+    with pytest.raises(InvalidInputError) as error:
+        imported(text, tmp_path, "a.yaml")
+    assert len(error.value.diagnostics) == 1
+    assert message in str(error.value)
+
+
+def test_python_files_are_executed_only_where_that_is_allowed(tmp_path: Path) -> None:
+    (tmp_path / "outside.py").write_text("def cost(a, b):\n    return 0.5 if a == b else -1\n")
+    text = f"{HEAD}  k: {{type: intention, source: outside.py, function: 'source.cost(x, y)'}}\n"
+    with pytest.raises(InvalidInputError, match="--allow-code"):
+        imported(text, tmp_path, "a.yaml")
+    assert optimum(imported(text, tmp_path, "a.yaml", allow_code=True).team) == Fraction(-5, 4)

@@ -1,0 +1,70 @@
+"""toulbar2's cfn and wcsp: tables, bounds, shared functions, loose signs."""
+
+from __future__ import annotations
+
+from fractions import Fraction
+from pathlib import Path
+
+import pytest
+
+from robochoc.formats import InvalidInputError, check_team
+from tests.support.foreign_problems import imported, optimum
+
+CFN = """# loose
+{ problem: { name: "loose" mustbe: "<20.00" }
+  variables: { x: [a b] "y": 3, z: -2 }  // three
+  functions: {
+    c: {scope: [], costs: [-1.50]}
+    {scope [x y] defaultcost: 1.259 costs: [a 0 2, b 2 inf, 1 1 -3.1]}
+    t1: {scope: [x z], costs: t2}
+    t2: {scope: [x 2], costs: [0 1 2 3]}
+} }
+"""
+WCSP = """shared 3 2 4 5
+2 2 2
+-2 0 1 0 2
+0 0 1
+1 1 9
+2 1 2 0 -1
+1 2 0 1
+1 2
+0 3 0
+"""
+
+
+def test_a_loose_cfn(tmp_path: Path) -> None:
+    found = imported(CFN, tmp_path, "a.cfn")
+    check_team(found.team)
+    assert optimum(found.team) == Fraction("-3.1") + 4 - Fraction("1.5")
+    assert {note.kind for note in found.notes} == {"truncated", "owner"}
+
+
+def test_a_wcsp_shares_tables_and_forbids_from_its_bound_on(tmp_path: Path) -> None:
+    team = imported(WCSP, tmp_path, "a.wcsp").team
+    check_team(team)
+    assert optimum(team) == 3
+
+
+def test_a_maximised_cfn(tmp_path: Path) -> None:
+    text = '[["up" >-5.0] [2 2] [[[0] [1.0 0.5]] [[0 1] [-1.0 0.5 -2.0 5.5]]]]'
+    assert optimum(imported(text, tmp_path, "a.cfn").team) == 6
+
+
+@pytest.mark.parametrize(
+    ("name", "text", "message"),
+    [
+        ("a.cfn", CFN.replace("costs: t2", "type: salldiff params: []"), "'salldiff'"),
+        ("a.cfn", CFN.replace("[0 1 2 3]", "[0 1 2]"), "3 costs instead of 4"),
+        ("a.cfn", CFN.replace("<20", "20"), "the bound"),
+        ("a.cfn", CFN.replace("a 0 2", "q 0 2"), "the value 'q'"),
+        ("a.wcsp", WCSP.replace("2 1 2 0 -1", "2 1 2 -1 alldiff"), "'alldiff'"),
+        ("a.wcsp", WCSP.replace("0 -1", "0 -2"), "the shared function 2"),
+        ("a.wcsp", WCSP[:30], "the file ends"),
+        ("a.wcsp", WCSP.replace("0 0 1", "0 7 1"), "the value 7"),
+    ],
+)
+def test_what_is_refused(name: str, text: str, message: str, tmp_path: Path) -> None:
+    with pytest.raises(InvalidInputError) as error:
+        imported(text, tmp_path, name)
+    assert len(error.value.diagnostics) == 1
+    assert message in str(error.value)
