@@ -6,7 +6,7 @@ docs/reference/format.md; the paper, Figure 2.
 from robochoc.formats.definitions import PREDEFINED
 from robochoc.formats.diagnostics import Diagnostic, InvalidInputError, encodable, on_one_line
 from robochoc.formats.folder import write_team
-from robochoc.formats.robot import read_robot, robot_in
+from robochoc.formats.robot import read_robot, read_robot_again, robot_in
 from robochoc.formats.team import find_teams, read_team, robot_names
 from robochoc.formats.validation import check_event, check_robot, check_team, with_checked_events
 from robochoc.formats.writer import robot_xml
@@ -23,6 +23,7 @@ __all__ = [
     "find_teams",
     "on_one_line",
     "read_robot",
+    "read_robot_again",
     "read_team",
     "robot_in",
     "robot_names",

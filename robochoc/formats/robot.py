@@ -92,6 +92,34 @@ def read_robot(path: Path | str) -> Robot:
     return with_table(read_robot_file(Path(path), table).robot, table.names)
 
 
+def read_robot_again(path: Path, symbols: tuple[str, ...], units: CostUnits) -> Robot:
+    """Return the robot in the XML file `path`, which returns to a team that has been read before.
+
+    Args:
+        path: The file. It may have changed.
+        symbols: The symbols of the team: those in the file get the same codes.
+        units: The units of the team's costs.
+
+    Raises:
+        InvalidInputError: with all mistakes of the file; or when it has other symbols, finer costs or another
+            objective, which the others do not know.
+    """
+    table = SymbolTable(symbols)
+    file = read_robot_file(path, table)
+    costs = file.robot.costs
+    if new := table.names[len(symbols) :]:
+        raise InvalidInputError(
+            [Diagnostic(str(path), 0, f"the symbol '{new[0]}' is new to the team", "use its symbols")]
+        )
+    if file.robot.kind is ProblemKind.DISWCSP and (costs.maximize, max(costs.places, units.places)) != (
+        units.maximize,
+        units.places,
+    ):
+        hint = "the others do not read it again: write the costs as they were"
+        raise InvalidInputError([Diagnostic(str(path), 0, "another objective, or finer costs than the team has", hint)])
+    return with_table(file.in_places(units.places).robot, symbols)
+
+
 def read_robot_file(path: Path, table: SymbolTable) -> RobotFile:
     """Return the robot in the XML file `path`, with what the team has to check.
 

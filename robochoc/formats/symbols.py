@@ -25,8 +25,9 @@ _NUMBER = re.compile(r"[-+.0-9]+")
 class SymbolTable:
     """The symbols of a team's files in the order in which they appear: the place of a symbol is its code."""
 
-    def __init__(self) -> None:
-        self._codes: dict[str, int] = {}
+    def __init__(self, known: Sequence[str] = ()) -> None:
+        """Begin with symbols whose codes are `known`."""
+        self._codes = {name: code for code, name in enumerate(known)}
         self._declared: set[str] = set()
         self._mentioned: dict[str, tuple[str, int]] = {}
 

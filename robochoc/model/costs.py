@@ -27,6 +27,7 @@ from robochoc.model.cost_units import PLAIN_COSTS, Cost, CostUnits, common_units
 from robochoc.model.expression import Apply, Constant, Expression
 from robochoc.model.expression.bounds import ANY_INTEGER, Interval, bounds
 from robochoc.model.problem import AddAgent, AddConstraint, AddValue, Change, Robot, ScenarioEvent, Team
+from robochoc.model.ranges import united_ranges
 
 MAX_TRIED = 4096
 """The maximum number of combinations of values of which the least cost of a function is computed exactly."""
@@ -128,8 +129,20 @@ def _taken_out(team: Team, without: Collection[str] = ()) -> int:
 
 
 def normalized_joining(team: Team, robot: Robot) -> Robot:
-    """Return `robot`, as its file says, for a normalised `team` that it joins. Raises `UnboundedCostError`."""
-    domains = {**_domains(team), **{variable.name: variable.domain for variable in robot.variables}}
+    """Return `robot`, as its file says now, for a normalised `team` that it joins, or comes back to.
+
+    Raises:
+        UnboundedCostError: if nothing bounds a function's cost, or a function that others hold is bounded for other
+            values than the robot's variables have now.
+    """
+    before = _domains(team)
+    domains = dict(before)
+    _widen(domains, robot)
+    own = {variable.name for variable in robot.variables}
+    wider = {name for name in own if name in before and len(domains[name]) > len(before[name])}
+    for constraint in _held_by_others(team, robot.name):
+        if isinstance(constraint.definition, Function) and (new := wider.intersection(constraint.variables)):
+            raise UnboundedCostError(f"{min(new)} has new values, and others have functions for the values it had")
     return normalized_robot(robot, team.told_in, domains)
 
 
@@ -176,6 +189,17 @@ def _joining(team: Team) -> list[Robot]:
     return [change.robot for change in changes if isinstance(change, AddAgent)]
 
 
+def _held_by_others(team: Team, name: str) -> Iterable[Constraint]:
+    """Yield the constraints that robots but `name` hold, now or after some event."""
+    for robot in [*team.robots, *_joining(team)]:
+        if robot.name != name:
+            yield from _constraints(robot)
+    for event in team.scenario:
+        for change in event.changes:
+            if isinstance(change, AddConstraint) and change.agent != name:
+                yield change.constraint
+
+
 def _constraints(robot: Robot) -> Iterable[Constraint]:
     yield from robot.private
     yield from robot.shared
@@ -184,16 +208,27 @@ def _constraints(robot: Robot) -> Iterable[Constraint]:
 
 
 def _domains(team: Team) -> dict[str, Domain]:
-    """Return the domains of all variables, with the values that the scenario adds."""
+    """Return the domains of all variables: all values that they ever have, those that the scenario brings included."""
     domains = {name: variable.domain for name, variable in team.variables.items()}
-    domains.update((one.name, one.domain) for robot in _joining(team) for one in robot.variables)
     for event in team.scenario:
         for change in event.changes:
-            if isinstance(change, AddValue) and change.variable in domains:
-                known = domains[change.variable]
-                wider = sorted({*known, change.value})
-                domains[change.variable] = replace(known, ranges=tuple(range(value, value + 1) for value in wider))
+            if isinstance(change, AddAgent):
+                _widen(domains, change.robot)
+            elif isinstance(change, AddValue) and change.variable in domains:
+                _add(domains, change.variable, [range(change.value, change.value + 1)])
     return domains
+
+
+def _widen(domains: dict[str, Domain], robot: Robot) -> None:
+    """Add the domains of `robot`: a robot that has left may come again with others."""
+    for variable in robot.variables:
+        domains.setdefault(variable.name, variable.domain)
+        _add(domains, variable.name, variable.domain.ranges)
+
+
+def _add(domains: dict[str, Domain], variable: str, ranges: Iterable[range]) -> None:
+    known = domains[variable]
+    domains[variable] = replace(known, ranges=united_ranges([*known.ranges, *ranges]))
 
 
 def _normalized_change(change: Change, units: CostUnits, domains: Domains) -> Change:

@@ -17,7 +17,7 @@ from typing import NamedTuple
 
 from robochoc.communication.run_result import RunResult
 from robochoc.communication.session import Epoch, Session
-from robochoc.formats import InvalidInputError, read_robot
+from robochoc.formats import InvalidInputError, read_robot_again
 from robochoc.model.change import (
     affected_robots,
     apply_changes,
@@ -25,11 +25,12 @@ from robochoc.model.change import (
     describe_change,
     team_after_events,
 )
-from robochoc.model.costs import normalized_joining
+from robochoc.model.costs import UnboundedCostError, normalized_joining
 from robochoc.model.orders import with_priorities
 from robochoc.model.outcome import EpochOutcome, Verdict
 from robochoc.model.problem import AddAgent, Change, Robot, ScenarioEvent, Team
 from robochoc.model.rejoin import rejoin
+from robochoc.model.symbols import symbol_table
 from robochoc.model.team_edits import ChangeError, without_robots
 from robochoc.solver.agent_problem import DEFAULT_PARAMETERS, RunParameters
 from robochoc.solver.compiled_team import CompiledTeam
@@ -216,7 +217,7 @@ class ScenarioRun:
                 try:
                     self._read_again(name)
                     back.append(name)
-                except (InvalidInputError, ChangeError, OSError) as why:
+                except (InvalidInputError, ChangeError, UnboundedCostError, OSError) as why:
                     self.failed_returns.append(f"{name} could not come back: {why}")
         self.withdrawn += [name for name in lost if name not in back]
         if back:
@@ -243,7 +244,9 @@ class ScenarioRun:
 
     def _read_again(self, name: str) -> None:
         """Replace the robot `name` by what its file says now, as if it had said so from the beginning."""
-        robot = normalized_joining(self.team, read_robot(Path(self.team[name].file)))
+        symbols = symbol_table(self.team.robots)
+        read = read_robot_again(Path(self.team[name].file), symbols, self._files.told_in)
+        robot = normalized_joining(self._files, read)
         if name in self._files:
             self._files = rejoin(self._files, robot)
         else:

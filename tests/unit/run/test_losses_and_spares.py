@@ -8,11 +8,8 @@ from pathlib import Path
 
 import pytest
 
-from robochoc.communication.run_result import RunResult
-from robochoc.communication.session import Epoch, Session
 from robochoc.formats import PREDEFINED, read_team, write_team
 from robochoc.model.change import apply_changes, team_after_events
-from robochoc.model.outcome import Metrics, Verdict
 from robochoc.model.problem import (
     AddAgent,
     AddConstraint,
@@ -28,34 +25,8 @@ from robochoc.model.problem import (
 from robochoc.model.team_edits import without_robots
 from robochoc.run.scenario import ScenarioRun
 from robochoc.solver.compiled_team import CompiledTeam
+from tests.support.losing import Losing
 from tests.support.small_teams import named_constraint, triangle
-
-
-class Losing(Session):
-    """Each search loses the robots it is told to, or solves the problem."""
-
-    def __init__(self, team: Team, losses: Sequence[str]) -> None:
-        super().__init__(team)
-        self._losses = list(losses)
-        self.epochs: list[Epoch] = []
-
-    @property
-    def lossless(self) -> bool:
-        return True
-
-    def search(self, timeout: float | None = None, messages: int | None = None) -> RunResult:
-        assert (timeout, messages) == (None, None)
-        lost = dict.fromkeys(self._losses.pop(0).split(), "was lost") if self._losses else {}
-        verdict = Verdict.UNKNOWN if lost else Verdict.SOLUTION
-        return RunResult(verdict, None, {}, Metrics(), lost)
-
-    def change(self, epoch: Epoch) -> None:
-        self.compiled = epoch.compiled
-        self.epochs.append(epoch)
-
-    def close(self) -> None:
-        """Nothing to close."""
-
 
 CHANGES: list[Change] = [
     RemoveConstraint("RC", "RB", "C"),

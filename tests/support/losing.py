@@ -1,0 +1,36 @@
+"""A made-up session that loses robots."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from robochoc.communication.run_result import RunResult
+from robochoc.communication.session import Epoch, Session
+from robochoc.model.outcome import Metrics, Verdict
+from robochoc.model.problem import Team
+
+
+class Losing(Session):
+    """Each search loses the robots it is told to, or solves the problem."""
+
+    def __init__(self, team: Team, losses: Sequence[str]) -> None:
+        super().__init__(team)
+        self._losses = list(losses)
+        self.epochs: list[Epoch] = []
+
+    @property
+    def lossless(self) -> bool:
+        return True
+
+    def search(self, timeout: float | None = None, messages: int | None = None) -> RunResult:
+        assert (timeout, messages) == (None, None)
+        lost = dict.fromkeys(self._losses.pop(0).split(), "was lost") if self._losses else {}
+        verdict = Verdict.UNKNOWN if lost else Verdict.SOLUTION
+        return RunResult(verdict, None, {}, Metrics(), lost)
+
+    def change(self, epoch: Epoch) -> None:
+        self.compiled = epoch.compiled
+        self.epochs.append(epoch)
+
+    def close(self) -> None:
+        """Nothing to close."""
