@@ -19,6 +19,7 @@ from robochoc.formats import check_team, read_robot, read_team
 from robochoc.journal.events import Observer
 from robochoc.model.outcome import Outcome
 from robochoc.model.problem import Team
+from robochoc.model.wording import counted
 from robochoc.modelling.solving import Solvable
 from robochoc.run.registry import UnknownProtocolError, installed_protocols
 
@@ -49,8 +50,8 @@ class Problem(Solvable):
         return self.team
 
     def __repr__(self) -> str:
-        constraints = sum(1 for _ in self.team.constraints())
-        return f"<problem {self.team.name}: {len(self.team.robots)} robots, {constraints} constraints>"
+        constraints = counted(sum(1 for _ in self.team.constraints()), "constraint")
+        return f"<problem {self.team.name}: {counted(len(self.team.robots), 'robot')}, {constraints}>"
 
 
 def load(path: Path | str) -> Problem:

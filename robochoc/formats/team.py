@@ -145,10 +145,12 @@ def _listing(folder: Path) -> list[os.DirEntry[str]]:
         with os.scandir(folder) as entries:
             return sorted(entries, key=lambda entry: natural_key(entry.name))
     except NotADirectoryError:
-        step = f"a robot's team is its folder: {folder.parent}" if folder.suffix == ".xml" else _NEXT_STEP
+        step = "give a team's folder; 'robochoc import' makes one of a file of another tool"
+        if folder.suffix == ".xml":
+            step = f"a robot's team is its folder: {folder.parent}"
         raise _invalid(folder, "is not a folder", step) from None
     except FileNotFoundError:
-        raise _invalid(folder, "does not exist", _NEXT_STEP) from None
+        raise _invalid(folder, "does not exist", "check its name" if folder.suffix else _NEXT_STEP) from None
     except (OSError, ValueError) as error:
         reason = error.strerror if isinstance(error, OSError) else error
         raise _invalid(folder, f"cannot be read: {reason}", "check the path and its permissions") from None

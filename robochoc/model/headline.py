@@ -52,4 +52,6 @@ def _lost(outcome: Outcome) -> str:
 
 
 def _cost(outcome: Outcome) -> str:
-    return f", cost {outcome.cost:,}" if outcome.cost else ""
+    if outcome.cost is None or not (outcome.cost or outcome.verdict is Verdict.OPTIMAL):
+        return ""
+    return f", cost {outcome.cost:,}"

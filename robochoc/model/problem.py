@@ -33,6 +33,7 @@ from robochoc.model.constraint import (
 )
 from robochoc.model.cost_units import PLAIN_COSTS, CostUnits, common_units
 from robochoc.model.expression import Expression
+from robochoc.model.wording import counted
 
 __all__ = [
     "INFINITE",
@@ -249,6 +250,9 @@ class Team:
     name: str
     robots: tuple[Robot, ...]
     scenario: tuple[ScenarioEvent, ...] = ()
+
+    def __repr__(self) -> str:
+        return f"<team {self.name}: {counted(len(self.robots), 'robot')}>"
 
     @cached_property
     def _by_name(self) -> dict[str, Robot]:

@@ -67,6 +67,7 @@ class Wording(NamedTuple):
         interfaces: By robot, the variables whose values its messages hold.
         branch: The robots whose values a partial assignment holds, the highest first: the priority order. In a
             protocol on the order's pseudo-tree these are the sender's ancestors and the sender.
+        symbols: By symbolic variable, the names that its values stand for.
     """
 
     sender: str
@@ -74,6 +75,7 @@ class Wording(NamedTuple):
     order: Sequence[str] = ()
     interfaces: Mapping[str, Sequence[str]] = {}
     branch: Sequence[str] = ()
+    symbols: Mapping[str, Sequence[str]] = {}
 
     def variables(self, robot: str) -> str:
         """Return what a robot's value is called: its variables' names."""
@@ -85,7 +87,12 @@ class Wording(NamedTuple):
         names = self.interfaces.get(robot, ())
         if len(names) != len(value):
             names = (robot,) if len(value) == 1 else [f"{robot}[{place}]" for place in range(1, len(value) + 1)]
-        return [(name, str(part)) for name, part in zip(names, value, strict=True) if part is not None]
+        known = zip(names, value, strict=True)
+        return [(name, self._called(name, part)) for name, part in known if part is not None]
+
+    def _called(self, variable: str, value: int) -> str:
+        symbols = self.symbols.get(variable, ())
+        return symbols[value] if 0 <= value < len(symbols) else str(value)
 
     def facts(self, robot: str, value: RobotValue) -> list[str]:
         """Return a robot's value variable by variable, such as `V1.1 = 2`; or that the robot withdraws."""
@@ -138,10 +145,11 @@ class Wording(NamedTuple):
         names = self.interfaces.get(self.sender, ())
         flying = [value for value in values if not is_withdrawn(value)]
         withdrawn = ", or I withdraw" if len(flying) < len(values) else ""
+        parts = [[part for _, part in self.parts(self.sender, value)] for value in flying]
         if all(len(value) == 1 for value in flying):
-            shown = listed([str(value[0]) for value in flying], "or")
+            shown = listed([part for value in parts for part in value], "or")
         else:
-            shown = listed([f"({', '.join(map(str, value))})" for value in flying], "or")
+            shown = listed([f"({', '.join(value)})" for value in parts], "or")
         called = names[0] if len(names) == 1 else f"({', '.join(names)})" if names else self.sender
         return f"{called} is {shown or 'nothing'}{withdrawn}"
 

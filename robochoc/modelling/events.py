@@ -35,7 +35,7 @@ class Event:
         self._model = model
 
     def __repr__(self) -> str:
-        return f"<event with {len(self.steps)} changes>"
+        return f"<event with {len(self.steps)} change{'s' * (len(self.steps) != 1)}>"
 
     def remove_robot(self, robot: ModelRobot | str) -> None:
         """Remove a robot, with its variables and every constraint that it shares."""

@@ -19,10 +19,12 @@ import itertools
 from pathlib import Path
 from typing import Self
 
-from robochoc.formats import InvalidInputError, read_team, write_team
+from robochoc.formats import InvalidInputError, encodable, read_team, write_team
+from robochoc.formats.diagnostics import Diagnostic
 from robochoc.model.cost_units import PLAIN_COSTS
 from robochoc.model.outcome import Outcome
 from robochoc.model.problem import Team
+from robochoc.model.wording import counted
 from robochoc.modelling.building import built, saved_order
 from robochoc.modelling.codes import Symbols
 from robochoc.modelling.drafts import split
@@ -221,7 +223,11 @@ class Model(Solvable):
             InvalidInputError: if files cannot say it, or the folder is there and is not replaced.
             OSError: if it cannot be written.
         """
-        write_team(built(self, saved_order(self.team)), Path(folder), replace=replace)
+        team = built(self, saved_order(self.team))
+        if not replace and Path(folder).exists():
+            hint = "choose another folder, or replace this one: save(folder, replace=True)"
+            raise InvalidInputError([Diagnostic(encodable(str(folder)), 0, "it exists already", hint)])
+        write_team(team, Path(folder), replace=replace)
 
     def _repr_html_(self) -> str:
         from robochoc.modelling.notebook.pages import team_html  # noqa: PLC0415 - notebooks only
@@ -241,5 +247,5 @@ class Model(Solvable):
         return Solution.of(outcome, team, dict(self.variables))
 
     def __repr__(self) -> str:
-        sizes = f"{len(self.robots)} robots, {len(self.variables)} variables, {len(self.constraints)} constraints"
-        return f"<model {self.name}: {sizes}>"
+        robots, variables = counted(len(self.robots), "robot"), counted(len(self.variables), "variable")
+        return f"<model {self.name}: {robots}, {variables}, {counted(len(self.constraints), 'constraint')}>"

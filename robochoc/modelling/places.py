@@ -50,7 +50,7 @@ def here() -> Place:
 def did_you_mean(word: object, known: Iterable[object], fallback: str = "") -> str:
     """Return a hint that names what comes nearest to `word`; if nothing does, `fallback`."""
     words = [str(one) for one in known]
-    near = difflib.get_close_matches(str(word), words, 1)
+    near = [one for one in words if one.endswith(f".{word}")] or difflib.get_close_matches(str(word), words, 1)
     if not near:
         folded = {one.lower(): one for one in words}
         near = [folded[one] for one in difflib.get_close_matches(str(word).lower(), folded, 1)]

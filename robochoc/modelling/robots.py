@@ -96,10 +96,12 @@ class ModelRobot:
         rule = self._model.rule(constraints, cost, name)
         owners = dict.fromkeys(variable.owner for variable in rule.term.variables)
         if self.name not in owners or len(owners) != 2:  # noqa: PLR2004 - a pair
-            raise ModelError(
-                f"the part that {self.name} knows is over variables of {' and '.join(owners)}",
-                f"let it be over variables of {self.name} and of one other robot; Model.add adds any other constraint",
+            hint = (
+                f"let it be over variables of {self.name} and of one other robot; Model.add adds any other constraint"
             )
+            if list(owners) == [self.name]:
+                hint = "add it by Model.add: what is over variables of one robot, no other robot learns"
+            raise ModelError(f"the part that {self.name} knows is over variables of {' and '.join(owners)}", hint)
         self.parts.append(rule)
         self._model.changed()
         return rule

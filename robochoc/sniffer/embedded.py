@@ -32,7 +32,7 @@ def _answers(data: PageData, journal: Journal | None, most_states: int) -> Itera
     yield "about", data.about()
     yield "columns", message_columns(trace, 0, len(trace.messages.t))
     yield "steps", step_columns(trace, 0, len(trace.steps.t))
-    yield "decisions", _encode(trace.decisions)
+    yield "decisions", _encode([(step, data.names.labelled(values)) for step, values in trace.decisions])
     for chunk in range(-(-len(trace.messages.t) // DETAILS)):
         yield f"details:{chunk}", data.details(chunk)
     if journal and not data.cannot_replay():

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import csv
 import io
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 
 import msgspec
 
@@ -87,7 +87,7 @@ def mermaid(data: PageData, messages: Sequence[int]) -> bytes:
     lines = ["sequenceDiagram"]
     lines += [f"    participant R{robot} as {_label(trace.robots[robot])}" for robot in robots]
     drawn = {*robots}
-    notes = _notes(trace, messages)
+    notes = _notes(data, messages)
     for message in messages:
         while notes and notes[0][0] <= of.step[message]:
             lines += _note(trace, *notes.pop(0), drawn)
@@ -117,15 +117,16 @@ def drawable(data: PageData, messages: Sequence[int]) -> Sequence[int]:
     return part
 
 
-def _notes(trace: Trace, messages: Sequence[int]) -> list[tuple[int, dict[str, int]]]:
+def _notes(data: PageData, messages: Sequence[int]) -> list[tuple[int, Mapping[str, int | str]]]:
     """Return the decisions between the first message and the last one."""
     if not messages:
         return []
+    trace = data.trace
     first, last = trace.messages.step[messages[0]], trace.messages.step[messages[-1]]
-    return [(step, taken) for step, taken in trace.decisions if first <= step <= last]
+    return [(step, data.names.labelled(taken)) for step, taken in trace.decisions if first <= step <= last]
 
 
-def _note(trace: Trace, step: int, assignment: dict[str, int], drawn: set[int]) -> list[str]:
+def _note(trace: Trace, step: int, assignment: Mapping[str, int | str], drawn: set[int]) -> list[str]:
     robot = trace.steps.robot[step]
     if robot not in drawn:
         return []

@@ -152,7 +152,7 @@ class PageData:
     def decisions(self, first: int, end: int) -> bytes:
         """Return the decisions."""
         _check(first, end, len(self.trace.decisions))
-        return _encode(self.trace.decisions[first:end])
+        return _encode([(step, self.names.labelled(values)) for step, values in self.trace.decisions[first:end]])
 
     def details(self, chunk: int) -> bytes:
         """Return the contents of the messages of a chunk."""

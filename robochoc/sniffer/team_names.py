@@ -17,6 +17,7 @@ from robochoc.sniffer.trace import Trace
 class _RunNames(NamedTuple):
     order: tuple[str, ...] = ()
     interfaces: Mapping[str, tuple[str, ...]] = {}
+    symbols: Mapping[str, tuple[str, ...]] = {}
     tree: PseudoTree | None = None
     """The pseudo-tree that the order induces, where the protocol works on it."""
 
@@ -67,7 +68,17 @@ class TeamNames:
         if self._works_on_tree(run):
             known = names.tree if names.tree and sender in names.tree.parents else None
             branch = (*reversed(known.ancestors(sender)), sender) if known else ()
-        return Wording(sender, receiver, names.order, interfaces, branch)
+        return Wording(sender, receiver, names.order, interfaces, branch, names.symbols)
+
+    def labelled(self, values: Mapping[str, int]) -> Mapping[str, int | str]:
+        """Return decided values, with the names of symbols as far as the last run that is known tells them."""
+        symbols = self._of_run(len(self._trace.runs) - 1).symbols if self._trace.runs else {}
+        if not symbols:
+            return values
+        return {
+            name: symbols[name][value] if 0 <= value < len(symbols.get(name, ())) else value
+            for name, value in values.items()
+        }
 
     def _works_on_tree(self, run: int) -> bool:
         found = self._protocols.of_run(run)
@@ -84,7 +95,8 @@ class TeamNames:
                     team.order, {robot.name: [parent.name for parent in robot.parents] for robot in team.robots}
                 )
             interfaces = {robot.name: robot.interface for robot in team.robots}
-            self._known[number] = _RunNames(tuple(team.order), interfaces, tree)
+            symbols = {name: one.domain.symbols for name, one in team.variables.items() if one.domain.symbols}
+            self._known[number] = _RunNames(tuple(team.order), interfaces, symbols, tree)
         return self._known[number]
 
     def _team(self, number: int) -> Team | None:

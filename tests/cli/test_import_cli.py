@@ -80,7 +80,7 @@ def test_import_of_a_folder_makes_a_team_of_each_problem(problem: Path, tmp_path
     ]
     assert "is of no format" not in done.stderr
     nothing = robochoc_within("import", teams, "-o", tmp_path / "more")
-    assert "no file here is of a format that is read" in nothing.stderr
+    assert "no file here is of a format that is read (a team's folder needs no import" in nothing.stderr
 
 
 def test_wrong_usage(problem: Path, tmp_path: Path) -> None:
@@ -92,6 +92,11 @@ def test_wrong_usage(problem: Path, tmp_path: Path) -> None:
     unknown.write_text("notes")
     told = robochoc_within("import", unknown, "-o", tmp_path / "team")
     assert (told.returncode, "is of no format that is read here" in told.stderr) == (1, True)
+    checked = robochoc_within("validate", unknown)
+    assert (checked.returncode, "is of no format that is read here" in checked.stdout) == (1, True)
+    for command in ("import", "validate", "solve"):
+        missing = robochoc_within(command, tmp_path / "nothing.yaml")
+        assert (missing.returncode, "does not exist (check its name)" in missing.stdout + missing.stderr) == (1, True)
 
 
 @pytest.mark.parametrize(("maximize", "cost"), [("false", 0.5), ("true", 2.0)])

@@ -19,7 +19,7 @@ PAGES = sorted([ROOT / "README.md", *(ROOT / "docs").rglob("*.md")])
 ELSEWHERE = {"write-a-protocol.md": "tests/cli/test_own_protocol.py"}
 """Pages whose snippets another test runs."""
 HERE = [page for page in PAGES if page.name not in ELSEWHERE]
-LANGUAGES = {"sh", "console", "python", "text", "xml", "toml", "json", "lisp", "bibtex", "make"}
+LANGUAGES = {"sh", "console", "python", "text", "xml", "yaml", "toml", "json", "lisp", "bibtex", "make"}
 BROWSER = """\
 #!{python} -SE
 import re, sys

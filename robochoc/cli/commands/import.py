@@ -117,7 +117,8 @@ def _sources(paths: Sequence[Path], output: Path | None, dialect: str | None) ->
         sources += [_Source(files, top / place) for place, files in problems_below(folder, dialect)]
     if not sources:
         shown = ", ".join(map(str, folders))
-        raise Failure(INVALID, f"{shown}: no file here is of a format that is read (name it with --format)")
+        hint = "a team's folder needs no import; otherwise name the format with --format"
+        raise Failure(INVALID, f"{shown}: no file here is of a format that is read ({hint})")
     return sources
 
 

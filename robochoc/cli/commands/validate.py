@@ -47,10 +47,12 @@ def validate(context: click.Context, paths: tuple[Path, ...], *, as_json: bool) 
 def _report(place: Path) -> dict[str, Any]:
     """The validation of one team, or of one robot's file."""
     from robochoc.formats import InvalidInputError, encodable, read_robot
-    from robochoc.formats.dialects.registry import recognise
+    from robochoc.formats.dialects.registry import recognise, unknown_format
 
     dialect = recognise(place)
     try:
+        if place.is_file() and dialect is None and place.suffix.lower() not in {"", ".xml"}:
+            raise unknown_format(place)
         if place.is_file() and dialect is None:
             robots: tuple[Robot, ...] = (read_robot(place),)
             events = 0

@@ -64,7 +64,7 @@ def read_foreign(paths: Sequence[Path], options: ImportOptions, name: str | None
     found = [dialect_called(name) if name else recognise(path) for path in paths]
     for path, dialect in zip(paths, found, strict=True):
         if dialect is None:
-            raise _invalid(path, "is of no format that is read here", "'robochoc import --help' lists those that are")
+            raise unknown_format(path)
         if dialect is not found[0]:
             first = found[0].title if found[0] else ""
             raise _invalid(path, f"is {dialect.title}, and {paths[0]} is {first}", "import them one by one")
@@ -87,6 +87,13 @@ def beginning_of(path: Path) -> bytes | None:
         return None
     finally:
         os.close(descriptor)
+
+
+def unknown_format(path: Path) -> InvalidInputError:
+    """Return the error of a file that is in no dialect, or not there."""
+    if not path.exists():
+        return _invalid(path, "does not exist", "check its name")
+    return _invalid(path, "is of no format that is read here", "'robochoc import --help' lists those that are")
 
 
 def _invalid(path: Path, message: str, hint: str) -> InvalidInputError:

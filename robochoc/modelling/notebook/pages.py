@@ -13,6 +13,7 @@ from robochoc.model.expression import Apply, Expression, Name
 from robochoc.model.expression import text as expression_text
 from robochoc.model.headline import describe_outcome
 from robochoc.model.problem import AddAgent, ProblemKind, Team
+from robochoc.model.wording import counted
 from robochoc.modelling.notebook.graph import graph_svg
 from robochoc.modelling.notebook.tables import heading, table
 
@@ -30,11 +31,12 @@ def team_html(team: Team, told: Mapping[str, Iterable[object]] = {}) -> str:
         told: The values of variables as their user wrote them, where these are not what files hold.
     """
     constraints = list(_constraints(team))
-    sizes = f"{len(team.robots)} robots, {len(team.variables)} variables, {len(constraints)} constraints"
+    counts = {"robot": len(team.robots), "variable": len(team.variables), "constraint": len(constraints)}
+    sizes = ", ".join(counted(number, thing) for thing, number in counts.items())
     aim = ""
     if team.kind is ProblemKind.DISWCSP:
         aim = ", maximised" if team.robots[0].costs.maximize else ", minimised"
-    events = f", {len(team.scenario)} events" if team.scenario else ""
+    events = f", {counted(len(team.scenario), 'event')}" if team.scenario else ""
     robots = [
         (robot.name, variable.name, _values(told[variable.name]) if variable.name in told else _domain(variable.domain))
         for robot in team.robots

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from decimal import Decimal
 from typing import Any
 
 import pytest
@@ -20,6 +21,8 @@ EPOCHS = (EpochOutcome(Verdict.SOLUTION, SIX, assignment={"V1": 1}), EpochOutcom
     [
         ({}, "solution for all 16 robots"),
         ({"verdict": Verdict.OPTIMAL, "cost": 1200}, "optimal solution for all 16 robots, cost 1,200"),
+        ({"verdict": Verdict.OPTIMAL, "cost": Decimal("0.0")}, "optimal solution for all 16 robots, cost 0.0"),
+        ({"cost": 0}, "solution for all 16 robots"),
         ({"verdict": Verdict.OPTIMAL, "withdrawn": SIX}, "10 of 16 fly (proven maximum)"),
         ({"withdrawn": SIX}, "10 of 16 fly (not proven to be the maximum)"),
         ({"withdrawn": SIX, "lost": SIX[:2]}, "10 of 16 fly (not proven to be the maximum; 2 lost)"),

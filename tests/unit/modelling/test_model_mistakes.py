@@ -11,6 +11,7 @@ from pathlib import Path
 import pytest
 
 import robochoc
+from robochoc.formats import InvalidInputError
 from robochoc.model.problem import Team
 from robochoc.modelling.places import ModelTypeError, UnknownNameError
 from robochoc.modelling.terms import Variable
@@ -93,8 +94,9 @@ MISTAKES: list[tuple[Callable[[Made], object], str]] = [
     (lambda m: m.a.variable("v", range(10**9)), "more than 100,000"),
     (lambda m: m.a.variable("v", [10**18]), "18 digits"),
     (lambda m: m.model["a.xx"], "did you mean 'a.x'"),
+    (lambda m: m.model["x"], "did you mean 'a.x'"),
     (lambda m: m.a["xx"], "a has no variable 'xx'"),
-    (lambda m: m.a.knows(m.x == 1), "Model.add"),
+    (lambda m: m.a.knows(m.x == 1), "add it by Model.add: what is over variables of one robot, no other robot learns"),
     (lambda m: m.b.knows(m.x + m.y == 1, m.x == 1), "of a alone"),
     (lambda m: m.a.topic("t", x=m.y), "no variable of a"),
     (lambda m: m.a.topic("t", x=m.x / 2), "no file can say"),
@@ -147,6 +149,14 @@ def test_variables_are_keys() -> None:
     assert where[made.y] == 2
     assert made.x in {made.x, made.y}
     assert stranger() not in where
+
+
+def test_a_folder_that_is_there_is_replaced_on_demand(tmp_path: Path) -> None:
+    made = Made()
+    made.model.save(tmp_path / "team")
+    with pytest.raises(InvalidInputError, match=r"it exists already .*save\(folder, replace=True\)"):
+        made.model.save(tmp_path / "team")
+    made.model.save(tmp_path / "team", replace=True)
 
 
 def test_names_of_the_library_are_listed_and_guessed() -> None:

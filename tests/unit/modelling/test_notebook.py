@@ -38,7 +38,8 @@ def test_a_model_shows_robots_constraints_and_the_graph() -> None:
     assert "ne(drone0.slot,drone1.slot)" in said
     assert shown.count("<line ") == 3
     assert shown.count("<circle ") == 3
-    assert repr(model) == "<model charging: 3 robots, 3 variables, 1 constraints>"
+    assert repr(model) == "<model charging: 3 robots, 3 variables, 1 constraint>"
+    assert repr(model.team) == "<team charging: 3 robots>"
 
 
 def test_a_problem_from_files_shows_itself_too() -> None:

@@ -38,7 +38,7 @@ def in_simulator(protocol: str, *, verify: bool = False) -> Options:
     return Options(protocol=protocol, runtime=Runtime.SIMULATOR, verify=verify)
 
 
-@count("seeds", 60, 2000)
+@count("seeds", 30, 2000)
 def test_every_complete_protocol_finds_the_exact_optimum(seeds: int) -> None:
     for seed in range(seeds):
         team = random_costs_team(seed)

@@ -16,10 +16,12 @@ from robochoc.formats.dialects.pydcop.python_values import (
     ARITHMETIC,
     COMPARISONS,
     FUNCTIONS,
+    OF_MEMBERS,
     SIGNS,
     NoValueError,
     Value,
     bounded,
+    distinct,
     items,
     literal,
     number,
@@ -235,7 +237,7 @@ class _Compiler:
                 self._outside
             ):
                 return self._call(name, self._outside, arguments)
-            case ast.Tuple(elts=parts) | ast.List(elts=parts) | ast.Set(elts=parts):
+            case ast.Tuple(elts=parts) | ast.List(elts=parts):
                 made = [self.expression(one) for one in parts]
                 return lambda names: tuple([one(names) for one in made])
             case ast.Dict(keys=keys, values=values) if None not in keys:
@@ -277,7 +279,8 @@ class _Compiler:
             raise MistakeError(f"the function calls '{shortened(name)}'", allowed)
         if any(isinstance(one, ast.Starred) for one in arguments):
             _refuse(arguments[0])
-        made = [self.expression(one) for one in arguments]
+        read = self._members if name in OF_MEMBERS and len(arguments) == 1 else self.expression
+        made = [read(one) for one in arguments]
 
         def call(names: _Names) -> Value:
             result = bounded(called(*[one(names) for one in made]))
@@ -286,9 +289,23 @@ class _Compiler:
 
         return call
 
+    def _members(self, node: ast.expr) -> _Closure:
+        """Return an expression that is only asked for its members: here a set is one, each member once."""
+        if not isinstance(node, ast.Set):
+            return self.expression(node)
+        made = [self.expression(one) for one in node.elts]
+
+        def members(names: _Names) -> Value:
+            return distinct([one(names) for one in made])
+
+        return members
+
     def _comparison(self, left: ast.expr, ops: Sequence[ast.cmpop], others: Sequence[ast.expr]) -> _Closure:
         first = self.expression(left)
-        rest = [(COMPARISONS[type(op)], self.expression(other)) for op, other in zip(ops, others, strict=True)]
+        rest = [
+            (COMPARISONS[type(op)], (self._members if isinstance(op, ast.In | ast.NotIn) else self.expression)(other))
+            for op, other in zip(ops, others, strict=True)
+        ]
 
         def compare(names: _Names) -> Value:
             before = first(names)

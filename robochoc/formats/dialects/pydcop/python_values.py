@@ -9,7 +9,7 @@ import ast
 import math
 import operator
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from fractions import Fraction
 
 Value = None | bool | int | Fraction | float | str | tuple["Value", ...] | dict["Value", "Value"]
@@ -167,6 +167,16 @@ FUNCTIONS: dict[str, Callable[..., Value]] = {
     "sum": lambda values: sum(map(number, values)),
 }
 """Python's functions that may be called."""
+OF_MEMBERS = frozenset({"all", "any", "len", "max", "min", "sum"})
+"""Those that ask a set for its members alone, in whatever order they are."""
+
+
+def distinct(values: Iterable[Value]) -> tuple[Value, ...]:
+    """Return each of `values` once. Raises `NoValueError` for what cannot be in a set."""
+    try:
+        return tuple(dict.fromkeys(values))
+    except TypeError:
+        raise NoValueError("a member of a set is a dictionary") from None
 
 
 def items(value: Value) -> tuple[Value, ...]:

@@ -44,6 +44,8 @@ def constraint(text: str) -> str:
         ("x ** 2 - max(x, y, 1) if c == 'R' else 5", -2),
         ("sum([v * 2 for v in [x, y] if v > 0]) - len('ab')", -2),
         ("{'R': 7, 'G': x}[c]", 0),
+        ("10 * len({x, y}) + (3 if x in {y, 0} else 4) - x * y", 9),
+        ("sum({x, y, 2}) if len({x, y, c}) == 2 else 9", 2),
         ("1 / (x + 1)", Fraction(333333333, 10**9)),
         ("|\n      b = 4\n      if x == 2:\n        b = b - y\n      return b", 2),
         ("|\n      t = 0\n      for i in range(x):\n        t += i - 1\n      return t", -1),
@@ -105,6 +107,8 @@ def test_distribution_and_scenario_are_files_of_their_own(tmp_path: Path) -> Non
         (f"{'(' * 500}x{')' * 500}", "function"),
         ("x / 0 + y", "has no value at x=0, y=0: ZeroDivisionError"),
         ("z + x", "'z', which is no variable"),
+        ("0 if {x, y} == {0, 1} else 1", "not allowed"),
+        ("len({x, {y: 1}})", "a member of a set is a dictionary"),
     ],
 )
 def test_functions_that_are_refused(function: str, message: str, tmp_path: Path) -> None:
