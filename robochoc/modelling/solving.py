@@ -62,7 +62,8 @@ class Solvable:
     ) -> Solution:
         """Let the robots solve the problem together.
 
-        The runtime `processes` starts processes. A program that uses it calls this below `if __name__ == "__main__":`.
+        The runtimes `processes` and `network` start processes. A program calls this below `if __name__ == "__main__":`,
+        for each of them may import it.
 
         Args:
             protocol: The name of the protocol, in any case. None: the default protocol for the kind of problem.

@@ -11,7 +11,7 @@ from collections.abc import Callable, Collection, Iterable, Sequence
 from dataclasses import dataclass
 from functools import lru_cache, reduce
 
-from robochoc.formats.diagnostics import MistakeError, shortened
+from robochoc.formats.diagnostics import MistakeError, shortened, suggestion
 from robochoc.model.expression import OPERATORS, Apply, Constant, Expression, Type
 
 MAX_TEXT = 1_000_000
@@ -264,7 +264,8 @@ def _applied(operator: str, arguments: list[Expression]) -> Expression:
     """Return XCSP3's `operator`, applied. Raises `MistakeError`."""
     least, most, make = _MEANINGS.get(operator, (0, -1, None))
     if make is None:
-        raise MistakeError(f"the operator '{shortened(operator)}' has no counterpart", "write it otherwise")
+        hint = suggestion(operator, _MEANINGS.keys(), "operators")
+        raise MistakeError(f"the operator '{shortened(operator)}' has no counterpart", hint)
     if not least <= len(arguments) <= most:
         raise MistakeError(f"{operator} with {len(arguments)} arguments", "see XCSP3-core, 'intension'")
     return make(arguments)

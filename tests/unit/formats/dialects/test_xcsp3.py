@@ -242,6 +242,7 @@ def test_owners_are_robots(tmp_path: Path) -> None:
 REFUSED = {
     "<stretch><list> x[] </list></stretch>": "<stretch> has no counterpart",
     "<intension> eq(x[0],sin(x[1])) </intension>": "'sin' has no counterpart",
+    "<intension> neq(x[0],x[1]) </intension>": "'neq' has no counterpart (did you mean 'ne'?)",
     "<intension> eq(x[0],y) </intension>": "no variable 'y'",
     "<intension> eq(x[0] </intension>": "is no expression",
     "<intension reifiedBy='x[0]'> eq(x[1],1) </intension>": "reifiedBy has no counterpart",
@@ -263,7 +264,7 @@ def test_what_has_no_counterpart_is_refused_by_name_with_its_line(xml: str, tmp_
     with pytest.raises(InvalidInputError) as refused:
         csp(tmp_path, f"\n\n{xml}")
     (mistake,) = refused.value.diagnostics
-    assert REFUSED[xml] in mistake.message
+    assert REFUSED[xml] in f"{mistake.message} ({mistake.hint})"
     assert mistake.line == 3
 
 
