@@ -47,8 +47,11 @@ def built(model: Model, order: Sequence[str] | None = None) -> Team:
         ModelError: if no team can be so.
         InvalidInputError: if that is nothing that one line of the program has made.
     """
-    builder = _Builder(model, order)
-    team = builder.team()
+    try:
+        builder = _Builder(model, order)
+        team = builder.team()
+    except RecursionError:
+        raise ModelError("a term of the model is nested too deeply", "let variables stand for parts of it") from None
     try:
         check_team(team)
     except InvalidInputError as invalid:

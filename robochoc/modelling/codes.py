@@ -176,7 +176,7 @@ def codes_of(domain: object, symbols: Symbols, place: Place) -> Codes:
         ModelError: if it is no domain.
     """
     if isinstance(domain, range) and domain.step == 1:
-        _check_size(len(domain), place)
+        _check_size(max(0, domain.stop - domain.start), place)  # `len` takes no more than 64 bits
         return _integers([domain], place)
     if domain is bool:
         domain = (False, True)

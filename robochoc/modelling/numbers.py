@@ -13,6 +13,9 @@ from robochoc.modelling.places import ModelError, ModelTypeError, Place
 Exact = int | Fraction
 """An exact number; a `Fraction` only where it is no integer."""
 
+_FAR = 400
+"""Decimals that are larger or smaller by this power of ten are refused: fractions of them fill the memory."""
+
 
 def is_number(value: object) -> bool:
     """Return whether `value` is a number, a truth value included."""
@@ -23,13 +26,15 @@ def exact(value: object) -> Exact:
     """Return the number `value` exactly. A float is what it is written as: 0.1 is one tenth.
 
     Raises:
-        ModelTypeError: if it is no finite number.
+        ModelError: if it is no finite number, or one that is too large to compute with.
     """
     if isinstance(value, int):
         return int(value)
     if isinstance(value, Fraction):
         return _whole_if_possible(value)
     if isinstance(value, Decimal) and value.is_finite():
+        if value and not -_FAR <= value.adjusted() <= _FAR:
+            raise ModelError(f"{value} is too large, or too small", "a cost has at most 18 digits")
         return _whole_if_possible(Fraction(value))
     if isinstance(value, float) and math.isfinite(value):
         return _whole_if_possible(Fraction(repr(float(value))))
@@ -56,4 +61,5 @@ def places_of(value: Exact, place: Place | None = None) -> int:
         if 10**places % Fraction(value).denominator == 0:
             return places
     hint = f"a cost has at most {MAX_PLACES} decimal places: multiply all costs by a number that makes them so"
-    raise ModelError(f"the cost {value} cannot be written as a decimal", hint, place)
+    shown = value if Fraction(value).denominator.bit_length() < _FAR else float(value)
+    raise ModelError(f"the cost {shown} cannot be written as a decimal", hint, place)

@@ -111,6 +111,7 @@ class Solvable:
             10
         """
         _refuse(unknown)
+        _check_numbers(seed=seed, timeout=timeout, messages=messages, delay=delay, spares=spares, patience=patience)
         team = self._team_to_solve()
         options = Options(
             protocol=installed_spelling(protocol) if protocol else default_protocol(team.kind),
@@ -155,6 +156,18 @@ def _refuse(unknown: Iterable[str]) -> None:
         known = [one for one in inspect.signature(Solvable.solve).parameters if one not in {"self", "unknown"}]
         hint = did_you_mean(name, known, f"there are {', '.join(known)}")
         raise TypeError(f"solve() has no option {name!r}; {hint}")
+
+
+def _check_numbers(**given: float | None) -> None:
+    """Raise `TypeError` for options that are no numbers, or integers, and `ValueError` for those that are negative."""
+    for name, value in given.items():
+        whole = name not in {"timeout", "patience"}
+        if value is None:
+            continue
+        if not isinstance(value, int if whole else (int, float)):
+            raise TypeError(f"{name}={value!r} is not allowed; expected {'an integer' if whole else 'seconds'}")
+        if name != "seed" and not value >= 0:
+            raise ValueError(f"{name}={value!r} is not allowed; expected 0 or more")
 
 
 def _choice(name: str, choices: type[_Choice], given: str) -> _Choice:

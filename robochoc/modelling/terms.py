@@ -12,6 +12,7 @@ from functools import cached_property
 from typing import NoReturn
 
 from robochoc.modelling.codes import BOOLEAN, NUMBER, Codes, Kind, kind_of
+from robochoc.modelling.extents import ALONE, Extent, extent_of
 from robochoc.modelling.meanings import MEANINGS, UndefinedTermError
 from robochoc.modelling.numbers import Exact, exact, is_number
 from robochoc.modelling.places import ModelError, ModelTypeError, Place, did_you_mean
@@ -30,6 +31,7 @@ class Term:
     kind: Kind | None = NUMBER
     """What it is. None: only its values say."""
     arguments: tuple[Term, ...] = ()
+    extent: Extent = ALONE
 
     @cached_property
     def variables(self) -> tuple[Variable, ...]:
@@ -217,6 +219,11 @@ class Linear(Term):
             merged[term] = merged.get(term, 0) + factor
         return tuple((factor, term) for term, factor in merged.items() if factor)
 
+    @property
+    def extent(self) -> Extent:  # type: ignore[override] # a sum grows; it is asked for once
+        """The extent of a sum of these terms."""
+        return extent_of(self.arguments)
+
     @cached_property
     def arguments(self) -> tuple[Term, ...]:  # type: ignore[override] # it is computed once
         """The distinct terms."""
@@ -240,6 +247,7 @@ class Applied(Term):
     def __init__(self, operator: str, *arguments: Term) -> None:
         self.operator, self.arguments = operator, arguments
         self.kind = MEANINGS[operator].gives
+        self.extent = extent_of(arguments)
 
     def value(self, values: Values) -> object:
         """Return its value."""
@@ -259,6 +267,7 @@ class Called(Term):
 
     def __init__(self, function: Callable[..., object], arguments: tuple[Term, ...], place: Place) -> None:
         self.function, self.arguments, self.place = function, arguments, place
+        self.extent = extent_of(arguments)
 
     def value(self, values: Values) -> object:
         """Return its value."""
@@ -282,6 +291,7 @@ class Tabled(Term):
     def __init__(self, arguments: tuple[Term, ...], rows: Mapping[tuple[object, ...], object], default: object) -> None:
         self.arguments, self.rows, self.default = arguments, rows, default
         self.kind = BOOLEAN if isinstance(default, bool) else NUMBER
+        self.extent = extent_of(arguments)
 
     def value(self, values: Values) -> object:
         """Return its value."""
