@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 from robochoc.communication.run_result import Progress
 from robochoc.formats import check_team, with_checked_events
 from robochoc.journal.events import Observer
+from robochoc.model.change import team_after_events
 from robochoc.model.costs import UnboundedCostError, normalized
 from robochoc.model.orders import OrderError
 from robochoc.model.outcome import Outcome, Verdict
@@ -80,9 +81,24 @@ def solve(
             outcome = _solve_distributed(counted, context, environment)
     except (OrderError, UnboundedCostError) as refused:
         raise UnsupportedError(str(refused)) from None
-    if counted is not team and not outcome.epochs:
-        check_told_cost(team, outcome.assignment, outcome.cost, without=outcome.withdrawn)
+    if counted is not team and environment is None:
+        _check_told_costs(team, outcome)
     return outcome
+
+
+def _check_told_costs(team: Team, outcome: Outcome) -> None:
+    """Check what answers cost, in the user's numbers. After losses the files no longer say what an epoch's team is.
+
+    Raises:
+        RefutedError: when a cost is another.
+    """
+    if not outcome.epochs:
+        check_told_cost(team, outcome.assignment, outcome.cost, without=outcome.withdrawn)
+        return
+    for events, epoch in enumerate(outcome.epochs):
+        if epoch.lost:
+            return
+        check_told_cost(team_after_events(team, events), epoch.assignment, epoch.cost)
 
 
 def _solve_centrally(team: Team, context: RunContext) -> Outcome:
