@@ -339,6 +339,21 @@ def test_a_parent_that_is_killed_while_there_is_no_router(short_path: Path) -> N
         left_nothing(run)
 
 
+def test_a_request_to_the_fork_server_that_ends_too_early(short_path: Path) -> None:
+    """As of a parent that is killed after it has connected: the server ends, and says nothing."""
+    program = (
+        "import os, socket; from multiprocessing.forkserver import _forkserver;"
+        "from robochoc.communication.network.local import _fork_server as begun;"
+        "from robochoc.protocols.abt import ABT; begun(ABT); connection = socket.socket(socket.AF_UNIX);"
+        "connection.connect(_forkserver._forkserver_address); connection.close();"
+        "os.waitpid(_forkserver._forkserver_pid, 0); os.kill(os.getpid(), 9)"
+    )
+    with running([sys.executable, "-c", program], short_path / "run") as run:
+        run.end()
+        assert run.status() == -signal.SIGKILL, run.errors()
+        left_nothing(run)
+
+
 def left_nothing(run: Run) -> None:
     assert "Traceback" not in run.errors(), run.errors()
     wait_until(lambda: not run.left_behind(), f"it leaves {run.left_behind()}")

@@ -1,7 +1,8 @@
-"""The last action of the fork server, when its parent has ended: remove the parent's temporary folder.
+"""What the fork server does when its parent has ended: it removes the parent's temporary folder, and ends in silence.
 
-Only the fork server imports this module. A parent that was killed cannot remove the folder. The router removes it too,
-but not every run has a router.
+Only in the fork server this module does something. A parent that was killed cannot remove the folder. The router
+removes it too, but not every run has a router. A parent that was killed in the middle of a request leaves a connection without what it
+was to bring, which `multiprocessing` does not expect.
 """
 
 from __future__ import annotations
@@ -9,9 +10,21 @@ from __future__ import annotations
 import atexit
 import os
 import shutil
+import sys
+from types import TracebackType
 
 SCRATCH = "ROBOCHOC_SCRATCH"
 """The environment's variable by which the parent says which folder that is."""
 
+_SERVER = os.getpid()
+
+
+def _without_a_parent(kind: type[BaseException], error: BaseException, trace: TracebackType | None) -> None:
+    """Say nothing of a request that ends too early, in the fork server itself; the robots it forks tell all errors."""
+    if not (issubclass(kind, EOFError) and os.getpid() == _SERVER):
+        sys.__excepthook__(kind, error, trace)
+
+
 if _scratch := os.environ.pop(SCRATCH, ""):
     atexit.register(shutil.rmtree, _scratch, ignore_errors=True)
+    sys.excepthook = _without_a_parent
