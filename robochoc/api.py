@@ -15,11 +15,14 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from robochoc.formats import check_team, read_robot, read_team
+from robochoc.formats import check_team, read_robot
+from robochoc.formats.problems import read_problem
 from robochoc.journal.events import Observer
+from robochoc.model.original_names import renamed_outcome, renamed_team
 from robochoc.model.outcome import Outcome
 from robochoc.model.problem import Team
 from robochoc.model.wording import counted
+from robochoc.modelling.solution import Solution
 from robochoc.modelling.solving import Solvable
 from robochoc.run.registry import UnknownProtocolError, installed_protocols
 
@@ -36,12 +39,15 @@ class Problem(Solvable):
 
     Attributes:
         team: The robots, their variables and constraints: from files, a generator, or built in Python.
+        names: The original names of robots and variables, by the team's, where it is from a file of another tool.
+            Solutions speak in these.
 
     Raises:
         InvalidInputError: if the team is invalid. It lists every mistake.
     """
 
     team: Team
+    names: Mapping[str, str] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         check_team(self.team)
@@ -49,16 +55,24 @@ class Problem(Solvable):
     def _team_to_solve(self) -> Team:
         return self.team
 
+    def _solution(self, outcome: Outcome, team: Team) -> Solution:
+        names = {} if team.dynamic else self.names
+        return Solution.of(renamed_outcome(outcome, names), renamed_team(team, names))
+
     def __repr__(self) -> str:
         constraints = counted(sum(1 for _ in self.team.constraints()), "constraint")
         return f"<problem {self.team.name}: {counted(len(self.team.robots), 'robot')}, {constraints}>"
 
 
-def load(path: Path | str) -> Problem:
-    """Return the problem of the team whose files are in the folder `path`.
+def load(path: Path | str, *, infinity: int | None = None, owner: str | None = None) -> Problem:
+    """Return the problem of the team whose files are in a folder, or the problem in a file of another tool.
 
     Args:
-        path: A folder with an XML file for each robot, and `scenario.xml` if the problem changes over time.
+        path: A folder with an XML file for each robot, and `scenario.xml` if the problem changes over time; or a file
+            of FRODO, DisChoco, pyDCOP, XCSP3 or toulbar2.
+        infinity: Of such a file: costs of at least so much forbid. None: none do.
+        owner: Of such a file: a regular expression; variables whose names have the same match, or first group, belong
+            to one robot. None: each variable has its own robot.
 
     Raises:
         InvalidInputError: if the files are invalid. It lists every mistake with its file and line.
@@ -68,7 +82,8 @@ def load(path: Path | str) -> Problem:
         >>> robochoc.load("instances/queens3d-4").team.name
         'queens3d-4'
     """
-    return Problem(read_team(Path(path)))
+    read = read_problem(Path(path), infinity=infinity, owner=owner)
+    return Problem(read.team, read.names if read.foreign else {})
 
 
 @dataclass

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import click
 
 from robochoc.cli.options.paths import OutputFile, refuse_same_places
-from robochoc.cli.options.problems import WRITTEN, Problem, read_problem
+from robochoc.cli.options.problems import WRITTEN, Problem
 from robochoc.cli.reports.failures import USAGE, Failure, failures_told
 
 if TYPE_CHECKING:
@@ -41,6 +41,8 @@ def export(folder: Path, kind: str, output: Path | None) -> None:
 
     refuse_same_places({"-o": output}, teams=[folder])
     with failures_told(folder):
+        from robochoc.formats.problems import read_problem
+
         team = read_problem(folder).team
         files = _files(team, kind)
     if output is None:

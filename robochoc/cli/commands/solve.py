@@ -17,7 +17,7 @@ from robochoc.cli.options.order import GIVEN, ORDER_NAME, order_for
 from robochoc.cli.options.order import NAMES as ORDERS
 from robochoc.cli.options.pages import html_option, serve_option
 from robochoc.cli.options.paths import refuse_same_places, teams_at
-from robochoc.cli.options.problems import Problem, ReadProblem, read_problem
+from robochoc.cli.options.problems import Problem
 from robochoc.cli.options.recording import journal_option, recording, shown_and_flushed
 from robochoc.cli.options.ros import (
     flight_options,
@@ -47,6 +47,7 @@ from robochoc.run.defaults import default_protocol
 
 if TYPE_CHECKING:
     from robochoc.cli.reports.closed_loop import FlownMission
+    from robochoc.formats.problems import ReadProblem
     from robochoc.journal.journal import Header, JournalRecorder
     from robochoc.model.outcome import Outcome
     from robochoc.model.problem import Team
@@ -249,6 +250,8 @@ class _RecordedRun(NamedTuple):
 
 def _recorded(folder: Path, options: Options, products: Products, wanted: Wanted, watch: Watch) -> _RecordedRun:
     """Solve the team in `folder`, with a journal and a closed loop where they are asked for, and print the outcome."""
+    from robochoc.formats.problems import read_problem
+
     problem = read_problem(folder)
     team = problem.team
     check_chosen(products.watching, team)

@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from robochoc.cli.options.paths import InputPath, foreign_files_told
-from robochoc.cli.options.problems import read_problem
 from robochoc.cli.reports.failures import INVALID
 
 if TYPE_CHECKING:
@@ -48,6 +47,7 @@ def _report(place: Path) -> dict[str, Any]:
     """The validation of one team, or of one robot's file."""
     from robochoc.formats import InvalidInputError, encodable, read_robot
     from robochoc.formats.dialects.registry import recognise, unknown_format
+    from robochoc.formats.problems import read_problem
 
     dialect = recognise(place)
     try:

@@ -6,6 +6,7 @@ import doctest
 import subprocess
 import sys
 from collections.abc import Iterator
+from decimal import Decimal
 from pathlib import Path
 from types import ModuleType
 
@@ -236,3 +237,24 @@ def test_examples_in_docstrings_run(module: ModuleType, monkeypatch: pytest.Monk
     attempted = doctest.testmod(module)
     assert attempted.attempted > 0
     assert attempted.failed == 0
+
+
+COLOURING = """name: colouring
+objective: min
+domains: {colours: {values: [red, green]}}
+variables: {_x1: {domain: colours}, _x2: {domain: colours}}
+constraints:
+  same: {type: intention, function: 1000 if _x1 == _x2 else 0.5}
+agents: [a1, a2]
+"""
+
+
+def test_a_file_of_another_tool_speaks_in_its_own_names(tmp_path: Path) -> None:
+    file = tmp_path / "colouring.yaml"
+    file.write_text(COLOURING)
+    problem = robochoc.load(file, infinity=1000)
+    solution = problem.solve("syncbb", runtime="simulator")
+    assert solution.cost == Decimal("0.5")
+    assert solution.values.keys() == {"_x1", "_x2"}
+    assert set(solution.values.values()) == {"red", "green"}
+    assert solution["_x1"] in {"red", "green"}

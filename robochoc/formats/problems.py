@@ -1,0 +1,54 @@
+"""A problem in a team's folder, or in a file of another tool: whatever a user names."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import NamedTuple
+
+from robochoc.formats.diagnostics import Diagnostic, InvalidInputError
+from robochoc.formats.team import read_team
+from robochoc.formats.validation import check_team
+from robochoc.model.problem import Team
+
+
+class ReadProblem(NamedTuple):
+    """A team, the original names of its robots and variables, and whether it is known by these alone."""
+
+    team: Team
+    names: Mapping[str, str]
+    foreign: bool
+
+
+def read_problem(
+    place: Path, *, infinity: int | None = None, owner: str | None = None, allow_code: bool = False
+) -> ReadProblem:
+    """Return the team in the folder `place`, or in the file of another tool.
+
+    Args:
+        place: The folder, or the file.
+        infinity: Of a file: costs of at least so much forbid; see `ImportOptions`.
+        owner: Of a file: a regular expression that says which variables belong to one robot.
+        allow_code: Of a file: whether Python files that it names may be executed.
+
+    Raises:
+        InvalidInputError: with the mistakes of the files.
+    """
+    from robochoc.formats.dialects.dialect import ImportOptions  # noqa: PLC0415 - start-up: files of other tools only
+    from robochoc.formats.dialects.names_file import original_names  # noqa: PLC0415 - as above
+    from robochoc.formats.dialects.registry import read_foreign, recognise  # noqa: PLC0415 - as above
+
+    if place.is_file() and recognise(place):
+        imported = read_foreign([place], ImportOptions(infinity=infinity, owner=owner, allow_code=allow_code))
+        check_team(imported.team)
+        return ReadProblem(imported.team, imported.names, foreign=True)
+    try:
+        return ReadProblem(read_team(place), original_names(place), foreign=False)
+    except InvalidInputError as invalid:
+        first = next(iter(invalid.diagnostics), None)
+        dialect = recognise(Path(first.file)) if first else None
+        if dialect is None or first is None:
+            raise
+        hint = f"robochoc import {place} -o FOLDER"
+        told = Diagnostic(first.file, 0, f"is {dialect.title}, and no file of a robot", hint)
+        raise InvalidInputError([told]) from None
