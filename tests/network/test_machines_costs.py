@@ -1,4 +1,4 @@
-"""Costs that people have, across machines: robots count in integers, and the master tells the user's numbers."""
+"""Costs and values that people have, across machines: robots count in integers, the master tells the user's own."""
 
 from __future__ import annotations
 
@@ -43,6 +43,24 @@ def test_a_utility_in_decimals_across_machines(site: Deployment) -> None:
     told = master.object
     assert (told["verdict"], told["assignment"]) == ("optimal", {"A": 1, "B": 2})
     assert Decimal(str(told["cost"])) == Decimal("2.45")
+
+
+def test_symbols_have_their_names_across_machines(site: Deployment) -> None:
+    colours = Domain("colours", (range(2),), ("red", "green"))
+    different = Relation("R", 2, Semantics.SUPPORTS, ((0, 1),))
+    team = assemble(
+        "colours",
+        {"RA": [Variable("A", colours)], "RB": [Variable("B", colours)]},
+        [Constraint("C", different, ("A", "B"), ("A", "B"))],
+    )
+    files = written(team, site)
+    tokens = site.enrol("--team", files)
+    master = site.master("--team", files, "--json")
+    robots = site.robots(files, tokens)
+    assert master.status() == 0, master.errors
+    ended(robots)
+    assert master.object["assignment"] == {"A": "red", "B": "green"}
+    assert "A = red" in robots["RA"].output
 
 
 def test_a_function_without_bounds_is_refused_where_domains_are_not_known(site: Deployment) -> None:

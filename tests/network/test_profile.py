@@ -307,20 +307,34 @@ def test_only_robots_that_are_there_are_held_against_each_other() -> None:
 
 
 def test_robots_that_count_symbols_differently_are_no_team() -> None:
-    upper = Profile("A", ProblemKind.DISCSP, (), ("B",), {"X": ((0, 1),)}, {}, 1, 0, (), symbols="1")
-    lower = Profile("B", ProblemKind.DISCSP, ("A",), (), {"Y": ((0, 1),)}, {}, 1, 0, (), symbols="1")
-    other = msgspec.structs.replace(lower, symbols="2")
-    none = msgspec.structs.replace(lower, symbols="")
+    upper = Profile("A", ProblemKind.DISCSP, (), ("B",), {"X": ((0, 1),)}, {}, 1, 0, (), symbols=("red", "green"))
+    lower = Profile("B", ProblemKind.DISCSP, ("A",), (), {"Y": ((0, 1),)}, {}, 1, 0, (), symbols=("red", "green"))
+    other = msgspec.structs.replace(lower, symbols=("green", "red"))
+    none = msgspec.structs.replace(lower, symbols=())
     assert list(profile_contradictions({"A": upper, "B": lower})) == []
     assert list(profile_contradictions({"A": upper, "B": none})) == []
     (told,) = profile_contradictions({"A": upper, "B": other})
     assert told.startswith("the symbols of A and B have different codes")
 
 
-def test_a_profile_says_which_symbols_a_robot_counts() -> None:
-    def digest(*symbols: str) -> str:
-        own = (Variable("X", Domain("D", (range(1),), symbols)),)
-        return profile_of(Robot("A", own)).symbols
+def test_a_profile_names_the_symbols_of_what_others_see() -> None:
+    colours = Domain("D", (range(1, 2),), ("red", "green"))
+    robot = Robot("A", (Variable("X", colours), Variable("Hidden", colours)), shown=("X",))
+    profile = profile_of(robot)
+    assert (profile.symbols, profile.symbolic) == (("red", "green"), ("X",))
+    assert visible_robot(profile, {}).variables[0].domain.label(1) == "green"
 
-    assert digest() == ""
-    assert digest("red", "green") == digest("red", "green") != digest("green", "red")
+
+@pytest.mark.parametrize(
+    ("symbols", "why"),
+    [
+        (("red", "red"), "one of them twice"),
+        (("red", "\x1b[31m"), "is no symbol"),
+        (("red",), "stands for no symbol"),
+    ],
+)
+def test_symbols_that_no_file_can_have(symbols: tuple[str, ...], why: str) -> None:
+    profile = Profile("A", ProblemKind.DISCSP, (), (), {"X": ((0, 1),)}, {}, 1, 0, ())
+    profile = msgspec.structs.replace(profile, symbols=symbols, symbolic=("X",))
+    with pytest.raises(ProfileError, match=why):
+        visible_robot(profile, {})

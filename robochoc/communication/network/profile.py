@@ -6,14 +6,15 @@ works out what all robots know anyway: the priority order, the interfaces, the d
 
 from __future__ import annotations
 
-import hashlib
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 
 import msgspec
 
+from robochoc.formats.diagnostics import MistakeError
 from robochoc.formats.extension import MAX_VALUES
 from robochoc.formats.names import is_name
+from robochoc.formats.symbols import check_symbol
 from robochoc.model.cost_units import MAX_PLACES, CostUnits
 from robochoc.model.costs import flat_units
 from robochoc.model.priorities import CycleError, priority_order
@@ -47,8 +48,9 @@ class Profile(msgspec.Struct, frozen=True, array_like=True):
     this robot's parts of partially known constraints look at; `wants` are the others' variables in the constraints that
     it holds towards its parents. `max_cost` is the most that the constraints it holds can
     charge together, short of being broken. `topics` are where it publishes its decision. `told_in` are its cost units:
-    whether the sum is maximised, the decimal places, and a constant. `symbols` is a digest of the names of the team's
-    symbols, in the order of their codes; empty where it knows of none.
+    whether the sum is maximised, the decimal places, and a constant. `symbols` are the names of the
+    team's symbols, in the order of their codes; empty where it knows of none. `symbolic` are those of `variables` whose
+    values stand for symbols.
     """
 
     name: str
@@ -62,7 +64,8 @@ class Profile(msgspec.Struct, frozen=True, array_like=True):
     topics: tuple[str, ...]
     wants: tuple[str, ...] = ()
     told_in: tuple[bool, int, int] = (False, 0, 0)
-    symbols: str = ""
+    symbols: tuple[str, ...] = ()
+    symbolic: tuple[str, ...] = ()
 
     @property
     def units(self) -> CostUnits:
@@ -99,12 +102,9 @@ def profile_of(robot: Robot) -> Profile:
         topics=tuple(topic.name for topic in robot.topics),
         wants=tuple(dict.fromkeys(name for one in robot.shared for name in one.variables if name not in own)),
         told_in=(units.maximize, units.places, units.constant),
-        symbols=_digest(robot.symbol_table),
+        symbols=robot.symbol_table,
+        symbolic=tuple(v.name for v in robot.variables if v.name in shown and v.domain.symbols),
     )
-
-
-def _digest(symbols: Sequence[str]) -> str:
-    return hashlib.sha256("\n".join(symbols).encode()).hexdigest() if symbols else ""
 
 
 def ranges_of(domain: Domain) -> Ranges:
@@ -146,16 +146,38 @@ def visible_robot(profile: Profile, also: Mapping[str, Ranges]) -> Robot:
         raise ProfileError("its cost units are out of range")
     if not (0 <= profile.max_cost <= LARGEST_DEAREST and 1 <= profile.weight <= LARGEST_WEIGHT):
         raise ProfileError(f"costs of {profile.max_cost:g} or a weight of {profile.weight} are out of range")
+    _check_symbols(profile)
     shown = {**profile.variables, **also}
     return Robot(
         name=profile.name,
-        variables=tuple(Variable(name, domain_of(name, ranges)) for name, ranges in shown.items()),
+        variables=tuple(Variable(name, _domain_in(profile, name, ranges)) for name, ranges in shown.items()),
         kind=profile.kind,
         parents=tuple(Parent(name) for name in profile.parents),
         children=tuple(Child(name) for name in profile.children),
         shown=tuple(shown),
         weight=profile.weight,
     )
+
+
+def _check_symbols(profile: Profile) -> None:
+    """Raise `ProfileError` unless a file can have the symbols of `profile`."""
+    if len(profile.symbols) > MAX_VALUES or len(set(profile.symbols)) < len(profile.symbols):
+        raise ProfileError("it has too many symbols, or one of them twice")
+    for name in profile.symbols:
+        try:
+            check_symbol(name)
+        except MistakeError:
+            raise ProfileError(f"{name[:LONGEST_NAME]!r} is no symbol") from None
+
+
+def _domain_in(profile: Profile, name: str, ranges: Ranges) -> Domain:
+    """Return the domain of the variable `name` of `profile`, symbolic if it is so. Raises `ProfileError`."""
+    domain = domain_of(name, ranges)
+    if name not in profile.symbolic:
+        return domain
+    if not 0 <= domain.ranges[0][0] <= domain.ranges[-1][-1] < len(profile.symbols):
+        raise ProfileError(f"a value of {name} stands for no symbol")
+    return replace(domain, symbols=profile.symbols)
 
 
 def profile_contradictions(profiles: Mapping[str, Profile]) -> Iterator[str]:

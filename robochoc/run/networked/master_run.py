@@ -24,6 +24,7 @@ from robochoc.communication.run_result import Progress, RobotsLostError
 from robochoc.journal.events import Observer
 from robochoc.model.outcome import Outcome, Verdict
 from robochoc.model.problem import Team
+from robochoc.model.symbols import symbol_table, symbolic_variables
 from robochoc.run.compatibility import refuse_options, refuse_settings, refuse_unfit
 from robochoc.run.defaults import DEFAULT_COST_PROTOCOL, DEFAULT_PROTOCOL, default_protocol
 from robochoc.run.distributed import solve_distributed
@@ -195,7 +196,15 @@ def _solve(plan: MasterPlan, master: Master, observer: Observer | None) -> Maste
     refuse_settings(name, protocol, options.settings)
     refuse_unfit(team, options, protocol.traits)
     machines = Machines(master, options, plan.name, observer)
-    header = Outcome(plan.name, name, Runtime.NETWORK, plan.seed, Verdict.UNKNOWN)
+    header = Outcome(
+        plan.name,
+        name,
+        Runtime.NETWORK,
+        plan.seed,
+        Verdict.UNKNOWN,
+        symbols=symbol_table(team.robots),
+        symbolic=symbolic_variables(team),
+    )
     outcome = claimed(solve_distributed(machines, protocol, header))
     return MasterResult(outcome, machines.team_seen())
 
