@@ -89,7 +89,7 @@ def check_units(units: CostUnits, kind: ProblemKind) -> None:
 
 
 class Rescaled:
-    """What costs something, with costs that are `finer` times as many; a definition is rescaled once."""
+    """Multiplies costs by `finer`: their robot counts in a coarser unit than the team. Definitions are made once."""
 
     def __init__(self, finer: int) -> None:
         self._finer = finer

@@ -8,7 +8,7 @@ scenario has emptied. Two things are not kept, as no robot looks at them: what d
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable
+from collections.abc import Collection
 from dataclasses import replace
 
 import msgspec
@@ -159,16 +159,9 @@ def _writable(robot: Robot) -> Robot:
     empty = [variable.name for variable in robot.variables if not variable.domain]
     if empty:
         robot = replace(robot, variables=_with_domain(robot, empty, _STAND_IN))
-    for constraint in _constraints(robot):
+    for constraint in robot.constraints():
         _check_costs(constraint)
     return robot
-
-
-def _constraints(robot: Robot) -> Iterable[Constraint]:
-    yield from robot.private
-    yield from robot.shared
-    for child in robot.children:
-        yield from child.constraints
 
 
 def _check_costs(constraint: Constraint) -> None:
@@ -191,7 +184,7 @@ def _check(team: Team) -> None:
         raise GivenProblemError("a variable belongs to two robots")
     for robot in team.robots:
         names = [*(one.name for one in robot.parents), *(one.name for one in robot.children)]
-        names += [name for constraint in _constraints(robot) for name in constraint.variables]
+        names += [name for constraint in robot.constraints() for name in constraint.variables]
         unknown = [name for name in names if name not in team and name not in team.owner]
         if unknown:
             raise GivenProblemError(f"{robot.name} was given something on {unknown[0]}, which is not in the team")

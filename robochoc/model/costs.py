@@ -171,7 +171,7 @@ def _needs_it(robot: Robot) -> bool:
     """Return whether the costs of `robot`, which may be normalised already, are not."""
     if robot.told_in != PLAIN_COSTS:
         return False
-    return robot.costs != PLAIN_COSTS or any(map(_may_be_negative, _constraints(robot)))
+    return robot.costs != PLAIN_COSTS or any(map(_may_be_negative, robot.constraints()))
 
 
 def _may_be_negative(constraint: Constraint) -> bool:
@@ -193,18 +193,11 @@ def _held_by_others(team: Team, name: str) -> Iterable[Constraint]:
     """Yield the constraints that robots but `name` hold, now or after some event."""
     for robot in [*team.robots, *_joining(team)]:
         if robot.name != name:
-            yield from _constraints(robot)
+            yield from robot.constraints()
     for event in team.scenario:
         for change in event.changes:
             if isinstance(change, AddConstraint) and change.agent != name:
                 yield change.constraint
-
-
-def _constraints(robot: Robot) -> Iterable[Constraint]:
-    yield from robot.private
-    yield from robot.shared
-    for child in robot.children:
-        yield from child.constraints
 
 
 def _domains(team: Team) -> dict[str, Domain]:

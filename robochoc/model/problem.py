@@ -152,6 +152,13 @@ class Robot:
     symbols: tuple[str, ...] = ()
     told_in: CostUnits = PLAIN_COSTS
 
+    def constraints(self) -> Iterator[Constraint]:
+        """Yield every constraint in its file: private ones, shared ones, and its parts of partially known ones."""
+        yield from self.private
+        yield from self.shared
+        for child in self.children:
+            yield from child.constraints
+
     @cached_property
     def shared(self) -> tuple[Constraint, ...]:
         """The shared constraints that this robot holds: those in whose scopes it is the lowest robot."""
@@ -301,7 +308,4 @@ class Team:
     def constraints(self) -> Iterator[Constraint]:
         """Yield C: every constraint of every robot, and the parts of partially known ones."""
         for robot in self.robots:
-            yield from robot.private
-            yield from robot.shared
-            for child in robot.children:
-                yield from child.constraints
+            yield from robot.constraints()

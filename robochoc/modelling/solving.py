@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import inspect
+from abc import ABC, abstractmethod
 from collections.abc import Iterable, Mapping, Sequence
 from enum import StrEnum
 from typing import TYPE_CHECKING, Never, TypeVar
@@ -29,8 +30,8 @@ NO_LIMITS = Limits()
 _Choice = TypeVar("_Choice", bound=StrEnum)
 
 
-class Solvable:
-    """What a team of robots can solve: it has a team."""
+class Solvable(ABC):
+    """A problem that a team of robots can solve: the base of `Problem` and `Model`."""
 
     def solve(  # noqa: PLR0913 - options of a run, by their names
         self,
@@ -143,8 +144,9 @@ class Solvable:
 
         return team_html(self._team_to_solve())
 
+    @abstractmethod
     def _team_to_solve(self) -> Team:
-        raise NotImplementedError
+        """Return the team, with its problem."""
 
     def _solution(self, outcome: Outcome, team: Team) -> Solution:
         return Solution.of(outcome, team)

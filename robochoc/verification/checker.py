@@ -80,7 +80,7 @@ def check_told_cost(team: Team, assignment: Assignment, cost: Cost | None, witho
     for robot in team.robots:
         unit = Fraction(1, 10**robot.costs.places)
         total += robot.costs.constant * unit
-        for constraint in robot_constraints(robot):
+        for constraint in robot.constraints():
             if any(team.owner[name] in without for name in constraint.variables):
                 continue
             paid = int(constraint_cost(constraint, assignment))
@@ -88,14 +88,6 @@ def check_told_cost(team: Team, assignment: Assignment, cost: Cost | None, witho
     if Fraction(cost) != total:
         exact = Decimal(int(total * 10**places)).scaleb(-places)
         raise RefutedError(f"the answer for {team.name} costs {exact:,}, and it is said to cost {cost:,}")
-
-
-def robot_constraints(robot: Robot) -> Iterator[Constraint]:
-    """Yield all constraints in the file of `robot`."""
-    yield from robot.private
-    yield from robot.shared
-    for child in robot.children:
-        yield from child.constraints
 
 
 def needlessly_withdrawn(team: Team, assignment: Assignment, withdrawn: Collection[str]) -> Iterator[str]:

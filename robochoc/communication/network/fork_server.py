@@ -1,4 +1,4 @@
-"""What the fork server does when its parent has ended: it removes the parent's temporary folder, and ends in silence.
+"""Clean-up in the fork server when its parent has ended: remove the parent's temporary folder, and end in silence.
 
 Only in the fork server this module does something. A parent that was killed cannot remove the folder. The router
 removes it too, but not every run has a router. A parent that was killed in the middle of a request leaves a connection

@@ -34,7 +34,7 @@ LARGEST_DEAREST = 2.0**80
 
 
 LARGEST_CONSTANT = 2**62
-"""What is added to the costs of all constraints, at most."""
+"""The largest constant that may be added to the costs of all constraints."""
 
 
 class ProfileError(ValueError):

@@ -1,4 +1,4 @@
-"""What every dialect has in common: what it is asked, what it returns, and what it tells about it."""
+"""The interface of a dialect: the options of an import, its result, and its notes; and names that are allowed here."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ class ImportOptions:
 
 
 class Note(NamedTuple):
-    """What an import has changed, in a word that scripts can look for, and in a sentence."""
+    """A change that an import has made: a keyword for scripts, and a sentence for people."""
 
     kind: str
     text: str

@@ -1,4 +1,4 @@
-"""Who shares constraints with whom, and the pseudo-tree of a depth-first search over it."""
+"""The constraint graph of a team's variables, and the pseudo-tree of a depth-first search over its robots."""
 
 from __future__ import annotations
 
@@ -13,9 +13,7 @@ def shared_constraints(team: Team) -> Counter[tuple[str, str]]:
     """Return how many constraints each pair of variables shares, parts of partially known ones included."""
     place = {name: number for number, name in enumerate(team.variables)}
     pairs: Counter[tuple[str, str]] = Counter()
-    parts = (one for robot in team.robots for child in robot.children for one in child.constraints)
-    held = (one for robot in team.robots for one in (*robot.private, *robot.shared))
-    for constraint in {id(one): one for one in (*held, *parts)}.values():
+    for constraint in {id(one): one for one in team.constraints()}.values():
         for one, other in combinations(sorted(constraint.variables, key=place.__getitem__), 2):
             pairs[one, other] += 1
     return pairs

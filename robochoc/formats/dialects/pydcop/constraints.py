@@ -27,7 +27,7 @@ MAX_CELLS = 5_000_000
 
 @dataclass(frozen=True)
 class Costs:
-    """What a constraint of the file costs.
+    """The costs of a constraint of the file.
 
     Attributes:
         name: Its name.

@@ -1,4 +1,4 @@
-"""Who owns which variable of a pyDCOP problem: distribution, hints, or the order of both."""
+"""The owners of a pyDCOP problem's variables: by the distribution, by hints, or by the order of both."""
 
 from __future__ import annotations
 
