@@ -10,7 +10,6 @@ What has been read is not kept: a file of any length takes as much memory as its
 
 from __future__ import annotations
 
-import tempfile
 import time
 from array import array
 from collections.abc import Callable, Iterable, Iterator
@@ -25,6 +24,7 @@ from robochoc.journal.journal import Ended, Follower, Header, JournalEntry, Jour
 from robochoc.model.outcome import Outcome
 from robochoc.sniffer.growing_file import GrowingFile
 from robochoc.sniffer.trace import Trace
+from robochoc.system.temporary_files import unnamed_file
 
 PIECE_BYTES = 1 << 16
 """Of a journal, read in one go: a fraction of a second's work."""
@@ -207,7 +207,7 @@ class _Aside:
     def __init__(self) -> None:
         self._times = array("d")
         self._ends = array("Q", [0])
-        self._file = tempfile.TemporaryFile()  # noqa: SIM115 - closed by `close`
+        self._file = unnamed_file()
         self._encode = msgspec.msgpack.Encoder().encode
         self._decode = msgspec.msgpack.Decoder(AnyEvent).decode
 

@@ -51,6 +51,7 @@ from robochoc.solver.enumeration import (
 from robochoc.solver.failures import SolverLostError, SolverMissingError, SolverTimeoutError
 from robochoc.solver.propagation import propagate
 from robochoc.solver.query import Query, SolvedBy, SolverAnswer
+from robochoc.system.temporary_files import temporary_folder
 
 CHUNK = 1 << 20
 LAST_WORDS_S = 1.0
@@ -248,7 +249,7 @@ class AceProcess:
     # The process
 
     def _start(self) -> None:
-        self._folder = Path(tempfile.mkdtemp(prefix="robochoc-"))
+        self._folder = Path(tempfile.mkdtemp(prefix="robochoc-", dir=temporary_folder()))
         ours, theirs = socket.socketpair()
         # The process reads from this pipe, whose other end only this process has: it ends with this process.
         watched, self._lifeline = os.pipe()

@@ -13,6 +13,8 @@ from html import escape
 from pathlib import Path
 from typing import Self
 
+from robochoc.system.temporary_files import temporary_folder
+
 _PAGE = """\
 <!DOCTYPE html>
 <html lang="en"><head><meta charset="utf-8"><title>robochoc</title>
@@ -26,7 +28,7 @@ class RedirectFile:
     """A file that leads a browser to `url`, until it is closed. Raises `OSError` if it cannot be written."""
 
     def __init__(self, url: str) -> None:
-        self._folder = Path(tempfile.mkdtemp(prefix="robochoc-"))
+        self._folder = Path(tempfile.mkdtemp(prefix="robochoc-", dir=temporary_folder()))
         try:
             file = self._folder / "page.html"
             with os.fdopen(os.open(file, os.O_CREAT | os.O_EXCL | os.O_WRONLY, 0o600), "w", encoding="utf-8") as page:

@@ -176,11 +176,10 @@ def _publication(*, sniffable: bool) -> Iterator[Publication | None]:
     if not sniffable:
         yield None
         return
-    import tempfile
-
     from robochoc.communication.network.journal_server import Publication
+    from robochoc.system.temporary_files import unnamed_file
 
-    with tempfile.TemporaryFile(buffering=0) as file, closing(Publication(file.fileno())) as publication:
+    with unnamed_file(buffered=False) as file, closing(Publication(file.fileno())) as publication:
         yield publication
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import tempfile
 from collections.abc import Callable, Mapping
 from contextlib import ExitStack, suppress
 from dataclasses import dataclass
@@ -154,8 +153,9 @@ class _Showing:
             click.echo(on_one_line(f"following the run at {self._place} into {self._copy}"), err=True)
             return
         from robochoc.sniffer.viewer import Viewer
+        from robochoc.system.temporary_files import unnamed_file
 
-        journal = self._stack.enter_context(tempfile.TemporaryFile())  # noqa: SIM115 - the stack closes it
+        journal = self._stack.enter_context(unnamed_file())
 
         def write(blocks: bytes) -> None:
             journal.write(blocks)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from contextlib import ExitStack, suppress
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, BinaryIO, Self
+from typing import TYPE_CHECKING, IO, Self
 
 import click
 
@@ -56,7 +56,7 @@ class Watch:
     def __init__(self, watching: Watching | None) -> None:
         self._watching = watching
         self._viewer: Viewer | None = None
-        self._file: BinaryIO | None = None
+        self._file: IO[bytes] | None = None
         self._stack = ExitStack()
         self._cut = ""
 
@@ -74,11 +74,10 @@ class Watch:
         """
         if self._watching is None:
             return []
-        import tempfile
-
         from robochoc.sniffer.viewer import Viewer
+        from robochoc.system.temporary_files import unnamed_file
 
-        file = tempfile.TemporaryFile(buffering=0)  # noqa: SIM115 - the stack closes it
+        file = unnamed_file(buffered=False)
         self._file = self._stack.enter_context(file)
         opens = self._watching.open_browser
         viewer = self._stack.enter_context(Viewer(file.fileno(), self._watching.chosen, open_browser=opens))
