@@ -100,6 +100,8 @@ def drawn_again(page: Page) -> None:
 def picture(page: Page) -> npt.NDArray[np.int16]:
     """The scene between caption and controls, as it is drawn: rows of red, green and blue."""
     drawn_again(page)
+    page.evaluate("Playback.labels.choose()")  # which is done a few times a second: names may hide what is behind
+    drawn_again(page)
     image = Image.open(io.BytesIO(page.screenshot())).convert("RGB")
     return np.asarray(image, dtype=np.int16)[20:400, 330:]
 
