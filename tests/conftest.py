@@ -22,6 +22,7 @@ from tests.support.authorities import Clock, Seen
 from tests.support.authority_service import AuthorityService, open_files
 from tests.support.deployments import Deployment
 from tests.support.examples import register_profiles
+from tests.support.large_pages import use_large_pages
 from tests.support.warm_programs import WarmPrograms
 
 register_profiles()
@@ -30,6 +31,11 @@ register_profiles()
 # starts would inherit that.
 if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
     signal.signal(signal.SIGINT, signal.default_int_handler)
+
+
+def pytest_collection_finish() -> None:
+    """All tests are there, with what they import: from now on processes are forked."""
+    use_large_pages()
 
 
 @pytest.fixture(autouse=True, scope="session")

@@ -17,6 +17,7 @@ import time
 from contextlib import suppress
 from pathlib import Path
 
+from tests.support.large_pages import use_large_pages
 from tests.support.warm_programs import HURRY, LONGEST
 
 A_DAY_S = 86_400.0
@@ -113,5 +114,6 @@ def _import_all() -> None:
 if __name__ == "__main__":
     _import_all()
     gc.freeze()
+    use_large_pages()
     main(socket.socket(fileno=int(sys.argv[1])))
     runpy.run_module("robochoc", run_name="__main__", alter_sys=True)
