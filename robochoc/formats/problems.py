@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import NamedTuple
 
-from robochoc.formats.diagnostics import Diagnostic, InvalidInputError
+from robochoc.formats.diagnostics import Diagnostic, InvalidInputError, encodable
 from robochoc.formats.team import read_team
 from robochoc.formats.validation import check_team
 from robochoc.model.problem import Team
@@ -32,7 +32,7 @@ def read_problem(
         allow_code: Of a file: whether Python files that it names may be executed.
 
     Raises:
-        InvalidInputError: with the mistakes of the files.
+        InvalidInputError: with the mistakes of the files, and for options of a file where there is a folder.
     """
     from robochoc.formats.dialects.dialect import ImportOptions  # noqa: PLC0415 - start-up: files of other tools only
     from robochoc.formats.dialects.names_file import original_names  # noqa: PLC0415 - as above
@@ -42,6 +42,10 @@ def read_problem(
         imported = read_foreign([place], ImportOptions(infinity=infinity, owner=owner, allow_code=allow_code))
         check_team(imported.team)
         return ReadProblem(imported.team, imported.names, foreign=True)
+    for option, given in (("infinity", infinity), ("owner", owner)):
+        if given is not None and place.is_dir():
+            what, hint = f"is the folder of a team, and '{option}' is for files of other tools", f"leave out '{option}'"
+            raise InvalidInputError([Diagnostic(encodable(str(place)), 0, what, hint)])
     try:
         return ReadProblem(read_team(place), original_names(place), foreign=False)
     except InvalidInputError as invalid:

@@ -121,6 +121,42 @@ def test_solve_of_an_imported_team_tells_both_names(problem: Path, tmp_path: Pat
     assert "r-1: x#1 = " in robochoc_within(*words).stdout
 
 
+PYDCOP = """name: pairs
+objective: min
+domains: {d: {values: [1, 2]}}
+variables: {a1: {domain: d}, a2: {domain: d}, b1: {domain: d}}
+constraints:
+  differ: {type: intention, function: 1000 if a1 == b1 or a2 == b1 else 0}
+  same: {type: intention, function: 1000 if a1 != a2 else 3}
+  low: {type: intention, function: b1}
+"""
+
+
+def test_files_are_read_with_the_options_of_an_import(tmp_path: Path) -> None:
+    file = tmp_path / "pairs.yaml"
+    file.write_text(PYDCOP)
+    asked = ("--infinity", 1000, "--owner", "[a-z]")
+    (sizes, *_) = robochoc_within("validate", file, *asked).stdout.splitlines()
+    assert sizes == f"{file}: 2 robots, 3 variables, 3 constraints: ok"
+    words = ["solve", file, "--protocol", "central", "--json", "--with", "ortools"]
+    told = json.loads(robochoc_within(*words, *asked).stdout)
+    assert (told["verdict"], told["cost"], told["assignment"]) == ("optimal", 4, {"a1": 2, "a2": 2, "b1": 1})
+    impossible = json.loads(robochoc_within(*words, "--infinity", 3).stdout)
+    assert (impossible["verdict"], impossible["cost"]) == ("no-solution", None)
+    dot = [robochoc_within("export", file, "--format", "dot", *more).stdout for more in ((), asked)]
+    assert [words.count("values)") for words in dot] == [3, 3]
+    assert ['"a" [label' in words for words in dot] == [False, True]
+
+
+@pytest.mark.parametrize("command", ["solve", "validate", "export"])
+def test_the_options_of_an_import_are_not_for_teams(command: str, problem: Path, tmp_path: Path) -> None:
+    team = tmp_path / "team"
+    assert robochoc_within("import", problem, "-o", team).returncode == 0
+    done = robochoc_within(command, team, "--infinity", 5)
+    assert done.returncode == 1
+    assert f"{team}: is the folder of a team, and 'infinity' is for files of other tools" in done.stdout + done.stderr
+
+
 def test_validate_says_what_a_file_is(problem: Path) -> None:
     done = robochoc_within("validate", problem)
     assert done.returncode == 0

@@ -11,7 +11,7 @@ import click
 from robochoc.cli.options.order import GIVEN, ORDER_NAME, order_for
 from robochoc.cli.options.order import NAMES as ORDERS
 from robochoc.cli.options.paths import InputPath
-from robochoc.cli.options.problems import READ, Pattern
+from robochoc.cli.options.problems import READ, reading_options
 from robochoc.cli.reports.failures import INVALID, Failure
 
 if TYPE_CHECKING:
@@ -35,15 +35,7 @@ class _Source(NamedTuple):
 @click.option(
     "--format", "dialect", type=click.Choice(READ), help="Format of the files.  [default: recognised by their contents]"
 )
-@click.option(
-    "--infinity", type=click.IntRange(1), metavar="N", help="Costs of N or more forbid (maximising: of -N or less)."
-)
-@click.option(
-    "--owner",
-    type=Pattern(),
-    metavar="REGEX",
-    help="Variables that nobody owns: one robot for those with the same match, or first group.  [default: one each]",
-)
+@reading_options
 @click.option("--allow-code", is_flag=True, help="Execute the Python files that a pyDCOP problem names.")
 @click.option(
     "--order",

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from robochoc.cli.options.paths import InputPath, foreign_files_told
+from robochoc.cli.options.problems import reading_options
 from robochoc.cli.reports.failures import INVALID
 
 if TYPE_CHECKING:
@@ -19,8 +20,11 @@ if TYPE_CHECKING:
 @click.command()
 @click.argument("paths", nargs=-1, type=InputPath(), metavar="[PATH ...]")
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON object per team.")
+@reading_options
 @click.pass_context
-def validate(context: click.Context, paths: tuple[Path, ...], *, as_json: bool) -> None:
+def validate(
+    context: click.Context, paths: tuple[Path, ...], *, as_json: bool, infinity: int | None, owner: str | None
+) -> None:
     """Check all teams in the folders PATH and below (default: instances/), or single robots' files.
 
     Checked are the XML, the schema, the meaning of each file, and the team as a whole. All errors of all files are
@@ -36,14 +40,14 @@ def validate(context: click.Context, paths: tuple[Path, ...], *, as_json: bool) 
         except InvalidInputError as invalid:
             reports.append(_invalid(path, invalid, foreign_files_told(path)))
         else:
-            reports.extend(_report(place) for place in found)
+            reports.extend(_report(place, infinity, owner) for place in found)
     for report in reports:
         _print_json(report) if as_json else _print(report)
     if not all(report["valid"] for report in reports):
         context.exit(INVALID)
 
 
-def _report(place: Path) -> dict[str, Any]:
+def _report(place: Path, infinity: int | None, owner: str | None) -> dict[str, Any]:
     """The validation of one team, or of one robot's file."""
     from robochoc.formats import InvalidInputError, encodable, read_robot
     from robochoc.formats.dialects.registry import recognise, unknown_format
@@ -57,7 +61,7 @@ def _report(place: Path) -> dict[str, Any]:
             robots: tuple[Robot, ...] = (read_robot(place),)
             events = 0
         else:
-            team = read_problem(place).team
+            team = read_problem(place, infinity=infinity, owner=owner).team
             robots, events = team.robots, len(team.scenario)
     except InvalidInputError as invalid:
         return _invalid(place, invalid)
