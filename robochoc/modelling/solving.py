@@ -140,7 +140,7 @@ class Solvable(ABC):
         return self._solution(solve(team, options, observer=observer, environment=environment), team)
 
     def _repr_html_(self) -> str:
-        from robochoc.modelling.notebook.pages import team_html  # noqa: PLC0415 - notebooks only
+        from robochoc.model.notebook.team import team_html  # noqa: PLC0415 - notebooks only
 
         return team_html(self._team_to_solve())
 

@@ -10,8 +10,8 @@ from lxml import html
 
 import robochoc
 from robochoc.formats.result import result_json
-from robochoc.modelling.notebook.graph import MAX_ROBOTS
-from robochoc.modelling.notebook.tables import MAX_ROWS, table
+from robochoc.model.notebook.graph import MAX_ROBOTS
+from robochoc.model.notebook.tables import MAX_ROWS, table
 from tests.support.program import ROOT
 
 HOSTILE = "<script>alert('1')</script>&\"'\u202e"
@@ -40,6 +40,7 @@ def test_a_model_shows_robots_constraints_and_the_graph() -> None:
     assert shown.count("<circle ") == 3
     assert repr(model) == "<model charging: 3 robots, 3 variables, 1 constraint>"
     assert repr(model.team) == "<team charging: 3 robots>"
+    assert model.team._repr_html_() == shown
 
 
 def test_a_problem_from_files_shows_itself_too() -> None:
