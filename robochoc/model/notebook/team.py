@@ -6,7 +6,7 @@ from collections.abc import Iterable, Iterator, Mapping
 from enum import Enum
 
 from robochoc.model.constraint import INFINITE, Constraint, Domain, Function, Predicate, Relation, Semantics
-from robochoc.model.cost_units import CostUnits
+from robochoc.model.cost_units import CostUnits, cost_shown
 from robochoc.model.expression import Apply, Expression, Name
 from robochoc.model.expression import text as expression_text
 from robochoc.model.notebook.graph import graph_svg
@@ -84,7 +84,7 @@ def _cost(constraint: Constraint, units: CostUnits) -> str:
         return "in the table"
     if constraint.cost == INFINITE:
         return "must hold"
-    return str(CostUnits(places=units.places).told(constraint.cost))
+    return cost_shown(CostUnits(places=units.places).told(constraint.cost))
 
 
 def shown_values(values: Iterable[object]) -> str:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from html import escape
 from typing import TYPE_CHECKING
 
+from robochoc.model.cost_units import Cost, cost_shown
 from robochoc.model.headline import describe_outcome
 from robochoc.model.notebook.tables import heading, table
 from robochoc.model.notebook.team import shown_values
@@ -28,7 +29,7 @@ def solution_html(solution: Solution) -> str:
         "seconds": f"{metrics.wall_s:.3f}",
     }
     epochs = [
-        (number, epoch.opened_by, len(epoch.robots), epoch.verdict, "" if epoch.cost is None or plain else epoch.cost)
+        (number, epoch.opened_by, len(epoch.robots), epoch.verdict, _cost(epoch.cost, plain=plain))
         for number, epoch in enumerate(solution.epochs)
     ]
     robots = len(team.robots) if team else len({owner.get(name, name) for name in solution.assignment})
@@ -46,6 +47,10 @@ def solution_html(solution: Solution) -> str:
         table(tuple(spent), [tuple(spent.values())]),
     )
     return f"<div>{''.join(parts)}</div>"
+
+
+def _cost(cost: Cost | None, *, plain: bool) -> str:
+    return "" if cost is None or plain else cost_shown(cost)
 
 
 def _owners(team: Team) -> dict[str, str]:
