@@ -8,6 +8,8 @@ from pathlib import Path
 
 import pytest
 
+from tests.support.limits import HANG_S
+
 MODEL = """import robochoc
 print("begun", flush=True)
 model = robochoc.Model("pair")
@@ -28,7 +30,7 @@ def run(folder: Path, text: str) -> subprocess.CompletedProcess[str]:
     """Run a program, whose processes start in the folder of its file."""
     file = folder / "program.py"
     file.write_text(text)
-    return subprocess.run([sys.executable, file], capture_output=True, text=True, check=False, timeout=60)
+    return subprocess.run([sys.executable, file], capture_output=True, text=True, check=False, timeout=HANG_S)
 
 
 @pytest.mark.parametrize("text", [MODEL + NETWORK, FORK_SERVER], ids=["network", "fork server"])
@@ -70,5 +72,5 @@ def test_processes_need_no_guard_as_they_are_forked(tmp_path: Path) -> None:
 
 def test_of_a_program_without_a_file_nothing_is_imported() -> None:
     words = [sys.executable, "-c", f"{CHECK}\npool()"]
-    done = subprocess.run(words, capture_output=True, text=True, check=False, timeout=60)
+    done = subprocess.run(words, capture_output=True, text=True, check=False, timeout=HANG_S)
     assert (done.stdout, done.stderr) == ("passed\n", "")
