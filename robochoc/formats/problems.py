@@ -21,12 +21,13 @@ class ReadProblem(NamedTuple):
 
 
 def read_problem(
-    place: Path, *, infinity: int | None = None, owner: str | None = None, allow_code: bool = False
+    place: Path, *more: Path, infinity: int | None = None, owner: str | None = None, allow_code: bool = False
 ) -> ReadProblem:
     """Return the team in the folder `place`, or in the file of another tool.
 
     Args:
         place: The folder, or the file.
+        *more: Further files of the problem in that file.
         infinity: Of a file: costs of at least so much forbid; see `ImportOptions`.
         owner: Of a file: a regular expression that says which variables belong to one robot.
         allow_code: Of a file: whether Python files that it names may be executed.
@@ -38,14 +39,20 @@ def read_problem(
     from robochoc.formats.dialects.names_file import original_names  # noqa: PLC0415 - as above
     from robochoc.formats.dialects.registry import read_foreign, recognise  # noqa: PLC0415 - as above
 
-    if place.is_file() and recognise(place):
-        imported = read_foreign([place], ImportOptions(infinity=infinity, owner=owner, allow_code=allow_code))
+    if place.is_file() and (more or recognise(place)):
+        imported = read_foreign([place, *more], ImportOptions(infinity=infinity, owner=owner, allow_code=allow_code))
         check_team(imported.team)
         return ReadProblem(imported.team, imported.names, foreign=True)
     for option, given in (("infinity", infinity), ("owner", owner)):
         if given is not None and place.is_dir():
             what, hint = f"is the folder of a team, and '{option}' is for files of other tools", f"leave out '{option}'"
             raise InvalidInputError([Diagnostic(encodable(str(place)), 0, what, hint)])
+    if more and place.is_dir():
+        what, hint = (
+            f"is the folder of a team, and {more[0]} another problem",
+            "name files of one problem, or one folder",
+        )
+        raise InvalidInputError([Diagnostic(encodable(str(place)), 0, what, hint)])
     try:
         return ReadProblem(read_team(place), original_names(place), foreign=False)
     except InvalidInputError as invalid:

@@ -7,8 +7,9 @@ from pathlib import Path
 
 import pytest
 
+from robochoc import load
 from robochoc.cli.options.problems import READ, WRITTEN
-from robochoc.formats import read_team
+from robochoc.formats import InvalidInputError, read_team
 from robochoc.formats.dialects.registry import NAMES
 from tests.support.program import robochoc_within
 
@@ -155,6 +156,41 @@ def test_the_options_of_an_import_are_not_for_teams(command: str, problem: Path,
     done = robochoc_within(command, team, "--infinity", 5)
     assert done.returncode == 1
     assert f"{team}: is the folder of a team, and 'infinity' is for files of other tools" in done.stdout + done.stderr
+
+
+DYNAMIC = """name: dynamic
+objective: min
+domains: {d: {values: [R, G]}}
+variables: {_a: {domain: d}, _b: {domain: d}}
+constraints: {differ: {type: intention, function: 2 if _a == _b else 1}}
+agents: [r-1, r-2]
+"""
+SCENARIO = "events: [{id: leaves, actions: [{type: remove_agent, agent: r-2}]}]\n"
+
+
+def test_epochs_of_an_imported_scenario_have_original_names(tmp_path: Path) -> None:
+    files = [tmp_path / "dynamic.yaml", tmp_path / "scenario.yaml"]
+    for file, text in zip(files, (DYNAMIC, SCENARIO), strict=True):
+        file.write_text(text)
+    team = tmp_path / "team"
+    assert robochoc_within("import", *files, "-o", team).returncode == 0
+    words = ["solve", team, "--protocol", "sfb", "--runtime", "simulator"]
+    shown = robochoc_within(*words).stdout
+    assert "1  -r-2            1  optimal" in shown
+    assert "    r-1: _a = R\n" in shown
+    told = json.loads(robochoc_within(*words, "--json").stdout)
+    assert (told["assignment"], told["names"]["v_a"]) == ({"v_a": "R"}, "_a")
+    solution = load(*files).solve("sfb", runtime="simulator")
+    assert solution.values == {"_a": "R"}
+    assert [(one.opened_by, *one.robots, *one.assignment) for one in solution.epochs] == [
+        ("the start", "r-1", "r-2", "_a", "_b"),
+        ("-r-2", "r-1", "_a"),
+    ]
+    assert "-r-2" in solution._repr_html_()
+    for wrong, message in ((team, "is the folder of a team, and"), (tmp_path / "none.yaml", "none.yaml")):
+        with pytest.raises(InvalidInputError, match=message):
+            load(wrong, files[1])
+    assert "name it with the file of the variables" in robochoc_within("solve", files[1]).stderr
 
 
 def test_validate_says_what_a_file_is(problem: Path) -> None:

@@ -331,7 +331,7 @@ def _tell(problem: ReadProblem, outcome: Outcome, wanted: Wanted) -> None:
     """
     from robochoc.model.original_names import renamed_outcome, renamed_team
 
-    names = {} if problem.team.dynamic else problem.names
+    names = problem.names
     if wanted.as_json:
         from robochoc.formats.result import result_json
 
@@ -341,7 +341,7 @@ def _tell(problem: ReadProblem, outcome: Outcome, wanted: Wanted) -> None:
         from robochoc.cli.reports.outcome import outcome_report
 
         outcome = renamed_outcome(outcome, names)
-        click.echo(outcome_report(renamed_team(problem.team, names), outcome))
+        click.echo(outcome_report(renamed_team(problem.team, names, outcome.events), outcome))
         if wanted.explain:
             from robochoc.cli.reports.pseudo_tree import tree_text
 
