@@ -37,9 +37,9 @@ def read_problem(
     """
     from robochoc.formats.dialects.dialect import ImportOptions  # noqa: PLC0415 - start-up: files of other tools only
     from robochoc.formats.dialects.names_file import original_names  # noqa: PLC0415 - as above
-    from robochoc.formats.dialects.registry import read_foreign, recognise  # noqa: PLC0415 - as above
+    from robochoc.formats.dialects.registry import read_foreign, recognise, recognised  # noqa: PLC0415 - as above
 
-    if place.is_file() and (more or recognise(place)):
+    if place.is_file() and (recognised(place) or more):
         imported = read_foreign([place, *more], ImportOptions(infinity=infinity, owner=owner, allow_code=allow_code))
         check_team(imported.team)
         return ReadProblem(imported.team, imported.names, foreign=True)

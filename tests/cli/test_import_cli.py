@@ -193,6 +193,36 @@ def test_epochs_of_an_imported_scenario_have_original_names(tmp_path: Path) -> N
     assert "name it with the file of the variables" in robochoc_within("solve", files[1]).stderr
 
 
+@pytest.mark.parametrize("command", ["solve", "validate", "export", "import"])
+@pytest.mark.parametrize(
+    ("content", "message"),
+    [
+        (PYDCOP.encode("utf-16"), "{file}: is not UTF-8: it looks like UTF-16 (save it in UTF-8)"),
+        (PYDCOP.encode("utf-16-le"), "{file}: is not UTF-8: it looks like UTF-16 (save it in UTF-8)"),
+        (PYDCOP.replace("pairs", "p\xe4rs").encode("latin-1"), "{file}: is not UTF-8 (save it in UTF-8)"),
+        (PYDCOP.replace("min", "Minimise").encode(), "{file}:2: has the objective 'Minimise' (write objective: min)"),
+        (b"print()\n", "{file}: is of no format that is read here ("),
+    ],
+    ids=["utf-16", "utf-16-le", "latin-1", "objective", "none"],
+)
+def test_a_file_that_cannot_be_read_is_told_in_one_line(
+    content: bytes, message: str, command: str, tmp_path: Path
+) -> None:
+    file = tmp_path / ("program.py" if content.startswith(b"print") else "pairs.yaml")
+    file.write_bytes(content)
+    done = robochoc_within(command, file, *(("-o", tmp_path / "team") if command == "import" else ()))
+    assert done.returncode == 1
+    assert message.format(file=file) in done.stdout + done.stderr
+
+
+def test_an_exported_problem_may_have_any_name(tmp_path: Path) -> None:
+    file, exported = tmp_path / "pairs.yaml", tmp_path / "pairs.txt"
+    file.write_text(PYDCOP)
+    assert robochoc_within("export", file, "--format", "pydcop", "-o", exported).returncode == 0
+    assert "it is pyDCOP's YAML" in robochoc_within("validate", exported).stdout
+    assert robochoc_within("import", exported, "-o", tmp_path / "team").returncode == 0
+
+
 def test_validate_says_what_a_file_is(problem: Path) -> None:
     done = robochoc_within("validate", problem)
     assert done.returncode == 0

@@ -50,13 +50,11 @@ def validate(
 def _report(place: Path, infinity: int | None, owner: str | None) -> dict[str, Any]:
     """The validation of one team, or of one robot's file."""
     from robochoc.formats import InvalidInputError, encodable, read_robot
-    from robochoc.formats.dialects.registry import recognise, unknown_format
+    from robochoc.formats.dialects.registry import recognised
     from robochoc.formats.problems import read_problem
 
-    dialect = recognise(place)
     try:
-        if place.is_file() and dialect is None and place.suffix.lower() not in {"", ".xml"}:
-            raise unknown_format(place)
+        dialect = recognised(place)
         if place.is_file() and dialect is None:
             robots: tuple[Robot, ...] = (read_robot(place),)
             events = 0
