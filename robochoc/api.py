@@ -10,7 +10,7 @@ Both are thin, and on the same code as the command line.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -41,6 +41,7 @@ class Problem(Solvable):
         team: The robots, their variables and constraints: from files, a generator, or built in Python.
         names: The original names of robots and variables, by the team's, where it is from a file of another tool.
             Solutions speak in these.
+        notes: What reading such a file has changed, as `robochoc import` tells it: pairs of a keyword and a sentence.
 
     Raises:
         InvalidInputError: if the team is invalid. It lists every mistake.
@@ -48,6 +49,7 @@ class Problem(Solvable):
 
     team: Team
     names: Mapping[str, str] = field(default_factory=dict)
+    notes: Sequence[tuple[str, str]] = ()
 
     def __post_init__(self) -> None:
         check_team(self.team)
@@ -83,7 +85,7 @@ def load(path: Path | str, *more: Path | str, infinity: int | None = None, owner
         'queens3d-4'
     """
     read = read_problem(Path(path), *map(Path, more), infinity=infinity, owner=owner)
-    return Problem(read.team, read.names if read.foreign else {})
+    return Problem(read.team, read.names if read.foreign else {}, read.notes)
 
 
 @dataclass

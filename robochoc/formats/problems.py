@@ -4,20 +4,31 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from pathlib import Path
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 from robochoc.formats.diagnostics import Diagnostic, InvalidInputError, encodable
 from robochoc.formats.team import read_team
 from robochoc.formats.validation import check_team
 from robochoc.model.problem import Team
 
+if TYPE_CHECKING:
+    from robochoc.formats.dialects.dialect import Note
+
 
 class ReadProblem(NamedTuple):
-    """A team, the original names of its robots and variables, and whether it is known by these alone."""
+    """A team, and what is known of where it comes from.
+
+    Attributes:
+        team: The team.
+        names: The original names of its robots and variables.
+        foreign: Whether it is known by these alone: it is in a file of another tool.
+        notes: What reading such a file has changed.
+    """
 
     team: Team
     names: Mapping[str, str]
     foreign: bool
+    notes: tuple[Note, ...] = ()
 
 
 def read_problem(
@@ -42,7 +53,7 @@ def read_problem(
     if place.is_file() and (recognised(place) or more):
         imported = read_foreign([place, *more], ImportOptions(infinity=infinity, owner=owner, allow_code=allow_code))
         check_team(imported.team)
-        return ReadProblem(imported.team, imported.names, foreign=True)
+        return ReadProblem(imported.team, imported.names, foreign=True, notes=imported.notes)
     for option, given in (("infinity", infinity), ("owner", owner)):
         if given is not None and place.is_dir():
             what, hint = f"is the folder of a team, and '{option}' is for files of other tools", f"leave out '{option}'"

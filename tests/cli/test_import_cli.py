@@ -215,6 +215,28 @@ def test_a_file_that_cannot_be_read_is_told_in_one_line(
     assert message.format(file=file) in done.stdout + done.stderr
 
 
+NETWORK = """{"problem": {"name": "b", "mustbe": "<8.0"}, "variables": {"x": 2, "y": 2, "z": 2}, "functions": {
+  "f": {"scope": ["x", "y"], "costs": [3, 4.25, 3, 5]}, "g": {"scope": ["y", "z"], "costs": [4, 3, 2, 3]}}}"""
+
+
+def test_what_would_be_another_problem_is_told_by_all_who_read_the_file(tmp_path: Path) -> None:
+    file = tmp_path / "b.cfn"
+    file.write_text(NETWORK)
+    changed = ("  truncated: costs are cut to 1 decimal place as mustbe has", "  bound: toulbar2 accepts only sums")
+    for words in (["solve", file, "--runtime", "simulator"], ["validate", file]):
+        done = robochoc_within(*words)
+        assert done.returncode == 0
+        told = done.stderr if words[0] == "solve" else done.stdout
+        assert all(one in told for one in changed)
+        assert "owner" not in told
+    assert "owner: the format knows no owners" in robochoc_within("import", file, "-o", tmp_path / "team").stdout
+    told = json.loads(robochoc_within("validate", file, "--json").stdout)
+    kinds = ["truncated", "bound", "owner"]
+    assert [note["kind"] for note in told["notes"]] == kinds
+    assert [kind for kind, _ in load(file).notes] == kinds
+    assert json.loads(robochoc_within("solve", file, "--runtime", "simulator", "--json").stdout)["cost"] == 6.0
+
+
 def test_an_exported_problem_may_have_any_name(tmp_path: Path) -> None:
     file, exported = tmp_path / "pairs.yaml", tmp_path / "pairs.txt"
     file.write_text(PYDCOP)

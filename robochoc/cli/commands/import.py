@@ -13,13 +13,11 @@ from robochoc.cli.options.order import NAMES as ORDERS
 from robochoc.cli.options.paths import InputPath
 from robochoc.cli.options.problems import READ, reading_options
 from robochoc.cli.reports.failures import INVALID, Failure
+from robochoc.cli.reports.notes import notes_told
 
 if TYPE_CHECKING:
     from robochoc.formats import InvalidInputError
     from robochoc.formats.dialects.dialect import Imported, ImportOptions
-
-_SHOWN = 3
-"""The notes of one kind that are shown."""
 
 
 class _Source(NamedTuple):
@@ -158,6 +156,7 @@ def _contents(imported: Imported) -> dict[str, Any]:
 
 def _tell(entry: dict[str, Any]) -> None:
     from robochoc.formats import on_one_line
+    from robochoc.formats.dialects.dialect import Note
 
     if not entry["imported"]:
         Failure(INVALID, "\n".join(entry["errors"])).show()
@@ -166,14 +165,8 @@ def _tell(entry: dict[str, Any]) -> None:
     counts = ", ".join(f"{number:,} {what if number != 1 else what[:-1]}" for what, number in sizes.items())
     folder = on_one_line(entry["team"])
     click.echo(f"{folder}: {counts}, from {entry['format']}; next: robochoc solve {folder}")
-    kinds: dict[str, list[str]] = {}
-    for note in entry["notes"]:
-        kinds.setdefault(note["kind"], []).append(note["text"])
-    for kind, texts in kinds.items():
-        for text in texts[:_SHOWN]:
-            click.echo(on_one_line(f"  {kind}: {text}"))
-        if len(texts) > _SHOWN:
-            click.echo(f"  {kind}: and {len(texts) - _SHOWN:,} more (--report lists them)")
+    for line in notes_told([Note(**note) for note in entry["notes"]], "--report lists them"):
+        click.echo(line)
 
 
 def _write_report(place: Path, told: list[dict[str, Any]]) -> None:

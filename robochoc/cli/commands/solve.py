@@ -43,6 +43,7 @@ from robochoc.cli.options.solve import (
 from robochoc.cli.reports.closed_loop import flight_told, told_of
 from robochoc.cli.reports.failures import LIMIT, Failure, failures_told, worst
 from robochoc.cli.reports.live_sniffer import Watch, check_chosen, watching
+from robochoc.cli.reports.notes import differences_told
 from robochoc.run.defaults import default_protocol
 
 if TYPE_CHECKING:
@@ -258,6 +259,8 @@ def _recorded(folder: Path, options: Options, products: Products, wanted: Wanted
     from robochoc.formats.problems import read_problem
 
     problem = read_problem(folder, infinity=wanted.infinity, owner=wanted.owner)
+    for line in differences_told(problem.notes):
+        click.echo(line, err=True)
     team = problem.team
     check_chosen(products.watching, team)
     protocol = wanted.protocol or default_protocol(team.kind)

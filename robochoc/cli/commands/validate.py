@@ -14,6 +14,7 @@ from robochoc.cli.reports.failures import INVALID
 
 if TYPE_CHECKING:
     from robochoc.formats import InvalidInputError
+    from robochoc.formats.dialects.dialect import Note
     from robochoc.model.problem import Robot
 
 
@@ -53,19 +54,22 @@ def _report(place: Path, infinity: int | None, owner: str | None) -> dict[str, A
     from robochoc.formats.dialects.registry import recognised
     from robochoc.formats.problems import read_problem
 
+    notes: tuple[Note, ...] = ()
     try:
         dialect = recognised(place)
         if place.is_file() and dialect is None:
             robots: tuple[Robot, ...] = (read_robot(place),)
             events = 0
         else:
-            team = read_problem(place, infinity=infinity, owner=owner).team
+            problem = read_problem(place, infinity=infinity, owner=owner)
+            team = problem.team
+            notes = problem.notes
             robots, events = team.robots, len(team.scenario)
     except InvalidInputError as invalid:
         return _invalid(place, invalid)
     report = {"path": encodable(str(place)), "valid": True, **_sizes(robots), "events": events, "errors": []}
     if dialect:
-        report |= {"format": dialect.name, "title": dialect.title}
+        report |= {"format": dialect.name, "title": dialect.title, "notes": [note._asdict() for note in notes]}
     return report
 
 
@@ -103,7 +107,9 @@ def _print_json(report: dict[str, Any]) -> None:
 
 
 def _print(report: dict[str, Any]) -> None:
+    from robochoc.cli.reports.notes import differences_told
     from robochoc.formats import on_one_line
+    from robochoc.formats.dialects.dialect import Note
 
     path = on_one_line(report["path"])
     if report["valid"]:
@@ -116,6 +122,8 @@ def _print(report: dict[str, Any]) -> None:
         click.echo(f"{path}: {counts}: ok{alone}")
         if "format" in report:
             click.echo(f"  it is {report['title']}: 'robochoc solve' takes it, 'robochoc import' makes a team of it")
+            for line in differences_told([Note(**note) for note in report["notes"]]):
+                click.echo(line)
         return
     errors = report["errors"]
     click.echo(f"{path}: {len(errors)} error{'s' * (len(errors) != 1)}")
