@@ -10,7 +10,7 @@ Both are thin, and on the same code as the command line.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -41,6 +41,7 @@ class Problem(Solvable):
         team: The robots, their variables and constraints: from files, a generator, or built in Python.
         names: The original names of robots and variables, by the team's, where it is from a file of another tool.
             Solutions speak in these.
+        notes: What reading such a file has changed, as `robochoc import` tells it: pairs of a keyword and a sentence.
 
     Raises:
         InvalidInputError: if the team is invalid. It lists every mistake.
@@ -48,6 +49,7 @@ class Problem(Solvable):
 
     team: Team
     names: Mapping[str, str] = field(default_factory=dict)
+    notes: Sequence[tuple[str, str]] = ()
 
     def __post_init__(self) -> None:
         check_team(self.team)
@@ -56,20 +58,20 @@ class Problem(Solvable):
         return self.team
 
     def _solution(self, outcome: Outcome, team: Team) -> Solution:
-        names = {} if team.dynamic else self.names
-        return Solution.of(renamed_outcome(outcome, names), renamed_team(team, names))
+        return Solution.of(renamed_outcome(outcome, self.names), renamed_team(team, self.names, outcome.events))
 
     def __repr__(self) -> str:
         constraints = counted(sum(1 for _ in self.team.constraints()), "constraint")
         return f"<problem {self.team.name}: {counted(len(self.team.robots), 'robot')}, {constraints}>"
 
 
-def load(path: Path | str, *, infinity: int | None = None, owner: str | None = None) -> Problem:
+def load(path: Path | str, *more: Path | str, infinity: int | None = None, owner: str | None = None) -> Problem:
     """Return the problem of the team whose files are in a folder, or the problem in a file of another tool.
 
     Args:
         path: A folder with an XML file for each robot, and `scenario.xml` if the problem changes over time; or a file
             of FRODO, DisChoco, pyDCOP, XCSP3 or toulbar2.
+        *more: Further files of the same problem, such as pyDCOP's distribution and scenario.
         infinity: Of such a file: costs of at least so much forbid. None: none do.
         owner: Of such a file: a regular expression; variables whose names have the same match, or first group, belong
             to one robot. None: each variable has its own robot.
@@ -82,8 +84,8 @@ def load(path: Path | str, *, infinity: int | None = None, owner: str | None = N
         >>> robochoc.load("instances/queens3d-4").team.name
         'queens3d-4'
     """
-    read = read_problem(Path(path), infinity=infinity, owner=owner)
-    return Problem(read.team, read.names if read.foreign else {})
+    read = read_problem(Path(path), *map(Path, more), infinity=infinity, owner=owner)
+    return Problem(read.team, read.names if read.foreign else {}, read.notes)
 
 
 @dataclass

@@ -4,44 +4,66 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from pathlib import Path
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
-from robochoc.formats.diagnostics import Diagnostic, InvalidInputError
+from robochoc.formats.diagnostics import Diagnostic, InvalidInputError, encodable
 from robochoc.formats.team import read_team
 from robochoc.formats.validation import check_team
 from robochoc.model.problem import Team
 
+if TYPE_CHECKING:
+    from robochoc.formats.dialects.dialect import Note
+
 
 class ReadProblem(NamedTuple):
-    """A team, the original names of its robots and variables, and whether it is known by these alone."""
+    """A team, and what is known of where it comes from.
+
+    Attributes:
+        team: The team.
+        names: The original names of its robots and variables.
+        foreign: Whether it is known by these alone: it is in a file of another tool.
+        notes: What reading such a file has changed.
+    """
 
     team: Team
     names: Mapping[str, str]
     foreign: bool
+    notes: tuple[Note, ...] = ()
 
 
 def read_problem(
-    place: Path, *, infinity: int | None = None, owner: str | None = None, allow_code: bool = False
+    place: Path, *more: Path, infinity: int | None = None, owner: str | None = None, allow_code: bool = False
 ) -> ReadProblem:
     """Return the team in the folder `place`, or in the file of another tool.
 
     Args:
         place: The folder, or the file.
+        *more: Further files of the problem in that file.
         infinity: Of a file: costs of at least so much forbid; see `ImportOptions`.
         owner: Of a file: a regular expression that says which variables belong to one robot.
         allow_code: Of a file: whether Python files that it names may be executed.
 
     Raises:
-        InvalidInputError: with the mistakes of the files.
+        InvalidInputError: with the mistakes of the files, and for options of a file where there is a folder.
     """
     from robochoc.formats.dialects.dialect import ImportOptions  # noqa: PLC0415 - start-up: files of other tools only
     from robochoc.formats.dialects.names_file import original_names  # noqa: PLC0415 - as above
-    from robochoc.formats.dialects.registry import read_foreign, recognise  # noqa: PLC0415 - as above
+    from robochoc.formats.dialects.registry import read_foreign, recognise, recognised  # noqa: PLC0415 - as above
 
-    if place.is_file() and recognise(place):
-        imported = read_foreign([place], ImportOptions(infinity=infinity, owner=owner, allow_code=allow_code))
+    if place.is_file() and (recognised(place) or more):
+        imported = read_foreign([place, *more], ImportOptions(infinity=infinity, owner=owner, allow_code=allow_code))
         check_team(imported.team)
-        return ReadProblem(imported.team, imported.names, foreign=True)
+        return ReadProblem(imported.team, imported.names, foreign=True, notes=imported.notes)
+    for option, given in (("infinity", infinity), ("owner", owner)):
+        if given is not None and place.is_dir():
+            what, hint = f"is the folder of a team, and '{option}' is for files of other tools", f"leave out '{option}'"
+            raise InvalidInputError([Diagnostic(encodable(str(place)), 0, what, hint)])
+    if more and place.is_dir():
+        what, hint = (
+            f"is the folder of a team, and {more[0]} another problem",
+            "name files of one problem, or one folder",
+        )
+        raise InvalidInputError([Diagnostic(encodable(str(place)), 0, what, hint)])
     try:
         return ReadProblem(read_team(place), original_names(place), foreign=False)
     except InvalidInputError as invalid:

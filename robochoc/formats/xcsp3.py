@@ -42,7 +42,7 @@ def xcsp3(team: Team, solver: AceProcess | None = None) -> bytes:
     for objective in root.iterfind("objectives/minimize"):
         objective.tag = "maximize" if team.told_in.maximize else "minimize"
         if team.told_in.places:
-            objective.set("note", f"in units of {Decimal(1).scaleb(-team.told_in.places)}")
+            objective.set("note", f"in units of {Decimal(1).scaleb(-team.told_in.places):f}")
     return etree.tostring(root, pretty_print=True, xml_declaration=True, encoding="UTF-8")
 
 

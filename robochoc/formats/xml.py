@@ -145,7 +145,7 @@ def _check_text(content: bytes, path: Path, most: int) -> None:
         content.decode()
     except UnicodeDecodeError as error:
         number = content.count(b"\n", 0, error.start) + 1
-        raise _invalid(path, number, "is not UTF-8", "save it in UTF-8, as the XML declaration says") from None
+        raise _invalid(path, number, "is not UTF-8", "save it in UTF-8") from None
 
 
 def _bytes(path: Path, most: int) -> bytes:

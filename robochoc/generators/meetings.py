@@ -1,4 +1,4 @@
-"""Meetings: a distributed multi-event scheduling problem (DiMES), with events as variables, or private ones.
+"""Meetings: a distributed multi-event scheduling problem (DiMES), with time slots or events as variables.
 
 Maheswaran, Tambe, Bowring, Pearce and Varakantham, "Taking DCOP to the real world: efficient complete solutions for
 distributed multi-event scheduling", AAMAS 2004. Persons value their time: each slot that stays free is worth something
@@ -6,13 +6,15 @@ to them, and so is each of their meetings, for each slot that it takes. A meetin
 time, in as many slots in a row as it is long; nobody is in two at once. It need not take place. To be maximised is the
 sum over all meetings that do: for each participant and slot, the meeting's value less that of the slot.
 
-Two models of the paper, with the same maximum:
+The three models of the paper, with the same maximum:
 
 * `peav` (private events as variables): a robot is a person, with a variable for each of its meetings: the slot in which
   it starts, or 0 where it does not take place. What meetings and slots are worth stays private. Participants of a
   meeting have equal values.
 * `eav` (events as variables): a robot is a meeting with one variable. What it is worth is the sum over its
   participants. Meetings that share one do not overlap.
+* `tsav` (time slots as variables): a robot is a person, with a variable for each slot: 0 where it is free, or a part of
+  one of its meetings. Parts are as long as a slot and follow each other.
 
 Where preferences do not count, all meetings must take place, and the problem is a DisCSP.
 """
@@ -38,13 +40,28 @@ ONE_AFTER_THE_OTHER = Predicate(
     "apart", _TERMS, parse("or(eq(X, 0), eq(Y, 0), ge(Y, add(X, i)), ge(X, add(Y, j)))", _TERMS, Type.BOOLEAN)
 )
 """Meetings that start in the slots X and Y, i and j slots long, do not overlap; 0: it does not take place."""
+AT_ONE_TIME = Predicate(
+    "together",
+    _TERMS,
+    parse("or(eq(X, Y), and(or(lt(X, i), gt(X, j)), or(lt(Y, i), gt(Y, j))))", _TERMS, Type.BOOLEAN),
+)
+"""If a slot of one person, X, or of another, Y, is one of the parts i to j, both are the same."""
+IN_A_ROW = Predicate(
+    "next",
+    _TERMS,
+    parse("or(eq(Y, add(X, 1)), and(or(lt(X, i), ge(X, j)), or(le(Y, i), gt(Y, j))))", _TERMS, Type.BOOLEAN),
+)
+"""In two slots, X and Y, of which one follows the other, so do the parts i to j of a meeting."""
+ONCE = Predicate("once", ("X", "Y"), parse("or(eq(X, 0), ne(X, Y))", ("X", "Y"), Type.BOOLEAN))
+"""No part of a meeting is in two slots."""
 
 
 class MeetingsModel(StrEnum):
-    """What a variable is: a meeting of a person, or a meeting."""
+    """What a variable is: a meeting of a person, a meeting, or a slot of a person."""
 
     PEAV = "peav"
     EAV = "eav"
+    TSAV = "tsav"
 
 
 @dataclass(frozen=True)
@@ -94,14 +111,15 @@ def meetings(
     """Return the problem of scheduling `meetings` of so many `participants` each that `seed` stands for.
 
     In `peav`, `Robot3` is a person, and `V3.2` is its part in meeting 2; who takes part in none is no robot. In `eav`,
-    `Meeting2` owns `V2`.
+    `Meeting2` owns `V2`. In `tsav`, `V3.2` is what `Robot3` does in slot 2: the parts of all meetings have numbers from
+    1 on, in their order.
 
     Args:
         agents: The number of persons.
         meetings: The number of meetings.
         participants: The number of persons in each meeting, any choice as likely as any other.
         slots: The number of time slots.
-        seed: The same seed makes the same problem on every machine, and the same one in both models.
+        seed: The same seed makes the same problem on every machine, and the same one in all models.
         max_length: Meetings take from 1 to so many slots.
         max_value: A meeting's slot is worth from 1 to so much to a participant; a free one from 0. None: preferences
             do not count, and all meetings must take place.
@@ -122,6 +140,8 @@ def meetings(
             variables, constraints = _peav(problem, preferences=preferences)
         case MeetingsModel.EAV:
             variables, constraints = _eav(problem, preferences=preferences)
+        case MeetingsModel.TSAV:
+            variables, constraints = _tsav(problem, preferences=preferences)
         case never:
             assert_never(never)
     told = f"-{max_length}-{max_value}" if preferences else f"-{max_length}-required"
@@ -191,6 +211,76 @@ def _eav(problem: Meetings, *, preferences: bool) -> _Parts:
             yield _apart((f"V{one.number}", f"V{other.number}"), one, other)
 
     return variables, constraints()
+
+
+def _tsav(problem: Meetings, *, preferences: bool) -> _Parts:
+    parts = _parts(problem)
+    attended = {
+        person: [meeting for meeting in problem.meetings if person in meeting.worth]
+        for person in sorted({person for meeting in problem.meetings for person in meeting.worth})
+    }
+    slots = range(1, problem.slots + 1)
+    variables = {
+        f"Robot{person}": [
+            Variable(
+                f"V{person}.{slot}",
+                Domain(f"Slot{person}.{slot}", (range(1), *(_there(problem, one, parts, slot) for one in held))),
+            )
+            for slot in slots
+        ]
+        for person, held in attended.items()
+    }
+
+    def constraints() -> Iterator[Constraint]:
+        for person, held in attended.items():
+            names = [f"V{person}.{slot}" for slot in slots]
+            for pair in itertools.combinations(names, 2):
+                yield Constraint("once", ONCE, pair, pair)
+            for one, pair in itertools.product(held, itertools.pairwise(names)):
+                if one.length > 1:
+                    yield Constraint("next", IN_A_ROW, pair, (*pair, parts[one.number][0], parts[one.number][-1]))
+            if preferences:
+                yield from _worth_of_slots(problem, person, held, parts)
+            else:
+                yield from (_takes_place(person, one, parts[one.number][0], problem.slots) for one in held)
+        for meeting, slot in itertools.product(problem.meetings, slots):
+            numbers = parts[meeting.number]
+            for persons in itertools.combinations(meeting.worth, 2):
+                scope = tuple(f"V{person}.{slot}" for person in persons)
+                yield Constraint(f"M{meeting.number}", AT_ONE_TIME, scope, (*scope, numbers[0], numbers[-1]))
+
+    return variables, constraints()
+
+
+def _parts(problem: Meetings) -> dict[int, range]:
+    """Return the numbers of the parts of each meeting."""
+    ends = itertools.accumulate((meeting.length for meeting in problem.meetings), initial=1)
+    bounds = zip(problem.meetings, itertools.pairwise(ends), strict=True)
+    return {meeting.number: range(begin, end) for meeting, (begin, end) in bounds}
+
+
+def _there(problem: Meetings, meeting: Meeting, parts: Mapping[int, range], slot: int) -> range:
+    """Return the parts of `meeting` that can be in a slot."""
+    numbers, starts = parts[meeting.number], problem.starts(meeting)
+    return numbers[max(0, slot - starts[-1]) : min(meeting.length, slot)]
+
+
+def _worth_of_slots(
+    problem: Meetings, person: int, attended: Sequence[Meeting], parts: Mapping[int, range]
+) -> Iterator[Constraint]:
+    for slot, free in enumerate(problem.free[person], 1):
+        worth = {part: one.worth[person] - free for one in attended for part in _there(problem, one, parts, slot)}
+        yield _worth(f"{person}.{slot}", worth)
+
+
+def _takes_place(person: int, meeting: Meeting, first: int, slots: int) -> Constraint:
+    """The first part of `meeting` is in one of the person's slots."""
+    names = tuple(f"S{slot}" for slot in range(1, slots + 1))
+    parts = [f"eq({name}, i)" for name in names]
+    body = f"or({', '.join(parts)})" if slots > 1 else parts[0]
+    scope = tuple(f"V{person}.{slot}" for slot in range(1, slots + 1))
+    predicate = Predicate("held", (*names, "i"), parse(body, (*names, "i"), Type.BOOLEAN))
+    return Constraint(f"held{person}.{meeting.number}", predicate, scope, (*scope, first))
 
 
 def _starts(problem: Meetings, meeting: Meeting, *, preferences: bool) -> Domain:

@@ -33,6 +33,11 @@ class CostUnits:
         return Decimal(whole).scaleb(-self.places) if self.places else whole
 
 
+def cost_shown(cost: Cost | float) -> str:
+    """Return a cost for people: all its digits, never `1.5E-8`; thousands have commas between them."""
+    return f"{cost:,f}" if isinstance(cost, Decimal) else f"{cost:,}"
+
+
 PLAIN_COSTS = CostUnits()
 """Integers that are minimised."""
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from robochoc.model.cost_units import cost_shown
 from robochoc.model.outcome import Outcome, Verdict
 
 
@@ -54,4 +55,4 @@ def _lost(outcome: Outcome) -> str:
 def _cost(outcome: Outcome) -> str:
     if outcome.cost is None or not (outcome.cost or outcome.verdict is Verdict.OPTIMAL):
         return ""
-    return f", cost {outcome.cost:,}"
+    return f", cost {cost_shown(outcome.cost)}"

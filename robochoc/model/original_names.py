@@ -2,11 +2,16 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable, Mapping
 from dataclasses import replace
 
+from robochoc.model.change import team_after_events
 from robochoc.model.outcome import EpochOutcome, Outcome, PseudoTreeNode
 from robochoc.model.problem import Team
+
+_NAME = re.compile(r"[A-Za-z0-9_.]+")
+"""A name in what opened an epoch (`describe_change`)."""
 
 
 def renamed_outcome(outcome: Outcome, names: Mapping[str, str]) -> Outcome:
@@ -26,10 +31,17 @@ def renamed_outcome(outcome: Outcome, names: Mapping[str, str]) -> Outcome:
     )
 
 
-def renamed_team(team: Team, names: Mapping[str, str]) -> Team:
-    """Return `team` for reports: its robots and variables have their original `names`, and no links."""
+def renamed_team(team: Team, names: Mapping[str, str], events: int = 0) -> Team:
+    """Return `team` for reports: its robots and variables have their original `names`, and no links.
+
+    Args:
+        team: The team.
+        names: The original names by those of the team. Without any, the team stays as it is.
+        events: How many events of its scenario have happened to the team that is returned.
+    """
     if not names:
         return team
+    team = team_after_events(team, events)
     robots = tuple(
         replace(
             robot,
@@ -41,12 +53,13 @@ def renamed_team(team: Team, names: Mapping[str, str]) -> Team:
         )
         for robot in team.robots
     )
-    return replace(team, robots=robots, scenario=())
+    return replace(team, robots=robots)
 
 
 def _epoch(epoch: EpochOutcome, names: Mapping[str, str]) -> EpochOutcome:
     return replace(
         epoch,
+        opened_by=_NAME.sub(lambda found: names.get(found[0], found[0]), epoch.opened_by),
         robots=_all(epoch.robots, names),
         assignment=_by(epoch.assignment, names),
         witness=_one(epoch.witness, names),

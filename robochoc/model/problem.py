@@ -261,6 +261,11 @@ class Team:
     def __repr__(self) -> str:
         return f"<team {self.name}: {counted(len(self.robots), 'robot')}>"
 
+    def _repr_html_(self) -> str:
+        from robochoc.model.notebook.team import team_html  # noqa: PLC0415 - notebooks only
+
+        return team_html(self)
+
     @cached_property
     def _by_name(self) -> dict[str, Robot]:
         return {robot.name: robot for robot in self.robots}

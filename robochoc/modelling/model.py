@@ -15,6 +15,7 @@ Robots know what their own file would say. Who shares what with whom, and who is
 
 from __future__ import annotations
 
+import copy
 import itertools
 from pathlib import Path
 from typing import Self
@@ -61,7 +62,7 @@ class Model(Solvable):
         self.maximized: bool | None = None
         self.given: Given | None = None
         self._team: Team | None = None
-        self._names = (f"C{number}" for number in itertools.count(1))
+        self._named = 0
 
     @classmethod
     def load(cls, folder: Path | str) -> Model:
@@ -185,7 +186,8 @@ class Model(Solvable):
 
     def _free_name(self) -> str:
         taken = {rule.name for rule in self.constraints} | (self.given.names if self.given else set())
-        return next(name for name in self._names if name not in taken)
+        self._named = next(number for number in itertools.count(self._named + 1) if f"C{number}" not in taken)
+        return f"C{self._named}"
 
     def after_solution(self) -> Event:
         """Add an event: what changes once the problem before it is solved."""
@@ -230,8 +232,8 @@ class Model(Solvable):
         write_team(team, Path(folder), replace=replace)
 
     def _repr_html_(self) -> str:
-        from robochoc.modelling.notebook.pages import team_html  # noqa: PLC0415 - notebooks only
-        from robochoc.modelling.notebook.tables import heading  # noqa: PLC0415 - the same
+        from robochoc.model.notebook.tables import heading  # noqa: PLC0415 - the same
+        from robochoc.model.notebook.team import team_html  # noqa: PLC0415 - notebooks only
 
         try:
             team = self.team
@@ -245,6 +247,14 @@ class Model(Solvable):
 
     def _solution(self, outcome: Outcome, team: Team) -> Solution:
         return Solution.of(outcome, team, dict(self.variables))
+
+    def __copy__(self) -> Self:
+        """Return a model of its own: what is added to one does not change the other."""
+        return copy.deepcopy(self)
+
+    def __getstate__(self) -> dict[str, object]:
+        """Return what a copy begins with: all but the team, which follows from it."""
+        return {**vars(self), "_team": None}
 
     def __repr__(self) -> str:
         robots, variables = counted(len(self.robots), "robot"), counted(len(self.variables), "variable")

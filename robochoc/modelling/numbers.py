@@ -57,9 +57,21 @@ def places_of(value: Exact, place: Place | None = None) -> int:
     Raises:
         ModelError: if it cannot be written with at most nine places.
     """
-    for places in range(MAX_PLACES + 1):
-        if 10**places % Fraction(value).denominator == 0:
-            return places
+    places = _places(value)
+    if places is not None:
+        return places
     hint = f"a cost has at most {MAX_PLACES} decimal places: multiply all costs by a number that makes them so"
-    shown = value if Fraction(value).denominator.bit_length() < _FAR else float(value)
-    raise ModelError(f"the cost {shown} cannot be written as a decimal", hint, place)
+    told = value if Fraction(value).denominator.bit_length() < _FAR else float(value)
+    raise ModelError(f"the cost {told} cannot be written as a decimal", hint, place)
+
+
+def shown(value: Exact) -> str:
+    """Return a number as a decimal where it is one that costs can be, and else as a fraction."""
+    places = _places(value)
+    return str(value) if places is None else f"{Decimal(int(value * 10**places)).scaleb(-places):f}"
+
+
+def _places(value: Exact) -> int | None:
+    """Return the decimal places of a number. None: it has more than a cost may have."""
+    denominator = Fraction(value).denominator
+    return next((places for places in range(MAX_PLACES + 1) if 10**places % denominator == 0), None)

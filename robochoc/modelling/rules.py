@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from robochoc.modelling.meanings import UndefinedTermError
-from robochoc.modelling.numbers import Exact, exact
+from robochoc.modelling.numbers import Exact, exact, shown
 from robochoc.modelling.places import ModelError, ModelTypeError, Place
 from robochoc.modelling.terms import Term, Variable, condition
 
@@ -32,7 +32,7 @@ class Rule:
     place: Place
 
     def __repr__(self) -> str:
-        return f"<{self.name}: {self.term!r}{'' if self.cost is None else f', cost {self.cost}'}>"
+        return f"<{self.name}: {self.term!r}{'' if self.cost is None else f', cost {shown(self.cost)}'}>"
 
     def drafts(self) -> Iterator[Draft]:
         """Yield what it becomes."""

@@ -63,8 +63,8 @@ class Solvable(ABC):
     ) -> Solution:
         """Let the robots solve the problem together.
 
-        The runtimes `processes` and `network` start processes. A program calls this below `if __name__ == "__main__":`,
-        for each of them may import it.
+        The runtime `network` starts processes that import the program: it calls this below
+        `if __name__ == "__main__":`. Those of the runtime `processes` import nothing.
 
         Args:
             protocol: The name of the protocol, in any case. None: the default protocol for the kind of problem.
@@ -140,7 +140,7 @@ class Solvable(ABC):
         return self._solution(solve(team, options, observer=observer, environment=environment), team)
 
     def _repr_html_(self) -> str:
-        from robochoc.modelling.notebook.pages import team_html  # noqa: PLC0415 - notebooks only
+        from robochoc.model.notebook.team import team_html  # noqa: PLC0415 - notebooks only
 
         return team_html(self._team_to_solve())
 

@@ -14,7 +14,7 @@ from typing import NoReturn
 from robochoc.modelling.codes import BOOLEAN, NUMBER, Codes, Kind, kind_of
 from robochoc.modelling.extents import ALONE, Extent, extent_of
 from robochoc.modelling.meanings import MEANINGS, UndefinedTermError
-from robochoc.modelling.numbers import Exact, exact, is_number
+from robochoc.modelling.numbers import Exact, exact, is_number, shown
 from robochoc.modelling.places import ModelError, ModelTypeError, Place, did_you_mean
 
 Values = Mapping["Variable", object]
@@ -237,8 +237,8 @@ class Linear(Term):
         return total
 
     def __repr__(self) -> str:
-        words = [f"{_FACTORS.get(factor, f'{factor}*')}{term!r}" for factor, term in self.parts]
-        return f"({' + '.join([*words, *([str(self.constant)] if self.constant else [])])})".replace("+ -", "- ")
+        words = [f"{_FACTORS.get(factor, f'{shown(factor)}*')}{term!r}" for factor, term in self.parts]
+        return f"({' + '.join([*words, *([shown(self.constant)] if self.constant else [])])})".replace("+ -", "- ")
 
 
 class Applied(Term):

@@ -15,7 +15,7 @@ from robochoc.sniffer.acl import text
 from robochoc.sniffer.columns import NOT_YET
 from robochoc.sniffer.page_data import PageData
 from robochoc.sniffer.trace import Trace
-from robochoc.view.label import printable
+from robochoc.system.plain_text import printable
 
 HEADINGS = (
     "message", "run", "step", "sent_at", "taken_at", "taken_in_step", "sender", "receiver", "type", "performative",

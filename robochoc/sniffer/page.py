@@ -13,8 +13,8 @@ from html import escape
 from importlib.resources import files
 from typing import Literal
 
+from robochoc.system.plain_text import printable
 from robochoc.view.content_security import content_security_policy
-from robochoc.view.label import printable
 from robochoc.view.script import labels_script, viewer_script
 
 Mode = Literal["served", "embedded"]

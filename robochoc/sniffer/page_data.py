@@ -17,6 +17,7 @@ from typing import Any, assert_never
 import msgspec
 
 from robochoc.formats.result import result_json
+from robochoc.model.cost_units import cost_shown
 from robochoc.model.headline import describe_outcome
 from robochoc.model.outcome import EpochOutcome, Outcome, Verdict
 from robochoc.model.priorities import natural_key
@@ -231,7 +232,7 @@ def _ending(trace: Trace, outcome: Outcome) -> str:
         headline = describe_outcome(outcome, len(trace.robots))
         return f"{headline}: no solution for all{witness}; withdrawn: {_cut(outcome.withdrawn_alive)}{out}."
     said = _said(outcome.verdict)
-    cost = f", of cost {outcome.cost}" if outcome.cost else ""
+    cost = f", of cost {cost_shown(outcome.cost)}" if outcome.cost else ""
     return f"{said[0].upper()}{said[1:]}{cost}{_by(outcome)}{reason}{out}."
 
 

@@ -15,7 +15,7 @@ from robochoc.model.communicative_acts import INFORM
 from robochoc.model.message import Message
 from robochoc.model.wording import MOST_LISTED, Wording, listed
 from robochoc.sniffer.recorded_messages import message_of
-from robochoc.view.label import printable
+from robochoc.system.plain_text import printable
 
 _MAX_CHARACTERS = 1000
 _MAX_VALUE_CHARACTERS = 60

@@ -31,6 +31,7 @@ from robochoc.journal.events import (
 )
 from robochoc.journal.given import told_by
 from robochoc.journal.journal import Header, Journal
+from robochoc.model.cost_units import cost_shown
 from robochoc.model.outcome import Outcome
 from robochoc.sniffer.columns import NOT_YET, floats, longs, shorts
 from robochoc.sniffer.contents import Contents
@@ -218,7 +219,7 @@ class Trace:
                 self._open_step(event.robot, event).notes.append(note)
             case Heard():
                 cost = told_by(self.runs[-1].given, event.cost) if self.runs else event.cost
-                note = (event.t, "heard", f"{event.robot} knows of an assignment that costs {cost}")
+                note = (event.t, "heard", f"{event.robot} knows of an assignment that costs {cost_shown(cost)}")
                 self._open_step(event.robot, event).notes.append(note)
             case Began():
                 self._new_run(event)

@@ -8,6 +8,7 @@ from typing import Any, NamedTuple
 import msgspec
 
 from robochoc.journal.events import AnyEvent, Given, Granted, Improved, Lost, Refused
+from robochoc.model.cost_units import cost_shown
 
 
 class RunRecord(msgspec.Struct, frozen=True):
@@ -74,7 +75,7 @@ def note_of(event: AnyEvent, step: int) -> Note | None:
     """Return a note for an event that is no message; None: the event needs no note."""
     match event:
         case Improved():
-            return Note(event.t, step, "improved", "", f"the cheapest so far costs {event.cost}")
+            return Note(event.t, step, "improved", "", f"the cheapest so far costs {cost_shown(event.cost)}")
         case Lost():
             return Note(event.t, step, "lost", event.robot, f"{event.robot} was lost: {event.why}")
         case Refused():

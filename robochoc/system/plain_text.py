@@ -20,3 +20,8 @@ def on_one_line(text: str, longest: int = LONGEST) -> str:
     """
     shown = "".join(char if char.isprintable() else ascii(char)[1:-1] for char in text[:longest])
     return shown if len(text) <= longest else f"{shown}... ({len(text) - longest:,} more characters)"
+
+
+def printable(text: str) -> str:
+    """Return `text` with a mark in place of what is not printable: control characters, half a surrogate pair."""
+    return "".join(sign if sign.isprintable() else "\N{REPLACEMENT CHARACTER}" for sign in text)

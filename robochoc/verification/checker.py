@@ -11,7 +11,7 @@ from decimal import Decimal
 from fractions import Fraction
 from typing import assert_never
 
-from robochoc.model.cost_units import Cost
+from robochoc.model.cost_units import Cost, cost_shown
 from robochoc.model.expression import UndefinedValueError, evaluate
 from robochoc.model.problem import (
     INFINITE,
@@ -87,7 +87,9 @@ def check_told_cost(team: Team, assignment: Assignment, cost: Cost | None, witho
             total += paid if isinstance(constraint.definition, Function) else paid * unit
     if Fraction(cost) != total:
         exact = Decimal(int(total * 10**places)).scaleb(-places)
-        raise RefutedError(f"the answer for {team.name} costs {exact:,}, and it is said to cost {cost:,}")
+        raise RefutedError(
+            f"the answer for {team.name} costs {cost_shown(exact)}, and it is said to cost {cost_shown(cost)}"
+        )
 
 
 def needlessly_withdrawn(team: Team, assignment: Assignment, withdrawn: Collection[str]) -> Iterator[str]:

@@ -6,6 +6,8 @@ import unicodedata
 from html import escape
 from typing import NamedTuple
 
+from robochoc.system.plain_text import printable
+
 _EM = 44
 """Font size in pixels: sharp from close by, and still small in memory."""
 _HEIGHT = 64
@@ -33,8 +35,3 @@ def label(text: str) -> Label:
         f' paint-order="stroke">{escape(shown)}</text></svg>'
     )
     return Label(svg, width / _HEIGHT)
-
-
-def printable(text: str) -> str:
-    """Return `text` with a mark in place of what is not printable: control characters, half a surrogate pair."""
-    return "".join(sign if sign.isprintable() else "\N{REPLACEMENT CHARACTER}" for sign in text)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from html import escape
 
-from robochoc.view.label import printable
+from robochoc.system.plain_text import printable
 from robochoc.view.palette import GREY, RED, Colour, colours, web
 from robochoc.view.playback import DroneState
 from robochoc.view.scene import Scene

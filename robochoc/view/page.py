@@ -11,9 +11,9 @@ from html import escape
 from importlib.resources import files
 from string import Template
 
+from robochoc.system.plain_text import printable
 from robochoc.view.content_security import content_security_policy
 from robochoc.view.drawing import commands
-from robochoc.view.label import printable
 from robochoc.view.legend import legend
 from robochoc.view.playback_json import playback_json
 from robochoc.view.scene import Scene

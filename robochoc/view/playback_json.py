@@ -6,8 +6,8 @@ import json
 from collections.abc import Iterator
 from typing import Any
 
+from robochoc.system.plain_text import printable
 from robochoc.view.drawing import cell_of, colour_of, corners, path_of, row_colours
-from robochoc.view.label import printable
 from robochoc.view.palette import web
 from robochoc.view.playback import Playback
 from robochoc.view.scene import Scene

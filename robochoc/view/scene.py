@@ -14,6 +14,7 @@ from robochoc.flight.cells import in_cells
 from robochoc.flight.layout import Axis, Point
 from robochoc.flight.log import FlightLog
 from robochoc.flight.mission import Goal, Mission
+from robochoc.model.cost_units import cost_shown
 from robochoc.model.headline import describe_outcome
 from robochoc.model.outcome import Outcome
 from robochoc.view.playback import Playback, fell, playback_of
@@ -139,6 +140,6 @@ def _facts(outcome: Outcome, mission: Mission) -> tuple[tuple[str, str], ...]:
     if outcome.lost:
         facts.append(("lost", ", ".join(outcome.lost)))
     if outcome.cost:
-        facts.append(("cost", f"{outcome.cost:,}"))
+        facts.append(("cost", cost_shown(outcome.cost)))
     facts.append(("messages", f"{sum(outcome.metrics.messages.values()):,}"))
     return tuple(facts)

@@ -7,8 +7,9 @@ from pathlib import Path
 
 import pytest
 
+from robochoc import load
 from robochoc.cli.options.problems import READ, WRITTEN
-from robochoc.formats import read_team
+from robochoc.formats import InvalidInputError, read_team
 from robochoc.formats.dialects.registry import NAMES
 from tests.support.program import robochoc_within
 
@@ -119,6 +120,129 @@ def test_solve_of_an_imported_team_tells_both_names(problem: Path, tmp_path: Pat
     told = json.loads(robochoc_within(*words, "--json").stdout)
     assert ({*told["assignment"]}, told["names"]["x_1"]) == ({"x_1", "x_2"}, "x#1")
     assert "r-1: x#1 = " in robochoc_within(*words).stdout
+
+
+PYDCOP = """name: pairs
+objective: min
+domains: {d: {values: [1, 2]}}
+variables: {a1: {domain: d}, a2: {domain: d}, b1: {domain: d}}
+constraints:
+  differ: {type: intention, function: 1000 if a1 == b1 or a2 == b1 else 0}
+  same: {type: intention, function: 1000 if a1 != a2 else 3}
+  low: {type: intention, function: b1}
+"""
+
+
+def test_files_are_read_with_the_options_of_an_import(tmp_path: Path) -> None:
+    file = tmp_path / "pairs.yaml"
+    file.write_text(PYDCOP)
+    asked = ("--infinity", 1000, "--owner", "[a-z]")
+    (sizes, *_) = robochoc_within("validate", file, *asked).stdout.splitlines()
+    assert sizes == f"{file}: 2 robots, 3 variables, 3 constraints: ok"
+    words = ["solve", file, "--protocol", "central", "--json", "--with", "ortools"]
+    told = json.loads(robochoc_within(*words, *asked).stdout)
+    assert (told["verdict"], told["cost"], told["assignment"]) == ("optimal", 4, {"a1": 2, "a2": 2, "b1": 1})
+    impossible = json.loads(robochoc_within(*words, "--infinity", 3).stdout)
+    assert (impossible["verdict"], impossible["cost"]) == ("no-solution", None)
+    dot = [robochoc_within("export", file, "--format", "dot", *more).stdout for more in ((), asked)]
+    assert [words.count("values)") for words in dot] == [3, 3]
+    assert ['"a" [label' in words for words in dot] == [False, True]
+
+
+@pytest.mark.parametrize("command", ["solve", "validate", "export"])
+def test_the_options_of_an_import_are_not_for_teams(command: str, problem: Path, tmp_path: Path) -> None:
+    team = tmp_path / "team"
+    assert robochoc_within("import", problem, "-o", team).returncode == 0
+    done = robochoc_within(command, team, "--infinity", 5)
+    assert done.returncode == 1
+    assert f"{team}: is the folder of a team, and 'infinity' is for files of other tools" in done.stdout + done.stderr
+
+
+DYNAMIC = """name: dynamic
+objective: min
+domains: {d: {values: [R, G]}}
+variables: {_a: {domain: d}, _b: {domain: d}}
+constraints: {differ: {type: intention, function: 2 if _a == _b else 1}}
+agents: [r-1, r-2]
+"""
+SCENARIO = "events: [{id: leaves, actions: [{type: remove_agent, agent: r-2}]}]\n"
+
+
+def test_epochs_of_an_imported_scenario_have_original_names(tmp_path: Path) -> None:
+    files = [tmp_path / "dynamic.yaml", tmp_path / "scenario.yaml"]
+    for file, text in zip(files, (DYNAMIC, SCENARIO), strict=True):
+        file.write_text(text)
+    team = tmp_path / "team"
+    assert robochoc_within("import", *files, "-o", team).returncode == 0
+    words = ["solve", team, "--protocol", "sfb", "--runtime", "simulator"]
+    shown = robochoc_within(*words).stdout
+    assert "1  -r-2            1  optimal" in shown
+    assert "    r-1: _a = R\n" in shown
+    told = json.loads(robochoc_within(*words, "--json").stdout)
+    assert (told["assignment"], told["names"]["v_a"]) == ({"v_a": "R"}, "_a")
+    solution = load(*files).solve("sfb", runtime="simulator")
+    assert solution.values == {"_a": "R"}
+    assert [(one.opened_by, *one.robots, *one.assignment) for one in solution.epochs] == [
+        ("the start", "r-1", "r-2", "_a", "_b"),
+        ("-r-2", "r-1", "_a"),
+    ]
+    assert "-r-2" in solution._repr_html_()
+    for wrong, message in ((team, "is the folder of a team, and"), (tmp_path / "none.yaml", "none.yaml")):
+        with pytest.raises(InvalidInputError, match=message):
+            load(wrong, files[1])
+    assert "name it with the file of the variables" in robochoc_within("solve", files[1]).stderr
+
+
+@pytest.mark.parametrize("command", ["solve", "validate", "export", "import"])
+@pytest.mark.parametrize(
+    ("content", "message"),
+    [
+        (PYDCOP.encode("utf-16"), "{file}: is not UTF-8: it looks like UTF-16 (save it in UTF-8)"),
+        (PYDCOP.encode("utf-16-le"), "{file}: is not UTF-8: it looks like UTF-16 (save it in UTF-8)"),
+        (PYDCOP.replace("pairs", "p\xe4rs").encode("latin-1"), "{file}: is not UTF-8 (save it in UTF-8)"),
+        (PYDCOP.replace("min", "Minimise").encode(), "{file}:2: has the objective 'Minimise' (write objective: min)"),
+        (b"print()\n", "{file}: is of no format that is read here ("),
+    ],
+    ids=["utf-16", "utf-16-le", "latin-1", "objective", "none"],
+)
+def test_a_file_that_cannot_be_read_is_told_in_one_line(
+    content: bytes, message: str, command: str, tmp_path: Path
+) -> None:
+    file = tmp_path / ("program.py" if content.startswith(b"print") else "pairs.yaml")
+    file.write_bytes(content)
+    done = robochoc_within(command, file, *(("-o", tmp_path / "team") if command == "import" else ()))
+    assert done.returncode == 1
+    assert message.format(file=file) in done.stdout + done.stderr
+
+
+NETWORK = """{"problem": {"name": "b", "mustbe": "<8.0"}, "variables": {"x": 2, "y": 2, "z": 2}, "functions": {
+  "f": {"scope": ["x", "y"], "costs": [3, 4.25, 3, 5]}, "g": {"scope": ["y", "z"], "costs": [4, 3, 2, 3]}}}"""
+
+
+def test_what_would_be_another_problem_is_told_by_all_who_read_the_file(tmp_path: Path) -> None:
+    file = tmp_path / "b.cfn"
+    file.write_text(NETWORK)
+    changed = ("  truncated: costs are cut to 1 decimal place as mustbe has", "  bound: toulbar2 accepts only sums")
+    for words in (["solve", file, "--runtime", "simulator"], ["validate", file]):
+        done = robochoc_within(*words)
+        assert done.returncode == 0
+        told = done.stderr if words[0] == "solve" else done.stdout
+        assert all(one in told for one in changed)
+        assert "owner" not in told
+    assert "owner: the format knows no owners" in robochoc_within("import", file, "-o", tmp_path / "team").stdout
+    told = json.loads(robochoc_within("validate", file, "--json").stdout)
+    kinds = ["truncated", "bound", "owner"]
+    assert [note["kind"] for note in told["notes"]] == kinds
+    assert [kind for kind, _ in load(file).notes] == kinds
+    assert json.loads(robochoc_within("solve", file, "--runtime", "simulator", "--json").stdout)["cost"] == 6.0
+
+
+def test_an_exported_problem_may_have_any_name(tmp_path: Path) -> None:
+    file, exported = tmp_path / "pairs.yaml", tmp_path / "pairs.txt"
+    file.write_text(PYDCOP)
+    assert robochoc_within("export", file, "--format", "pydcop", "-o", exported).returncode == 0
+    assert "it is pyDCOP's YAML" in robochoc_within("validate", exported).stdout
+    assert robochoc_within("import", exported, "-o", tmp_path / "team").returncode == 0
 
 
 def test_validate_says_what_a_file_is(problem: Path) -> None:

@@ -10,19 +10,15 @@ import msgspec
 import pytest
 
 from robochoc.cli.reports.outcome import outcome_report
-from robochoc.communication.control import Conclusion, Counters, Ready
-from robochoc.communication.network.audited_state import AuditedSearchState
-from robochoc.communication.network.control_messages import Charge, DetailedReport, Exchanged
-from robochoc.communication.network.plausibility import Declarations
+from robochoc.communication.control import Conclusion
+from robochoc.communication.network.control_messages import Charge
 from robochoc.communication.processes.processes import ProcessesRun
 from robochoc.communication.run_result import RobotsLostError
 from robochoc.formats.result import read_result, result_json
-from robochoc.model.outcome import ALL_ROBOTS, CheckCounts, Metrics, Outcome, PseudoTreeNode, Verdict
-from robochoc.model.problem import Constraint, Team
+from robochoc.model.outcome import ALL_ROBOTS, CheckCounts, Outcome, Verdict
 from robochoc.protocols.abt import ABT
 from robochoc.protocols.afc import AFC
 from robochoc.protocols.awc import AWC
-from robochoc.protocols.findings import NOTHING, Findings, Incumbent, Trail
 from robochoc.protocols.first_fit import FirstFit
 from robochoc.protocols.protocol import Protocol
 from robochoc.protocols.sfb import SFB
@@ -31,27 +27,9 @@ from robochoc.run.networked.machines import claimed
 from robochoc.run.registry import protocol_named, protocol_names
 from tests.support import traitors
 from tests.support.in_memory_network import InMemoryNetwork
-from tests.support.problems import PREDICATES, known_to_both, team_of
+from tests.support.one_traitor import CHAIN, DIFFERENT, VALUES, begun
+from tests.support.problems import known_to_both, team_of
 from tests.support.traitors import Lie, changed
-
-_DIFFERENT = [Constraint("C", PREDICATES[0], pair, pair) for pair in (("A", "B"), ("B", "C"))]
-CHAIN = team_of(dict.fromkeys("ABC", (1, 2)), _DIFFERENT)
-"""RA, RB and RC, each other than the one before: it has two solutions."""
-VALUES = {"A": 1, "B": 2, "C": 1}
-
-
-@pytest.fixture
-def lied(monkeypatch: pytest.MonkeyPatch) -> Callable[..., InMemoryNetwork]:
-    """A team in which RB lies, after a search."""
-
-    def searched(lie: Lie, protocol: type[Protocol] = ABT, team: Team = CHAIN) -> InMemoryNetwork:
-        traitors.install(lie, "RB", monkeypatch.setattr)
-        office = InMemoryNetwork(team, protocol, traitor="RB")
-        office.search()
-        return office
-
-    return searched
-
 
 # Its verdict
 
@@ -124,12 +102,6 @@ def test_no_solution_rests_on_its_word(lied: Callable[..., InMemoryNetwork]) -> 
     office = lied(traitors.LIES["no-solution"])
     result = office.state.result(0)
     assert (result.verdict, result.witness, result.lost) == (Verdict.NO_SOLUTION, "RB", {})
-
-
-def begun(traits: Traits = AFC.traits) -> AuditedSearchState:
-    state = AuditedSearchState(1, ("RA", "RB", "RC"), None, Declarations(traits))
-    state.ordered = True
-    return state
 
 
 def test_a_second_verdict_that_contradicts_the_first() -> None:
@@ -251,13 +223,13 @@ def test_it_judges_its_own_constraint_alone(lied: Callable[..., InMemoryNetwork]
     office = lied(traitors.LIES["a wrong value"])
     assert judged(office)[0] is False, "RC's constraint with RB is broken as well, and RC says so"
     assert office.state.objections == ("RC finds its constraint over B C broken",)
-    office = lied(traitors.LIES["a wrong value"], team=team_of(dict.fromkeys("AB", (1, 2)), _DIFFERENT[:1]))
+    office = lied(traitors.LIES["a wrong value"], team=team_of(dict.fromkeys("AB", (1, 2)), DIFFERENT[:1]))
     assert judged(office) == (True, 0)
     assert office.state.thoroughness == (0, 1), "on its owner's word alone"
 
 
 def test_its_parent_knows_the_constraint_from_its_own_file(lied: Callable[..., InMemoryNetwork]) -> None:
-    team = known_to_both(team_of(dict.fromkeys("AB", (1, 2)), _DIFFERENT[:1]))
+    team = known_to_both(team_of(dict.fromkeys("AB", (1, 2)), DIFFERENT[:1]))
     office = lied(traitors.LIES["a wrong value"], team=team)
     judged(office)
     (doubt,) = office.state.doubts_about_verdict
@@ -321,164 +293,3 @@ def test_it_has_checked_what_cannot_be(lied: Callable[..., InMemoryNetwork], cha
     office = lied(traitors.judging(lambda one: changed(one, **change)))
     judged(office)
     assert set(office.state.lost) == {"RB"}
-
-
-# Its counts
-
-
-@pytest.mark.parametrize(
-    ("lie", "why"),
-    [
-        (traitors.counting(lambda _: -1), "it has counted -1 messages sent"),
-        (traitors.counting(lambda sent: sent, lambda _: -5), "-5 taken in, which cannot be"),
-        (traitors.counting(lambda _: 2**53 + 1), "which cannot be"),
-        (traitors.LIES["falling"], "its counters have fallen, from "),
-        (traitors.counting(lambda sent: sent + 1, lambda received: received + 1), "its counters have fallen"),
-        (traitors.LIES["costs"], "it has reported 9,007,199,254,740,992 constraint checks in 0.0 s"),
-        (traitors.spending(ncccs=2**40), "its clock is at 1,099,511,627,776, and neither its own"),
-        (traitors.spending(bytes=0), "bytes together, the largest of"),
-        (traitors.spending(bytes=2**50), "bytes together, the largest of"),
-        (traitors.spending(largest=2**50), "the largest of 1,125,899,906,842,624, which cannot be"),
-        (traitors.spending(largest=-1), "counts that cannot be"),
-        (traitors.spending(bytes=-1), "it has reported counts that cannot be"),
-        (traitors.spending(memory=2**52), "it has reported costs that are not its own"),
-        (traitors.spending(wall_s=1e300), "it has reported costs that are not its own"),
-        (traitors.spending(simulated_s=float("nan")), "it has reported costs that are not its own"),
-        (traitors.spending(messages={"Ok": 0}, bytes=0, largest=0), "are not as many as those"),
-        (traitors.spending(messages={"\x1b[2J": 1}), "it has reported messages of kinds that are none"),
-        (traitors.spending(messages={f"K{n}": 0 for n in range(101)} | {"Ok": 1}), "of kinds that are none"),
-        (
-            traitors.reporting(lambda one: changed(one, exchanged={"R9": Exchanged(1)})),
-            "somebody who is not of the team",
-        ),
-        (traitors.reporting(lambda one: changed(one, exchanged={"RA": Exchanged(1, -1)})), "counts that cannot be"),
-        (traitors.finding(Findings(bound=float("-inf"))), "it tells of costs that cannot be"),
-        (traitors.finding(Findings(bound=float("nan"))), "it tells of costs that cannot be"),
-        (traitors.finding(Findings(best=Incumbent(-1.0, {}))), "it tells of costs that cannot be"),
-        (
-            traitors.finding(Findings(best=Incumbent(1, {"\x1b[2J": (1,)}))),
-            "it tells of a robot that is not of the team",
-        ),
-        (traitors.finding(Findings(place=PseudoTreeNode("R9"))), "it tells of a robot that is not of the team"),
-        (traitors.finding(Findings(trail=Trail([(0, -1)], 0))), "it tells of cycles that cannot be"),
-    ],
-)
-def test_counts_that_cannot_be(lied: Callable[..., InMemoryNetwork], lie: Lie, why: str) -> None:
-    office = lied(lie)
-    assert set(office.state.lost) == {"RB"}
-    assert why in office.state.lost["RB"]
-
-
-def test_more_taken_in_than_was_sent(lied: Callable[..., InMemoryNetwork]) -> None:
-    """The sums tell that somebody lies; the report, held against its own earlier words, who."""
-    office = lied(traitors.counting(lambda sent: sent, lambda received: received + 3))
-    assert set(office.state.lost) == {"RB"}
-
-
-def exchanging(change: Callable[[Exchanged], Exchanged], who: str = "RA") -> Lie:
-    """What it says of its messages with another is changed, and its sums go with that."""
-
-    def reported(account: DetailedReport) -> DetailedReport:
-        exchanged = {**account.exchanged, who: change(account.exchanged.get(who, Exchanged()))}
-        sent = sum(one.sent for one in exchanged.values())
-        metrics = replace(account.metrics, messages={"Ok": sent}, bytes=max(account.metrics.bytes, sent))
-        return changed(account, metrics=metrics, exchanged=exchanged)
-
-    return traitors.reporting(reported)
-
-
-@pytest.mark.parametrize(
-    ("change", "why"),
-    [
-        (
-            lambda one: one._replace(received=one.received + 3),
-            "RA says that it has sent RB 1 messages, and RB that it has had 4",
-        ),
-        (lambda one: one._replace(clock=1000), "RB says that the clock of RA was at 1,000 when it spoke"),
-    ],
-)
-def test_messages_that_nobody_has_sent(
-    lied: Callable[..., InMemoryNetwork], change: Callable[[Exchanged], Exchanged], why: str
-) -> None:
-    office = lied(exchanging(change))
-    doubts = office.state.doubts_about_counts
-    assert [set(doubt.between) for doubt in doubts] == [{"RA", "RB"}]
-    assert doubts[0].why.startswith(why)
-    assert not office.state.doubts_about_verdict, "a solution is checked, whatever was counted"
-
-
-def quiet(accounts: dict[str, DetailedReport], heard: dict[str, tuple[int, int]], traits: Traits) -> AuditedSearchState:
-    """All have answered two waves, and reported."""
-    state = begun(traits)
-    for _ in range(2):
-        wave = state.counters.begin_wave()
-        for name, counts in heard.items():
-            assert not state.handle(name, Counters(1, wave, *counts))
-    for name, account in accounts.items():
-        assert not state.handle(name, account)
-    assert state.counters.quiescent
-    return state
-
-
-def reported(kind: str = "Ok", checks: int = 0, **exchanged: Exchanged) -> DetailedReport:
-    sent = sum(one.sent for one in exchanged.values())
-    return DetailedReport(
-        1,
-        {},
-        Metrics({kind: sent}, sent, 0, checks, largest=min(sent, 1)),
-        NOTHING,
-        assigned=False,
-        exchanged=exchanged,
-    )
-
-
-def test_quiet_too_early() -> None:
-    """RB has counted as many messages taken in as RA sent it; RA's message to RC, it says, it has had itself."""
-    heard = {"RA": (2, 0), "RB": (0, 2), "RC": (0, 0)}
-    accounts = {"RA": reported(RB=Exchanged(1), RC=Exchanged(1)), "RB": reported(RA=Exchanged(0, 2)), "RC": reported()}
-    state = quiet(accounts, heard, SFB.traits)
-    assert [doubt.between for doubt in state.doubts_about_verdict] == [("RA", "RB"), ("RA", "RC")]
-    assert not quiet(accounts, heard, ABT.traits).doubts_about_verdict, (
-        "where nothing is minimised, the answer is checked"
-    )
-
-
-def test_whom_it_stirs_after_all_were_quiet_is_not_blamed() -> None:
-    heard = {"RA": (1, 0), "RB": (0, 1), "RC": (0, 0)}
-    accounts = {
-        "RA": reported(RB=Exchanged(1, 1), RC=Exchanged(1)),
-        "RB": reported(RA=Exchanged(1, 1)),
-        "RC": reported(),
-    }
-    state = begun(SFB.traits)
-    for _ in range(2):
-        wave = state.counters.begin_wave()
-        for name, counts in heard.items():
-            state.handle(name, Counters(1, wave, *counts))
-    assert not state.handle("RA", accounts["RA"]), "it has answered what it was told"
-    assert state.handle("RB", accounts["RB"]) == "it has sent messages after all were quiet, in answer to none"
-    assert not state.handle("RC", accounts["RC"])
-
-
-def test_who_keeps_it_awake() -> None:
-    state = begun()
-    assert not state.handle("RA", reported(RB=Exchanged(150, 3)))
-    assert not state.handle("RB", reported(RA=Exchanged(3, 2), RC=Exchanged(0, 0)))
-    assert not state.handle("RC", reported())
-    assert state.unfinished == "RA says that it has sent RB 150 messages, and RB that it has had 2 of it"
-
-
-def test_who_does_not_answer() -> None:
-    state = begun()
-    for name in state.order:
-        state.handle(name, Ready(1))
-    state.handle("RA", Counters(1, state.counters.begin_wave(), 150, 3))
-    state.note_end(1, in_time=False)
-    assert state.unfinished == "RB, RC have not answered the master"
-
-
-def test_who_was_never_ready() -> None:
-    state = begun()
-    state.handle("RA", Ready(1))
-    state.note_end(1, in_time=False)
-    assert state.unfinished.startswith("RB, RC have not answered the master")

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import click
 
 from robochoc.cli.options.paths import OutputFile, refuse_same_places
-from robochoc.cli.options.problems import WRITTEN, Problem
+from robochoc.cli.options.problems import WRITTEN, Problem, reading_options
 from robochoc.cli.reports.failures import USAGE, Failure, failures_told
 
 if TYPE_CHECKING:
@@ -22,7 +22,8 @@ if TYPE_CHECKING:
     "--format", "kind", type=click.Choice(WRITTEN), default="xcsp3", show_default=True, help="What is written."
 )
 @click.option("-o", "--output", type=OutputFile(), metavar="FILE", help="File to write.  [default: standard output]")
-def export(folder: Path, kind: str, output: Path | None) -> None:
+@reading_options
+def export(folder: Path, kind: str, output: Path | None, **reading: Any) -> None:  # noqa: ANN401 - `read_problem`
     """Write the problem of the team in the folder TEAM for other tools, all files merged.
 
     \b
@@ -43,7 +44,7 @@ def export(folder: Path, kind: str, output: Path | None) -> None:
     with failures_told(folder):
         from robochoc.formats.problems import read_problem
 
-        team = read_problem(folder).team
+        team = read_problem(folder, **reading).team
         files = _files(team, kind)
     if output is None:
         click.echo(b"".join(files.values()), nl=False)

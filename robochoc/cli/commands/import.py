@@ -11,15 +11,13 @@ import click
 from robochoc.cli.options.order import GIVEN, ORDER_NAME, order_for
 from robochoc.cli.options.order import NAMES as ORDERS
 from robochoc.cli.options.paths import InputPath
-from robochoc.cli.options.problems import READ, Pattern
+from robochoc.cli.options.problems import READ, reading_options
 from robochoc.cli.reports.failures import INVALID, Failure
+from robochoc.cli.reports.notes import notes_told
 
 if TYPE_CHECKING:
     from robochoc.formats import InvalidInputError
     from robochoc.formats.dialects.dialect import Imported, ImportOptions
-
-_SHOWN = 3
-"""The notes of one kind that are shown."""
 
 
 class _Source(NamedTuple):
@@ -35,15 +33,7 @@ class _Source(NamedTuple):
 @click.option(
     "--format", "dialect", type=click.Choice(READ), help="Format of the files.  [default: recognised by their contents]"
 )
-@click.option(
-    "--infinity", type=click.IntRange(1), metavar="N", help="Costs of N or more forbid (maximising: of -N or less)."
-)
-@click.option(
-    "--owner",
-    type=Pattern(),
-    metavar="REGEX",
-    help="Variables that nobody owns: one robot for those with the same match, or first group.  [default: one each]",
-)
+@reading_options
 @click.option("--allow-code", is_flag=True, help="Execute the Python files that a pyDCOP problem names.")
 @click.option(
     "--order",
@@ -166,6 +156,7 @@ def _contents(imported: Imported) -> dict[str, Any]:
 
 def _tell(entry: dict[str, Any]) -> None:
     from robochoc.formats import on_one_line
+    from robochoc.formats.dialects.dialect import Note
 
     if not entry["imported"]:
         Failure(INVALID, "\n".join(entry["errors"])).show()
@@ -174,14 +165,8 @@ def _tell(entry: dict[str, Any]) -> None:
     counts = ", ".join(f"{number:,} {what if number != 1 else what[:-1]}" for what, number in sizes.items())
     folder = on_one_line(entry["team"])
     click.echo(f"{folder}: {counts}, from {entry['format']}; next: robochoc solve {folder}")
-    kinds: dict[str, list[str]] = {}
-    for note in entry["notes"]:
-        kinds.setdefault(note["kind"], []).append(note["text"])
-    for kind, texts in kinds.items():
-        for text in texts[:_SHOWN]:
-            click.echo(on_one_line(f"  {kind}: {text}"))
-        if len(texts) > _SHOWN:
-            click.echo(f"  {kind}: and {len(texts) - _SHOWN:,} more (--report lists them)")
+    for line in notes_told([Note(**note) for note in entry["notes"]], "--report lists them"):
+        click.echo(line)
 
 
 def _write_report(place: Path, told: list[dict[str, Any]]) -> None:

@@ -17,7 +17,7 @@ from robochoc.cli.options.order import GIVEN, ORDER_NAME, order_for
 from robochoc.cli.options.order import NAMES as ORDERS
 from robochoc.cli.options.pages import html_option, serve_option
 from robochoc.cli.options.paths import refuse_same_places, teams_at
-from robochoc.cli.options.problems import Problem
+from robochoc.cli.options.problems import Problem, reading_options
 from robochoc.cli.options.recording import journal_option, recording, shown_and_flushed
 from robochoc.cli.options.ros import (
     flight_options,
@@ -43,6 +43,7 @@ from robochoc.cli.options.solve import (
 from robochoc.cli.reports.closed_loop import flight_told, told_of
 from robochoc.cli.reports.failures import LIMIT, Failure, failures_told, worst
 from robochoc.cli.reports.live_sniffer import Watch, check_chosen, watching
+from robochoc.cli.reports.notes import differences_told
 from robochoc.run.defaults import default_protocol
 
 if TYPE_CHECKING:
@@ -65,6 +66,7 @@ _SECTIONS: Sections = {
     "Losses of robots (processes and network)": ("--on-loss", "--spare", "--patience", "--kill"),
     "Messages on their way": ("--schedule", "--delay", "--channel", "--filter"),
     "Robots with several variables": ("--local-solutions", "--local-timeout", "--ace", "--no-cache"),
+    "Files of other tools (docs/guides/import.md)": ("--infinity", "--owner"),
     "Output": ("--explain", "--serve", "--open"),
     "ROS (docs/guides/ros.md)": ("--ros", "--frame", "--scale", "--situation", "--report-timeout", "--battery"),
     "Simulated flight (--situation flight)": ("--fail", "--distance", "--wind", "--gusts", "--obstacle"),
@@ -157,6 +159,7 @@ _SECTIONS: Sections = {
 )
 @click.option("--verify", is_flag=True, help="Confirm a no-solution or an optimum centrally.")
 @local_options
+@reading_options
 @ros_options
 @situation_options
 @flight_options
@@ -193,7 +196,10 @@ def solve(
     named = {"--order": settings["order"], "--channel": settings["channel"]}
     given = {option: value for option, value in named.items() if isinstance(value, Path)}
     options = options_of(settings, environment=bool(ros.situation))
-    wanted = Wanted(settings["protocol"], settings["order"], as_json=as_json, explain=explain, ros=ros)
+    wanted = Wanted(
+        settings["protocol"], settings["order"], settings.pop("infinity"), settings.pop("owner"),
+        as_json=as_json, explain=explain, ros=ros,
+    )  # fmt: skip
     products = Products(html, journal, serve, watching(settings["sniff"], open_browser=settings["open_browser"]))
     folders = teams_at(paths, foreign=True)
     refuse_same_places(
@@ -252,7 +258,9 @@ def _recorded(folder: Path, options: Options, products: Products, wanted: Wanted
     """Solve the team in `folder`, with a journal and a closed loop where they are asked for, and print the outcome."""
     from robochoc.formats.problems import read_problem
 
-    problem = read_problem(folder)
+    problem = read_problem(folder, infinity=wanted.infinity, owner=wanted.owner)
+    for line in differences_told(problem.notes):
+        click.echo(line, err=True)
     team = problem.team
     check_chosen(products.watching, team)
     protocol = wanted.protocol or default_protocol(team.kind)
@@ -326,7 +334,7 @@ def _tell(problem: ReadProblem, outcome: Outcome, wanted: Wanted) -> None:
     """
     from robochoc.model.original_names import renamed_outcome, renamed_team
 
-    names = {} if problem.team.dynamic else problem.names
+    names = problem.names
     if wanted.as_json:
         from robochoc.formats.result import result_json
 
@@ -336,7 +344,7 @@ def _tell(problem: ReadProblem, outcome: Outcome, wanted: Wanted) -> None:
         from robochoc.cli.reports.outcome import outcome_report
 
         outcome = renamed_outcome(outcome, names)
-        click.echo(outcome_report(renamed_team(problem.team, names), outcome))
+        click.echo(outcome_report(renamed_team(problem.team, names, outcome.events), outcome))
         if wanted.explain:
             from robochoc.cli.reports.pseudo_tree import tree_text
 

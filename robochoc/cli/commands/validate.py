@@ -9,18 +9,23 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from robochoc.cli.options.paths import InputPath, foreign_files_told
+from robochoc.cli.options.problems import reading_options
 from robochoc.cli.reports.failures import INVALID
 
 if TYPE_CHECKING:
     from robochoc.formats import InvalidInputError
+    from robochoc.formats.dialects.dialect import Note
     from robochoc.model.problem import Robot
 
 
 @click.command()
 @click.argument("paths", nargs=-1, type=InputPath(), metavar="[PATH ...]")
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON object per team.")
+@reading_options
 @click.pass_context
-def validate(context: click.Context, paths: tuple[Path, ...], *, as_json: bool) -> None:
+def validate(
+    context: click.Context, paths: tuple[Path, ...], *, as_json: bool, infinity: int | None, owner: str | None
+) -> None:
     """Check all teams in the folders PATH and below (default: instances/), or single robots' files.
 
     Checked are the XML, the schema, the meaning of each file, and the team as a whole. All errors of all files are
@@ -36,34 +41,35 @@ def validate(context: click.Context, paths: tuple[Path, ...], *, as_json: bool) 
         except InvalidInputError as invalid:
             reports.append(_invalid(path, invalid, foreign_files_told(path)))
         else:
-            reports.extend(_report(place) for place in found)
+            reports.extend(_report(place, infinity, owner) for place in found)
     for report in reports:
         _print_json(report) if as_json else _print(report)
     if not all(report["valid"] for report in reports):
         context.exit(INVALID)
 
 
-def _report(place: Path) -> dict[str, Any]:
+def _report(place: Path, infinity: int | None, owner: str | None) -> dict[str, Any]:
     """The validation of one team, or of one robot's file."""
     from robochoc.formats import InvalidInputError, encodable, read_robot
-    from robochoc.formats.dialects.registry import recognise, unknown_format
+    from robochoc.formats.dialects.registry import recognised
     from robochoc.formats.problems import read_problem
 
-    dialect = recognise(place)
+    notes: tuple[Note, ...] = ()
     try:
-        if place.is_file() and dialect is None and place.suffix.lower() not in {"", ".xml"}:
-            raise unknown_format(place)
+        dialect = recognised(place)
         if place.is_file() and dialect is None:
             robots: tuple[Robot, ...] = (read_robot(place),)
             events = 0
         else:
-            team = read_problem(place).team
+            problem = read_problem(place, infinity=infinity, owner=owner)
+            team = problem.team
+            notes = problem.notes
             robots, events = team.robots, len(team.scenario)
     except InvalidInputError as invalid:
         return _invalid(place, invalid)
     report = {"path": encodable(str(place)), "valid": True, **_sizes(robots), "events": events, "errors": []}
     if dialect:
-        report |= {"format": dialect.name, "title": dialect.title}
+        report |= {"format": dialect.name, "title": dialect.title, "notes": [note._asdict() for note in notes]}
     return report
 
 
@@ -101,7 +107,9 @@ def _print_json(report: dict[str, Any]) -> None:
 
 
 def _print(report: dict[str, Any]) -> None:
+    from robochoc.cli.reports.notes import differences_told
     from robochoc.formats import on_one_line
+    from robochoc.formats.dialects.dialect import Note
 
     path = on_one_line(report["path"])
     if report["valid"]:
@@ -114,6 +122,8 @@ def _print(report: dict[str, Any]) -> None:
         click.echo(f"{path}: {counts}: ok{alone}")
         if "format" in report:
             click.echo(f"  it is {report['title']}: 'robochoc solve' takes it, 'robochoc import' makes a team of it")
+            for line in differences_told([Note(**note) for note in report["notes"]]):
+                click.echo(line)
         return
     errors = report["errors"]
     click.echo(f"{path}: {len(errors)} error{'s' * (len(errors) != 1)}")

@@ -33,12 +33,12 @@ _LOCAL_OPTIONS = (
         "--ace",
         "always_ace",
         is_flag=True,
-        help="Have ACE solve small local problems too; by default they are enumerated.",
+        help="Have ACE solve small local problems, too.",
     ),
     click.option(
         "--no-cache",
         is_flag=True,
-        help="Do not use the cache of solved local problems ('robochoc cache').",
+        help="Do not use the cache of solved local problems.",
     ),
 )
 

@@ -136,13 +136,13 @@ def teams_at(paths: Iterable[Path], *, foreign: bool = False) -> list[Path]:
     Raises `Failure`, which names every path without a team: nothing is done by half.
     """
     from robochoc.formats import InvalidInputError, find_teams
-    from robochoc.formats.dialects.registry import recognise
+    from robochoc.formats.dialects.registry import recognised
 
     folders: dict[Path, None] = {}
     wrong = []
     for path in paths:
         try:
-            if foreign and path.is_file() and recognise(path):
+            if foreign and recognised(path):
                 folders[path] = None
             else:
                 folders.update(dict.fromkeys(find_teams(path)))

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from collections.abc import Callable
+from typing import TYPE_CHECKING, TypeVar
 
 import click
 
@@ -10,6 +11,8 @@ from robochoc.cli.options.paths import TeamFolder
 
 if TYPE_CHECKING:
     from click.shell_completion import CompletionItem
+
+_Command = TypeVar("_Command", bound=Callable[..., object])
 
 READ = ("frodo", "xdiscsp", "pydcop", "xcsp3", "cfn", "wcsp")
 """The dialects that are imported."""
@@ -41,3 +44,17 @@ class Pattern(click.ParamType[str]):
         except (re.error, OverflowError, RecursionError) as error:
             self.fail(f"{value!r} is no regular expression: {error}", param, ctx)
         return value
+
+
+def reading_options(command: _Command) -> _Command:
+    """Add `--infinity` and `--owner`: how a file of another tool is read."""
+    owner = click.option(
+        "--owner",
+        type=Pattern(),
+        metavar="REGEX",
+        help="One robot for variables with the same match (or first group).",
+    )
+    infinity = click.option(
+        "--infinity", type=click.IntRange(1), metavar="N", help="Costs of N or more forbid (maximising: of -N or less)."
+    )
+    return infinity(owner(command))

@@ -60,7 +60,7 @@ flight_options = _optional(
         "--distance",
         type=Finite(0, min_open=True),
         metavar="METRES",
-        help="Minimum distance between drones.  [default: 0.5, or less where places are nearer]",
+        help="Minimum distance between drones.  [default: 0.5 or less]",
     ),
     click.option("--wind", type=WindType(), metavar="X[,Y,Z]", help="Wind, in m/s."),
     click.option("--gusts", type=Finite(0), metavar="M/S", help="Strength of gusts, in m/s."),
@@ -89,7 +89,7 @@ situation_options = _optional(
         "--report-timeout",
         type=Finite(0, min_open=True),
         metavar="SECONDS",
-        help="With --situation: how long to wait for a report after each decision.  [default: 10]",
+        help="With --situation: wait so long.  [default: 10]",
     ),
     click.option(
         "--battery",

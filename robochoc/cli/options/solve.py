@@ -95,7 +95,7 @@ kill_option = click.option(
     type=KillType(),
     multiple=True,
     metavar="ROBOT@SECONDS",
-    help="Kill the robot's process this many seconds after the search began. Repeatable.",
+    help="Kill the robot's process after so long. Repeatable.",
 )
 filter_option = click.option(
     "--filter",
@@ -167,10 +167,12 @@ class Products:
 
 @dataclass(frozen=True)
 class Wanted:
-    """The request for each team: the protocol (None: by the team's kind), the order, the report, and the place."""
+    """The request for each team: the protocol (None: by its kind), the order, how files are read, and what is told."""
 
     protocol: str | None
     order: str | Path
+    infinity: int | None
+    owner: str | None
     as_json: bool
     explain: bool
     ros: RosOptions

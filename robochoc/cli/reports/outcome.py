@@ -9,7 +9,7 @@ from robochoc.cli.reports.table import table_lines
 from robochoc.formats import on_one_line
 from robochoc.formats.diagnostics import shortened
 from robochoc.model.change import team_after_events
-from robochoc.model.cost_units import Cost
+from robochoc.model.cost_units import Cost, cost_shown
 from robochoc.model.headline import describe_outcome
 from robochoc.model.outcome import ALL_ROBOTS, CENTRAL_SOLVER, Metrics, Outcome, Verdict
 from robochoc.model.priorities import natural_key
@@ -134,7 +134,7 @@ def _weight(team: Team, outcome: Outcome) -> str:
 
 
 def _number(cost: Cost | None) -> str:
-    return "unknown" if cost is None else f"{cost:,}"
+    return "unknown" if cost is None else cost_shown(cost)
 
 
 def _so_far(team: Team, outcome: Outcome) -> str:

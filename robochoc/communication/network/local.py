@@ -22,6 +22,7 @@ from multiprocessing.util import get_temp_dir
 from typing import cast
 
 from robochoc.authority.admission import InMemoryAuthority
+from robochoc.communication.main_guard import require_main_guard
 from robochoc.communication.network import fork_server
 from robochoc.communication.network.master import Master
 from robochoc.communication.network.members import Members, reach
@@ -73,6 +74,7 @@ class LocalNetwork(Session):
         settings: NetworkSettings = NetworkSettings(),
         parameters: RunParameters = DEFAULT_PARAMETERS,
     ) -> None:
+        require_main_guard()
         super().__init__(team)
         team = self.compiled.team
         require_descriptors(_DESCRIPTORS + _DESCRIPTORS_PER_ROBOT * len(team.robots))

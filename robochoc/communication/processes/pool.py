@@ -12,6 +12,7 @@ from multiprocessing.context import ForkContext, ForkServerContext
 from typing import Literal, cast
 
 from robochoc.communication.control import FromRobot, QueueFrom, QueuesTo
+from robochoc.communication.main_guard import require_main_guard
 from robochoc.communication.processes.process_status import ProcessStatus
 from robochoc.communication.processes.robot_link import RobotLink
 from robochoc.communication.processes.robot_process import RobotStart, robot_process
@@ -36,6 +37,8 @@ class ProcessPool:
     """
 
     def __init__(self, start_method: StartMethod) -> None:
+        if start_method != "fork":
+            require_main_guard()
         self._context = _CONTEXTS[start_method]()
         self.robots: dict[str, RobotLink] = {}
         self._dismissed: list[RobotLink] = []

@@ -39,6 +39,12 @@ class Note(NamedTuple):
     text: str
 
 
+OTHER_PROBLEM = {
+    "bound", "default", "dropped", "external", "infinity", "left out", "repeated", "rounded", "scenario", "truncated",
+}  # fmt: skip
+"""Kinds of notes on what the team says otherwise than the file, or not at all; the others are on how it says it."""
+
+
 @dataclass(frozen=True)
 class Imported:
     """A problem of another tool, as a team.

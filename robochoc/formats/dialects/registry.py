@@ -5,6 +5,7 @@ Each is a module of this package that ends in `DIALECT = Dialect(...)`. It is im
 
 from __future__ import annotations
 
+import codecs
 import importlib
 import os
 import stat
@@ -89,10 +90,30 @@ def beginning_of(path: Path) -> bytes | None:
         os.close(descriptor)
 
 
+def recognised(path: Path) -> Dialect | None:
+    """Return the dialect that the file at `path` is in. None: it is no file, or may be that of a robot.
+
+    Raises:
+        InvalidInputError: if it is a file, and neither.
+    """
+    dialect = recognise(path)
+    if dialect is None and path.is_file() and (_is_wide(path) or path.suffix.lower() not in {"", ".xml"}):
+        raise unknown_format(path)
+    return dialect
+
+
+def _is_wide(path: Path) -> bool:
+    """Return whether a file begins as a text in UTF-16 or UTF-32 does: by its mark, or with zeros."""
+    first = (beginning_of(path) or b"")[:4]
+    return first.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)) or b"\0" in first
+
+
 def unknown_format(path: Path) -> InvalidInputError:
     """Return the error of a file that is in no dialect, or not there."""
     if not path.exists():
         return _invalid(path, "does not exist", "check its name")
+    if _is_wide(path):
+        return _invalid(path, "is not UTF-8: it looks like UTF-16", "save it in UTF-8")
     return _invalid(path, "is of no format that is read here", "'robochoc import --help' lists those that are")
 
 

@@ -22,6 +22,14 @@ EPOCHS = (EpochOutcome(Verdict.SOLUTION, SIX, assignment={"V1": 1}), EpochOutcom
         ({}, "solution for all 16 robots"),
         ({"verdict": Verdict.OPTIMAL, "cost": 1200}, "optimal solution for all 16 robots, cost 1,200"),
         ({"verdict": Verdict.OPTIMAL, "cost": Decimal("0.0")}, "optimal solution for all 16 robots, cost 0.0"),
+        (
+            {"verdict": Verdict.OPTIMAL, "cost": Decimal("1.5E-8")},
+            "optimal solution for all 16 robots, cost 0.000000015",
+        ),
+        (
+            {"verdict": Verdict.OPTIMAL, "cost": Decimal("-1234567.50")},
+            "optimal solution for all 16 robots, cost -1,234,567.50",
+        ),
         ({"cost": 0}, "solution for all 16 robots"),
         ({"verdict": Verdict.OPTIMAL, "withdrawn": SIX}, "10 of 16 fly (proven maximum)"),
         ({"withdrawn": SIX}, "10 of 16 fly (not proven to be the maximum)"),

@@ -2,8 +2,12 @@
 
 from __future__ import annotations
 
+import copy
+import pickle
+from collections.abc import Callable
 from dataclasses import replace
 from decimal import Decimal
+from enum import Enum
 from pathlib import Path
 
 import pytest
@@ -13,6 +17,7 @@ from robochoc.formats import InvalidInputError, read_team
 from robochoc.model.problem import Robot, Team
 from tests.support.program import ROOT
 
+Kind = Enum("Kind", ["FIRST", "SECOND"])
 TEAMS = ["docs/examples/" + name for name in ("arm", "hangar", "patrol", "rescue", "secrets")]
 
 
@@ -122,3 +127,48 @@ def test_symbols_that_are_there_already_are_not_taken_for_new_texts() -> None:
     new = more.robot("b").variable("y", ["1 2", "other"])
     more.add(new != more["a.x"], more["a.x"] == "v1_2", new != "other")
     assert more.solve("abt", runtime="simulator").values == {"a.x": "v1_2", "b.y": "1 2"}
+
+
+def twice(value: int) -> int:
+    return 2 * value
+
+
+COPIES = {
+    "copy": copy.copy,
+    "deepcopy": copy.deepcopy,
+    "pickle": lambda model: pickle.loads(pickle.dumps(model)),  # noqa: S301 - its own
+}
+
+
+@pytest.mark.parametrize("copied", COPIES.values(), ids=COPIES)
+def test_a_copy_of_a_model_is_a_model_of_its_own(copied: Callable[[robochoc.Model], robochoc.Model]) -> None:
+    model = robochoc.Model("original")
+    one, other = (model.robot(name) for name in "ab")
+    x, y = one.variable("x", Kind), other.variable("y", range(4))
+    model.add((x == Kind.FIRST) | (y > 1), robochoc.function(twice, y) <= 4)
+    one.knows((x == Kind.FIRST).implies(y != 1))
+    other.knows((x == Kind.SECOND) | (y != 3))
+    event = model.after_solution()
+    event.add(event.robot("c").variable("z", [1, 2]) == y)
+    before = model.solve("abt", runtime="simulator").values
+
+    again = copied(model)
+    assert again.team == model.team
+    assert again.solve("abt", runtime="simulator").values == before
+    assert again["a.x"] is not x
+    again.add(again["b.y"] != 0, name="more")
+    again.add(again["a.x"] == Kind.SECOND)
+    again.robot("d").boolean("flag")
+    assert [rule.name for rule in again.constraints] == ["C1", "more", "C5"]
+    assert (len(model.constraints), len(model.robots), model.team.name) == (1, 3, "original")
+    with pytest.raises(robochoc.ModelError):
+        again.add(y == 1)
+
+
+def test_what_pickle_does_not_take_it_says() -> None:
+    model = robochoc.Model()
+    x = model.robot("a").variable("x", range(3))
+    model.add(robochoc.function(lambda value: value > 1, x))
+    with pytest.raises((pickle.PicklingError, AttributeError), match="lambda"):
+        pickle.dumps(model)
+    assert copy.deepcopy(model).solve("abt", runtime="simulator")["a.x"] == 2

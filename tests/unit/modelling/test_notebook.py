@@ -4,14 +4,15 @@ from __future__ import annotations
 
 import json
 import re
+from decimal import Decimal
 from pathlib import Path
 
 from lxml import html
 
 import robochoc
 from robochoc.formats.result import result_json
-from robochoc.modelling.notebook.graph import MAX_ROBOTS
-from robochoc.modelling.notebook.tables import MAX_ROWS, table
+from robochoc.model.notebook.graph import MAX_ROBOTS
+from robochoc.model.notebook.tables import MAX_ROWS, table
 from tests.support.program import ROOT
 
 HOSTILE = "<script>alert('1')</script>&\"'\u202e"
@@ -40,6 +41,7 @@ def test_a_model_shows_robots_constraints_and_the_graph() -> None:
     assert shown.count("<circle ") == 3
     assert repr(model) == "<model charging: 3 robots, 3 variables, 1 constraint>"
     assert repr(model.team) == "<team charging: 3 robots>"
+    assert model.team._repr_html_() == shown
 
 
 def test_a_problem_from_files_shows_itself_too() -> None:
@@ -96,6 +98,22 @@ def test_the_scene_is_a_page_in_a_frame_that_reaches_nothing(tmp_path: Path) -> 
     assert (tmp_path / "scene.html").read_text() == scene.html
     assert "charging" in repr(scene)
     assert len(repr(scene)) < 100
+
+
+def test_small_costs_have_no_exponents() -> None:
+    model = robochoc.Model("small")
+    x, y = (model.robot(name).variable("x", range(2)) for name in "ab")
+    rule = model.add(x == y, cost=Decimal("0.000000015"))
+    model.minimize(x * 1e-8 + y * Decimal("1.5") - 1e-9)
+    assert repr(rule) == "<C1: (a.x == b.x), cost 0.000000015>"
+    assert repr(x * 1e-8 + y * Decimal("1.5") - 1e-9) == "(0.00000001*a.x + 1.5*b.x - 0.000000001)"
+    assert repr(x / 3) == "(1/3*a.x)"
+    told = model.solve("dpop", runtime="simulator")
+    assert repr(told) == "<small: optimal solution for all 2 robots, cost -0.000000001; dpop, simulator>"
+    for shown in (model._repr_html_(), told._repr_html_()):
+        assert not re.search("[0-9]E-", shown)
+    assert "0.000000015" in model._repr_html_()
+    assert json.loads(result_json(told))["cost"] == -1e-9
 
 
 def test_an_outcome_is_a_dictionary() -> None:

@@ -5,10 +5,15 @@ from __future__ import annotations
 from dataclasses import replace
 from decimal import Decimal
 from fractions import Fraction
+from pathlib import Path
+from random import Random
 
 import pytest
 
+from robochoc.communication.kill_schedule import Kill
+from robochoc.formats import write_team
 from robochoc.formats.result import read_result, result_json
+from robochoc.formats.team import read_team
 from robochoc.model.assembly import assemble
 from robochoc.model.expression import Type, parse
 from robochoc.model.outcome import Verdict
@@ -24,7 +29,8 @@ from robochoc.model.problem import (
     Team,
     Variable,
 )
-from robochoc.run.options import Options, Runtime, Withdrawal
+from robochoc.model.team_edits import without_robots
+from robochoc.run.options import OnLoss, Options, Runtime, Withdrawal
 from robochoc.run.orchestrator import solve
 from robochoc.solver.encoding import UnsupportedError
 from robochoc.verification.checker import RefutedError, check_told_cost
@@ -57,6 +63,30 @@ def test_robots_with_processes_count_the_same(runtime: Runtime) -> None:
         best = best_cost(team)
         outcome = solve(team, Options(protocol="adopt", runtime=runtime))
         assert (None if outcome.cost is None else Fraction(outcome.cost)) == best
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("runtime", [Runtime.PROCESSES, Runtime.NETWORK])
+def test_who_is_left_after_a_loss_has_the_exact_optimum(runtime: Runtime, tmp_path: Path) -> None:
+    """Robots that are killed are lost, or come back in processes of their own."""
+    for seed in range(25):
+        chance = Random(seed)
+        write_team(random_costs_team(seed), tmp_path / str(seed))
+        team = read_team(tmp_path / str(seed))
+        struck = chance.sample([robot.name for robot in team.robots], min(2, len(team.robots) - 1))
+        spares = len(struck) * (runtime is Runtime.PROCESSES and chance.random() < 0.5)
+        outcome = solve(
+            team,
+            Options(
+                protocol=chance.choice(PROTOCOLS[1:]),
+                runtime=runtime,
+                kill=tuple(Kill(robot, after_s=0) for robot in struck),
+                on_loss=None if spares else OnLoss.WITHDRAW,
+                spares=spares,
+            ),
+        )
+        best = best_cost(without_robots(team, outcome.lost))
+        assert (None if outcome.cost is None else Fraction(outcome.cost)) == best, seed
 
 
 @pytest.mark.parametrize("protocol", ["dsa", "mgm", "mgm2", "maxsum"])

@@ -109,7 +109,7 @@ def test_notes_are_bounded_and_losses_are_not_crowded_out() -> None:
     notes = told(feed.about())["notes"]
     assert len(notes) == 2 * MOST_NOTES
     assert notes[MOST_NOTES - 1]["text"] == f"a was lost: {MOST_NOTES + 4}"
-    assert notes[-1]["text"] == f"the cheapest so far costs {MOST_NOTES + 4}"
+    assert notes[-1]["text"] == f"the cheapest so far costs {MOST_NOTES + 4:,}"
 
 
 @pytest.mark.parametrize("protocol", OURS)

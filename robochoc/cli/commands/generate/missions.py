@@ -26,7 +26,7 @@ def model_option(name: str, choices: list[str], text: str) -> Callable[..., Any]
         "Preferences": ("--max-length", "--max-value", "--required"),
         "Output": OUTPUT,
     },
-    short_help="Meetings with preferences (DiMES): PEAV and EAV.",
+    short_help="Meetings with preferences (DiMES): PEAV, EAV and TSAV.",
 )
 @number("--agents", "Number of persons.")
 @number("--meetings", "Number of meetings.")
@@ -36,8 +36,9 @@ def model_option(name: str, choices: list[str], text: str) -> Callable[..., Any]
 @number("--max-value", "Meetings are worth 1 to N a slot and person, free slots 0 to N.", most=1_000_000, default=10)
 @model_option(
     "--model",
-    ["peav", "eav"],
-    "peav: a robot is a person, with a variable for each of its meetings; eav: a robot is a meeting.",
+    ["peav", "eav", "tsav"],
+    "peav: a robot is a person, with a variable for each of its meetings; eav: a robot is a meeting; tsav: a robot is a"
+    " person, with a variable for each slot.",
 )
 @click.option("--required", is_flag=True, help="All meetings must take place, and preferences do not count: a DisCSP.")
 @seed_option

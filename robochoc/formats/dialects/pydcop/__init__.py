@@ -9,14 +9,16 @@ from robochoc.formats.dialects.pydcop.parts import sections
 from robochoc.formats.dialects.pydcop.reader import read
 from robochoc.formats.dialects.pydcop.writer import written
 
+_BEGINS = {"objective", "domains"}
 _SECTIONS = {"domains", "variables", "constraints", "objective", "distribution", "events", "agents", "replica_dist"}
 
 
 def recognises(path: Path, beginning: bytes) -> bool:
-    """Return whether a file is pyDCOP's: it is called YAML, and has one of the sections."""
-    if path.suffix.lower() not in (".yaml", ".yml"):
-        return False
-    return bool(sections(beginning.decode("utf-8", "replace").lstrip("\ufeff")) & _SECTIONS)
+    """Return whether a file is pyDCOP's: it is called YAML, and has one of the sections; or it begins as a problem."""
+    found = sections(beginning.decode("utf-8", "replace").lstrip("\ufeff"))
+    if path.suffix.lower() in (".yaml", ".yml"):
+        return bool(found & _SECTIONS)
+    return not beginning.lstrip().startswith((b"<", b"{")) and found >= _BEGINS
 
 
 DIALECT = Dialect("pydcop", "pyDCOP's YAML", recognises, read, written)

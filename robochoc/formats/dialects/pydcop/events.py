@@ -9,6 +9,7 @@ from robochoc.formats.dialects.dialect import Names, Note
 from robochoc.formats.dialects.pydcop.hosting import text_of
 from robochoc.formats.dialects.pydcop.yaml_tree import Document, Node, Scalar
 from robochoc.model.problem import RemoveAgent, ScenarioEvent, Team
+from robochoc.model.wording import counted
 
 
 def read_scenario(
@@ -56,7 +57,7 @@ def _notes(events: int, delays: int, left_out: int) -> Iterator[Note]:
         text = "with pyDCOP other agents take the variables of one that leaves; here they leave with their robot"
         yield Note("scenario", text)
     if delays:
-        yield Note("scenario", f"{delays} delays in seconds: an event happens when the problem before is solved")
+        yield Note("scenario", f"{counted(delays, 'delay')} in seconds: events happen once what was before is solved")
     if left_out:
         yield Note("dropped", f"{left_out} actions that remove no agent, which pyDCOP passes over, too")
 

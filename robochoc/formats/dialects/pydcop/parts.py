@@ -78,7 +78,11 @@ def read_parts(paths: Sequence[Path]) -> Parts:
             raise _invalid(path, f"makes more than {MAX_BYTES // 2**20} MiB", "import a smaller problem")
         texts[_kind(text)].append((path, text))
     if not texts["problem"]:
-        raise _invalid(paths[0], "is no problem", "name the file with its variables and constraints, too")
+        raise _invalid(
+            paths[0],
+            "is no problem",
+            "name it with the file of the variables and constraints: robochoc import PROBLEM FILE -o FOLDER",
+        )
     for kind in ("distribution", "scenario"):
         if len(texts[kind]) > 1:
             raise _invalid(texts[kind][1][0], f"is a second {kind}", "name one")

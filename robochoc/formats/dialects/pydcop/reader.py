@@ -39,6 +39,7 @@ _SECTIONS = {
     "name", "objective", "description", "domains", "variables", "external_variables", "constraints", "agents",
     "distribution_hints", "distribution", "infinity", "inputs",
 }  # fmt: skip
+_OBJECTIVE = "write objective: min, or objective: max"
 _DROPPED = {
     "routes": "routes between agents",
     "hosting_costs": "costs of hosting",
@@ -102,9 +103,15 @@ class _Reader:
 
     def _maximize(self) -> bool:
         node = self._root.get("objective")
-        if node is None or node.scalar not in ("min", "max"):
-            raise MistakeError("has no objective", "write objective: min, or objective: max", node.line if node else 0)
-        return node.scalar == "max"
+        known = node.scalar if node is not None else None
+        if node is None or known is None:
+            raise MistakeError("has no objective", _OBJECTIVE, node.line if node else 0)
+        if known not in ("min", "max"):
+            word = str(known)
+            meant = next((short for short in ("min", "max") if word.strip().lower().startswith(short)), None)
+            hint = f"write objective: {meant}" if meant else _OBJECTIVE
+            raise MistakeError(f"has the objective '{shortened(word)}'", hint, node.line)
+        return known == "max"
 
     def _infinity(self) -> int | None:
         """Return the infinity of the options, or the one that an exported file names."""

@@ -19,6 +19,7 @@ from robochoc.formats.dialects.tables import Amount, CostTable
 from robochoc.formats.dialects.toulbar2.network import CostFunction, Network, imported
 from robochoc.formats.dialects.toulbar2.text import Reader, Words
 from robochoc.model.constraint import INFINITE
+from robochoc.model.wording import counted
 
 _TOKEN = re.compile(r'[{}\[\]]|[^{}\[\]\s":,]+')
 
@@ -62,7 +63,7 @@ class _CfnReader:
             self._functions[place] = self._sharing(self._functions[place], wanted)
         notes: tuple[Note, ...] = ()
         if self._truncated:
-            text = f"costs are cut to the {self._places} decimal places of mustbe, as toulbar2 does"
+            text = f"costs are cut to {counted(self._places, 'decimal place')} as mustbe has, which toulbar2 does too"
             notes = (Note("truncated", text),)
         return Network(_title(name, self._stem), self._variables, self._functions, bound, maximize, notes)
 

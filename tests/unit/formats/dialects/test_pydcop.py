@@ -133,7 +133,7 @@ LAUGHS = "a: &a [x,x,x,x,x,x,x,x,x]\n" + "".join(
         (f"variables: {'[' * 5000}", "nested"),
         ("variables: *nowhere\n", "alias"),
         ("variables: {x: {domain: d}\n", "is not YAML"),
-        ("objective: best\nvariables: {}\n", "no objective"),
+        ("objective: best\nvariables: {}\n", "has the objective 'best' (write objective: min, or objective: max)"),
         ("objective: min\nvariables: {no: {domain: d}}\n", "where a name should stand"),
         ("objective: min\ndomains: {d: {values: [0..999999999]}}\nvariables: {x: {domain: d}}\n", "100000"),
     ],

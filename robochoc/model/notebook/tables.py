@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from html import escape
 
-from robochoc.view.label import printable
+from robochoc.system.plain_text import printable
 
 MAX_ROWS = 40
 """The maximum number of rows of a table; of the others their number is told."""

@@ -5,9 +5,9 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
+from robochoc.model.notebook.tables import text
 from robochoc.model.orders import constraint_graph
 from robochoc.model.problem import Team
-from robochoc.modelling.notebook.tables import text
 
 MAX_ROBOTS = 60
 """More robots are not drawn: one could not tell them apart."""

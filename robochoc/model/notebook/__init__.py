@@ -1,0 +1,1 @@
+"""Teams as pieces of a notebook's page."""
