@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING, Any
 from robochoc.formats import check_team, read_robot
 from robochoc.formats.problems import read_problem
 from robochoc.journal.events import Observer
-from robochoc.model.original_names import renamed_outcome, renamed_team
+from robochoc.model.original_names import renamed_outcome, renamed_team, robots_called
 from robochoc.model.outcome import Outcome
 from robochoc.model.problem import Team
 from robochoc.model.wording import counted
@@ -56,6 +56,9 @@ class Problem(Solvable):
 
     def _team_to_solve(self) -> Team:
         return self.team
+
+    def _robots_called(self, team: Team) -> Mapping[str, str]:
+        return robots_called(team, self.names)
 
     def _solution(self, outcome: Outcome, team: Team) -> Solution:
         return Solution.of(renamed_outcome(outcome, self.names), renamed_team(team, self.names, outcome.events))

@@ -2,32 +2,39 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
 
 from robochoc.formats.diagnostics import Diagnostic, DiagnosticCollector, InvalidInputError, shortened, suggestion
+from robochoc.model.original_names import robots_called
 from robochoc.model.problem import Team
 
 MAX_BYTES = 1024 * 1024
 _MISSING_SHOWN = 10
 
 
-def read_order(path: Path, team: Team) -> tuple[str, ...]:
-    """Return the order in the file `path`, of all robots of `team`. Raises `InvalidInputError` with every mistake."""
+def read_order(path: Path, team: Team, names: Mapping[str, str] = {}) -> tuple[str, ...]:
+    """Return the order in the file `path`, of all robots of `team`, which it may call by their original `names`.
+
+    Raises:
+        InvalidInputError: with every mistake.
+    """
     report = DiagnosticCollector(str(path))
     lines = _text(path).splitlines()
-    known = frozenset(team.order)
+    known = robots_called(team, names)
     places: dict[str, int] = {}
     for number, line in enumerate(lines, start=1):
         name = line.partition("#")[0].strip()
         if not name:
             continue
         if name not in known:
-            hint = suggestion(name, team.order, "robots")
+            hint = suggestion(name, list(known), "robots")
             report.add(number, f"'{shortened(name)}' is no robot of {team.name}", hint)
-        elif name in places:
-            report.add(number, f"'{name}' stands here again", f"name each robot once; it is in line {places[name]}")
+        elif known[name] in places:
+            first = places[known[name]]
+            report.add(number, f"'{name}' stands here again", f"name each robot once; it is in line {first}")
         else:
-            places[name] = number
+            places[known[name]] = number
     missing = [name for name in team.order if name not in places]
     if missing:
         many = len(missing) > 1

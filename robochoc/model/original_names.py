@@ -56,6 +56,11 @@ def renamed_team(team: Team, names: Mapping[str, str], events: int = 0) -> Team:
     return replace(team, robots=robots)
 
 
+def robots_called(team: Team, names: Mapping[str, str]) -> dict[str, str]:
+    """Return the names that the robots of `team` have there, by these and by their original `names`."""
+    return {**{names.get(name, name): name for name in team.order}, **{name: name for name in team.order}}
+
+
 def _epoch(epoch: EpochOutcome, names: Mapping[str, str]) -> EpochOutcome:
     return replace(
         epoch,

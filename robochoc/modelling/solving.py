@@ -114,6 +114,7 @@ class Solvable(ABC):
         _refuse(unknown)
         _check_numbers(seed=seed, timeout=timeout, messages=messages, delay=delay, spares=spares, patience=patience)
         team = self._team_to_solve()
+        called = self._robots_called(team)
         options = Options(
             protocol=installed_spelling(protocol) if protocol else default_protocol(team.kind),
             runtime=_choice("runtime", Runtime, runtime),
@@ -127,7 +128,7 @@ class Solvable(ABC):
             count=count,
             central_with=_choice("central_with", CentralSolverName, central_with),
             verify=verify,
-            order=_order(order, team),
+            order=_order(order, called),
             messages=messages,
             on_loss=None if on_loss is None else _choice("on_loss", OnLoss, on_loss),
             spares=spares,
@@ -135,7 +136,7 @@ class Solvable(ABC):
             channel=channel,
             settings={name: str(value) for name, value in settings.items()},
             filters=tuple(filters),
-            kill=tuple(kill),
+            kill=tuple(one._replace(robot=called.get(one.robot, one.robot)) for one in kill),
         )
         return self._solution(solve(team, options, observer=observer, environment=environment), team)
 
@@ -147,6 +148,10 @@ class Solvable(ABC):
     @abstractmethod
     def _team_to_solve(self) -> Team:
         """Return the team, with its problem."""
+
+    def _robots_called(self, team: Team) -> Mapping[str, str]:
+        """Return the names of the robots in `team` by those that users have for them."""
+        return {name: name for name in team.order}
 
     def _solution(self, outcome: Outcome, team: Team) -> Solution:
         return Solution.of(outcome, team)
@@ -182,10 +187,10 @@ def _choice(name: str, choices: type[_Choice], given: str) -> _Choice:
         raise ValueError(f"{name}={given!r} is not allowed; {hint}") from None
 
 
-def _order(order: str | Sequence[str] | None, team: Team) -> Order | tuple[str, ...] | None:
+def _order(order: str | Sequence[str] | None, called: Mapping[str, str]) -> Order | tuple[str, ...] | None:
     if order is None or isinstance(order, str):
         return None if order is None else _choice("order", Order, order)
     for name in order:
-        if name not in team:
-            raise ValueError(f"order: there is no robot {name!r}; {did_you_mean(name, team.order, 'name all robots')}")
-    return tuple(order)
+        if name not in called:
+            raise ValueError(f"order: there is no robot {name!r}; {did_you_mean(name, called, 'name all robots')}")
+    return tuple(called[name] for name in order)

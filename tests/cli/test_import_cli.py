@@ -237,6 +237,44 @@ def test_what_would_be_another_problem_is_told_by_all_who_read_the_file(tmp_path
     assert json.loads(robochoc_within("solve", file, "--runtime", "simulator", "--json").stdout)["cost"] == 6.0
 
 
+def test_orders_and_kills_may_use_original_names(tmp_path: Path) -> None:
+    file, order = tmp_path / "dynamic.yaml", tmp_path / "order.txt"
+    file.write_text(DYNAMIC)
+    order.write_text("r-2\nr_1\n")
+    words = ["solve", file, "--protocol", "dpop", "--explain", "--runtime"]
+    assert "    r-2\n    └── r-1" in robochoc_within(*words, "simulator", "--order", order).stdout
+    order.write_text("r-2\nr_2\nr-3\n")
+    wrong = robochoc_within(*words, "simulator", "--order", order)
+    assert "'r_2' stands here again (name each robot once; it is in line 1)" in wrong.stderr
+    assert "'r-3' is no robot of dynamic (did you mean 'r-2'?)" in wrong.stderr
+    assert "r-9" in robochoc_within(*words, "processes", "--kill", "r-9@1").stderr
+    assert robochoc_within(*words, "processes", "--kill", "r-2@50").returncode == 0
+    problem = load(file)
+    solution = problem.solve("dpop", "simulator", order=["r-2", "r_1"], kill=[])
+    assert [(name, node.parent) for name, node in sorted(solution.tree.items())] == [("r-1", "r-2"), ("r-2", None)]
+    with pytest.raises(ValueError, match="no robot 'r-3'; did you mean"):
+        problem.solve(order=["r-3"])
+
+
+def test_a_robot_of_one_variable_of_its_name_is_listed_once(tmp_path: Path) -> None:
+    file = tmp_path / "b.cfn"
+    file.write_text(NETWORK)
+    assert "\n    x = 0  y = 0  z = 1\n" in robochoc_within("solve", file, "--runtime", "simulator").stdout
+
+
+def test_several_files_are_exported_to_named_ones_only(tmp_path: Path) -> None:
+    team, exported = tmp_path / "team", tmp_path / "exported.yaml"
+    for name, text in (("a.yaml", DYNAMIC), ("b.yaml", SCENARIO)):
+        (tmp_path / name).write_text(text)
+    assert robochoc_within("import", tmp_path / "a.yaml", tmp_path / "b.yaml", "-o", team).returncode == 0
+    done = robochoc_within("export", team, "--format", "pydcop")
+    assert (done.returncode, "the scenario is a file of its own; name the first one: -o" in done.stderr) == (2, True)
+    first, second = robochoc_within("export", team, "--format", "pydcop", "-o", exported).stdout.splitlines()
+    assert first.endswith(" bytes, 2 variables")
+    assert second.endswith(" bytes")
+    assert robochoc_within("export", tmp_path / "a.yaml").stdout.endswith("</instance>\n")
+
+
 def test_an_exported_problem_may_have_any_name(tmp_path: Path) -> None:
     file, exported = tmp_path / "pairs.yaml", tmp_path / "pairs.txt"
     file.write_text(PYDCOP)

@@ -47,12 +47,16 @@ def export(folder: Path, kind: str, output: Path | None, **reading: Any) -> None
         team = read_problem(folder, **reading).team
         files = _files(team, kind)
     if output is None:
-        click.echo(b"".join(files.values()), nl=False)
+        if len(files) > 1:
+            raise Failure(USAGE, f"{folder}: the scenario is a file of its own; name the first one: -o FILE")
+        (content,) = files.values()
+        click.echo(content, nl=not content.endswith(b"\n"))
         return
     for place, (name, content) in enumerate(files.items()):
         path = output if place == 0 else output.with_name(f"{output.stem}{_ending(team, name)}")
         write_atomically(path, content)
-        click.echo(f"{path}: {len(content):,} bytes, {len(team.variables)} variables")
+        of_it = f", {len(team.variables)} variables" if place == 0 else ""
+        click.echo(f"{path}: {len(content):,} bytes{of_it}")
 
 
 def _files(team: Team, kind: str) -> Mapping[str, bytes]:

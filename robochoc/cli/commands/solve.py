@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
@@ -48,6 +48,7 @@ from robochoc.run.defaults import default_protocol
 
 if TYPE_CHECKING:
     from robochoc.cli.reports.closed_loop import FlownMission
+    from robochoc.communication.kill_schedule import Kill
     from robochoc.formats.problems import ReadProblem
     from robochoc.journal.journal import Header, JournalRecorder
     from robochoc.model.outcome import Outcome
@@ -245,6 +246,14 @@ def _solved(folder: Path, options: Options, products: Products, wanted: Wanted, 
     return LIMIT
 
 
+def _called(kills: Sequence[Kill], problem: ReadProblem) -> tuple[Kill, ...]:
+    """Return `kills` with the robots' names in the team. One that no robot has stays: the run refuses it."""
+    from robochoc.model.original_names import robots_called
+
+    known = robots_called(problem.team, problem.names)
+    return tuple(one._replace(robot=known.get(one.robot, one.robot)) for one in kills)
+
+
 class _RecordedRun(NamedTuple):
     """A run that is over, and whose journal is written."""
 
@@ -264,7 +273,8 @@ def _recorded(folder: Path, options: Options, products: Products, wanted: Wanted
     team = problem.team
     check_chosen(products.watching, team)
     protocol = wanted.protocol or default_protocol(team.kind)
-    options = replace(options, protocol=protocol, order=order_for(team, wanted.order))
+    order = order_for(team, wanted.order, problem.names)
+    options = replace(options, protocol=protocol, order=order, kill=_called(options.kill, problem))
     header = partial(_header, team, options)
     objective = None if wanted.ros.situation else _objective(team, options)
     with (

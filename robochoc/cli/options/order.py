@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -16,8 +17,13 @@ NAMES = (GIVEN, "lexicographic", "max-degree", "min-width", "dom-deg", "dfs", "r
 ORDER_NAME = NameOrFile("order", NAMES, {"dom/deg": "dom-deg"})
 
 
-def order_for(team: Team, order: str | Path) -> Order | tuple[str, ...] | None:
+def order_for(team: Team, order: str | Path, names: Mapping[str, str] = {}) -> Order | tuple[str, ...] | None:
     """Return the order for `team`, or None for the files' own.
+
+    Args:
+        team: The team.
+        order: The name of the order, or the path of a file.
+        names: The original names of the robots, which a file may use.
 
     Raises:
         InvalidInputError: a file does not list the team's robots.
@@ -26,5 +32,5 @@ def order_for(team: Team, order: str | Path) -> Order | tuple[str, ...] | None:
     from robochoc.model.orders import Order
 
     if isinstance(order, Path):
-        return read_order(order, team)
+        return read_order(order, team, names)
     return None if order == GIVEN else Order(order)

@@ -206,7 +206,8 @@ def _list(team: Team, assignment: Mapping[str, int | str]) -> list[str]:
     owners = sorted({team.owner[name] for name in assignment}, key=natural_key)
     own = {owner: [variable.name for variable in team[owner].variables] for owner in owners}
     values = {owner: ", ".join(f"{name} = {assignment[name]}" for name in names) for owner, names in own.items()}
-    return _wrapped([f"{owner}: {values[owner]}" for owner in owners])
+    alike = own == {owner: [owner] for owner in owners}
+    return _wrapped([values[owner] if alike else f"{owner}: {values[owner]}" for owner in owners])
 
 
 def _wrapped(words: tuple[str, ...] | list[str]) -> list[str]:
