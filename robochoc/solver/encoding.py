@@ -17,7 +17,7 @@ from dataclasses import dataclass, replace
 from robochoc.model.expression import UndefinedValueError, compile_expression
 from robochoc.model.expression.bounds import ANY_INTEGER, bounds
 from robochoc.model.problem import INFINITE, Constraint, Function, Predicate, Relation, Semantics, Variable
-from robochoc.solver.splitting import split
+from robochoc.solver.splitting import MAX_TRIED, split
 
 MAX_TUPLES = 4_000_000
 """The maximum number of tuples of values that a constraint is tried on."""
@@ -102,15 +102,7 @@ def components(
             (unary if len(constraint.variables) <= 1 else wider).append(constraint)
     for constraint in unary:
         _fold(constraint, domains)
-    tables = _Tables(domains)
-    relevant: list[_Rows] = []
-    for number, constraint in enumerate(wider):
-        several = _split(constraint, domains, f"#{number}.") if may_split else None
-        if several is None:
-            rows = tables.of(constraint)
-            relevant += [rows] if rows is not None else []
-        else:
-            relevant += several
+    relevant = _tables(wider, domains, may_split=may_split)
     groups = _connected(domains, [*(rows.scope for rows in relevant), *together])
     held: dict[str, list[_Rows]] = {names[0]: [] for names in groups}
     first = {name: names[0] for names in groups for name in names}
@@ -274,18 +266,23 @@ class _Coder:
         return Table(tuple(sorted(scope)), held.allowed, self._rows[alike])
 
 
-def _split(constraint: Constraint, domains: dict[str, list[int]], prefix: str) -> list[_Rows] | None:
-    """Return a wide predicate as several tables; None if it is not wide, or cannot be split.
-
-    Names of variables that it adds to `domains` begin with `prefix`.
-    """
-    if math.prod(len(domains[name]) for name in constraint.variables) <= MAX_ALLOWED_ROWS:
-        return None
-    found = split(constraint, domains, prefix)
-    if found is None:
-        return None
-    domains.update({name: [*values] for name, values in found.domains.items() if name.startswith(prefix)})
-    return [_Rows(scope, allowed=True, rows=rows) for scope, rows in found.tables]
+def _tables(constraints: Iterable[Constraint], domains: dict[str, list[int]], *, may_split: bool) -> list[_Rows]:
+    """Return `constraints` as tables. With `may_split`, wide predicates are several: `domains` get their variables."""
+    tables = _Tables(domains)
+    found: list[_Rows] = []
+    budget = MAX_TRIED
+    for number, constraint in enumerate(constraints):
+        parts = None
+        if may_split and math.prod(len(domains[name]) for name in constraint.variables) > MAX_ALLOWED_ROWS:
+            parts = split(constraint, domains, f"#{number}.", budget)
+        if parts is None:
+            rows = tables.of(constraint)
+            found += [rows] if rows is not None else []
+            continue
+        budget = parts.budget
+        domains.update({name: [*values] for name, values in parts.domains.items() if name not in domains})
+        found += [_Rows(scope, allowed=True, rows=rows) for scope, rows in parts.tables]
+    return found
 
 
 class _Tables:

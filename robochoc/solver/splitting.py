@@ -33,8 +33,8 @@ SMALL = 256
 """So many combinations of values at most are put into one table where they could be in two."""
 MAX_COMBINATIONS = 1_000_000
 """The maximum number of combinations of values that one table is made of."""
-MAX_TRIED = 6_000_000
-"""The maximum number of combinations of values that all tables of one predicate are made of."""
+MAX_TRIED = 2_000_000
+"""The maximum number of combinations of values that all tables of the split predicates of a problem are made of."""
 LARGEST = BOUND >> 20
 """What is computed on the way is no larger, so that in no order it leaves the bounds of an expression."""
 
@@ -52,14 +52,15 @@ class Split:
         tables: The tables.
         domains: The values of all variables that may stand in scopes, in ascending order: `given` and further ones.
         prefix: The beginning of the names of further variables.
+        budget: So many combinations of values may be tried yet.
     """
 
     domains: dict[str, Sequence[int]]
     prefix: str
+    budget: int
     tables: list[tuple[tuple[str, ...], tuple[Row, ...]]] = field(default_factory=list)
     _made: dict[Expression, Name] = field(default_factory=dict)
     _further: int = 0
-    _tried: int = 0
 
     # Truth
 
@@ -167,8 +168,8 @@ class Split:
     def _worth(self, expression: Expression, scope: tuple[str, ...]) -> Iterable[tuple[Row, int]]:
         """Yield all combinations of values of `scope` with the value of `expression`, where it is defined."""
         size = math.prod(len(self.domains[name]) for name in scope)
-        self._tried += size
-        if size > MAX_COMBINATIONS or self._tried > MAX_TRIED:
+        self.budget -= size
+        if size > MAX_COMBINATIONS or self.budget < 0:
             raise NotSplitError
         value = compile_expression(expression, scope)
         for row in itertools.product(*(self.domains[name] for name in scope)):
@@ -193,13 +194,16 @@ class NotSplitError(Exception):
     """The tables would still be too large."""
 
 
-def split(constraint: Constraint, domains: Mapping[str, Sequence[int]], prefix: str) -> Split | None:
+def split(
+    constraint: Constraint, domains: Mapping[str, Sequence[int]], prefix: str, budget: int = MAX_TRIED
+) -> Split | None:
     """Return a hard predicate as small tables; None where that is not possible.
 
     Args:
         constraint: The predicate.
         domains: The values of its variables, in ascending order.
         prefix: How the names of further variables begin; no other name does.
+        budget: So many combinations of values may be tried.
     """
     definition = constraint.definition
     if not isinstance(definition, Predicate):
@@ -209,7 +213,7 @@ def split(constraint: Constraint, domains: Mapping[str, Sequence[int]], prefix: 
         formal: Name(term) if isinstance(term, str) else Constant(term)
         for formal, term in zip(definition.parameters, constraint.parameters, strict=True)
     }
-    result = Split(dict(given), prefix)
+    result = Split(dict(given), prefix, budget)
     if any(not values for values in given.values()):
         return None
     try:
