@@ -56,7 +56,7 @@ def read_problem(
         return ReadProblem(imported.team, imported.names, foreign=True, notes=imported.notes)
     for option, given in (("infinity", infinity), ("owner", owner)):
         if given is not None and place.is_dir():
-            what, hint = f"is the folder of a team, and '{option}' is for files of other tools", f"leave out '{option}'"
+            what, hint = f"is the folder of a team, and '{option}' is for files of other tools", "leave it out"
             raise InvalidInputError([Diagnostic(encodable(str(place)), 0, what, hint)])
     if more and place.is_dir():
         what, hint = (

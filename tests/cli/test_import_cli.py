@@ -222,7 +222,7 @@ NETWORK = """{"problem": {"name": "b", "mustbe": "<8.0"}, "variables": {"x": 2, 
 def test_what_would_be_another_problem_is_told_by_all_who_read_the_file(tmp_path: Path) -> None:
     file = tmp_path / "b.cfn"
     file.write_text(NETWORK)
-    changed = ("  truncated: costs are cut to 1 decimal place as mustbe has", "  bound: toulbar2 accepts only sums")
+    changed = (" truncated: costs are cut to 1 decimal place as mustbe has", " bound: toulbar2 accepts only sums")
     for words in (["solve", file, "--runtime", "simulator"], ["validate", file]):
         done = robochoc_within(*words)
         assert done.returncode == 0

@@ -265,11 +265,12 @@ class _RecordedRun(NamedTuple):
 
 def _recorded(folder: Path, options: Options, products: Products, wanted: Wanted, watch: Watch) -> _RecordedRun:
     """Solve the team in `folder`, with a journal and a closed loop where they are asked for, and print the outcome."""
+    from robochoc.formats import on_one_line
     from robochoc.formats.problems import read_problem
 
     problem = read_problem(folder, infinity=wanted.infinity, owner=wanted.owner)
     for line in differences_told(problem.notes):
-        click.echo(line, err=True)
+        click.echo(f"{on_one_line(str(folder))}: {line.strip()}", err=True)
     team = problem.team
     check_chosen(products.watching, team)
     protocol = wanted.protocol or default_protocol(team.kind)
