@@ -19,8 +19,9 @@ from robochoc.solver.weighted import MAX_TOTAL_COST
 def xcsp3(team: Team, solver: AceProcess | None = None) -> bytes:
     """Return the merged problem of `team` as an XCSP3-core document: tables over the true values, and allDifferent.
 
-    Variables get names that XCSP3 allows; the attribute `note` says whose variable each is. With costs it is a COP:
-    what soft constraints charge are variables too, and their sum is to be minimised, or maximised where the team does.
+    Variables get names that XCSP3 allows; the attribute `note` says whose variable each is. Those without one are parts
+    of predicates that are too wide for one table. With costs it is a COP: what soft constraints charge are variables
+    too, and their sum is to be minimised, or maximised where the team does.
     Costs are integers in the team's unit, as a `note` says where that is not 1; one further variable stands for their
     constant part. To export many teams, one may lend a `solver`.
 
@@ -31,9 +32,10 @@ def xcsp3(team: Team, solver: AceProcess | None = None) -> bytes:
     team = normalized(team)
     network, costs = _as_told(team, *team_network(team))
     names = list(team.variables)
+    further = [f"partial{number}" for number in range(1, len(network.domains) - len(names) - len(costs) + 1)]
     charged = [f"cost{number}" for number in range(1, len(costs) + 1)]
     with nullcontext(solver) if solver else AceProcess(java=False) as writer:
-        document = writer.export(network, identifiers([*names, *charged]), costs)
+        document = writer.export(network, identifiers([*names, *further, *charged]), costs)
     root = etree.fromstring(document, etree.XMLParser(huge_tree=True, resolve_entities=False, no_network=True))
     for element, name in zip(root.iterfind("variables/var"), names, strict=False):
         element.set("note", f"{name} of {team.owner[name]}")

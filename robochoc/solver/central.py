@@ -137,7 +137,7 @@ class CentralSolver:
         with ExitStack() as processes:
             ace = self._solver or processes.enter_context(AceProcess(always=self._always_ace))
             spare = processes.enter_context(AceProcess(always=True))
-            parts = components(team.variables.values(), team.constraints())
+            parts = components(team.variables.values(), team.constraints(), may_split=True)
             if sum(len(table.rows) for part in parts for table in part.network.tables) > MANY_ROWS:
                 ace.start()
             parts.sort(key=lambda part: math.prod(len(domain) for domain in part.network.domains))

@@ -17,6 +17,7 @@ from dataclasses import dataclass, replace
 from robochoc.model.expression import UndefinedValueError, compile_expression
 from robochoc.model.expression.bounds import ANY_INTEGER, bounds
 from robochoc.model.problem import INFINITE, Constraint, Function, Predicate, Relation, Semantics, Variable
+from robochoc.solver.splitting import MAX_TRIED, split
 
 MAX_TUPLES = 4_000_000
 """The maximum number of tuples of values that a constraint is tried on."""
@@ -63,7 +64,10 @@ class Network:
 
 @dataclass(frozen=True)
 class Component:
-    """Variables that constraints connect, as a network; `values[code]` is the value that a code stands for."""
+    """Variables that constraints connect, as a network; `values[code]` is the value that a code stands for.
+
+    `names` are the variables, in their given order, and behind them the further ones of split constraints.
+    """
 
     names: tuple[str, ...]
     values: tuple[int, ...]
@@ -75,12 +79,17 @@ class Component:
 
 
 def components(
-    variables: Iterable[Variable], constraints: Iterable[Constraint], together: Iterable[Sequence[str]] = ()
+    variables: Iterable[Variable],
+    constraints: Iterable[Constraint],
+    together: Iterable[Sequence[str]] = (),
+    *,
+    may_split: bool = False,
 ) -> list[Component]:
     """Return the connected components of `variables` under the hard part of `constraints`.
 
     Components are in the order of their first variables, variables within in their given order. Constraints are on
-    `variables` only; so are the scopes in `together`, each of which is to be in one component.
+    `variables` only; so are the scopes in `together`, each of which is to be in one component. With `may_split`,
+    predicates that are too wide for a table become several, with further variables (`solver/splitting.py`).
 
     Raises:
         UnsupportedError: when a constraint has too many tuples to be made a table.
@@ -93,8 +102,7 @@ def components(
             (unary if len(constraint.variables) <= 1 else wider).append(constraint)
     for constraint in unary:
         _fold(constraint, domains)
-    tables = _Tables(domains)
-    relevant = [rows for rows in map(tables.of, wider) if rows is not None]
+    relevant = _tables(wider, domains, may_split=may_split)
     groups = _connected(domains, [*(rows.scope for rows in relevant), *together])
     held: dict[str, list[_Rows]] = {names[0]: [] for names in groups}
     first = {name: names[0] for names in groups for name in names}
@@ -256,6 +264,25 @@ class _Coder:
             code = self._code
             self._rows[alike] = tuple(sorted(tuple([code[row[index]] for index in order]) for row in held.rows))
         return Table(tuple(sorted(scope)), held.allowed, self._rows[alike])
+
+
+def _tables(constraints: Iterable[Constraint], domains: dict[str, list[int]], *, may_split: bool) -> list[_Rows]:
+    """Return `constraints` as tables. With `may_split`, wide predicates are several: `domains` get their variables."""
+    tables = _Tables(domains)
+    found: list[_Rows] = []
+    budget = MAX_TRIED
+    for number, constraint in enumerate(constraints):
+        parts = None
+        if may_split and math.prod(len(domains[name]) for name in constraint.variables) > MAX_ALLOWED_ROWS:
+            parts = split(constraint, domains, f"#{number}.", budget)
+        if parts is None:
+            rows = tables.of(constraint)
+            found += [rows] if rows is not None else []
+            continue
+        budget = parts.budget
+        domains.update({name: [*values] for name, values in parts.domains.items() if name not in domains})
+        found += [_Rows(scope, allowed=True, rows=rows) for scope, rows in parts.tables]
+    return found
 
 
 class _Tables:

@@ -21,8 +21,9 @@ MAX_SPREAD = 2**31 - 1
 def team_network(team: Team) -> tuple[Network, Codes]:
     """Return all variables of `team`, in its order, with all its constraints; codes are values.
 
-    Unary constraints are folded into domains, cliques of `ne` are made explicit. What soft constraints charge are
-    variables too, after the others: those at the places that are returned, whose sum is what the problem costs.
+    Unary constraints are folded into domains, cliques of `ne` are made explicit. Behind the team's variables come those
+    that wide predicates are split by (`solver/splitting.py`). What soft constraints charge are variables too, after the
+    others: those at the places that are returned, whose sum is what the problem costs.
 
     Raises:
         UnsupportedError: for a team that changes over time, and when a constraint is too large to be a table, or
@@ -37,11 +38,12 @@ def team_network(team: Team) -> tuple[Network, Codes]:
     soft = [constraint for constraint in team.constraints() if is_soft(constraint) and constraint.variables]
     charges: list[Table] = []
     impossible = False
-    for part in components(team.variables.values(), team.constraints(), [one.variables for one in soft]):
-        places = [place[name] for name in part.names]
+    together = [one.variables for one in soft]
+    for part in components(team.variables.values(), team.constraints(), together, may_split=True):
+        places = [place.setdefault(name, len(place)) for name in part.names]
         network = with_cliques(part.network, lambda _: None)
         for name, codes in zip(part.names, network.domains, strict=True):
-            domains[name] = part.decoded(codes) or domains[name]  # no format has an empty domain
+            domains[name] = part.decoded(codes) or domains.get(name, (0,))  # no format has an empty domain
         impossible = impossible or part.network.impossible
         tables += [_over_values(table, part, places) for table in network.tables]
         different += [tuple([places[member] for member in scope]) for scope in network.different]

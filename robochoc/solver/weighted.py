@@ -67,7 +67,7 @@ def weighted_components(variables: Iterable[Variable], constraints: Sequence[Con
         UnsupportedError: when a constraint has too many tuples, or charges are too high.
     """
     soft = [constraint for constraint in constraints if is_soft(constraint) and constraint.variables]
-    parts = components(variables, constraints, [constraint.variables for constraint in soft])
+    parts = components(variables, constraints, [constraint.variables for constraint in soft], may_split=True)
     of: dict[str, list[Constraint]] = {part.names[0]: [] for part in parts}
     first = {name: part.names[0] for part in parts for name in part.names}
     for constraint in soft:

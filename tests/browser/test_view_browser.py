@@ -241,10 +241,13 @@ def test_cameras_by_keys_and_by_buttons(player: Page) -> None:
         return list(player.evaluate("Playback.viewer.camera.position.toArray()"))
 
     overview = looked_from()
+    takes = player.evaluate("Playback.camera.constructor.TURN")
+    player.evaluate("Playback.camera.constructor.TURN = Infinity")
     player.emulate_media(reduced_motion="no-preference")
     player.keyboard.press("2")
     assert player.evaluate("Boolean(Playback.camera.turning)"), "it turns"
     player.emulate_media(reduced_motion="reduce")
+    player.evaluate(f"Playback.camera.constructor.TURN = {takes}")
     assert pressed(player) == "top"
     above = looked_from()
     assert above[1] > 2 * abs(above[0])

@@ -20,6 +20,7 @@ from robochoc.authority.certificates import (
 from robochoc.formats.result import ResultError, read_result
 from robochoc.ros.recordings.types import types_of
 from tests.fuzz.file_targets import TARGETS as FILES
+from tests.fuzz.foreign_targets import TARGETS as FOREIGN
 from tests.fuzz.harness import Findings, Target, TooDearError, spoilt, tried
 from tests.fuzz.mutations import spoilt_bytes
 from tests.fuzz.wire_targets import TARGETS as WIRE
@@ -28,7 +29,7 @@ INPUTS = 12
 """Spoilt inputs of each target: enough to see that it works."""
 
 
-@pytest.mark.parametrize("target", [*FILES, *WIRE], ids=lambda target: target.name)
+@pytest.mark.parametrize("target", [*FILES, *FOREIGN, *WIRE], ids=lambda target: target.name)
 def test_valid_inputs_are_accepted_and_spoilt_ones_do_no_harm(target: Target) -> None:
     corpus = target.corpus()
     assert tried(target, corpus[0]) == (True, None)

@@ -227,7 +227,7 @@ def _notes(posting: Posting, root: etree._Element, changed: Mapping[str, str]) -
         Note(
             "wide",
             f"line {one.line}: {one.name} is over {len(one.variables)} variables with"
-            f" {in_words(posting.size(one.variables))} combinations of values; only local search takes that",
+            f" {in_words(posting.size(one.variables))} combinations of values; protocols with tables do not take it",
         )
         for one in wide[:100]
     ]

@@ -1,0 +1,311 @@
+"""Predicates over many variables as small tables, for solvers that are handed nothing but tables.
+
+A predicate with too many combinations of values to try is taken apart along its expression: what a part of it is worth
+becomes a further variable, and a table says how that follows from the part's variables. Sums that are compared with
+something are added up term by term (Trick, "A dynamic programming approach for consistency and propagation for
+knapsack constraints", Annals of OR 118, 2003): each partial sum is a variable, and sums from which the rest cannot
+change the outcome any more are one value. Every further variable follows from the others, so that there are neither
+more nor fewer solutions.
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
+
+from robochoc.model.constraint import Constraint, Predicate
+from robochoc.model.expression import (
+    OPERATORS,
+    Apply,
+    Constant,
+    Expression,
+    Name,
+    UndefinedValueError,
+    compile_expression,
+    names,
+)
+from robochoc.model.expression.bounds import Interval, bounds
+from robochoc.model.expression.tree import BOUND
+
+SMALL = 256
+"""So many combinations of values at most are put into one table where they could be in two."""
+MAX_COMBINATIONS = 1_000_000
+"""The maximum number of combinations of values that one table is made of."""
+MAX_TRIED = 2_000_000
+"""The maximum number of combinations of values that all tables of the split predicates of a problem are made of."""
+LARGEST = BOUND >> 20
+"""What is computed on the way is no larger, so that in no order it leaves the bounds of an expression."""
+
+Row = tuple[int, ...]
+_COMPARISONS = {"le": "le", "ge": "ge", "lt": "le", "gt": "ge", "eq": "eq", "ne": "ne"}
+_STRICT = {"lt": -1, "gt": 1}
+_MAY_BE_UNDEFINED = {"div", "mod", "pow"}
+
+
+@dataclass
+class Split:
+    """Tables that say together what a predicate says: the scope and the allowed rows of each.
+
+    Attributes:
+        tables: The tables.
+        domains: The values of all variables that may stand in scopes, in ascending order: `given` and further ones.
+        prefix: The beginning of the names of further variables.
+        budget: So many combinations of values may be tried yet.
+    """
+
+    domains: dict[str, Sequence[int]]
+    prefix: str
+    budget: int
+    tables: list[tuple[tuple[str, ...], tuple[Row, ...]]] = field(default_factory=list)
+    _made: dict[Expression, Name] = field(default_factory=dict)
+    _further: int = 0
+
+    # Truth
+
+    def require(self, expression: Expression) -> None:
+        """Add tables that say that a Boolean expression is true."""
+        if isinstance(expression, Apply) and expression.operator == "and":
+            for part in expression.arguments:
+                self.require(part)
+        elif self._size(expression) <= SMALL:
+            self._allow(expression)
+        elif isinstance(expression, Apply) and expression.operator in _COMPARISONS and len(expression.arguments) == 2:  # noqa: PLR2004
+            self._compare(expression.operator, *expression.arguments)
+        else:
+            self._allow(self._reduced(expression))
+
+    def _allow(self, expression: Expression) -> None:
+        scope = names(expression) or tuple(self.domains)[:1]
+        rows = tuple([row for row, value in self._worth(expression, scope) if value])
+        self.tables.append((scope, rows))
+
+    # Sums
+
+    def _compare(self, operator: str, left: Expression, right: Expression) -> None:
+        """Add tables that say that a comparison is true: of a sum of terms with zero."""
+        terms: dict[Expression, int] = {}
+        target = -_collect(left, 1, terms) - _collect(right, -1, terms) + _STRICT.get(operator, 0)
+        kept = [(term, factor) for term, factor in terms.items() if factor or _may_be_undefined(term)]
+        reduced = [_times(self._reduced(term), factor) for term, factor in kept]
+        ends = [self._ends(term) for term in reduced]
+        window = _Window(_COMPARISONS[operator], target)
+        if not reduced and window.state(0, 0, 0) is None:
+            self.tables.append((tuple(self.domains)[:1], ()))
+        state: Name | None = None
+        place = 0
+        while place < len(reduced):
+            group, after = self._group(reduced, place, state)
+            low = sum(end.low for end in ends[after:])
+            high = sum(end.high for end in ends[after:])
+            scope = (*((state.name,) if state else ()), *names(group)) or tuple(self.domains)[:1]
+            total = Apply("add", (state, group)) if state else group
+            found = ((row, window.state(value, int(low), int(high))) for row, value in self._worth(total, scope))
+            rows = [(row, value) for row, value in found if value is not None]
+            if after == len(reduced):
+                self.tables.append((scope, tuple(row for row, _ in rows)))
+            else:
+                state = self._variable(scope, rows)
+            place = after
+
+    def _group(self, terms: Sequence[Expression], place: int, state: Name | None) -> tuple[Expression, int]:
+        """Return the sum of the terms from `place` on that fit into one table with `state`, and where it ends."""
+        before = [state] if state else []
+        after = place + 1
+        while after < len(terms) and self._size(*before, *terms[place : after + 1]) <= SMALL:
+            after += 1
+        return _folded("add", terms[place:after]), after
+
+    # Values
+
+    def _reduced(self, expression: Expression) -> Expression:
+        """Return an expression of the same value over few variables, further ones among them."""
+        if not isinstance(expression, Apply) or self._size(expression) <= SMALL:
+            return expression
+        operator = expression.operator
+        if operator == "if" and _may_be_undefined(expression):
+            raise NotSplitError  # an argument that is not chosen may be undefined
+        parts = [self._reduced(part) for part in expression.arguments]
+        if OPERATORS[operator].variadic and not OPERATORS[operator].whole:
+            first, *others = parts
+            together = [first]
+            for part in others:
+                if self._size(*together, part) > SMALL:
+                    together = [self._named(_folded(operator, together))]
+                together.append(part)
+            return _folded(operator, together) if self._size(*together) <= SMALL else self._joined(operator, together)
+        return self._joined(operator, parts)
+
+    def _joined(self, operator: str, parts: Sequence[Expression]) -> Expression:
+        """Return `operator` applied to `parts`, of which the widest become variables as long as it is needed."""
+        chosen = list(parts)
+        widest_first = sorted(range(len(parts)), key=lambda place: -self._size(parts[place]))
+        for place in widest_first:
+            if self._size(*chosen) <= SMALL:
+                break
+            chosen[place] = self._named(chosen[place])
+        return Apply(operator, tuple(chosen))
+
+    def _named(self, expression: Expression) -> Expression:
+        """Return a variable that has the value of `expression`."""
+        if not isinstance(expression, Apply):
+            return expression
+        if expression not in self._made:
+            scope = names(expression) or tuple(self.domains)[:1]
+            self._made[expression] = self._variable(scope, list(self._worth(expression, scope)))
+        return self._made[expression]
+
+    def _variable(self, scope: tuple[str, ...], rows: Iterable[tuple[Row, int]]) -> Name:
+        """Return a further variable, whose value follows from those of `scope`."""
+        name = f"{self.prefix}{self._further}"
+        self._further += 1
+        table = tuple([(*row, value) for row, value in rows])
+        self.domains[name] = sorted({row[-1] for row in table})
+        self.tables.append(((*scope, name), table))
+        return Name(name)
+
+    def _worth(self, expression: Expression, scope: tuple[str, ...]) -> Iterable[tuple[Row, int]]:
+        """Yield all combinations of values of `scope` with the value of `expression`, where it is defined."""
+        size = math.prod(len(self.domains[name]) for name in scope)
+        self.budget -= size
+        if size > MAX_COMBINATIONS or self.budget < 0:
+            raise NotSplitError
+        value = compile_expression(expression, scope)
+        for row in itertools.product(*(self.domains[name] for name in scope)):
+            try:
+                yield row, int(value(row))
+            except UndefinedValueError:
+                continue
+
+    def _size(self, *expressions: Expression) -> int:
+        scope = dict.fromkeys(name for expression in expressions for name in names(expression))
+        return math.prod(len(self.domains[name]) for name in scope)
+
+    def _ends(self, expression: Expression) -> Interval:
+        limits = {
+            name: Interval(min(self.domains[name], default=0), max(self.domains[name], default=0))
+            for name in names(expression)
+        }
+        return bounds(expression, limits)
+
+
+class NotSplitError(Exception):
+    """The tables would still be too large."""
+
+
+def split(
+    constraint: Constraint, domains: Mapping[str, Sequence[int]], prefix: str, budget: int = MAX_TRIED
+) -> Split | None:
+    """Return a hard predicate as small tables; None where that is not possible.
+
+    Args:
+        constraint: The predicate.
+        domains: The values of its variables, in ascending order.
+        prefix: How the names of further variables begin; no other name does.
+        budget: So many combinations of values may be tried.
+    """
+    definition = constraint.definition
+    if not isinstance(definition, Predicate):
+        return None
+    given = {name: list(domains[name]) for name in constraint.variables}
+    actual: dict[str, Expression] = {
+        formal: Name(term) if isinstance(term, str) else Constant(term)
+        for formal, term in zip(definition.parameters, constraint.parameters, strict=True)
+    }
+    result = Split(dict(given), prefix, budget)
+    if any(not values for values in given.values()):
+        return None
+    try:
+        body = _with(definition.body, actual)
+        if _largest(body, {name: Interval(values[0], values[-1]) for name, values in given.items()}) > LARGEST:
+            return None
+        result.require(body)
+    except NotSplitError:
+        return None
+    return result
+
+
+@dataclass(frozen=True)
+class _Window:
+    """What a partial sum has to be told apart for: whether the sum is at most, at least, equal or not equal `target`.
+
+    Sums that are true, or false, whatever the rest adds are one.
+    """
+
+    operator: str
+    target: int
+
+    def state(self, value: int, low: int, high: int) -> int | None:
+        """Return what `value` is as a state, where the rest adds from `low` to `high`. None: it cannot be true."""
+        least, most = value + low, value + high
+        match self.operator:
+            case "le":
+                return None if least > self.target else max(value, self.target - high)
+            case "ge":
+                return None if most < self.target else min(value, self.target - low)
+            case "eq":
+                return value if least <= self.target <= most else None
+            case _:
+                if least == most == self.target:
+                    return None
+                return value if least <= self.target <= most else self.target - low + 1
+
+
+def _collect(expression: Expression, factor: int, terms: dict[Expression, int]) -> int:
+    """Add the terms of `factor` times `expression` to `terms`; return what is constant in it."""
+    match expression:
+        case Constant(value):
+            return factor * value
+        case Apply("add" | "sub" | "neg" as operator, arguments):
+            signs = {"add": [1] * len(arguments), "sub": [1, -1], "neg": [-1]}[operator]
+            return sum(_collect(part, sign * factor, terms) for part, sign in zip(arguments, signs, strict=True))
+        case Apply("mul", arguments):
+            fixed = math.prod(one.value for one in arguments if isinstance(one, Constant))
+            others = [one for one in arguments if not isinstance(one, Constant)]
+            if len(others) <= 1:
+                return _collect(others[0] if others else Constant(1), factor * fixed, terms)
+        case _:
+            pass
+    terms[expression] = terms.get(expression, 0) + factor
+    return 0
+
+
+def _folded(operator: str, parts: Sequence[Expression]) -> Expression:
+    return parts[0] if len(parts) == 1 else Apply(operator, tuple(parts))
+
+
+def _times(term: Expression, factor: int) -> Expression:
+    return term if factor == 1 else Apply("mul", (Constant(factor), term))
+
+
+def _with(expression: Expression, actual: Mapping[str, Expression]) -> Expression:
+    """Return `expression` with what its names stand for."""
+    match expression:
+        case Name(name):
+            return actual[name]
+        case Apply(operator, arguments):
+            return Apply(operator, tuple(_with(argument, actual) for argument in arguments))
+        case Constant():
+            return expression
+
+
+def _may_be_undefined(expression: Expression) -> bool:
+    return isinstance(expression, Apply) and (
+        expression.operator in _MAY_BE_UNDEFINED or any(map(_may_be_undefined, expression.arguments))
+    )
+
+
+def _largest(expression: Expression, limits: Mapping[str, Interval]) -> float:
+    """Return a bound on all that is computed on the way: how far it can be from zero."""
+    if not isinstance(expression, Apply):
+        return 0
+    parts = [_largest(part, limits) for part in expression.arguments]
+    ends = [bounds(part, limits) for part in expression.arguments]
+    sizes = [max(abs(end.low), abs(end.high)) for end in ends]
+    own = bounds(expression, limits)
+    if expression.operator == "mul":
+        sizes.append(math.prod(max(1, size) for size in sizes))
+    if expression.operator == "add":
+        sizes.append(sum(sizes))
+    return max(*parts, *sizes, abs(own.low), abs(own.high))
