@@ -169,7 +169,7 @@ def test_a_copy_of_a_model_is_a_model_of_its_own(copied: Callable[[robochoc.Mode
 def test_deep_and_wide_terms_are_copied(copied: Callable[[robochoc.Model], robochoc.Model]) -> None:
     model = robochoc.Model()
     x = model.robot("a").variable("x", range(5))
-    deep, wide = x, x
+    deep, wide = 1 * x, 1 * x
     for _ in range(99):
         deep = abs(deep - 1)
     for _ in range(15):
