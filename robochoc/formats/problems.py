@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from fractions import Fraction
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -23,12 +24,14 @@ class ReadProblem(NamedTuple):
         names: The original names of its robots and variables.
         foreign: Whether it is known by these alone: it is in a file of another tool.
         notes: What reading such a file has changed.
+        bound: What its format takes for no solution; see `Imported`.
     """
 
     team: Team
     names: Mapping[str, str]
     foreign: bool
     notes: tuple[Note, ...] = ()
+    bound: Fraction | None = None
 
 
 def read_problem(
@@ -53,7 +56,7 @@ def read_problem(
     if place.is_file() and (recognised(place) or more):
         imported = read_foreign([place, *more], ImportOptions(infinity=infinity, owner=owner, allow_code=allow_code))
         check_team(imported.team)
-        return ReadProblem(imported.team, imported.names, foreign=True, notes=imported.notes)
+        return ReadProblem(imported.team, imported.names, foreign=True, notes=imported.notes, bound=imported.bound)
     for option, given in (("infinity", infinity), ("owner", owner)):
         if given is not None and place.is_dir():
             what, hint = f"is the folder of a team, and '{option}' is for files of other tools", "leave it out"

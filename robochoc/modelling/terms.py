@@ -6,6 +6,7 @@ same in the language of files.
 
 from __future__ import annotations
 
+import copy
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from fractions import Fraction
 from functools import cached_property
@@ -157,6 +158,18 @@ class Term:
 
     def __iter__(self) -> NoReturn:
         raise ModelTypeError(f"{self!r} is one term, no list of them")
+
+    def __deepcopy__(self, memo: dict[int, object]) -> Term:
+        """Return a copy. What is deepest is copied first: Python does not call itself as deep as terms may be."""
+        waiting = [self]
+        while waiting:
+            below = [one for one in waiting[-1].arguments if id(one) not in memo]
+            waiting += below
+            if not below and id(term := waiting.pop()) not in memo:
+                made = memo[id(term)] = object.__new__(type(term))
+                vars(made).update(copy.deepcopy(vars(term), memo))
+        copied: Term = memo[id(self)]  # type: ignore[assignment] # what is there is its copy
+        return copied
 
 
 class Variable(Term):

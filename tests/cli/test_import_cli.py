@@ -237,6 +237,39 @@ def test_what_would_be_another_problem_is_told_by_all_who_read_the_file(tmp_path
     assert json.loads(robochoc_within("solve", file, "--runtime", "simulator", "--json").stdout)["cost"] == 6.0
 
 
+MAX_CSP = """<instance><presentation format="XDisCSP 1.0" type="DCOP"/>
+  <agents><agent name="a"/><agent name="b"/></agents><domains><domain name="d">1..2</domain></domains>
+  <variables><variable name="x" agent="a" domain="d"/><variable name="y" agent="b" domain="d"/></variables>
+  <relations><relation name="r" arity="2" semantics="soft" defaultCost="3">3:1 1</relation></relations>
+  <constraints initialCost="2" maximalCost="5"><constraint name="c" arity="2" scope="x y" reference="r"/>
+  </constraints></instance>"""
+ABOVE = """{"problem": {"name": "b", "mustbe": "BOUND"}, "variables": {"x": 2, "y": 2, "z": 2}, "functions": {
+  "f": {"scope": ["x", "y"], "costs": [0, -4, -4, -4]}, "g": {"scope": ["y", "z"], "costs": [-4, -4, -4, 0]},
+  "h": {"scope": ["x", "z"], "costs": [-4, -4, 0, -4]}}}"""
+BELOW = ABOVE.replace("-4", "4")
+
+
+@pytest.mark.parametrize(
+    ("name", "text", "reached", "other", "words"),
+    [
+        ("a.cfn", ABOVE, ">-8", ">-9", "a cost of -8 is not above"),
+        ("b.cfn", BELOW, "<8.0", "<8.1", "a cost of 8 is not below"),
+        ("c.xml", MAX_CSP, 'initialCost="2"', 'initialCost="1"', "a cost of 5 is not below"),
+    ],
+    ids=["above", "below", "xdiscsp"],
+)
+def test_an_optimum_that_reaches_the_bound_of_the_file_is_told_so(
+    name: str, text: str, reached: str, other: str, words: str, tmp_path: Path
+) -> None:
+    file = tmp_path / name
+    file.write_text(text.replace("BOUND", reached))
+    run = ("solve", file, "--protocol", "syncbb", "--runtime", "simulator")
+    assert f"bound: {words} the file's bound: there this is no solution" in robochoc_within(*run).stderr
+    file.write_text(text.replace("BOUND", other).replace(reached, other))
+    done = robochoc_within(*run)
+    assert (done.returncode, "this is no solution" in done.stderr) == (0, False)
+
+
 def test_orders_and_kills_may_use_original_names(tmp_path: Path) -> None:
     file, order = tmp_path / "dynamic.yaml", tmp_path / "order.txt"
     file.write_text(DYNAMIC)

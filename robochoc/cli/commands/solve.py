@@ -43,7 +43,7 @@ from robochoc.cli.options.solve import (
 from robochoc.cli.reports.closed_loop import flight_told, told_of
 from robochoc.cli.reports.failures import LIMIT, Failure, failures_told, worst
 from robochoc.cli.reports.live_sniffer import Watch, check_chosen, watching
-from robochoc.cli.reports.notes import differences_told
+from robochoc.cli.reports.notes import bound_told, differences_told
 from robochoc.run.defaults import default_protocol
 
 if TYPE_CHECKING:
@@ -346,6 +346,8 @@ def _tell(problem: ReadProblem, outcome: Outcome, wanted: Wanted) -> None:
     from robochoc.model.original_names import renamed_outcome, renamed_team
 
     names = problem.names
+    if reached := bound_told(problem, outcome.cost):
+        click.echo(f"{problem.team.name}: {reached}", err=True)
     if wanted.as_json:
         from robochoc.formats.result import result_json
 

@@ -5,8 +5,11 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator
 from typing import TYPE_CHECKING
 
+from robochoc.model.cost_units import Cost, cost_shown
+
 if TYPE_CHECKING:
     from robochoc.formats.dialects.dialect import Note
+    from robochoc.formats.problems import ReadProblem
 
 _SHOWN = 3
 """The notes of one kind that are shown."""
@@ -36,3 +39,14 @@ def differences_told(notes: Iterable[Note]) -> Iterator[str]:
     from robochoc.formats.dialects.dialect import OTHER_PROBLEM
 
     return notes_told((note for note in notes if note.kind in OTHER_PROBLEM), "'robochoc import --report' lists them")
+
+
+def bound_told(problem: ReadProblem, cost: Cost | None) -> str:
+    """Return what a cost means for the tool that the problem is from, if it reaches the bound there; or nothing."""
+    if problem.bound is None or cost is None:
+        return ""
+    maximize = problem.team.robots[0].costs.maximize
+    if cost > problem.bound if maximize else cost < problem.bound:
+        return ""
+    side = "above" if maximize else "below"
+    return f"bound: a cost of {cost_shown(cost)} is not {side} the file's bound: there this is no solution"

@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, field
+from fractions import Fraction
 from pathlib import Path
 from typing import NamedTuple
 
@@ -54,12 +55,15 @@ class Imported:
         dialect: The name of the dialect.
         names: The original names of robots and variables, by the team's, where they differ.
         notes: What has been mapped: `renamed`, `scale`, `shared variable`, ...
+        bound: A sum that the format takes for no solution, as it takes greater ones (maximising: smaller ones), and
+            that the team can reach. None: there is none.
     """
 
     team: Team
     dialect: str
     names: Mapping[str, str] = field(default_factory=dict)
     notes: tuple[Note, ...] = ()
+    bound: Fraction | None = None
 
 
 @dataclass(frozen=True)

@@ -165,6 +165,19 @@ def test_a_copy_of_a_model_is_a_model_of_its_own(copied: Callable[[robochoc.Mode
         again.add(y == 1)
 
 
+@pytest.mark.parametrize("copied", COPIES.values(), ids=COPIES)
+def test_deep_and_wide_terms_are_copied(copied: Callable[[robochoc.Model], robochoc.Model]) -> None:
+    model = robochoc.Model()
+    x = model.robot("a").variable("x", range(5))
+    deep, wide = 1 * x, 1 * x
+    for _ in range(99):
+        deep = abs(deep - 1)
+    for _ in range(15):
+        wide = abs(wide) + wide
+    model.add(deep >= 0, wide >= 0)
+    assert copied(model).team == model.team
+
+
 def test_what_pickle_does_not_take_it_says() -> None:
     model = robochoc.Model()
     x = model.robot("a").variable("x", range(3))

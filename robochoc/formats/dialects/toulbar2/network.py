@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
@@ -67,7 +66,8 @@ def imported(network: Network, options: ImportOptions, dialect: str) -> Imported
             scope = tuple(names.of(places[place]) for place in one.scope[: made.arity])
             name = word(one.table.name)
             constraints.append(Constraint(name, made, scope, scope, ConstraintModel.TKC, line=one.line))
-    notes = [*network.notes, *_notes(network, functions, scale)]
+    reaches = _reaches_the_bound(network, functions)
+    notes = [*network.notes, *_notes(network, scale, reaches=reaches)]
     notes += notes_on_names([*names.changed.items(), *symbols.changed.items()])
     if options.owner is None:
         notes.append(Note("owner", "the format knows no owners: each variable is a robot's of its own"))
@@ -77,7 +77,8 @@ def imported(network: Network, options: ImportOptions, dialect: str) -> Imported
         team = assemble(title, variables, constraints, kind=ProblemKind.DISWCSP, costs=units)
     else:
         team = assemble(title, variables, constraints)
-    return Imported(team, dialect, {**names.changed, **robots.changed}, tuple(notes))
+    bound = Fraction(network.bound) if reaches else None
+    return Imported(team, dialect, {**names.changed, **robots.changed}, tuple(notes), bound)
 
 
 def _is_soft(constraint: Constraint) -> bool:
@@ -159,18 +160,20 @@ def _changed(function: CostFunction, change: object) -> CostFunction:
     return replace(function, table=replace(function.table, rows=rows, default=known[function.table.default]))
 
 
-def _notes(network: Network, functions: Iterable[CostFunction], scale: Scale) -> Iterator[Note]:
-    if scale.rounds:
-        yield Note("rounded", f"some costs have more than {scale.places} decimal places, and were rounded to that many")
+def _reaches_the_bound(network: Network, functions: Iterable[CostFunction]) -> bool:
+    """Return whether a sum of finite costs may reach the bound, as far as the greatest cost of each function says."""
     sign = -1 if network.maximize else 1
     most: Amount = 0
     for one in functions:
         finite = [sign * amount for amount in one.table.amounts() if amount != INFINITE]
         most += max(finite, default=0)
-    if most >= sign * network.bound:
+    return abs(network.bound) != INFINITE and most >= sign * network.bound
+
+
+def _notes(network: Network, scale: Scale, *, reaches: bool) -> Iterator[Note]:
+    if scale.rounds:
+        yield Note("rounded", f"some costs have more than {scale.places} decimal places, and were rounded to that many")
+    if reaches:
         side = "above" if network.maximize else "below"
-        bound = float(network.bound) if not math.isinf(network.bound) else "inf"
-        text = (
-            f"toulbar2 accepts only sums {side} {bound:g}; here what reaches it is a solution, too, and its cost tells"
-        )
-        yield Note("bound", text)
+        text = f"toulbar2 accepts only sums {side} {float(network.bound):g}; here what reaches it is a solution, too"
+        yield Note("bound", f"{text}, and its cost tells")

@@ -7,6 +7,7 @@ from collections import defaultdict
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import replace
 from decimal import Decimal
+from fractions import Fraction
 
 from robochoc.formats.definitions import PREDEFINED
 from robochoc.formats.diagnostics import shortened
@@ -88,7 +89,9 @@ class _Import:
             extras=Extras(parts=parts),
         )
         changed = self._names.changed
-        return Imported(team, dialect, changed, (*notes_on_names([*changed.items()]), *self._notes))
+        notes = (*notes_on_names([*changed.items()]), *self._notes)
+        bound = None if instance.costs_from is None or instance.maximize else Fraction(instance.costs_from)
+        return Imported(team, dialect, changed, notes, bound)
 
     # Owners
 
