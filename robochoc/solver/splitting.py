@@ -89,16 +89,28 @@ class Split:
         target = -_collect(left, 1, terms) - _collect(right, -1, terms) + _STRICT.get(operator, 0)
         kept = [(term, factor) for term, factor in terms.items() if factor or _may_be_undefined(term)]
         reduced = [_times(self._reduced(term), factor) for term, factor in kept]
-        ends = [self._ends(term) for term in reduced]
         window = _Window(_COMPARISONS[operator], target)
         if not reduced and window.state(0, 0, 0) is None:
             self.tables.append((tuple(self.domains)[:1], ()))
+        before = len(self.tables), dict(self.domains), self.budget
+        try:
+            self._add_up(reduced, window)
+        except NotSplitError:
+            del self.tables[before[0] :]
+            _, self.domains, self.budget = before
+            # With the largest terms first, few partial sums can still be made good by the rest.
+            ends = {term: self._ends(term) for term in reduced}
+            self._add_up(sorted(reduced, key=lambda term: ends[term].low - ends[term].high), window)
+
+    def _add_up(self, reduced: Sequence[Expression], window: _Window) -> None:
+        """Add tables that say that the sum of terms over few variables is in a window."""
+        ends = [self._ends(term) for term in reduced]
         state: Name | None = None
         place = 0
         while place < len(reduced):
             group, after = self._group(reduced, place, state)
-            if state and after == len(reduced) and operator == "eq":
-                self._complete(state, group, target)
+            if state and after == len(reduced) and window.operator == "eq":
+                self._complete(state, group, window.target)
                 return
             low = sum(end.low for end in ends[after:])
             high = sum(end.high for end in ends[after:])

@@ -89,6 +89,7 @@ def test_tables_have_the_solutions_of_the_predicate_each_once(batch: int, monkey
     for seed in range(EACH * batch, EACH * (batch + 1)):
         chance = Random(seed)
         monkeypatch.setattr(splitting, "SMALL", chance.choice((1, 3, 6, 20)))
+        monkeypatch.setattr(splitting, "MAX_COMBINATIONS", chance.choice((12, 10**6, 10**6, 10**6)))
         width = chance.randint(2, 4)
         domains = {f"V{place}": sorted(chance.sample(range(-3, 5), chance.randint(1, 3))) for place in range(width)}
         formal = tuple(f"X{place}" for place in range(width))
@@ -100,6 +101,7 @@ def test_tables_have_the_solutions_of_the_predicate_each_once(batch: int, monkey
         if found is None:
             continue
         done += 1
+        assert found.domains.keys() == {*scope, *(name for names, _ in found.tables for name in names)}
         rows = itertools.product(*(domains[name] for name in scope))
         expected = Counter(row for row in rows if constraint.allows(dict(zip(scope, row, strict=True))))
         assert joined(found, scope, domains) == expected, (seed, text(body))
@@ -199,6 +201,12 @@ def test_counts_and_numbers_of_different_values_are_split() -> None:
     assert CentralSolver().solve(wide_team(often), count=True).count == 396  # 66 places for the zeros, then 2 * 3
     never = Apply("and", (Apply("ge", (hits(0), Constant(8))), Apply("ge", (hits(1), Constant(5)))))
     assert CentralSolver().solve(wide_team(never)).verdict is Verdict.NO_SOLUTION
+
+
+def test_a_sum_of_powers_of_ten_is_added_up_from_the_largest_on() -> None:
+    team = wide_team(Apply("eq", (weighted([10**place for place in range(9)]), Constant(987654321))), 9, values=10)
+    found = CentralSolver().solve(team, count=True)
+    assert found.count == 1
 
 
 def test_a_protocol_takes_the_predicate_as_it_is() -> None:
