@@ -273,7 +273,8 @@ def _tables(constraints: Iterable[Constraint], domains: dict[str, list[int]], *,
     budget = MAX_TRIED
     for number, constraint in enumerate(constraints):
         parts = None
-        if may_split and math.prod(len(domains[name]) for name in constraint.variables) > MAX_ALLOWED_ROWS:
+        scope = constraint.variables
+        if may_split and len(scope) > 2 and math.prod(len(domains[name]) for name in scope) > MAX_ALLOWED_ROWS:  # noqa: PLR2004
             parts = split(constraint, domains, f"#{number}.", budget)
         if parts is None:
             rows = tables.of(constraint)

@@ -33,7 +33,7 @@ SMALL = 256
 """So many combinations of values at most are put into one table where they could be in two."""
 MAX_COMBINATIONS = 1_000_000
 """The maximum number of combinations of values that one table is made of."""
-MAX_TRIED = 2_000_000
+MAX_TRIED = 3_000_000
 """The maximum number of combinations of values that all tables of the split predicates of a problem are made of."""
 LARGEST = BOUND >> 20
 """What is computed on the way is no larger, so that in no order it leaves the bounds of an expression."""
@@ -97,6 +97,9 @@ class Split:
         place = 0
         while place < len(reduced):
             group, after = self._group(reduced, place, state)
+            if state and after == len(reduced) and operator == "eq":
+                self._complete(state, group, target)
+                return
             low = sum(end.low for end in ends[after:])
             high = sum(end.high for end in ends[after:])
             scope = (*((state.name,) if state else ()), *names(group)) or tuple(self.domains)[:1]
@@ -108,6 +111,16 @@ class Split:
             else:
                 state = self._variable(scope, rows)
             place = after
+
+    def _complete(self, state: Name, group: Expression, target: int) -> None:
+        """Add the table that says that `state` and `group` add up to `target`: of each sum, the rows that fit."""
+        scope = names(group)
+        fitting: dict[int, list[Row]] = {}
+        for row, value in self._worth(group, scope):
+            fitting.setdefault(target - value, []).append(row)
+        rows = [(total, *row) for total in self.domains[state.name] for row in fitting.get(total, ())]
+        self.budget -= len(rows)
+        self.tables.append(((state.name, *scope), tuple(rows)))
 
     def _group(self, terms: Sequence[Expression], place: int, state: Name | None) -> tuple[Expression, int]:
         """Return the sum of the terms from `place` on that fit into one table with `state`, and where it ends."""

@@ -8,6 +8,7 @@ from dataclasses import replace
 from functools import cache, partial
 from random import Random
 
+from robochoc.cli.reports.notes import notes_told
 from robochoc.formats import InvalidInputError, check_team, read_team, write_team
 from robochoc.formats.dialects.dialect import Dialect, Imported, ImportOptions
 from robochoc.formats.dialects.names_file import NAMES_FILE, names_json, original_names
@@ -92,8 +93,8 @@ def _checked(read: Callable[[], Imported]) -> Team | None:
     except InvalidInputError as invalid:
         assert_clear(str(invalid))
         return None
-    for note in imported.notes:
-        assert_clear(note.text)
+    for line in notes_told(imported.notes, "'--report' lists them"):
+        assert_clear(line)
     with folder() as place:
         again = place / "team"
         write_team(replace(imported.team, scenario=()), again)

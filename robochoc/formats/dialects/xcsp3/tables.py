@@ -60,6 +60,10 @@ class _TooWideError(Exception):
 def _rows(text: str, scope: Sequence[Item], posting: Posting) -> Iterator[Row]:
     """Yield the tuples in a text; `*` is any value of its variable, `1..3` each of three."""
     if not text.startswith("("):
+        if text and len(scope) != 1:
+            raise MistakeError(
+                f"single values for {len(scope)} variables", "expected tuples in parentheses: (1,2)(3,4)"
+            )
         for word in text.split():
             yield from ((value,) for value in _cell(word, scope[0], posting))
         return
