@@ -270,6 +270,17 @@ def test_an_optimum_that_reaches_the_bound_of_the_file_is_told_so(
     assert (done.returncode, "this is no solution" in done.stderr) == (0, False)
 
 
+def test_an_infinity_means_nothing_to_xcsp3_and_that_is_told(tmp_path: Path) -> None:
+    file = tmp_path / "x.xml"
+    file.write_text(
+        '<instance format="XCSP3" type="COP"><variables><var id="x"> 2 3 </var></variables>'
+        "<objectives><minimize> x </minimize></objectives></instance>"
+    )
+    done = robochoc_within("solve", file, "--infinity", 2, "--runtime", "simulator")
+    assert "optimal solution for the robot, cost 2" in done.stdout
+    assert f"{file}: infinity: no cost of XCSP3 forbids, however large" in done.stderr
+
+
 def test_orders_and_kills_may_use_original_names(tmp_path: Path) -> None:
     file, order = tmp_path / "dynamic.yaml", tmp_path / "order.txt"
     file.write_text(DYNAMIC)

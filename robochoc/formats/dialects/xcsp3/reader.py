@@ -105,7 +105,10 @@ def read(paths: Sequence[Path], options: ImportOptions) -> Imported:
         costs=CostUnits(maximize, 0, posting.constant),
     )
     changed = {ours: theirs for theirs, ours in ids.items() if ours != theirs}
-    return Imported(team, NAME, changed, tuple(_notes(posting, root, changed)))
+    notes = list(_notes(posting, root, changed))
+    if options.infinity is not None:
+        notes.append(Note("infinity", "no cost of XCSP3 forbids, however large: its constraints are hard ones"))
+    return Imported(team, NAME, changed, tuple(notes))
 
 
 @dataclass
