@@ -169,6 +169,8 @@ class Posting:
 
     def post_table(self, scope: Sequence[Item], rows: Iterable[Sequence[int]], *, allowed: bool) -> None:
         """Post that `scope` has one of the values in `rows`, or none of them."""
+        if any(isinstance(item, Apply) for item in scope):
+            raise MistakeError("an expression in the scope of a table", "use variables and integers")
         own = [item.name for item in scope if isinstance(item, Name)]
         if len(own) != len(scope) or len(set(own)) != len(own):
             own = list(dict.fromkeys(own))

@@ -254,6 +254,7 @@ REFUSED = {
     "<extension type='hybrid-1'><list> x[] </list><supports/></extension>": "hybrid",
     "<extension><list> x[] </list><supports> (1,2) </supports></extension>": "of 2",
     "<extension><list> x[0] x[0] </list><supports> 1 2 </supports></extension>": "single values for 2 variables",
+    "<extension><list> x[0] add(x[1],1) </list><supports> (1,2) </supports></extension>": "an expression in the scope",
     "<element><list> x[] </list><index rank='first'> x[0] </index><value> 1 </value></element>": "rank",
     "<cumulative><origins> x[] </origins><lengths> 1 1 1 </lengths><heights> 1 1 1 </heights>"
     "<condition> (ge,1) </condition></cumulative>": "ge has no counterpart",
