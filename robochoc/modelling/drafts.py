@@ -16,7 +16,8 @@ from robochoc.modelling.numbers import Exact, exact, places_of
 from robochoc.modelling.places import ModelError, Place
 from robochoc.modelling.rules import check_constant
 from robochoc.modelling.tables import Price, Row, commonest, listed_rows, prices, truths
-from robochoc.modelling.terms import Applied, Linear, Tabled, Term, Variable
+from robochoc.modelling.tabulated import Tabled
+from robochoc.modelling.terms import Applied, Linear, Term, Variable
 from robochoc.modelling.translation import Translator, UntranslatableError, may_be_undefined
 
 

@@ -9,7 +9,8 @@ from typing import Any
 from robochoc.modelling.codes import NUMBER, kind_of
 from robochoc.modelling.numbers import exact, is_number
 from robochoc.modelling.places import ModelError, ModelTypeError, here
-from robochoc.modelling.terms import Applied, Called, Tabled, Term, Variable, all_of, condition, number, term_of
+from robochoc.modelling.tabulated import Called, Tabled
+from robochoc.modelling.terms import Applied, Term, Variable, all_of, condition, number, term_of
 
 
 def all_different(*terms: object) -> Term:

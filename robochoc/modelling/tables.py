@@ -10,7 +10,8 @@ from collections.abc import Iterator, Mapping, Sequence
 from robochoc.modelling.meanings import UndefinedTermError
 from robochoc.modelling.numbers import Exact, exact, is_number
 from robochoc.modelling.places import ModelError, ModelTypeError, Place
-from robochoc.modelling.terms import Tabled, Term, Variable
+from robochoc.modelling.tabulated import Tabled
+from robochoc.modelling.terms import Term, Variable
 
 MAX_COMBINATIONS = 100_000
 """The maximum number of combinations of values of which a table is computed."""

@@ -7,14 +7,14 @@ same in the language of files.
 from __future__ import annotations
 
 import copy
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from fractions import Fraction
 from functools import cached_property
 from typing import NoReturn
 
 from robochoc.modelling.codes import BOOLEAN, NUMBER, Codes, Kind, kind_of
 from robochoc.modelling.extents import ALONE, Extent, extent_of
-from robochoc.modelling.meanings import MEANINGS, UndefinedTermError
+from robochoc.modelling.meanings import MEANINGS
 from robochoc.modelling.numbers import Exact, exact, is_number, shown
 from robochoc.modelling.places import ModelError, ModelTypeError, Place, did_you_mean
 
@@ -271,47 +271,6 @@ class Applied(Term):
 
     def __repr__(self) -> str:
         return MEANINGS[self.operator].text([repr(one) for one in self.arguments])
-
-
-class Called(Term):
-    """A function of the user's, of terms. What it returns says whether it is a condition or a number."""
-
-    kind = None
-
-    def __init__(self, function: Callable[..., object], arguments: tuple[Term, ...], place: Place) -> None:
-        self.function, self.arguments, self.place = function, arguments, place
-        self.extent = extent_of(arguments)
-
-    def value(self, values: Values) -> object:
-        """Return its value."""
-        given = [one.value(values) for one in self.arguments]
-        try:
-            return self.function(*given)
-        except ArithmeticError as error:
-            raise UndefinedTermError from error
-        except Exception as error:
-            name = getattr(self.function, "__name__", "the function")
-            shown = ", ".join(map(repr, given))
-            raise ModelError(f"{name}({shown}): {type(error).__name__}: {error}", place=self.place) from error
-
-    def __repr__(self) -> str:
-        return f"{getattr(self.function, '__name__', 'function')}({', '.join(map(repr, self.arguments))})"
-
-
-class Tabled(Term):
-    """A table over terms: the value of each combination that it lists, and of all others."""
-
-    def __init__(self, arguments: tuple[Term, ...], rows: Mapping[tuple[object, ...], object], default: object) -> None:
-        self.arguments, self.rows, self.default = arguments, rows, default
-        self.kind = BOOLEAN if isinstance(default, bool) else NUMBER
-        self.extent = extent_of(arguments)
-
-    def value(self, values: Values) -> object:
-        """Return its value."""
-        return self.rows.get(tuple(one.value(values) for one in self.arguments), self.default)
-
-    def __repr__(self) -> str:
-        return f"table({', '.join(map(repr, self.arguments))})"
 
 
 _FACTORS: dict[Exact, str] = {1: "", -1: "-"}

@@ -339,14 +339,21 @@ def test_a_parent_that_is_killed_while_there_is_no_router(short_path: Path) -> N
         left_nothing(run)
 
 
-def test_a_request_to_the_fork_server_that_ends_too_early(short_path: Path) -> None:
+@pytest.mark.parametrize(
+    "request_",
+    [
+        "connection = socket.socket(socket.AF_UNIX); connection.connect(server._forkserver_address)",
+        "server.connect_to_new_process([])",
+        "os.write(server.connect_to_new_process([])[1], pickle.dumps({'a': 'b'})[:-4])",
+    ],
+    ids=["nothing", "no robot", "half a robot"],
+)
+def test_a_request_to_the_fork_server_that_ends_too_early(request_: str, short_path: Path) -> None:
     """As of a parent that is killed after it has connected: the server ends, and says nothing."""
     program = (
-        "import os, socket; from multiprocessing.forkserver import _forkserver;"
+        "import os, pickle, socket; from multiprocessing.forkserver import _forkserver as server;"
         "from robochoc.communication.network.local import _fork_server as begun;"
-        "from robochoc.protocols.abt import ABT; begun(ABT); connection = socket.socket(socket.AF_UNIX);"
-        "connection.connect(_forkserver._forkserver_address); connection.close();"
-        "os.waitpid(_forkserver._forkserver_pid, 0); os.kill(os.getpid(), 9)"
+        f"from robochoc.protocols.abt import ABT; begun(ABT); {request_}; os.kill(os.getpid(), 9)"
     )
     with running([sys.executable, "-c", program], short_path / "run") as run:
         run.end()

@@ -16,12 +16,14 @@ from types import TracebackType
 SCRATCH = "ROBOCHOC_SCRATCH"
 """The environment's variable by which the parent says which folder that is."""
 
-_SERVER = os.getpid()
-
 
 def _without_a_parent(kind: type[BaseException], error: BaseException, trace: TracebackType | None) -> None:
-    """Say nothing of a request that ends too early, in the fork server itself; the robots it forks tell all errors."""
-    if not (issubclass(kind, EOFError) and os.getpid() == _SERVER):
+    """Say nothing of a request whose rest does not come, in the fork server and in the process that it has forked.
+
+    What goes wrong in a robot is told by the process itself (`Process._bootstrap`), and does not come here.
+    """
+    truncated = kind.__name__ == "UnpicklingError" and "truncated" in str(error)
+    if not (truncated or issubclass(kind, EOFError)):
         sys.__excepthook__(kind, error, trace)
 
 
