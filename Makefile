@@ -64,7 +64,8 @@ COVERAGE := $(BIN)/coverage
 coverage: $(READY)  ## lines and branches that make test reaches, by room: out/coverage/rooms.txt, out/coverage/html
 	rm -rf out/coverage
 	$(COVERAGE) run -m pytest -n $(JOBS) --dist worksteal $(TESTS) \
-		--deselect tests/unit/communication/test_faults.py::test_a_signal_before_the_program_has_begun; \
+		--deselect tests/unit/communication/test_faults.py::test_a_signal_before_the_program_has_begun \
+		--deselect tests/cli/test_local_signals.py::test_a_signal_at_the_start; \
 	tests=$$?; PYTHONWARNINGS=ignore $(COVERAGE) combine --quiet && rm -f out/coverage/data.* && \
 	$(COVERAGE) json --quiet && $(COVERAGE) html --quiet && \
 	$(BIN)/python -m tests.support.coverage_by_room out/coverage/coverage.json >out/coverage/rooms.txt; \

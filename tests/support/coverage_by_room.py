@@ -11,7 +11,27 @@ import sys
 from collections import Counter
 from pathlib import Path
 
-FLOORS: dict[str, float] = {}
+FLOORS: dict[str, float] = {
+    "protocols": 100.0,
+    "generators": 98.0,
+    "services": 98.0,
+    "verification": 96.0,
+    "view": 96.0,
+    "flight": 95.0,
+    "model": 95.0,
+    "authority": 94.0,
+    "replay": 93.0,
+    "system": 93.0,
+    "journal": 91.0,
+    "sniffer": 91.0,
+    "communication": 90.0,
+    "run": 90.0,
+    "cli": 89.0,
+    "modelling": 88.0,
+    "solver": 87.0,
+    "ros": 86.0,
+    "formats": 84.0,
+}
 """The share of branches, in percent, that tests have to reach in a room."""
 
 
