@@ -71,6 +71,7 @@ def player(one: Page) -> Iterator[Page]:
     one.select_option("#trail", "all")
     one.locator("#play").focus()
     one.evaluate("document.activeElement.blur()")
+    drawn_again(one)  # where things are on the screen is known then
     yield one
     one.evaluate("Playback.player.pause()")  # what moves is painted again and again
 
