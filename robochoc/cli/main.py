@@ -11,6 +11,8 @@ import signal
 import sys
 import time
 
+from robochoc.system.termination import Terminated
+
 TYPE_CHECKING = False  # see robochoc/__init__.py
 if TYPE_CHECKING:
     from types import FrameType
@@ -49,7 +51,7 @@ def _open_standard_streams() -> None:
 
 
 class TerminationSignals:
-    """The handler of SIGINT and SIGTERM: the first signal raises `KeyboardInterrupt` or `SystemExit`.
+    """The handler of SIGINT and SIGTERM: the first signal raises `KeyboardInterrupt` or `Terminated`.
 
     It does not raise during an import, as many modules print or swallow exceptions while they load.
     """
@@ -85,7 +87,7 @@ class TerminationSignals:
         self._since = time.monotonic()
         if signum == signal.SIGINT:
             raise KeyboardInterrupt
-        sys.exit(128 + signum)
+        raise Terminated(128 + signum)
 
     def _again(self, _signum: int, frame: FrameType | None) -> None:
         self._hear(self._signum, frame)

@@ -15,6 +15,7 @@ from robochoc.ros.source import Source, SourceError
 from robochoc.system.entry_points import EntryPoint
 from robochoc.system.files import resolved
 from robochoc.system.installed import entry_points_named, load_entry_point, not_installed_message
+from robochoc.system.termination import Terminated
 
 SINKS, SOURCES = "robochoc.sinks", "robochoc.sources"
 
@@ -90,6 +91,8 @@ def _lacking(entry: EntryPoint) -> str:
         if entry.dist and entry.name in extras:
             wanted = f"{entry.dist.name}[{entry.name}]"
             return f"{entry.name} needs {error.name}, which is not installed: pip install '{wanted}'"
+    except Terminated:
+        raise
     except (Exception, SystemExit):  # noqa: BLE001 - raised when it is loaded once more
         return ""
     return ""

@@ -9,6 +9,7 @@ from functools import lru_cache
 from typing import NamedTuple
 
 from robochoc.system.entry_points import EntryPoint, entry_points
+from robochoc.system.termination import Terminated
 
 Fault = Callable[[object], str]
 """Returns why a loaded object cannot be used. Empty: it can."""
@@ -75,6 +76,8 @@ def load_entry_point(entry: EntryPoint, namesakes: Sequence[EntryPoint], fault: 
         return Loaded(None, f"is offered by several packages, and only one may: {places}")
     try:
         found = entry.load()
+    except Terminated:
+        raise
     except (Exception, SystemExit) as error:  # noqa: BLE001 - see above
         return Loaded(None, f"cannot be imported: {type(error).__name__}: {error}")
     broken = fault(found)

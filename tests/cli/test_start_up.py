@@ -50,7 +50,9 @@ def test_help_imports_no_command() -> None:
         "except SystemExit: print(*(n for n in sys.modules if n.startswith('robochoc.')), file=sys.stderr)"
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True, env=unmeasured())
-    assert set(done.stderr.split()) == {"robochoc.cli", "robochoc.cli.main", "robochoc.cli.group"}
+    assert set(done.stderr.split()) == {
+        "robochoc.cli", "robochoc.cli.main", "robochoc.cli.group", "robochoc.system", "robochoc.system.termination"
+    }  # fmt: skip
 
 
 def test_nothing_slow_is_imported_before_signals_are_heard() -> None:

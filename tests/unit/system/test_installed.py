@@ -1,0 +1,40 @@
+"""A signal that meets the import of a package ends the program: it is no fault of the package."""
+
+from __future__ import annotations
+
+import signal
+
+import pytest
+
+from robochoc.ros import sinks
+from robochoc.system.installed import load_entry_point
+from robochoc.system.termination import Terminated
+
+
+class Struck:
+    """An entry point during whose import SIGTERM arrives."""
+
+    name, value, dist = "own", "own:Own", None
+
+    def load(self) -> object:
+        raise Terminated(128 + signal.SIGTERM)
+
+
+class Leaving(Struck):
+    def load(self) -> object:
+        raise SystemExit(3)
+
+
+def test_sigterm_ends_the_program_while_a_protocol_is_imported() -> None:
+    with pytest.raises(Terminated, match="143"):
+        load_entry_point(Struck(), [], lambda _: "")
+    assert load_entry_point(Leaving(), [], lambda _: "").broken == "cannot be imported: SystemExit: 3"
+
+
+def test_sigterm_ends_the_program_while_a_sink_is_imported(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(sinks, "entry_points_named", lambda *_: [Struck()])
+    with pytest.raises(Terminated):
+        sinks.open_sink("own:")
+    monkeypatch.setattr(sinks, "entry_points_named", lambda *_: [Leaving()])
+    with pytest.raises(sinks.UnknownSinkError, match="cannot be imported: SystemExit: 3"):
+        sinks.open_sink("own:")
