@@ -169,7 +169,7 @@ def test_reading_the_frames_of_others(run: NetworkRun, key: str) -> None:
         run.wait_for_refusal("RX3", f"declare subscriber {key}".replace("*", r"\*"), "no rule")
         run.wait_for_refusal("RX3", f"query {key}".replace("*", r"\*"), "no rule")
         run.wait_for_progress()
-        assert not heard
+        assert {str(one.key_expr).split("/")[2] for one in heard} <= {"RX3"}  # the master welcomes whoever comes back
         del subscriber
 
 
