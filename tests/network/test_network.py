@@ -165,8 +165,11 @@ def test_what_the_robots_check_is_what_the_checker_checks() -> None:
         assert network.master.checked(wrong) == (False, 0.0)
 
 
-def test_limits() -> None:
-    with LocalNetwork(queens3d(4), protocol_named("abt")) as network:
+def test_the_limit_on_messages_ends_a_search_that_would_not_end_by_itself() -> None:
+    """Robots are not held up while the master counts: a short search may be over before it has."""
+    for_ever = RunParameters(settings={"cycles": "1000000000"})
+    team = random_cost_team(Random("limits"), n_ary=False)
+    with LocalNetwork(team, protocol_named("mgm"), parameters=for_ever) as network:
         result = network.search(messages=20)
         assert result.verdict is Verdict.UNKNOWN
         assert sum(result.metrics.messages.values()) >= 20
