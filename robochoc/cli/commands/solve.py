@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
@@ -55,7 +55,6 @@ if TYPE_CHECKING:
     from robochoc.model.problem import Team
     from robochoc.ros.closed_loop import ClosedLoop
     from robochoc.run.options import Options
-    from robochoc.verification.objective import Objective
 
 
 _SECTIONS: Sections = {
@@ -277,7 +276,9 @@ def _recorded(folder: Path, options: Options, products: Products, wanted: Wanted
     order = order_for(team, wanted.order, problem.names)
     options = replace(options, protocol=protocol, order=order, kill=_called(options.kill, problem))
     header = partial(_header, team, options)
-    objective = None if wanted.ros.situation else _objective(team, options)
+    from robochoc.run.objective import objective_to_record
+
+    objective = None if wanted.ros.situation else objective_to_record(team, options)
     with (
         closed_loop(wanted.ros, team, options.seed) as loop,
         recording(products.journal, header, objective, watch.begun()) as recorder,
@@ -323,19 +324,6 @@ def _header(team: Team, options: Options) -> Header:
         order=options.order or UNSET,
         channel=options.channel.name if options.channel else UNSET,
     )
-
-
-def _objective(team: Team, options: Options) -> Callable[[], Objective] | None:
-    """Return the journal's objective. None where nothing is minimised, or the problem changes."""
-    from robochoc.model.costs import normalized
-    from robochoc.run.options import Withdrawal
-    from robochoc.verification.objective import Objective, withdrawal_cost
-
-    fewest = options.withdraw is Withdrawal.MINIMUM
-    if team.dynamic or not (fewest or team.kind == "DisWCSP"):
-        return None
-    counted = normalized(team)
-    return lambda: Objective(counted, withdrawal_cost(counted) if fewest else None)
 
 
 def _tell(problem: ReadProblem, outcome: Outcome, wanted: Wanted) -> None:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from functools import wraps
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -92,22 +91,8 @@ GRAPH = ("--connected", "--links", "--neighbours", "--rewiring", "--rows", "--to
 KINDS = ("random", "scale-free", "small-world", "grid", "tree")
 
 
-@dataclass(frozen=True)
-class _Belongs:
-    """An option of some kinds of graphs alone."""
-
-    name: str
-    kinds: tuple[str, ...]
-
-
-_OWN = {
-    "links": _Belongs("--links", ("scale-free",)),
-    "neighbours": _Belongs("--neighbours", ("small-world",)),
-    "rewiring": _Belongs("--rewiring", ("small-world",)),
-    "rows": _Belongs("--rows", ("grid",)),
-    "torus": _Belongs("--torus", ("grid",)),
-    "connected": _Belongs("--connected", ("random", "small-world")),
-}
+_OWN = ("links", "neighbours", "rewiring", "rows", "torus", "connected")
+"""Parameters of some kinds of graphs alone."""
 
 
 def graph_options(command: Command) -> Command:
@@ -149,61 +134,15 @@ def graph_of(options: Options, density: str) -> Graph | None:
     For that one `options` keep the number of robots, the density and whether it is connected.
 
     Raises:
-        click.UsageError: if an option is missing, or has nothing to say about this graph.
-        ValueError: if numbers do not fit together.
+        ValueError: if an option is missing, or has nothing to say about this graph, or numbers do not fit together.
     """
-    name = options.pop("graph")
-    kind = name if name in KINDS else "file"
+    from robochoc.generators.graph_choice import GraphChoice
+
     given = {key: options.pop(key) for key in _OWN}
-    for key, option in _OWN.items():
-        if given[key] not in {None, False} and kind not in option.kinds:
-            raise click.UsageError(f"{option.name} is for --graph {' or '.join(option.kinds)}, not for {name}.")
-    if kind == "file":
-        return _of_file(name, options, density)
-    if options["agents"] is None:
-        raise click.UsageError("Missing option '--agents'.")
-    if kind == "random":
-        if options[density] is None:
-            raise click.UsageError(f"Missing option '--{density}' (without --graph).")
-        options["connected"] = given["connected"]
-        return None
-    _refuse_density(density, options, name)
-    return _drawn(kind, options.pop("agents"), given)
-
-
-def _refuse_density(density: str, options: Options, name: str) -> None:
-    if options.pop(density) is not None:
-        raise click.UsageError(f"--{density} is for --graph random; of {name} it follows from the other options.")
-
-
-def _drawn(kind: str, agents: int, given: Options) -> Graph:
-    from robochoc.generators import graphs
-
-    match kind:
-        case "scale-free":
-            return graphs.scale_free(agents, given["links"] or 2)
-        case "small-world":
-            rewiring = 0.1 if given["rewiring"] is None else given["rewiring"]
-            return graphs.small_world(agents, given["neighbours"] or 4, rewiring, connected=given["connected"])
-        case "grid":
-            rows = given["rows"] or graphs.nearest_to_a_square(agents)
-            if agents % rows:
-                raise click.UsageError(f"{agents} robots do not fill {rows} rows; change --agents or --rows.")
-            return graphs.grid(rows, agents // rows, torus=given["torus"])
-        case _:
-            return graphs.tree(agents)
-
-
-def _of_file(name: str, options: Options, density: str) -> Graph:
-    from robochoc.generators.graph_files import read_graph
-
-    if not Path(name).exists():
-        import difflib
-
-        near = difflib.get_close_matches(name, KINDS, 1)
-        hint = f" Did you mean {near[0]!r}?" if near else ""
-        raise click.UsageError(f"--graph {name!r} is none of {', '.join(KINDS)}, and no file.{hint}")
-    _refuse_density(density, options, name)
-    if options.pop("agents") is not None:
-        raise click.UsageError("--agents follows from the graph in the file; leave it out.")
-    return read_graph(Path(name))
+    choice = GraphChoice(kind=options.pop("graph"), agents=options["agents"], **given)
+    graph = choice.graph(density, options[density], dashes="--")
+    if graph is None:
+        options["connected"] = choice.connected
+    else:
+        del options["agents"], options[density]
+    return graph

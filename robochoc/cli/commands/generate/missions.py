@@ -43,7 +43,7 @@ def model_option(name: str, choices: list[str], text: str) -> Callable[..., Any]
 @click.option("--required", is_flag=True, help="All meetings must take place, and preferences do not count: a DisCSP.")
 @seed_option
 @team_written("meetings-MODEL-AGENTS-MEETINGS-PARTICIPANTS-SLOTS-LENGTH-VALUE-SEED")
-def meetings(max_value: int, *, required: bool, **problem: Any) -> Team:  # noqa: ANN401 - `meetings`'s own
+def meetings(**problem: Any) -> Team:  # noqa: ANN401 - `meetings`'s own
     """Distributed multi-event scheduling (DiMES; Maheswaran et al. 2004): what meetings are worth is maximised.
 
     A variable is the slot in which a meeting starts, or 0: it does not take place. Both models of a seed have the same
@@ -54,9 +54,9 @@ def meetings(max_value: int, *, required: bool, **problem: Any) -> Team:  # noqa
     robochoc generate meetings --agents 5 --meetings 4 --slots 5 --max-length 2 --model eav
     robochoc generate meetings --agents 8 --meetings 6 --participants 3 --slots 6 --required
     """  # noqa: D301 - \\b is how click is told to leave the lines as they are
-    from robochoc.generators.meetings import meetings as scheduling
+    from robochoc.generators.families import meetings as scheduling
 
-    return scheduling(**problem, max_value=None if required else max_value)
+    return scheduling(**problem)
 
 
 def _sensor_options(command: Command) -> Command:
@@ -112,23 +112,16 @@ def sensors(**problem: Any) -> Team:  # noqa: ANN401 - `sensors`'s own
 @share("--visibility", "Probability that a sensor that is near enough sees a target", 1)
 @share("--compatibility", "Probability that two sensors that are near enough are compatible", 1)
 @team_written("grid-sensors-MODEL-ROWSxCOLUMNS-TARGETS-NEEDED-SIGHT-HEARING-VISIBILITY-COMPATIBILITY-SEED")
-def grid_sensors(
-    sight: int,
-    hearing: int,
-    visibility: float,
-    compatibility: float,
-    **problem: Any,  # noqa: ANN401 - `grid_sensors`'s own
-) -> Team:
+def grid_sensors(**problem: Any) -> Team:  # noqa: ANN401 - `grid_sensors`'s own
     """GSensorDCSP (Bejar et al. 2005): sensors stand on the nodes of a grid, and targets in cells, one a cell at most.
 
     \b
     robochoc generate grid-sensors --rows 4 --columns 4 --targets 3
     robochoc generate grid-sensors --rows 5 --columns 5 --targets 5 --sight 2 --hearing 2 --visibility 0.8
     """  # noqa: D301 - \\b is how click is told to leave the lines as they are
-    from robochoc.generators.sensors import Reach
-    from robochoc.generators.sensors import grid_sensors as tracked
+    from robochoc.generators.families import grid_sensors as tracked
 
-    return tracked(**problem, reach=Reach(sight, hearing, visibility, compatibility))
+    return tracked(**problem)
 
 
 @click.command(
@@ -186,14 +179,7 @@ def tracking(**problem: Any) -> Team:  # noqa: ANN401 - `tracking`'s own
 @number("--capacity", "several: room of a robot; tasks take 1 to 3.", default=3)
 @seed_option
 @team_written("tasks-MODEL-AGENTS-TASKS-SIDE-WORTH-SKILLS-DISTANCE-SEED")
-def tasks(
-    side: int,
-    distance: str,
-    places: int,
-    skills: int,
-    skilled: int,
-    **problem: Any,  # noqa: ANN401 - `tasks`'s own
-) -> Team:
+def tasks(**problem: Any) -> Team:  # noqa: ANN401 - `tasks`'s own
     """Task allocation (Gerkey and Mataric 2004; Scerri et al. 2005): the tasks' worth less the ways is maximised.
 
     \b
@@ -201,7 +187,6 @@ def tasks(
     robochoc generate tasks --agents 6 --tasks 8 --skills 3 --skilled 2 --distance straight --places 2
     robochoc generate tasks --agents 4 --tasks 8 --model several --capacity 5
     """  # noqa: D301 - \\b is how click is told to leave the lines as they are
-    from robochoc.generators.tasks import Distance, Skills, Ways
-    from robochoc.generators.tasks import tasks as allocation
+    from robochoc.generators.families import tasks as allocation
 
-    return allocation(**problem, ways=Ways(side, Distance(distance), places), skills=Skills(skills, skilled))
+    return allocation(**problem)

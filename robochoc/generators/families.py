@@ -1,0 +1,190 @@
+"""The families of problems by name: what `robochoc generate`, studies and `robochoc compare` make.
+
+Parameters are called as the options of `robochoc generate`, with underscores.
+"""
+
+from __future__ import annotations
+
+import inspect
+from collections.abc import Callable, Mapping
+from functools import cache
+from types import MappingProxyType, UnionType
+from typing import Any, get_args, get_type_hints
+
+from robochoc.generators import coloring as colorings
+from robochoc.generators import ising as isings
+from robochoc.generators import meetings as schedules
+from robochoc.generators import queens3d as queens
+from robochoc.generators import random_csp as random_problems
+from robochoc.generators import sensors as sensor_networks
+from robochoc.generators import tasks as allocations
+from robochoc.generators import tracking as trackings
+from robochoc.generators.graph_choice import GraphChoice
+from robochoc.model.cost_units import CostUnits
+from robochoc.model.problem import Team
+
+Parameter = str | int | float | bool
+
+
+def random(  # noqa: PLR0913 - parameters of a family, by their names
+    *,
+    domain: int,
+    agents: int | None = None,
+    density: float | None = None,
+    tightness: float | None = None,
+    max_cost: int | None = None,
+    places: int = 0,
+    maximize: bool = False,
+    seed: int = 0,
+    graph: str = "random",
+    **of_graph: Any,  # noqa: ANN401 - `GraphChoice`'s own
+) -> Team:
+    """Return a random problem of Model B: see `generators/random_csp.py`."""
+    if tightness is None and max_cost is None:
+        raise ValueError("tightness is missing (without max_cost)")
+    drawn = GraphChoice(kind=graph, agents=agents, **of_graph)
+    costs = CostUnits(maximize, places)
+    on = drawn.graph("density", density)
+    if on is not None:
+        return random_problems.random_on(on, domain, tightness or 0, seed, max_cost=max_cost, costs=costs)
+    return random_problems.random_csp(
+        agents or 0,
+        domain,
+        density or 0,
+        tightness or 0,
+        seed,
+        connected=drawn.connected,
+        max_cost=max_cost,
+        costs=costs,
+    )
+
+
+def coloring(
+    *,
+    agents: int | None = None,
+    colors: int = 3,
+    degree: float | None = None,
+    conflicts: str = "soft",
+    max_cost: int = 10,
+    places: int = 0,
+    seed: int = 0,
+    graph: str = "random",
+    **of_graph: Any,  # noqa: ANN401 - `GraphChoice`'s own
+) -> Team:
+    """Return a graph to be coloured: see `generators/coloring.py`."""
+    drawn = GraphChoice(kind=graph, agents=agents, **of_graph)
+    on = drawn.graph("degree", degree)
+    if on is not None:
+        return colorings.coloring_of(on, colors, seed, conflicts=conflicts, max_cost=max_cost, places=places)
+    return colorings.coloring(
+        agents or 0,
+        colors,
+        degree or 0,
+        seed,
+        connected=drawn.connected,
+        conflicts=conflicts,
+        max_cost=max_cost,
+        places=places,
+    )
+
+
+def meetings(  # noqa: PLR0913 - parameters of a family, by their names
+    *,
+    agents: int,
+    meetings: int,
+    slots: int,
+    participants: int = 2,
+    model: str = "peav",
+    max_length: int = 1,
+    max_value: int = 10,
+    required: bool = False,
+    seed: int = 0,
+) -> Team:
+    """Return meetings to be scheduled: see `generators/meetings.py`."""
+    worth = None if required else max_value
+    return schedules.meetings(
+        agents, meetings, participants, slots, seed, max_length=max_length, max_value=worth, model=model
+    )
+
+
+def grid_sensors(  # noqa: PLR0913 - parameters of a family, by their names
+    *,
+    rows: int,
+    columns: int,
+    targets: int,
+    needed: int = 3,
+    model: str = "targets",
+    sight: int = 1,
+    hearing: int = 1,
+    visibility: float = 1,
+    compatibility: float = 1,
+    seed: int = 0,
+) -> Team:
+    """Return sensors on a grid: see `generators/sensors.py`."""
+    reach = sensor_networks.Reach(sight, hearing, visibility, compatibility)
+    return sensor_networks.grid_sensors(rows, columns, targets, seed, reach=reach, needed=needed, model=model)
+
+
+def tasks(  # noqa: PLR0913 - parameters of a family, by their names
+    *,
+    agents: int,
+    tasks: int,
+    side: int = 100,
+    worth: int = 200,
+    skills: int = 1,
+    skilled: int = 1,
+    distance: str = "streets",
+    places: int = 0,
+    model: str = "assignment",
+    capacity: int = 3,
+    seed: int = 0,
+) -> Team:
+    """Return tasks to be allocated: see `generators/tasks.py`."""
+    ways = allocations.Ways(side, allocations.Distance(distance), places)
+    has = allocations.Skills(skills, skilled)
+    return allocations.tasks(agents, tasks, seed, worth=worth, ways=ways, skills=has, model=model, capacity=capacity)
+
+
+FAMILIES: Mapping[str, Callable[..., Team]] = MappingProxyType(
+    {
+        "coloring": coloring,
+        "grid-sensors": grid_sensors,
+        "ising": isings.ising,
+        "meetings": meetings,
+        "queens3d": queens.queens3d,
+        "random": random,
+        "sensors": sensor_networks.sensors,
+        "tasks": tasks,
+        "tracking": trackings.tracking,
+    }
+)
+"""What makes each family's problems, of parameters by name."""
+
+
+@cache
+def parameters_of(family: str) -> Mapping[str, tuple[type, ...]]:
+    """Return the parameters of a family, and the types that each may have."""
+    make = FAMILIES[family]
+    hints = get_type_hints(make)
+    found = {name: _types(hints[name]) for name in inspect.signature(make).parameters if name != "of_graph"}
+    if "graph" in found:
+        of_graph = {name: _types(hint) for name, hint in get_type_hints(GraphChoice).items()}
+        found |= {name: types for name, types in of_graph.items() if name not in {"kind", "agents"}}
+    return MappingProxyType(found)
+
+
+def required_of(family: str) -> tuple[str, ...]:
+    """Return the parameters of a family that have no default."""
+    signature = inspect.signature(FAMILIES[family])
+    return tuple(
+        name
+        for name, one in signature.parameters.items()
+        if one.default is one.empty and one.kind is not one.VAR_KEYWORD
+    )
+
+
+def _types(hint: Any) -> tuple[type, ...]:  # noqa: ANN401 - whatever a parameter is declared as
+    """Return the plain types that a parameter may have; an integer will do for a float."""
+    alternatives = get_args(hint) if isinstance(hint, UnionType) else (hint,)
+    plain = [one for one in alternatives if one in {int, float, bool, str}]
+    return tuple(dict.fromkeys([*plain, *([int] if float in plain else [])]))
