@@ -1,0 +1,134 @@
+"""`robochoc compare`: protocols side by side, at once."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from robochoc.cli.options.paths import InputPath
+from robochoc.cli.reports.failures import invalid_input_fails
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from robochoc.experiments.study import Study
+
+DEFAULT_SEEDS = "1..10"
+
+
+@click.command(short_help="Compare protocols on problems: a table and a picture.")
+@click.argument("problem", nargs=-1, required=True, metavar="PATH ...|FAMILY [NAME=VALUE ...]")
+@click.option("--protocols", required=True, metavar="NAME,NAME,...", help="The protocols.")
+@click.option("--set", "settings", multiple=True, metavar="NAME=VALUE", help="Set a parameter of all. Repeatable.")
+@click.option("--order", metavar="NAME", help="Priority order of the robots, or several with commas.")
+@click.option("--runtime", default="simulator", show_default=True, metavar="NAME", help="simulator or processes.")
+@click.option("--channel", metavar="NAME", help="Channel model of the simulator: wlan, wpan, wman, wwan.")
+@click.option(
+    "--timeout", type=click.FloatRange(0, min_open=True), default=30, show_default=True, metavar="SECONDS",
+    help="Limit of each run.",
+)  # fmt: skip
+@click.option("--over", metavar="PARAMETER", help="A row for each value of it.  [default: the first with several]")
+@click.option("--html", type=InputPath(), metavar="FILE", help="Write a page with figures and tests.")
+@click.option("--save", type=InputPath(), metavar="FILE", help="Keep the results: an SQLite file to go on with.")
+@click.option("--jobs", type=click.IntRange(1, 1024), metavar="N", help="Workers.  [default: one for each processor]")
+@invalid_input_fails
+def compare(
+    problem: tuple[str, ...],
+    *,
+    over: str | None,
+    html: Path | None,
+    save: Path | None,
+    jobs: int | None,
+    **runs: Any,  # noqa: ANN401 - the other options
+) -> None:
+    """Run protocols on the same problems, and show medians side by side.
+
+    The problems are those of folders and files, or of a family of 'robochoc generate', whose parameters are given as
+    NAME=VALUE; a range such as 1..30 or 0.2..0.6:0.1 stands for each of its values.
+
+    \b
+    robochoc compare instances/queens3d-4 --protocols abt,afc-ng,dynabt
+    robochoc compare random agents=15 domain=5 density=0.4 tightness=0.2..0.6:0.1 seed=1..30 \\
+        --protocols abt,afc-ng,dynabt,awc --html compare.html
+    """  # noqa: D301 - \\b is how click is told to leave the lines as they are
+    if html is not None:
+        from robochoc.cli.commands.experiment import need_figures
+
+        need_figures()
+    from robochoc.cli.commands.experiment import carried_out, stored
+    from robochoc.cli.reports.experiment import print_endings, print_medians
+
+    study = _study(problem, runs)
+    with stored(save) as store:
+        carried_out(study, store, jobs)
+        results = store.results()
+    print_medians(results.rows, over, ())
+    print_endings(results.rows)
+    if html is not None:
+        from robochoc.experiments.report import write_page
+
+        write_page(results, html, over)
+        click.echo(f"{html}: written", err=True)
+
+
+def _study(problem: Sequence[str], runs: dict[str, Any]) -> Study:
+    """Return the study that the command line describes."""
+    from robochoc.experiments.study import study_of_tables
+
+    protocols = [name for name in runs.pop("protocols").split(",") if name]
+    if not protocols:
+        raise click.UsageError("--protocols names no protocol; write --protocols abt,afc-ng")
+    settings = dict(_pair(word, "--set") for word in runs.pop("settings"))
+    order = runs.pop("order")
+    timeout = runs.pop("timeout")
+    table: dict[str, Any] = {
+        "protocol": protocols,
+        **{name: value for name, value in runs.items() if value is not None},
+    }
+    table |= {"order": order.split(",")} if order else {}
+    table |= {"settings": settings} if settings else {}
+    tables = {"problems": _problems(problem), "runs": table, "limits": {"timeout": timeout}}
+    return study_of_tables("compare", tables)
+
+
+def _problems(words: Sequence[str]) -> dict[str, Any]:
+    """Return the table of the problems: a family and its parameters, or paths."""
+    from robochoc.generators.families import FAMILIES, parameters_of
+
+    first = words[0]
+    if first in FAMILIES and not Path(first).exists():
+        given = dict(_pair(word, first) for word in words[1:])
+        if "seed" in parameters_of(first):
+            given.setdefault("seed", DEFAULT_SEEDS)
+        return {"family": first, **given}
+    missing = [word for word in words if not Path(word).exists()]
+    if missing:
+        import difflib
+
+        near = difflib.get_close_matches(missing[0], FAMILIES, 1)
+        hint = f"did you mean {near[0]!r}?" if near else f"families are {', '.join(FAMILIES)}"
+        raise click.UsageError(f"{missing[0]!r} is no folder, no file and no family; {hint}")
+    return {"path": [str(Path(word).absolute()) for word in words]}
+
+
+def _pair(word: str, of: str) -> tuple[str, Any]:
+    name, equals, value = word.partition("=")
+    if not equals or not name:
+        raise click.UsageError(f"{of} takes NAME=VALUE, not {word!r}")
+    return name.replace("-", "_") if of != "--set" else name, _value(value)
+
+
+def _value(text: str) -> Any:  # noqa: ANN401 - a number, a word, or a list
+    """Return the value that `text` stands for; with commas, several."""
+    if "," in text:
+        return [_value(part) for part in text.split(",") if part]
+    if text in {"true", "false"}:
+        return text == "true"
+    for kind in (int, float):
+        try:
+            return kind(text)
+        except ValueError:
+            continue
+    return text

@@ -1,0 +1,226 @@
+"""`robochoc experiment`: studies, from a question to a figure."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+
+from robochoc.cli.options.paths import InputPath
+from robochoc.cli.reports.failures import INVALID, LOST, USAGE, Failure, invalid_input_fails
+
+if TYPE_CHECKING:
+    from collections import Counter
+    from collections.abc import Callable
+
+    from robochoc.experiments.runner import Workers
+    from robochoc.experiments.store import Store
+    from robochoc.experiments.study import Study
+
+FORMATS = ("csv", "json", "latex", "parquet")
+
+
+@click.group()
+def experiment() -> None:
+    """Carry out studies: which protocols, on which problems, and what came out. docs/guides/experiments.md.
+
+    \b
+    robochoc experiment run study.toml
+    robochoc experiment show study.sqlite
+    robochoc experiment report study.sqlite -o report.html
+    """  # noqa: D301 - \\b is how click is told to leave the lines as they are
+
+
+@experiment.command(short_help="Carry out a study, or go on with it.")
+@click.argument("study", type=InputPath(), metavar="STUDY.toml")
+@click.option("-o", "--output", type=InputPath(), metavar="FILE", help="File of the results.  [default: STUDY.sqlite]")
+@click.option("--jobs", type=click.IntRange(1, 1024), metavar="N", help="Workers.  [default: one for each processor]")
+@click.option("--dry-run", is_flag=True, help="Show how many runs there are, and run none.")
+@click.option("--scheduler", metavar="ADDRESS", help="Run on the Dask cluster there, such as tcp://10.0.0.1:8786.")
+@click.option("--dask", type=InputPath(), metavar="FILE", help="Run on a Dask cluster, by its scheduler's JSON file.")
+@invalid_input_fails
+def run(
+    study: Path, output: Path | None, jobs: int | None, scheduler: str | None, dask: Path | None, *, dry_run: bool
+) -> None:
+    """Carry out the study in the file STUDY.toml, and write one row for each run into an SQLite file.
+
+    What is there already is not run again: after Ctrl-C, a crash or a change of the study say the same once more.
+    Answers are checked and compared; the study stops at two that contradict each other, with exit status 4.
+
+    \b
+    robochoc experiment run study.toml --dry-run
+    robochoc experiment run study.toml --jobs 8
+    """  # noqa: D301 - \\b is how click is told to leave the lines as they are
+    from robochoc.cli.reports.experiment import ended_line
+    from robochoc.experiments.study import read_study
+
+    read = read_study(study)
+    path = output or study.with_suffix(".sqlite")
+    if dry_run:
+        _show_plan(read, path)
+        return
+    workers = _workers(scheduler, dask)
+    with stored(path) as store, _cluster_told(workers):
+        ended = carried_out(read, store, jobs, workers)
+    click.echo(ended_line(read.name, ended), err=True)
+    click.echo(f"{path}: next: robochoc experiment show {path}", err=True)
+
+
+@experiment.command(short_help="Show what came of a study.")
+@click.argument("results", type=InputPath(), metavar="RESULTS.sqlite")
+@click.option("--over", metavar="PARAMETER", help="A row for each value of it.  [default: the first with several]")
+@click.option("--metric", "metrics", multiple=True, metavar="NAME", help="Metric to show. Repeatable.")
+@invalid_input_fails
+def show(results: Path, over: str | None, metrics: tuple[str, ...]) -> None:
+    """Show medians of what came of a study, and how its runs ended; it may still be running.
+
+    \b
+    robochoc experiment show study.sqlite
+    robochoc experiment show study.sqlite --over tightness --metric ncccs
+    """  # noqa: D301 - \\b is how click is told to leave the lines as they are
+    from robochoc.cli.reports.experiment import print_summary
+    from robochoc.experiments.store import read_results
+
+    print_summary(read_results(results), over, metrics)
+
+
+@experiment.command(short_help="Write the results for other programs.")
+@click.argument("results", type=InputPath(), metavar="RESULTS.sqlite")
+@click.option("-o", "--output", type=InputPath(), metavar="FILE", help="File to write.  [default: standard output]")
+@click.option(
+    "--format", "form", type=click.Choice(FORMATS), help="csv, json (a line each), latex (medians), parquet."
+    "  [default: by the file's ending, else csv]",
+)  # fmt: skip
+@invalid_input_fails
+def export(results: Path, output: Path | None, form: str | None) -> None:
+    """Write the results as CSV, JSON lines or Parquet, a row a run, or as a LaTeX table of medians.
+
+    \b
+    robochoc experiment export study.sqlite -o study.csv
+    robochoc experiment export study.sqlite --format latex > table.tex
+    """  # noqa: D301 - \\b is how click is told to leave the lines as they are
+    from robochoc.cli.reports.failures import failures_told
+    from robochoc.experiments.export import exported
+    from robochoc.experiments.store import read_results
+    from robochoc.system.files import write_atomically
+
+    endings = {".jsonl": "json", ".tex": "latex", ".pq": "parquet", **{f".{name}": name for name in FORMATS}}
+    form = form or (endings.get(output.suffix) if output else None) or "csv"
+    if form == "parquet" and output is None:
+        raise click.UsageError("Parquet is binary: name a file with -o.")
+    with failures_told(results):
+        content = exported(read_results(results), form)
+    if output is None:
+        click.echo(content, nl=False)
+    else:
+        write_atomically(output, content)
+
+
+@experiment.command(short_help="Draw the results: a page, or figures for a paper.")
+@click.argument("results", type=InputPath(), metavar="RESULTS.sqlite")
+@click.option("-o", "--output", type=InputPath(), required=True, metavar="PAGE.html|FOLDER", help="What to write.")
+@click.option("--over", metavar="PARAMETER", help="Draw over this one.  [default: the first with several values]")
+@click.option("--force", is_flag=True, help="Replace figures that exist in the folder.")
+@invalid_input_fails
+def report(results: Path, output: Path, over: str | None, *, force: bool) -> None:
+    """Draw what came of a study: one page that needs nothing else, or a folder with the figures in SVG and PDF.
+
+    Medians with intervals over a parameter, profiles, cost over time, pairs of protocols, tests.
+
+    \b
+    robochoc experiment report study.sqlite -o report.html
+    robochoc experiment report study.sqlite -o figures/
+    """  # noqa: D301 - \\b is how click is told to leave the lines as they are
+    need_figures()
+    from robochoc.experiments.report import write_folder, write_page
+    from robochoc.experiments.store import read_results
+
+    if output.suffix.lower() in {".html", ".htm"}:
+        write_page(read_results(results), output, over)
+    else:
+        write_folder(read_results(results), output, over, replace=force)
+    click.echo(f"{output}: written", err=True)
+
+
+def need_figures() -> None:
+    """Fail unless what draws figures is installed."""
+    from importlib.util import find_spec
+
+    for name in ("matplotlib", "scipy"):
+        if find_spec(name) is None:
+            raise Failure(USAGE, f"figures need {name}, which is not installed: pip install 'robochoc[experiments]'")
+
+
+def _workers(scheduler: str | None, dask: Path | None) -> Callable[[int | None], Workers] | None:
+    """Return what makes the workers of a cluster. None: this machine's."""
+    if scheduler is None and dask is None:
+        return None
+    if scheduler is not None and dask is not None:
+        raise click.UsageError("--scheduler and --dask both name a cluster; leave one out.")
+    from importlib.util import find_spec
+
+    if find_spec("distributed") is None:
+        raise Failure(USAGE, "a cluster needs Dask, which is not installed: pip install 'robochoc[cluster]'")
+    from functools import partial
+
+    from robochoc.experiments.cluster import ClusterWorkers
+
+    return partial(ClusterWorkers, scheduler, dask)
+
+
+def _show_plan(study: Study, path: Path) -> None:
+    from robochoc.cli.reports.experiment import plan_lines
+
+    for line in plan_lines(study, path):
+        click.echo(line)
+
+
+@contextmanager
+def _cluster_told(workers: object) -> Iterator[None]:
+    """Turn the loss of a cluster, if there is one, into a failure."""
+    if workers is None:
+        yield
+        return
+    import logging
+
+    from robochoc.experiments.cluster import SchedulerLostError
+
+    logging.disable(logging.CRITICAL)  # Dask logs the loss of a scheduler with a traceback
+    try:
+        yield
+    except SchedulerLostError as lost:
+        raise Failure(LOST, str(lost)) from None
+
+
+@contextmanager
+def stored(path: Path | None) -> Iterator[Store]:
+    """Open the file of a study's results; None: memory."""
+    from robochoc.experiments.store import Store, StudyInUseError
+
+    try:
+        store = Store(path)
+    except StudyInUseError as refused:
+        raise Failure(INVALID, str(refused)) from None
+    with store:
+        yield store
+
+
+def carried_out(
+    study: Study, store: Store, jobs: int | None, workers: Callable[[int | None], Workers] | None = None
+) -> Counter[str]:
+    """Carry out a study, with its progress on a terminal; each foreseen error is a failure."""
+    from robochoc.cli.reports.experiment import progress_of
+    from robochoc.experiments.agreement import DisagreementError
+    from robochoc.experiments.plan import TooManyRunsError
+    from robochoc.experiments.runner import run_study
+
+    try:
+        with progress_of(study.name) as progress:
+            return run_study(study, store, jobs, progress=progress, workers=workers)
+    except DisagreementError as wrong:
+        raise Failure(LOST, f"{study.name}: stopped: {wrong}") from None
+    except TooManyRunsError as refused:
+        raise Failure(INVALID, f"{study.name}: {refused}") from None

@@ -1,0 +1,129 @@
+"""Studies on the terminal: the plan, the progress, and what came of them."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from robochoc.cli.reports.failures import USAGE, Failure
+from robochoc.cli.reports.progress import progress_line
+from robochoc.cli.reports.table import print_table
+from robochoc.system.plain_text import on_one_line
+
+if TYPE_CHECKING:
+    from robochoc.experiments.runner import StudyProgress
+    from robochoc.experiments.store import Results
+    from robochoc.experiments.study import Study
+    from robochoc.experiments.summary import Rows
+
+_MINUTE_S, _HOUR_S = 60, 3600
+
+
+@contextmanager
+def progress_of(name: str) -> Iterator[Callable[[StudyProgress], None] | None]:
+    """Give a function that shows how far a study is, on the last line of a terminal; None elsewhere."""
+    from robochoc.communication.run_result import Progress
+
+    with progress_line(name) as show:
+        if show is None:
+            yield None
+            return
+
+        def told(now: StudyProgress) -> None:
+            left = f", about {duration(now.left_s)} left" if now.left_s else ""
+            show(Progress(0, now.elapsed_s, f"{now.done:,} of {now.planned:,} runs{left}"))
+
+        yield told
+
+
+def duration(seconds: float) -> str:
+    """Return a time as people say it."""
+    if seconds < _MINUTE_S:
+        return f"{seconds:.0f} s"
+    if seconds < _HOUR_S:
+        return f"{seconds / _MINUTE_S:.0f} min"
+    return f"{seconds / _HOUR_S:.1f} h"
+
+
+def plan_lines(study: Study, path: Path) -> Iterator[str]:
+    """Yield what a study is going to run, how much of it is there, and about how long the rest takes."""
+    from robochoc.experiments.plan import TooManyRunsError, plan_of
+    from robochoc.experiments.store import read
+
+    try:
+        plan = plan_of(study)
+    except TooManyRunsError as refused:
+        raise Failure(USAGE, str(refused)) from None
+    rows = {row["key"]: row for row in read(path)} if path.exists() else {}
+    missing = [task for key, task in plan.items() if key not in rows]
+    problems = len({task.problem.identity for task in plan.values()})
+    labels = list(dict.fromkeys(task.setup.label for task in plan.values()))
+    ways = on_one_line(", ".join(labels))
+    yield f"{on_one_line(study.title)}: {len(plan):,} runs: {problems:,} problems, {len(labels)} ways to run ({ways})"
+    there = len(plan) - len(missing)
+    yield f"{on_one_line(str(path))}: {there:,} are there, {len(missing):,} are to be run{_about(missing, rows)}"
+
+
+def _about(missing: Sequence[Any], rows: Mapping[str, Mapping[str, Any]]) -> str:
+    """Return how long the missing runs take, by what those that are there took; nothing where none is."""
+    took: dict[str, list[float]] = {}
+    for row in rows.values():
+        took.setdefault(row["label"], []).append(row["total_s"])
+    known = [time_s for times in took.values() for time_s in times]
+    if not missing or not known:
+        return ""
+    mean = sum(known) / len(known)
+    total = sum(sum(times) / len(times) if (times := took.get(task.setup.label)) else mean for task in missing)
+    return f"; about {duration(total)} of one worker"
+
+
+def ended_line(name: str, ended: Counter[str]) -> str:
+    """Return how the runs of a study have ended."""
+    told = ", ".join(f"{count:,} {status}" for status, count in ended.most_common())
+    return f"{on_one_line(name)}: {sum(ended.values()):,} runs: {told}"
+
+
+def print_summary(results: Results, over: str | None, metrics: Sequence[str]) -> None:
+    """Print medians of a study's metrics, and how its runs have ended."""
+    from robochoc.experiments.study import study_wishes
+
+    rows, count, title = results.rows, results.planned, results.title
+    wishes = study_wishes(results.text)
+    there = f"{len(rows):,} of {count:,} runs" if len(rows) < count else f"{len(rows):,} runs"
+    click.echo(f"{on_one_line(title)}: {there}")
+    if rows:
+        print_medians(rows, over or wishes.over, metrics or wishes.metrics)
+        print_endings(rows)
+
+
+def print_medians(rows: Rows, over: str | None, metrics: Sequence[str]) -> None:
+    """Print a table of medians for each metric."""
+    from robochoc.experiments import summary
+
+    try:
+        over = summary.parameter_to_draw_over(rows, over)
+        shown = summary.metrics_to_show(rows, metrics)
+    except summary.NoSuchColumnError as wrong:
+        raise click.UsageError(str(wrong)) from None
+    rows = summary.by_parameter(rows, over)
+    for metric in shown:
+        click.echo(f"\n{summary.METRICS[metric]}, median")
+        heads, lines = summary.medians(rows, metric, over)
+        print_table(heads, lines, right=heads[1:])
+
+
+def print_endings(rows: Sequence[Mapping[str, Any]]) -> None:
+    """Print how runs have ended, and with which verdicts, for each way to run."""
+    from robochoc.experiments.summary import endings
+
+    heads, lines = endings(rows)
+    click.echo("\nhow runs ended")
+    print_table(heads, lines, right=heads[1:])
+    told = next(((row["reason"], row["label"]) for row in rows if row["status"] not in {"done", "limit"}), None)
+    if told:
+        click.echo(on_one_line(f"{told[1]}: {told[0]}"))

@@ -1,0 +1,101 @@
+"""Answers to one problem are compared, whoever gave them: two proofs that differ are a fault of the program."""
+
+from __future__ import annotations
+
+import shlex
+from collections.abc import Mapping
+from decimal import Decimal
+from typing import Any
+
+from robochoc.communication.simulator.channel import CHANNELS
+from robochoc.experiments.task import Row, Status, Task
+from robochoc.model.outcome import Verdict
+
+_Question = tuple[str, str | None]
+
+
+class DisagreementError(Exception):
+    """Two runs contradict each other, or the checker refutes one. The text says how to repeat them."""
+
+
+class Agreement:
+    """The answers so far, by problem and by the rule of withdrawal."""
+
+    def __init__(self) -> None:
+        self._answers: dict[_Question, list[tuple[Task, Row]]] = {}
+
+    def add(self, task: Task, row: Row) -> None:
+        """Compare the answer of a run with the others to its problem.
+
+        Raises:
+            DisagreementError: if they contradict each other, or the checker has refuted it.
+        """
+        if row.status is Status.REFUTED:
+            raise DisagreementError(
+                f"the checker refutes the answer of {task.setup.label}: {row.reason}\n{repeat(task)}"
+            )
+        if row.status is not Status.DONE or "after" in task.problem.scenario:
+            return
+        others = self._answers.setdefault((row.digest, task.setup.withdraw), [])
+        for other_task, other in others:
+            if why := contradiction(row, other):
+                told = f"{task.setup.label} and {other_task.setup.label} contradict each other on {row.team}: {why}"
+                raise DisagreementError(f"{told}\n{repeat(task)}\n{repeat(other_task)}")
+        kinds = {(one.verdict, one.cost) for _, one in others}
+        if (row.verdict, row.cost) not in kinds:
+            others.append((task, row))
+
+
+def contradiction(one: Row, other: Row) -> str:
+    """Return why two answers to the same problem cannot both be right. Empty: they can."""
+    verdicts = {one.verdict, other.verdict}
+    if Verdict.NO_SOLUTION in verdicts and len(verdicts) > 1:
+        return f"{one.verdict} and {other.verdict}"
+    if Verdict.OPTIMAL not in verdicts:
+        return ""
+    optimum, found = (one, other) if one.verdict == Verdict.OPTIMAL else (other, one)
+    if optimum.withdrawn != found.withdrawn and found.verdict == Verdict.OPTIMAL:
+        return f"{optimum.withdrawn} and {found.withdrawn} robots withdraw at least"
+    if optimum.cost is None or found.cost is None or optimum.withdrawn != found.withdrawn:
+        return ""
+    best, cost = Decimal(optimum.cost), Decimal(found.cost)
+    better = cost > best if optimum.maximises else cost < best
+    if better or (found.verdict == Verdict.OPTIMAL and cost != best):
+        return f"{optimum.cost} is said to be optimal, and {found.cost} was found"
+    return ""
+
+
+def repeat(task: Task) -> str:
+    """Return the commands that repeat a run by itself."""
+    problem, setup = task.problem, task.setup
+    folder = problem.path or "PROBLEM"
+    words = ["robochoc", "solve", folder, "--protocol", setup.protocol, "--runtime", setup.runtime]
+    words += ["--seed", str(task.seed)] * bool(task.seed)
+    words += ["--order", setup.order] if setup.order else []
+    words += ["--channel", _channel(setup.channel.name)] if setup.channel else []
+    words += ["--schedule", setup.schedule] if setup.schedule != "concurrent" else []
+    words += ["--delay", str(setup.delay)] if setup.delay else []
+    words += [f"--withdraw={setup.withdraw}"] if setup.withdraw else []
+    words += ["--verify"] * setup.verify
+    words += [word for name, value in setup.settings.items() for word in ("--set", f"{name}={value}")]
+    made = [_generated(problem.family, problem.parameters, folder)] if problem.family else []
+    if problem.scenario:
+        made.append(_options(["robochoc", "generate", "scenario", folder], problem.scenario, folder, force=True))
+    return "; ".join([*made, shlex.join(words)])
+
+
+def _channel(name: str) -> str:
+    return name if name in CHANNELS else f"{name}.toml"
+
+
+def _generated(family: str, parameters: Mapping[str, Any], folder: str) -> str:
+    return _options(["robochoc", "generate", family], parameters, folder)
+
+
+def _options(words: list[str], parameters: Mapping[str, Any], folder: str, *, force: bool = False) -> str:
+    for name, value in parameters.items():
+        option = f"--{name.replace('_', '-')}"
+        several = str(value).split() if name == "kinds" else [str(value)]
+        if value is not False:
+            words += [option] if value is True else [word for one in several for word in (option, one)]
+    return shlex.join([*words, "-o", folder, *["--force"] * force])

@@ -1,0 +1,90 @@
+"""The workers of a cluster, by Dask (https://distributed.dask.org): the extra `cluster`.
+
+Each run is one task of the cluster. Tasks and rows travel as JSON, and the files of teams with them: workers need
+robochoc, and no folder that all can see. A worker that is lost has its tasks tried again by others. Dask itself
+unpickles what it receives, so a scheduler is to be reachable for those only who may run programs there.
+"""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Iterable, Iterator, Sequence
+from pathlib import Path
+from types import TracebackType
+from typing import Self
+
+import msgspec
+from distributed import CancelledError, Client, as_completed
+from distributed.scheduler import KilledWorker
+
+from robochoc.experiments.elsewhere import files_of, run_one
+from robochoc.experiments.task import Row, Status, Task
+
+AT_ONCE = 1000
+"""Tasks that the scheduler has at a time: it need not know of a million."""
+
+
+class SchedulerLostError(Exception):
+    """The scheduler cannot be reached, or no longer."""
+
+
+class ClusterWorkers:
+    """The workers of a Dask cluster.
+
+    Args:
+        address: The scheduler's, such as `tcp://10.0.0.1:8786`. None: `file` has it.
+        file: The scheduler's JSON file, as `dask scheduler --scheduler-file` and dask-jobqueue write it.
+        memory_mb: A limit on memory, which Dask's workers have of their own: it is not used here.
+    """
+
+    def __init__(self, address: str | None, file: Path | None, memory_mb: int | None = None) -> None:
+        del memory_mb
+        self._address, self._file = address, file
+        self._client: Client | None = None
+
+    def __enter__(self) -> Self:
+        """Connect with the scheduler. Raises `SchedulerLostError` if it cannot be reached."""
+        known = {"scheduler_file": str(self._file)} if self._file else {"address": self._address}
+        try:
+            self._client = Client(**known, set_as_default=False, name="robochoc experiment")
+        except (OSError, ValueError) as error:
+            told = f"the scheduler at {self._file or self._address} cannot be reached: {error}"
+            raise SchedulerLostError(told) from None
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        """Disconnect. Tasks that are still waiting are dropped."""
+        if self._client is not None:
+            self._client.close()
+
+    def rows(self, bundles: Iterable[Sequence[Task]]) -> Iterator[tuple[Task, Row]]:
+        """Yield what comes of all tasks, as soon as it is there."""
+        client = self._client
+        assert client is not None  # noqa: S101 - it is used as a context
+        tasks = itertools.chain.from_iterable(bundles)
+        running = {self._submit(client, task): task for task in itertools.islice(tasks, AT_ONCE)}
+        completed = as_completed(list(running), loop=client.loop)
+        for ended in completed:
+            yield running.pop(ended), _row(ended)
+            for task in itertools.islice(tasks, 1):
+                future = self._submit(client, task)
+                running[future] = task
+                completed.add(future)
+
+    def _submit(self, client: Client, task: Task) -> object:
+        content = msgspec.json.encode(task)
+        return client.submit(run_one, content, files_of(task), key=f"robochoc-{task.key}", pure=False)
+
+
+def _row(future: object) -> Row:
+    """Return the row of a task that has ended, one way or the other."""
+    try:
+        return msgspec.json.decode(future.result(), type=Row)  # type: ignore[attr-defined]
+    except CancelledError:
+        raise SchedulerLostError("the scheduler of the cluster was lost; say the same again to go on") from None
+    except KilledWorker as killed:
+        return Row(status=Status.CRASHED, reason=f"workers of the cluster died of it: {killed}")
+    except Exception as error:  # noqa: BLE001 - whatever a cluster may raise is one row
+        return Row(status=Status.ERROR, reason=f"{type(error).__name__}: {error}")

@@ -1,0 +1,171 @@
+"""One run of a study is carried out: a task goes in, a row comes out, whatever happens."""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import platform
+import time
+from contextlib import AbstractContextManager, ExitStack
+from functools import cache
+from pathlib import Path
+from types import TracebackType
+from typing import Any, Self
+
+from robochoc import __version__
+from robochoc.communication.run_result import RobotsLostError
+from robochoc.experiments.observers import CostOverTime, RobotLoads, several
+from robochoc.experiments.task import ProblemSpec, Recording, Row, Status, Task, options_of
+from robochoc.formats.diagnostics import InvalidInputError
+from robochoc.formats.problems import read_problem
+from robochoc.formats.scenario_writer import team_files
+from robochoc.generators.families import FAMILIES
+from robochoc.generators.scenario import random_scenario
+from robochoc.model.cost_units import Cost, common_units
+from robochoc.model.outcome import Outcome, Verdict
+from robochoc.model.problem import ProblemKind, Team
+from robochoc.run.orchestrator import solve
+from robochoc.run.registry import UnknownProtocolError
+from robochoc.solver.ace import AceProcess
+from robochoc.solver.encoding import UnsupportedError
+from robochoc.verification.checker import RefutedError
+
+KEPT = 4
+"""Problems that are kept: the runs of one problem follow each other."""
+_DIGEST_BYTES = 16
+_STATUS_OF: tuple[tuple[type[Exception], Status], ...] = (
+    (InvalidInputError, Status.INVALID),
+    (UnsupportedError, Status.REFUSED),
+    (UnknownProtocolError, Status.REFUSED),
+    (RobotsLostError, Status.LOST),
+    (RefutedError, Status.REFUTED),
+    (MemoryError, Status.MEMORY),
+)
+
+
+class Bench(AbstractContextManager["Bench"]):
+    """What runs one task after the other: it keeps problems and one constraint solver."""
+
+    def __init__(self) -> None:
+        self._stack = ExitStack()
+        self._solver = self._stack.enter_context(AceProcess())
+        self._teams: dict[str, tuple[Team, str]] = {}
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        """End the solver."""
+        self._stack.__exit__(kind, error, trace)
+
+    def __enter__(self) -> Self:
+        """Return itself."""
+        return self
+
+    def run(self, task: Task) -> Row:
+        """Return what comes of `task`. Each error is a row that says so."""
+        began = time.perf_counter()
+        row = Row(status=Status.ERROR, machine=machine(), version=__version__)
+        try:
+            team, digest = self._team(task.problem)
+        except Exception as error:  # noqa: BLE001 - whatever is wrong with one problem, the study goes on
+            row.status, row.reason = _status(error, Status.INVALID), _told(error)
+            return row
+        _describe(row, team, digest)
+        try:
+            self._solve(task, team, row)
+        except Exception as error:  # noqa: BLE001 - also that of a user's protocol
+            row.status, row.reason = _status(error, Status.ERROR), _told(error)
+        row.total_s = time.perf_counter() - began
+        return row
+
+    def _solve(self, task: Task, team: Team, row: Row) -> None:
+        curve = CostOverTime(team, task) if Recording.COST_OVER_TIME in task.record else None
+        loads = RobotLoads() if Recording.ROBOTS in task.record else None
+        cpu = time.process_time()
+        outcome = solve(
+            team, options_of(task.setup, task.limits, task.seed), observer=several(curve, loads), solver=self._solver
+        )
+        row.cpu_s = None if task.is_timed else time.process_time() - cpu
+        _fill(row, outcome, team)
+        row.cost_over_time = curve.points() if curve else []
+        row.loads = loads.found() if loads else []
+
+    def _team(self, problem: ProblemSpec) -> tuple[Team, str]:
+        """Return the team of a problem, and the digest of its robots' files. Raises what is wrong with it."""
+        identity = problem.identity
+        if identity not in self._teams:
+            while len(self._teams) >= KEPT:
+                del self._teams[next(iter(self._teams))]
+            team = team_of(problem)
+            self._teams[identity] = team, problem.digest or digest_of(team)
+        return self._teams[identity]
+
+
+def team_of(problem: ProblemSpec) -> Team:
+    """Return the team of a problem.
+
+    Raises:
+        InvalidInputError: if its files are invalid.
+        ValueError: if the family has no such problem.
+    """
+    if problem.family:
+        team = FAMILIES[problem.family](**problem.parameters)
+    else:
+        options: dict[str, Any] = {key: one for key, one in problem.parameters.items() if key != "instance"}
+        team = read_problem(Path(problem.path), **options).team
+    if problem.scenario:
+        scenario = dict(problem.scenario)
+        if "kinds" in scenario:
+            scenario["kinds"] = scenario["kinds"].split()
+        team = random_scenario(team, **scenario)
+    return team
+
+
+def digest_of(team: Team) -> str:
+    """Return the digest of what the robots' files would hold."""
+    content = hashlib.blake2b(digest_size=_DIGEST_BYTES)
+    for name, file in team_files(team).items():
+        content.update(f"{name}\0{len(file)}\0".encode())
+        content.update(file)
+    return content.hexdigest()
+
+
+@cache
+def machine() -> str:
+    """Return what ran: the name of the machine, its processors, its Python."""
+    return f"{platform.node()}, {os.cpu_count()} x {platform.machine()}, Python {platform.python_version()}"
+
+
+def _status(error: Exception, otherwise: Status) -> Status:
+    return next((status for kind, status in _STATUS_OF if isinstance(error, kind)), otherwise)
+
+
+def _told(error: Exception) -> str:
+    text = str(error)
+    foreseen = isinstance(error, (ValueError, *(kind for kind, _ in _STATUS_OF)))
+    return text if text and foreseen else f"{type(error).__name__}: {text}".rstrip(": ")
+
+
+def _describe(row: Row, team: Team, digest: str) -> None:
+    row.team, row.digest = team.name, digest
+    row.robots, row.variables = len(team.robots), len(team.variables)
+    row.constraints = sum(1 for _ in team.constraints())
+    row.maximises = common_units(robot.costs for robot in team.robots).maximize
+
+
+def _fill(row: Row, outcome: Outcome, team: Team) -> None:
+    """Write what an outcome says into its row."""
+    metrics = outcome.metrics
+    row.status = Status.LIMIT if outcome.verdict is Verdict.UNKNOWN else Status.DONE
+    row.reason, row.verdict = outcome.reason, str(outcome.verdict)
+    row.cost, row.bound = _exact(outcome.cost if team.kind is ProblemKind.DISWCSP else None), _exact(outcome.bound)
+    row.withdrawn, row.verified, row.confirmed = len(outcome.withdrawn), outcome.verified, outcome.confirmed
+    row.messages_by_type = dict(sorted(metrics.messages.items()))
+    row.messages, row.bytes, row.largest = sum(metrics.messages.values()), metrics.bytes, metrics.largest
+    row.ncccs, row.checks = metrics.ncccs, metrics.checks
+    row.simulated_s = metrics.simulated_s or None
+    row.wall_s, row.compile_s, row.memory = metrics.wall_s, metrics.compile_s, metrics.memory or None
+
+
+def _exact(cost: Cost | None) -> str | None:
+    return None if cost is None else str(cost)

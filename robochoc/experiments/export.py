@@ -1,0 +1,97 @@
+"""Results for other programs: CSV, JSON lines, Parquet, and a LaTeX table of medians."""
+
+from __future__ import annotations
+
+import csv
+import io
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import msgspec
+
+from robochoc.experiments import summary
+from robochoc.experiments.store import Results
+from robochoc.solver.encoding import UnsupportedError
+
+_NESTED = ("settings", "messages_by_type", "cost_over_time", "loads")
+"""Columns that are JSON where a cell is text."""
+_LATEX = str.maketrans(
+    {sign: f"\\{sign}" for sign in "&%$#_{}"}
+    | {"~": r"\textasciitilde{}", "\\": r"\textbackslash{}", "^": r"\textasciicircum{}"}
+)
+
+
+def exported(results: Results, form: str) -> bytes:
+    """Return the results of a study in the form `csv`, `json`, `latex` or `parquet`.
+
+    Raises:
+        UnsupportedError: if what writes the form is not installed.
+    """
+    rows = results.rows
+    match form:
+        case "csv":
+            return _csv(rows).encode()
+        case "json":
+            return b"".join(msgspec.json.encode(row) + b"\n" for row in rows)
+        case "latex":
+            return latex_table(rows, results.title).encode()
+        case _:
+            return _parquet(rows)
+
+
+def _columns(rows: Sequence[Mapping[str, Any]]) -> list[str]:
+    parameters = summary.parameters(rows)
+    others = [name for name in rows[0] if name not in parameters] if rows else []
+    return [*parameters, *others]
+
+
+def _flat(rows: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:
+    """Return rows of the same columns, with plain values."""
+    columns = _columns(rows)
+    return [
+        {name: msgspec.json.encode(row[name]).decode() if name in _NESTED else row.get(name) for name in columns}
+        for row in rows
+    ]
+
+
+def _csv(rows: Sequence[Mapping[str, Any]]) -> str:
+    out = io.StringIO()
+    writer = csv.DictWriter(out, _columns(rows), lineterminator="\n")
+    writer.writeheader()
+    writer.writerows(_flat(rows))
+    return out.getvalue()
+
+
+def _parquet(rows: Sequence[Mapping[str, Any]]) -> bytes:
+    try:
+        from pyarrow import BufferOutputStream, Table  # noqa: PLC0415 - an extra
+        from pyarrow.parquet import write_table  # noqa: PLC0415 - the same
+    except ModuleNotFoundError:
+        raise UnsupportedError(
+            "Parquet needs pyarrow, which is not installed: pip install 'robochoc[parquet]'"
+        ) from None
+    out = BufferOutputStream()
+    write_table(Table.from_pylist(_flat(rows)), out)
+    return bytes(out.getvalue())
+
+
+def latex_table(rows: Sequence[Mapping[str, Any]], title: str, over: str | None = None) -> str:
+    """Return a table of medians in LaTeX, with the rules of the package booktabs: a block for each metric."""
+    if not rows:
+        return ""
+    over = summary.parameter_to_draw_over(rows, over)
+    ways = summary.labels(rows)
+    lines = [
+        f"% {title}: medians; >= marks those that a limit leaves open. Needs \\usepackage{{booktabs}}.",
+        rf"\begin{{tabular}}{{l{'r' * len(ways)}}}",
+        r"\toprule",
+    ]
+    for place, metric in enumerate(summary.metrics_to_show(rows)):
+        found = summary.samples(rows, metric, over)
+        lines += [r"\midrule"] * bool(place)
+        heads = [f"{summary.METRICS[metric]}, {over}", *ways]
+        lines += [f"{' & '.join(head.translate(_LATEX) for head in heads)} \\\\", r"\midrule"]
+        for value in summary.values_of(rows, over):
+            cells = [summary.cell(found.get((value, way))).replace(">= ", r"$\geq$") for way in ways]
+            lines.append(f"{' & '.join([str(value).translate(_LATEX), *cells])} \\\\")
+    return "\n".join([*lines, r"\bottomrule", r"\end{tabular}", ""])

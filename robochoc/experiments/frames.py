@@ -1,0 +1,51 @@
+"""Frames on a socket between the runner of a study and its workers: four bytes of length, then the content."""
+
+from __future__ import annotations
+
+import socket
+import struct
+
+_LENGTH = struct.Struct("!I")
+_CHUNK = 1 << 16
+
+
+def write_frame(connection: socket.socket, content: bytes) -> None:
+    """Send a frame. Raises `OSError`."""
+    connection.sendall(_LENGTH.pack(len(content)) + content)
+
+
+def read_frame(connection: socket.socket) -> bytes | None:
+    """Wait for a frame, and return its content; None: the other end has been closed."""
+    frames = Frames()
+    while True:
+        received = connection.recv(_CHUNK if frames.missing is None else frames.missing)
+        if not received:
+            return None
+        for content in frames.take(received):
+            return content
+
+
+class Frames:
+    """Frames out of the pieces in which they arrive."""
+
+    def __init__(self) -> None:
+        self._buffer = bytearray()
+
+    @property
+    def missing(self) -> int | None:
+        """Return the bytes that are missing in the present frame, at least; None once there is a whole one."""
+        length = _LENGTH.unpack_from(self._buffer)[0] if len(self._buffer) >= _LENGTH.size else 0
+        return max(0, _LENGTH.size + length - len(self._buffer)) or None
+
+    def take(self, received: bytes) -> list[bytes]:
+        """Return the contents of the frames that are complete with `received`."""
+        self._buffer += received
+        whole = []
+        while len(self._buffer) >= _LENGTH.size:
+            (length,) = _LENGTH.unpack_from(self._buffer)
+            end = _LENGTH.size + length
+            if len(self._buffer) < end:
+                break
+            whole.append(bytes(self._buffer[_LENGTH.size : end]))
+            del self._buffer[:end]
+        return whole

@@ -1,0 +1,90 @@
+"""What is seen of a run besides its counts: the cost over time, and the load of each robot."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Callable, Iterator
+from operator import itemgetter
+
+from robochoc.experiments.task import CostPoint, RobotLoad, Task, options_of
+from robochoc.journal.events import AnyEvent, Decided, Given, Heard, Improved, Observer, Sent
+from robochoc.journal.recorder import improvements
+from robochoc.model.problem import Team
+from robochoc.run.objective import objective_to_record
+
+MOST_POINTS = 10_000
+"""A curve has no more points: the cost of an assignment falls seldom, but costs can be large."""
+
+
+class CostOverTime:
+    """An observer: when the team's assignment became cheaper than ever, and what had been sent until then.
+
+    The moments are those of a journal's `Improved` events.
+    """
+
+    def __init__(self, team: Team, task: Task) -> None:
+        self._objective = objective_to_record(team, options_of(task.setup))
+        self._messages = 0
+        self._clock = 0
+        self._seen: list[tuple[float, int, int, AnyEvent]] = []
+
+    def __call__(self, event: AnyEvent) -> None:
+        """Take in one event."""
+        match event:
+            case Sent():
+                self._messages += 1
+                self._clock = max(self._clock, event.clock)
+            case Given() if self._objective is not None:
+                self._seen.append((0, self._messages, self._clock, event))
+            case Decided() | Heard() if self._objective is not None:
+                self._clock = max(self._clock, getattr(event, "clock", 0))
+                self._seen.append((event.t, self._messages, self._clock, event))
+            case _:
+                pass
+
+    def points(self) -> list[CostPoint]:
+        """Return the moments, in their order. None where nothing is minimised."""
+        return list(self._points())[:MOST_POINTS]
+
+    def _points(self) -> Iterator[CostPoint]:
+        if self._objective is None or not self._seen:
+            return
+        seen = sorted(self._seen, key=itemgetter(0))
+        moments = iter(seen)
+        messages, clock = 0, 0
+        for event in improvements((one[3] for one in seen), self._objective()):
+            if isinstance(event, Improved):
+                yield CostPoint(messages, clock, event.t, str(event.cost))
+            else:
+                _, messages, clock, _ = next(moments)
+
+
+class RobotLoads:
+    """An observer: how many messages and bytes each robot has sent."""
+
+    def __init__(self) -> None:
+        self._messages: Counter[str] = Counter()
+        self._bytes: Counter[str] = Counter()
+
+    def __call__(self, event: AnyEvent) -> None:
+        """Take in one event."""
+        if isinstance(event, Sent):
+            self._messages[event.sender] += 1
+            self._bytes[event.sender] += event.bytes
+
+    def found(self) -> list[RobotLoad]:
+        """Return the load of each robot that has sent something, by name."""
+        return [RobotLoad(name, count, self._bytes[name]) for name, count in sorted(self._messages.items())]
+
+
+def several(*observers: Callable[[AnyEvent], None] | None) -> Observer | None:
+    """Return one observer that passes events on to all `observers`; None if there are none."""
+    there = [one for one in observers if one is not None]
+    if not there:
+        return None
+
+    def observe(event: AnyEvent) -> None:
+        for one in there:
+            one(event)
+
+    return observe

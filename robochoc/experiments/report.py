@@ -1,0 +1,171 @@
+"""Reports: one page that needs nothing else, or a folder of figures for a paper."""
+
+from __future__ import annotations
+
+import html
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+
+from robochoc.experiments import statistics, summary
+from robochoc.experiments.export import latex_table
+from robochoc.experiments.figures import Drawing, drawings
+from robochoc.experiments.store import Results
+from robochoc.experiments.study import study_wishes
+from robochoc.experiments.summary import METRICS, Rows
+from robochoc.formats.diagnostics import Diagnostic, InvalidInputError, encodable
+from robochoc.system.files import write_atomically
+
+SIGNIFICANT = 0.05
+_STYLE = """
+:root { color-scheme: light dark; }
+body { font: 16px/1.5 system-ui, sans-serif; max-width: 72rem; margin: 0 auto; padding: 1rem; }
+h1 { font-size: 1.6rem; } h2 { font-size: 1.2rem; margin-top: 2.2rem; }
+figure { margin: 0; } figcaption { font-size: .85rem; opacity: .8; }
+.figures { display: grid; grid-template-columns: repeat(auto-fill, minmax(min(26rem, 100%), 1fr)); gap: 1.5rem; }
+figure svg { width: 100%; height: auto; background: #fff; border-radius: 4px; }
+.wide { overflow-x: auto; }
+table { border-collapse: collapse; font-variant-numeric: tabular-nums; font-size: .9rem; }
+th, td { padding: .2rem .8rem .2rem 0; text-align: right; white-space: nowrap; }
+th:first-child, td:first-child { text-align: left; }
+thead th { border-bottom: 1px solid; }
+pre { overflow-x: auto; padding: .8rem; border: 1px solid #8884; border-radius: 4px; font-size: .85rem; }
+"""
+_PAIRS_TOLD = (
+    "On runs that both have solved: how often each needs less, the median of the ratio, and Wilcoxon's signed-rank"
+    " test, corrected for the number of pairs (Holm)."
+)
+_POLICY = "default-src 'none'; style-src 'unsafe-inline'; img-src data:"
+
+
+def write_page(results: Results, page: Path, over: str | None = None) -> None:
+    """Write the report on the results of a study as one HTML file.
+
+    Args:
+        results: The results.
+        page: The file to write.
+        over: The parameter over which is drawn. None: as the study says, or the first that has several values.
+
+    Raises:
+        InvalidInputError: if there are no results, or no such parameter.
+        OSError: if the page cannot be written.
+    """
+    write_atomically(page, _Report(results, over).page().encode())
+
+
+def write_folder(results: Results, folder: Path, over: str | None = None, *, replace: bool = False) -> None:
+    """Write the figures of the report as SVG and PDF, and its table in LaTeX, into `folder`.
+
+    Raises:
+        InvalidInputError: as `write_page`, and if a figure is there already and `replace` is not set.
+        OSError: if they cannot be written.
+    """
+    report = _Report(results, over)
+    files = {"medians.tex": latex_table(report.rows, report.title, report.over).encode()}
+    for drawing in report.drawings:
+        files |= {f"{drawing.name}.svg": drawing.svg(), f"{drawing.name}.pdf": drawing.pdf()}
+    there = [name for name in files if (folder / name).exists()]
+    if there and not replace:
+        raise _invalid(folder / there[0], "is there already", "--force replaces figures")
+    folder.mkdir(parents=True, exist_ok=True)
+    for name, content in files.items():
+        write_atomically(folder / name, content)
+
+
+class _Report:
+    """What is told of the results of a study."""
+
+    def __init__(self, results: Results, over: str | None) -> None:
+        self.name, self.title, self.text, self.planned, rows = results
+        self.rows: Rows = rows
+        if not rows:
+            raise _invalid(self.name, "has no results yet", "robochoc experiment run goes on with the study")
+        wishes = study_wishes(self.text)
+        self.introduction = wishes.text
+        try:
+            self.over = summary.parameter_to_draw_over(self.rows, over or wishes.over)
+            self.rows = summary.by_parameter(rows, self.over)
+            self.metrics = summary.metrics_to_show(self.rows, wishes.metrics)
+        except summary.NoSuchColumnError as wrong:
+            raise _invalid(self.name, str(wrong), "--over names one, or the table [report] of the study") from None
+        self.drawings: list[Drawing] = list(drawings(self.rows, self.over, self.metrics))
+
+    def page(self) -> str:
+        """Return the whole page."""
+        title = html.escape(self.title)
+        head = (
+            f'<meta charset="utf-8"><title>{title}</title>'
+            f'<meta name="viewport" content="width=device-width, initial-scale=1">'
+            f'<meta http-equiv="Content-Security-Policy" content="{_POLICY}"><style>{_STYLE}</style>'
+        )
+        body = "\n".join(self._body())
+        return f'<!doctype html>\n<html lang="en"><head>{head}</head>\n<body><h1>{title}</h1>\n{body}\n</body></html>\n'
+
+    def _body(self) -> Iterator[str]:
+        yield from (f"<p>{html.escape(part)}</p>" for part in self.introduction.split("\n\n") if part)
+        yield "".join(f"<p>{html.escape(line)}</p>" for line in self._measured())
+        yield "<h2>How runs ended</h2>" + _table(*summary.endings(self.rows))
+        yield '<h2>Figures</h2><div class="figures">'
+        for drawing in self.drawings:
+            caption = f"<b>{html.escape(drawing.title)}.</b> {html.escape(drawing.caption)}"
+            yield f"<figure>{_inline(drawing)}<figcaption>{caption}</figcaption></figure>"
+        yield "</div><h2>Medians</h2>"
+        for metric in self.metrics:
+            yield f"<h3>{html.escape(METRICS[metric])}</h3>" + _table(*summary.medians(self.rows, metric, self.over))
+        yield from self._tests()
+        yield "<h2>How to repeat it</h2>" + self._how_to_repeat()
+
+    def _measured(self) -> Iterator[str]:
+        count, rows = self.planned, self.rows
+        there = f"{len(rows):,} of {count:,} runs are there" if len(rows) < count else f"{count:,} runs"
+        problems, ways = len({row["digest"] for row in rows if row["digest"]}), len(summary.labels(rows))
+        yield f"{there}: {problems:,} problems, {ways} ways to run."
+        machines, versions = (sorted({row[name] for row in rows if row[name]}) for name in ("machine", "version"))
+        yield f"robochoc {', '.join(versions)} on {'; '.join(machines)}."
+        if all(row["runtime"] == "simulator" for row in rows):
+            yield "All runs were in the simulator: counts are exact, and the same wherever they are repeated."
+        checked = sum(row["verified"] for row in rows)
+        told = f"The answers of {checked:,} runs were checked against every constraint"
+        yield f"{told}, and no two answers to a problem contradict each other."
+
+    def _tests(self) -> Iterator[str]:
+        for metric in [one for one in self.metrics if one in summary.CENSORED][:2]:
+            found = statistics.comparisons(self.rows, metric)
+            if found:
+                yield f"<h2>Pairs: {html.escape(METRICS[metric])}</h2>"
+                yield f"<p>{_PAIRS_TOLD}</p>"
+                heads = ["", "runs", "first needs less", "second needs less", "median ratio", "p"]
+                yield _table(heads, [_compared(one) for one in found])
+
+    def _how_to_repeat(self) -> str:
+        name = html.escape(f"{self.name}.toml")
+        return (
+            f"<p>Save this as {name}:</p><pre>{html.escape(self.text)}</pre>"
+            f"<pre>robochoc experiment run {name}\n"
+            f"robochoc experiment report {html.escape(self.name)}.sqlite -o report.html</pre>"
+        )
+
+
+def _compared(one: statistics.Comparison) -> list[str]:
+    p = "-" if one.p is None else f"{one.p:.2g}{' *' if one.p < SIGNIFICANT else ''}"
+    ratio = "-" if one.ratio is None else f"{one.ratio:.2f}"
+    return [f"{one.one} / {one.other}", f"{one.pairs:,}", f"{one.one_better:,}", f"{one.other_better:,}", ratio, p]
+
+
+def _table(heads: Sequence[str], lines: Sequence[Sequence[str]]) -> str:
+    head = "".join(f"<th>{html.escape(one)}</th>" for one in heads)
+    rows = "".join(f"<tr>{''.join(f'<td>{html.escape(cell)}</td>' for cell in line)}</tr>" for line in lines)
+    return f'<div class="wide"><table><thead><tr>{head}</tr></thead><tbody>{rows}</tbody></table></div>'
+
+
+def _inline(drawing: Drawing) -> str:
+    """Return a figure as an element of the page: without the XML declaration, and with identifiers of its own."""
+    svg = drawing.svg(text=True).decode()
+    svg = svg[svg.index("<svg") :]
+    for sign in ('id="', 'href="#', "url(#"):
+        svg = svg.replace(sign, f"{sign}{drawing.name}-")
+    label = html.escape(drawing.title)
+    return svg.replace("<svg", f'<svg role="img" aria-label="{label}"', 1)
+
+
+def _invalid(what: Path | str, message: str, hint: str) -> InvalidInputError:
+    return InvalidInputError([Diagnostic(encodable(str(what)), 0, message, hint)])

@@ -1,0 +1,154 @@
+"""The table `[runs]` of a study: protocols, and how each is run."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Any
+
+import msgspec
+
+from robochoc.communication.simulator.channel import CHANNELS, ChannelModel, read_channel
+from robochoc.experiments.table import MAX_INTEGER, Place
+from robochoc.experiments.task import GIVEN, Limits, Setup, options_of
+from robochoc.formats.diagnostics import shortened, suggestion
+from robochoc.model.orders import Order
+from robochoc.run.compatibility import refuse_options, refuse_settings
+from robochoc.run.options import CENTRAL, Runtime, ScheduleName, Withdrawal
+from robochoc.run.registry import UnknownProtocolError, installed_spelling, protocol_named
+from robochoc.solver.encoding import UnsupportedError
+
+RUN_KEYS = (
+    "protocol", "label", "settings", "order", "runtime", "channel", "seed", "schedule", "delay", "withdraw", "verify",
+    "timeout", "messages",
+)  # fmt: skip
+_CHOICES: Mapping[str, Sequence[str]] = {
+    "runtime": tuple(map(str, Runtime)),
+    "schedule": tuple(map(str, ScheduleName)),
+    "withdraw": tuple(map(str, Withdrawal)),
+    "order": (GIVEN, *map(str, Order)),
+}
+_TOLD = ("order", "runtime", "channel", "schedule", "delay", "withdraw", "verify")
+"""What a label may say, besides the protocol and its settings."""
+_WITHIN = ("label", "settings", "seed", "timeout", "messages")
+"""Keys that stand for no combinations of their own here."""
+
+
+def setups_of(
+    table: Mapping[str, Any], limits: Limits, place: Place
+) -> Iterator[tuple[Setup, tuple[int, ...], Limits]]:
+    """Yield the setups that a table stands for, each with its seeds and its limits.
+
+    Args:
+        table: The table.
+        limits: Those of the whole study.
+        place: Where the table stands.
+
+    Raises:
+        InvalidInputError: if it stands for none.
+    """
+    place.check_keys(table, RUN_KEYS)
+    if "protocol" not in table:
+        raise place.mistake("", "protocol is missing", 'write, for example, protocol = ["abt", "afc-ng"]')
+    seeds = tuple(place.values("seed", table.get("seed", 0)))
+    if not all(type(seed) is int and seed >= 0 for seed in seeds):
+        raise place.mistake("seed", "expected integers of 0 or more")
+    limits = _limits(table, limits, place)
+    found = list(_setups(table, place))
+    for setup in _labelled(found, table.get("label"), place):
+        yield setup, seeds, limits
+
+
+def _setups(table: Mapping[str, Any], place: Place) -> Iterator[Setup]:
+    settings = table.get("settings", {})
+    at = place.below(f"{place.table}.settings")
+    if not isinstance(settings, dict):
+        raise place.mistake("settings", 'expected a table, such as { variant = ["A", "B"] }')
+    combined = list(at.combinations(settings))
+    for plain in place.combinations({key: value for key, value in table.items() if key not in _WITHIN}):
+        for one in combined:
+            yield _setup(plain, {name: _text(value) for name, value in one.items()}, place)
+
+
+def _text(value: object) -> str:
+    return str(value).lower() if isinstance(value, bool) else str(value)
+
+
+def _setup(plain: Mapping[str, Any], settings: dict[str, str], place: Place) -> Setup:
+    given = dict(plain)
+    for key, choices in _CHOICES.items():
+        if key in given and given[key] not in choices:
+            hint = suggestion(str(given[key]), choices, "names")
+            raise place.mistake(key, f"expected {', '.join(choices)}, got {shortened(str(given[key]))}", hint)
+    if given.get("order") == GIVEN:
+        del given["order"]
+    given["protocol"] = installed_spelling(str(given["protocol"]))
+    if "channel" in given:
+        given["channel"] = _channel(given["channel"], place)
+    try:
+        setup = msgspec.convert({**given, "settings": settings}, Setup)
+    except msgspec.ValidationError as wrong:
+        raise place.mistake("", str(wrong)) from None
+    _refuse(setup, place)
+    return setup
+
+
+def _channel(word: object, place: Place) -> ChannelModel:
+    if isinstance(word, str) and word in CHANNELS:
+        return CHANNELS[word]
+    return read_channel(place.path.parent / str(word))
+
+
+def _refuse(setup: Setup, place: Place) -> None:
+    """Raise `InvalidInputError` if the options of `setup` do not go together, whatever the problem is."""
+    try:
+        refuse_options(options_of(setup))
+        if setup.protocol != CENTRAL:
+            refuse_settings(setup.protocol, protocol_named(setup.protocol), setup.settings)
+    except UnknownProtocolError as unknown:
+        raise place.mistake("protocol", str(unknown), "robochoc protocols lists them") from None
+    except UnsupportedError as refused:
+        raise place.mistake("", str(refused)) from None
+
+
+def _limits(table: Mapping[str, Any], limits: Limits, place: Place) -> Limits:
+    own = {name: table[name] for name in ("timeout", "messages") if name in table}
+    for name, value in own.items():
+        kinds = (int,) if name == "messages" else (int, float)
+        if type(value) not in kinds or not 0 < value <= MAX_INTEGER:
+            raise place.mistake(name, f"expected more than 0, got {shortened(str(value))}")
+    return msgspec.structs.replace(limits, **own)
+
+
+def _labelled(setups: Sequence[Setup], label: object, place: Place) -> Iterator[Setup]:
+    """Yield the setups of a table, each with a label that says in what it differs from the others."""
+    if label is not None and (not isinstance(label, str) or len(setups) > 1):
+        raise place.mistake("label", "expected a text, in a table that stands for one way to run")
+    for one in setups:
+        yield msgspec.structs.replace(one, label=label or " ".join([one.protocol, *_differences(one, setups)]))
+
+
+def distinct(setups: Sequence[Setup]) -> list[Setup]:
+    """Return the setups of all tables, with longer labels where some that differ have the same."""
+    found = []
+    for one in setups:
+        same = [other for other in setups if other.label == one.label]
+        label = " ".join([one.label, *_differences(one, same)])
+        found.append(msgspec.structs.replace(one, label=label))
+    return found
+
+
+def _differences(one: Setup, others: Sequence[Setup]) -> list[str]:
+    """Return the words that say in what a setup differs from others."""
+    settings = sorted({name for other in others for name in other.settings})
+    differing = [name for name in settings if len({other.settings.get(name) for other in others}) > 1]
+    names = [name for name in _TOLD if len({getattr(other, name) for other in others}) > 1]
+    words = [f"{name}={one.settings[name]}" for name in differing if name in one.settings]
+    return [word for word in [*words, *(_told(name, getattr(one, name)) for name in names)] if word]
+
+
+def _told(name: str, value: object) -> str:
+    if isinstance(value, ChannelModel):
+        return value.name
+    if name in {"delay", "verify"}:
+        return f"{name}={_text(value)}" if value else ""
+    return str(value) if value is not None else GIVEN if name == "order" else ""

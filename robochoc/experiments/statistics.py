@@ -1,0 +1,200 @@
+"""Statistics of results: intervals of medians, tests of pairs, profiles."""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from robochoc.experiments.summary import Rows, labels
+from robochoc.experiments.task import Status
+
+RESAMPLES = 2000
+CONFIDENCE = 0.95
+_SEED = 0
+"""Of the resampling: the same results have the same intervals."""
+FEWEST_PAIRS = 6
+"""With fewer pairs no result of the test can be significant at 5 %."""
+
+
+@dataclass(frozen=True)
+class Interval:
+    """A median, and the interval that holds it with the probability `CONFIDENCE`."""
+
+    median: float
+    low: float
+    high: float
+
+
+def median_interval(values: Sequence[float]) -> Interval:
+    """Return the median of `values` and its interval by the percentile bootstrap.
+
+    Efron and Tibshirani, "An Introduction to the Bootstrap", 1993, Section 13.3.
+
+    Raises:
+        ValueError: if there are no values.
+    """
+    if not values:
+        raise ValueError("there are no values")
+    given = np.asarray(values, dtype=float)
+    drawn = np.random.default_rng(_SEED).integers(0, len(given), (RESAMPLES, len(given)))
+    medians = np.median(given[drawn], axis=1)
+    rest = (1 - CONFIDENCE) / 2
+    low, high = np.quantile(medians, [rest, 1 - rest])
+    return Interval(float(np.median(given)), float(low), float(high))
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """Two ways to run, on the problems that both have solved.
+
+    Attributes:
+        one: The label of the first.
+        other: The label of the second.
+        pairs: The number of problems, or problems and seeds, that both have solved.
+        one_better: In how many of them the first needs less.
+        other_better: In how many of them the second needs less.
+        ratio: The median of what the first needs for one of what the second needs. None: there is none.
+        p: The probability of such a difference if there were none, corrected for the number of tests. None: too few
+            pairs.
+    """
+
+    one: str
+    other: str
+    pairs: int
+    one_better: int
+    other_better: int
+    ratio: float | None
+    p: float | None
+
+
+def comparisons(rows: Rows, metric: str) -> list[Comparison]:
+    """Compare all pairs of ways to run by Wilcoxon's signed-rank test, with Holm's correction.
+
+    Wilcoxon, "Individual comparisons by ranking methods", 1945; Holm, "A simple sequentially rejective multiple test
+    procedure", 1979. Only runs with a verdict are compared: what a limit has ended is in no pair.
+    """
+    values = {way: _by_case(rows, way, metric) for way in labels(rows)}
+    found = [_comparison(one, other, values) for one, other in itertools.combinations(values, 2)]
+    return _corrected(found)
+
+
+def _by_case(rows: Rows, way: str, metric: str) -> dict[tuple[Any, ...], float]:
+    """Return a metric of a way to run, by problem, seed and repetition."""
+    return {
+        (row["digest"], row["seed"], row["repetition"]): float(row[metric])
+        for row in rows
+        if row["label"] == way and row["status"] == Status.DONE and row[metric] is not None
+    }
+
+
+def _comparison(one: str, other: str, values: Mapping[str, Mapping[tuple[Any, ...], float]]) -> Comparison:
+    both = [case for case in values[one] if case in values[other]]
+    pairs = [(values[one][case], values[other][case]) for case in both]
+    ratios = [a / b for a, b in pairs if b]
+    return Comparison(
+        one,
+        other,
+        len(pairs),
+        sum(a < b for a, b in pairs),
+        sum(b < a for a, b in pairs),
+        float(np.median(ratios)) if ratios else None,
+        _wilcoxon([a - b for a, b in pairs]),
+    )
+
+
+def _wilcoxon(differences: Sequence[float]) -> float | None:
+    """Return the two-sided probability; None for too few differences. Pairs without a difference are left out."""
+    some = [one for one in differences if one]
+    if len(some) < FEWEST_PAIRS:
+        return None
+    from scipy.stats import wilcoxon  # noqa: PLC0415 - an extra
+
+    return float(wilcoxon(some).pvalue)
+
+
+def _corrected(found: Sequence[Comparison]) -> list[Comparison]:
+    """Return `found` with probabilities corrected for their number (Holm)."""
+    tested = sorted((one for one in found if one.p is not None), key=lambda one: one.p or 0.0)
+    corrected: dict[tuple[str, str], float] = {}
+    highest = 0.0
+    for place, one in enumerate(tested):
+        highest = max(highest, min(1.0, (one.p or 0.0) * (len(tested) - place)))
+        corrected[one.one, one.other] = highest
+    return [replace(one, p=corrected.get((one.one, one.other))) for one in found]
+
+
+def cactus(rows: Rows, metric: str) -> dict[str, list[float]]:
+    """Return what each way to run needed for the problems that it has solved, in ascending order."""
+    return {way: sorted(_by_case(rows, way, metric).values()) for way in labels(rows)}
+
+
+def performance_profile(rows: Rows, metric: str) -> dict[str, list[tuple[float, float]]]:
+    """Return for each way to run the share of problems that it solves within a factor of the best: (factor, share).
+
+    Dolan and More, "Benchmarking optimization software with performance profiles", Mathematical Programming 91, 2002.
+    """
+    values = {way: _by_case(rows, way, metric) for way in labels(rows)}
+    cases = list(dict.fromkeys((row["digest"], row["seed"], row["repetition"]) for row in rows))
+    best = {case: min((one[case] for one in values.values() if case in one), default=math.inf) for case in cases}
+    profile = {}
+    for way, found in values.items():
+        factors = sorted(_factor(value, best[case]) for case, value in found.items())
+        profile[way] = [(factor, place / len(cases)) for place, factor in enumerate(factors, 1)]
+    return profile
+
+
+def _factor(value: float, best: float) -> float:
+    return 1.0 if value == best else value / best if best else math.inf
+
+
+@dataclass(frozen=True)
+class Band:
+    """The quality of the best assignment so far, over what was spent: quartiles over runs, at each of `spent`."""
+
+    spent: tuple[float, ...]
+    low: tuple[float, ...]
+    median: tuple[float, ...]
+    high: tuple[float, ...]
+
+
+_POINTS = 200
+
+
+def cost_bands(rows: Rows, spent: str) -> dict[str, Band]:
+    """Return for each way to run the cost of its best assignment over `spent`: `messages`, `ncccs` or `time`.
+
+    A point is there from where all runs of the way have an assignment.
+    """
+    bands = {}
+    for way in labels(rows):
+        curves = [_curve(row, spent) for row in rows if row["label"] == way and row["cost_over_time"]]
+        if curves:
+            bands[way] = _band(curves)
+    return bands
+
+
+def _curve(row: Mapping[str, Any], spent: str) -> list[tuple[float, float]]:
+    place = ("messages", "ncccs", "time").index(spent)
+    points = [(float(point[place]), float(point[3])) for point in row["cost_over_time"]]
+    last = row[spent] if spent != "time" else None
+    return [*points, (max(points[-1][0], float(last)), points[-1][1])] if last is not None else points
+
+
+def _band(curves: Sequence[Sequence[tuple[float, float]]]) -> Band:
+    first = max(curve[0][0] for curve in curves)
+    last = max(first, *(curve[-1][0] for curve in curves))
+    spent = np.unique(np.linspace(first, last, _POINTS))
+    costs = np.array([_at(curve, spent) for curve in curves])
+    low, median, high = np.quantile(costs, [0.25, 0.5, 0.75], axis=0)
+    return Band(tuple(spent.tolist()), tuple(low.tolist()), tuple(median.tolist()), tuple(high.tolist()))
+
+
+def _at(curve: Sequence[tuple[float, float]], spent: Any) -> list[float]:  # noqa: ANN401 - an array of floats
+    """Return the cost at each of `spent`: that of the last point before."""
+    places = np.searchsorted([point[0] for point in curve], spent, side="right") - 1
+    return [curve[max(0, int(place))][1] for place in places]

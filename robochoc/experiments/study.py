@@ -1,0 +1,205 @@
+"""A study's file: which problems, which protocols, which limits. docs/guides/experiments.md describes it.
+
+    [problems]
+    family = "random"
+    agents = 15
+    domain = 5
+    density = 0.4
+    tightness = "0.2..0.6:0.1"
+    seed = "1..30"
+
+    [runs]
+    protocol = ["abt", "afc-ng", "dynabt", "awc"]
+
+A list, or a range as in `ranges.py`, stands for each of its values; several stand for all combinations.
+"""
+
+from __future__ import annotations
+
+import tomllib
+from collections.abc import Iterator, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import msgspec
+
+from robochoc.experiments.problem_table import PROBLEM_KEYS, problems_of
+from robochoc.experiments.run_table import RUN_KEYS, distinct, setups_of
+from robochoc.experiments.table import MAX_INTEGER, Place, mistake
+from robochoc.experiments.task import Limits, ProblemSpec, Recording, Setup
+from robochoc.formats.diagnostics import Diagnostic, InvalidInputError, encodable, shortened
+from robochoc.system.decode_errors import describe_decode_error
+
+LARGEST_FILE = 2**20
+"""A study's file has no more bytes."""
+_TOP = ("title", "problems", "runs", "limits", "repeat", "record", "report")
+MOST_REPETITIONS = 1000
+
+
+class ReportWishes(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """What a report is to show: the table `[report]`.
+
+    Attributes:
+        over: The parameter over which figures are drawn. None: the first that has several values.
+        metrics: The metrics that are drawn. Empty: those that there are.
+        text: What is to be read above the figures.
+    """
+
+    over: str | None = None
+    metrics: tuple[str, ...] = ()
+    text: str = ""
+
+
+class Study(msgspec.Struct, frozen=True, kw_only=True):
+    """A study.
+
+    Attributes:
+        name: The name of its file, without the ending.
+        title: What it is called.
+        text: Its file.
+        problems: The problems, in the file's order.
+        setups: The protocols, and how each is run, with the seeds of its runs and its limits.
+        repeat: How often each run is repeated.
+        record: What is recorded besides counts.
+        report: What a report is to show.
+    """
+
+    name: str
+    title: str
+    text: str
+    problems: tuple[ProblemSpec, ...]
+    setups: tuple[tuple[Setup, tuple[int, ...], Limits], ...]
+    repeat: int = 1
+    record: tuple[Recording, ...] = ()
+    report: ReportWishes = ReportWishes()
+
+
+def read_study(path: Path) -> Study:
+    """Return the study in the TOML file at `path`.
+
+    Raises:
+        InvalidInputError: with the line, if it is no study.
+    """
+    text = _text(path)
+    try:
+        tables = tomllib.loads(text)
+    except (ValueError, RecursionError) as wrong:
+        what = "it is nested too deep" if isinstance(wrong, RecursionError) else shortened(str(wrong))
+        raise mistake(Place(path, text), f"is no TOML file: {what}", "docs/guides/experiments.md shows one") from None
+    return study_of(tables, Place(path, text))
+
+
+def study_of_tables(name: str, tables: Mapping[str, Any]) -> Study:
+    """Return the study that `tables` describe, and that no file has; `text` is what its file would be.
+
+    Raises:
+        InvalidInputError: if they describe none.
+    """
+    study = study_of(tables, Place(Path(name), ""))
+    return msgspec.structs.replace(study, text=toml_of(tables))
+
+
+def toml_of(tables: Mapping[str, Any]) -> str:
+    """Return tables of plain values, lists and tables as TOML. JSON's numbers, words and lists are TOML's, too."""
+    parts = []
+    for name, table in tables.items():
+        lines = [f"{key} = {_toml(value)}" for key, value in table.items()]
+        parts.append("\n".join([f"[{name}]", *lines, ""]))
+    return "\n".join(parts)
+
+
+def _toml(value: object) -> str:
+    if isinstance(value, Mapping):
+        return f"{{ {', '.join(f'{_toml(key)} = {_toml(one)}' for key, one in value.items())} }}"
+    return msgspec.json.encode(value).decode()
+
+
+def study_of(tables: Mapping[str, Any], place: Place) -> Study:
+    """Return the study that `tables` describe. Raises `InvalidInputError`."""
+    place.check_keys(tables, _TOP)
+    limits = _convert(tables.get("limits", {}), Limits, place.below("limits"))
+    problems = [one for table, at in _tables(tables, "problems", place) for one in problems_of(table, at)]
+    setups = [one for table, at in _tables(tables, "runs", place) for one in setups_of(table, limits, at)]
+    named = distinct([setup for setup, *_ in setups])
+    repeat = tables.get("repeat", 1)
+    if type(repeat) is not int or not 1 <= repeat <= MOST_REPETITIONS:
+        raise place.mistake(
+            "repeat", f"expected an integer from 1 to {MOST_REPETITIONS:,}, got {shortened(str(repeat))}"
+        )
+    report = _convert(tables.get("report", {}), ReportWishes, place.below("report"))
+    return Study(
+        name=place.path.stem,
+        title=_word(tables, "title", place) or place.path.stem,
+        text=place.text,
+        problems=tuple(problems),
+        setups=tuple((setup, seeds, limit) for setup, (_, seeds, limit) in zip(named, setups, strict=True)),
+        repeat=repeat,
+        record=_recordings(tables.get("record", []), place),
+        report=report,
+    )
+
+
+def _tables(tables: Mapping[str, Any], name: str, place: Place) -> Iterator[tuple[Mapping[str, Any], Place]]:
+    """Yield the tables `[name]` or `[[name]]`, each with its place."""
+    keys = PROBLEM_KEYS if name == "problems" else RUN_KEYS
+    found = tables.get(name)
+    several = found if isinstance(found, list) else [found] if found is not None else []
+    if not several or not all(isinstance(one, dict) for one in several):
+        raise place.mistake(name, f"expected a table, [{name}] or [[{name}]], with {', '.join(keys[:3])}, ...")
+    for number, one in enumerate(several):
+        yield one, place.below(name, number)
+
+
+def _convert(table: object, kind: Any, place: Place) -> Any:  # noqa: ANN401 - of `kind`
+    if isinstance(table, dict):
+        place.check_keys(table, kind.__struct_fields__)
+    try:
+        found = msgspec.convert(table, kind)
+    except msgspec.ValidationError as wrong:
+        raise place.mistake("", describe_decode_error(wrong, kind)) from None
+    if isinstance(found, Limits):
+        for name in Limits.__struct_fields__:
+            value = getattr(found, name)
+            if value is not None and not 0 < value <= MAX_INTEGER:
+                raise place.mistake(name, f"expected more than 0, and no more than 2^53, got {value:g}")
+    return found
+
+
+def _word(table: Mapping[str, Any], name: str, place: Place) -> str:
+    word = table.get(name, "")
+    if not isinstance(word, str):
+        raise place.mistake(name, f"expected a text, got {shortened(str(word))}")
+    return word
+
+
+def _recordings(words: object, place: Place) -> tuple[Recording, ...]:
+    several: Sequence[object] = words if isinstance(words, list) else [words]
+    for word in several:
+        if word not in {str(one) for one in Recording}:
+            raise place.mistake("record", f"expected {' or '.join(Recording)}, got {shortened(str(word))}")
+    return tuple(one for one in Recording if one in several)
+
+
+def _text(path: Path) -> str:
+    try:
+        with path.open("rb") as file:
+            content = file.read(LARGEST_FILE + 1)
+    except OSError as error:
+        hint = "name the TOML file of a study; docs/guides/experiments.md shows one"
+        raise InvalidInputError(
+            [Diagnostic(encodable(str(path)), 0, f"cannot be read: {error.strerror}", hint)]
+        ) from None
+    if len(content) > LARGEST_FILE:
+        raise mistake(
+            Place(path, ""), f"is too large for a study's file, which has up to {LARGEST_FILE:,} bytes", "cut it"
+        )
+    try:
+        return content.decode()
+    except UnicodeDecodeError:
+        raise mistake(Place(path, ""), "is not UTF-8", "a study's file is TOML, in UTF-8") from None
+
+
+def study_wishes(text: str) -> ReportWishes:
+    """Return what the report on a study that was read before is to show."""
+    table = tomllib.loads(text).get("report", {}) if text else {}
+    return msgspec.convert(table, ReportWishes)

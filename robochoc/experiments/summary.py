@@ -1,0 +1,222 @@
+"""Results summed up: medians of a metric over a parameter, for each way to run."""
+
+from __future__ import annotations
+
+import statistics
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from contextlib import suppress
+from dataclasses import dataclass
+from types import MappingProxyType
+from typing import Any
+
+from robochoc.experiments.task import Status
+
+Rows = Sequence[Mapping[str, Any]]
+
+METRICS: Mapping[str, str] = MappingProxyType(
+    {
+        "messages": "messages",
+        "ncccs": "NCCCs",
+        "bytes": "bytes",
+        "checks": "constraint checks",
+        "simulated_s": "simulated seconds",
+        "cost": "cost",
+        "wall_s": "seconds of the search",
+        "total_s": "seconds of the whole run",
+        "cpu_s": "seconds of the processor",
+        "memory": "bytes of memory",
+        "largest": "bytes of the largest message",
+    }
+)
+"""Each metric, and what it is called on an axis."""
+CENSORED = ("messages", "ncccs", "bytes", "checks", "simulated_s", "wall_s", "total_s", "cpu_s")
+"""Metrics that would have gone on growing where a limit has ended a run."""
+OF_RUNS = ("order", "schedule", "delay", "withdraw", "runtime", "channel", "seed")
+"""Parameters of runs, over which results can be shown, too."""
+_SEEDS = ("seed", "problem_seed", "scenario_seed")
+MOST_TEAMS = 12
+"""More problems have no lines of their own, unless it is asked for."""
+DEFAULT_METRICS = ("messages", "ncccs", "bytes")
+
+
+class NoSuchColumnError(ValueError):
+    """The results have no such parameter or metric."""
+
+
+@dataclass(frozen=True)
+class Sample:
+    """What one way to run came to at one value of the parameter.
+
+    Attributes:
+        values: The metric of the runs with a verdict, and of those that a limit has ended where that says something.
+        censored: How many of these a limit has ended.
+        failed: How many runs have no value: they crashed, were refused, and so on.
+    """
+
+    values: tuple[float, ...]
+    censored: int = 0
+    failed: int = 0
+
+    @property
+    def median(self) -> float | None:
+        """The median. None: there is no value."""
+        return statistics.median(self.values) if self.values else None
+
+    @property
+    def open_ended(self) -> bool:
+        """Whether so many runs were cut short that the median is a lower bound of what it would be."""
+        return self.censored * 2 >= len(self.values) > 0
+
+
+def parameters(rows: Rows) -> list[str]:
+    """Return the names of the problems' parameters, in their order."""
+    names: dict[str, None] = {}
+    for row in rows:
+        for name in row:
+            if name == "key":
+                break
+            names[name] = None
+    return list(names)
+
+
+def parameter_to_draw_over(rows: Rows, wanted: str | None = None) -> str:
+    """Return the parameter over which results are shown.
+
+    Args:
+        rows: The results.
+        wanted: The name that was asked for. None: the first parameter that all problems have, with several values,
+            seeds aside; if there is none, the problems, or the kinds of problems where there are many.
+
+    Raises:
+        NoSuchColumnError: if there is no such parameter.
+    """
+    of_problems = parameters(rows)
+    known = [*of_problems, "problems", "team", *OF_RUNS, *_settings(rows)]
+    if wanted is not None:
+        if wanted not in known:
+            raise NoSuchColumnError(f"there is no parameter {wanted!r}; there are {', '.join(known)}")
+        return wanted
+    for name in of_problems:
+        if name not in _SEEDS and all(name in row for row in rows) and len({row[name] for row in rows}) > 1:
+            return name
+    return "team" if len({row["team"] for row in rows}) <= MOST_TEAMS else "problems"
+
+
+def by_parameter(rows: Rows, over: str) -> Rows:
+    """Return `rows` for tables and figures over a parameter: a parameter of runs becomes a column of its own.
+
+    What the labels say of it is taken out of them: `abt delay=20` and `abt delay=50` are both `abt`, over `delay`.
+    """
+    if over in OF_RUNS:
+        return [{**row, "label": _without(row["label"], over, row[over])} for row in rows]
+    if over in _settings(rows):
+        values = [row["settings"].get(over) for row in rows]
+        given = zip(rows, values, strict=True)
+        return [{**row, over: _number(value), "label": _without(row["label"], over, value)} for row, value in given]
+    return rows
+
+
+def _settings(rows: Rows) -> list[str]:
+    return list(dict.fromkeys(name for row in rows for name in row.get("settings", ())))
+
+
+def _without(label: str, name: str, value: object) -> str:
+    return " ".join(word for word in label.split() if word not in {f"{name}={value}", str(value)}) or label
+
+
+def _number(text: str | None) -> str | int | float | None:
+    for kind in (int, float):
+        with suppress(ValueError, TypeError):
+            return kind(str(text))
+    return text
+
+
+def metrics_to_show(rows: Rows, wanted: Sequence[str] = ()) -> list[str]:
+    """Return the metrics that are shown: the wanted ones, or the usual ones as far as the results have them.
+
+    Raises:
+        NoSuchColumnError: if there is no such metric.
+    """
+    for name in wanted:
+        if name not in METRICS:
+            raise NoSuchColumnError(f"there is no metric {name!r}; there are {', '.join(METRICS)}")
+    if wanted:
+        return list(wanted)
+    usual = [*DEFAULT_METRICS, "simulated_s", "cost"]
+    if any(row["runtime"] != "simulator" for row in rows):
+        usual.append("wall_s")
+    return [name for name in usual if any(row[name] is not None for row in rows)]
+
+
+def labels(rows: Rows) -> list[str]:
+    """Return the ways to run, in the order of the study."""
+    return list(dict.fromkeys(str(row["label"]) for row in rows))
+
+
+def values_of(rows: Rows, name: str) -> list[Any]:
+    """Return the values of a parameter, in ascending order if they are numbers, else as they come."""
+    found = list(dict.fromkeys(row.get(name) for row in rows))
+    numbers = all(isinstance(value, (int, float)) for value in found)
+    return sorted(found) if numbers else found
+
+
+def samples(rows: Rows, metric: str, over: str) -> dict[tuple[Any, str], Sample]:
+    """Return what each way to run came to, by the value of the parameter `over` and its label."""
+    groups: dict[tuple[Any, str], list[Mapping[str, Any]]] = {}
+    for row in rows:
+        groups.setdefault((row.get(over), str(row["label"])), []).append(row)
+    return {key: sample(group, metric) for key, group in groups.items()}
+
+
+def sample(rows: Rows, metric: str) -> Sample:
+    """Return what `rows` came to."""
+    counted = [row for row in rows if _counts(row, metric)]
+    cut = sum(row["status"] == Status.LIMIT for row in counted) if metric in CENSORED else 0
+    return Sample(tuple(float(row[metric]) for row in counted), cut, len(rows) - len(counted))
+
+
+def _counts(row: Mapping[str, Any], metric: str) -> bool:
+    return row[metric] is not None and row["status"] in {Status.DONE, Status.LIMIT}
+
+
+Table = tuple[list[str], list[list[str]]]
+"""The headings of a table, and its lines."""
+
+
+def medians(rows: Rows, metric: str, over: str) -> Table:
+    """Return the medians of a metric: a line for each value of the parameter `over`, a column for each way to run."""
+    found = samples(rows, metric, over)
+    ways = labels(rows)
+    some = [
+        value for value in values_of(rows, over) if any(one.values for (at, _), one in found.items() if at == value)
+    ]
+    return [over, *ways], [[str(value), *(cell(found.get((value, way))) for way in ways)] for value in some]
+
+
+def endings(rows: Rows) -> Table:
+    """Return how runs have ended, a line for each way to run: their verdicts, or why they have none."""
+    kinds = Counter(_ending(row) for row in rows)
+    by_way: dict[str, Counter[str]] = {way: Counter() for way in labels(rows)}
+    for row in rows:
+        by_way[str(row["label"])][_ending(row)] += 1
+    heads = [kind for kind, _ in kinds.most_common()]
+    return ["", *heads], [[way, *(f"{count[kind]:,}" for kind in heads)] for way, count in by_way.items()]
+
+
+def _ending(row: Mapping[str, Any]) -> str:
+    return str(row["verdict"] if row["status"] == Status.DONE else row["status"])
+
+
+def cell(one: Sample | None) -> str:
+    """Return a sample in a table: its median, with a sign where limits leave it open."""
+    if one is None or one.median is None:
+        return "-"
+    return f"{'>= ' * one.open_ended}{number(one.median)}"
+
+
+def number(value: float) -> str:
+    """Return a number with about four digits."""
+    if value == int(value) or abs(value) >= 1000:  # noqa: PLR2004 - digits before the point suffice
+        return f"{value:,.0f}"
+    return f"{value:.3g}" if abs(value) < 1 else f"{value:,.2f}"

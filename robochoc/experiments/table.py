@@ -1,0 +1,106 @@
+"""A table of a study's file: where its keys stand, and what their lists and ranges come to."""
+
+from __future__ import annotations
+
+import itertools
+import math
+import re
+from collections.abc import Collection, Iterator, Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+from robochoc.experiments.ranges import range_of
+from robochoc.formats.diagnostics import Diagnostic, InvalidInputError, encodable, shortened, suggestion
+
+HINT = "docs/guides/experiments.md describes the file of a study"
+MAX_INTEGER = 2**53
+_HEAD = re.compile(r"\s*\[\[?\s*([\w.-]+)\s*\]?\]")
+
+
+@dataclass(frozen=True)
+class Place:
+    """A table of a study's file.
+
+    Attributes:
+        path: The file.
+        text: Its content.
+        table: The table's name. Empty: keys before all tables.
+        number: Which of several tables of that name, from 0.
+    """
+
+    path: Path
+    text: str
+    table: str = ""
+    number: int = 0
+
+    def below(self, table: str, number: int = 0) -> Place:
+        """Return the place of a table."""
+        return replace(self, table=table, number=number)
+
+    def line(self, key: str) -> int:
+        """Return the line of a key, or of its table if the key is empty or stands elsewhere; 0 if there is none."""
+        table, number, head = "", 0, 0
+        wanted = re.compile(rf"\s*[\"']?{re.escape(key)}[\"']?\s*[=.]") if key else None
+        for line, words in enumerate(self.text.splitlines(), 1):
+            if found := _HEAD.match(words):
+                number = number + 1 if found[1] == table else 0
+                table = found[1]
+                if key and not self.table and table == key:
+                    return line
+            if (table, number) == (self.table, self.number):
+                head = head or line
+                if wanted and wanted.match(words):
+                    return line
+            elif self.table and table == f"{self.table}.{key}":
+                return line
+        return head if self.table else 0
+
+    def mistake(self, key: str, message: str, hint: str = HINT) -> InvalidInputError:
+        """Return the error that something is wrong with a key; empty: with the table."""
+        named = ".".join(filter(None, (self.table, key)))
+        told = f"{shortened(named)}: {message}" if named else message
+        return InvalidInputError([Diagnostic(encodable(str(self.path)), self.line(key), told, hint)])
+
+    def check_keys(self, table: Mapping[str, Any], known: Collection[str]) -> None:
+        """Raise `InvalidInputError` for a key that is not known."""
+        for key in table:
+            if key not in known:
+                raise self.mistake(key, "there is no such key", suggestion(key, known, "keys"))
+
+    def values(self, key: str, given: object) -> list[Any]:
+        """Return the values that a list, a range or a plain value stands for.
+
+        Raises:
+            InvalidInputError: if there are none, or they are no plain values.
+        """
+        found: list[Any] = []
+        for one in given if isinstance(given, list) else [given]:
+            try:
+                numbers = range_of(one) if isinstance(one, str) else None
+            except ValueError as wrong:
+                raise self.mistake(key, str(wrong)) from None
+            if numbers is None and not _is_plain(one):
+                raise self.mistake(key, f"expected numbers, words, or a list of them, got {shortened(str(one))}")
+            found += [one] if numbers is None else numbers
+        if not found:
+            raise self.mistake(key, "expected at least one value")
+        return list(dict.fromkeys(found))
+
+    def combinations(self, table: Mapping[str, Any]) -> Iterator[dict[str, Any]]:
+        """Yield all combinations of the values in `table`; the last key varies fastest."""
+        keys = list(table)
+        for values in itertools.product(*(self.values(key, table[key]) for key in keys)):
+            yield dict(zip(keys, values, strict=True))
+
+
+def _is_plain(value: object) -> bool:
+    """Return whether a value is a word or a number of which JSON and SQLite can hold all digits."""
+    if isinstance(value, float):
+        return math.isfinite(value)
+    return isinstance(value, str) or (isinstance(value, int) and abs(value) <= MAX_INTEGER)
+
+
+def mistake(place: Place, message: str, hint: str) -> InvalidInputError:
+    """Return the error that something is wrong with the whole file."""
+    return InvalidInputError([Diagnostic(encodable(str(place.path)), 0, message, hint)])

@@ -1,0 +1,244 @@
+"""One run of a study, and the row that comes of it: plain data, which travels to workers as JSON."""
+
+from __future__ import annotations
+
+import hashlib
+from enum import StrEnum
+from typing import Any
+
+import msgspec
+
+from robochoc.communication.simulator.channel import ChannelModel
+from robochoc.model.orders import Order
+from robochoc.run.options import Options, Runtime, ScheduleName, Withdrawal
+
+Parameter = str | int | float | bool
+GIVEN = "given"
+"""The priority order of the files."""
+_KEY_BYTES = 16
+
+
+class ProblemSpec(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True):
+    """A problem: of a family, or from files.
+
+    Attributes:
+        group: What the study calls the problems that it is one of.
+        family: The family of generated problems. Empty: the problem is in files.
+        parameters: The family's parameters, or options of reading the files.
+        path: The team's folder or the file, where it is in one.
+        digest: Of the files' content. Two problems of the same content are the same problem.
+        scenario: The parameters of a random scenario. Empty: there is none.
+    """
+
+    group: str = ""
+    family: str = ""
+    parameters: dict[str, Parameter] = {}
+    path: str = ""
+    digest: str = ""
+    scenario: dict[str, Any] = {}
+
+    @property
+    def identity(self) -> str:
+        """Return what the problem is, whatever it is called and wherever its files are."""
+        identity = msgspec.structs.replace(self, group="", path="" if self.digest else self.path)
+        return msgspec.json.encode(identity, order="deterministic").decode()
+
+
+class Setup(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True):
+    """A protocol and how it is run. Attributes are as in `robochoc.run.options.Options`.
+
+    `label` is what tables and figures call it.
+    """
+
+    label: str = ""
+    protocol: str
+    settings: dict[str, str] = {}
+    order: str | None = None
+    runtime: str = "simulator"
+    channel: ChannelModel | None = None
+    schedule: str = "concurrent"
+    delay: int = 0
+    withdraw: str | None = None
+    verify: bool = False
+
+
+class Limits(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True):
+    """The limits of one run.
+
+    Attributes:
+        timeout: Seconds for the run, its set-up included. None: no limit.
+        messages: The number of messages. None: no limit.
+        memory_mb: Megabytes of the process that solves. None: no limit.
+    """
+
+    timeout: float | None = None
+    messages: int | None = None
+    memory_mb: int | None = None
+
+
+NO_LIMITS = Limits()
+
+
+def options_of(setup: Setup, limits: Limits = NO_LIMITS, seed: int = 0) -> Options:
+    """Return the options of a run."""
+    return Options(
+        protocol=setup.protocol,
+        runtime=Runtime(setup.runtime),
+        seed=seed,
+        timeout=limits.timeout,
+        withdraw=None if setup.withdraw is None else Withdrawal(setup.withdraw),
+        schedule=ScheduleName(setup.schedule),
+        delay=setup.delay,
+        verify=setup.verify,
+        order=None if setup.order is None else Order(setup.order),
+        messages=limits.messages,
+        channel=setup.channel,
+        settings=setup.settings,
+    )
+
+
+class Task(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True):
+    """One run of a study.
+
+    Attributes:
+        problem: The problem.
+        setup: The protocol, and how it is run.
+        seed: The run's seed.
+        limits: The run's limits.
+        repetition: The number of the repetition, from 1.
+        record: What is recorded besides counts; see `Recording`.
+    """
+
+    problem: ProblemSpec
+    setup: Setup
+    seed: int = 0
+    limits: Limits = NO_LIMITS
+    repetition: int = 1
+    record: tuple[str, ...] = ()
+
+    @property
+    def key(self) -> str:
+        """Return the digest of all that decides what the run does; labels and places of files do not."""
+        plain = msgspec.structs.replace(self, setup=msgspec.structs.replace(self.setup, label=""))
+        content = msgspec.json.encode(
+            [self.problem.identity, msgspec.structs.replace(plain, problem=_NOWHERE)], order="deterministic"
+        )
+        return hashlib.blake2b(content, digest_size=_KEY_BYTES).hexdigest()
+
+    @property
+    def is_timed(self) -> bool:
+        """Return whether robots have processes: then nothing else is to run on the machine."""
+        return self.setup.runtime != "simulator"
+
+
+_NOWHERE = ProblemSpec()
+
+
+class Recording(StrEnum):
+    """What is recorded besides the counts of the whole run."""
+
+    COST_OVER_TIME = "cost-over-time"
+    ROBOTS = "robots"
+
+
+class Status(StrEnum):
+    """How a run has ended.
+
+    `DONE`: with a verdict. `LIMIT`: a limit was reached before. `REFUSED`: problem, protocol and options do not go
+    together. `INVALID`: there is no such problem. `LOST`: robots were lost. `REFUTED`: the checker refutes the answer.
+    `MEMORY`: the memory did not suffice. `CRASHED`: the process that solved has ended. `ERROR`: something else.
+    """
+
+    DONE = "done"
+    LIMIT = "limit"
+    REFUSED = "refused"
+    INVALID = "invalid"
+    LOST = "lost"
+    REFUTED = "refuted"
+    MEMORY = "memory"
+    CRASHED = "crashed"
+    ERROR = "error"
+
+
+class CostPoint(msgspec.Struct, frozen=True, array_like=True):
+    """A moment at which the team's assignment became cheaper than ever before.
+
+    Attributes:
+        messages: Messages sent until then.
+        ncccs: The highest NCCC clock until then.
+        time: Seconds since the start; in the simulator steps, with a channel model simulated seconds.
+        cost: The cost, as text, in the user's numbers.
+    """
+
+    messages: int
+    ncccs: int
+    time: float
+    cost: str
+
+
+class RobotLoad(msgspec.Struct, frozen=True, array_like=True):
+    """What one robot has sent: messages and bytes."""
+
+    robot: str
+    messages: int
+    bytes: int
+
+
+class Row(msgspec.Struct, kw_only=True, omit_defaults=True):
+    """What came of a run. Counts are as in `robochoc.model.outcome.Metrics`; None where there is no answer.
+
+    Attributes:
+        status: How the run has ended.
+        reason: Why, where it has no verdict.
+        team: The name of the team.
+        digest: Of the problem as it was solved.
+        robots: The number of robots.
+        variables: The number of variables.
+        constraints: The number of constraints.
+        verdict: The verdict.
+        cost: The cost in the user's numbers, exactly, as text.
+        bound: A lower bound of it, where one is known.
+        maximises: Whether the cost is a utility.
+        withdrawn: The number of withdrawn robots.
+        verified: Whether the checker has checked the answer.
+        confirmed: Whether a central solver has found the same.
+        messages: Messages sent.
+        messages_by_type: The same, by type.
+        total_s: Seconds of the whole run, checks and set-up included.
+        cpu_s: Seconds of the processor, in the simulator.
+        cost_over_time: With `COST_OVER_TIME`.
+        loads: With `ROBOTS`.
+        machine: Where it ran: host, processor, Python.
+        version: The version of robochoc.
+    """
+
+    status: Status
+    reason: str | None = None
+    team: str = ""
+    digest: str = ""
+    robots: int = 0
+    variables: int = 0
+    constraints: int = 0
+    verdict: str | None = None
+    cost: str | None = None
+    bound: str | None = None
+    maximises: bool = False
+    withdrawn: int = 0
+    verified: bool = False
+    confirmed: bool = False
+    messages: int | None = None
+    messages_by_type: dict[str, int] = {}
+    bytes: int | None = None
+    largest: int | None = None
+    ncccs: int | None = None
+    checks: int | None = None
+    simulated_s: float | None = None
+    wall_s: float | None = None
+    compile_s: float | None = None
+    total_s: float = 0.0
+    cpu_s: float | None = None
+    memory: int | None = None
+    cost_over_time: list[CostPoint] = []
+    loads: list[RobotLoad] = []
+    machine: str = ""
+    version: str = ""

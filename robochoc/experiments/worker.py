@@ -1,0 +1,48 @@
+"""A worker of this machine: it reads tasks from a socket, and writes their rows to it, until that is closed.
+
+It is a program of its own, `python -m robochoc.experiments.worker DESCRIPTOR PARENT MEMORY_MB`: what a task breaks is
+broken here.
+"""
+
+from __future__ import annotations
+
+import os
+import resource
+import signal
+import socket
+import sys
+
+import msgspec
+
+from robochoc.experiments.execute import Bench
+from robochoc.experiments.frames import read_frame, write_frame
+from robochoc.experiments.task import Status, Task
+from robochoc.system.orphans import signal_when_orphaned
+
+_MB = 2**20
+
+
+def main(descriptor: int, parent: int, memory_mb: int) -> None:
+    """Run tasks until there are no more.
+
+    Args:
+        descriptor: The socket's.
+        parent: The process that has started this one.
+        memory_mb: How much memory it may use; 0: any.
+    """
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # who has started this process decides when it ends
+    signal_when_orphaned(signal.SIGKILL)
+    if os.getppid() != parent:
+        return
+    if memory_mb:
+        resource.setrlimit(resource.RLIMIT_DATA, (memory_mb * _MB, resource.RLIM_INFINITY))
+    with socket.socket(fileno=descriptor) as connection, Bench() as bench:
+        while (content := read_frame(connection)) is not None:
+            row = bench.run(msgspec.json.decode(content, type=Task))
+            write_frame(connection, msgspec.json.encode(row))
+            if row.status is Status.MEMORY:
+                return  # what is left is in pieces; another worker takes over
+
+
+if __name__ == "__main__":
+    main(*map(int, sys.argv[1:]))

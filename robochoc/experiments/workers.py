@@ -1,0 +1,179 @@
+"""The workers of this machine: processes that carry out the runs of a study."""
+
+from __future__ import annotations
+
+import os
+import selectors
+import signal
+import socket
+import subprocess
+import sys
+import time
+from collections import deque
+from collections.abc import Iterable, Iterator, Sequence
+from contextlib import suppress
+from types import TracebackType
+from typing import Self
+
+import msgspec
+
+from robochoc.experiments.frames import Frames, write_frame
+from robochoc.experiments.task import Row, Status, Task
+
+SETUP_S = 60.0
+"""Seconds that a run may take beyond its limit: for reading, compiling, and ending. Then its worker is killed."""
+LEAVING_S = 5.0
+"""Seconds that a worker without a task has to end by itself."""
+_CHUNK = 1 << 16
+
+
+class LocalWorkers:
+    """Processes of this machine. Each has one bundle of tasks at a time: those of one problem.
+
+    A worker that dies, or does not come to an end, costs the task that it was at; others go on with the rest.
+    """
+
+    def __init__(self, count: int, memory_mb: int | None = None) -> None:
+        self._count = count
+        self._memory_mb = memory_mb
+        self._selector = selectors.DefaultSelector()
+        self._workers: list[_Worker] = []
+
+    def __enter__(self) -> Self:
+        """Return itself."""
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        """End all workers, and what they were at."""
+        for worker in self._workers:
+            worker.end(busy=bool(worker.tasks))
+        self._selector.close()
+
+    @property
+    def pids(self) -> list[int]:
+        """Return the ids of the workers' processes."""
+        return [worker.pid for worker in self._workers]
+
+    def rows(self, bundles: Iterable[Sequence[Task]]) -> Iterator[tuple[Task, Row]]:
+        """Yield what comes of all tasks, as soon as it is there."""
+        waiting = deque(deque(bundle) for bundle in bundles)
+        while waiting or any(worker.tasks for worker in self._workers):
+            self._hand_out(waiting)
+            for key, _ in self._selector.select(self._patience_s()):
+                yield from self._heard(key.data, waiting)
+            for worker in [one for one in self._workers if one.is_late]:
+                task = worker.tasks.popleft()
+                self._replace(worker, waiting, busy=True)
+                yield task, _late(task)
+
+    def _hand_out(self, waiting: deque[deque[Task]]) -> None:
+        """Give each worker that has nothing to do a bundle; start workers as long as there may be more."""
+        while waiting and len(self._workers) < self._count:
+            worker = _Worker(self._memory_mb)
+            self._workers.append(worker)
+            self._selector.register(worker.connection, selectors.EVENT_READ, worker)
+        for worker in self._workers:
+            if waiting and not worker.tasks:
+                worker.give(waiting.popleft())
+
+    def _patience_s(self) -> float | None:
+        left = [worker.deadline - time.monotonic() for worker in self._workers if worker.deadline is not None]
+        return max(0.0, min(left)) if left else None
+
+    def _heard(self, worker: _Worker, waiting: deque[deque[Task]]) -> Iterator[tuple[Task, Row]]:
+        try:
+            received = worker.connection.recv(_CHUNK)
+        except OSError:
+            received = b""
+        for content in worker.frames.take(received):
+            row = msgspec.json.decode(content, type=Row)
+            task = worker.tasks.popleft()
+            if row.status is Status.MEMORY:  # and with this it leaves
+                self._replace(worker, waiting)
+            else:
+                worker.next()
+            yield task, row
+        if not received and worker in self._workers:
+            if worker.tasks:
+                yield worker.tasks.popleft(), Row(status=Status.CRASHED, reason=worker.how_it_ended())
+            self._replace(worker, waiting)
+
+    def _replace(self, worker: _Worker, waiting: deque[deque[Task]], *, busy: bool = False) -> None:
+        """End a worker; another one gets the tasks that it has not come to."""
+        if worker.tasks:
+            waiting.appendleft(worker.tasks)
+        self._selector.unregister(worker.connection)
+        self._workers.remove(worker)
+        worker.end(busy=busy)
+
+
+class _Worker:
+    """One process, the tasks that it was given, and until when the first of them is to be answered."""
+
+    def __init__(self, memory_mb: int | None) -> None:
+        self.connection, theirs = socket.socketpair()
+        self.frames = Frames()
+        self.tasks: deque[Task] = deque()
+        self.deadline: float | None = None
+        command = [sys.executable, "-P", "-m", "robochoc.experiments.worker"]
+        words = [str(theirs.fileno()), str(os.getpid()), str(memory_mb or 0)]
+        with theirs:
+            # In a session of its own, so that Ctrl-C on a terminal is heard by one process: it decides what ends when.
+            self._process = subprocess.Popen(  # noqa: S603 - our own module
+                [*command, *words],
+                stdin=subprocess.DEVNULL,
+                stdout=subprocess.DEVNULL,
+                stderr=subprocess.DEVNULL,
+                pass_fds=(theirs.fileno(),),
+                start_new_session=True,
+            )
+
+    @property
+    def pid(self) -> int:
+        """Return the id of the process."""
+        return self._process.pid
+
+    def give(self, tasks: deque[Task]) -> None:
+        """Give it a bundle, one task after the other: it has the next one when it has answered."""
+        self.tasks = tasks
+        self.next()
+
+    def next(self) -> None:
+        """Send the next task, if there is one."""
+        self.deadline = None
+        if not self.tasks:
+            return
+        limit_s = self.tasks[0].limits.timeout
+        self.deadline = None if limit_s is None else time.monotonic() + limit_s + SETUP_S
+        with suppress(OSError):  # it has ended after its last answer, and its socket says so
+            write_frame(self.connection, msgspec.json.encode(self.tasks[0]))
+
+    @property
+    def is_late(self) -> bool:
+        """Return whether its task has taken too long."""
+        return self.deadline is not None and time.monotonic() > self.deadline
+
+    def how_it_ended(self) -> str:
+        """Return why there is no answer."""
+        status = self._process.wait()
+        if status < 0:
+            hint = "; perhaps the memory did not suffice" if status == -signal.SIGKILL else ""
+            return f"the process was ended by {signal.Signals(-status).name}{hint}"
+        return f"the process ended with status {status}"
+
+    def end(self, *, busy: bool) -> None:
+        """End the process: by itself, with its solver, unless it is `busy`."""
+        self.connection.close()
+        if not busy:
+            with suppress(subprocess.TimeoutExpired):
+                self._process.wait(LEAVING_S)
+        self._process.kill()
+        self._process.wait()
+
+
+def _late(task: Task) -> Row:
+    limit_s = task.limits.timeout or 0
+    told = f"it did not stop at its limit of {limit_s:g} s, nor {SETUP_S:g} s later; its set-up may take so long"
+    return Row(status=Status.LIMIT, reason=told, total_s=limit_s + SETUP_S)

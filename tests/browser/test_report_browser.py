@@ -1,0 +1,63 @@
+"""The report of a study, in a browser and as files."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import pytest
+from lxml import etree
+
+from tests.support.browser_pages import watched_page
+from tests.support.program import robochoc_within
+from tests.support.studies import COSTS, results_of
+
+pytest.importorskip("matplotlib")
+pytest.importorskip("scipy")
+
+
+@pytest.fixture(scope="module")
+def results(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    path = tmp_path_factory.mktemp("study") / "costs.sqlite"
+    results_of(COSTS + '[report]\ntext = "Is <b>one</b> better?"\nmetrics = ["messages", "cost"]\n', path)
+    # Fonts that matplotlib has opened once stay open.
+    assert robochoc_within("experiment", "report", path, "-o", path.with_name("first.html")).returncode == 0
+    return path
+
+
+def test_the_page_shows_figures_tables_and_how_to_repeat_it(results: Path, browser: Any) -> None:  # noqa: ANN401 - Playwright's
+    page_file = results.with_name("report.html")
+    done = robochoc_within("experiment", "report", results, "-o", page_file)
+    assert done.returncode == 0, done.stderr
+    with watched_page(browser, viewport={"width": 1200, "height": 800}) as (page, complaints, asked):
+        page.goto(page_file.as_uri())
+        titles = [one.get_attribute("aria-label") for one in page.query_selector_all("figure svg")]
+        assert titles[:3] == ["messages over agents", "cost over agents", "Solved, over agents"]
+        assert "Cost over NCCCs" in titles
+        assert page.inner_text("h1") == "Costs"
+        assert "Is <b>one</b> better?" in page.inner_text("p")
+        assert "32 runs: 8 problems, 4 ways to run." in page.inner_text("body")
+        assert page.query_selector_all("table tbody tr")
+        assert 'record = ["cost-over-time", "robots"]' in page.inner_text("pre")
+        boxes = [one.bounding_box() for one in page.query_selector_all("figure svg")]
+        assert all(box and box["width"] > 300 and box["height"] > 150 for box in boxes)
+        page.set_viewport_size({"width": 360, "height": 640})
+        assert page.evaluate("document.documentElement.scrollWidth") <= 360
+        assert not complaints
+        assert asked == [page_file.as_uri()]
+
+
+def test_figures_for_a_paper(results: Path, tmp_path: Path) -> None:
+    folder = tmp_path / "figures"
+    done = robochoc_within("experiment", "report", results, "-o", folder)
+    assert done.returncode == 0, done.stderr
+    names = {path.name for path in folder.iterdir()}
+    assert {"messages-over-agents.svg", "messages-over-agents.pdf", "medians.tex", "cost-over-ncccs.pdf"} <= names
+    for path in folder.glob("*.svg"):
+        assert etree.parse(path).getroot().tag.endswith("svg")
+    assert all(path.read_bytes().startswith(b"%PDF") for path in folder.glob("*.pdf"))
+    first = {path.name: path.read_bytes() for path in folder.iterdir()}
+    refused = robochoc_within("experiment", "report", results, "-o", folder)
+    assert (refused.returncode, "is there already (--force replaces figures)" in refused.stderr) == (1, True)
+    assert robochoc_within("experiment", "report", results, "-o", folder, "--force").returncode == 0
+    assert {path.name: path.read_bytes() for path in folder.iterdir()} == first

@@ -1,0 +1,231 @@
+"""`robochoc experiment` and `robochoc compare`, as people use them."""
+
+from __future__ import annotations
+
+import csv
+import io
+import json
+import os
+import random
+import signal
+import time
+from contextlib import suppress
+from pathlib import Path
+
+import pytest
+
+from robochoc.experiments import read
+from robochoc.experiments.plan import plan_of
+from robochoc.experiments.store import Store
+from robochoc.experiments.task import Row, Status
+from robochoc.formats import write_team
+from robochoc.generators.queens3d import queens3d
+from tests.support.faults import PROGRAM, running
+from tests.support.limits import wait_until
+from tests.support.program import robochoc_within
+from tests.support.studies import COSTS, SMALL, comparable, results_of, study
+
+slow = pytest.mark.slow
+
+
+@pytest.fixture
+def small(tmp_path: Path) -> Path:
+    path = tmp_path / "small.toml"
+    path.write_text(SMALL)
+    return path
+
+
+def test_run_show_and_export(small: Path) -> None:
+    planned = robochoc_within("experiment", "run", small, "--dry-run")
+    assert planned.stdout.splitlines() == [
+        "small: 12 runs: 6 problems, 2 ways to run (abt, afc-ng)",
+        f"{small.with_suffix('.sqlite')}: 0 are there, 12 are to be run",
+    ]
+    assert not small.with_suffix(".sqlite").exists()
+    done = robochoc_within("experiment", "run", small, "--jobs", 1)
+    results = small.with_suffix(".sqlite")
+    assert (done.returncode, done.stdout) == (0, "")
+    assert done.stderr == f"small: 12 runs: 12 done\n{results}: next: robochoc experiment show {results}\n"
+    shown = robochoc_within("experiment", "show", results).stdout
+    assert "small: 12 runs\n\nmessages, median\ntightness" in shown
+    assert shown.count("median\n") == 3
+    rows = read(results)
+    median = sorted(row["ncccs"] for row in rows if row["label"] == "abt" and row["tightness"] == 0.5)[1]
+    only = robochoc_within("experiment", "show", results, "--metric", "ncccs").stdout.splitlines()
+    assert [line.split()[:2] for line in only if line.startswith("0.5")] == [["0.5", f"{median:,}"]]
+    again = robochoc_within("experiment", "run", small, "--dry-run").stdout
+    assert "12 are there, 0 are to be run" in again
+    longer = small.with_name("longer.toml")
+    longer.write_text(SMALL.replace("1..3", "1..5"))
+    told = robochoc_within("experiment", "run", longer, "-o", results, "--dry-run").stdout
+    assert "12 are there, 8 are to be run; about " in told
+
+
+def test_export(tmp_path: Path) -> None:
+    results_of(COSTS, tmp_path / "costs.sqlite")
+    path = tmp_path / "costs.sqlite"
+    rows = read(path)
+    table = list(csv.DictReader(io.StringIO(robochoc_within("experiment", "export", path).stdout)))
+    assert [(row["label"], int(row["messages"])) for row in table] == [(r["label"], r["messages"]) for r in rows]
+    assert json.loads(table[0]["loads"]) == rows[0]["loads"]
+    lines = robochoc_within("experiment", "export", path, "--format", "json").stdout.splitlines()
+    assert [json.loads(line) for line in lines] == rows
+    assert robochoc_within("experiment", "export", path, "-o", tmp_path / "table.tex").returncode == 0
+    latex = (tmp_path / "table.tex").read_text()
+    assert latex.count(r"\midrule") == 2 * 4 - 1
+    assert latex.rstrip().endswith(r"\end{tabular}")
+    assert r"dsa variant=A & dsa variant=B \\" in latex
+    refused = robochoc_within("experiment", "export", path, "--format", "parquet")
+    assert (refused.returncode, "name a file with -o" in refused.stderr) == (2, True)
+
+
+def test_what_a_file_says_does_not_reach_the_terminal_as_it_is(tmp_path: Path) -> None:
+    text = 'title = "\\u001b[2J"\n' + SMALL
+    path = tmp_path / "study.toml"
+    path.write_text(text)
+    told = [robochoc_within("experiment", "run", path, *more) for more in (["--dry-run"], [])]
+    told.append(robochoc_within("experiment", "show", path.with_suffix(".sqlite")))
+    assert [done.returncode for done in told] == [0, 0, 0]
+    assert not any("\x1b" in done.stdout + done.stderr for done in told)
+    assert "[2J" in told[2].stdout
+
+
+def test_parquet(tmp_path: Path) -> None:
+    parquet = pytest.importorskip("pyarrow.parquet")
+    results_of(COSTS, tmp_path / "costs.sqlite")
+    done = robochoc_within("experiment", "export", tmp_path / "costs.sqlite", "-o", tmp_path / "costs.parquet")
+    assert done.returncode == 0
+    table = parquet.read_table(tmp_path / "costs.parquet").to_pylist()
+    assert [row["messages"] for row in table] == [row["messages"] for row in read(tmp_path / "costs.sqlite")]
+
+
+@pytest.mark.parametrize(
+    ("words", "status", "said"),
+    [
+        (["run", "nothing.toml"], 1, "nothing.toml: cannot be read"),
+        (["show", "nothing.sqlite"], 1, "is no file (name the file that 'robochoc experiment run' writes)"),
+        (["show", "{}", "--over", "tight"], 2, "there is no parameter 'tight'; there are agents,"),
+        (["show", "{}", "--metric", "nccs"], 2, "there is no metric 'nccs'; there are messages,"),
+        (["report", "{}", "-o", "page.html", "--over", "x"], 1, "there is no parameter 'x'"),
+        (["run", "{}.toml", "--scheduler", "tcp://x:1", "--dask", "y"], 1, "cannot be read"),
+    ],
+)
+def test_mistakes_are_told(words: list[str], status: int, said: str, tmp_path: Path) -> None:
+    if "report" in words:
+        pytest.importorskip("matplotlib")
+    results_of(SMALL, tmp_path / "s.sqlite")
+    done = robochoc_within("experiment", *(word.format(tmp_path / "s.sqlite") for word in words), folder=tmp_path)
+    assert done.returncode == status
+    assert said in done.stderr
+    assert not (tmp_path / "page.html").exists()
+
+
+def test_a_contradiction_ends_with_status_4(small: Path) -> None:
+    path = small.with_suffix(".sqlite")
+    digest = results_of(SMALL).rows[0]["digest"]
+    with Store(path) as store:
+        plan = plan_of(study(SMALL))
+        store.begin(study(SMALL), plan)
+        store.add([(next(iter(plan)), Row(status=Status.DONE, verdict="no-solution", digest=digest, team="wrong"))])
+    done = robochoc_within("experiment", "run", small)
+    assert done.returncode == 4
+    assert "small: stopped: " in done.stderr
+    assert done.stderr.count("robochoc generate random --agents 6") == 2
+
+
+def test_compare_a_family_and_folders(tmp_path: Path) -> None:
+    words = [
+        "random",
+        "agents=6",
+        "domain=3",
+        "density=0.5",
+        "tightness=0.2,0.5",
+        "seed=1..3",
+        "--protocols",
+        "abt,AFC-ng",
+    ]
+    done = robochoc_within("compare", *words, "--save", tmp_path / "kept.sqlite")
+    assert done.returncode == 0, done.stderr
+    assert "messages, median\ntightness" in done.stdout
+    assert _counts(tmp_path / "kept.sqlite") == [
+        (row["label"], row["messages"], row["ncccs"]) for row in results_of(SMALL).rows
+    ]
+    for size in (2, 3):
+        write_team(queens3d(size), tmp_path / f"queens-{size}")
+    done = robochoc_within("compare", "queens-2", "queens-3", "--protocols", "abt,afc-ng", folder=tmp_path)
+    assert done.returncode == 0, done.stderr
+    assert "instance" in done.stdout
+    assert not list(tmp_path.glob("compare*"))
+
+
+def _counts(path: Path) -> list[tuple[str, int, int]]:
+    return [(row["label"], row["messages"], row["ncccs"]) for row in read(path)]
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        ("random --protocols ,", "--protocols names no protocol"),
+        ("rando --protocols abt", "did you mean 'random'?"),
+        ("random agents --protocols abt", "random takes NAME=VALUE, not 'agents'"),
+        ("random agents=3 --protocols abt --set x", "--set takes NAME=VALUE"),
+    ],
+)
+def test_what_compare_cannot_take_is_wrong_usage(words: str, said: str) -> None:
+    done = robochoc_within("compare", *words.split())
+    assert (done.returncode, said in done.stderr) == (2, True), done.stderr
+
+
+@pytest.mark.parametrize("strikes", [pytest.param(3, id="three"), pytest.param(50, id="fifty", marks=slow)])
+def test_whoever_is_killed_nothing_is_lost_and_nothing_is_there_twice(strikes: int, tmp_path: Path) -> None:
+    """The runner, or one of its workers, or both at once, at random moments; SIGINT and SIGTERM, too."""
+    text = SMALL.replace("1..3", "1..20")
+    (tmp_path / "study.toml").write_text(text)
+    results = tmp_path / "study.sqlite"
+    chance = random.Random(strikes)
+    for strike in range(strikes):
+        if strike % 10 == 0:
+            results.unlink(missing_ok=True)
+        command = [PROGRAM, "experiment", "run", str(tmp_path / "study.toml"), "--jobs", "2"]
+        with running(command, tmp_path / f"run{strike}") as run:
+            run.wait_until_listening()
+            time.sleep(chance.uniform(0, 1.5))
+            victims = run.processes() if strike % 3 == 0 else [run.pid]
+            for pid in victims:
+                if pid == run.pid or chance.random() < 0.5:
+                    _strike(pid, chance.choice([signal.SIGKILL, signal.SIGKILL, signal.SIGTERM, signal.SIGINT]))
+            run.end()
+            assert run.left_behind() == []
+            assert "Traceback" not in run.errors()
+    done = robochoc_within("experiment", "run", tmp_path / "study.toml")
+    assert done.returncode == 0, done.stderr
+    assert comparable(results) == comparable(results_of(text))
+
+
+def _strike(pid: int, signum: signal.Signals) -> None:
+    with suppress(ProcessLookupError):
+        os.kill(pid, signum)
+
+
+def test_workers_end_with_their_runner(tmp_path: Path) -> None:
+    """A worker that is at a long run does not outlive the runner, and leaves nothing."""
+    (tmp_path / "study.toml").write_text(_LONG)
+    command = [PROGRAM, "experiment", "run", str(tmp_path / "study.toml"), "--jobs", "2"]
+    with running(command, tmp_path / "run") as run:
+        wait_until(lambda: len(run.processes()) == 3, "the workers never start")
+        run.strike(signal.SIGKILL)
+        run.end()
+        assert run.left_behind() == []
+
+
+_LONG = """
+[problems]
+family = "random"
+agents = 40
+domain = 10
+density = 0.2
+tightness = 0.45
+seed = "1..4"
+[runs]
+protocol = "awc"
+"""

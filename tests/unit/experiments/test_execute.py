@@ -1,0 +1,142 @@
+"""One run: its row says what the run itself says; whatever goes wrong is a row, too."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+
+import msgspec
+import pytest
+
+from robochoc.experiments.execute import Bench, team_of
+from robochoc.experiments.task import Limits, ProblemSpec, Row, Setup, Status, Task, options_of
+from robochoc.formats.folder import write_team
+from robochoc.generators.queens3d import queens3d
+from robochoc.journal.events import Improved
+from robochoc.journal.journal import Header, JournalRecorder, read_journal
+from robochoc.model.problem import Team
+from robochoc.run.objective import objective_to_record
+from robochoc.run.orchestrator import solve
+
+RANDOM = ProblemSpec(family="random", parameters={"agents": 6, "domain": 3, "density": 0.5, "tightness": 0.4})
+COSTS = ProblemSpec(
+    family="random", parameters={"agents": 5, "domain": 3, "density": 0.5, "max_cost": 9, "places": 2, "maximize": True}
+)
+ABT = {"protocol": "abt"}
+BOTH = ("cost-over-time", "robots")
+
+
+@pytest.fixture(scope="module")
+def bench() -> Iterator[Bench]:
+    with Bench() as one:
+        yield one
+
+
+def row(bench: Bench, problem: ProblemSpec, setup: Mapping[str, object] = ABT, record: tuple[str, ...] = ()) -> Row:
+    """Return what comes of a run, as a worker sends it."""
+    task = Task(problem=problem, setup=msgspec.convert(setup, Setup), seed=3, record=record)
+    return msgspec.json.decode(msgspec.json.encode(bench.run(task)), type=Row)
+
+
+@pytest.mark.parametrize(
+    ("problem", "setup"),
+    [
+        (RANDOM, {"protocol": "abt"}),
+        (RANDOM, {"protocol": "afc-ng", "order": "random", "delay": 20}),
+        (RANDOM, {"protocol": "abt", "channel": {"name": "mine", "latency_ms": 3.0}}),
+        (RANDOM, {"protocol": "central"}),
+        (COSTS, {"protocol": "sfb"}),
+        (COSTS, {"protocol": "dsa", "settings": {"cycles": "5", "variant": "A"}}),
+        (ProblemSpec(family="queens3d", parameters={"n": 3}), {"protocol": "abt", "withdraw": "minimum"}),
+    ],
+)  # fmt: skip
+def test_a_row_says_what_the_run_says(problem: ProblemSpec, setup: dict[str, object], bench: Bench) -> None:
+    found = row(bench, problem, setup)
+    team = team_of(problem)
+    outcome = solve(team, options_of(msgspec.convert(setup, Setup), seed=3))
+    metrics = outcome.metrics
+    assert (found.status, found.verdict, found.team) == (Status.DONE, outcome.verdict, team.name)
+    assert found.cost == (str(outcome.cost) if problem is COSTS else None)
+    assert found.maximises is (problem is COSTS)
+    assert (found.messages, found.ncccs, found.bytes) == (sum(metrics.messages.values()), metrics.ncccs, metrics.bytes)
+    assert (found.checks, found.largest) == (metrics.checks, metrics.largest)
+    assert found.messages_by_type == metrics.messages
+    assert found.simulated_s == (metrics.simulated_s or None)
+    assert (found.withdrawn, found.verified) == (len(outcome.withdrawn), outcome.verified)
+    assert (found.robots, found.constraints) == (len(team.robots), len(list(team.constraints())))
+
+
+def test_the_cost_over_time_is_that_of_the_journal(bench: Bench) -> None:
+    setup: dict[str, object] = {"protocol": "dsa", "settings": {"cycles": "8"}}
+    found = row(bench, COSTS, setup, BOTH)
+    assert [(point.time, point.cost) for point in found.cost_over_time] == _improved(team_of(COSTS), setup)
+    assert found.cost_over_time[-1].cost == found.cost
+    assert [point.messages for point in found.cost_over_time] == sorted(p.messages for p in found.cost_over_time)
+    assert sum(load.messages for load in found.loads) == found.messages
+    assert sum(load.bytes for load in found.loads) == found.bytes
+    assert row(bench, RANDOM, record=BOTH).cost_over_time == []
+
+
+def _improved(team: Team, setup: dict[str, object]) -> list[tuple[float, str]]:
+    options = options_of(msgspec.convert(setup, Setup), seed=3)
+    header = Header(team=team.name, protocol="dsa", runtime="simulator", seed=3)
+    recorder = JournalRecorder(header, objective_to_record(team, options))
+    solve(team, options, observer=recorder)
+    events = read_journal(recorder.content()).events
+    return [(event.t, str(event.cost)) for event in events if isinstance(event, Improved)]
+
+
+def test_what_cannot_be_run_is_a_row_that_says_why(bench: Bench, tmp_path: Path) -> None:
+    refused = row(bench, COSTS)
+    assert refused.status is Status.REFUSED
+    assert "abt" in str(refused.reason)
+    family = ProblemSpec(family="random", parameters={"agents": 3, "domain": 2, "density": 3.0, "tightness": 0.5})
+    invalid = row(bench, family)
+    assert (invalid.status, invalid.messages) == (Status.INVALID, None)
+    assert "density is 3.0" in str(invalid.reason)
+    missing = row(bench, ProblemSpec(path=str(tmp_path / "nothing")))
+    assert missing.status is Status.INVALID
+    unknown = row(bench, RANDOM, {"protocol": "nobody's"})
+    assert (unknown.status, "no protocol" in str(unknown.reason)) == (Status.REFUSED, True)
+
+
+def test_a_limit_is_a_row_with_what_was_counted_until_then(bench: Bench) -> None:
+    found = bench.run(Task(problem=RANDOM, setup=Setup(protocol="abt"), limits=Limits(messages=5)))
+    assert (found.status, found.verdict) == (Status.LIMIT, "unknown")
+    assert found.messages is not None
+    assert found.messages >= 5
+
+
+def test_a_protocol_that_fails_is_a_row(bench: Bench, monkeypatch: pytest.MonkeyPatch) -> None:
+    def fail(*_: object, **__: object) -> None:
+        raise KeyError("mine")
+
+    monkeypatch.setattr("robochoc.experiments.execute.solve", fail)
+    found = bench.run(Task(problem=RANDOM, setup=Setup(protocol="abt")))
+    assert (found.status, found.reason) == (Status.ERROR, "KeyError: 'mine'")
+    monkeypatch.setattr("robochoc.experiments.execute.solve", _no_memory)
+    assert bench.run(Task(problem=RANDOM, setup=Setup(protocol="abt"))).status is Status.MEMORY
+
+
+def _no_memory(*_: object, **__: object) -> None:
+    raise MemoryError
+
+
+def test_problems_in_files_and_generated_ones_are_the_same_problem(bench: Bench, tmp_path: Path) -> None:
+    write_team(queens3d(3), tmp_path / "queens")
+    counts = [
+        (found.messages, found.ncccs, found.verdict)
+        for found in (
+            row(bench, ProblemSpec(path=str(tmp_path / "queens"), digest="x")),
+            row(bench, ProblemSpec(family="queens3d", parameters={"n": 3})),
+        )
+    ]
+    assert counts[0] == counts[1]
+
+
+def test_a_scenario_is_drawn(bench: Bench) -> None:
+    problem = msgspec.structs.replace(RANDOM, scenario={"events": 3, "rate": 0.2, "seed": 1, "kinds": "add-constraint"})
+    found = row(bench, problem, {"protocol": "dynabt"})
+    assert found.status is Status.DONE
+    assert "events3" in found.team
+    assert found.digest != row(bench, RANDOM).digest

@@ -1,0 +1,129 @@
+"""What results come to: medians where limits cut runs short, intervals, tests, profiles, cost over time."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import Any
+
+import pytest
+
+from robochoc.experiments import statistics, summary
+from robochoc.experiments.summary import Sample
+
+pytest.importorskip("scipy")
+
+
+def row(label: str, case: int, messages: float | None, status: str = "done", **more: object) -> dict[str, Any]:
+    given = {
+        "tightness": 0.5, "problem_seed": case, "key": f"{label}{case}", "problems": "random", "label": label,
+        "seed": 0, "repetition": 1, "status": status, "verdict": "solution" if status == "done" else None,
+        "digest": str(case), "messages": messages, "ncccs": None, "bytes": None, "simulated_s": None, "cost": None,
+        "runtime": "simulator", "settings": {},
+        "team": f"team{case}", "cost_over_time": [],
+    }  # fmt: skip
+    return {**given, **more}
+
+
+def rows(**values: Sequence[float | None]) -> list[dict[str, Any]]:
+    return [row(label, case, one) for label, given in values.items() for case, one in enumerate(given)]
+
+
+def test_medians_say_where_limits_leave_them_open() -> None:
+    found = summary.sample([row("a", 1, 10), row("a", 2, 30, "limit"), row("a", 3, None, "crashed")], "messages")
+    assert found == Sample((10.0, 30.0), censored=1, failed=1)
+    assert (found.median, found.open_ended, summary.cell(found)) == (20.0, True, ">= 20")
+    closed = summary.sample([row("a", case, case, "limit" if case == 1 else "done") for case in range(5)], "messages")
+    assert (closed.open_ended, summary.cell(closed)) == (False, "2")
+    assert summary.cell(summary.sample([row("a", 1, None, "refused")], "messages")) == "-"
+
+
+@pytest.mark.parametrize(
+    ("value", "text"), [(3, "3"), (2.5, "2.50"), (0.01234, "0.0123"), (12345.6, "12,346"), (1e6, "1,000,000")]
+)
+def test_numbers_are_short(value: float, text: str) -> None:
+    assert summary.number(value) == text
+
+
+def test_what_is_drawn_over() -> None:
+    given = [row("a", case, 1, tightness=case / 10) for case in (1, 2)]
+    assert summary.parameter_to_draw_over(given) == "tightness"
+    assert summary.parameter_to_draw_over(given, "problem_seed") == "problem_seed"
+    assert summary.parameter_to_draw_over(rows(a=[1, 2])) == "team"
+    assert summary.parameter_to_draw_over(rows(a=range(13))) == "problems"
+    mixed = [{"n": 3, **row("a", 1, 1)}, {"n": 4, **row("a", 2, 1)}, row("a", 3, 1)]
+    assert summary.parameter_to_draw_over(mixed) == "team"
+    assert summary.values_of([{"x": 3}, {"x": 1}], "x") == [1, 3]
+    assert summary.values_of([{"x": "b"}, {"x": "a"}], "x") == ["b", "a"]
+
+
+def test_parameters_of_runs_are_drawn_over_as_well() -> None:
+    given = [row(f"abt delay={delay}" if delay else "abt", delay, 1, delay=delay) for delay in (0, 20)]
+    given += [row("dsa cycles=5 variant=A", 3, 1, delay=0, settings={"cycles": "5", "variant": "A"})]
+    by_delay = summary.by_parameter(given, summary.parameter_to_draw_over(given, "delay"))
+    assert [(one["delay"], one["label"]) for one in by_delay][:2] == [(0, "abt"), (20, "abt")]
+    by_cycles = summary.by_parameter(given, summary.parameter_to_draw_over(given, "cycles"))
+    assert (by_cycles[2]["cycles"], by_cycles[2]["label"]) == (5, "dsa variant=A")
+    assert summary.by_parameter(given, "tightness") is given
+    with pytest.raises(summary.NoSuchColumnError, match="there is no parameter 'cycle'"):
+        summary.parameter_to_draw_over(given, "cycle")
+
+
+def test_the_interval_of_a_median() -> None:
+    assert statistics.median_interval([7]) == statistics.Interval(7, 7, 7)
+    found = statistics.median_interval([float(value) for value in range(101)])
+    assert found.median == 50
+    # The binomial interval of the median of 101 values, from the 41st to the 61st, is 40 to 60 (Conover 1999).
+    assert abs(found.low - 40) <= 3
+    assert abs(found.high - 60) <= 3
+    assert found == statistics.median_interval([float(value) for value in range(101)])
+    with pytest.raises(ValueError, match="no values"):
+        statistics.median_interval([])
+
+
+def test_pairs_are_compared_on_what_both_have_solved() -> None:
+    given = [
+        *rows(a=range(1, 11), b=[value + 10 for value in range(1, 11)]),
+        row("a", 99, 1, "limit"),
+        row("b", 99, 1),
+        row("b", 98, 1),
+    ]
+    (found,) = statistics.comparisons(given, "messages")
+    assert (found.pairs, found.one_better, found.other_better) == (10, 10, 0)
+    assert found.p == pytest.approx(2 / 2**10)  # all ten ranks have one sign: exactly one of 2^10 cases on each side
+    assert found.ratio == pytest.approx((5 / 15 + 6 / 16) / 2)
+
+
+def test_tests_are_corrected_for_their_number() -> None:
+    """Holm: the smallest probability times their number, the next times one less, and none below those before."""
+    given = rows(a=range(1, 11), b=range(11, 21), c=range(21, 31), d=[30 - v for v in range(10)])
+    by_pair = {(one.one, one.other): one.p for one in statistics.comparisons(given, "messages")}
+    alone = statistics.comparisons(rows(a=range(1, 11), b=range(11, 21)), "messages")[0].p
+    assert alone is not None
+    assert by_pair["a", "b"] == pytest.approx(6 * alone)
+    assert all(p is None or p <= 1 for p in by_pair.values())
+    few = statistics.comparisons(rows(a=[1, 2, 3, 4, 5], b=[2, 3, 4, 5, 6]), "messages")
+    assert few[0].p is None
+    same = statistics.comparisons(rows(a=[5] * 9, b=[5] * 9), "messages")
+    assert (same[0].p, same[0].ratio) == (None, 1.0)
+
+
+def test_profiles_count_what_is_not_solved() -> None:
+    given = [*rows(a=[10, 40], b=[20, 10]), row("a", 2, 9, "limit"), row("b", 2, 30)]
+    assert statistics.cactus(given, "messages") == {"a": [10.0, 40.0], "b": [10.0, 20.0, 30.0]}
+    found = statistics.performance_profile(given, "messages")
+    assert [(factor, round(3 * share)) for factor, share in found["a"]] == [(1.0, 1), (4.0, 2)]
+    assert [(factor, round(3 * share)) for factor, share in found["b"]] == [(1.0, 1), (1.0, 2), (2.0, 3)]
+    free = statistics.performance_profile(rows(a=[0], b=[3]), "messages")
+    assert free == {"a": [(1.0, 1.0)], "b": [(math.inf, 1.0)]}
+
+
+def test_the_cost_over_time_is_that_of_the_last_point_before() -> None:
+    curves = [[(2, 0, 0.0, "9"), (6, 0, 0.0, "5")], [(4, 0, 0.0, "7"), (8, 0, 0.0, "1")]]
+    given = [row("a", case, 10, cost_over_time=points) for case, points in enumerate(curves)]
+    band = statistics.cost_bands(given, "messages")["a"]
+    at = {round(spent, 2): median for spent, median in zip(band.spent, band.median, strict=True)}
+    assert (band.spent[0], band.spent[-1]) == (4.0, 10.0)
+    assert (at[4.0], at[10.0]) == (8.0, 3.0)
+    assert next(cost for spent, cost in at.items() if spent > 6) == 6.0
+    assert statistics.cost_bands(rows(a=[1]), "messages") == {}
