@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from robochoc.communication.simulator.schedule import Concurrent, RandomChannels, Schedule
+from robochoc.communication.simulator.schedule import Concurrent, Cycles, RandomChannels, Schedule
 from robochoc.generators.queens3d import queens3d
 from robochoc.journal.journal import Header, JournalRecorder, lines_of, metrics_of, read_journal
 from robochoc.model.message import Envelope
@@ -99,7 +99,7 @@ def test_a_timeout_holds_where_a_packet_takes_long() -> None:
     longest=st.integers(0, 50),
 )
 def test_channels_are_fifo_and_lose_nothing(sends: list[tuple[str, str, int]], seed: int, longest: int) -> None:
-    for schedule in (RandomChannels(seed), Concurrent(seed, longest)):
+    for schedule in (RandomChannels(seed), Concurrent(seed, longest), Cycles(seed)):
         arrived = delivered(schedule, sends)
         for edge in {send[:2] for send in sends}:
             sent = [number for number, send in enumerate(sends) if send[:2] == edge]
