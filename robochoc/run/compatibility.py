@@ -79,7 +79,7 @@ OPTION_RULES = (
     OptionRule(
         lambda o: o.channel and _is_delayed(o),
         "--channel says how long messages take",
-        "drop --delay and --schedule random",
+        "drop --delay and --schedule",
     ),
     OptionRule(
         lambda o: _is_delayed(o) and o.runtime is not Runtime.SIMULATOR,

@@ -28,9 +28,13 @@ class Runtime(StrEnum):
 
 
 class ScheduleName(StrEnum):
-    """The order in which the simulator handles events: by time counted in checks, or from any channel next."""
+    """The order in which the simulator handles events: by time counted in checks, or from any channel next.
+
+    In `CONCURRENT` a robot reads its whole inbox before it settles, in `ONE_BY_ONE` it settles after each message.
+    """
 
     CONCURRENT = "concurrent"
+    ONE_BY_ONE = "one-by-one"
     RANDOM = "random"
 
 

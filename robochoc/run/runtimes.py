@@ -119,6 +119,8 @@ def _schedule_of(options: Options) -> Schedule:
     match options.schedule:
         case ScheduleName.CONCURRENT:
             return Concurrent(options.seed, options.delay)
+        case ScheduleName.ONE_BY_ONE:
+            return Concurrent(options.seed, options.delay, one_by_one=True)
         case ScheduleName.RANDOM:
             return RandomChannels(options.seed)
         case never:

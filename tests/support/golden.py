@@ -68,7 +68,7 @@ def files() -> dict[str, tuple[str, str, ScheduleName]]:
         for protocol in protocol_names()
         if protocol_named(protocol).__module__.startswith("robochoc.")
         for team in fixed_teams(protocol)
-        for schedule in ScheduleName
+        for schedule in (ScheduleName.CONCURRENT, ScheduleName.RANDOM)
     }
 
 

@@ -103,11 +103,12 @@ _SECTIONS: Sections = {
 )
 @click.option(
     "--schedule",
-    type=click.Choice(["concurrent", "random"]),
+    type=click.Choice(["concurrent", "one-by-one", "random"]),
     default="concurrent",
     show_default=True,
     metavar="NAME",
-    help="Simulator. concurrent: time counts constraint checks; random: channels take random turns.",
+    help="Simulator. concurrent: time counts constraint checks; one-by-one: the same, and robots answer each message"
+    " before they read the next; random: channels take random turns.",
 )
 @click.option(
     "--delay",

@@ -106,7 +106,7 @@ def test_where_no_protocol_does_the_judge_may() -> None:
 WLAN = CHANNELS["wlan"]
 REFUSED_OPTIONS: list[tuple[dict[str, Any], str]] = [
     ({"channel": WLAN, "runtime": Runtime.PROCESSES}, "add --runtime simulator"),
-    ({"channel": WLAN, "delay": 3}, "drop --delay and --schedule random"),
+    ({"channel": WLAN, "delay": 3}, "drop --delay and --schedule"),
     ({"delay": 3, "runtime": Runtime.PROCESSES}, "--delay and --schedule are the simulator's"),
     ({"delay": 3, "schedule": ScheduleName.RANDOM}, "--delay is for --schedule concurrent"),
     ({"protocol": "central", "verify": True}, "--verify asks the central solver"),
