@@ -119,6 +119,11 @@ def _file(label: str) -> str:
     return "".join(sign if sign.isalnum() else "-" for sign in label)
 
 
+def file_name(name: str, part: str) -> str:
+    """Return the name of a file about a part of the problems."""
+    return f"{name}-{_file(part)}" if part else name
+
+
 def _styles(ways: Sequence[str]) -> dict[str, Style]:
     return {
         way: Style(

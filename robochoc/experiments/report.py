@@ -4,18 +4,17 @@ from __future__ import annotations
 
 import html
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from pathlib import Path
 
-from robochoc.experiments import statistics, summary
+from robochoc.experiments import summary
+from robochoc.experiments.account import PAIRS_TOLD, Account, headed, invalid
 from robochoc.experiments.export import latex_table
-from robochoc.experiments.figures import Drawing, drawings
+from robochoc.experiments.figures import Drawing, drawings, file_name
 from robochoc.experiments.store import Results
-from robochoc.experiments.study import study_wishes
-from robochoc.experiments.summary import METRICS, Rows
-from robochoc.formats.diagnostics import Diagnostic, InvalidInputError, encodable
+from robochoc.experiments.summary import METRICS
 from robochoc.system.files import write_atomically
 
-SIGNIFICANT = 0.05
 _STYLE = """
 :root { color-scheme: light dark; }
 body { font: 16px/1.5 system-ui, sans-serif; max-width: 72rem; margin: 0 auto; padding: 1rem; }
@@ -30,10 +29,6 @@ th:first-child, td:first-child { text-align: left; }
 thead th { border-bottom: 1px solid; }
 pre { overflow-x: auto; padding: .8rem; border: 1px solid #8884; border-radius: 4px; font-size: .85rem; }
 """
-_PAIRS_TOLD = (
-    "On runs that both have solved: how often each needs less, the median of the ratio, and Wilcoxon's signed-rank"
-    " test, corrected for the number of pairs (Holm)."
-)
 _POLICY = "default-src 'none'; style-src 'unsafe-inline'; img-src data:"
 
 
@@ -60,34 +55,28 @@ def write_folder(results: Results, folder: Path, over: str | None = None, *, rep
         OSError: if they cannot be written.
     """
     report = _Report(results, over)
-    files = {"medians.tex": latex_table(report.rows, report.title, report.over).encode()}
+    files = {
+        file_name("medians", part) + ".tex": latex_table(rows, headed(report.title, part), report.over).encode()
+        for part, rows in report.parts
+    }
     for drawing in report.drawings:
         files |= {f"{drawing.name}.svg": drawing.svg(), f"{drawing.name}.pdf": drawing.pdf()}
     there = [name for name in files if (folder / name).exists()]
     if there and not replace:
-        raise _invalid(folder / there[0], "is there already", "--force replaces figures")
+        raise invalid(folder / there[0], "is there already", "--force replaces figures")
     folder.mkdir(parents=True, exist_ok=True)
     for name, content in files.items():
         write_atomically(folder / name, content)
 
 
-class _Report:
-    """What is told of the results of a study."""
+class _Report(Account):
+    """The account of a study's results, with figures."""
 
     def __init__(self, results: Results, over: str | None) -> None:
-        self.name, self.title, self.text, self.planned, rows = results
-        self.rows: Rows = rows
-        if not rows:
-            raise _invalid(self.name, "has no results yet", "robochoc experiment run goes on with the study")
-        wishes = study_wishes(self.text)
-        self.introduction = wishes.text
-        try:
-            self.over = summary.parameter_to_draw_over(self.rows, over or wishes.over)
-            self.rows = summary.by_parameter(rows, self.over)
-            self.metrics = summary.metrics_to_show(self.rows, wishes.metrics)
-        except summary.NoSuchColumnError as wrong:
-            raise _invalid(self.name, str(wrong), "--over names one, or the table [report] of the study") from None
-        self.drawings: list[Drawing] = list(drawings(self.rows, self.over, self.metrics))
+        super().__init__(results, over)
+        self.drawings: list[Drawing] = [
+            _of_part(drawing, part) for part, rows in self.parts for drawing in drawings(rows, self.over, self.metrics)
+        ]
 
     def page(self) -> str:
         """Return the whole page."""
@@ -101,40 +90,26 @@ class _Report:
         return f'<!doctype html>\n<html lang="en"><head>{head}</head>\n<body><h1>{title}</h1>\n{body}\n</body></html>\n'
 
     def _body(self) -> Iterator[str]:
-        yield from (f"<p>{html.escape(part)}</p>" for part in self.introduction.split("\n\n") if part)
-        yield "".join(f"<p>{html.escape(line)}</p>" for line in self._measured())
+        yield from (f"<p>{html.escape(part)}</p>" for part in self.paragraphs)
+        yield "".join(f"<p>{html.escape(line)}</p>" for line in self.measured())
         yield "<h2>How runs ended</h2>" + _table(*summary.endings(self.rows))
         yield '<h2>Figures</h2><div class="figures">'
         for drawing in self.drawings:
             caption = f"<b>{html.escape(drawing.title)}.</b> {html.escape(drawing.caption)}"
             yield f"<figure>{_inline(drawing)}<figcaption>{caption}</figcaption></figure>"
         yield "</div><h2>Medians</h2>"
-        for metric in self.metrics:
-            yield f"<h3>{html.escape(METRICS[metric])}</h3>" + _table(*summary.medians(self.rows, metric, self.over))
+        for part, rows in self.parts:
+            for metric in self.metrics:
+                head = html.escape(headed(METRICS[metric], part))
+                yield f"<h3>{head}</h3>" + _table(*summary.medians(rows, metric, self.over))
         yield from self._tests()
         yield "<h2>How to repeat it</h2>" + self._how_to_repeat()
 
-    def _measured(self) -> Iterator[str]:
-        count, rows = self.planned, self.rows
-        there = f"{len(rows):,} of {count:,} runs are there" if len(rows) < count else f"{count:,} runs"
-        problems, ways = len({row["digest"] for row in rows if row["digest"]}), len(summary.labels(rows))
-        yield f"{there}: {problems:,} problems, {ways} ways to run."
-        machines, versions = (sorted({row[name] for row in rows if row[name]}) for name in ("machine", "version"))
-        yield f"robochoc {', '.join(versions)} on {'; '.join(machines)}."
-        if all(row["runtime"] == "simulator" for row in rows):
-            yield "All runs were in the simulator: counts are exact, and the same wherever they are repeated."
-        checked = sum(row["verified"] for row in rows)
-        told = f"The answers of {checked:,} runs were checked against every constraint"
-        yield f"{told}, and no two answers to a problem contradict each other."
-
     def _tests(self) -> Iterator[str]:
-        for metric in [one for one in self.metrics if one in summary.CENSORED][:2]:
-            found = statistics.comparisons(self.rows, metric)
-            if found:
-                yield f"<h2>Pairs: {html.escape(METRICS[metric])}</h2>"
-                yield f"<p>{_PAIRS_TOLD}</p>"
-                heads = ["", "runs", "first needs less", "second needs less", "median ratio", "p"]
-                yield _table(heads, [_compared(one) for one in found])
+        for name, table in self.pairs():
+            yield f"<h2>Pairs: {html.escape(name)}</h2>"
+            yield f"<p>{PAIRS_TOLD}</p>"
+            yield _table(*table)
 
     def _how_to_repeat(self) -> str:
         name = html.escape(f"{self.name}.toml")
@@ -145,10 +120,8 @@ class _Report:
         )
 
 
-def _compared(one: statistics.Comparison) -> list[str]:
-    p = "-" if one.p is None else f"{one.p:.2g}{' *' if one.p < SIGNIFICANT else ''}"
-    ratio = "-" if one.ratio is None else f"{one.ratio:.2f}"
-    return [f"{one.one} / {one.other}", f"{one.pairs:,}", f"{one.one_better:,}", f"{one.other_better:,}", ratio, p]
+def _of_part(drawing: Drawing, part: str) -> Drawing:
+    return replace(drawing, name=file_name(drawing.name, part), title=f"{drawing.title}: {part}") if part else drawing
 
 
 def _table(heads: Sequence[str], lines: Sequence[Sequence[str]]) -> str:
@@ -165,7 +138,3 @@ def _inline(drawing: Drawing) -> str:
         svg = svg.replace(sign, f"{sign}{drawing.name}-")
     label = html.escape(drawing.title)
     return svg.replace("<svg", f'<svg role="img" aria-label="{label}"', 1)
-
-
-def _invalid(what: Path | str, message: str, hint: str) -> InvalidInputError:
-    return InvalidInputError([Diagnostic(encodable(str(what)), 0, message, hint)])

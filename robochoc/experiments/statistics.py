@@ -62,6 +62,7 @@ class Comparison:
         ratio: The median of what the first needs for one of what the second needs. None: there is none.
         p: The probability of such a difference if there were none, corrected for the number of tests. None: too few
             pairs.
+        at: The value of the parameter of runs at which they are compared. None: tables are over none.
     """
 
     one: str
@@ -71,26 +72,37 @@ class Comparison:
     other_better: int
     ratio: float | None
     p: float | None
+    at: Any = None
 
 
 def comparisons(rows: Rows, metric: str) -> list[Comparison]:
     """Compare all pairs of ways to run by Wilcoxon's signed-rank test, with Holm's correction.
 
     Wilcoxon, "Individual comparisons by ranking methods", 1945; Holm, "A simple sequentially rejective multiple test
-    procedure", 1979. Only runs with a verdict are compared: what a limit has ended is in no pair.
+    procedure", 1979. Only runs with a verdict are compared: what a limit has ended is in no pair. Over a parameter of
+    runs they are compared at each of its values, as runs of the same problem are not independent of each other.
     """
-    values = {way: _by_case(rows, way, metric) for way in labels(rows)}
-    found = [_comparison(one, other, values) for one, other in itertools.combinations(values, 2)]
+    found = []
+    for at in dict.fromkeys(row.get("case") for row in rows):
+        own = [row for row in rows if row.get("case") == at]
+        values = {way: _by_case(own, way, metric) for way in labels(own)}
+        pairs = itertools.combinations(values, 2)
+        found += [replace(_comparison(one, other, values), at=at) for one, other in pairs]
     return _corrected(found)
 
 
 def _by_case(rows: Rows, way: str, metric: str) -> dict[tuple[Any, ...], float]:
-    """Return a metric of a way to run, by problem, seed and repetition."""
+    """Return a metric of a way to run, by the case."""
     return {
-        (row["digest"], row["seed"], row["repetition"]): float(row[metric])
+        _case(row): float(row[metric])
         for row in rows
         if row["label"] == way and row["status"] == Status.DONE and row[metric] is not None
     }
+
+
+def _case(row: Mapping[str, Any]) -> tuple[Any, ...]:
+    """Return what two ways to run are compared on: problem, seed, repetition, and the value drawn over."""
+    return row["digest"], row["seed"], row["repetition"], row.get("case")
 
 
 def _comparison(one: str, other: str, values: Mapping[str, Mapping[tuple[Any, ...], float]]) -> Comparison:
@@ -120,13 +132,13 @@ def _wilcoxon(differences: Sequence[float]) -> float | None:
 
 def _corrected(found: Sequence[Comparison]) -> list[Comparison]:
     """Return `found` with probabilities corrected for their number (Holm)."""
-    tested = sorted((one for one in found if one.p is not None), key=lambda one: one.p or 0.0)
-    corrected: dict[tuple[str, str], float] = {}
+    tested = sorted((one.p, place) for place, one in enumerate(found) if one.p is not None)
+    corrected: dict[int, float] = {}
     highest = 0.0
-    for place, one in enumerate(tested):
-        highest = max(highest, min(1.0, (one.p or 0.0) * (len(tested) - place)))
-        corrected[one.one, one.other] = highest
-    return [replace(one, p=corrected.get((one.one, one.other))) for one in found]
+    for rank, (p, place) in enumerate(tested):
+        highest = max(highest, min(1.0, p * (len(tested) - rank)))
+        corrected[place] = highest
+    return [replace(one, p=corrected.get(place)) for place, one in enumerate(found)]
 
 
 def cactus(rows: Rows, metric: str) -> dict[str, list[float]]:
@@ -140,7 +152,7 @@ def performance_profile(rows: Rows, metric: str) -> dict[str, list[tuple[float, 
     Dolan and More, "Benchmarking optimization software with performance profiles", Mathematical Programming 91, 2002.
     """
     values = {way: _by_case(rows, way, metric) for way in labels(rows)}
-    cases = list(dict.fromkeys((row["digest"], row["seed"], row["repetition"]) for row in rows))
+    cases = list(dict.fromkeys(map(_case, rows)))
     best = {case: min((one[case] for one in values.values() if case in one), default=math.inf) for case in cases}
     profile = {}
     for way, found in values.items():

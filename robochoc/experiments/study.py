@@ -41,11 +41,14 @@ class ReportWishes(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fie
 
     Attributes:
         over: The parameter over which figures are drawn. None: the first that has several values.
+        each: The parameter of problems that has tables and figures of its own for each of its values. None: all
+            problems are in the same.
         metrics: The metrics that are drawn. Empty: those that there are.
         text: What is to be read above the figures.
     """
 
     over: str | None = None
+    each: str | None = None
     metrics: tuple[str, ...] = ()
     text: str = ""
 

@@ -11,6 +11,7 @@ from types import MappingProxyType
 from typing import Any
 
 from robochoc.experiments.task import Status
+from robochoc.model.outcome import Verdict
 
 Rows = Sequence[Mapping[str, Any]]
 
@@ -107,15 +108,38 @@ def parameter_to_draw_over(rows: Rows, wanted: str | None = None) -> str:
 def by_parameter(rows: Rows, over: str) -> Rows:
     """Return `rows` for tables and figures over a parameter: a parameter of runs becomes a column of its own.
 
-    What the labels say of it is taken out of them: `abt delay=20` and `abt delay=50` are both `abt`, over `delay`.
+    What the labels say of it is taken out of them: `abt delay=20` and `abt delay=50` are both `abt`, over `delay`. The
+    column `case` keeps runs of the same label and problem apart.
     """
     if over in OF_RUNS:
-        return [{**row, "label": _without(row["label"], over, row[over])} for row in rows]
+        return [{**row, "case": row[over], "label": _without(row["label"], over, row[over])} for row in rows]
     if over in _settings(rows):
         values = [row["settings"].get(over) for row in rows]
         given = zip(rows, values, strict=True)
-        return [{**row, over: _number(value), "label": _without(row["label"], over, value)} for row, value in given]
+        return [
+            {**row, over: _number(value), "case": value, "label": _without(row["label"], over, value)}
+            for row, value in given
+        ]
     return rows
+
+
+def parts(rows: Rows, each: str | None) -> list[tuple[str, Rows]]:
+    """Return the parts of the results that have tables and figures of their own, each with its name.
+
+    Args:
+        rows: The results.
+        each: The parameter whose values make the parts. None: all results are one part, without a name.
+
+    Raises:
+        NoSuchColumnError: if there is no such parameter.
+    """
+    if each is None:
+        return [("", rows)]
+    known = [*parameters(rows), "problems", "team"]
+    if each not in known:
+        raise NoSuchColumnError(f"there is no parameter {each!r} of problems; there are {', '.join(known)}")
+    name = "" if each in {"problems", "team"} else f"{each} "
+    return [(f"{name}{value}", [row for row in rows if row.get(each) == value]) for value in values_of(rows, each)]
 
 
 def _settings(rows: Rows) -> list[str]:
@@ -203,6 +227,18 @@ def endings(rows: Rows) -> Table:
         by_way[str(row["label"])][_ending(row)] += 1
     heads = [kind for kind, _ in kinds.most_common()]
     return ["", *heads], [[way, *(f"{count[kind]:,}" for kind in heads)] for way, count in by_way.items()]
+
+
+def solved(rows: Rows, over: str) -> Table:
+    """Return how many problems have a solution and how many have none, as far as a run says so, over a parameter."""
+    found: dict[Any, dict[str, set[str]]] = {}
+    for row in rows:
+        kinds = found.setdefault(row.get(over), {kind: set() for kind in ("problems", "with", "without")})
+        kinds["problems"].add(row["digest"])
+        if row["status"] == Status.DONE:
+            kinds["without" if row["verdict"] == Verdict.NO_SOLUTION else "with"].add(row["digest"])
+    heads = [over, "problems", "with a solution", "without"]
+    return heads, [[str(value), *(f"{len(one):,}" for one in found[value].values())] for value in values_of(rows, over)]
 
 
 def _ending(row: Mapping[str, Any]) -> str:

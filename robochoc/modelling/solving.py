@@ -87,7 +87,7 @@ class Solvable(ABC):
             central_with: Who decides with the protocol `central`: `ace` or `ortools`.
             cache: Whether solutions of local problems are kept in the user's cache folder.
             local: Limits on the compilation of each robot's domain.
-            schedule: How the simulator orders events: `concurrent`, `cycles` or `random`.
+            schedule: How the simulator orders events: `concurrent`, `one-by-one`, `cycles` or `random`.
             delay: The longest delay of a message in the simulator, in constraint checks.
             channel: A channel model: the simulator counts seconds of computing and radio.
             on_loss: What the loss of a robot means: `fail` or `withdraw`. None: the run fails, unless there are

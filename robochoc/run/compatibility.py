@@ -87,7 +87,7 @@ OPTION_RULES = (
         "add --runtime simulator",
     ),
     OptionRule(
-        lambda o: o.delay and o.schedule is not ScheduleName.CONCURRENT,
+        lambda o: o.delay and o.schedule in {ScheduleName.CYCLES, ScheduleName.RANDOM},
         "--delay is for --schedule concurrent: in a random one any message may take any time, in cycles each takes one",
     ),
     OptionRule(

@@ -28,10 +28,14 @@ class Runtime(StrEnum):
 
 
 class ScheduleName(StrEnum):
-    """The order in which the simulator handles events: by time counted in checks, in cycles, any channel next."""
+    """The order in which the simulator handles events: by time counted in checks, in cycles, or from any channel next.
+
+    In `CONCURRENT` a robot reads its whole inbox before it settles, in `ONE_BY_ONE` it settles after each message.
+    """
 
     CONCURRENT = "concurrent"
     CYCLES = "cycles"
+    ONE_BY_ONE = "one-by-one"
     RANDOM = "random"
 
 

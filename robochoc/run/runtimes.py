@@ -130,6 +130,8 @@ def _schedule_of(options: Options) -> Schedule:
             return Concurrent(options.seed, options.delay)
         case ScheduleName.CYCLES:
             return Cycles(options.seed)
+        case ScheduleName.ONE_BY_ONE:
+            return Concurrent(options.seed, options.delay, one_by_one=True)
         case ScheduleName.RANDOM:
             return RandomChannels(options.seed)
         case never:

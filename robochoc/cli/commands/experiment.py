@@ -143,24 +143,36 @@ def _write_journals(results: Path, folder: Path | None) -> None:
     click.echo(f"{folder}: {written:,} journals", err=True)
 
 
-@experiment.command(short_help="Draw the results: a page, or figures for a paper.")
+@experiment.command(short_help="Report on the results: a page, or figures for a paper.")
 @click.argument("results", type=InputPath(), metavar="RESULTS.sqlite")
-@click.option("-o", "--output", type=InputPath(), required=True, metavar="PAGE.html|FOLDER", help="What to write.")
+@click.option(
+    "-o", "--output", type=InputPath(), required=True, metavar="PAGE.html|PAGE.md|FOLDER", help="What to write."
+)
 @click.option("--over", metavar="PARAMETER", help="Draw over this one.  [default: the first with several values]")
 @click.option("--force", is_flag=True, help="Replace figures that exist in the folder.")
 @invalid_input_fails
 def report(results: Path, output: Path, over: str | None, *, force: bool) -> None:
-    """Draw what came of a study: one page that needs nothing else, or a folder with the figures in SVG and PDF.
+    """Report on a study: one page that needs nothing else, or a folder with the figures in SVG and PDF.
 
-    Medians with intervals over a parameter, profiles, cost over time, pairs of protocols, tests.
+    Medians with intervals over a parameter, profiles, cost over time, pairs of protocols, tests. Markdown has the
+    tables without the figures.
 
     \b
     robochoc experiment report study.sqlite -o report.html
+    robochoc experiment report study.sqlite -o report.md
     robochoc experiment report study.sqlite -o figures/
     """  # noqa: D301 - \\b is how click is told to leave the lines as they are
+    from robochoc.experiments.store import read_results
+
+    if output.suffix.lower() == ".md":
+        need("tests of pairs", "scipy")
+        from robochoc.experiments.markdown import write_markdown
+
+        write_markdown(read_results(results), output, over)
+        click.echo(f"{output}: written", err=True)
+        return
     need_figures()
     from robochoc.experiments.report import write_folder, write_page
-    from robochoc.experiments.store import read_results
 
     if output.suffix.lower() in {".html", ".htm"}:
         write_page(read_results(results), output, over)
@@ -171,11 +183,16 @@ def report(results: Path, output: Path, over: str | None, *, force: bool) -> Non
 
 def need_figures() -> None:
     """Fail unless what draws figures is installed."""
+    need("figures", "matplotlib", "scipy")
+
+
+def need(what: str, *modules: str) -> None:
+    """Fail unless the modules are installed, which `what` needs: those of the extra `experiments`."""
     from importlib.util import find_spec
 
-    for name in ("matplotlib", "scipy"):
+    for name in modules:
         if find_spec(name) is None:
-            raise Failure(USAGE, f"figures need {name}, which is not installed: pip install 'robochoc[experiments]'")
+            raise Failure(USAGE, f"{what} need {name}, which is not installed: pip install 'robochoc[experiments]'")
 
 
 def _workers(scheduler: str | None, dask: Path | None) -> Callable[[int | None], Workers] | None:

@@ -103,10 +103,10 @@ _SECTIONS: Sections = {
 )
 @click.option(
     "--schedule",
-    type=click.Choice(["concurrent", "cycles", "random"]),
+    type=click.Choice(["concurrent", "cycles", "one-by-one", "random"]),
     default="concurrent",
     metavar="NAME",
-    help="Simulator. concurrent (default): time counts checks; cycles: all go in step; random: channels by chance.",
+    help="Simulator: concurrent (default), one-by-one (messages), cycles (all in step), or random (channels).",
 )
 @click.option(
     "--delay",

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
@@ -97,23 +98,24 @@ def print_summary(results: Results, over: str | None, metrics: Sequence[str]) ->
     there = f"{len(rows):,} of {count:,} runs" if len(rows) < count else f"{len(rows):,} runs"
     click.echo(f"{on_one_line(title)}: {there}")
     if rows:
-        print_medians(rows, over or wishes.over, metrics or wishes.metrics)
+        print_medians(rows, over or wishes.over, metrics or wishes.metrics, wishes.each)
         print_endings(rows)
 
 
-def print_medians(rows: Rows, over: str | None, metrics: Sequence[str]) -> None:
-    """Print a table of medians for each metric."""
+def print_medians(rows: Rows, over: str | None, metrics: Sequence[str], each: str | None = None) -> None:
+    """Print a table of medians for each metric; for each value of the parameter `each`, if there is one."""
     from robochoc.experiments import summary
 
     try:
         over = summary.parameter_to_draw_over(rows, over)
         shown = summary.metrics_to_show(rows, metrics)
+        parts = summary.parts(summary.by_parameter(rows, over), each)
     except summary.NoSuchColumnError as wrong:
         raise click.UsageError(str(wrong)) from None
-    rows = summary.by_parameter(rows, over)
-    for metric in shown:
-        click.echo(f"\n{summary.METRICS[metric]}, median")
-        heads, lines = summary.medians(rows, metric, over)
+    for (part, own), metric in itertools.product(parts, shown):
+        where = f", {on_one_line(part)}" if part else ""
+        click.echo(f"\n{summary.METRICS[metric]}, median{where}")
+        heads, lines = summary.medians(own, metric, over)
         print_table(heads, lines, right=heads[1:])
 
 

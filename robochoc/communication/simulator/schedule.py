@@ -66,11 +66,14 @@ class Concurrent(Schedule):
     checks take, then takes in all that has arrived meanwhile. A message leaves at the check at which it is said,
     which its clock tells, so it may be there before its sender is free again. It takes a number of checks drawn from
     0..`longest`, which the receiver's NCCC clock takes up as well. Ties are broken by the seed.
+
+    With `one_by_one` a robot takes in one message at a time, and settles after each.
     """
 
-    def __init__(self, seed: int, longest: int = 0) -> None:
+    def __init__(self, seed: int, longest: int = 0, *, one_by_one: bool = False) -> None:
         self._chance = random.Random(seed)  # noqa: S311 - a schedule is no secret
         self._longest = longest
+        self._one_by_one = one_by_one
         self._count = count()
         self._busy_until: dict[str, int] = {}
         self._inboxes: dict[str, list[tuple[int, int, Envelope]]] = {}
@@ -92,7 +95,7 @@ class Concurrent(Schedule):
             self._note(envelope.receiver)
 
     def get(self) -> Sequence[Envelope]:
-        """Return all messages in the inbox of the robot that reads its inbox next."""
+        """Return all messages in the inbox of the robot that reads its inbox next, or the first of them."""
         while self._agenda:
             due, _, robot = heapq.heappop(self._agenda)
             inbox = self._inboxes[robot]
@@ -105,6 +108,8 @@ class Concurrent(Schedule):
             packet = []
             while inbox and inbox[0][0] <= due:
                 packet.append(heapq.heappop(inbox)[2])
+                if self._one_by_one:
+                    break
             return packet
         return ()
 

@@ -10,6 +10,7 @@ from hypothesis import strategies as st
 
 from robochoc.communication.simulator.schedule import Concurrent, Cycles, RandomChannels, Schedule
 from robochoc.generators.queens3d import queens3d
+from robochoc.generators.random_csp import random_csp
 from robochoc.journal.journal import Header, JournalRecorder, lines_of, metrics_of, read_journal
 from robochoc.model.message import Envelope
 from robochoc.model.outcome import Verdict
@@ -99,11 +100,31 @@ def test_a_timeout_holds_where_a_packet_takes_long() -> None:
     longest=st.integers(0, 50),
 )
 def test_channels_are_fifo_and_lose_nothing(sends: list[tuple[str, str, int]], seed: int, longest: int) -> None:
-    for schedule in (RandomChannels(seed), Concurrent(seed, longest), Cycles(seed)):
+    asynchronous = RandomChannels(seed), Concurrent(seed, longest), Concurrent(seed, longest, one_by_one=True)
+    for schedule in (*asynchronous, Cycles(seed)):
         arrived = delivered(schedule, sends)
         for edge in {send[:2] for send in sends}:
             sent = [number for number, send in enumerate(sends) if send[:2] == edge]
             assert [int(e.content) for e in arrived if (e.sender, e.receiver) == edge] == sent
+
+
+def test_one_by_one_a_packet_is_the_first_message_of_the_inbox() -> None:
+    """The next one is read when the first has been answered, even if both were there."""
+    for one_by_one, packets in ((False, [["1", "2", "3"]]), (True, [["1"], ["2"], ["3"]])):
+        schedule = Concurrent(0, one_by_one=one_by_one)
+        for number, sender in enumerate("ABA", 1):
+            schedule.put(Envelope(sender, "D", str(number).encode(), 0))
+        read = []
+        while packet := taken(schedule):
+            read.append([envelope.content.decode() for envelope in packet])
+        assert read == packets
+
+
+def test_one_by_one_abt_needs_more() -> None:
+    team = random_csp(12, 5, 0.5, 0.4, 1, connected=True)
+    found = [solve(team, Options(runtime=Runtime.SIMULATOR, schedule=name)) for name in list(ScheduleName)[:2]]
+    assert found[0].verdict is found[1].verdict
+    assert found[1].metrics.ncccs > found[0].metrics.ncccs
 
 
 def delivered(schedule: Schedule, sends: list[tuple[str, str, int]]) -> list[Envelope]:

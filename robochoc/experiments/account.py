@@ -1,0 +1,108 @@
+"""What a report tells of a study's results, whatever form it has: HTML in `report.py`, Markdown in `markdown.py`."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+
+from robochoc.experiments import statistics, summary
+from robochoc.experiments.store import Results
+from robochoc.experiments.study import study_wishes
+from robochoc.experiments.summary import CENSORED, Rows, Table
+from robochoc.formats.diagnostics import Diagnostic, InvalidInputError, encodable
+
+SIGNIFICANT = 0.05
+MOST_TESTED = 2
+"""Pairs are compared by no more metrics."""
+PAIRS_TOLD = (
+    "On runs that both have solved: how often each needs less, the median of the ratio, and Wilcoxon's signed-rank"
+    " test, corrected for the number of pairs (Holm)."
+)
+_OF_MACHINES = {"wall_s", "total_s", "cpu_s", "memory"}
+"""Metrics that differ from machine to machine."""
+
+
+class Account:
+    """The results of a study, and what is to be told of them.
+
+    Args:
+        results: The results.
+        over: The parameter over which tables and figures are. None: as the study says, or the first that has several
+            values.
+
+    Raises:
+        InvalidInputError: if there are no results, or no such parameter.
+    """
+
+    def __init__(self, results: Results, over: str | None) -> None:
+        self.name, self.title, self.text, self.planned, rows = results
+        if not rows:
+            raise invalid(self.name, "has no results yet", "robochoc experiment run goes on with the study")
+        wishes = study_wishes(self.text)
+        self.introduction = wishes.text
+        try:
+            self.over = summary.parameter_to_draw_over(rows, over or wishes.over)
+            self.rows: Rows = summary.by_parameter(rows, self.over)
+            self.metrics = summary.metrics_to_show(self.rows, wishes.metrics)
+            self.parts = summary.parts(self.rows, wishes.each)
+        except summary.NoSuchColumnError as wrong:
+            raise invalid(self.name, str(wrong), "--over names one, or the table [report] of the study") from None
+
+    @property
+    def paragraphs(self) -> list[str]:
+        """Return the study's own text."""
+        return [part for part in self.introduction.strip().split("\n\n") if part]
+
+    def measured(self) -> Iterator[str]:
+        """Yield what was measured, and where, a sentence or two at a time."""
+        count, rows = self.planned, self.rows
+        there = f"{len(rows):,} of {count:,} runs are there" if len(rows) < count else f"{count:,} runs"
+        problems, ways = len({row["digest"] for row in rows if row["digest"]}), len(summary.labels(rows))
+        yield f"{there}: {problems:,} problems, {ways} ways to run."
+        simulated = all(row["runtime"] == "simulator" for row in rows)
+        exact = simulated and _OF_MACHINES.isdisjoint(self.metrics)
+        machines, versions = (sorted({row[name] for row in rows if row[name]}) for name in ("machine", "version"))
+        where = "" if exact else f" on {'; '.join(machines)}"
+        yield f"robochoc {', '.join(versions)}{where}."
+        if simulated:
+            yield "All runs were in the simulator: counts are exact, and the same wherever they are repeated."
+        checked = sum(row["verified"] for row in rows)
+        told = f"The answers of {checked:,} runs were checked against every constraint"
+        yield f"{told}, and no two answers to a problem contradict each other."
+
+    def pairs(self, *, first_only: bool = False) -> Iterator[tuple[str, Table]]:
+        """Yield for each metric that is compared its name, and a table of pairs.
+
+        Args:
+            first_only: Whether only pairs with the first way to run are told of. The tests are of all pairs.
+        """
+        for metric in [one for one in self.metrics if one in (*CENSORED, "cost")][:MOST_TESTED]:
+            for part, rows in self.parts:
+                first = summary.labels(rows)[0]
+                found = statistics.comparisons(rows, metric)
+                shown = [one for one in found if not first_only or one.one == first]
+                if any(one.one_better or one.other_better for one in shown):
+                    yield headed(summary.METRICS[metric], part), self._table_of(shown)
+
+    def _table_of(self, pairs: Sequence[statistics.Comparison]) -> Table:
+        heads = ["", "runs", "first needs less", "second needs less", "median ratio", "p"]
+        lines = [_compared(one) for one in pairs]
+        if all(one.at is None for one in pairs):
+            return heads, lines
+        return [self.over, *heads], [[str(one.at), *line] for one, line in zip(pairs, lines, strict=True)]
+
+
+def headed(what: str, part: str) -> str:
+    """Return a heading, with the part of the problems that it is about."""
+    return f"{what}: {part}" if part else what
+
+
+def invalid(what: Path | str, message: str, hint: str) -> InvalidInputError:
+    """Return the error that says what is wrong with a report."""
+    return InvalidInputError([Diagnostic(encodable(str(what)), 0, message, hint)])
+
+
+def _compared(one: statistics.Comparison) -> list[str]:
+    p = "-" if one.p is None else f"{one.p:.2g}{' *' if one.p < SIGNIFICANT else ''}"
+    ratio = "-" if one.ratio is None else f"{one.ratio:.2f}"
+    return [f"{one.one} / {one.other}", f"{one.pairs:,}", f"{one.one_better:,}", f"{one.other_better:,}", ratio, p]

@@ -1,0 +1,124 @@
+"""Reports in Markdown: tables for a page of a repository or a site, without figures."""
+
+from __future__ import annotations
+
+import itertools
+import re
+import tomllib
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+
+from robochoc.experiments import summary
+from robochoc.experiments.account import PAIRS_TOLD, Account, headed
+from robochoc.experiments.store import Results
+from robochoc.experiments.summary import METRICS, Table
+from robochoc.system.files import write_atomically
+from robochoc.system.plain_text import on_one_line
+
+MOST_COLUMNS = 7
+"""Where there are more ways to run than this, and than values of the parameter, each has a line and not a column."""
+MOST_PAIRS = 10
+"""Where there are more pairs, only those with the first way to run are told of."""
+_INTRODUCTION = re.compile(r'^text = (?:"""[^"]*"""|"[^"\n]*")\n', re.MULTILINE)
+
+
+def write_markdown(results: Results, page: Path, over: str | None = None) -> None:
+    """Write the report on the results of a study as one Markdown file.
+
+    Args:
+        results: The results.
+        page: The file to write.
+        over: The parameter over which tables are. None: as the study says, or the first that has several values.
+
+    Raises:
+        InvalidInputError: if there are no results, or no such parameter.
+        OSError: if the page cannot be written.
+    """
+    write_atomically(page, markdown_page(results, page.name, over).encode())
+
+
+def markdown_page(results: Results, name: str, over: str | None = None) -> str:
+    """Return the report on the results of a study in Markdown. `name` is that of its file.
+
+    Raises:
+        InvalidInputError: as `write_markdown`.
+    """
+    return "\n\n".join(block.strip() for block in _blocks(Account(results, over), name)) + "\n"
+
+
+def markdown_table(heads: Sequence[str], lines: Sequence[Sequence[str]]) -> str:
+    """Return a table in Markdown."""
+    rule = ["---"] * len(heads)
+    return "".join(f"| {' | '.join(map(_cell, line))} |\n" for line in [heads, rule, *lines])
+
+
+def _cell(text: str) -> str:
+    return on_one_line(text).replace("|", "\\|")
+
+
+def _blocks(told: Account, name: str) -> Iterator[str]:
+    yield f"# {on_one_line(told.title)}"
+    yield from told.paragraphs
+    yield " ".join(told.measured())
+    yield "## Medians"
+    yield "A `>=` marks a median that limits leave open: they have ended half of its runs or more."
+    for part, rows in told.parts:
+        for metric in told.metrics:
+            yield f"### {headed(METRICS[metric], part)}"
+            yield markdown_table(*_lying(summary.medians(rows, metric, told.over)))
+    yield "## How runs ended"
+    yield markdown_table(*summary.endings(told.rows))
+    yield from _solved(told)
+    yield from _pairs(told)
+    yield from _how_to_repeat(told, name)
+
+
+def _lying(table: Table) -> Table:
+    """Return a table with lines and columns exchanged, if it is too wide."""
+    heads, lines = table
+    if len(heads) - 1 <= max(MOST_COLUMNS, len(lines)):
+        return table
+    first, *others = (list(column) for column in zip(heads, *lines, strict=True))
+    return first, others
+
+
+def _solved(told: Account) -> Iterator[str]:
+    """Yield how many problems have a solution; nothing where all that were decided have one."""
+    tables = [(part, summary.solved(rows, told.over)) for part, rows in told.parts]
+    if any(line[3] != "0" for _, (_, lines) in tables for line in lines):
+        yield "## Problems with a solution"
+        for part, table in tables:
+            yield from [f"### {part}"] * bool(part)
+            yield markdown_table(*table)
+
+
+def _pairs(told: Account) -> Iterator[str]:
+    cases = {row.get("case") for row in told.rows}
+    first_only = len(list(itertools.combinations(summary.labels(told.rows), 2))) * len(cases) > MOST_PAIRS
+    tables = list(told.pairs(first_only=first_only))
+    if tables:
+        yield "## Pairs"
+        left = " Only those with the first way to run are shown, and all were tested." if first_only else ""
+        yield f"{PAIRS_TOLD} `*`: p is below 5 %.{left}"
+    for name, table in tables:
+        yield f"### Pairs: {name}"
+        yield markdown_table(*table)
+
+
+def _how_to_repeat(told: Account, name: str) -> Iterator[str]:
+    yield "## How to repeat it"
+    yield f"Save this as `{told.name}.toml`:"
+    yield f"```toml\n{_without_introduction(told.text).strip()}\n```"
+    run = f"robochoc experiment run {told.name}.toml"
+    yield f"```sh\n{run}\nrobochoc experiment report {told.name}.sqlite -o {name}\n```"
+
+
+def _without_introduction(text: str) -> str:
+    """Return a study's file without the text that stands on the page already; the whole file where in doubt."""
+    rest = _INTRODUCTION.sub("", text)
+    whole = tomllib.loads(text)
+    whole.get("report", {}).pop("text", None)
+    try:
+        return rest if tomllib.loads(rest) == whole else text
+    except tomllib.TOMLDecodeError:
+        return text
