@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
-from robochoc.experiments import statistics, summary
+from robochoc.experiments import ranking, statistics, summary
 from robochoc.experiments.store import Results
 from robochoc.experiments.study import study_wishes
 from robochoc.experiments.summary import CENSORED, Rows, Table
@@ -15,8 +15,8 @@ SIGNIFICANT = 0.05
 MOST_TESTED = 2
 """Pairs are compared by no more metrics."""
 PAIRS_TOLD = (
-    "On runs that both have solved: how often each needs less, the median of the ratio, and Wilcoxon's signed-rank"
-    " test, corrected for the number of pairs (Holm)."
+    "On problems that both have solved: how often each needs less (in the median of its runs), the median of the"
+    " ratio, and Wilcoxon's signed-rank test, corrected for the number of pairs (Holm)."
 )
 _OF_MACHINES = {"wall_s", "total_s", "cpu_s", "memory"}
 """Metrics that differ from machine to machine."""
@@ -70,6 +70,10 @@ class Account:
         told = f"The answers of {checked:,} runs were checked against every constraint"
         yield f"{told}, and no two answers to a problem contradict each other."
 
+    def answers(self) -> list[str]:
+        """Return who needs least, and who does the same as who, a sentence each."""
+        return ranking.answers(self.rows, self.metrics)
+
     def pairs(self, *, first_only: bool = False) -> Iterator[tuple[str, Table]]:
         """Yield for each metric that is compared its name, and a table of pairs.
 
@@ -85,7 +89,7 @@ class Account:
                     yield headed(summary.METRICS[metric], part), self._table_of(shown)
 
     def _table_of(self, pairs: Sequence[statistics.Comparison]) -> Table:
-        heads = ["", "runs", "first needs less", "second needs less", "median ratio", "p"]
+        heads = ["", "problems", "first needs less", "second needs less", "median ratio", "p"]
         lines = [_compared(one) for one in pairs]
         if all(one.at is None for one in pairs):
             return heads, lines

@@ -8,7 +8,7 @@ unpickles what it receives, so a scheduler is to be reachable for those only who
 from __future__ import annotations
 
 import itertools
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from pathlib import Path
 from types import TracebackType
 from typing import Self
@@ -35,11 +35,18 @@ class ClusterWorkers:
         address: The scheduler's, such as `tcp://10.0.0.1:8786`. None: `file` has it.
         file: The scheduler's JSON file, as `dask scheduler --scheduler-file` and dask-jobqueue write it.
         memory_mb: A limit on memory, which Dask's workers have of their own: it is not used here.
+        notice: Is told, once, that there are no workers yet.
     """
 
-    def __init__(self, address: str | None, file: Path | None, memory_mb: int | None = None) -> None:
+    def __init__(
+        self,
+        address: str | None,
+        file: Path | None,
+        memory_mb: int | None = None,
+        notice: Callable[[str], object] | None = None,
+    ) -> None:
         del memory_mb
-        self._address, self._file = address, file
+        self._address, self._file, self._notice = address, file, notice
         self._client: Client | None = None
 
     def __enter__(self) -> Self:
@@ -50,6 +57,8 @@ class ClusterWorkers:
         except (OSError, ValueError) as error:
             told = f"the scheduler at {self._file or self._address} cannot be reached: {error}"
             raise SchedulerLostError(told) from None
+        if self._notice and not self._client.scheduler_info()["workers"]:
+            self._notice(f"the cluster at {self._file or self._address} has no workers yet; runs wait for them")
         return self
 
     def __exit__(

@@ -169,7 +169,7 @@ def _over_parameter(rows: Rows, metric: str, over: str, styles: dict[str, Style]
     drawn: list[float] = []
     for way, style in styles.items():
         here = [(places[value], one) for value in values if (one := found.get((value, way))) and one.values]
-        bands = [(place, statistics.median_interval(one.values), one.open_ended) for place, one in here]
+        bands = [(place, statistics.median_interval(one.values, one.problems), one.open_ended) for place, one in here]
         where, medians = [place for place, *_ in bands], [band.median for _, band, _ in bands]
         drawn += medians
         axes.plot(where, medians, color=style.colour, linestyle=style.dashes, label=way)

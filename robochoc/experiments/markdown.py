@@ -60,6 +60,7 @@ def _blocks(told: Account, name: str) -> Iterator[str]:
     yield f"# {on_one_line(told.title)}"
     yield from told.paragraphs
     yield " ".join(told.measured())
+    yield "\n".join(f"- {on_one_line(line)}" for line in told.answers())
     yield "## Medians"
     yield "A `>=` marks a median that limits leave open: they have ended half of its runs or more."
     for part, rows in told.parts:

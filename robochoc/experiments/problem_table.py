@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import hashlib
+import re
 from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
 import msgspec
 
-from robochoc.experiments.table import Place
+from robochoc.experiments.table import HINT, Place
 from robochoc.experiments.task import ProblemSpec
 from robochoc.formats.diagnostics import shortened
 from robochoc.formats.team import find_teams
@@ -25,6 +26,7 @@ _SCENARIO: Mapping[str, tuple[type, ...]] = {
 }
 _OF_FILES: Mapping[str, tuple[type, ...]] = {"infinity": (int,), "owner": (str,)}
 _DIGEST_BYTES = 16
+_RANGE = re.compile(r"\d+-\d+")
 
 
 MOST_PROBLEMS = 100_000
@@ -97,7 +99,8 @@ def _check_types(parameters: Mapping[str, Any], known: Mapping[str, tuple[type, 
     for key, value in parameters.items():
         if type(value) not in known[key]:
             expected = {int: "an integer", float: "a number", str: "a word", bool: "true or false"}[known[key][0]]
-            raise place.mistake(key, f"expected {expected}, got {shortened(repr(value))}")
+            hint = "a range is written 1..30" if isinstance(value, str) and _RANGE.fullmatch(value) else HINT
+            raise place.mistake(key, f"expected {expected}, got {shortened(repr(value))}", hint)
 
 
 def _of_files(paths: object, given: Mapping[str, Any], name: str, place: Place) -> Iterator[ProblemSpec]:

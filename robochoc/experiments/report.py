@@ -92,6 +92,8 @@ class _Report(Account):
     def _body(self) -> Iterator[str]:
         yield from (f"<p>{html.escape(part)}</p>" for part in self.paragraphs)
         yield "".join(f"<p>{html.escape(line)}</p>" for line in self.measured())
+        told = "".join(f"<li>{html.escape(line)}</li>" for line in self.answers())
+        yield f"<ul>{told}</ul>" if told else ""
         yield "<h2>How runs ended</h2>" + _table(*summary.endings(self.rows))
         yield '<h2>Figures</h2><div class="figures">'
         for drawing in self.drawings:

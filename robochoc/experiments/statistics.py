@@ -31,22 +31,39 @@ class Interval:
     high: float
 
 
-def median_interval(values: Sequence[float]) -> Interval:
+def median_interval(values: Sequence[float], problems: Sequence[str] = ()) -> Interval:
     """Return the median of `values` and its interval by the percentile bootstrap.
 
-    Efron and Tibshirani, "An Introduction to the Bootstrap", 1993, Section 13.3.
+    Efron and Tibshirani, "An Introduction to the Bootstrap", 1993, Section 13.3. Problems are drawn, each with all of
+    its runs: repetitions of one problem say little of others.
+
+    Args:
+        values: The values of runs.
+        problems: The problem of each. Without: all are of different problems.
 
     Raises:
         ValueError: if there are no values.
     """
     if not values:
         raise ValueError("there are no values")
-    given = np.asarray(values, dtype=float)
-    drawn = np.random.default_rng(_SEED).integers(0, len(given), (RESAMPLES, len(given)))
-    medians = np.median(given[drawn], axis=1)
+    order = np.argsort(values, kind="stable")
+    given = np.asarray(values, dtype=float)[order]
+    of_problem = np.unique(problems or np.arange(len(given)), return_inverse=True)[1][order]
+    count = int(of_problem.max()) + 1
+    drawn = np.random.default_rng(_SEED).multinomial(count, np.full(count, 1 / count), RESAMPLES)
+    medians = weighted_medians(given, drawn[:, of_problem])
     rest = (1 - CONFIDENCE) / 2
     low, high = np.quantile(medians, [rest, 1 - rest])
     return Interval(float(np.median(given)), float(low), float(high))
+
+
+def weighted_medians(values: Any, counts: Any) -> Any:  # noqa: ANN401 - arrays of numbers
+    """Return for each row of `counts` the median of `values`, in ascending order, each there so many times."""
+    until = np.cumsum(counts, axis=1)
+    total = until[:, -1:]
+    low = values[np.argmax(until >= (total + 1) // 2, axis=1)]
+    high = values[np.argmax(until >= total // 2 + 1, axis=1)]
+    return (low + high) / 2
 
 
 @dataclass(frozen=True)
@@ -56,8 +73,8 @@ class Comparison:
     Attributes:
         one: The label of the first.
         other: The label of the second.
-        pairs: The number of problems, or problems and seeds, that both have solved.
-        one_better: In how many of them the first needs less.
+        pairs: The number of problems that both have solved.
+        one_better: In how many of them the first needs less: the median of its runs of the problem.
         other_better: In how many of them the second needs less.
         ratio: The median of what the first needs for one of what the second needs. None: there is none.
         p: The probability of such a difference if there were none, corrected for the number of tests. None: too few
@@ -79,16 +96,28 @@ def comparisons(rows: Rows, metric: str) -> list[Comparison]:
     """Compare all pairs of ways to run by Wilcoxon's signed-rank test, with Holm's correction.
 
     Wilcoxon, "Individual comparisons by ranking methods", 1945; Holm, "A simple sequentially rejective multiple test
-    procedure", 1979. Only runs with a verdict are compared: what a limit has ended is in no pair. Over a parameter of
-    runs they are compared at each of its values, as runs of the same problem are not independent of each other.
+    procedure", 1979. A problem counts once, however many runs of it there are: they are not independent of each
+    other. So over a parameter of runs, too, ways are compared at each of its values. A problem of which half of the
+    runs have no verdict is in no pair.
     """
     found = []
     for at in dict.fromkeys(row.get("case") for row in rows):
         own = [row for row in rows if row.get("case") == at]
-        values = {way: _by_case(own, way, metric) for way in labels(own)}
+        values = {way: _by_problem(own, way, metric) for way in labels(own)}
         pairs = itertools.combinations(values, 2)
         found += [replace(_comparison(one, other, values), at=at) for one, other in pairs]
     return _corrected(found)
+
+
+def _by_problem(rows: Rows, way: str, metric: str) -> dict[str, float]:
+    """Return the median of a metric over a way's runs of each problem, where more than half have a verdict."""
+    runs: dict[str, list[float]] = {}
+    for row in rows:
+        if row["label"] == way:
+            known = row["status"] == Status.DONE and row[metric] is not None
+            runs.setdefault(row["digest"], []).append(float(row[metric]) if known else math.inf)
+    medians = {problem: float(np.median(values)) for problem, values in runs.items()}
+    return {problem: median for problem, median in medians.items() if median < math.inf}
 
 
 def _by_case(rows: Rows, way: str, metric: str) -> dict[tuple[Any, ...], float]:
@@ -101,11 +130,11 @@ def _by_case(rows: Rows, way: str, metric: str) -> dict[tuple[Any, ...], float]:
 
 
 def _case(row: Mapping[str, Any]) -> tuple[Any, ...]:
-    """Return what two ways to run are compared on: problem, seed, repetition, and the value drawn over."""
+    """Return what a run is of: problem, seed, repetition, and the value drawn over."""
     return row["digest"], row["seed"], row["repetition"], row.get("case")
 
 
-def _comparison(one: str, other: str, values: Mapping[str, Mapping[tuple[Any, ...], float]]) -> Comparison:
+def _comparison(one: str, other: str, values: Mapping[str, Mapping[str, float]]) -> Comparison:
     both = [case for case in values[one] if case in values[other]]
     pairs = [(values[one][case], values[other][case]) for case in both]
     ratios = [a / b for a, b in pairs if b]

@@ -19,7 +19,7 @@ from typing import Any, NamedTuple, Self
 import msgspec
 
 from robochoc.experiments.study import Study
-from robochoc.experiments.task import GIVEN, KEY, Row, Status, Task
+from robochoc.experiments.task import GIVEN, KEY, CostPoint, RobotLoad, Row, Status, Task
 from robochoc.formats.diagnostics import Diagnostic, InvalidInputError, encodable, shortened
 
 APPLICATION_ID = 0x726F626F
@@ -36,7 +36,9 @@ _COLUMNS: Mapping[str, str] = {
 }  # fmt: skip
 """The columns of a row, and their types."""
 _NUMBERS = [name for name, kind in _COLUMNS.items() if kind != "TEXT"]
-_JSON = ("messages_by_type", "cost_over_time", "loads")
+_JSON: Mapping[str, Any] = {
+    "messages_by_type": dict[str, int], "cost_over_time": list[CostPoint], "loads": list[RobotLoad],
+}  # fmt: skip
 _TABLES = f"""
 CREATE TABLE IF NOT EXISTS study (id INTEGER PRIMARY KEY CHECK (id = 1), name TEXT, title TEXT, text TEXT);
 CREATE TABLE IF NOT EXISTS runs (key TEXT PRIMARY KEY, {", ".join(f"{n} {t}" for n, t in _COLUMNS.items())})
@@ -220,13 +222,27 @@ def _results(database: sqlite3.Connection) -> Iterator[dict[str, Any]]:
         row = dict(zip(names, values, strict=True))
         parameters = msgspec.json.decode(row.pop("parameters"), type=dict[str, str | int | float | bool])
         del row["task"], row["position"]
-        for name in ("settings", *_JSON):
-            row[name] = msgspec.json.decode(row[name])
+        settings = msgspec.json.decode(row["settings"], type=dict[str, str])
+        row["settings"] = {name: _number(one) for name, one in settings.items()}
+        for name, kind in _JSON.items():
+            row[name] = msgspec.json.decode(row[name], type=kind)
+        row["cost_over_time"] = [
+            [one.messages, one.ncccs, one.time, _number(one.cost)] for one in row["cost_over_time"]
+        ]
+        row["loads"] = [[one.robot, one.messages, one.bytes] for one in row["loads"]]
         for name in ("maximises", "verified", "confirmed"):
             row[name] = bool(row[name])
         if strange := [name for name in _NUMBERS if not isinstance(row[name], (int, float, NoneType))]:
             raise TypeError(f"{strange[0]} is no number in run {row['key']}")
         yield {**{(f"problem_{name}" if name in row else name): value for name, value in parameters.items()}, **row}
+
+
+def _number(text: str) -> str | int | float:
+    """Return the number that a text is, or the text."""
+    for kind in (int, float):
+        with suppress(ValueError):
+            return kind(text)
+    return text
 
 
 def _planned(place: int, key: str, task: Task) -> tuple[Any, ...]:

@@ -25,9 +25,10 @@ import msgspec
 
 from robochoc.experiments.problem_table import PROBLEM_KEYS, problems_of
 from robochoc.experiments.run_table import RUN_KEYS, distinct, setups_of
+from robochoc.experiments.summary import METRICS, OF_RUNS
 from robochoc.experiments.table import MAX_INTEGER, Place, mistake
 from robochoc.experiments.task import Limits, ProblemSpec, Recording, Setup
-from robochoc.formats.diagnostics import Diagnostic, InvalidInputError, encodable, shortened
+from robochoc.formats.diagnostics import Diagnostic, InvalidInputError, encodable, shortened, suggestion
 from robochoc.system.decode_errors import describe_decode_error
 
 LARGEST_FILE = 2**20
@@ -130,6 +131,7 @@ def study_of(tables: Mapping[str, Any], place: Place) -> Study:
             "repeat", f"expected an integer from 1 to {MOST_REPETITIONS:,}, got {shortened(str(repeat))}"
         )
     report = _convert(tables.get("report", {}), ReportWishes, place.below("report"))
+    _check_wishes(report, problems, named, place.below("report"))
     return Study(
         name=place.path.stem,
         title=_word(tables, "title", place) or place.path.stem,
@@ -166,6 +168,21 @@ def _convert(table: object, kind: Any, place: Place) -> Any:  # noqa: ANN401 - o
             if value is not None and not 0 < value <= MAX_INTEGER:
                 raise place.mistake(name, f"expected more than 0, and no more than 2^53, got {value:g}")
     return found
+
+
+def _check_wishes(wishes: ReportWishes, problems: Sequence[ProblemSpec], setups: Sequence[Setup], place: Place) -> None:
+    """Raise `InvalidInputError` for a parameter or a metric that the results will not have: before all is run."""
+    of_problems = {name for one in problems for name in (*one.parameters, *(f"scenario_{n}" for n in one.scenario))}
+    of_problems |= {f"problem_{name}" for name in of_problems} | {"problems", "team"}
+    of_runs = {*OF_RUNS, *(name for one in setups for name in one.settings)}
+    for key, name, known in (("over", wishes.over, of_problems | of_runs), ("each", wishes.each, of_problems)):
+        if name is not None and name not in known:
+            raise place.mistake(key, f"there is no parameter {shortened(name)}", suggestion(name, known, "parameters"))
+    for name in wishes.metrics:
+        if name not in METRICS:
+            raise place.mistake(
+                "metrics", f"there is no metric {shortened(name)}", suggestion(name, METRICS, "metrics")
+            )
 
 
 def _word(table: Mapping[str, Any], name: str, place: Place) -> str:

@@ -39,6 +39,9 @@ OF_RUNS = ("order", "schedule", "delay", "withdraw", "runtime", "channel", "seed
 _SEEDS = ("seed", "problem_seed", "scenario_seed")
 MOST_TEAMS = 12
 """More problems have no lines of their own, unless it is asked for."""
+_MOST = {"instance": MOST_TEAMS}
+ONE_BY_ONE = ("instance", "team", "problems")
+"""What problems are called by: parameters that are no number or choice."""
 DEFAULT_METRICS = ("messages", "ncccs", "bytes")
 
 
@@ -52,11 +55,13 @@ class Sample:
 
     Attributes:
         values: The metric of the runs with a verdict, and of those that a limit has ended where that says something.
+        problems: The problem of each.
         censored: How many of these a limit has ended.
         failed: How many runs have no value: they crashed, were refused, and so on.
     """
 
     values: tuple[float, ...]
+    problems: tuple[str, ...] = ()
     censored: int = 0
     failed: int = 0
 
@@ -100,9 +105,20 @@ def parameter_to_draw_over(rows: Rows, wanted: str | None = None) -> str:
             raise NoSuchColumnError(f"there is no parameter {wanted!r}; there are {', '.join(known)}")
         return wanted
     for name in of_problems:
-        if name not in _SEEDS and all(name in row for row in rows) and len({row[name] for row in rows}) > 1:
+        several = len({row.get(name) for row in rows})
+        if name not in _SEEDS and all(name in row for row in rows) and 1 < several <= _MOST.get(name, several):
             return name
+    if len({row["digest"] for row in rows}) == 1:
+        return next((name for name in OF_RUNS if _parts_labels(rows, name)), "team")
     return "team" if len({row["team"] for row in rows}) <= MOST_TEAMS else "problems"
+
+
+def _parts_labels(rows: Rows, name: str) -> bool:
+    """Return whether each way to run has been run with several values of a parameter of runs."""
+    ways: dict[str, set[Any]] = {}
+    for row in rows:
+        ways.setdefault(_without(row["label"], name, row[name]), set()).add(row[name])
+    return name not in _SEEDS and len(ways) < len(labels(rows)) and all(len(values) > 1 for values in ways.values())
 
 
 def by_parameter(rows: Rows, over: str) -> Rows:
@@ -198,7 +214,8 @@ def sample(rows: Rows, metric: str) -> Sample:
     """Return what `rows` came to."""
     counted = [row for row in rows if _counts(row, metric)]
     cut = sum(row["status"] == Status.LIMIT for row in counted) if metric in CENSORED else 0
-    return Sample(tuple(float(row[metric]) for row in counted), cut, len(rows) - len(counted))
+    values, problems = tuple(float(row[metric]) for row in counted), tuple(str(row["digest"]) for row in counted)
+    return Sample(values, problems, cut, len(rows) - len(counted))
 
 
 def _counts(row: Mapping[str, Any], metric: str) -> bool:
@@ -210,13 +227,19 @@ Table = tuple[list[str], list[list[str]]]
 
 
 def medians(rows: Rows, metric: str, over: str) -> Table:
-    """Return the medians of a metric: a line for each value of the parameter `over`, a column for each way to run."""
+    """Return the medians of a metric: a line for each value of the parameter `over`, a column for each way to run.
+
+    Over problems, or kinds of them, there is a line for all together, too.
+    """
     found = samples(rows, metric, over)
     ways = labels(rows)
     some = [
         value for value in values_of(rows, over) if any(one.values for (at, _), one in found.items() if at == value)
     ]
-    return [over, *ways], [[str(value), *(cell(found.get((value, way))) for way in ways)] for value in some]
+    lines = [[str(value), *(cell(found.get((value, way))) for way in ways)] for value in some]
+    if over in ONE_BY_ONE and len(lines) > 1:
+        lines.append(["all", *(cell(sample([row for row in rows if row["label"] == way], metric)) for way in ways)])
+    return [over, *ways], lines
 
 
 def endings(rows: Rows) -> Table:

@@ -138,6 +138,7 @@ def test_parquet(tmp_path: Path) -> None:
         (["show", "{}", "--metric", "nccs"], 2, "there is no metric 'nccs'; there are messages,"),
         (["report", "{}", "-o", "page.html", "--over", "x"], 1, "there is no parameter 'x'"),
         (["run", "{}.toml", "--scheduler", "tcp://x:1", "--dask", "y"], 1, "cannot be read"),
+        (["run", "{}.toml", "-o", "/nothing/here.sqlite"], 2, "there is no folder /nothing"),
     ],
 )
 def test_mistakes_are_told(words: list[str], status: int, said: str, tmp_path: Path) -> None:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from robochoc.cli.options.paths import InputPath
+from robochoc.cli.options.paths import OutputFile
 from robochoc.cli.reports.failures import invalid_input_fails
 
 if TYPE_CHECKING:
@@ -30,8 +30,8 @@ DEFAULT_SEEDS = "1..10"
     help="Limit of each run.",
 )  # fmt: skip
 @click.option("--over", metavar="PARAMETER", help="A row for each value of it.  [default: the first with several]")
-@click.option("--html", type=InputPath(), metavar="FILE", help="Write a page with figures and tests.")
-@click.option("--save", type=InputPath(), metavar="FILE", help="Keep the results: an SQLite file to go on with.")
+@click.option("--html", type=OutputFile(), metavar="FILE", help="Write a page with figures and tests.")
+@click.option("--save", type=OutputFile(), metavar="FILE", help="Keep the results: an SQLite file to go on with.")
 @click.option("--jobs", type=click.IntRange(1, 1024), metavar="N", help="Workers.  [default: one for each processor]")
 @invalid_input_fails
 def compare(
@@ -58,7 +58,7 @@ def compare(
 
         need_figures()
     from robochoc.cli.commands.experiment import carried_out, stored
-    from robochoc.cli.reports.experiment import print_endings, print_medians
+    from robochoc.cli.reports.experiment import print_answers, print_endings, print_medians
 
     study = _study(problem, runs)
     with stored(save) as store:
@@ -66,6 +66,7 @@ def compare(
         results = store.results()
     print_medians(results.rows, over, ())
     print_endings(results.rows)
+    print_answers(results.rows, over, ())
     if html is not None:
         from robochoc.experiments.report import write_page
 

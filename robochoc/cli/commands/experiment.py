@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from robochoc.cli.options.paths import InputPath
+from robochoc.cli.options.paths import InputPath, OutputFile
 from robochoc.cli.reports.failures import INVALID, LOST, USAGE, Failure, invalid_input_fails
 
 if TYPE_CHECKING:
@@ -37,7 +37,7 @@ def experiment() -> None:
 
 @experiment.command(short_help="Carry out a study, or go on with it.")
 @click.argument("study", type=InputPath(), metavar="STUDY.toml")
-@click.option("-o", "--output", type=InputPath(), metavar="FILE", help="File of the results.  [default: STUDY.sqlite]")
+@click.option("-o", "--output", type=OutputFile(), metavar="FILE", help="File of the results.  [default: STUDY.sqlite]")
 @click.option("--jobs", type=click.IntRange(1, 1024), metavar="N", help="Workers.  [default: one for each processor]")
 @click.option("--dry-run", is_flag=True, help="Show how many runs there are, and run none.")
 @click.option("--scheduler", metavar="ADDRESS", help="Run on the Dask cluster there, such as tcp://10.0.0.1:8786.")
@@ -64,6 +64,8 @@ def run(
         _show_plan(read, path)
         return
     workers = _workers(scheduler, dask)
+    if workers and any(setup.runtime != "simulator" for setup, *_ in read.setups):
+        click.echo(f"{read.name}: robots that have processes run here, not on the cluster", err=True)
     with stored(path) as store, _cluster_told(workers):
         ended = carried_out(read, store, jobs, workers)
     click.echo(ended_line(read.name, ended), err=True)
@@ -205,11 +207,13 @@ def _workers(scheduler: str | None, dask: Path | None) -> Callable[[int | None],
 
     if find_spec("distributed") is None:
         raise Failure(USAGE, "a cluster needs Dask, which is not installed: pip install 'robochoc[cluster]'")
+    if dask is not None and not dask.is_file():
+        raise Failure(INVALID, f"{dask} is no file; name the one that 'dask scheduler --scheduler-file' writes")
     from functools import partial
 
     from robochoc.experiments.cluster import ClusterWorkers
 
-    return partial(ClusterWorkers, scheduler, dask)
+    return partial(ClusterWorkers, scheduler, dask, notice=partial(click.echo, err=True))
 
 
 def _show_plan(study: Study, path: Path) -> None:
@@ -261,6 +265,10 @@ def carried_out(
     try:
         with progress_of(study.name) as progress:
             return run_study(study, store, jobs, progress=progress, workers=workers)
+    except KeyboardInterrupt:
+        there = len(store.results().rows)
+        click.echo(f"\n{study.name}: {there:,} runs are kept; the same command goes on with the others", err=True)
+        raise
     except DisagreementError as wrong:
         raise Failure(LOST, f"{study.name}: stopped: {wrong}") from None
     except TooManyRunsError as refused:

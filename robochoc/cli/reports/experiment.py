@@ -98,8 +98,10 @@ def print_summary(results: Results, over: str | None, metrics: Sequence[str]) ->
     there = f"{len(rows):,} of {count:,} runs" if len(rows) < count else f"{len(rows):,} runs"
     click.echo(f"{on_one_line(title)}: {there}")
     if rows:
-        print_medians(rows, over or wishes.over, metrics or wishes.metrics, wishes.each)
+        over, metrics = over or wishes.over, metrics or wishes.metrics
+        print_medians(rows, over, metrics, wishes.each)
         print_endings(rows)
+        print_answers(rows, over, metrics)
 
 
 def print_medians(rows: Rows, over: str | None, metrics: Sequence[str], each: str | None = None) -> None:
@@ -117,6 +119,16 @@ def print_medians(rows: Rows, over: str | None, metrics: Sequence[str], each: st
         click.echo(f"\n{summary.METRICS[metric]}, median{where}")
         heads, lines = summary.medians(own, metric, over)
         print_table(heads, lines, right=heads[1:])
+
+
+def print_answers(rows: Rows, over: str | None, metrics: Sequence[str]) -> None:
+    """Print who needs least of each metric, and who does the same as who."""
+    from robochoc.experiments import ranking, summary
+
+    over = summary.parameter_to_draw_over(rows, over)
+    shown = summary.metrics_to_show(rows, metrics)
+    for line in ["", *ranking.answers(summary.by_parameter(rows, over), shown)]:
+        click.echo(on_one_line(line))
 
 
 def print_endings(rows: Sequence[Mapping[str, Any]]) -> None:

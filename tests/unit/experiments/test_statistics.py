@@ -6,10 +6,14 @@ import math
 from collections.abc import Sequence
 from typing import Any
 
+import hypothesis
+import numpy as np
 import pytest
+from hypothesis import strategies as st
 
 from robochoc.experiments import statistics, summary
 from robochoc.experiments.summary import Sample
+from tests.support.examples import examples
 
 pytest.importorskip("scipy")
 
@@ -31,7 +35,7 @@ def rows(**values: Sequence[float | None]) -> list[dict[str, Any]]:
 
 def test_medians_say_where_limits_leave_them_open() -> None:
     found = summary.sample([row("a", 1, 10), row("a", 2, 30, "limit"), row("a", 3, None, "crashed")], "messages")
-    assert found == Sample((10.0, 30.0), censored=1, failed=1)
+    assert found == Sample((10.0, 30.0), ("1", "2"), censored=1, failed=1)
     assert (found.median, found.open_ended, summary.cell(found)) == (20.0, True, ">= 20")
     closed = summary.sample([row("a", case, case, "limit" if case == 1 else "done") for case in range(5)], "messages")
     assert (closed.open_ended, summary.cell(closed)) == (False, "2")
@@ -69,6 +73,21 @@ def test_parameters_of_runs_are_drawn_over_as_well() -> None:
         summary.parameter_to_draw_over(given, "cycle")
 
 
+def test_one_problem_is_drawn_over_what_its_runs_differ_in() -> None:
+    given = [row(f"{way} delay={delay}", 1, delay, delay=delay) for way in "ab" for delay in (5, 20)]
+    assert summary.parameter_to_draw_over(given) == "delay"
+    assert summary.parameter_to_draw_over([row(way, 1, 1, delay=0) for way in "ab"]) == "team"
+
+
+def test_own_instances_have_a_line_for_all() -> None:
+    given = [row(way, case, case, instance=f"p{case}") for way in "ab" for case in (1, 2, 3)]
+    given = [{"instance": one["instance"], **{k: v for k, v in one.items() if k != "tightness"}} for one in given]
+    assert summary.parameter_to_draw_over(given) == "instance"
+    heads, lines = summary.medians(given, "messages", "instance")
+    assert lines == [["p1", "1", "1"], ["p2", "2", "2"], ["p3", "3", "3"], ["all", "2", "2"]]
+    assert heads == ["instance", "a", "b"]
+
+
 def test_the_interval_of_a_median() -> None:
     assert statistics.median_interval([7]) == statistics.Interval(7, 7, 7)
     found = statistics.median_interval([float(value) for value in range(101)])
@@ -79,6 +98,44 @@ def test_the_interval_of_a_median() -> None:
     assert found == statistics.median_interval([float(value) for value in range(101)])
     with pytest.raises(ValueError, match="no values"):
         statistics.median_interval([])
+
+
+def test_runs_of_one_problem_are_drawn_together() -> None:
+    """Ten runs of each of eleven problems say no more of the problems than one run of each."""
+    values = [float(value) for value in range(11)]
+    once = statistics.median_interval(values)
+    runs = [value for value in values for _ in range(10)]
+    often = statistics.median_interval(runs, [str(value) for value in runs])
+    assert (often.low, often.high) == (once.low, once.high)
+    alone = statistics.median_interval(runs)
+    assert alone.high - alone.low < once.high - once.low
+
+
+@hypothesis.given(st.lists(st.tuples(st.integers(-50, 50), st.integers(0, 5)), min_size=1, max_size=12))
+@examples(100)
+def testweighted_medians_are_those_of_the_values_written_out(them: list[tuple[int, int]]) -> None:
+    values = sorted(value for value, _ in them)
+    counts = [count for _, count in them]
+    if any(counts):
+        found = statistics.weighted_medians(np.array(values, dtype=float), np.array([counts]))
+        assert found == [np.median(np.repeat(values, counts))]
+
+
+def test_a_problem_counts_once_however_many_runs_there_are() -> None:
+    them = [
+        row(label, case, case + 10 * (label == "b") + repetition, repetition=repetition)
+        for label in "ab" for case in range(8) for repetition in range(1, 6)
+    ]  # fmt: skip
+    (found,) = statistics.comparisons(them, "messages")
+    assert (found.pairs, found.one_better) == (8, 8)
+    assert found.p == pytest.approx(2 / 2**8)
+
+
+def test_a_problem_that_is_seldom_solved_is_in_no_pair() -> None:
+    some = [row("a", 0, 5, repetition=n, status="done" if n < 3 else "limit") for n in (1, 2, 3)]
+    few = [row("a", 1, 5, repetition=n, status="done" if n == 1 else "limit") for n in (1, 2)]
+    (found,) = statistics.comparisons([*some, *few, row("b", 0, 1), row("b", 1, 1)], "messages")
+    assert (found.pairs, found.other_better) == (1, 1)
 
 
 def test_pairs_are_compared_on_what_both_have_solved() -> None:

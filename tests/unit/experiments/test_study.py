@@ -134,11 +134,21 @@ WRONG = {
     "limit of words": (f'{SMALL}[limits]\ntimeout = "x"\n', 12, "limits"),
     "limit below": (f"{SMALL}timeout = -2\n", 12, "expected more than 0"),
     "repeated never": (f"repeat = 0\n{SMALL}", 1, "expected an integer from 1 to 1,000"),
-    "unknown recording": (f'record = ["cost"]\n{SMALL}', 1, "expected cost-over-time or robots"),
+    "unknown recording": (f'record = ["cost"]\n{SMALL}', 1, "expected cost-over-time or robots or journal"),
     "no team there": ('[problems]\npath = "nothing-*"\n[runs]\nprotocol = "abt"\n', 2, "there is no team at nothing-*"),
     "option of files": (SMALL.replace("domain", "infinity = 3\ndomain"), 5, "is for files of other tools"),
     "half a scenario": (SMALL.replace("domain", "scenario = { events = 2 }\ndomain"), 5, "rate is missing"),
     "label of several": (f'{SMALL}label = "x"\n', 12, "in a table that stands for one way to run"),
+    "wish for no metric": (
+        f'{SMALL}[report]\nmetrics = ["costs"]\n',
+        13,
+        "there is no metric costs (did you mean 'cost'?",
+    ),
+    "wish over nothing": (f'{SMALL}[report]\nover = "tightnes"\n', 13, "did you mean 'tightness'?"),
+    "wish for each run": (f'{SMALL}[report]\neach = "delay"\n', 13, "there is no parameter delay"),
+    "a range with a dash": (SMALL.replace('"1..3"', '"1-3"'), 8, "a range is written 1..30"),
+    "NCCCs of processes": (f'{SMALL}runtime = "processes"\nncccs = 3\n', 10, "--ncccs is a limit for the simulator"),
+    "cycles of none": (f"{SMALL}cycles = 3\n", 10, "--cycles is a limit on the simulator's cycles"),
     "unknown wish": (f'{SMALL}[report]\nabove = "x"\n', 13, "there is no such key"),
 }
 
