@@ -23,7 +23,8 @@ def row(label: str, case: int, messages: float | None, status: str = "done", **m
         "tightness": 0.5, "problem_seed": case, "key": f"{label}{case}", "problems": "random", "label": label,
         "seed": 0, "repetition": 1, "status": status, "verdict": "solution" if status == "done" else None,
         "digest": str(case), "messages": messages, "ncccs": None, "bytes": None, "simulated_s": None, "cost": None,
-        "runtime": "simulator", "settings": {},
+        "runtime": "simulator", "settings": {}, "order": "given", "schedule": "concurrent", "delay": 0,
+        "withdraw": None, "channel": None,
         "team": f"team{case}", "cost_over_time": [],
     }  # fmt: skip
     return {**given, **more}
