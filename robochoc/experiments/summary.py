@@ -236,7 +236,7 @@ def solved(rows: Rows, over: str) -> Table:
         kinds["problems"].add(row["digest"])
         if row["status"] == Status.DONE:
             kinds["without" if row["verdict"] == Verdict.NO_SOLUTION else "with"].add(row["digest"])
-    heads = [over, "problems", "with a solution", "without"]
+    heads = [over, "all", "with a solution", "without"]
     return heads, [[str(value), *(f"{len(one):,}" for one in found[value].values())] for value in values_of(rows, over)]
 
 
