@@ -12,7 +12,7 @@ STUDIES = Path(__file__).with_name("studies")
 PAGES = Path(__file__).with_name("results")
 HEADING = "## Studies"
 NAMES = (
-    "sweep-sparse", "sweep-dense", "variants", "weak-commitment", "dynamic", "optimum", "colouring-cycles", "channels",
+    "sweep-sparse", "sweep-dense", "variants", "awc-and-orders", "dynamic", "optimum", "colouring-cycles", "channels",
     "channels-costs",
 )  # fmt: skip
 """Other studies repeat what papers claim: docs/explanation/replications.md."""
