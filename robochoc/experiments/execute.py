@@ -14,7 +14,7 @@ from typing import Any, Self
 
 from robochoc import __version__
 from robochoc.communication.run_result import RobotsLostError
-from robochoc.experiments.observers import CostOverTime, RobotLoads, several
+from robochoc.experiments.observers import CostOverTime, RobotLoads, journal_of, several, written
 from robochoc.experiments.task import ProblemSpec, Recording, Row, Status, Task, options_of
 from robochoc.formats.diagnostics import InvalidInputError
 from robochoc.formats.problems import read_problem
@@ -82,13 +82,14 @@ class Bench(AbstractContextManager["Bench"]):
         curve = CostOverTime(team, task) if Recording.COST_OVER_TIME in task.record else None
         loads = RobotLoads() if Recording.ROBOTS in task.record else None
         cpu = time.process_time()
-        outcome = solve(
-            team, options_of(task.setup, task.limits, task.seed), observer=several(curve, loads), solver=self._solver
-        )
+        options = options_of(task.setup, task.limits, task.seed)
+        journal = journal_of(team, options) if Recording.JOURNAL in task.record else None
+        outcome = solve(team, options, observer=several(curve, loads, journal), solver=self._solver)
         row.cpu_s = None if task.is_timed else time.process_time() - cpu
         _fill(row, outcome, team)
         row.cost_over_time = curve.points() if curve else []
         row.loads = loads.found() if loads else []
+        row.journal = written(journal, outcome) if journal else b""
 
     def _team(self, problem: ProblemSpec) -> tuple[Team, str]:
         """Return the team of a problem, and the digest of its robots' files. Raises what is wrong with it."""
@@ -163,7 +164,7 @@ def _fill(row: Row, outcome: Outcome, team: Team) -> None:
     row.messages_by_type = dict(sorted(metrics.messages.items()))
     row.messages, row.bytes, row.largest = sum(metrics.messages.values()), metrics.bytes, metrics.largest
     row.ncccs, row.checks = metrics.ncccs, metrics.checks
-    row.simulated_s = metrics.simulated_s or None
+    row.simulated_s, row.cycles = metrics.simulated_s or None, metrics.cycles or None
     row.wall_s, row.compile_s, row.memory = metrics.wall_s, metrics.compile_s, metrics.memory or None
 
 

@@ -92,7 +92,7 @@ def drawings(rows: Rows, over: str, metrics: Sequence[str]) -> Iterator[Drawing]
         yield Drawing(f"solved-over-{over}", f"Solved, over {over}", told, partial(_solved, rows, over, styles))
     for metric in [one for one in metrics if one in summary.CENSORED][:MOST_PROFILES]:
         yield from _profiles(rows, metric, styles)
-    for spent in ("messages", "ncccs"):
+    for spent in statistics.SPENT:
         if statistics.cost_bands(rows, spent):
             told = "Cost of the best assignment so far: median and quartiles over runs."
             draw = partial(_cost_over, rows, spent, styles)

@@ -8,9 +8,11 @@ from operator import itemgetter
 
 from robochoc.experiments.task import CostPoint, RobotLoad, Task, options_of
 from robochoc.journal.events import AnyEvent, Decided, Given, Heard, Improved, Observer, Sent
-from robochoc.journal.recorder import improvements
+from robochoc.journal.recorder import JournalRecorder, improvements
+from robochoc.model.outcome import Outcome
 from robochoc.model.problem import Team
-from robochoc.run.objective import objective_to_record
+from robochoc.run.options import Options
+from robochoc.run.recording import journal_header, objective_to_record
 
 MOST_POINTS = 10_000
 """A curve has no more points: the cost of an assignment falls seldom, but costs can be large."""
@@ -75,6 +77,22 @@ class RobotLoads:
     def found(self) -> list[RobotLoad]:
         """Return the load of each robot that has sent something, by name."""
         return [RobotLoad(name, count, self._bytes[name]) for name, count in sorted(self._messages.items())]
+
+
+LARGEST_JOURNAL = 256 * 2**20
+"""Bytes. A run whose journal is larger keeps none."""
+
+
+def journal_of(team: Team, options: Options) -> JournalRecorder:
+    """Return an observer that keeps the run's journal in memory."""
+    return JournalRecorder(journal_header(team, options), objective_to_record(team, options))
+
+
+def written(journal: JournalRecorder, outcome: Outcome) -> bytes:
+    """Return the journal of a run that is over."""
+    journal.outcome = outcome
+    content = journal.content()
+    return content if len(content) <= LARGEST_JOURNAL else b""
 
 
 def several(*observers: Callable[[AnyEvent], None] | None) -> Observer | None:

@@ -19,7 +19,7 @@ from robochoc.solver.encoding import UnsupportedError
 
 RUN_KEYS = (
     "protocol", "label", "settings", "order", "runtime", "channel", "seed", "schedule", "delay", "withdraw", "verify",
-    "timeout", "messages",
+    "timeout", "messages", "ncccs", "cycles",
 )  # fmt: skip
 _CHOICES: Mapping[str, Sequence[str]] = {
     "runtime": tuple(map(str, Runtime)),
@@ -29,7 +29,8 @@ _CHOICES: Mapping[str, Sequence[str]] = {
 }
 _TOLD = ("order", "runtime", "channel", "schedule", "delay", "withdraw", "verify")
 """What a label may say, besides the protocol and its settings."""
-_WITHIN = ("label", "settings", "seed", "timeout", "messages")
+_OWN_LIMITS = ("timeout", "messages", "ncccs", "cycles")
+_WITHIN = ("label", "settings", "seed", *_OWN_LIMITS)
 """Keys that stand for no combinations of their own here."""
 
 
@@ -52,13 +53,13 @@ def setups_of(
     seeds = tuple(place.values("seed", table.get("seed", 0)))
     if not all(type(seed) is int and seed >= 0 for seed in seeds):
         raise place.mistake("seed", "expected integers of 0 or more")
-    limits = _limits(table, limits, place)
-    found = list(_setups(table, place))
+    own = _own_limits(table, place)
+    found = list(_setups(table, own, place))
     for setup in _labelled(found, table.get("label"), place):
-        yield setup, seeds, limits
+        yield setup, seeds, msgspec.structs.replace(limits, **own).meant_for(setup)
 
 
-def _setups(table: Mapping[str, Any], place: Place) -> Iterator[Setup]:
+def _setups(table: Mapping[str, Any], limits: Mapping[str, Any], place: Place) -> Iterator[Setup]:
     settings = table.get("settings", {})
     at = place.below(f"{place.table}.settings")
     if not isinstance(settings, dict):
@@ -66,7 +67,9 @@ def _setups(table: Mapping[str, Any], place: Place) -> Iterator[Setup]:
     combined = list(at.combinations(settings))
     for plain in place.combinations({key: value for key, value in table.items() if key not in _WITHIN}):
         for one in combined:
-            yield _setup(plain, {name: _text(value) for name, value in one.items()}, place)
+            setup = _setup(plain, {name: _text(value) for name, value in one.items()}, place)
+            _refuse(setup, Limits(**limits), place)
+            yield setup
 
 
 def _text(value: object) -> str:
@@ -85,11 +88,9 @@ def _setup(plain: Mapping[str, Any], settings: dict[str, str], place: Place) -> 
     if "channel" in given:
         given["channel"] = _channel(given["channel"], place)
     try:
-        setup = msgspec.convert({**given, "settings": settings}, Setup)
+        return msgspec.convert({**given, "settings": settings}, Setup)
     except msgspec.ValidationError as wrong:
         raise place.mistake("", str(wrong)) from None
-    _refuse(setup, place)
-    return setup
 
 
 def _channel(word: object, place: Place) -> ChannelModel:
@@ -98,10 +99,10 @@ def _channel(word: object, place: Place) -> ChannelModel:
     return read_channel(place.path.parent / str(word))
 
 
-def _refuse(setup: Setup, place: Place) -> None:
+def _refuse(setup: Setup, limits: Limits, place: Place) -> None:
     """Raise `InvalidInputError` if the options of `setup` do not go together, whatever the problem is."""
     try:
-        refuse_options(options_of(setup))
+        refuse_options(options_of(setup, limits))
         if setup.protocol != CENTRAL:
             refuse_settings(setup.protocol, protocol_named(setup.protocol), setup.settings)
     except UnknownProtocolError as unknown:
@@ -110,13 +111,14 @@ def _refuse(setup: Setup, place: Place) -> None:
         raise place.mistake("", str(refused)) from None
 
 
-def _limits(table: Mapping[str, Any], limits: Limits, place: Place) -> Limits:
-    own = {name: table[name] for name in ("timeout", "messages") if name in table}
+def _own_limits(table: Mapping[str, Any], place: Place) -> dict[str, Any]:
+    """Return the limits that a table names by itself."""
+    own = {name: table[name] for name in _OWN_LIMITS if name in table}
     for name, value in own.items():
-        kinds = (int,) if name == "messages" else (int, float)
+        kinds = (int, float) if name == "timeout" else (int,)
         if type(value) not in kinds or not 0 < value <= MAX_INTEGER:
             raise place.mistake(name, f"expected more than 0, got {shortened(str(value))}")
-    return msgspec.structs.replace(limits, **own)
+    return own
 
 
 def _labelled(setups: Sequence[Setup], label: object, place: Place) -> Iterator[Setup]:

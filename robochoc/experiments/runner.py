@@ -133,7 +133,7 @@ class _Clock:
 def _compare_what_is_there(store: Store, plan: dict[str, Task], agreement: Agreement) -> None:
     """Compare the rows of earlier starts. Raises `DisagreementError`."""
     for found in store.results().rows:
-        fields = {name: found[name] for name in Row.__struct_fields__}
+        fields = {name: found[name] for name in Row.__struct_fields__ if name in found}
         costs = {name: None if fields[name] is None else str(fields[name]) for name in ("cost", "bound")}
         row = Row(**{**fields, **costs, "status": Status(fields["status"])})
         agreement.add(plan[found["key"]], row)

@@ -6,6 +6,7 @@ import itertools
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from types import MappingProxyType
 from typing import Any
 
 import numpy as np
@@ -175,26 +176,27 @@ class Band:
 
 
 _POINTS = 200
+SPENT: Mapping[str, int] = MappingProxyType({"messages": 0, "ncccs": 1, "cycles": 2, "simulated_s": 2})
+"""What costs are drawn over, and where a point of the curve has it: the time is in the run's own unit."""
 
 
 def cost_bands(rows: Rows, spent: str) -> dict[str, Band]:
-    """Return for each way to run the cost of its best assignment over `spent`: `messages`, `ncccs` or `time`.
+    """Return for each way to run the cost of its best assignment over `spent`, one of `SPENT`.
 
-    A point is there from where all runs of the way have an assignment.
+    A point is there from where all runs of the way have an assignment. Runs that do not count `spent` are left out.
     """
     bands = {}
     for way in labels(rows):
-        curves = [_curve(row, spent) for row in rows if row["label"] == way and row["cost_over_time"]]
+        of_way = [row for row in rows if row["label"] == way and row[spent] is not None]
+        curves = [_curve(row, spent) for row in of_way if row["cost_over_time"]]
         if curves:
             bands[way] = _band(curves)
     return bands
 
 
 def _curve(row: Mapping[str, Any], spent: str) -> list[tuple[float, float]]:
-    place = ("messages", "ncccs", "time").index(spent)
-    points = [(float(point[place]), float(point[3])) for point in row["cost_over_time"]]
-    last = row[spent] if spent != "time" else None
-    return [*points, (max(points[-1][0], float(last)), points[-1][1])] if last is not None else points
+    points = [(float(point[SPENT[spent]]), float(point[3])) for point in row["cost_over_time"]]
+    return [*points, (max(points[-1][0], float(row[spent])), points[-1][1])]
 
 
 def _band(curves: Sequence[Sequence[tuple[float, float]]]) -> Band:

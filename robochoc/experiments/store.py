@@ -19,19 +19,20 @@ from typing import Any, NamedTuple, Self
 import msgspec
 
 from robochoc.experiments.study import Study
-from robochoc.experiments.task import GIVEN, Row, Status, Task
-from robochoc.formats.diagnostics import Diagnostic, InvalidInputError, encodable
+from robochoc.experiments.task import GIVEN, KEY, Row, Status, Task
+from robochoc.formats.diagnostics import Diagnostic, InvalidInputError, encodable, shortened
 
 APPLICATION_ID = 0x726F626F
 """What marks the file as one of ours (SQLite, `PRAGMA application_id`): `robo`."""
-VERSION = 1
+VERSION = 2
 _COLUMNS: Mapping[str, str] = {
     "status": "TEXT", "reason": "TEXT", "team": "TEXT", "digest": "TEXT", "robots": "INTEGER", "variables": "INTEGER",
     "constraints": "INTEGER", "verdict": "TEXT", "cost": "NUMERIC", "bound": "NUMERIC", "maximises": "INTEGER",
     "withdrawn": "INTEGER", "verified": "INTEGER", "confirmed": "INTEGER", "messages": "INTEGER",
     "messages_by_type": "TEXT", "bytes": "INTEGER", "largest": "INTEGER", "ncccs": "INTEGER", "checks": "INTEGER",
-    "simulated_s": "REAL", "wall_s": "REAL", "compile_s": "REAL", "total_s": "REAL", "cpu_s": "REAL",
-    "memory": "INTEGER", "cost_over_time": "TEXT", "loads": "TEXT", "machine": "TEXT", "version": "TEXT",
+    "simulated_s": "REAL", "cycles": "INTEGER", "wall_s": "REAL", "compile_s": "REAL", "total_s": "REAL",
+    "cpu_s": "REAL", "memory": "INTEGER", "cost_over_time": "TEXT", "loads": "TEXT", "machine": "TEXT",
+    "version": "TEXT",
 }  # fmt: skip
 """The columns of a row, and their types."""
 _NUMBERS = [name for name, kind in _COLUMNS.items() if kind != "TEXT"]
@@ -40,6 +41,7 @@ _TABLES = f"""
 CREATE TABLE IF NOT EXISTS study (id INTEGER PRIMARY KEY CHECK (id = 1), name TEXT, title TEXT, text TEXT);
 CREATE TABLE IF NOT EXISTS runs (key TEXT PRIMARY KEY, {", ".join(f"{n} {t}" for n, t in _COLUMNS.items())})
     WITHOUT ROWID;
+CREATE TABLE IF NOT EXISTS journals (key TEXT PRIMARY KEY, content BLOB) WITHOUT ROWID;
 CREATE TABLE IF NOT EXISTS plan (
     position INTEGER PRIMARY KEY, key TEXT UNIQUE, problems TEXT, label TEXT, protocol TEXT, settings TEXT,
     "order" TEXT, schedule TEXT, delay INTEGER, withdraw TEXT, runtime TEXT, channel TEXT, seed INTEGER,
@@ -131,10 +133,13 @@ class Store:
     def add(self, rows: Iterable[tuple[str, Row]]) -> None:
         """Write the rows of runs, by their keys. One that is there already stays."""
         marks = ", ".join("?" * (1 + len(_COLUMNS)))
+        several = list(rows)
+        journals = [(key, row.journal) for key, row in several if row.journal]
         with self._writing() as writing:
+            writing.executemany("INSERT OR IGNORE INTO journals VALUES (?, ?)", journals)
             writing.executemany(
                 f"INSERT OR IGNORE INTO runs VALUES ({marks})",  # noqa: S608 - question marks
-                [(key, *(_stored(name, getattr(row, name)) for name in _COLUMNS)) for key, row in rows],
+                [(key, *(_stored(name, getattr(row, name)) for name in _COLUMNS)) for key, row in several],
             )
 
     @contextmanager
@@ -178,6 +183,28 @@ def read_results(path: Path) -> Results:
             return _read(database)
         except (sqlite3.Error, msgspec.MsgspecError, TypeError) as error:
             raise _invalid(path, f"holds no results of a study: {error}") from None
+
+
+def journals(path: Path) -> Iterator[tuple[str, bytes]]:
+    """Yield the journals of the study's runs, by their keys, where the study records them.
+
+    Raises:
+        InvalidInputError: if the file holds no results of a study.
+    """
+    with closing(_opened(path, writing=False)) as database:
+        try:
+            found = "SELECT key, content FROM plan JOIN journals USING (key) ORDER BY position"
+            yield from map(_journal, database.execute(found))
+        except (sqlite3.Error, TypeError) as error:
+            raise _invalid(path, f"holds no results of a study: {error}") from None
+
+
+def _journal(found: tuple[object, object]) -> tuple[str, bytes]:
+    """Return a key and a journal. Raises `TypeError`: the key will be the name of a file."""
+    key, content = found
+    if isinstance(key, str) and KEY.fullmatch(key) and isinstance(content, bytes):
+        return key, content
+    raise TypeError(f"{shortened(str(key))} is no key of a run, or has no journal")
 
 
 def _read(database: sqlite3.Connection) -> Results:

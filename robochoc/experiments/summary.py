@@ -21,6 +21,7 @@ METRICS: Mapping[str, str] = MappingProxyType(
         "ncccs": "NCCCs",
         "bytes": "bytes",
         "checks": "constraint checks",
+        "cycles": "cycles",
         "simulated_s": "simulated seconds",
         "cost": "cost",
         "wall_s": "seconds of the search",
@@ -31,7 +32,7 @@ METRICS: Mapping[str, str] = MappingProxyType(
     }
 )
 """Each metric, and what it is called on an axis."""
-CENSORED = ("messages", "ncccs", "bytes", "checks", "simulated_s", "wall_s", "total_s", "cpu_s")
+CENSORED = ("messages", "ncccs", "bytes", "checks", "cycles", "simulated_s", "wall_s", "total_s", "cpu_s")
 """Metrics that would have gone on growing where a limit has ended a run."""
 OF_RUNS = ("order", "schedule", "delay", "withdraw", "runtime", "channel", "seed")
 """Parameters of runs, over which results can be shown, too."""
@@ -167,7 +168,7 @@ def metrics_to_show(rows: Rows, wanted: Sequence[str] = ()) -> list[str]:
             raise NoSuchColumnError(f"there is no metric {name!r}; there are {', '.join(METRICS)}")
     if wanted:
         return list(wanted)
-    usual = [*DEFAULT_METRICS, "simulated_s", "cost"]
+    usual = [*DEFAULT_METRICS, "cycles", "simulated_s", "cost"]
     if any(row["runtime"] != "simulator" for row in rows):
         usual.append("wall_s")
     return [name for name in usual if any(row[name] is not None for row in rows)]

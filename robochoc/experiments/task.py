@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import re
 from enum import StrEnum
 from typing import Any
 
@@ -10,12 +11,15 @@ import msgspec
 
 from robochoc.communication.simulator.channel import ChannelModel
 from robochoc.model.orders import Order
-from robochoc.run.options import Options, Runtime, ScheduleName, Withdrawal
+from robochoc.run.options import CENTRAL, Options, Runtime, ScheduleName, Withdrawal
 
 Parameter = str | int | float | bool
+Content = bytes
 GIVEN = "given"
 """The priority order of the files."""
 _KEY_BYTES = 16
+KEY = re.compile(f"[0-9a-f]{{{2 * _KEY_BYTES}}}")
+"""What the key of a run looks like."""
 
 
 class ProblemSpec(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True):
@@ -68,12 +72,26 @@ class Limits(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True):
     Attributes:
         timeout: Seconds for the run, its set-up included. None: no limit.
         messages: The number of messages. None: no limit.
+        ncccs: Non-concurrent constraint checks, in the simulator. None: no limit.
+        cycles: Cycles, with the schedule `cycles`. None: no limit.
         memory_mb: Megabytes of the process that solves. None: no limit.
     """
 
     timeout: float | None = None
     messages: int | None = None
+    ncccs: int | None = None
+    cycles: int | None = None
     memory_mb: int | None = None
+
+    def meant_for(self, setup: Setup) -> Limits:
+        """Return those of the limits that there can be for `setup`."""
+        by_robots = setup.protocol != CENTRAL
+        return msgspec.structs.replace(
+            self,
+            messages=self.messages if by_robots else None,
+            ncccs=self.ncccs if by_robots and setup.runtime == Runtime.SIMULATOR else None,
+            cycles=self.cycles if by_robots and setup.schedule == ScheduleName.CYCLES else None,
+        )
 
 
 NO_LIMITS = Limits()
@@ -92,6 +110,8 @@ def options_of(setup: Setup, limits: Limits = NO_LIMITS, seed: int = 0) -> Optio
         verify=setup.verify,
         order=None if setup.order is None else Order(setup.order),
         messages=limits.messages,
+        ncccs=limits.ncccs,
+        cycles=limits.cycles,
         channel=setup.channel,
         settings=setup.settings,
     )
@@ -139,6 +159,7 @@ class Recording(StrEnum):
 
     COST_OVER_TIME = "cost-over-time"
     ROBOTS = "robots"
+    JOURNAL = "journal"
 
 
 class Status(StrEnum):
@@ -208,6 +229,7 @@ class Row(msgspec.Struct, kw_only=True, omit_defaults=True):
         cpu_s: Seconds of the processor, in the simulator.
         cost_over_time: With `COST_OVER_TIME`.
         loads: With `ROBOTS`.
+        journal: With `JOURNAL`: the content of the run's journal.
         machine: Where it ran: host, processor, Python.
         version: The version of robochoc.
     """
@@ -233,6 +255,7 @@ class Row(msgspec.Struct, kw_only=True, omit_defaults=True):
     ncccs: int | None = None
     checks: int | None = None
     simulated_s: float | None = None
+    cycles: int | None = None
     wall_s: float | None = None
     compile_s: float | None = None
     total_s: float = 0.0
@@ -240,5 +263,6 @@ class Row(msgspec.Struct, kw_only=True, omit_defaults=True):
     memory: int | None = None
     cost_over_time: list[CostPoint] = []
     loads: list[RobotLoad] = []
+    journal: Content = b""
     machine: str = ""
     version: str = ""

@@ -29,6 +29,7 @@ class _MetricsForm(msgspec.Struct):
     memory: int = 0
     simulated_s: float = 0.0
     largest: int = 0
+    cycles: int = 0
 
 
 class _EpochForm(msgspec.Struct, omit_defaults=True):
@@ -46,6 +47,7 @@ class _EpochForm(msgspec.Struct, omit_defaults=True):
     lost: list[str] = []
     confirmed: bool = False
     simulated_s: float | UnsetType = UNSET
+    cycles: int | UnsetType = UNSET
 
 
 class _CheckedForm(msgspec.Struct):
@@ -122,6 +124,7 @@ def _metrics(spent: Metrics) -> _MetricsForm:
         memory=spent.memory,
         simulated_s=spent.simulated_s,
         largest=spent.largest,
+        cycles=spent.cycles,
     )
 
 
@@ -142,6 +145,7 @@ def _epoch(epoch: EpochOutcome, outcome: Outcome) -> _EpochForm:
         lost=list(epoch.lost),
         confirmed=epoch.confirmed,
         simulated_s=spent.simulated_s or UNSET,
+        cycles=spent.cycles or UNSET,
     )
 
 
@@ -165,7 +169,9 @@ class _Symbols:
 
 def _epoch_of(form: _EpochForm, symbols: _Symbols) -> EpochOutcome:
     counts = form.bytes, form.ncccs, form.checks, form.wall_s
-    metrics = Metrics({"messages": form.messages}, *counts, simulated_s=form.simulated_s or 0.0)
+    metrics = Metrics(
+        {"messages": form.messages}, *counts, simulated_s=form.simulated_s or 0.0, cycles=form.cycles or 0
+    )
     return EpochOutcome(
         verdict=form.verdict,
         robots=tuple(form.robots),
@@ -209,4 +215,4 @@ def read_result(content: bytes) -> Outcome:
 def _metrics_of(form: _MetricsForm) -> Metrics:
     messages = form.messages_by_type or {"messages": form.messages}
     counts = form.bytes, form.ncccs, form.checks, form.wall_s, form.compile_s, form.memory, form.simulated_s
-    return Metrics(messages, *counts, largest=form.largest)
+    return Metrics(messages, *counts, largest=form.largest, cycles=form.cycles)

@@ -237,12 +237,15 @@ def improvements(events: Iterable[AnyEvent], objective: Objective) -> Iterator[A
     reader = TeamReader()
     now: Mapping[str, Mapping[str, int]] | None
     own: dict[str, dict[str, int]] = {}
-    for event in events:
+    several = list(events)
+    for event, following in zip(several, [*several[1:], None], strict=True):
         yield event
         match event:
             case Decided():
                 own[event.robot] = event.assignment
                 objective.change({event.robot: event.assignment})
+                if objective.in_step and isinstance(following, Decided) and following.t == event.t:
+                    continue
                 cost, now = objective.cost, own
             case Heard():
                 cost, now = event.cost, objective.shown(event.values)

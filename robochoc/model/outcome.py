@@ -37,6 +37,7 @@ class Metrics:
         memory: Bytes that the largest robot's process alone used in the end. 0: robots had no processes.
         simulated_s: Seconds of simulated time, by a channel model. 0: there was none.
         largest: Bytes of the largest message's content.
+        cycles: Cycles of the simulator's schedule `cycles`. 0: they were not counted.
     """
 
     messages: dict[str, int] = field(default_factory=dict)
@@ -48,6 +49,7 @@ class Metrics:
     memory: int = 0
     simulated_s: float = 0.0
     largest: int = 0
+    cycles: int = 0
 
     def __add__(self, other: Metrics) -> Metrics:
         """Return the cost of two runs, one after the other."""
@@ -62,6 +64,7 @@ class Metrics:
             memory=max(self.memory, other.memory),
             simulated_s=self.simulated_s + other.simulated_s,
             largest=max(self.largest, other.largest),
+            cycles=self.cycles + other.cycles,
         )
 
 

@@ -46,6 +46,8 @@ class Solvable(ABC):
         seed: int = 0,
         timeout: float | None = None,
         messages: int | None = None,
+        ncccs: int | None = None,
+        cycles: int | None = None,
         verify: bool = False,
         count: bool = False,
         central_with: str = CentralSolverName.ACE,
@@ -78,12 +80,14 @@ class Solvable(ABC):
             seed: The seed of the simulator, of the order `random`, and of protocols that draw lots.
             timeout: A limit on wall-clock time, in seconds. None: no limit.
             messages: A limit on the number of messages. None: no limit.
+            ncccs: A limit on non-concurrent constraint checks, in the simulator. None: no limit.
+            cycles: A limit on cycles, with the schedule `cycles`. None: no limit.
             verify: Whether the central solver checks a `no-solution` or a minimum cost that robots have found.
             count: Whether the central solver counts all solutions.
             central_with: Who decides with the protocol `central`: `ace` or `ortools`.
             cache: Whether solutions of local problems are kept in the user's cache folder.
             local: Limits on the compilation of each robot's domain.
-            schedule: How the simulator orders events: `concurrent`, `one-by-one` or `random`.
+            schedule: How the simulator orders events: `concurrent`, `one-by-one`, `cycles` or `random`.
             delay: The longest delay of a message in the simulator, in constraint checks.
             channel: A channel model: the simulator counts seconds of computing and radio.
             on_loss: What the loss of a robot means: `fail` or `withdraw`. None: the run fails, unless there are
@@ -112,7 +116,8 @@ class Solvable(ABC):
             10
         """
         _refuse(unknown)
-        _check_numbers(seed=seed, timeout=timeout, messages=messages, delay=delay, spares=spares, patience=patience)
+        _check_numbers(seed=seed, timeout=timeout, delay=delay, spares=spares, patience=patience)
+        _check_numbers(messages=messages, ncccs=ncccs, cycles=cycles)
         team = self._team_to_solve()
         called = self._robots_called(team)
         options = Options(
@@ -130,6 +135,8 @@ class Solvable(ABC):
             verify=verify,
             order=_order(order, called),
             messages=messages,
+            ncccs=ncccs,
+            cycles=cycles,
             on_loss=None if on_loss is None else _choice("on_loss", OnLoss, on_loss),
             spares=spares,
             patience=patience,

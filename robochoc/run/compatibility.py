@@ -87,8 +87,18 @@ OPTION_RULES = (
         "add --runtime simulator",
     ),
     OptionRule(
-        lambda o: o.delay and o.schedule is ScheduleName.RANDOM,
-        "--delay is for --schedule concurrent: in a random one any message may take any time",
+        lambda o: o.delay and o.schedule in {ScheduleName.CYCLES, ScheduleName.RANDOM},
+        "--delay is for --schedule concurrent: in a random one any message may take any time, in cycles each takes one",
+    ),
+    OptionRule(
+        lambda o: o.ncccs is not None and o.runtime is not Runtime.SIMULATOR,
+        "--ncccs is a limit for the simulator, which knows all clocks",
+        "add --runtime simulator",
+    ),
+    OptionRule(
+        lambda o: o.cycles is not None and o.schedule is not ScheduleName.CYCLES,
+        "--cycles is a limit on the simulator's cycles",
+        "add --runtime simulator --schedule cycles (a local search has its own number of cycles: --set cycles=N)",
     ),
     OptionRule(
         lambda o: o.protocol == CENTRAL and o.verify,
@@ -100,6 +110,8 @@ OPTION_RULES = (
         "drop it",
     ),
     _for_robots("--messages", lambda o: o.messages),
+    _for_robots("--ncccs", lambda o: o.ncccs is not None),
+    _for_robots("--cycles", lambda o: o.cycles is not None),
     _for_robots("--on-loss", lambda o: o.on_loss),
     _for_robots("--spare", lambda o: o.spares),
     _for_robots("--kill", lambda o: o.kill),

@@ -105,12 +105,19 @@ class Deployment(ABC):
             return f"{answer.witness} gave up, as its protocol has it"
         if answer.ended:
             return f"{phase.name} has come to its end, and all that it came by breaks a hard constraint"
-        timeout, messages = self.options.timeout, self.options.messages
-        if messages is not None and self.left_s() != 0 and sum(answer.metrics.messages.values()) >= messages:
-            limit = f"so many messages have been sent (--messages {messages})"
-        else:
-            limit = "the time was over" if timeout is None else f"the time was over (--timeout {timeout:g})"
-        return "; ".join(filter(None, [limit, self.unsettled]))
+        return "; ".join(filter(None, [self._limit_reached(answer.metrics), self.unsettled]))
+
+    def _limit_reached(self, spent: Metrics) -> str:
+        """Return the limit that has ended a search."""
+        options = self.options
+        if self.left_s() != 0:
+            if options.messages is not None and sum(spent.messages.values()) >= options.messages:
+                return f"so many messages have been sent (--messages {options.messages})"
+            if options.ncccs is not None and spent.ncccs >= options.ncccs:
+                return f"so many checks have been made one after the other (--ncccs {options.ncccs})"
+            if options.cycles is not None and spent.cycles >= options.cycles:
+                return f"so many cycles are over (--cycles {options.cycles})"
+        return "the time was over" if options.timeout is None else f"the time was over (--timeout {options.timeout:g})"
 
     def outcome(self, header: Outcome, answer: Answer) -> Outcome:
         """Return `header`, which says what was run, with its `answer`."""

@@ -28,12 +28,13 @@ class Runtime(StrEnum):
 
 
 class ScheduleName(StrEnum):
-    """The order in which the simulator handles events: by time counted in checks, or from any channel next.
+    """The order in which the simulator handles events: by time counted in checks, in cycles, or from any channel next.
 
     In `CONCURRENT` a robot reads its whole inbox before it settles, in `ONE_BY_ONE` it settles after each message.
     """
 
     CONCURRENT = "concurrent"
+    CYCLES = "cycles"
     ONE_BY_ONE = "one-by-one"
     RANDOM = "random"
 
@@ -88,6 +89,8 @@ class Options:
             OR-Tools is installed, it is asked as well.
         order: The total priority order of the robots, by name or as their names (None: that of the files).
         messages: A limit on the number of messages (None: no limit).
+        ncccs: A limit on non-concurrent constraint checks, in the simulator (None: no limit).
+        cycles: A limit on cycles, with `ScheduleName.CYCLES` (None: no limit).
         on_loss: What the loss of a robot means (None: the run fails, unless there are `spares`).
         spares: How many robots that are lost come back.
         patience: A robot whose process is stopped (on a network: that is out of reach) for so many seconds is lost
@@ -112,6 +115,8 @@ class Options:
     verify: bool = False
     order: Order | tuple[str, ...] | None = None
     messages: int | None = None
+    ncccs: int | None = None
+    cycles: int | None = None
     on_loss: OnLoss | None = None
     spares: int = 0
     patience: float | None = None

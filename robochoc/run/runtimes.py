@@ -103,9 +103,14 @@ def open_processes(request: SessionRequest) -> Session:
 
 def open_simulator(request: SessionRequest) -> Session:
     """Open a session in which all robots live in one thread."""
-    from robochoc.communication.simulator.simulator import Simulation  # noqa: PLC0415 - one runtime is enough
+    from robochoc.communication.simulator.simulator import (  # noqa: PLC0415 - one runtime is enough
+        EffortLimits,
+        Simulation,
+    )
 
-    return Simulation(request.team, request.protocol, _schedule_of(request.options), **request.common)
+    options = request.options
+    limits = EffortLimits(options.ncccs, options.cycles)
+    return Simulation(request.team, request.protocol, _schedule_of(options), limits=limits, **request.common)
 
 
 def _schedule_of(options: Options) -> Schedule:
@@ -114,11 +119,17 @@ def _schedule_of(options: Options) -> Schedule:
         from robochoc.communication.simulator.timed import Timed  # noqa: PLC0415 - start-up: seldom asked for
 
         return Timed(options.seed, options.channel)
-    from robochoc.communication.simulator.schedule import Concurrent, RandomChannels  # noqa: PLC0415 - the simulator's
+    from robochoc.communication.simulator.schedule import (  # noqa: PLC0415 - the simulator's
+        Concurrent,
+        Cycles,
+        RandomChannels,
+    )
 
     match options.schedule:
         case ScheduleName.CONCURRENT:
             return Concurrent(options.seed, options.delay)
+        case ScheduleName.CYCLES:
+            return Cycles(options.seed)
         case ScheduleName.ONE_BY_ONE:
             return Concurrent(options.seed, options.delay, one_by_one=True)
         case ScheduleName.RANDOM:

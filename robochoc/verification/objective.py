@@ -18,13 +18,15 @@ class Objective:
         team: The team, with normalised costs (`model/costs.py`).
         withdrawal_cost: The cost of withdrawing a robot of weight 1. Robots without values are withdrawn. None: no
             robot may withdraw, and the cost is infinite until all have values.
+        in_step: Whether decisions of the same time are made at once: what the team has in between is no assignment.
 
     Attributes:
         interfaces: The interface variables of each robot. Runs that reorder the team replace them.
     """
 
-    def __init__(self, team: Team, withdrawal_cost: float | None = None) -> None:
+    def __init__(self, team: Team, withdrawal_cost: float | None = None, *, in_step: bool = False) -> None:
         self._team = team
+        self.in_step = in_step
         self._weights = {robot.name: robot.weight for robot in team.robots}
         self._withdrawal_cost = withdrawal_cost
         self._constraints = [(c.variables, cost_function(c, c.variables)) for c in team.constraints()]

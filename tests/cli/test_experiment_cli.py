@@ -8,8 +8,9 @@ import json
 import os
 import random
 import signal
+import sqlite3
 import time
-from contextlib import suppress
+from contextlib import closing, suppress
 from pathlib import Path
 
 import pytest
@@ -20,6 +21,7 @@ from robochoc.experiments.store import Store
 from robochoc.experiments.task import Row, Status
 from robochoc.formats import write_team
 from robochoc.generators.queens3d import queens3d
+from robochoc.journal.journal import read_journal
 from tests.support.faults import PROGRAM, running
 from tests.support.limits import wait_until
 from tests.support.program import robochoc_within
@@ -59,6 +61,34 @@ def test_run_show_and_export(small: Path) -> None:
     longer.write_text(SMALL.replace("1..3", "1..5"))
     told = robochoc_within("experiment", "run", longer, "-o", results, "--dry-run").stdout
     assert "12 are there, 8 are to be run; about " in told
+
+
+def test_journals_are_files_that_other_commands_read(tmp_path: Path) -> None:
+    (tmp_path / "study.toml").write_text(f'record = "journal"\n{SMALL}')
+    assert robochoc_within("experiment", "run", tmp_path / "study.toml").returncode == 0
+    path = tmp_path / "study.sqlite"
+    refused = robochoc_within("experiment", "export", path, "--format", "journals")
+    assert (refused.returncode, "name a folder" in refused.stderr) == (2, True)
+    done = robochoc_within("experiment", "export", path, "--format", "journals", "-o", tmp_path / "journals")
+    assert (done.returncode, "12 journals" in done.stderr) == (0, True)
+    rows = {row["key"]: row for row in read(path)}
+    files = list((tmp_path / "journals").iterdir())
+    assert {file.name for file in files} == {f"{key}.journal" for key in rows}
+    for file in files:
+        assert read_journal(file.read_bytes()).header.protocol == rows[file.stem]["protocol"]
+
+
+def test_a_journal_called_like_another_place_is_refused(tmp_path: Path) -> None:
+    (tmp_path / "study.toml").write_text(f'record = "journal"\n{SMALL}')
+    assert robochoc_within("experiment", "run", tmp_path / "study.toml").returncode == 0
+    path = tmp_path / "study.sqlite"
+    with closing(sqlite3.connect(path)) as database, database:
+        for table in ("plan", "journals"):
+            database.execute(f"UPDATE {table} SET key = '../out' WHERE key = (SELECT min(key) FROM journals)")  # noqa: S608
+    refused = robochoc_within("experiment", "export", path, "--format", "journals", "-o", tmp_path / "journals")
+    assert refused.returncode == 1
+    assert "../out is no key of a run" in refused.stderr
+    assert not (tmp_path / "out.journal").exists()
 
 
 def test_export(tmp_path: Path) -> None:

@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from robochoc.experiments.study import Study
 
 FORMATS = ("csv", "json", "latex", "parquet")
+JOURNALS = "journals"
 
 
 @click.group()
@@ -89,10 +90,12 @@ def show(results: Path, over: str | None, metrics: tuple[str, ...]) -> None:
 
 @experiment.command(short_help="Write the results for other programs.")
 @click.argument("results", type=InputPath(), metavar="RESULTS.sqlite")
-@click.option("-o", "--output", type=InputPath(), metavar="FILE", help="File to write.  [default: standard output]")
 @click.option(
-    "--format", "form", type=click.Choice(FORMATS), help="csv, json (a line each), latex (medians), parquet."
-    "  [default: by the file's ending, else csv]",
+    "-o", "--output", type=InputPath(), metavar="FILE", help="File, or folder, to write.  [default: standard output]"
+)
+@click.option(
+    "--format", "form", type=click.Choice([*FORMATS, JOURNALS]), help="csv, json (a line each), latex (medians),"
+    " parquet; journals: a folder of those that the study records.  [default: by the file's ending, else csv]",
 )  # fmt: skip
 @invalid_input_fails
 def export(results: Path, output: Path | None, form: str | None) -> None:
@@ -101,6 +104,7 @@ def export(results: Path, output: Path | None, form: str | None) -> None:
     \b
     robochoc experiment export study.sqlite -o study.csv
     robochoc experiment export study.sqlite --format latex > table.tex
+    robochoc experiment export study.sqlite --format journals -o journals/
     """  # noqa: D301 - \\b is how click is told to leave the lines as they are
     from robochoc.cli.reports.failures import failures_told
     from robochoc.experiments.export import exported
@@ -111,12 +115,32 @@ def export(results: Path, output: Path | None, form: str | None) -> None:
     form = form or (endings.get(output.suffix) if output else None) or "csv"
     if form == "parquet" and output is None:
         raise click.UsageError("Parquet is binary: name a file with -o.")
+    if form == JOURNALS:
+        _write_journals(results, output)
+        return
     with failures_told(results):
         content = exported(read_results(results), form)
     if output is None:
         click.echo(content, nl=False)
     else:
         write_atomically(output, content)
+
+
+def _write_journals(results: Path, folder: Path | None) -> None:
+    """Write each journal to a file of the folder, called by the run's key."""
+    from robochoc.experiments.store import journals
+    from robochoc.system.files import write_atomically
+
+    if folder is None:
+        raise click.UsageError("Journals are files: name a folder with -o.")
+    written = 0
+    for key, content in journals(results):
+        folder.mkdir(parents=True, exist_ok=True)
+        write_atomically(folder / f"{key}.journal", content)
+        written += 1
+    if not written:
+        raise Failure(USAGE, f'{results} has no journals; say record = ["journal"] in the study')
+    click.echo(f"{folder}: {written:,} journals", err=True)
 
 
 @experiment.command(short_help="Report on the results: a page, or figures for a paper.")

@@ -50,7 +50,7 @@ if TYPE_CHECKING:
     from robochoc.cli.reports.closed_loop import FlownMission
     from robochoc.communication.kill_schedule import Kill
     from robochoc.formats.problems import ReadProblem
-    from robochoc.journal.journal import Header, JournalRecorder
+    from robochoc.journal.journal import JournalRecorder
     from robochoc.model.outcome import Outcome
     from robochoc.model.problem import Team
     from robochoc.ros.closed_loop import ClosedLoop
@@ -62,7 +62,7 @@ _SECTIONS: Sections = {
         "--protocol", "--runtime", "--timeout", "--withdraw", "--verify", "--seed",
         "--json", "--html", "--journal", "--sniff", "--help",
     ),
-    "Search": ("--order", "--set", "--messages", "--count", "--with"),
+    "Search": ("--order", "--set", "--messages", "--ncccs", "--cycles", "--count", "--with"),
     "Losses of robots (processes and network)": ("--on-loss", "--spare", "--patience", "--kill"),
     "Messages on their way": ("--schedule", "--delay", "--channel", "--filter"),
     "Robots with several variables": ("--local-solutions", "--local-timeout", "--ace", "--no-cache"),
@@ -103,12 +103,10 @@ _SECTIONS: Sections = {
 )
 @click.option(
     "--schedule",
-    type=click.Choice(["concurrent", "one-by-one", "random"]),
+    type=click.Choice(["concurrent", "cycles", "one-by-one", "random"]),
     default="concurrent",
-    show_default=True,
     metavar="NAME",
-    help="Simulator. concurrent: time counts constraint checks; one-by-one: the same, and robots answer each message"
-    " before they read the next; random: channels take random turns.",
+    help="Simulator: concurrent (default), one-by-one (messages), cycles (all in step), or random (channels).",
 )
 @click.option(
     "--delay",
@@ -132,6 +130,18 @@ _SECTIONS: Sections = {
 )
 @withdraw_option
 @messages_option
+@click.option(
+    "--ncccs",
+    type=click.IntRange(1),
+    metavar="N",
+    help="Simulator: stop after N non-concurrent constraint checks.",
+)
+@click.option(
+    "--cycles",
+    type=click.IntRange(1),
+    metavar="N",
+    help="Stop after N cycles of --schedule cycles.",
+)
 @click.option(
     "--on-loss",
     type=click.Choice(["fail", "withdraw"]),
@@ -276,8 +286,9 @@ def _recorded(folder: Path, options: Options, products: Products, wanted: Wanted
     protocol = wanted.protocol or default_protocol(team.kind)
     order = order_for(team, wanted.order, problem.names)
     options = replace(options, protocol=protocol, order=order, kill=_called(options.kill, problem))
-    header = partial(_header, team, options)
-    from robochoc.run.objective import objective_to_record
+    from robochoc.run.recording import journal_header, objective_to_record
+
+    header = partial(journal_header, team, options)
 
     objective = None if wanted.ros.situation else objective_to_record(team, options)
     with (
@@ -309,22 +320,6 @@ def _run(team: Team, options: Options, recorder: JournalRecorder | None, loop: C
         recorder.outcome = outcome
         recorder.close()  # before anything else goes to where it may be written
     return outcome
-
-
-def _header(team: Team, options: Options) -> Header:
-    """Return the journal's header for the run."""
-    from msgspec import UNSET
-
-    from robochoc.journal.journal import Header
-
-    return Header(
-        team=team.name,
-        protocol=options.protocol,
-        runtime=options.runtime,
-        seed=options.seed,
-        order=options.order or UNSET,
-        channel=options.channel.name if options.channel else UNSET,
-    )
 
 
 def _tell(problem: ReadProblem, outcome: Outcome, wanted: Wanted) -> None:

@@ -60,7 +60,7 @@ flight_options = _optional(
         "--distance",
         type=Finite(0, min_open=True),
         metavar="METRES",
-        help="Minimum distance between drones.  [default: 0.5 or less]",
+        help="Distance that drones keep.  [default: 0.5 or less]",
     ),
     click.option("--wind", type=WindType(), metavar="X[,Y,Z]", help="Wind, in m/s."),
     click.option("--gusts", type=Finite(0), metavar="M/S", help="Strength of gusts, in m/s."),

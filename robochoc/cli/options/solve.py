@@ -106,7 +106,10 @@ filter_option = click.option(
 )
 
 
-_SAME_NAMES = ("seed", "timeout", "delay", "count", "verify", "messages", "spares", "patience", "filters", "kill")
+_SAME_NAMES = (
+    "seed", "timeout", "delay", "count", "verify", "messages", "ncccs", "cycles", "spares", "patience", "filters",
+    "kill",
+)  # fmt: skip
 """Arguments of `robochoc solve` that are called as in `robochoc.run.Options`."""
 
 

@@ -161,8 +161,13 @@ def _metrics(outcome: Outcome) -> str:
     total = sum(spent.messages.values())
     return (
         f"{total:,} message{'s' * (total != 1)} ({types or 'none'}), {spent.bytes:,} bytes{_largest(spent)},"
-        f" {spent.ncccs:,} NCCCs, {spent.checks:,} checks, {spent.wall_s:.2f} s{_local(spent)}"
+        f" {spent.ncccs:,} NCCCs, {spent.checks:,} checks,{_cycles(spent)} {spent.wall_s:.2f} s{_local(spent)}"
     )
+
+
+def _cycles(spent: Metrics) -> str:
+    """Return the number of cycles, if they were counted."""
+    return f" {spent.cycles:,} cycle{'s' * (spent.cycles != 1)}," if spent.cycles else ""
 
 
 def _largest(spent: Metrics) -> str:

@@ -48,6 +48,16 @@ class Schedule(ABC):
         """Simulated seconds until the last robot had finished; 0 where time is not counted in seconds."""
         return 0.0
 
+    @property
+    def cycles(self) -> int:
+        """Cycles that have begun; 0 where time is not counted in cycles."""
+        return 0
+
+    @property
+    def next_cycle(self) -> int:
+        """The cycle in which the next packet arrives; 0 where there is none, or time is not counted in cycles."""
+        return 0
+
 
 class Concurrent(Schedule):
     """All robots compute at the same time, and time is counted in constraint checks. The default.
@@ -121,6 +131,49 @@ class Concurrent(Schedule):
 
     def _note(self, robot: str) -> None:
         heapq.heappush(self._agenda, (self._wakes(robot), self._chance.random(), robot))
+
+
+class Cycles(Schedule):
+    """All robots go in step: in each cycle, each takes in all that was sent to it in the cycle before.
+
+    The synchronous simulator by which Yokoo, Durfee, Ishida and Kuwabara (1998, section 6) and Modi, Shen, Tambe and
+    Yokoo (2005, section 6) count cycles. The start is no cycle. Within a cycle robots are drawn by the seed; no
+    protocol can tell.
+    """
+
+    def __init__(self, seed: int) -> None:
+        self._chance = random.Random(seed)  # noqa: S311 - a schedule is no secret
+        self._packets: list[list[Envelope]] = []
+        self._sent: dict[str, list[Envelope]] = {}
+
+    @property
+    def cycles(self) -> int:
+        """Cycles that have begun."""
+        return self.now
+
+    @property
+    def next_cycle(self) -> int:
+        """The cycle in which the next packet arrives; 0 where there is none."""
+        return self.now if self._packets else self.now + 1 if self._sent else 0
+
+    def put(self, envelope: Envelope, checks: int = 0) -> None:  # noqa: ARG002 - a cycle is as long as it takes
+        """Send `envelope`: it arrives in the next cycle."""
+        self._sent.setdefault(envelope.receiver, []).append(envelope)
+
+    def get(self) -> Sequence[Envelope]:
+        """Return what has been sent to a robot that has not had its turn in this cycle."""
+        if not self._packets and self._sent:
+            self.now += 1
+            self._packets = list(self._sent.values())
+            self._sent = {}
+            self._chance.shuffle(self._packets)
+        return self._packets.pop() if self._packets else ()
+
+    def clear(self) -> None:
+        """Drop all messages under way; cycles are counted from 0 again."""
+        self._packets.clear()
+        self._sent.clear()
+        self.now = 0
 
 
 class RandomChannels(Schedule):

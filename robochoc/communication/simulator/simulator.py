@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import partial
 
 from robochoc.communication.host import Host
@@ -17,7 +17,7 @@ from robochoc.communication.session import Epoch, Session
 from robochoc.communication.simulator.schedule import Schedule
 from robochoc.journal.events import Observer
 from robochoc.model.message import Envelope
-from robochoc.model.outcome import Verdict
+from robochoc.model.outcome import Metrics, Verdict
 from robochoc.model.problem import Team
 from robochoc.protocols.protocol import Protocol
 from robochoc.solver.agent_problem import DEFAULT_PARAMETERS, AgentProblem, RunParameters
@@ -25,6 +25,22 @@ from robochoc.solver.compiled_team import CompiledTeam
 
 PROGRESS_EVERY = 256
 """Packets between two reports of progress."""
+
+
+@dataclass(frozen=True)
+class EffortLimits:
+    """Limits on what all searches of a simulation take together. None: no limit.
+
+    Attributes:
+        ncccs: Non-concurrent constraint checks.
+        cycles: Cycles, where the schedule counts them.
+    """
+
+    ncccs: int | None = None
+    cycles: int | None = None
+
+
+NO_LIMITS = EffortLimits()
 
 
 class Simulation(Session):
@@ -37,6 +53,7 @@ class Simulation(Session):
         observer: Receives all events, with the schedule's time.
         progress: Receives the count of messages now and then.
         parameters: What robots are given besides the problem.
+        limits: On what the searches take. They are looked at after each packet.
     """
 
     def __init__(
@@ -48,14 +65,16 @@ class Simulation(Session):
         observer: Observer | None = None,
         progress: Callable[[Progress], None] | None = None,
         parameters: RunParameters = DEFAULT_PARAMETERS,
+        limits: EffortLimits = NO_LIMITS,
     ) -> None:
         super().__init__(team)
         self._protocol = protocol
         self._schedule = schedule
         self._observer = observer
         self._progress = progress
+        self._limits = limits
         self._lossless = True
-        self._checks = 0
+        self._checks = self._ncccs = 0
         self._verdict: Verdict | None = None
         self._witness: str | None = None
         parts = Epoch(self.compiled, parameters=parameters).parts(protocol)
@@ -71,7 +90,7 @@ class Simulation(Session):
         began = time.monotonic()
         if self._verdict is None:
             self._play(began, timeout, messages)
-        simulated_s = self._schedule.elapsed_s
+        simulated_s, cycles = self._schedule.elapsed_s, self._schedule.cycles
         self._schedule.clear()
         result = RunResult.of(
             self._verdict or Verdict.UNKNOWN,
@@ -80,7 +99,8 @@ class Simulation(Session):
             [host.metrics() for host in self._hosts.values()],
             time.monotonic() - began,
         )
-        metrics = replace(result.metrics, simulated_s=simulated_s)
+        metrics = replace(result.metrics, simulated_s=simulated_s, cycles=cycles)
+        self._limits = _left(self._limits, metrics)
         findings = {name: host.protocol.findings for name, host in self._hosts.items()}
         return replace(result, metrics=metrics, findings=findings)
 
@@ -88,6 +108,7 @@ class Simulation(Session):
         """See `Session.change`."""
         self.compiled = epoch.compiled
         self._verdict = self._witness = None
+        self._ncccs = 0
         before = self._hosts
         self._hosts = {}
         for name, part in epoch.parts(self._protocol).items():
@@ -119,6 +140,10 @@ class Simulation(Session):
                 return
             if messages is not None and self._sent() >= messages:
                 return
+            if self._limits.ncccs is not None and self._ncccs >= self._limits.ncccs:
+                return
+            if self._limits.cycles is not None and self._schedule.next_cycle > self._limits.cycles:
+                return
             if self._progress and packets % PROGRESS_EVERY == 0:
                 self._progress(Progress(self._sent(), elapsed_s))
             packet = self._schedule.get()
@@ -136,6 +161,7 @@ class Simulation(Session):
         for envelope, checks in zip(envelopes, host.said_at, strict=True):
             self._schedule.put(envelope, checks - self._checks)
         self._schedule.done(host.name, host.clock, host.checks - self._checks)
+        self._ncccs = max(self._ncccs, host.clock)
         self._note_verdict(host)
 
     def _time(self, checks: int) -> float:
@@ -148,3 +174,10 @@ class Simulation(Session):
 
     def _sent(self) -> int:
         return sum(sum(host.sent.values()) for host in self._hosts.values())
+
+
+def _left(limits: EffortLimits, spent: Metrics) -> EffortLimits:
+    """Return what is left of `limits` after a search."""
+    ncccs = None if limits.ncccs is None else max(0, limits.ncccs - spent.ncccs)
+    cycles = None if limits.cycles is None else max(0, limits.cycles - spent.cycles)
+    return EffortLimits(ncccs, cycles)

@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from robochoc.communication.simulator.schedule import Concurrent, RandomChannels, Schedule
+from robochoc.communication.simulator.schedule import Concurrent, Cycles, RandomChannels, Schedule
 from robochoc.generators.queens3d import queens3d
 from robochoc.generators.random_csp import random_csp
 from robochoc.journal.journal import Header, JournalRecorder, lines_of, metrics_of, read_journal
@@ -100,7 +100,8 @@ def test_a_timeout_holds_where_a_packet_takes_long() -> None:
     longest=st.integers(0, 50),
 )
 def test_channels_are_fifo_and_lose_nothing(sends: list[tuple[str, str, int]], seed: int, longest: int) -> None:
-    for schedule in (RandomChannels(seed), Concurrent(seed, longest), Concurrent(seed, longest, one_by_one=True)):
+    asynchronous = RandomChannels(seed), Concurrent(seed, longest), Concurrent(seed, longest, one_by_one=True)
+    for schedule in (*asynchronous, Cycles(seed)):
         arrived = delivered(schedule, sends)
         for edge in {send[:2] for send in sends}:
             sent = [number for number, send in enumerate(sends) if send[:2] == edge]

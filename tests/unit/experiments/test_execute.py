@@ -9,14 +9,14 @@ import msgspec
 import pytest
 
 from robochoc.experiments.execute import Bench, team_of
-from robochoc.experiments.task import Limits, ProblemSpec, Row, Setup, Status, Task, options_of
+from robochoc.experiments.task import Limits, ProblemSpec, Recording, Row, Setup, Status, Task, options_of
 from robochoc.formats.folder import write_team
 from robochoc.generators.queens3d import queens3d
-from robochoc.journal.events import Improved
+from robochoc.journal.events import Improved, Sent
 from robochoc.journal.journal import Header, JournalRecorder, read_journal
 from robochoc.model.problem import Team
-from robochoc.run.objective import objective_to_record
 from robochoc.run.orchestrator import solve
+from robochoc.run.recording import objective_to_record
 
 RANDOM = ProblemSpec(family="random", parameters={"agents": 6, "domain": 3, "density": 0.5, "tightness": 0.4})
 COSTS = ProblemSpec(
@@ -105,6 +105,36 @@ def test_a_limit_is_a_row_with_what_was_counted_until_then(bench: Bench) -> None
     assert (found.status, found.verdict) == (Status.LIMIT, "unknown")
     assert found.messages is not None
     assert found.messages >= 5
+
+
+def test_limits_on_cycles_and_ncccs(bench: Bench) -> None:
+    in_step = Setup(protocol="abt", schedule="cycles")
+    whole = bench.run(Task(problem=RANDOM, setup=in_step))
+    assert whole.status is Status.DONE
+    assert whole.cycles
+    found = bench.run(Task(problem=RANDOM, setup=in_step, limits=Limits(cycles=whole.cycles - 1)))
+    assert (found.status, found.cycles) == (Status.LIMIT, whole.cycles - 1)
+    found = bench.run(Task(problem=RANDOM, setup=in_step, limits=Limits(ncccs=3)))
+    assert found.status is Status.LIMIT
+    assert row(bench, RANDOM).cycles is None
+
+
+def test_limits_are_for_those_that_can_keep_them() -> None:
+    limits = Limits(timeout=9, messages=8, ncccs=7, cycles=6, memory_mb=5)
+    assert limits.meant_for(Setup(protocol="abt", schedule="cycles")) == limits
+    assert limits.meant_for(Setup(protocol="abt")) == Limits(timeout=9, messages=8, ncccs=7, memory_mb=5)
+    assert limits.meant_for(Setup(protocol="abt", runtime="processes")) == Limits(timeout=9, messages=8, memory_mb=5)
+    assert limits.meant_for(Setup(protocol="central")) == Limits(timeout=9, memory_mb=5)
+
+
+def test_a_journal_is_that_of_the_run(bench: Bench) -> None:
+    found = row(bench, COSTS, {"protocol": "syncbb"}, (Recording.JOURNAL,))
+    journal = read_journal(found.journal)
+    assert (journal.header.protocol, journal.header.seed) == ("syncbb", 3)
+    assert sum(isinstance(event, Sent) for event in journal.events) == found.messages
+    assert any(isinstance(event, Improved) for event in journal.events)
+    assert journal.outcome is not None
+    assert str(journal.outcome.verdict) == found.verdict
 
 
 def test_a_protocol_that_fails_is_a_row(bench: Bench, monkeypatch: pytest.MonkeyPatch) -> None:

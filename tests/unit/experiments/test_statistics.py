@@ -127,3 +127,11 @@ def test_the_cost_over_time_is_that_of_the_last_point_before() -> None:
     assert (at[4.0], at[10.0]) == (8.0, 3.0)
     assert next(cost for spent, cost in at.items() if spent > 6) == 6.0
     assert statistics.cost_bands(rows(a=[1]), "messages") == {}
+
+
+def test_costs_are_drawn_over_cycles_where_they_are_counted() -> None:
+    curve = [(2, 0, 1.0, "9"), (6, 0, 4.0, "5")]
+    given = [row("a", 1, 10, cost_over_time=curve, cycles=8), row("b", 1, 10, cost_over_time=curve, cycles=None)]
+    bands = statistics.cost_bands(given, "cycles")
+    assert list(bands) == ["a"]
+    assert (bands["a"].spent[0], bands["a"].spent[-1], bands["a"].median[-1]) == (1.0, 8.0, 5.0)

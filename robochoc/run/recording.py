@@ -1,0 +1,40 @@
+"""What a recording of a run begins with: its header, and what it weighs the robots' decisions by."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import TYPE_CHECKING
+
+from robochoc.model.costs import normalized
+from robochoc.model.problem import ProblemKind, Team
+from robochoc.run.options import Options, ScheduleName, Withdrawal
+from robochoc.verification.objective import Objective, withdrawal_cost
+
+if TYPE_CHECKING:
+    from robochoc.journal.entries import Header
+
+
+def objective_to_record(team: Team, options: Options) -> Callable[[], Objective] | None:
+    """Return what makes the objective of a run. None where nothing is minimised, or the problem changes."""
+    minimum = options.withdraw is Withdrawal.MINIMUM
+    if team.dynamic or not (minimum or team.kind is ProblemKind.DISWCSP):
+        return None
+    counted = normalized(team)
+    in_step = options.schedule is ScheduleName.CYCLES
+    return lambda: Objective(counted, withdrawal_cost(counted) if minimum else None, in_step=in_step)
+
+
+def journal_header(team: Team, options: Options) -> Header:
+    """Return the header of the run's journal."""
+    from msgspec import UNSET  # noqa: PLC0415 - start-up: seldom asked for
+
+    from robochoc.journal.entries import Header  # noqa: PLC0415 - as above
+
+    return Header(
+        team=team.name,
+        protocol=options.protocol,
+        runtime=options.runtime,
+        seed=options.seed,
+        order=options.order or UNSET,
+        channel=options.channel.name if options.channel else UNSET,
+    )
