@@ -46,7 +46,7 @@ def test_the_page_has_medians_endings_problems_pairs_and_the_study() -> None:
     assert tables(page, "### NCCCs") == [heads, *lines]
     assert tables(page, "## How runs ended")[1:] == summary.endings(results.rows)[1]
     decided = tables(page, "## Problems with a solution")
-    assert decided[0] == ["tightness", "all", "with a solution", "without"]
+    assert decided[0] == ["tightness", "problems", "with a solution", "without"]
     assert decided[1] == ["0.2", "3", "3", "0"]
     assert int(decided[2][3]) == 3 - int(decided[2][2]) > 0
     assert [line[:2] for line in tables(page, "### Pairs: messages")[1:]] == [["abt / afc-ng", "6"]]
