@@ -4,11 +4,8 @@ from __future__ import annotations
 
 import os
 import platform
-import sys
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from importlib import import_module
-from importlib.util import find_spec
 
 Row = tuple[str, ...]
 
@@ -42,12 +39,3 @@ def machine() -> str:
 
 def _line(cells: Iterable[str]) -> str:
     return f"| {' | '.join(cells)} |"
-
-
-def draw(part: str) -> None:
-    """Draw the pictures of `part`, if matplotlib is here."""
-    if find_spec("matplotlib") is None:
-        print("  pictures: skipped, as matplotlib is not installed (pip install -e '.[bench]')", file=sys.stderr)
-        return
-    plots = import_module("plots")
-    plots.DRAWN[part]()

@@ -1,6 +1,7 @@
 """Benchmarks. Without PART, measure all short parts and write RESULTS.md. With PART, measure these and print them.
 
-Sections of RESULTS.md whose parts are not measured stay as they are.
+Sections of RESULTS.md whose parts are not measured stay as they are. Studies are parts, too: `robochoc experiment`
+carries them out, and writes their pages in results/.
 """
 
 from __future__ import annotations
@@ -12,23 +13,18 @@ import time
 from collections.abc import Callable
 from pathlib import Path
 
-import channels
 import command_time
-import dynamic
 import flagship
 import flight
 import journals
-import local_search
 import network
-import optimum
+import own_studies
 import peers
 import simulator
 import sniffer
 import solver
 import start_up
-import sweep
 import transport
-import variants
 from measure import RUNS
 from report import Section, machine
 
@@ -44,12 +40,6 @@ PARTS: dict[str, Callable[[], Section]] = {
     "flight": flight.measured,
 }
 LONG: dict[str, Callable[[], Section]] = {
-    "sweep": sweep.measured,
-    "variants": variants.measured,
-    "dynamic": dynamic.measured,
-    "optimum": optimum.measured,
-    "local_search": local_search.measured,
-    "channels": channels.measured,
     "network": network.measured,
     "sniffer": sniffer.measured,
 }
@@ -72,16 +62,17 @@ def main() -> None:
     parser.add_argument("--write", action="store_true", help="rewrite the sections of these parts in RESULTS.md")
     options = parser.parse_args()
     chosen: list[str] = options.parts
-    if strange := [part for part in chosen if part not in ALL]:
-        parser.error(f"no part {strange[0]!r}; there are: {', '.join(ALL)}")
+    if strange := [part for part in chosen if part not in {*ALL, *own_studies.names()}]:
+        parser.error(f"no part {strange[0]!r}; there are: {', '.join([*ALL, *own_studies.names()])}")
     began = time.monotonic()
-    sections = {part: str(_measured(part)) for part in chosen or PARTS}
-    if options.write or not chosen:
+    sections = {part: str(_measured(part)) for part in chosen or PARTS if part in ALL}
+    pages = [own_studies.page_of(name) for name in own_studies.names() if name in chosen]
+    if options.write or pages or not chosen:
         kept = _written()
         every = [sections.get(part) or kept.get(part) for part in dict.fromkeys((*kept, *ALL))]
-        RESULTS.write_text("\n\n".join([_head(), *filter(None, every)]) + "\n")
+        RESULTS.write_text("\n\n".join([_head(), own_studies.listed(), *filter(None, every)]) + "\n")
         print(f"{RESULTS}: written, after {time.monotonic() - began:.0f} s", file=sys.stderr)
-    print("\n\n".join([_head(), *sections.values()]))
+    print("\n\n".join([_head(), *sections.values(), *pages]))
 
 
 def _parts() -> str:
@@ -91,6 +82,7 @@ def _parts() -> str:
         for name, measured in names.items():
             words = str(sys.modules[measured.__module__].__doc__).splitlines()[0]
             lines.append(f"  {name:12} {words.partition(': ')[2]}{kind}")
+    lines += ["studies (a page each, in results/):", *(f"  {name}" for name in own_studies.names())]
     lines += [
         "decided, not measured any more (see RESULTS.md):",
         *(f"  {name:12} {what}" for name, what in DECIDED.items()),
@@ -105,6 +97,8 @@ def _written() -> dict[str, str]:
     sections = re.split(r"^(?=## )", RESULTS.read_text(), flags=re.MULTILINE)[1:]
     found = {}
     for text in sections:
+        if text.startswith(own_studies.HEADING):
+            continue
         repeated = re.search(r"^Repeat: `python benchmarks/run.py (\w+)`", text, re.MULTILINE)
         found[repeated[1] if repeated else text.partition("\n")[0]] = text.strip()
     return found

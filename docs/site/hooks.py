@@ -30,12 +30,17 @@ ROOT = Path(__file__).parents[2]
 DOCS = ROOT / "docs"
 LANGUAGES = {".xml": "xml", ".py": "python", ".toml": "toml"}
 PROTOCOLS = "reference/protocols/index.md"
-MOVED = {"benchmarks/RESULTS.md": "reference/results.md", "CHANGELOG.md": "reference/changes.md"}
+STUDIES = {
+    f"benchmarks/results/{page.name}": f"reference/results/{page.name}"
+    for page in sorted((ROOT / "benchmarks" / "results").glob("*.md"))
+}
+"""The pages of our own studies, and those of the site."""
+MOVED = {"benchmarks/RESULTS.md": "reference/results.md", "CHANGELOG.md": "reference/changes.md", **STUDIES}
 """Files of the repository that are pages of the site, under these names."""
 
 
 def on_config(config: MkDocsConfig) -> MkDocsConfig:
-    """Put the protocols' and the examples' pages into the navigation, beside their lists."""
+    """Put the pages of protocols, examples and studies into the navigation, beside their lists."""
     names = sorted(Path(name).stem for name in protocol_pages() if name != PROTOCOLS)
     protocols = [{name: f"reference/protocols/{name}.md"} for name in names]
     for section in config.nav or []:
@@ -43,19 +48,20 @@ def on_config(config: MkDocsConfig) -> MkDocsConfig:
             if isinstance(pages, list) and PROTOCOLS in pages:
                 pages[pages.index(PROTOCOLS)] = {"Protocols": [PROTOCOLS, *protocols]}
                 pages.append({"Examples": [*example_pages()]})
+                pages.append({"Studies": [*STUDIES.values()]})
     return config
 
 
 def on_files(files: Files, config: MkDocsConfig) -> Files:
-    """Add the generated pages, and the pictures of the benchmarks."""
+    """Add the generated pages, and the files of the studies."""
     from mkdocs.structure.files import File  # noqa: PLC0415 - this module is also read where MkDocs is not installed
 
     pages = {**protocol_pages(), **example_pages()}
     pages |= {name: with_links((ROOT / path).read_text(), path, name) for path, name in MOVED.items()}
     for name, text in pages.items():
         files.append(File.generated(config, name, content=text))
-    for picture in (ROOT / "benchmarks" / "plots").glob("*.svg"):
-        files.append(File.generated(config, f"reference/plots/{picture.name}", abs_src_path=str(picture)))
+    for study in (ROOT / "benchmarks" / "studies").glob("*.toml"):
+        files.append(File.generated(config, f"reference/studies/{study.name}", abs_src_path=str(study)))
     return files
 
 
@@ -83,7 +89,7 @@ def page_of(path: str) -> str:
     """Return the name of the site's page for a file or folder of the repository."""
     if path in MOVED:
         return MOVED[path]
-    if path.startswith("benchmarks/plots/"):
+    if path.startswith("benchmarks/studies/"):
         return path.replace("benchmarks", "reference", 1)
     if re.fullmatch(r"docs/examples/[a-z]+", path):
         return f"{path.removeprefix('docs/')}/index.md"

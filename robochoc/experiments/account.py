@@ -75,7 +75,7 @@ class Account:
         return ranking.answers(self.rows, self.metrics)
 
     def pairs(self, *, first_only: bool = False) -> Iterator[tuple[str, Table]]:
-        """Yield for each metric that is compared its name, and a table of pairs.
+        """Yield for each metric that is compared its name, and a table of pairs; none where no test was possible.
 
         Args:
             first_only: Whether only pairs with the first way to run are told of. The tests are of all pairs.
@@ -85,7 +85,7 @@ class Account:
                 first = summary.labels(rows)[0]
                 found = statistics.comparisons(rows, metric)
                 shown = [one for one in found if not first_only or one.one == first]
-                if any(one.one_better or one.other_better for one in shown):
+                if any(one.p is not None for one in shown):
                     yield headed(summary.METRICS[metric], part), self._table_of(shown)
 
     def _table_of(self, pairs: Sequence[statistics.Comparison]) -> Table:

@@ -85,7 +85,8 @@ def _lying(table: Table) -> Table:
 
 def _solved(told: Account) -> Iterator[str]:
     """Yield how many problems have a solution; nothing where all that were decided have one."""
-    tables = [(part, summary.solved(rows, told.over)) for part, rows in told.parts]
+    over = "problems" if "case" in told.rows[0] else told.over
+    tables = [(part, summary.solved(rows, over)) for part, rows in told.parts]
     if any(line[3] != "0" for _, (_, lines) in tables for line in lines):
         yield "## Problems with a solution"
         for part, table in tables:

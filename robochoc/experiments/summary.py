@@ -242,6 +242,27 @@ def medians(rows: Rows, metric: str, over: str) -> Table:
     return [over, *ways], lines
 
 
+def reached(rows: Rows, over: str) -> Table:
+    """Return how many runs came to the best cost that any run of the same problem has come to, and of how many."""
+    best: dict[str, float] = {}
+    for row in rows:
+        if _counts(row, "cost"):
+            better = max if row["maximises"] else min
+            best[row["digest"]] = better(best.get(row["digest"], row["cost"]), row["cost"])
+    counts: dict[tuple[Any, str], list[bool]] = {}
+    for row in rows:
+        counts.setdefault((row.get(over), str(row["label"])), []).append(
+            _counts(row, "cost") and row["cost"] == best[row["digest"]]
+        )
+    ways = labels(rows)
+    lines = [[str(value), *(_share(counts.get((value, way), [])) for way in ways)] for value in values_of(rows, over)]
+    return [over, *ways], lines
+
+
+def _share(found: Sequence[bool]) -> str:
+    return f"{sum(found)} of {len(found)}" if found else "-"
+
+
 def endings(rows: Rows) -> Table:
     """Return how runs have ended, a line for each way to run: their verdicts, or why they have none."""
     kinds = Counter(_ending(row) for row in rows)

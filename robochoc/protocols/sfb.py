@@ -31,6 +31,8 @@ up, with the charges of the values and an upper bound on all costs. The last rob
 that is cheaper than all before goes up the order, and every robot stores its value in it; CPAs carry its cost down.
 When the first robot has nothing left to extend, the last solution is optimal, or there is none.
 
+The proof, and how it compares: docs/explanation/sfb.md.
+
 Constraints may be n-ary: the last but one robot of a scope adds the costs that the last one will pay. Costs are read
 from tables that are made before the search (see `LocalProblem.tables`), so all constraint checks are done by then.
 

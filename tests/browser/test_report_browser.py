@@ -61,3 +61,22 @@ def test_figures_for_a_paper(results: Path, tmp_path: Path) -> None:
     assert (refused.returncode, "is there already (--force replaces figures)" in refused.stderr) == (1, True)
     assert robochoc_within("experiment", "report", results, "-o", folder, "--force").returncode == 0
     assert {path.name: path.read_bytes() for path in folder.iterdir()} == first
+
+
+@pytest.mark.usefixtures("results")  # as it says: fonts
+def test_parts_have_figures_and_tables_of_their_own(tmp_path: Path) -> None:
+    path = tmp_path / "costs.sqlite"
+    results_of(COSTS + '[report]\nover = "problem_seed"\neach = "agents"\nmetrics = ["messages"]\n', path)
+    done = robochoc_within("experiment", "report", path, "-o", tmp_path / "figures")
+    assert done.returncode == 0, done.stderr
+    names = {file.name for file in (tmp_path / "figures").iterdir()}
+    wanted = {
+        f"{name}-agents-{agents}.{end}"
+        for name, end in (("medians", "tex"), ("profile-messages", "svg"))
+        for agents in (5, 7)
+    }
+    assert wanted <= names
+    assert "agents 5" in (tmp_path / "figures" / "medians-agents-5.tex").read_text()
+    assert robochoc_within("experiment", "report", path, "-o", tmp_path / "page.html").returncode == 0
+    page = (tmp_path / "page.html").read_text()
+    assert all(f"<h3>messages: agents {agents}</h3>" in page for agents in (5, 7))

@@ -109,6 +109,16 @@ def test_export(tmp_path: Path) -> None:
     assert (refused.returncode, "name a file with -o" in refused.stderr) == (2, True)
 
 
+def test_a_report_in_markdown(tmp_path: Path) -> None:
+    pytest.importorskip("scipy")
+    results_of(COSTS + '[report]\neach = "agents"\nover = "cycles"\nmetrics = ["cost"]\n', tmp_path / "costs.sqlite")
+    done = robochoc_within("experiment", "report", tmp_path / "costs.sqlite", "-o", tmp_path / "costs.md")
+    assert (done.returncode, done.stderr) == (0, f"{tmp_path / 'costs.md'}: written\n")
+    assert "### cost: agents 5\n\n| cycles | sfb |" in (tmp_path / "costs.md").read_text()
+    shown = robochoc_within("experiment", "show", tmp_path / "costs.sqlite").stdout
+    assert "cost, median, agents 5\ncycles" in shown
+
+
 def test_what_a_file_says_does_not_reach_the_terminal_as_it_is(tmp_path: Path) -> None:
     text = 'title = "\\u001b[2J"\n' + SMALL
     path = tmp_path / "study.toml"

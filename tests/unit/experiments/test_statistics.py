@@ -89,6 +89,20 @@ def test_own_instances_have_a_line_for_all() -> None:
     assert heads == ["instance", "a", "b"]
 
 
+def test_how_many_runs_reach_the_best_known_cost() -> None:
+    """Problems that are maximised the other way round, and without a solution no cost is reached."""
+    given = [
+        {**row("dsa", 0, 1), "digest": "a", "cost": 3, "maximises": False, "size": 1},
+        {**row("mgm", 0, 1), "digest": "a", "cost": 4, "maximises": False, "size": 1},
+        {**row("dsa", 1, 1), "digest": "b", "cost": 3, "maximises": True, "size": 1},
+        {**row("mgm", 1, 1), "digest": "b", "cost": 4, "maximises": True, "size": 1},
+        {**row("dsa", 2, 1), "digest": "c", "cost": None, "maximises": False, "size": 2},
+    ]
+    heads, lines = summary.reached(given, "size")
+    assert heads == ["size", "dsa", "mgm"]
+    assert lines == [["1", "1 of 2", "1 of 2"], ["2", "0 of 1", "-"]]
+
+
 def test_the_interval_of_a_median() -> None:
     assert statistics.median_interval([7]) == statistics.Interval(7, 7, 7)
     found = statistics.median_interval([float(value) for value in range(101)])
