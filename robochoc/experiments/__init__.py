@@ -12,7 +12,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from robochoc.experiments.store import read as read
+    from robochoc.experiments.results import read as read
 
 __all__ = ["read"]
 
@@ -20,7 +20,7 @@ __all__ = ["read"]
 def __getattr__(name: str) -> object:
     """Import what is asked for: who runs `robochoc experiment --help` waits for no database."""
     if name == "read":
-        from robochoc.experiments.store import read  # noqa: PLC0415 - as the docstring says
+        from robochoc.experiments.results import read  # noqa: PLC0415 - as the docstring says
 
         return read
     raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

@@ -6,7 +6,7 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 from robochoc.experiments import ranking, statistics, summary
-from robochoc.experiments.store import Results
+from robochoc.experiments.results import Results
 from robochoc.experiments.study import study_wishes
 from robochoc.experiments.summary import CENSORED, Rows, Table
 from robochoc.formats.diagnostics import Diagnostic, InvalidInputError, encodable
@@ -35,7 +35,7 @@ class Account:
     """
 
     def __init__(self, results: Results, over: str | None) -> None:
-        self.name, self.title, self.text, self.planned, rows = results
+        self.name, self.title, self.text, self.stopped, self.planned, rows = results
         if not rows:
             raise invalid(self.name, "has no results yet", "robochoc experiment run goes on with the study")
         wishes = study_wishes(self.text)
@@ -68,7 +68,10 @@ class Account:
             yield "All runs were in the simulator: counts are exact, and the same wherever they are repeated."
         checked = sum(row["verified"] for row in rows)
         told = f"The answers of {checked:,} runs were checked against every constraint"
-        yield f"{told}, and no two answers to a problem contradict each other."
+        if self.stopped:
+            yield f"{told}. The study was stopped, as two answers contradict each other: {self.stopped}"
+        else:
+            yield f"{told}, and no two answers to a problem contradict each other."
 
     def answers(self) -> list[str]:
         """Return who needs least, and who does the same as who, a sentence each."""

@@ -11,6 +11,8 @@ from robochoc.communication.simulator.channel import CHANNELS
 from robochoc.experiments.task import Row, Status, Task
 from robochoc.model.outcome import Verdict
 
+_OWN = "PROBLEM"
+"""The folder for what is generated."""
 _Question = tuple[str, str | None]
 
 
@@ -68,7 +70,12 @@ def contradiction(one: Row, other: Row) -> str:
 def repeat(task: Task) -> str:
     """Return the commands that repeat a run by itself."""
     problem, setup = task.problem, task.setup
-    folder = problem.path or "PROBLEM"
+    made = [_generated(problem.family, problem.parameters)] if problem.family else []
+    folder = problem.path or _OWN
+    if problem.scenario:  # into a folder of its own: the team's files are the user's
+        scenario = _options(["robochoc", "generate", "scenario", folder], problem.scenario)
+        made.append(f"{scenario} --force" if problem.family else scenario)
+        folder = _OWN
     words = ["robochoc", "solve", folder, "--protocol", setup.protocol, "--runtime", setup.runtime]
     words += ["--seed", str(task.seed)] * bool(task.seed)
     words += ["--order", setup.order] if setup.order else []
@@ -77,10 +84,10 @@ def repeat(task: Task) -> str:
     words += ["--delay", str(setup.delay)] if setup.delay else []
     words += [f"--withdraw={setup.withdraw}"] if setup.withdraw else []
     words += ["--verify"] * setup.verify
+    words += ["--owner", str(problem.parameters["owner"])] if problem.path and "owner" in problem.parameters else []
     words += [word for name, value in setup.settings.items() for word in ("--set", f"{name}={value}")]
-    made = [_generated(problem.family, problem.parameters, folder)] if problem.family else []
-    if problem.scenario:
-        made.append(_options(["robochoc", "generate", "scenario", folder], problem.scenario, folder, force=True))
+    for name, value in _limits(task).items():
+        words += [f"--{name}", f"{value:g}"]
     return "; ".join([*made, shlex.join(words)])
 
 
@@ -88,14 +95,22 @@ def _channel(name: str) -> str:
     return name if name in CHANNELS else f"{name}.toml"
 
 
-def _generated(family: str, parameters: Mapping[str, Any], folder: str) -> str:
-    return _options(["robochoc", "generate", family], parameters, folder)
+def _limits(task: Task) -> dict[str, float]:
+    """Return the limits, and how a file of another tool is read."""
+    limits, given = task.limits, task.problem.parameters if task.problem.path else {}
+    told = {name: getattr(limits, name) for name in ("timeout", "messages", "ncccs", "cycles")}
+    told |= {name: given.get(name) for name in ("infinity",)}
+    return {name: value for name, value in told.items() if value is not None}
 
 
-def _options(words: list[str], parameters: Mapping[str, Any], folder: str, *, force: bool = False) -> str:
+def _generated(family: str, parameters: Mapping[str, Any]) -> str:
+    return _options(["robochoc", "generate", family], parameters)
+
+
+def _options(words: list[str], parameters: Mapping[str, Any]) -> str:
     for name, value in parameters.items():
         option = f"--{name.replace('_', '-')}"
         several = str(value).split() if name == "kinds" else [str(value)]
         if value is not False:
             words += [option] if value is True else [word for one in several for word in (option, one)]
-    return shlex.join([*words, "-o", folder, *["--force"] * force])
+    return shlex.join([*words, "-o", _OWN])

@@ -15,8 +15,9 @@ from typing import Any, Self
 from robochoc import __version__
 from robochoc.communication.run_result import RobotsLostError
 from robochoc.experiments.observers import CostOverTime, RobotLoads, journal_of, several, written
+from robochoc.experiments.problem_table import digest_of_files
 from robochoc.experiments.task import ProblemSpec, Recording, Row, Status, Task, options_of
-from robochoc.formats.diagnostics import InvalidInputError
+from robochoc.formats.diagnostics import Diagnostic, InvalidInputError
 from robochoc.formats.problems import read_problem
 from robochoc.formats.scenario_writer import team_files
 from robochoc.generators.families import FAMILIES
@@ -24,6 +25,8 @@ from robochoc.generators.scenario import random_scenario
 from robochoc.model.cost_units import Cost, common_units
 from robochoc.model.outcome import Outcome, Verdict
 from robochoc.model.problem import ProblemKind, Team
+from robochoc.run.distributed import FOUND_NOTHING, GAVE_UP
+from robochoc.run.options import CENTRAL
 from robochoc.run.orchestrator import solve
 from robochoc.run.registry import UnknownProtocolError
 from robochoc.solver.ace import AceProcess
@@ -33,6 +36,7 @@ from robochoc.verification.checker import RefutedError
 KEPT = 4
 """Problems that are kept: the runs of one problem follow each other."""
 _DIGEST_BYTES = 16
+CHANGED = "run the study again"
 _STATUS_OF: tuple[tuple[type[Exception], Status], ...] = (
     (InvalidInputError, Status.INVALID),
     (UnsupportedError, Status.REFUSED),
@@ -98,7 +102,9 @@ class Bench(AbstractContextManager["Bench"]):
             while len(self._teams) >= KEPT:
                 del self._teams[next(iter(self._teams))]
             team = team_of(problem)
-            self._teams[identity] = team, problem.digest or digest_of(team)
+            if problem.digest and digest_of_files(Path(problem.path)) != problem.digest:
+                raise InvalidInputError([Diagnostic(problem.path, 0, "has changed since the study began", CHANGED)])
+            self._teams[identity] = team, digest_of(team)
         return self._teams[identity]
 
 
@@ -123,7 +129,7 @@ def team_of(problem: ProblemSpec) -> Team:
 
 
 def digest_of(team: Team) -> str:
-    """Return the digest of what the robots' files would hold."""
+    """Return the digest of what the robots' files would hold: however it came about, it is the same problem."""
     content = hashlib.blake2b(digest_size=_DIGEST_BYTES)
     for name, file in team_files(team).items():
         content.update(f"{name}\0{len(file)}\0".encode())
@@ -138,6 +144,8 @@ def machine() -> str:
 
 
 def _status(error: Exception, otherwise: Status) -> Status:
+    if isinstance(error, RobotsLostError) and MemoryError.__name__ in str(error):
+        return Status.MEMORY
     return next((status for kind, status in _STATUS_OF if isinstance(error, kind)), otherwise)
 
 
@@ -157,15 +165,20 @@ def _describe(row: Row, team: Team, digest: str) -> None:
 def _fill(row: Row, outcome: Outcome, team: Team) -> None:
     """Write what an outcome says into its row."""
     metrics = outcome.metrics
-    row.status = Status.LIMIT if outcome.verdict is Verdict.UNKNOWN else Status.DONE
+    row.status = Status.DONE
+    if outcome.verdict is Verdict.UNKNOWN:
+        by_itself = (outcome.reason or "").endswith((GAVE_UP, FOUND_NOTHING))
+        row.status = Status.ENDED if by_itself else Status.LIMIT
     row.reason, row.verdict = outcome.reason, str(outcome.verdict)
     row.cost, row.bound = _exact(outcome.cost if team.kind is ProblemKind.DISWCSP else None), _exact(outcome.bound)
     row.withdrawn, row.verified, row.confirmed = len(outcome.withdrawn), outcome.verified, outcome.confirmed
+    row.wall_s, row.compile_s, row.memory = metrics.wall_s, metrics.compile_s, metrics.memory or None
+    if outcome.protocol == CENTRAL:  # it sends none, and that is no count to compare
+        return
     row.messages_by_type = dict(sorted(metrics.messages.items()))
     row.messages, row.bytes, row.largest = sum(metrics.messages.values()), metrics.bytes, metrics.largest
     row.ncccs, row.checks = metrics.ncccs, metrics.checks
     row.simulated_s, row.cycles = metrics.simulated_s or None, metrics.cycles or None
-    row.wall_s, row.compile_s, row.memory = metrics.wall_s, metrics.compile_s, metrics.memory or None
 
 
 def _exact(cost: Cost | None) -> str | None:

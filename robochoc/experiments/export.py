@@ -10,8 +10,10 @@ from typing import Any
 import msgspec
 
 from robochoc.experiments import summary
-from robochoc.experiments.store import Results
+from robochoc.experiments.results import Results
+from robochoc.experiments.study import study_wishes
 from robochoc.solver.encoding import UnsupportedError
+from robochoc.system.plain_text import on_one_line
 
 _NESTED = ("settings", "messages_by_type", "cost_over_time", "loads")
 """Columns that are JSON where a cell is text."""
@@ -34,7 +36,8 @@ def exported(results: Results, form: str) -> bytes:
         case "json":
             return b"".join(msgspec.json.encode(row) + b"\n" for row in rows)
         case "latex":
-            return latex_table(rows, results.title).encode()
+            wishes = study_wishes(results.text)
+            return latex_table(rows, results.title, wishes.over, wishes.metrics).encode()
         case _:
             return _parquet(rows)
 
@@ -75,23 +78,30 @@ def _parquet(rows: Sequence[Mapping[str, Any]]) -> bytes:
     return bytes(out.getvalue())
 
 
-def latex_table(rows: Sequence[Mapping[str, Any]], title: str, over: str | None = None) -> str:
+def _latex(text: str) -> str:
+    return on_one_line(text).translate(_LATEX)
+
+
+def latex_table(
+    rows: Sequence[Mapping[str, Any]], title: str, over: str | None = None, metrics: Sequence[str] = ()
+) -> str:
     """Return a table of medians in LaTeX, with the rules of the package booktabs: a block for each metric."""
     if not rows:
         return ""
     over = summary.parameter_to_draw_over(rows, over)
+    rows = summary.by_parameter(rows, over)
     ways = summary.labels(rows)
     lines = [
-        f"% {title}: medians; >= marks those that a limit leaves open. Needs \\usepackage{{booktabs}}.",
+        f"% {on_one_line(title)}: medians; >= marks those that a limit leaves open. Needs \\usepackage{{booktabs}}.",
         rf"\begin{{tabular}}{{l{'r' * len(ways)}}}",
         r"\toprule",
     ]
-    for place, metric in enumerate(summary.metrics_to_show(rows)):
+    for place, metric in enumerate(summary.metrics_to_show(rows, metrics)):
         found = summary.samples(rows, metric, over)
         lines += [r"\midrule"] * bool(place)
         heads = [f"{summary.METRICS[metric]}, {over}", *ways]
-        lines += [f"{' & '.join(head.translate(_LATEX) for head in heads)} \\\\", r"\midrule"]
+        lines += [f"{' & '.join(map(_latex, heads))} \\\\", r"\midrule"]
         for value in summary.values_of(rows, over):
             cells = [summary.cell(found.get((value, way))).replace(">= ", r"$\geq$") for way in ways]
-            lines.append(f"{' & '.join([str(value).translate(_LATEX), *cells])} \\\\")
+            lines.append(f"{' & '.join([_latex(str(value)), *cells])} \\\\")
     return "\n".join([*lines, r"\bottomrule", r"\end{tabular}", ""])

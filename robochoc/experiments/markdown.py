@@ -10,7 +10,7 @@ from pathlib import Path
 
 from robochoc.experiments import summary
 from robochoc.experiments.account import PAIRS_TOLD, Account, headed
-from robochoc.experiments.store import Results
+from robochoc.experiments.results import Results
 from robochoc.experiments.summary import METRICS, Table
 from robochoc.system.files import write_atomically
 from robochoc.system.plain_text import on_one_line

@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 import re
 from collections.abc import Iterable, Iterator, Mapping
+from glob import glob, has_magic
 from pathlib import Path
 from typing import Any
 
@@ -41,8 +42,8 @@ def problems_of(table: Mapping[str, Any], place: Place) -> Iterator[ProblemSpec]
     """
     scenarios = list(_scenarios(table, place))
     name = table.get("name", "")
-    if not isinstance(name, str):
-        raise place.mistake("name", f"expected a text, got {shortened(str(name))}")
+    if not isinstance(name, str) or not name.isprintable():
+        raise place.mistake("name", f"expected one line of text, got {shortened(str(name))}")
     rest = {key: value for key, value in table.items() if key not in {"family", "path", "name", "scenario"}}
     if ("family" in table) == ("path" in table):
         families = ", ".join(FAMILIES)
@@ -107,10 +108,10 @@ def _of_files(paths: object, given: Mapping[str, Any], name: str, place: Place) 
     options = list(place.combinations(given))
     for one in options:
         _check_types(one, _OF_FILES, place)
-    for word in place.values("path", paths):
+    for word in paths if isinstance(paths, list) else [paths]:
         if not isinstance(word, str):
             raise place.mistake("path", f"expected the path of a folder or file, got {shortened(str(word))}")
-        found = sorted(place.path.parent.glob(word)) if _has_wildcard(word) else [place.path.parent / word]
+        found = _named(place.path.parent, word)
         problems = [one for path in found for one in _teams(path)]
         if not problems:
             raise place.mistake("path", f"there is no team at {shortened(word)}", "paths begin at the study's folder")
@@ -124,22 +125,32 @@ def _of_files(paths: object, given: Mapping[str, Any], name: str, place: Place) 
                 )
 
 
-def _has_wildcard(word: str) -> bool:
-    return any(sign in word for sign in "*?[") and not word.startswith("/")
+def _named(folder: Path, word: str) -> list[Path]:
+    """Return the paths that a word with or without wildcards names. What is there as it is written has no wildcards."""
+    path = folder / word
+    if path.exists() or not has_magic(word):
+        return [path]
+    return [folder / name for name in sorted(glob(word, root_dir=folder))]  # noqa: PTH207 - also absolute ones
 
 
 def _teams(path: Path) -> list[Path]:
     return list(find_teams(path)) if path.is_dir() else [path] if path.is_file() else []
 
 
-def _digest(path: Path, place: Place) -> str:
-    """Return the digest of the names and contents of a team's files. Raises `InvalidInputError`."""
+def digest_of_files(path: Path) -> str:
+    """Return the digest of the names and contents of a team's files. Raises `OSError`."""
     content = hashlib.blake2b(digest_size=_DIGEST_BYTES)
+    for file in sorted(path.iterdir()) if path.is_dir() else [path]:
+        if file.is_file():
+            held = file.read_bytes()
+            content.update(f"{file.name}\0{len(held)}\0".encode(errors="surrogateescape"))
+            content.update(held)
+    return content.hexdigest()
+
+
+def _digest(path: Path, place: Place) -> str:
+    """Return the digest of a team's files. Raises `InvalidInputError`."""
     try:
-        for file in sorted(path.iterdir()) if path.is_dir() else [path]:
-            if file.is_file():
-                content.update(f"{file.name}\0{file.stat().st_size}\0".encode(errors="surrogateescape"))
-                content.update(file.read_bytes())
+        return digest_of_files(path)
     except OSError as error:
         raise place.mistake("path", f"{error.filename} cannot be read: {error.strerror}") from None
-    return content.hexdigest()

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import math
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
+from robochoc.experiments.statistics import by_problem, case_of
 from robochoc.experiments.summary import METRICS, Rows, labels
-from robochoc.experiments.task import Status
 
 MOST_TOLD = 3
 """Ways that a sentence names."""
@@ -28,52 +27,40 @@ def answers(rows: Rows, metrics: Sequence[str]) -> list[str]:
 
 
 def _least(rows: Rows, metric: str) -> str:
-    """Return in how many cases each way needs least; empty where all need the same."""
-    found = _by_case(rows, metric)
+    """Return in how many cases each way needs least; empty where all need the same.
+
+    A case is a problem, and a value of the parameter of runs; it counts with the median of its runs. Higher utilities
+    are better.
+    """
+    ways = labels(rows)
+    needs = {way: by_problem(rows, way, metric) for way in ways}
+    upwards = {row["digest"] for row in rows if metric == "cost" and row["maximises"]}
     wins: Counter[str] = Counter()
-    decided = 0
-    for values in found.values():
-        best = min(values.values())
-        if best == math.inf:
-            continue
-        decided += 1
+    cases = list(dict.fromkeys(case for values in needs.values() for case in values))
+    for case in cases:
+        values = {way: found[case] for way, found in needs.items() if case in found}
+        best = (max if case[0] in upwards else min)(values.values())
         winners = [way for way, value in values.items() if value == best]
-        if len(winners) < len(labels(rows)):
+        if len(winners) < len(ways):
             wins.update(winners)
     if not wins:
         return ""
     named = [f"{way} in {count:,}" for way, count in wins.most_common(MOST_TOLD)]
     others = len(wins) - len(named)
     rest = f", {others} other{'s' * (others > 1)} in fewer" if others else ""
-    return (
-        f"{'Best' if metric == 'cost' else 'Least'} {METRICS[metric]}: {', '.join(named)} of {decided:,} cases{rest}."
-    )
+    how = "Best" if metric == "cost" else "Least"
+    return f"{how} {METRICS[metric]}: {', '.join(named)} of {len(cases):,} cases{rest}."
 
 
-def _by_case(rows: Rows, metric: str) -> dict[tuple[Any, ...], dict[str, float]]:
-    """Return for each case what each way needs: infinitely much where it has no verdict.
-
-    A case is a problem with a seed and a repetition, and a value of the parameter of runs. Costs of problems that
-    maximise are the less the better, too, with their sign turned.
-    """
-    found: dict[tuple[Any, ...], dict[str, float]] = {}
-    for row in rows:
-        value = math.inf
-        if row["status"] == Status.DONE and row[metric] is not None:
-            value = -row[metric] if metric == "cost" and row["maximises"] else row[metric]
-        found.setdefault(_case(row), {})[str(row["label"])] = value
-    return found
-
-
-def _case(row: Mapping[str, Any]) -> tuple[Any, ...]:
-    return row["digest"], row["seed"], row["repetition"], row.get("case")
+def _run(row: Mapping[str, Any]) -> tuple[Any, ...]:
+    return *case_of(row), row["seed"], row["repetition"]
 
 
 def _twins(rows: Rows) -> Iterator[str]:
     """Yield who has done the same as who in all cases."""
     did: dict[str, dict[tuple[Any, ...], tuple[Any, ...]]] = {}
     for row in rows:
-        did.setdefault(str(row["label"]), {})[_case(row)] = (row["status"], *(row[name] for name in _SEARCHED))
+        did.setdefault(str(row["label"]), {})[_run(row)] = (row["status"], *(row[name] for name in _SEARCHED))
     groups: list[list[str]] = []
     for way, cases in did.items():
         same = next((group for group in groups if did[group[0]] == cases), None)

@@ -11,7 +11,7 @@ from robochoc.experiments import summary
 from robochoc.experiments.account import PAIRS_TOLD, Account, headed, invalid
 from robochoc.experiments.export import latex_table
 from robochoc.experiments.figures import Drawing, drawings, file_name
-from robochoc.experiments.store import Results
+from robochoc.experiments.results import Results
 from robochoc.experiments.summary import METRICS
 from robochoc.system.files import write_atomically
 

@@ -25,8 +25,10 @@ _CHOICES: Mapping[str, Sequence[str]] = {
     "runtime": tuple(map(str, Runtime)),
     "schedule": tuple(map(str, ScheduleName)),
     "withdraw": tuple(map(str, Withdrawal)),
-    "order": (GIVEN, *map(str, Order)),
+    "order": tuple(dict.fromkeys((GIVEN, *map(str, Order)))),
 }
+MOST_SETUPS = 2000
+"""A table stands for no more ways to run."""
 _TOLD = ("order", "runtime", "channel", "schedule", "delay", "withdraw", "verify")
 """What a label may say, besides the protocol and its settings."""
 _OWN_LIMITS = ("timeout", "messages", "ncccs", "cycles")
@@ -65,7 +67,10 @@ def _setups(table: Mapping[str, Any], limits: Mapping[str, Any], place: Place) -
     if not isinstance(settings, dict):
         raise place.mistake("settings", 'expected a table, such as { variant = ["A", "B"] }')
     combined = list(at.combinations(settings))
-    for plain in place.combinations({key: value for key, value in table.items() if key not in _WITHIN}):
+    plain_ones = list(place.combinations({key: value for key, value in table.items() if key not in _WITHIN}))
+    if (count := len(combined) * len(plain_ones)) > MOST_SETUPS:
+        raise place.mistake("", f"stands for {count:,} ways to run; at most {MOST_SETUPS:,} are allowed")
+    for plain in plain_ones:
         for one in combined:
             setup = _setup(plain, {name: _text(value) for name, value in one.items()}, place)
             _refuse(setup, Limits(**limits), place)
@@ -88,9 +93,12 @@ def _setup(plain: Mapping[str, Any], settings: dict[str, str], place: Place) -> 
     if "channel" in given:
         given["channel"] = _channel(given["channel"], place)
     try:
-        return msgspec.convert({**given, "settings": settings}, Setup)
+        setup = msgspec.convert({**given, "settings": settings}, Setup)
     except msgspec.ValidationError as wrong:
         raise place.mistake("", str(wrong)) from None
+    if setup.delay < 0:
+        raise place.mistake("delay", f"expected 0 or more, got {setup.delay}")
+    return setup
 
 
 def _channel(word: object, place: Place) -> ChannelModel:
@@ -123,19 +131,32 @@ def _own_limits(table: Mapping[str, Any], place: Place) -> dict[str, Any]:
 
 def _labelled(setups: Sequence[Setup], label: object, place: Place) -> Iterator[Setup]:
     """Yield the setups of a table, each with a label that says in what it differs from the others."""
-    if label is not None and (not isinstance(label, str) or len(setups) > 1):
-        raise place.mistake("label", "expected a text, in a table that stands for one way to run")
+    if label is not None and (not isinstance(label, str) or len(setups) > 1 or not label.isprintable()):
+        raise place.mistake("label", "expected one line of text, in a table that stands for one way to run")
     for one in setups:
         yield msgspec.structs.replace(one, label=label or " ".join([one.protocol, *_differences(one, setups)]))
 
 
-def distinct(setups: Sequence[Setup]) -> list[Setup]:
-    """Return the setups of all tables, with longer labels where some that differ have the same."""
-    found = []
-    for one in setups:
-        same = [other for other in setups if other.label == one.label]
-        label = " ".join([one.label, *_differences(one, same)])
-        found.append(msgspec.structs.replace(one, label=label))
+def distinct(given: Sequence[tuple[Setup, Limits]]) -> list[Setup]:
+    """Return the setups of all tables, with longer labels where some that differ have the same.
+
+    Args:
+        given: The setups, each with its limits, in which they may differ as well.
+    """
+    found: list[Setup] = []
+    alike: dict[str, list[tuple[Setup, Limits]]] = {}
+    for setup, limits in given:
+        alike.setdefault(setup.label, []).append((setup, limits))
+    for setup, limits in given:
+        same = alike[setup.label]
+        words = _differences(setup, [other for other, _ in same])
+        if len({other.protocol for other, _ in same}) > 1:
+            words.insert(0, setup.protocol)
+        for name in _OWN_LIMITS:
+            several = len({getattr(other, name) for _, other in same}) > 1
+            if several and getattr(limits, name) is not None:
+                words.append(f"{name}={getattr(limits, name)}")
+        found.append(msgspec.structs.replace(setup, label=" ".join([setup.label, *words])))
     return found
 
 

@@ -6,12 +6,12 @@ import itertools
 import os
 import time
 from collections import Counter
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
 from contextlib import AbstractContextManager
 from types import TracebackType
 from typing import NamedTuple, Protocol, Self
 
-from robochoc.experiments.agreement import Agreement
+from robochoc.experiments.agreement import Agreement, DisagreementError
 from robochoc.experiments.plan import plan_of
 from robochoc.experiments.store import Store
 from robochoc.experiments.study import Study
@@ -60,6 +60,7 @@ def run_study(
     *,
     progress: Callable[[StudyProgress], None] | None = None,
     workers: Callable[[int | None], Workers] | None = None,
+    again: Collection[Status] = (),
 ) -> Counter[str]:
     """Run what `study` has and `store` has not.
 
@@ -73,6 +74,7 @@ def run_study(
         progress: It is called after each run.
         workers: Returns what carries out runs in the simulator, instead of this machine; it is given the limit on
             memory in megabytes.
+        again: How runs have ended that are made again, besides those that always are.
 
     Returns:
         How many of the study's runs have which status.
@@ -82,22 +84,34 @@ def run_study(
         TooManyRunsError: if the study has too many runs.
     """
     plan = plan_of(study)
-    there = store.begin(study, plan)
+    there = store.begin(study, plan, again)
     missing = [task for key, task in plan.items() if key not in there]
     agreement = Agreement()
-    _compare_what_is_there(store, plan, agreement)
-    with _Writer(store, agreement, _Clock(len(plan), len(missing), progress)) as writer:
-        for timed, tasks in itertools.groupby(sorted(missing, key=_is_timed), key=_is_timed):
-            bundles = [[*bundle] for _, bundle in itertools.groupby(tasks, key=_problem)]
-            memory_mb = bundles[0][0].limits.memory_mb
-            if timed or workers is None:
-                hands: Workers = LocalWorkers(1 if timed else jobs or _processors(), memory_mb)
-            else:
-                hands = workers(memory_mb)
-            with hands:
-                for task, row in hands.rows(bundles):
-                    writer.take(task, row)
+    try:
+        _compare_what_is_there(store, plan, agreement)
+        with _Writer(store, agreement, _Clock(len(plan), len(missing), progress)) as writer:
+            _run_all(missing, writer, jobs, workers)
+    except DisagreementError as wrong:
+        store.stop(str(wrong))
+        raise
+    store.check_place()
     return Counter(str(row["status"]) for row in store.results().rows)
+
+
+def _run_all(
+    missing: Sequence[Task], writer: _Writer, jobs: int | None, workers: Callable[[int | None], Workers] | None
+) -> None:
+    """Run the missing tasks, those of processes after the others."""
+    for timed, tasks in itertools.groupby(sorted(missing, key=_is_timed), key=_is_timed):
+        bundles = [[*bundle] for _, bundle in itertools.groupby(tasks, key=_problem)]
+        memory_mb = bundles[0][0].limits.memory_mb
+        if timed or workers is None:
+            hands: Workers = LocalWorkers(1 if timed else jobs or _processors(), memory_mb)
+        else:
+            hands = workers(memory_mb)
+        with hands:
+            for task, row in hands.rows(bundles):
+                writer.take(task, row)
 
 
 def _is_timed(task: Task) -> bool:
@@ -133,9 +147,9 @@ class _Clock:
 def _compare_what_is_there(store: Store, plan: dict[str, Task], agreement: Agreement) -> None:
     """Compare the rows of earlier starts. Raises `DisagreementError`."""
     for found in store.results().rows:
-        fields = {name: found[name] for name in Row.__struct_fields__ if name in found}
-        costs = {name: None if fields[name] is None else str(fields[name]) for name in ("cost", "bound")}
-        row = Row(**{**fields, **costs, "status": Status(fields["status"])})
+        compared = {name: found[name] for name in ("team", "digest", "verdict", "withdrawn", "maximises", "reason")}
+        cost = None if found["cost"] is None else str(found["cost"])
+        row = Row(status=Status(found["status"]), cost=cost, **compared)
         agreement.add(plan[found["key"]], row)
 
 

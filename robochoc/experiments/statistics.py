@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 import math
+import statistics
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from types import MappingProxyType
@@ -18,6 +19,7 @@ RESAMPLES = 2000
 CONFIDENCE = 0.95
 _SEED = 0
 """Of the resampling: the same results have the same intervals."""
+MOST_EXACT = 10
 FEWEST_PAIRS = 6
 """With fewer pairs no result of the test can be significant at 5 %."""
 
@@ -103,38 +105,33 @@ def comparisons(rows: Rows, metric: str) -> list[Comparison]:
     found = []
     for at in dict.fromkeys(row.get("case") for row in rows):
         own = [row for row in rows if row.get("case") == at]
-        values = {way: _by_problem(own, way, metric) for way in labels(own)}
+        values = {way: by_problem(own, way, metric) for way in labels(own)}
         pairs = itertools.combinations(values, 2)
         found += [replace(_comparison(one, other, values), at=at) for one, other in pairs]
     return _corrected(found)
 
 
-def _by_problem(rows: Rows, way: str, metric: str) -> dict[str, float]:
+Case = tuple[str, Any]
+"""What two ways to run are compared on: a problem, and the value of the parameter of runs that is drawn over."""
+
+
+def by_problem(rows: Rows, way: str, metric: str) -> dict[Case, float]:
     """Return the median of a metric over a way's runs of each problem, where more than half have a verdict."""
-    runs: dict[str, list[float]] = {}
+    runs: dict[Case, list[float]] = {}
     for row in rows:
         if row["label"] == way:
             known = row["status"] == Status.DONE and row[metric] is not None
-            runs.setdefault(row["digest"], []).append(float(row[metric]) if known else math.inf)
-    medians = {problem: float(np.median(values)) for problem, values in runs.items()}
-    return {problem: median for problem, median in medians.items() if median < math.inf}
+            runs.setdefault(case_of(row), []).append(float(row[metric]) if known else math.inf)
+    medians = {case: statistics.median(values) for case, values in runs.items()}
+    return {case: median for case, median in medians.items() if median < math.inf}
 
 
-def _by_case(rows: Rows, way: str, metric: str) -> dict[tuple[Any, ...], float]:
-    """Return a metric of a way to run, by the case."""
-    return {
-        _case(row): float(row[metric])
-        for row in rows
-        if row["label"] == way and row["status"] == Status.DONE and row[metric] is not None
-    }
+def case_of(row: Mapping[str, Any]) -> Case:
+    """Return the case of a run."""
+    return row["digest"], row.get("case")
 
 
-def _case(row: Mapping[str, Any]) -> tuple[Any, ...]:
-    """Return what a run is of: problem, seed, repetition, and the value drawn over."""
-    return row["digest"], row["seed"], row["repetition"], row.get("case")
-
-
-def _comparison(one: str, other: str, values: Mapping[str, Mapping[str, float]]) -> Comparison:
+def _comparison(one: str, other: str, values: Mapping[str, Mapping[Case, float]]) -> Comparison:
     both = [case for case in values[one] if case in values[other]]
     pairs = [(values[one][case], values[other][case]) for case in both]
     ratios = [a / b for a, b in pairs if b]
@@ -150,13 +147,18 @@ def _comparison(one: str, other: str, values: Mapping[str, Mapping[str, float]])
 
 
 def _wilcoxon(differences: Sequence[float]) -> float | None:
-    """Return the two-sided probability; None for too few differences. Pairs without a difference are left out."""
+    """Return the two-sided probability; None for too few differences. Pairs without a difference are left out.
+
+    With ties it is exact for up to `MOST_EXACT` differences, and approximated else: scipy takes seconds for more.
+    """
     some = [one for one in differences if one]
     if len(some) < FEWEST_PAIRS:
         return None
     from scipy.stats import wilcoxon  # noqa: PLC0415 - an extra
 
-    return float(wilcoxon(some).pvalue)
+    ties = len({abs(one) for one in some}) < len(some)
+    approximate = {"method": "approx", "correction": True} if ties and len(some) > MOST_EXACT else {}
+    return float(wilcoxon(some, **approximate).pvalue)
 
 
 def _corrected(found: Sequence[Comparison]) -> list[Comparison]:
@@ -172,7 +174,7 @@ def _corrected(found: Sequence[Comparison]) -> list[Comparison]:
 
 def cactus(rows: Rows, metric: str) -> dict[str, list[float]]:
     """Return what each way to run needed for the problems that it has solved, in ascending order."""
-    return {way: sorted(_by_case(rows, way, metric).values()) for way in labels(rows)}
+    return {way: sorted(by_problem(rows, way, metric).values()) for way in labels(rows)}
 
 
 def performance_profile(rows: Rows, metric: str) -> dict[str, list[tuple[float, float]]]:
@@ -180,8 +182,8 @@ def performance_profile(rows: Rows, metric: str) -> dict[str, list[tuple[float, 
 
     Dolan and More, "Benchmarking optimization software with performance profiles", Mathematical Programming 91, 2002.
     """
-    values = {way: _by_case(rows, way, metric) for way in labels(rows)}
-    cases = list(dict.fromkeys(map(_case, rows)))
+    values = {way: by_problem(rows, way, metric) for way in labels(rows)}
+    cases = list(dict.fromkeys(map(case_of, rows)))
     best = {case: min((one[case] for one in values.values() if case in one), default=math.inf) for case in cases}
     profile = {}
     for way, found in values.items():

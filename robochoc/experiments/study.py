@@ -35,6 +35,7 @@ LARGEST_FILE = 2**20
 """A study's file has no more bytes."""
 _TOP = ("title", "problems", "runs", "limits", "repeat", "record", "report")
 MOST_REPETITIONS = 1000
+MOST_MEMORY_MB = 2**30
 
 
 class ReportWishes(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
@@ -124,7 +125,9 @@ def study_of(tables: Mapping[str, Any], place: Place) -> Study:
     limits = _convert(tables.get("limits", {}), Limits, place.below("limits"))
     problems = [one for table, at in _tables(tables, "problems", place) for one in problems_of(table, at)]
     setups = [one for table, at in _tables(tables, "runs", place) for one in setups_of(table, limits, at)]
-    named = distinct([setup for setup, *_ in setups])
+    named = distinct([(setup, limit) for setup, _, limit in setups])
+    if clash := _same_labels(named, setups):
+        raise place.below("runs").mistake("label", f"{shortened(clash)} stands for several ways to run")
     repeat = tables.get("repeat", 1)
     if type(repeat) is not int or not 1 <= repeat <= MOST_REPETITIONS:
         raise place.mistake(
@@ -167,7 +170,19 @@ def _convert(table: object, kind: Any, place: Place) -> Any:  # noqa: ANN401 - o
             value = getattr(found, name)
             if value is not None and not 0 < value <= MAX_INTEGER:
                 raise place.mistake(name, f"expected more than 0, and no more than 2^53, got {value:g}")
+        if (found.memory_mb or 0) > MOST_MEMORY_MB:
+            raise place.mistake("memory_mb", f"expected no more than {MOST_MEMORY_MB:,}, got {found.memory_mb:,}")
     return found
+
+
+def _same_labels(named: Sequence[Setup], setups: Sequence[tuple[Setup, tuple[int, ...], Limits]]) -> str:
+    """Return a label that several ways to run would have; empty: there is none. The same way twice is one way."""
+    ways: dict[str, Any] = {}
+    for one, (setup, _, limits) in zip(named, setups, strict=True):
+        way = msgspec.structs.replace(setup, label=""), limits
+        if ways.setdefault(one.label, way) != way:
+            return one.label
+    return ""
 
 
 def _check_wishes(wishes: ReportWishes, problems: Sequence[ProblemSpec], setups: Sequence[Setup], place: Place) -> None:
@@ -189,13 +204,15 @@ def _word(table: Mapping[str, Any], name: str, place: Place) -> str:
     word = table.get(name, "")
     if not isinstance(word, str):
         raise place.mistake(name, f"expected a text, got {shortened(str(word))}")
+    if not word.isprintable():
+        raise place.mistake(name, f"expected one line without control characters, got {shortened(word)}")
     return word
 
 
 def _recordings(words: object, place: Place) -> tuple[Recording, ...]:
     several: Sequence[object] = words if isinstance(words, list) else [words]
     for word in several:
-        if word not in {str(one) for one in Recording}:
+        if not isinstance(word, str) or word not in set(map(str, Recording)):
             raise place.mistake("record", f"expected {' or '.join(Recording)}, got {shortened(str(word))}")
     return tuple(one for one in Recording if one in several)
 

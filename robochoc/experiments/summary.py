@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
+import math
 import statistics
 from collections import Counter
 from collections.abc import Mapping, Sequence
-from contextlib import suppress
 from dataclasses import dataclass
 from types import MappingProxyType
 from typing import Any
@@ -58,22 +58,20 @@ class Sample:
         problems: The problem of each.
         censored: How many of these a limit has ended.
         failed: How many runs have no value: they crashed, were refused, and so on.
+        open_ended: Whether the median would be higher if the runs that a limit has ended had gone on for ever: it is a
+            lower bound.
     """
 
     values: tuple[float, ...]
     problems: tuple[str, ...] = ()
     censored: int = 0
     failed: int = 0
+    open_ended: bool = False
 
     @property
     def median(self) -> float | None:
         """The median. None: there is no value."""
         return statistics.median(self.values) if self.values else None
-
-    @property
-    def open_ended(self) -> bool:
-        """Whether so many runs were cut short that the median is a lower bound of what it would be."""
-        return self.censored * 2 >= len(self.values) > 0
 
 
 def parameters(rows: Rows) -> list[str]:
@@ -128,15 +126,25 @@ def by_parameter(rows: Rows, over: str) -> Rows:
     column `case` keeps runs of the same label and problem apart.
     """
     if over in OF_RUNS:
-        return [{**row, "case": row[over], "label": _without(row["label"], over, row[over])} for row in rows]
-    if over in _settings(rows):
+        values = [row[over] for row in rows]
+    elif over in _settings(rows):
         values = [row["settings"].get(over) for row in rows]
-        given = zip(rows, values, strict=True)
-        return [
-            {**row, over: _number(value), "case": value, "label": _without(row["label"], over, value)}
-            for row, value in given
-        ]
-    return rows
+    else:
+        return rows
+    shorter = [_without(row["label"], over, value) for row, value in zip(rows, values, strict=True)]
+    meant: dict[str, set[str]] = {}
+    for row, label in zip(rows, shorter, strict=True):
+        meant.setdefault(label, set()).add(_way(row, over))
+    return [
+        {**row, over: value, "case": value, "label": label if len(meant[label]) == 1 else row["label"]}
+        for row, value, label in zip(rows, values, shorter, strict=True)
+    ]
+
+
+def _way(row: Mapping[str, Any], over: str) -> str:
+    """Return the way to run without the parameter `over`: labels alone may be called alike."""
+    settings = {name: value for name, value in row["settings"].items() if name != over}
+    return str([row["protocol"], sorted(settings.items()), *(row[name] for name in OF_RUNS if name != over)])
 
 
 def parts(rows: Rows, each: str | None) -> list[tuple[str, Rows]]:
@@ -164,13 +172,6 @@ def _settings(rows: Rows) -> list[str]:
 
 def _without(label: str, name: str, value: object) -> str:
     return " ".join(word for word in label.split() if word not in {f"{name}={value}", str(value)}) or label
-
-
-def _number(text: str | None) -> str | int | float | None:
-    for kind in (int, float):
-        with suppress(ValueError, TypeError):
-            return kind(str(text))
-    return text
 
 
 def metrics_to_show(rows: Rows, wanted: Sequence[str] = ()) -> list[str]:
@@ -213,13 +214,15 @@ def samples(rows: Rows, metric: str, over: str) -> dict[tuple[Any, str], Sample]
 def sample(rows: Rows, metric: str) -> Sample:
     """Return what `rows` came to."""
     counted = [row for row in rows if _counts(row, metric)]
-    cut = sum(row["status"] == Status.LIMIT for row in counted) if metric in CENSORED else 0
+    cut = [metric in CENSORED and row["status"] == Status.LIMIT for row in counted]
     values, problems = tuple(float(row[metric]) for row in counted), tuple(str(row["digest"]) for row in counted)
-    return Sample(values, problems, cut, len(rows) - len(counted))
+    without_end = [math.inf if open_ended else value for value, open_ended in zip(values, cut, strict=True)]
+    higher = any(cut) and statistics.median(without_end) > statistics.median(values)
+    return Sample(values, problems, sum(cut), len(rows) - len(counted), higher)
 
 
 def _counts(row: Mapping[str, Any], metric: str) -> bool:
-    return row[metric] is not None and row["status"] in {Status.DONE, Status.LIMIT}
+    return row[metric] is not None and row["status"] in {Status.DONE, Status.LIMIT, Status.ENDED}
 
 
 Table = tuple[list[str], list[list[str]]]
@@ -233,10 +236,7 @@ def medians(rows: Rows, metric: str, over: str) -> Table:
     """
     found = samples(rows, metric, over)
     ways = labels(rows)
-    some = [
-        value for value in values_of(rows, over) if any(one.values for (at, _), one in found.items() if at == value)
-    ]
-    lines = [[str(value), *(cell(found.get((value, way))) for way in ways)] for value in some]
+    lines = [[str(value), *(cell(found.get((value, way))) for way in ways)] for value in values_of(rows, over)]
     if over in ONE_BY_ONE and len(lines) > 1:
         lines.append(["all", *(cell(sample([row for row in rows if row["label"] == way], metric)) for way in ways)])
     return [over, *ways], lines
@@ -298,6 +298,8 @@ def cell(one: Sample | None) -> str:
 
 def number(value: float) -> str:
     """Return a number with about four digits."""
+    if not math.isfinite(value):
+        return str(value)
     if value == int(value) or abs(value) >= 1000:  # noqa: PLR2004 - digits before the point suffice
         return f"{value:,.0f}"
     return f"{value:.3g}" if abs(value) < 1 else f"{value:,.2f}"

@@ -15,6 +15,8 @@ from robochoc.formats.diagnostics import Diagnostic, InvalidInputError, encodabl
 
 HINT = "docs/guides/experiments.md describes the file of a study"
 MAX_INTEGER = 2**53
+MOST_COMBINATIONS = 100_000
+"""A table stands for no more."""
 _HEAD = re.compile(r"\s*\[\[?\s*([\w.-]+)\s*\]?\]")
 
 
@@ -54,6 +56,9 @@ class Place:
                     return line
             elif self.table and table == f"{self.table}.{key}":
                 return line
+        outer, dot, inner = self.table.rpartition(".")
+        if dot and not head:  # the table stands in braces
+            return replace(self, table=outer).line(inner)
         return head if self.table else 0
 
     def mistake(self, key: str, message: str, hint: str = HINT) -> InvalidInputError:
@@ -80,7 +85,7 @@ class Place:
                 numbers = range_of(one) if isinstance(one, str) else None
             except ValueError as wrong:
                 raise self.mistake(key, str(wrong)) from None
-            if numbers is None and not _is_plain(one):
+            if not all(map(_is_plain, [one] if numbers is None else numbers)):
                 raise self.mistake(key, f"expected numbers, words, or a list of them, got {shortened(str(one))}")
             found += [one] if numbers is None else numbers
         if not found:
@@ -88,9 +93,17 @@ class Place:
         return list(dict.fromkeys(found))
 
     def combinations(self, table: Mapping[str, Any]) -> Iterator[dict[str, Any]]:
-        """Yield all combinations of the values in `table`; the last key varies fastest."""
+        """Yield all combinations of the values in `table`; the last key varies fastest.
+
+        Raises:
+            InvalidInputError: if there are too many, or values are none.
+        """
         keys = list(table)
-        for values in itertools.product(*(self.values(key, table[key]) for key in keys)):
+        several = [self.values(key, table[key]) for key in keys]
+        if (count := math.prod(map(len, several))) > MOST_COMBINATIONS:
+            told = f"stands for {count:,} combinations; at most {MOST_COMBINATIONS:,} are allowed"
+            raise self.mistake("", told, "cut its lists and ranges")
+        for values in itertools.product(*several):
             yield dict(zip(keys, values, strict=True))
 
 

@@ -165,13 +165,15 @@ class Recording(StrEnum):
 class Status(StrEnum):
     """How a run has ended.
 
-    `DONE`: with a verdict. `LIMIT`: a limit was reached before. `REFUSED`: problem, protocol and options do not go
+    `DONE`: with a verdict. `LIMIT`: a limit was reached before. `ENDED`: an incomplete protocol has come to its end,
+    and has found nothing that holds. `REFUSED`: problem, protocol and options do not go
     together. `INVALID`: there is no such problem. `LOST`: robots were lost. `REFUTED`: the checker refutes the answer.
     `MEMORY`: the memory did not suffice. `CRASHED`: the process that solved has ended. `ERROR`: something else.
     """
 
     DONE = "done"
     LIMIT = "limit"
+    ENDED = "ended"
     REFUSED = "refused"
     INVALID = "invalid"
     LOST = "lost"

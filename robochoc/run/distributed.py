@@ -19,6 +19,9 @@ from robochoc.run.evaluation import Answer, Search, evaluate_search
 from robochoc.run.options import Options
 from robochoc.run.withdrawal import Phase, first_phase, second_phase
 
+GAVE_UP = "gave up, as its protocol has it"
+FOUND_NOTHING = "has come to its end, and all that it came by breaks a hard constraint"
+
 
 class Deployment(ABC):
     """A team of robots that searches on command, on this machine or on several.
@@ -102,9 +105,9 @@ class Deployment(ABC):
         if answer.verdict is not Verdict.UNKNOWN:
             return None
         if answer.witness is not None:
-            return f"{answer.witness} gave up, as its protocol has it"
+            return f"{answer.witness} {GAVE_UP}"
         if answer.ended:
-            return f"{phase.name} has come to its end, and all that it came by breaks a hard constraint"
+            return f"{phase.name} {FOUND_NOTHING}"
         return "; ".join(filter(None, [self._limit_reached(answer.metrics), self.unsettled]))
 
     def _limit_reached(self, spent: Metrics) -> str:

@@ -20,6 +20,7 @@ from robochoc.experiments.plan import plan_of
 from robochoc.experiments.store import Store
 from robochoc.experiments.task import Row, Status
 from robochoc.formats import write_team
+from robochoc.formats.diagnostics import InvalidInputError
 from robochoc.generators.queens3d import queens3d
 from robochoc.journal.journal import read_journal
 from tests.support.faults import PROGRAM, running
@@ -120,14 +121,74 @@ def test_a_report_in_markdown(tmp_path: Path) -> None:
 
 
 def test_what_a_file_says_does_not_reach_the_terminal_as_it_is(tmp_path: Path) -> None:
-    text = 'title = "\\u001b[2J"\n' + SMALL
     path = tmp_path / "study.toml"
-    path.write_text(text)
-    told = [robochoc_within("experiment", "run", path, *more) for more in (["--dry-run"], [])]
-    told.append(robochoc_within("experiment", "show", path.with_suffix(".sqlite")))
-    assert [done.returncode for done in told] == [0, 0, 0]
+    path.write_text('title = "\\u001b[2J"\n' + SMALL)
+    refused = robochoc_within("experiment", "run", path)
+    assert (refused.returncode, "without control characters" in refused.stderr) == (1, True)
+    path.write_text(SMALL)
+    assert robochoc_within("experiment", "run", path).returncode == 0
+    results = path.with_suffix(".sqlite")
+    with closing(sqlite3.connect(results)) as database, database:
+        database.execute(
+            "UPDATE plan SET label = char(27) || '[2J' || label, parameters = '{\"tightness\": \"\\u001b[3J\"}'"
+        )
+        database.execute("UPDATE study SET title = char(27) || '[2J' || title, stopped = char(27) || '[2J'")
+    told = [robochoc_within("experiment", "show", results)]
+    told.append(robochoc_within("experiment", "export", results, "--format", "latex"))
+    assert [done.returncode for done in told] == [0, 0]
     assert not any("\x1b" in done.stdout + done.stderr for done in told)
-    assert "[2J" in told[2].stdout
+    assert all("[2J" in done.stdout for done in told)
+
+
+STRANGE = {
+    "no study": "UPDATE study SET text = 'report = 5'",
+    "a study of bytes": "UPDATE study SET text = x'ff'",
+    "settings of a number": "UPDATE plan SET settings = '5'",
+    "no settings": "UPDATE plan SET settings = 'null'",
+    "endless messages": "UPDATE runs SET messages = 9e999",
+    "a word for a number": "UPDATE runs SET messages = 'many'",
+    "an unknown status": "UPDATE runs SET status = 'foo'",
+    "no status": "UPDATE runs SET status = NULL",
+    "no cost": "UPDATE runs SET cost = 'NaN'",
+    "broken points": "UPDATE runs SET cost_over_time = '[[5]]'",
+    "points of a word": "UPDATE runs SET cost_over_time = '\"x\"'",
+    "another view": "DROP VIEW results; CREATE VIEW results AS SELECT 1 AS one FROM plan",
+}
+
+
+@pytest.mark.parametrize("name", STRANGE)
+def test_strange_content_is_a_message(name: str, small: Path) -> None:
+    path = small.with_suffix(".sqlite")
+    results_of(SMALL, path)
+    with closing(sqlite3.connect(path)) as database, database:
+        database.executescript(STRANGE[name])
+    for words in (["show"], ["export"], ["export", "--format", "latex"]):
+        done = robochoc_within("experiment", *words, path)
+        assert (done.returncode, "holds no results of a study" in done.stderr) == (1, True), done.stderr
+
+
+def test_what_has_failed_can_be_run_again(small: Path) -> None:
+    path = small.with_suffix(".sqlite")
+    whole = results_of(SMALL, path)
+    with closing(sqlite3.connect(path)) as database, database:
+        for status, first in (("invalid", 0), ("crashed", 1), ("refused", 2), ("memory", 3)):
+            database.execute(
+                "UPDATE runs SET status = ?, messages = 1 WHERE key = ?", (status, whole.rows[first]["key"])
+            )
+    planned = robochoc_within("experiment", "run", small, "--dry-run")
+    assert "10 are there, 2 are to be run" in planned.stdout
+    assert robochoc_within("experiment", "run", small).returncode == 0
+    assert [row["status"] for row in read(path)] == ["done", "done", "refused", "memory", *["done"] * 8]
+    done = robochoc_within("experiment", "run", small, "--again", "refused", "--again", "memory")
+    assert done.returncode == 0
+    assert comparable(path) == comparable(whole)
+
+
+def test_results_that_are_removed_meanwhile_are_missed(small: Path) -> None:
+    with Store(small.with_suffix(".sqlite")) as store:
+        small.with_suffix(".sqlite").unlink()
+        with pytest.raises(InvalidInputError, match="was removed while it was written to"):
+            store.check_place()
 
 
 def test_parquet(tmp_path: Path) -> None:
@@ -172,6 +233,9 @@ def test_a_contradiction_ends_with_status_4(small: Path) -> None:
     assert done.returncode == 4
     assert "small: stopped: " in done.stderr
     assert done.stderr.count("robochoc generate random --agents 6") == 2
+    shown = robochoc_within("experiment", "show", path)
+    assert "stopped: " in shown.stdout
+    assert "contradict each other" in shown.stdout
 
 
 def test_compare_a_family_and_folders(tmp_path: Path) -> None:

@@ -7,8 +7,9 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+from robochoc.experiments.results import Results, read_results
 from robochoc.experiments.runner import StudyProgress, run_study
-from robochoc.experiments.store import Results, Store, read_results
+from robochoc.experiments.store import Store
 from robochoc.experiments.study import Study, study_of
 from robochoc.experiments.table import Place
 

@@ -60,7 +60,7 @@ def compare(
     from robochoc.cli.commands.experiment import carried_out, stored
     from robochoc.cli.reports.experiment import print_answers, print_endings, print_medians
 
-    study = _study(problem, runs)
+    study = _study(problem, over, runs)
     with stored(save) as store:
         carried_out(study, store, jobs)
         results = store.results()
@@ -74,7 +74,7 @@ def compare(
         click.echo(f"{html}: written", err=True)
 
 
-def _study(problem: Sequence[str], runs: dict[str, Any]) -> Study:
+def _study(problem: Sequence[str], over: str | None, runs: dict[str, Any]) -> Study:
     """Return the study that the command line describes."""
     from robochoc.experiments.study import study_of_tables
 
@@ -90,7 +90,8 @@ def _study(problem: Sequence[str], runs: dict[str, Any]) -> Study:
     }
     table |= {"order": order.split(",")} if order else {}
     table |= {"settings": settings} if settings else {}
-    tables = {"problems": _problems(problem), "runs": table, "limits": {"timeout": timeout}}
+    report = {"over": over} if over else {}
+    tables = {"problems": _problems(problem), "runs": table, "limits": {"timeout": timeout}, "report": report}
     return study_of_tables("compare", tables)
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -14,7 +15,7 @@ from robochoc.cli.reports.failures import INVALID, LOST, USAGE, Failure, invalid
 
 if TYPE_CHECKING:
     from collections import Counter
-    from collections.abc import Callable
+    from collections.abc import Callable, Sequence
 
     from robochoc.experiments.runner import Workers
     from robochoc.experiments.store import Store
@@ -22,6 +23,7 @@ if TYPE_CHECKING:
 
 FORMATS = ("csv", "json", "latex", "parquet")
 JOURNALS = "journals"
+AGAIN = ("refused", "limit", "memory")
 
 
 @click.group()
@@ -39,12 +41,20 @@ def experiment() -> None:
 @click.argument("study", type=InputPath(), metavar="STUDY.toml")
 @click.option("-o", "--output", type=OutputFile(), metavar="FILE", help="File of the results.  [default: STUDY.sqlite]")
 @click.option("--jobs", type=click.IntRange(1, 1024), metavar="N", help="Workers.  [default: one for each processor]")
+@click.option("--again", type=click.Choice(AGAIN), multiple=True, help="Run again also what has ended so. Repeatable.")
 @click.option("--dry-run", is_flag=True, help="Show how many runs there are, and run none.")
 @click.option("--scheduler", metavar="ADDRESS", help="Run on the Dask cluster there, such as tcp://10.0.0.1:8786.")
 @click.option("--dask", type=InputPath(), metavar="FILE", help="Run on a Dask cluster, by its scheduler's JSON file.")
 @invalid_input_fails
 def run(
-    study: Path, output: Path | None, jobs: int | None, scheduler: str | None, dask: Path | None, *, dry_run: bool
+    study: Path,
+    output: Path | None,
+    jobs: int | None,
+    again: tuple[str, ...],
+    scheduler: str | None,
+    dask: Path | None,
+    *,
+    dry_run: bool,
 ) -> None:
     """Carry out the study in the file STUDY.toml, and write one row for each run into an SQLite file.
 
@@ -67,9 +77,9 @@ def run(
     if workers and any(setup.runtime != "simulator" for setup, *_ in read.setups):
         click.echo(f"{read.name}: robots that have processes run here, not on the cluster", err=True)
     with stored(path) as store, _cluster_told(workers):
-        ended = carried_out(read, store, jobs, workers)
+        ended = carried_out(read, store, jobs, workers, again)
     click.echo(ended_line(read.name, ended), err=True)
-    click.echo(f"{path}: next: robochoc experiment show {path}", err=True)
+    click.echo(f"{path}: next: {shlex.join(['robochoc', 'experiment', 'show', str(path)])}", err=True)
 
 
 @experiment.command(short_help="Show what came of a study.")
@@ -85,7 +95,7 @@ def show(results: Path, over: str | None, metrics: tuple[str, ...]) -> None:
     robochoc experiment show study.sqlite --over tightness --metric ncccs
     """  # noqa: D301 - \\b is how click is told to leave the lines as they are
     from robochoc.cli.reports.experiment import print_summary
-    from robochoc.experiments.store import read_results
+    from robochoc.experiments.results import read_results
 
     print_summary(read_results(results), over, metrics)
 
@@ -110,7 +120,7 @@ def export(results: Path, output: Path | None, form: str | None) -> None:
     """  # noqa: D301 - \\b is how click is told to leave the lines as they are
     from robochoc.cli.reports.failures import failures_told
     from robochoc.experiments.export import exported
-    from robochoc.experiments.store import read_results
+    from robochoc.experiments.results import read_results
     from robochoc.system.files import write_atomically
 
     endings = {".jsonl": "json", ".tex": "latex", ".pq": "parquet", **{f".{name}": name for name in FORMATS}}
@@ -130,7 +140,7 @@ def export(results: Path, output: Path | None, form: str | None) -> None:
 
 def _write_journals(results: Path, folder: Path | None) -> None:
     """Write each journal to a file of the folder, called by the run's key."""
-    from robochoc.experiments.store import journals
+    from robochoc.experiments.results import journals
     from robochoc.system.files import write_atomically
 
     if folder is None:
@@ -164,7 +174,7 @@ def report(results: Path, output: Path, over: str | None, *, force: bool) -> Non
     robochoc experiment report study.sqlite -o report.md
     robochoc experiment report study.sqlite -o figures/
     """  # noqa: D301 - \\b is how click is told to leave the lines as they are
-    from robochoc.experiments.store import read_results
+    from robochoc.experiments.results import read_results
 
     if output.suffix.lower() == ".md":
         need("tests of pairs", "scipy")
@@ -254,17 +264,23 @@ def stored(path: Path | None) -> Iterator[Store]:
 
 
 def carried_out(
-    study: Study, store: Store, jobs: int | None, workers: Callable[[int | None], Workers] | None = None
+    study: Study,
+    store: Store,
+    jobs: int | None,
+    workers: Callable[[int | None], Workers] | None = None,
+    again: Sequence[str] = (),
 ) -> Counter[str]:
     """Carry out a study, with its progress on a terminal; each foreseen error is a failure."""
     from robochoc.cli.reports.experiment import progress_of
     from robochoc.experiments.agreement import DisagreementError
     from robochoc.experiments.plan import TooManyRunsError
     from robochoc.experiments.runner import run_study
+    from robochoc.experiments.task import Status
 
     try:
         with progress_of(study.name) as progress:
-            return run_study(study, store, jobs, progress=progress, workers=workers)
+            once_more = [Status(one) for one in again]
+            return run_study(study, store, jobs, progress=progress, workers=workers, again=once_more)
     except KeyboardInterrupt:
         there = len(store.results().rows)
         click.echo(f"\n{study.name}: {there:,} runs are kept; the same command goes on with the others", err=True)

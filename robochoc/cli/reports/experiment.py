@@ -17,8 +17,8 @@ from robochoc.cli.reports.table import print_table
 from robochoc.system.plain_text import on_one_line
 
 if TYPE_CHECKING:
+    from robochoc.experiments.results import Results
     from robochoc.experiments.runner import StudyProgress
-    from robochoc.experiments.store import Results
     from robochoc.experiments.study import Study
     from robochoc.experiments.summary import Rows
 
@@ -54,14 +54,15 @@ def duration(seconds: float) -> str:
 def plan_lines(study: Study, path: Path) -> Iterator[str]:
     """Yield what a study is going to run, how much of it is there, and about how long the rest takes."""
     from robochoc.experiments.plan import TooManyRunsError, plan_of
-    from robochoc.experiments.store import read
+    from robochoc.experiments.results import keys_there, read
 
     try:
         plan = plan_of(study)
     except TooManyRunsError as refused:
         raise Failure(USAGE, str(refused)) from None
     rows = {row["key"]: row for row in read(path)} if path.exists() else {}
-    missing = [task for key, task in plan.items() if key not in rows]
+    known = keys_there(path) if rows else set()
+    missing = [task for key, task in plan.items() if key not in known]
     problems = len({task.problem.identity for task in plan.values()})
     labels = list(dict.fromkeys(task.setup.label for task in plan.values()))
     ways = on_one_line(", ".join(labels))
@@ -97,6 +98,8 @@ def print_summary(results: Results, over: str | None, metrics: Sequence[str]) ->
     wishes = study_wishes(results.text)
     there = f"{len(rows):,} of {count:,} runs" if len(rows) < count else f"{len(rows):,} runs"
     click.echo(f"{on_one_line(title)}: {there}")
+    if results.stopped:
+        click.echo(f"stopped: {on_one_line(results.stopped)}")
     if rows:
         over, metrics = over or wishes.over, metrics or wishes.metrics
         print_medians(rows, over, metrics, wishes.each)
@@ -117,8 +120,13 @@ def print_medians(rows: Rows, over: str | None, metrics: Sequence[str], each: st
     for (part, own), metric in itertools.product(parts, shown):
         where = f", {on_one_line(part)}" if part else ""
         click.echo(f"\n{summary.METRICS[metric]}, median{where}")
-        heads, lines = summary.medians(own, metric, over)
-        print_table(heads, lines, right=heads[1:])
+        _print_table(*summary.medians(own, metric, over))
+
+
+def _print_table(heads: Sequence[str], lines: Sequence[Sequence[str]]) -> None:
+    """Print a table whose words may come from a file."""
+    heads = [on_one_line(head) for head in heads]
+    print_table(heads, [[on_one_line(cell) for cell in line] for line in lines], right=heads[1:])
 
 
 def print_answers(rows: Rows, over: str | None, metrics: Sequence[str]) -> None:
@@ -135,9 +143,8 @@ def print_endings(rows: Sequence[Mapping[str, Any]]) -> None:
     """Print how runs have ended, and with which verdicts, for each way to run."""
     from robochoc.experiments.summary import endings
 
-    heads, lines = endings(rows)
     click.echo("\nhow runs ended")
-    print_table(heads, lines, right=heads[1:])
+    _print_table(*endings(rows))
     told = next(((row["reason"], row["label"]) for row in rows if row["status"] not in {"done", "limit"}), None)
     if told:
         click.echo(on_one_line(f"{told[1]}: {told[0]}"))

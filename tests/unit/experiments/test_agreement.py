@@ -10,7 +10,7 @@ import pytest
 
 from robochoc.experiments.agreement import Agreement, DisagreementError, contradiction, repeat
 from robochoc.experiments.execute import Bench
-from robochoc.experiments.task import ProblemSpec, Row, Setup, Status, Task
+from robochoc.experiments.task import Limits, ProblemSpec, Row, Setup, Status, Task
 from tests.support.program import robochoc_within
 
 SOLUTION, NONE = ("solution", None), ("no-solution", None)
@@ -46,6 +46,18 @@ def test_contradictions(one: Row, other: Row, why: str) -> None:
         found = contradiction(*pair)
         assert bool(found) == bool(why)
     assert why in contradiction(one, other)
+
+
+def test_the_commands_leave_the_users_files_alone() -> None:
+    problem = ProblemSpec(path="mine", digest="x", scenario={"events": 3, "rate": 0.3, "seed": 1})
+    told = repeat(Task(problem=problem, setup=Setup(protocol="dynabt"), limits=Limits(messages=9)))
+    assert told == (
+        "robochoc generate scenario mine --events 3 --rate 0.3 --seed 1 -o PROBLEM;"
+        " robochoc solve PROBLEM --protocol dynabt --runtime simulator --messages 9"
+    )
+    foreign = ProblemSpec(path="w.yaml", digest="x", parameters={"instance": "w.yaml", "infinity": 10, "owner": "(.)"})
+    told = repeat(Task(problem=foreign, setup=Setup(protocol="sfb")))
+    assert told == "robochoc solve w.yaml --protocol sfb --runtime simulator --owner '(.)' --infinity 10"
 
 
 TASK = Task(problem=ProblemSpec(family="queens3d", parameters={"n": 2}), setup=Setup(protocol="abt", label="abt"))

@@ -9,6 +9,7 @@ import msgspec
 import pytest
 
 from robochoc.experiments.execute import Bench, team_of
+from robochoc.experiments.problem_table import digest_of_files
 from robochoc.experiments.task import Limits, ProblemSpec, Recording, Row, Setup, Status, Task, options_of
 from robochoc.formats.folder import write_team
 from robochoc.generators.queens3d import queens3d
@@ -58,6 +59,9 @@ def test_a_row_says_what_the_run_says(problem: ProblemSpec, setup: dict[str, obj
     assert (found.status, found.verdict, found.team) == (Status.DONE, outcome.verdict, team.name)
     assert found.cost == (str(outcome.cost) if problem is COSTS else None)
     assert found.maximises is (problem is COSTS)
+    if setup["protocol"] == "central":  # it sends nothing, which is no count to compare with
+        assert (found.messages, found.ncccs, found.bytes, found.checks, found.largest) == (None,) * 5
+        return
     assert (found.messages, found.ncccs, found.bytes) == (sum(metrics.messages.values()), metrics.ncccs, metrics.bytes)
     assert (found.checks, found.largest) == (metrics.checks, metrics.largest)
     assert found.messages_by_type == metrics.messages
@@ -137,6 +141,36 @@ def test_a_journal_is_that_of_the_run(bench: Bench) -> None:
     assert str(journal.outcome.verdict) == found.verdict
 
 
+def test_what_ends_by_itself_is_no_limit(bench: Bench) -> None:
+    """A problem without a solution: local search comes to its end all the same."""
+    found = row(
+        bench, ProblemSpec(family="queens3d", parameters={"n": 4}), {"protocol": "dsa", "settings": {"cycles": "3"}}
+    )
+    assert (found.status, found.verdict) == (Status.ENDED, "unknown")
+    assert found.messages
+
+
+def test_problems_differ_by_how_files_are_read_and_by_their_scenarios(bench: Bench, tmp_path: Path) -> None:
+    write_team(team_of(RANDOM), tmp_path / "team")
+    path, digest = str(tmp_path / "team"), digest_of_files(tmp_path / "team")
+    scenarios = [{"events": 3, "rate": 0.3, "seed": seed} for seed in (1, 2)]
+    found = [
+        row(bench, ProblemSpec(path=path, digest=digest, scenario=scenario), {"protocol": "dynabt"})
+        for scenario in ({}, *scenarios)
+    ]
+    assert len({one.digest for one in found}) == 3
+
+
+def test_files_that_have_changed_since_the_plan_are_not_run(bench: Bench, tmp_path: Path) -> None:
+    write_team(queens3d(3), tmp_path / "team")
+    planned = digest_of_files(tmp_path / "team")
+    with (tmp_path / "team" / "Robot1.1.xml").open("a") as file:
+        file.write("\n")
+    found = row(bench, ProblemSpec(path=str(tmp_path / "team"), digest=planned))
+    assert found.status is Status.INVALID
+    assert "has changed since the study began" in str(found.reason)
+
+
 def test_a_protocol_that_fails_is_a_row(bench: Bench, monkeypatch: pytest.MonkeyPatch) -> None:
     def fail(*_: object, **__: object) -> None:
         raise KeyError("mine")
@@ -153,11 +187,12 @@ def _no_memory(*_: object, **__: object) -> None:
 
 
 def test_problems_in_files_and_generated_ones_are_the_same_problem(bench: Bench, tmp_path: Path) -> None:
-    write_team(queens3d(3), tmp_path / "queens")
+    path = tmp_path / "queens"
+    write_team(queens3d(3), path)
     counts = [
         (found.messages, found.ncccs, found.verdict)
         for found in (
-            row(bench, ProblemSpec(path=str(tmp_path / "queens"), digest="x")),
+            row(bench, ProblemSpec(path=str(path), digest=digest_of_files(path))),
             row(bench, ProblemSpec(family="queens3d", parameters={"n": 3})),
         )
     ]

@@ -11,7 +11,7 @@ import pytest
 from robochoc.experiments import statistics, summary
 from robochoc.experiments.account import Account
 from robochoc.experiments.markdown import markdown_page, markdown_table
-from robochoc.experiments.store import Results
+from robochoc.experiments.results import Results
 from robochoc.formats.diagnostics import InvalidInputError
 from tests.support.studies import COSTS, SMALL, results_of
 

@@ -12,8 +12,9 @@ import pytest
 from robochoc.experiments import read
 from robochoc.experiments.agreement import DisagreementError
 from robochoc.experiments.plan import plan_of
+from robochoc.experiments.results import read_results
 from robochoc.experiments.runner import StudyProgress, run_study
-from robochoc.experiments.store import Store, StudyInUseError, read_results
+from robochoc.experiments.store import Store, StudyInUseError
 from robochoc.experiments.task import Row, Status, Task
 from robochoc.experiments.workers import LocalWorkers
 from robochoc.formats.diagnostics import InvalidInputError

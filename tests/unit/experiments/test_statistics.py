@@ -24,7 +24,7 @@ def row(label: str, case: int, messages: float | None, status: str = "done", **m
         "seed": 0, "repetition": 1, "status": status, "verdict": "solution" if status == "done" else None,
         "digest": str(case), "messages": messages, "ncccs": None, "bytes": None, "simulated_s": None, "cost": None,
         "runtime": "simulator", "settings": {}, "order": "given", "schedule": "concurrent", "delay": 0,
-        "withdraw": None, "channel": None,
+        "withdraw": None, "channel": None, "protocol": label.split(maxsplit=1)[0],
         "team": f"team{case}", "cost_over_time": [],
     }  # fmt: skip
     return {**given, **more}
@@ -36,10 +36,14 @@ def rows(**values: Sequence[float | None]) -> list[dict[str, Any]]:
 
 def test_medians_say_where_limits_leave_them_open() -> None:
     found = summary.sample([row("a", 1, 10), row("a", 2, 30, "limit"), row("a", 3, None, "crashed")], "messages")
-    assert found == Sample((10.0, 30.0), ("1", "2"), censored=1, failed=1)
+    assert found == Sample((10.0, 30.0), ("1", "2"), censored=1, failed=1, open_ended=True)
     assert (found.median, found.open_ended, summary.cell(found)) == (20.0, True, ">= 20")
-    closed = summary.sample([row("a", case, case, "limit" if case == 1 else "done") for case in range(5)], "messages")
+    closed = summary.sample([row("a", case, case, "limit" if case == 4 else "done") for case in range(5)], "messages")
     assert (closed.open_ended, summary.cell(closed)) == (False, "2")
+    low = summary.sample([row("a", case, case, "limit" if case == 1 else "done") for case in range(5)], "messages")
+    assert (low.open_ended, summary.cell(low)) == (True, ">= 2")
+    by_itself = summary.sample([row("a", case, case, "ended") for case in range(5)], "messages")
+    assert (by_itself.open_ended, by_itself.censored) == (False, 0)
     assert summary.cell(summary.sample([row("a", 1, None, "refused")], "messages")) == "-"
 
 
@@ -64,7 +68,7 @@ def test_what_is_drawn_over() -> None:
 
 def test_parameters_of_runs_are_drawn_over_as_well() -> None:
     given = [row(f"abt delay={delay}" if delay else "abt", delay, 1, delay=delay) for delay in (0, 20)]
-    given += [row("dsa cycles=5 variant=A", 3, 1, delay=0, settings={"cycles": "5", "variant": "A"})]
+    given += [row("dsa cycles=5 variant=A", 3, 1, delay=0, settings={"cycles": 5, "variant": "A"})]
     by_delay = summary.by_parameter(given, summary.parameter_to_draw_over(given, "delay"))
     assert [(one["delay"], one["label"]) for one in by_delay][:2] == [(0, "abt"), (20, "abt")]
     by_cycles = summary.by_parameter(given, summary.parameter_to_draw_over(given, "cycles"))

@@ -146,6 +146,16 @@ WRONG = {
     ),
     "wish over nothing": (f'{SMALL}[report]\nover = "tightnes"\n', 13, "did you mean 'tightness'?"),
     "wish for each run": (f'{SMALL}[report]\neach = "delay"\n', 13, "there is no parameter delay"),
+    "too many settings": (
+        SMALL.replace('["abt", "afc-ng"]', '"dsa"') + 'settings = { cycles = "1..1000", probability = "1..1000" }\n',
+        12,
+        "stands for 1,000,000 combinations",
+    ),
+    "a range of many digits": (f'{SMALL}seed = "{10**19}..{10**19}"\n', 12, "expected numbers, words"),
+    "a recording of a list": (f"record = [[1]]\n{SMALL}", 1, "expected cost-over-time or"),
+    "a delay below": (f"{SMALL}delay = -1\n", 12, "expected 0 or more"),
+    "too much memory": (f"{SMALL}[limits]\nmemory_mb = {2**50}\n", 13, "expected no more than"),
+    "a title of two lines": (f'title = "a\\nb"\n{SMALL}', 1, "expected one line"),
     "a range with a dash": (SMALL.replace('"1..3"', '"1-3"'), 8, "a range is written 1..30"),
     "NCCCs of processes": (f'{SMALL}runtime = "processes"\nncccs = 3\n', 10, "--ncccs is a limit for the simulator"),
     "cycles of none": (f"{SMALL}cycles = 3\n", 10, "--cycles is a limit on the simulator's cycles"),
@@ -164,6 +174,16 @@ def test_what_is_wrong_is_said_with_its_line(name: str, tmp_path: Path) -> None:
     assert said in str(caught.value)
     if line:
         assert [one.line for one in caught.value.diagnostics] == [line]
+
+
+def test_ways_that_are_called_alike_tell_their_protocols_and_limits() -> None:
+    text = SMALL.partition("[runs]")[0]
+    runs = '[[runs]]\nprotocol = "abt"\nlabel = "x"\n[[runs]]\nprotocol = "afc-ng"\nlabel = "x"\n'
+    assert [setup.label for setup, *_ in study(text + runs).setups] == ["x abt", "x afc-ng"]
+    runs = '[[runs]]\nprotocol = "abt"\n[[runs]]\nprotocol = "abt"\nmessages = 5\n'
+    assert [setup.label for setup, *_ in study(text + runs).setups] == ["abt", "abt messages=5"]
+    runs = '[[runs]]\nprotocol = "abt"\nlabel = "abt order"\n[[runs]]\nprotocol = "abt"\n[[runs]]\nprotocol = "abt"\n'
+    assert [setup.label for setup, *_ in study(text + runs).setups] == ["abt order", "abt", "abt"]
 
 
 def test_too_many_runs_are_refused() -> None:

@@ -1,0 +1,117 @@
+"""The SQLite file of a study's results: its tables, and how it is opened."""
+
+from __future__ import annotations
+
+import os
+import sqlite3
+from collections.abc import Mapping
+from contextlib import suppress
+from pathlib import Path
+from typing import Any
+
+import msgspec
+
+from robochoc.experiments.task import CostPoint, RobotLoad, Status
+from robochoc.formats.diagnostics import Diagnostic, InvalidInputError, encodable
+
+APPLICATION_ID = 0x726F626F
+"""What marks the file as one of ours (SQLite, `PRAGMA application_id`): `robo`."""
+VERSION = 2
+COLUMNS: Mapping[str, str] = {
+    "status": "TEXT", "reason": "TEXT", "team": "TEXT", "digest": "TEXT", "robots": "INTEGER", "variables": "INTEGER",
+    "constraints": "INTEGER", "verdict": "TEXT", "cost": "TEXT", "bound": "TEXT", "maximises": "INTEGER",
+    "withdrawn": "INTEGER", "verified": "INTEGER", "confirmed": "INTEGER", "messages": "INTEGER",
+    "messages_by_type": "TEXT", "bytes": "INTEGER", "largest": "INTEGER", "ncccs": "INTEGER", "checks": "INTEGER",
+    "simulated_s": "REAL", "cycles": "INTEGER", "wall_s": "REAL", "compile_s": "REAL", "total_s": "REAL",
+    "cpu_s": "REAL", "memory": "INTEGER", "cost_over_time": "TEXT", "loads": "TEXT", "machine": "TEXT",
+    "version": "TEXT",
+}  # fmt: skip
+"""The columns of a row, and their types."""
+NUMBERS = [name for name, kind in COLUMNS.items() if kind != "TEXT"]
+JSON: Mapping[str, Any] = {
+    "messages_by_type": dict[str, int], "cost_over_time": list[CostPoint], "loads": list[RobotLoad],
+}  # fmt: skip
+_TABLES = f"""
+CREATE TABLE IF NOT EXISTS study
+    (id INTEGER PRIMARY KEY CHECK (id = 1), name TEXT, title TEXT, text TEXT, stopped TEXT);
+CREATE TABLE IF NOT EXISTS runs (key TEXT PRIMARY KEY, {", ".join(f"{n} {t}" for n, t in COLUMNS.items())})
+    WITHOUT ROWID;
+CREATE TABLE IF NOT EXISTS journals (key TEXT PRIMARY KEY, content BLOB) WITHOUT ROWID;
+CREATE TABLE IF NOT EXISTS plan (
+    position INTEGER PRIMARY KEY, key TEXT UNIQUE, problems TEXT, label TEXT, protocol TEXT, settings TEXT,
+    "order" TEXT, schedule TEXT, delay INTEGER, withdraw TEXT, runtime TEXT, channel TEXT, seed INTEGER,
+    repetition INTEGER, parameters TEXT, task TEXT
+);
+CREATE VIEW IF NOT EXISTS results AS
+    SELECT plan.*, {", ".join(f"runs.{name}" for name in COLUMNS)} FROM plan JOIN runs USING (key) ORDER BY position;
+"""  # noqa: S608 - our own names
+
+TRIED_AGAIN = (Status.CRASHED, Status.LOST, Status.INVALID, Status.ERROR)
+"""Runs that ended so are repeated when the study is run again: what was wrong may be mended."""
+STRANGE = (sqlite3.Error, msgspec.MsgspecError, TypeError, ValueError, KeyError, OverflowError, ArithmeticError)
+"""What strange content of a file may raise."""
+
+
+def opened(path: Path, *, writing: bool = True) -> sqlite3.Connection:
+    """Return the database at `path`. Raises `InvalidInputError`."""
+    if not writing and not path.is_file():
+        raise invalid(path, "is no file")
+    try:
+        # A reader that may write tidies up behind itself: SQLite keeps two files beside one that is being read.
+        mode = "rwc" if writing else "rw" if os.access(path, os.W_OK) else "ro"
+        address = f"{path.absolute().as_uri()}?mode={mode}"
+        database = sqlite3.connect(address, uri=True, timeout=60)
+        if mode == "ro" and not _is_readable(database):  # SQLite wants to write beside it, and nobody may
+            database.close()
+            database = sqlite3.connect(f"{path.absolute().as_uri()}?immutable=1", uri=True)
+        try:
+            _check(database, path, writing=writing)
+        except BaseException:
+            database.close()
+            raise
+    except sqlite3.Error as error:
+        raise invalid(path, f"holds no results of a study: {error}") from None
+    return database
+
+
+def _is_readable(database: sqlite3.Connection) -> bool:
+    try:
+        database.execute("SELECT count(*) FROM sqlite_master")
+    except sqlite3.OperationalError:
+        return False
+    return True
+
+
+def _check(database: sqlite3.Connection, path: Path, *, writing: bool) -> None:
+    """Make the tables of a new file, and refuse one that is none of ours."""
+    (application,) = database.execute("PRAGMA application_id").fetchone()
+    (tables,) = database.execute("SELECT count(*) FROM sqlite_master").fetchone()
+    (version,) = database.execute("PRAGMA user_version").fetchone()
+    if tables and (application != APPLICATION_ID or version != VERSION):
+        raise invalid(path, "is a database, but none of 'robochoc experiment run' of this version")
+    if not tables:
+        if not writing:
+            raise invalid(path, "holds no results yet")
+        database.execute("PRAGMA journal_mode = WAL")
+        make_tables(database)
+    if writing:
+        database.execute("PRAGMA synchronous = NORMAL")
+        with suppress(sqlite3.OperationalError):
+            database.execute("PRAGMA wal_checkpoint")
+
+
+def make_tables(database: sqlite3.Connection) -> None:
+    """Make all tables, or none if the process is killed meanwhile."""
+    with database:
+        database.execute("BEGIN IMMEDIATE")
+        for statement in filter(str.strip, _TABLES.split(";\n")):
+            database.execute(statement)
+        database.execute(f"PRAGMA application_id = {APPLICATION_ID}")
+        database.execute(f"PRAGMA user_version = {VERSION}")
+
+
+def invalid(
+    path: Path, message: str, hint: str = "name the file that 'robochoc experiment run' writes"
+) -> InvalidInputError:
+    """Return the error that something is wrong with the file."""
+    return InvalidInputError([Diagnostic(encodable(str(path)), 0, message, hint)])

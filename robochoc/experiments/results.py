@@ -1,0 +1,157 @@
+"""The results of a study, read from its file."""
+
+from __future__ import annotations
+
+import math
+import sqlite3
+from collections.abc import Iterator
+from contextlib import closing, suppress
+from decimal import Decimal
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import msgspec
+
+from robochoc.experiments.database import JSON, NUMBERS, STRANGE, TRIED_AGAIN, invalid, opened
+from robochoc.experiments.study import study_wishes
+from robochoc.experiments.task import KEY, Status
+from robochoc.formats.diagnostics import shortened
+from robochoc.system.plain_text import on_one_line
+
+
+class Results(NamedTuple):
+    """The results of a study.
+
+    Attributes:
+        name: The name of the study's file, without the ending.
+        title: What the study is called.
+        text: The study's file.
+        stopped: Why it was stopped: two answers contradict each other. Empty: it was not.
+        planned: How many runs it has, made or not.
+        rows: Those that were made, as `read` returns them.
+    """
+
+    name: str
+    title: str
+    text: str
+    stopped: str
+    planned: int
+    rows: tuple[dict[str, Any], ...]
+
+
+def read(path: Path | str) -> list[dict[str, Any]]:
+    """Return the results of a study: one dictionary a run, in the order of the study's file.
+
+    Args:
+        path: The SQLite file that `robochoc experiment run` writes; it may be running.
+
+    Returns:
+        Rows for `pandas.DataFrame(rows)` or `polars.DataFrame(rows)`. The problem's parameters have columns of their
+        own names; those that others have, too, begin with `problem_`.
+
+    Raises:
+        InvalidInputError: if the file holds no results of a study.
+    """
+    return list(read_results(Path(path)).rows)
+
+
+def read_results(path: Path) -> Results:
+    """Return the results of a study with the study itself; it may be running.
+
+    Raises:
+        InvalidInputError: if the file holds no results of a study.
+    """
+    with closing(opened(path, writing=False)) as database:
+        try:
+            return results_of(database)
+        except STRANGE as error:
+            raise invalid(path, f"holds no results of a study: {on_one_line(str(error))}") from None
+
+
+def journals(path: Path) -> Iterator[tuple[str, bytes]]:
+    """Yield the journals of the study's runs, by their keys, where the study records them.
+
+    Raises:
+        InvalidInputError: if the file holds no results of a study.
+    """
+    with closing(opened(path, writing=False)) as database:
+        try:
+            found = "SELECT key, content FROM plan JOIN journals USING (key) ORDER BY position"
+            yield from map(_journal, database.execute(found))
+        except (sqlite3.Error, TypeError) as error:
+            raise invalid(path, f"holds no results of a study: {error}") from None
+
+
+def _journal(found: tuple[object, object]) -> tuple[str, bytes]:
+    """Return a key and a journal. Raises `TypeError`: the key will be the name of a file."""
+    key, content = found
+    if isinstance(key, str) and KEY.fullmatch(key) and isinstance(content, bytes):
+        return key, content
+    raise TypeError(f"{shortened(str(key))} is no key of a run, or has no journal")
+
+
+def results_of(database: sqlite3.Connection) -> Results:
+    """Return the results in an open file. Raises one of `STRANGE` for strange content."""
+    found = database.execute("SELECT name, title, text, stopped FROM study").fetchone() or ("",) * 4
+    if not all(isinstance(one, str) for one in found):
+        raise TypeError("the study has no name")
+    name, title, text, stopped = map(str, found)
+    study_wishes(text)
+    (planned,) = database.execute("SELECT count(*) FROM plan").fetchone()
+    return Results(name, title, text, stopped, planned, tuple(_results(database)))
+
+
+def keys_there(path: Path) -> set[str]:
+    """Return the keys of all runs that were ever made and are not tried again.
+
+    Raises:
+        InvalidInputError: if the file holds no results of a study.
+    """
+    with closing(opened(path, writing=False)) as database:
+        found = database.execute("SELECT key, status FROM runs").fetchall()
+    return {key for key, status in found if status not in TRIED_AGAIN}
+
+
+def _results(database: sqlite3.Connection) -> Iterator[dict[str, Any]]:
+    cursor = database.execute("SELECT * FROM results")
+    names = [column[0] for column in cursor.description]
+    for values in cursor:
+        row = dict(zip(names, values, strict=True))
+        parameters = msgspec.json.decode(row.pop("parameters"), type=dict[str, str | int | float | bool])
+        row["status"] = str(Status(row["status"]))
+        del row["task"], row["position"]
+        settings = msgspec.json.decode(row["settings"], type=dict[str, str])
+        row["settings"] = {name: _number(one) for name, one in settings.items()}
+        for name, kind in JSON.items():
+            row[name] = msgspec.json.decode(row[name], type=kind)
+        row["cost_over_time"] = [[one.messages, one.ncccs, one.time, _exact(one.cost)] for one in row["cost_over_time"]]
+        row["loads"] = [[one.robot, one.messages, one.bytes] for one in row["loads"]]
+        for name in ("cost", "bound"):
+            row[name] = None if row[name] is None else _exact(row[name])
+        for name in ("maximises", "verified", "confirmed"):
+            row[name] = bool(row[name])
+        if strange := [name for name in NUMBERS if not _is_number(row[name])]:
+            raise TypeError(f"{strange[0]} is no number in run {row['key']}")
+        yield {**{(f"problem_{name}" if name in row else name): value for name, value in parameters.items()}, **row}
+
+
+def _is_number(value: object) -> bool:
+    return value is None or (isinstance(value, (int, float)) and math.isfinite(value))
+
+
+def _exact(text: str) -> int | float | Decimal:
+    """Return the number that a text is: as a float where that is exactly the same."""
+    exact = Decimal(text)
+    if not exact.is_finite():
+        raise TypeError(f"{shortened(text)} is no cost")
+    if exact == int(exact):
+        return int(exact)
+    return float(text) if Decimal(repr(float(text))) == exact else exact
+
+
+def _number(text: str) -> str | int | float:
+    """Return the number that a text is, or the text."""
+    for kind in (int, float):
+        with suppress(ValueError):
+            return kind(text)
+    return text
