@@ -43,7 +43,7 @@ class Account:
         try:
             self.over = summary.parameter_to_draw_over(rows, over or wishes.over)
             self.rows: Rows = summary.by_parameter(rows, self.over)
-            self.metrics = summary.metrics_to_show(self.rows, wishes.metrics)
+            self.metrics = summary.metrics_to_show(self.rows, wishes.metrics, self.over)
             self.parts = summary.parts(self.rows, wishes.each)
         except summary.NoSuchColumnError as wrong:
             raise invalid(self.name, str(wrong), "--over names one, or the table [report] of the study") from None

@@ -96,7 +96,7 @@ def latex_table(
         rf"\begin{{tabular}}{{l{'r' * len(ways)}}}",
         r"\toprule",
     ]
-    for place, metric in enumerate(summary.metrics_to_show(rows, metrics)):
+    for place, metric in enumerate(summary.metrics_to_show(rows, metrics, over)):
         found = summary.samples(rows, metric, over)
         lines += [r"\midrule"] * bool(place)
         heads = [f"{summary.METRICS[metric]}, {over}", *ways]

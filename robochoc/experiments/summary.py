@@ -174,8 +174,10 @@ def _without(label: str, name: str, value: object) -> str:
     return " ".join(word for word in label.split() if word not in {f"{name}={value}", str(value)}) or label
 
 
-def metrics_to_show(rows: Rows, wanted: Sequence[str] = ()) -> list[str]:
+def metrics_to_show(rows: Rows, wanted: Sequence[str] = (), over: str = "") -> list[str]:
     """Return the metrics that are shown: the wanted ones, or the usual ones as far as the results have them.
+
+    What is shown `over` is none: `cycles` is a setting of local searches, too.
 
     Raises:
         NoSuchColumnError: if there is no such metric.
@@ -188,7 +190,7 @@ def metrics_to_show(rows: Rows, wanted: Sequence[str] = ()) -> list[str]:
     usual = [*DEFAULT_METRICS, "cycles", "simulated_s", "cost"]
     if any(row["runtime"] != "simulator" for row in rows):
         usual.append("wall_s")
-    return [name for name in usual if any(row[name] is not None for row in rows)]
+    return [name for name in usual if name != over and any(row[name] is not None for row in rows)]
 
 
 def labels(rows: Rows) -> list[str]:

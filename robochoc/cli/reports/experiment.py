@@ -113,7 +113,7 @@ def print_medians(rows: Rows, over: str | None, metrics: Sequence[str], each: st
 
     try:
         over = summary.parameter_to_draw_over(rows, over)
-        shown = summary.metrics_to_show(rows, metrics)
+        shown = summary.metrics_to_show(rows, metrics, over)
         parts = summary.parts(summary.by_parameter(rows, over), each)
     except summary.NoSuchColumnError as wrong:
         raise click.UsageError(str(wrong)) from None
@@ -134,7 +134,7 @@ def print_answers(rows: Rows, over: str | None, metrics: Sequence[str]) -> None:
     from robochoc.experiments import ranking, summary
 
     over = summary.parameter_to_draw_over(rows, over)
-    shown = summary.metrics_to_show(rows, metrics)
+    shown = summary.metrics_to_show(rows, metrics, over)
     for line in ["", *ranking.answers(summary.by_parameter(rows, over), shown)]:
         click.echo(on_one_line(line))
 
