@@ -11,6 +11,7 @@ import msgspec
 
 from robochoc.experiments import summary
 from robochoc.experiments.store import Results
+from robochoc.experiments.study import study_wishes
 from robochoc.solver.encoding import UnsupportedError
 
 _NESTED = ("settings", "messages_by_type", "cost_over_time", "loads")
@@ -34,7 +35,8 @@ def exported(results: Results, form: str) -> bytes:
         case "json":
             return b"".join(msgspec.json.encode(row) + b"\n" for row in rows)
         case "latex":
-            return latex_table(rows, results.title).encode()
+            wishes = study_wishes(results.text)
+            return latex_table(summary.named(rows, wishes.names), results.title).encode()
         case _:
             return _parquet(rows)
 
