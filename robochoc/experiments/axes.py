@@ -26,6 +26,8 @@ _WIDE_RANGE = 30
 """Axes of values are logarithmic where the largest is so many times the smallest."""
 _BLOT = 0.05
 """Marks that are nearer to each other than this share of the axis are one blot."""
+_EVEN = 1.01
+"""Values are in even steps if the largest is less than so many times the smallest."""
 _LETTER, _LINE, _HANDLE = 0.075, 0.17, 0.5
 """Inches: about the width of a letter, the height of a line of text, and the width of a legend's sample."""
 _LONGEST_TICK, _LONGEST_LABEL, _TURNED = 18, 40, 35
@@ -102,11 +104,19 @@ def _nearest(places: Sequence[float]) -> float:
 
 
 def _that_fit(at: Sequence[float], texts: Sequence[str], width: float) -> list[int]:
-    """Return which ticks are kept so that their texts do not lie upon each other."""
+    """Return which ticks are kept so that their texts do not lie upon each other: in steps, if values are in steps."""
     letter = _LETTER / (0.8 * width)
+
+    def apart(one: int, other: int) -> bool:
+        return at[other] - at[one] > letter * ((len(texts[one]) + len(texts[other])) / 2 + 1)
+
+    gaps = [b - a for a, b in itertools.pairwise(at)]
+    if gaps and max(gaps) < _EVEN * min(gaps):
+        steps = (range(0, len(at), step) for step in range(1, len(at)))
+        return list(next((step for step in steps if all(itertools.starmap(apart, itertools.pairwise(step)))), [0]))
     kept: list[int] = []
-    for place, text in enumerate(texts):
-        if not kept or at[place] - at[kept[-1]] > letter * ((len(text) + len(texts[kept[-1]])) / 2 + 1):
+    for place in range(len(at)):
+        if not kept or apart(kept[-1], place):
             kept.append(place)
     return kept
 

@@ -61,10 +61,11 @@ class Drawing:
 
     def drawn(self) -> Figure:
         """Return the figure with its axes."""
-        figure = Figure(figsize=(self.width, _HEIGHT * self.width))
-        axes = figure.add_subplot()
-        self.draw(axes)
-        plain_ticks(axes)
+        with mpl.rc_context(_SETTINGS):
+            figure = Figure(figsize=(self.width, _HEIGHT * self.width))
+            axes = figure.add_subplot()
+            self.draw(axes)
+            plain_ticks(axes)
         return figure
 
     def _saved(self, form: str, metadata: dict[str, None], settings: dict[str, str]) -> bytes:

@@ -162,7 +162,7 @@ def _stairs(axes: Axes, steps: Steps, styles: Styles, each: float, last: float, 
     """Draw lines that rise by `each` at each step, from `first`, or the first step, to the right edge behind `last`."""
     begin = min((line[0] for line in steps.values() if line), default=last) if first is None else first
     room = (last - begin) * 0.05 or 1.0
-    edge = last + room if axes.get_xscale() == "linear" else last * (last / begin) ** 0.05
+    edge = last + room if axes.get_xscale() == "linear" else last * 1.1
     above = _lines_above({way: tuple(line) for way, line in steps.items()})
     for place, (way, line) in enumerate(steps.items()):
         x = [begin, *line, edge]
