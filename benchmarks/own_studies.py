@@ -42,7 +42,7 @@ def listed() -> str:
         HEADING,
         "",
         (
-            "Questions that a [study](../docs/guides/experiments.md) answers, each in up to three minutes of one core. "
+            "Questions that a [study](../docs/guides/experiments.md) answers, each in under four minutes of one core. "
             "`python benchmarks/run.py NAME` carries one out and writes its page; a test holds each page against it. "
             "[Replications](../docs/explanation/replications.md) has those that papers have answered before."
         ),

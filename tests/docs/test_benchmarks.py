@@ -35,6 +35,7 @@ def test_a_page_quotes_its_study(page: Path) -> None:
 
 
 @pytest.mark.slow
+@pytest.mark.timeout(1200)
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: page.stem)
 def test_a_page_says_what_its_study_comes_to(page: Path) -> None:
     pytest.importorskip("scipy")
