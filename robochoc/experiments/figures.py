@@ -34,7 +34,7 @@ MOST_KINDS = 12
 MOST_PROFILES, MOST_PAIRS = 2, 4
 """Profiles of more metrics, and scatters of more pairs, nobody looks at."""
 _NEARLY = 1.01
-"""Values that differ by less than this factor are drawn as one."""
+"""Values that differ by no more than this factor, 1 %, are taken for the same."""
 
 
 @dataclass(frozen=True)
@@ -213,12 +213,15 @@ def _profiles(shown: _Shown, metrics: Sequence[str]) -> Iterator[Drawing | str]:
             yield from _profile(shown, metric)
             yield from _scatters(shown, metric, found)
         elif any(found.values()):
-            yield f"Each way to run needs as many {METRICS[metric]} in all of its runs: no profiles of them are drawn."
+            at = f" at the same {shown.over}" if any("case" in row for row in shown.rows) else ""
+            need = f"the same number of {METRICS[metric]} in all of its runs{at}, within 1 %"
+            yield f"Each way to run needs {need}: no profiles of them are drawn."
     first, *others = shown.styles
     for way in others:
         same = [metric for metric, found in needs.items() if _the_same(_pairs(found, first, way))]
         if same:
-            yield f"{first} and {way} need as many {listed(METRICS[one] for one in same)} in all runs that both solve."
+            what = listed(METRICS[one] for one in same)
+            yield f"{first} and {way} need the same number of {what} in all runs that both have solved."
 
 
 def _profile(shown: _Shown, metric: str) -> Iterator[Drawing]:

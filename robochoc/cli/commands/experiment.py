@@ -167,7 +167,7 @@ def report(results: Path, output: Path, over: str | None, *, force: bool) -> Non
 
     if output.suffix.lower() not in PAGES and output.suffix[1:].isalpha() and not output.is_dir():
         raise click.UsageError(
-            f"-o {output}: a page ends in .html or .md; figures in SVG and PDF go to a folder, whose name has no ending."
+            f"-o {output}: pages end in .html or .md; figures in SVG and PDF go to a folder, whose name has no ending."
         )
     if output.suffix.lower() == ".md":
         need("tests of pairs", "scipy")

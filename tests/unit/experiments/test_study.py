@@ -139,6 +139,7 @@ WRONG = {
     "option of files": (SMALL.replace("domain", "infinity = 3\ndomain"), 5, "is for files of other tools"),
     "half a scenario": (SMALL.replace("domain", "scenario = { events = 2 }\ndomain"), 5, "rate is missing"),
     "label of several": (f'{SMALL}label = "x"\n', 12, "in a table that stands for one way to run"),
+    "too narrow": (f"{SMALL}[report]\nwidth = 0.5\n", 12, "report: width: expected a number >= 2.0"),
     "unknown wish": (f'{SMALL}[report]\nabove = "x"\n', 13, "there is no such key"),
 }
 
