@@ -39,10 +39,10 @@ class Account:
         if not rows:
             raise invalid(self.name, "has no results yet", "robochoc experiment run goes on with the study")
         wishes = study_wishes(self.text)
-        self.introduction = wishes.text
+        self.introduction, self.width = wishes.text, wishes.width
         try:
             self.over = summary.parameter_to_draw_over(rows, over or wishes.over)
-            self.rows: Rows = summary.by_parameter(rows, self.over)
+            self.rows: Rows = summary.named(summary.by_parameter(rows, self.over), wishes.names)
             self.metrics = summary.metrics_to_show(self.rows, wishes.metrics, self.over)
             self.parts = summary.parts(self.rows, wishes.each)
         except summary.NoSuchColumnError as wrong:

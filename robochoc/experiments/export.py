@@ -37,7 +37,8 @@ def exported(results: Results, form: str) -> bytes:
             return b"".join(msgspec.json.encode(row) + b"\n" for row in rows)
         case "latex":
             wishes = study_wishes(results.text)
-            return latex_table(rows, results.title, wishes.over, wishes.metrics).encode()
+            named = summary.named(rows, wishes.names)
+            return latex_table(named, results.title, wishes.over, wishes.metrics).encode()
         case _:
             return _parquet(rows)
 

@@ -1,13 +1,10 @@
-"""The figures of a report. The only file that needs matplotlib: the extra `experiments`.
-
-Lines differ in colour, in dashes and in markers: the colours are those of Okabe and Ito, "Color Universal Design",
-2008, which the colour-blind can tell apart, and the rest serves who prints in grey.
-"""
+"""The figures of a report: which there are, of what, and what is to be read below them."""
 
 from __future__ import annotations
 
 import io
-from collections.abc import Callable, Iterator, Sequence
+import math
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 from typing import Any, NamedTuple
@@ -15,43 +12,41 @@ from typing import Any, NamedTuple
 import matplotlib as mpl
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.ticker import MaxNLocator, NullFormatter
 
-from robochoc.experiments import statistics, summary
+from robochoc.experiments import plots, statistics, summary
+from robochoc.experiments.axes import MOST_WAYS, Style, numbers, plain_ticks, styles_of
+from robochoc.experiments.plots import Spot, same_lines
+from robochoc.experiments.statistics import Case
+from robochoc.experiments.study import WIDTH
 from robochoc.experiments.summary import METRICS, Rows
+from robochoc.experiments.task import Status
+from robochoc.model.outcome import Verdict
+from robochoc.model.wording import listed
 
 _SETTINGS = {
     "font.size": 9, "axes.spines.top": False, "axes.spines.right": False, "axes.grid": True, "grid.alpha": 0.25,
     "legend.frameon": False, "legend.fontsize": 8, "svg.hashsalt": "robochoc",
     "pdf.fonttype": 42, "lines.linewidth": 1.4, "lines.markersize": 4.5, "figure.constrained_layout.use": True,
 }  # fmt: skip
-_COLOURS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#000000", "#e69f00", "#56b4e9", "#7f7f7f")
-_MARKERS = ("o", "s", "^", "D", "v", "P", "X", "*")
-_DASHES = ("-", "--", "-.", ":")
-_SIZE = (4.6, 3.2)
-"""Inches: one column of a paper, and a little more."""
-_WIDE_RANGE = 30
-"""Axes are logarithmic where the largest value is so many times the smallest."""
+_HEIGHT = 0.64
+"""Of the width, without the legend."""
+MOST_KINDS = 12
+"""Over more kinds of problems, or instances, nothing is drawn: their names would be too small to be read."""
 MOST_PROFILES, MOST_PAIRS = 2, 4
 """Profiles of more metrics, and scatters of more pairs, nobody looks at."""
-
-
-class Style(NamedTuple):
-    """How one way to run is drawn."""
-
-    colour: str
-    marker: str
-    dashes: str
+_NEARLY = 1.01
+"""Values that differ by no more than this factor, 1 %, are taken for the same."""
 
 
 @dataclass(frozen=True)
 class Drawing:
-    """A figure: the name of its file, what it shows, and what draws it."""
+    """A figure: the name of its file, what it shows, what draws it, and how wide it is, in inches."""
 
     name: str
     title: str
     caption: str
     draw: Callable[[Axes], None]
+    width: float = WIDTH
 
     def __post_init__(self) -> None:
         """Make of the name one that a file can have: there are names of parameters in it, which come from a file."""
@@ -65,54 +60,258 @@ class Drawing:
         """Return it as PDF."""
         return self._saved("pdf", {"CreationDate": None}, {})
 
-    def _saved(self, form: str, metadata: dict[str, None], settings: dict[str, str]) -> bytes:
-        with mpl.rc_context({**_SETTINGS, **settings}):
-            figure = Figure(figsize=_SIZE)
+    def drawn(self) -> Figure:
+        """Return the figure with its axes."""
+        with mpl.rc_context(_SETTINGS):
+            figure = Figure(figsize=(self.width, _HEIGHT * self.width))
             axes = figure.add_subplot()
             self.draw(axes)
-            _plain_ticks(axes)
-            out = io.BytesIO()
-            figure.savefig(out, format=form, metadata=metadata)
+            plain_ticks(axes)
+        return figure
+
+    def _saved(self, form: str, metadata: dict[str, None], settings: dict[str, str]) -> bytes:
+        out = io.BytesIO()
+        with mpl.rc_context({**_SETTINGS, **settings}):
+            self.drawn().savefig(out, format=form, metadata=metadata)
         return out.getvalue()
 
 
-def drawings(rows: Rows, over: str, metrics: Sequence[str]) -> Iterator[Drawing]:
-    """Yield the figures that the results have something to say in."""
-    styles = _styles(summary.labels(rows))
-    several = len(summary.values_of(rows, over)) > 1
-    for metric in metrics:
-        name = METRICS[metric]
-        if several:
-            told = f"Median of {name}, and the interval that holds it with 95 % (bootstrap)."
-            hollow = " A hollow mark: limits ended half of the runs or more, and the value is a lower bound."
-            draw = partial(_over_parameter, rows, metric, over, styles)
-            yield Drawing(f"{metric}-over-{over}", f"{name} over {over}", told + hollow, draw)
-    if several:
-        told = "Share of runs with a verdict (lines), and of problems with a solution (shaded)."
-        yield Drawing(f"solved-over-{over}", f"Solved, over {over}", told, partial(_solved, rows, over, styles))
-    for metric in [one for one in metrics if one in summary.CENSORED][:MOST_PROFILES]:
-        yield from _profiles(rows, metric, styles)
-    for spent in statistics.SPENT:
-        if statistics.cost_bands(rows, spent):
-            told = "Cost of the best assignment so far: median and quartiles over runs."
-            draw = partial(_cost_over, rows, spent, styles)
-            yield Drawing(f"cost-over-{spent}", f"Cost over {METRICS[spent]}", told, draw)
+class Figures(NamedTuple):
+    """The figures that results have something to say in, and a sentence for each that is left out."""
+
+    drawings: list[Drawing]
+    remarks: list[str]
 
 
-def _profiles(rows: Rows, metric: str, styles: dict[str, Style]) -> Iterator[Drawing]:
-    name = METRICS[metric]
-    if len(styles) == 1:
+@dataclass(frozen=True)
+class _Shown:
+    """What figures are of: the rows of the ways to run that have a style, over a parameter."""
+
+    rows: Rows
+    over: str
+    styles: Mapping[str, Style]
+
+    @property
+    def values(self) -> list[Any]:
+        return summary.values_of(self.rows, self.over)
+
+
+def figures_of(rows: Rows, over: str, metrics: Sequence[str], width: float = WIDTH) -> Figures:
+    """Return the figures that the results have something to say in, each `width` inches wide."""
+    styles = styles_of(summary.labels(rows))
+    shown = _Shown([row for row in rows if str(row["label"]) in styles], over, styles)
+    found = list(_all(shown, metrics))
+    if len(summary.labels(rows)) > MOST_WAYS:
+        found.append(f"Figures show the first {MOST_WAYS} of {len(summary.labels(rows))} ways to run; tables show all.")
+    drawings = [Drawing(one.name, one.title, one.caption, one.draw, width) for one in found if isinstance(one, Drawing)]
+    return Figures(drawings, [one for one in found if isinstance(one, str)])
+
+
+def _all(shown: _Shown, metrics: Sequence[str]) -> Iterator[Drawing | str]:
+    """Yield figures, and sentences in the place of those that would say nothing; costs first where they differ."""
+    local = _costs_differ(shown.rows)
+    if local:
+        yield from _costs(shown, metrics)
+    yield from _over_parameter(shown, metrics)
+    yield from _profiles(shown, [one for one in metrics if one in summary.CENSORED][:MOST_PROFILES])
+    if not local:
+        yield from _costs(shown, ())
+
+
+def _over_parameter(shown: _Shown, metrics: Sequence[str]) -> Iterator[Drawing | str]:
+    over, values = shown.over, shown.values
+    if len(values) == 1:
         return
-    told = f"How many runs have a verdict within so many {name} each (cactus plot)."
-    yield Drawing(f"cactus-{metric}", f"Runs solved within {name}", told, partial(_cactus, rows, metric, styles))
-    told = f"Share of runs with a verdict within a factor of the best way's {name} (performance profile)."
-    draw = partial(_profile, rows, metric, styles)
-    yield Drawing(f"profile-{metric}", f"Performance profile of {name}", told, draw)
-    ways = list(styles)
-    for other in ways[1 : MOST_PAIRS + 1]:
-        told = f"A point for each run that both have solved: {name} of the one against {name} of the other."
-        draw = partial(_scatter, rows, metric, (ways[0], other))
-        yield Drawing(f"{metric}-{_file(ways[0])}-{_file(other)}", f"{name}: {ways[0]} and {other}", told, draw)
+    if not numbers(values) and len(values) > MOST_KINDS:
+        yield f"There are {len(values):,} values of {over}: tables list them, and no figures are drawn over them."
+        return
+    for metric in metrics:
+        name, spots = METRICS[metric], _spots(shown, metric)
+        some = [value for value in values if any(spot.at == value for line in spots.values() for spot in line)]
+        if some and metric != over:
+            draw = partial(plots.over_parameter, spots, some, (over, name), shown.styles)
+            yield Drawing(f"{metric}-over-{over}", f"{name} over {over}", _told_of(spots, values, name), draw)
+    yield from _solved(shown)
+
+
+def _spots(shown: _Shown, metric: str) -> dict[str, list[Spot]]:
+    found = summary.samples(shown.rows, metric, shown.over)
+    spots: dict[str, list[Spot]] = {way: [] for way in shown.styles}
+    for way, line in spots.items():
+        for value in shown.values:
+            one = found.get((value, way))
+            if one and one.values:
+                band = statistics.median_interval(one.values, one.problems)
+                line.append(Spot(value, band.median, band.low, band.high, one.open_ended))
+    return spots
+
+
+def _told_of(spots: Mapping[str, Sequence[Spot]], values: Sequence[Any], name: str) -> str:
+    """Return the caption of medians over a parameter."""
+    drawn = [spot for line in spots.values() for spot in line]
+    told = f"Median of {name}"
+    told += ", and the interval that holds it with 95 % (bootstrap)." if any(s.low < s.high for s in drawn) else "."
+    if any(spot.open_ended for spot in drawn):
+        told += " A hollow mark: limits ended half of the runs or more, and the value is a lower bound."
+    lines = {way: tuple((spot.at, spot.median) for spot in line) for way, line in spots.items() if line}
+    return told + (_same(lines) if numbers(values) else "") + _missing(spots)
+
+
+def _same(lines: Mapping[str, Any]) -> str:
+    """Return which lines lie upon each other."""
+    groups = same_lines(lines)
+    return "".join(f" The lines of {listed(group)} lie upon each other." for group in groups)
+
+
+def _missing(lines: Mapping[str, Sequence[Any]]) -> str:
+    """Return which ways to run have no line."""
+    missing = [way for way, line in lines.items() if not line]
+    return f" Without a value: {', '.join(missing)}." if missing else ""
+
+
+def _solved(shown: _Shown) -> Iterator[Drawing | str]:
+    rows, over, values = shown.rows, shown.over, shown.values
+    found = {
+        way: [_share([row for row in rows if row.get(over) == value and row["label"] == way]) for value in values]
+        for way in shown.styles
+    }
+    solutions = [_solutions([row for row in rows if row.get(over) == value]) for value in values]
+    if all(share == 1 or math.isnan(share) for line in found.values() for share in line):
+        yield "Every run has a verdict."
+        found = {}
+    if found:
+        same = _same(_lines(found)) if numbers(values) else ""
+        told = f"Share of runs with a verdict, and, shaded, that of problems with a solution.{same}"
+        draw = partial(plots.shares, found, values, solutions, (over, "share of runs"), shown.styles)
+        yield Drawing(f"solved-over-{over}", f"Solved, over {over}", told, draw)
+    elif len(set(solutions)) > 1 and len({row["digest"] for row in rows}) > len(values):
+        told = "Share of problems with a solution."
+        draw = partial(plots.shares, {}, values, solutions, (over, "share of problems"), shown.styles)
+        yield Drawing(f"solutions-over-{over}", f"Problems with a solution, over {over}", told, draw)
+
+
+def _lines(found: Mapping[str, Sequence[Any]]) -> dict[str, tuple[Any, ...]]:
+    return {way: tuple(line) for way, line in found.items()}
+
+
+def _share(rows: Rows) -> float:
+    return sum(row["status"] == Status.DONE for row in rows) / len(rows) if rows else math.nan
+
+
+def _solutions(rows: Rows) -> float:
+    """Return the share of problems with a solution, of those that some way to run has solved."""
+    solved = {row["digest"]: row["verdict"] != Verdict.NO_SOLUTION for row in rows if row["status"] == Status.DONE}
+    return sum(solved.values()) / len(solved) if solved else math.nan
+
+
+def _profiles(shown: _Shown, metrics: Sequence[str]) -> Iterator[Drawing | str]:
+    """Yield profiles and scatters of some metrics, and which ways need the same."""
+    if len(shown.styles) == 1:
+        return
+    needs = {metric: _by_case(shown, metric) for metric in metrics}
+    for metric, found in needs.items():
+        if any(_vary(cases) for cases in found.values()):
+            yield from _profile(shown, metric)
+            yield from _scatters(shown, metric, found)
+        elif any(found.values()):
+            at = f" at the same {shown.over}" if any("case" in row for row in shown.rows) else ""
+            need = f"the same number of {METRICS[metric]} in all of its runs{at}, within 1 %"
+            yield f"Each way to run needs {need}: no profiles of them are drawn."
+    first, *others = shown.styles
+    for way in others:
+        same = [metric for metric, found in needs.items() if _the_same(_pairs(found, first, way))]
+        if same:
+            what = listed(METRICS[one] for one in same)
+            yield f"{first} and {way} need the same number of {what} for all problems that both have solved."
+
+
+def _profile(shown: _Shown, metric: str) -> Iterator[Drawing]:
+    """Yield what shows how many runs are solved at which price: nothing, where all ways have the same line."""
+    name, found = METRICS[metric], statistics.cactus(shown.rows, metric)
+    solved = {way: line for way, line in found.items() if line}
+    cut = " Runs that limits have ended are not solved." if _some_cut(shown.rows) else ""
+    lines = _lines(found)
+    if len(set(lines.values())) > 1:
+        told = f"How many problems are solved within so many {name} each: a cactus plot, its axes exchanged.{cut}"
+        told += _same(_lines(solved)) + _missing(found)
+        draw = partial(plots.cactus, solved, name, shown.styles)
+        yield Drawing(f"cactus-{metric}", f"Solved within {name}", told, draw)
+    points = {way: line for way, line in statistics.performance_profile(shown.rows, metric).items() if line}
+    factors = {way: [factor for factor, _ in line if math.isfinite(factor)] for way, line in points.items()}
+    if len(set(_lines(factors).values())) > 1:
+        each = min(share for line in points.values() for _, share in line)
+        told = f"Share of problems that are solved within a factor of the best way's {name} (performance profile).{cut}"
+        draw = partial(plots.profile, factors, name, each, shown.styles)
+        yield Drawing(f"profile-{metric}", f"Performance profile of {name}", told + _same(_lines(factors)), draw)
+
+
+def _by_case(shown: _Shown, metric: str) -> dict[str, dict[Case, float]]:
+    """Return for each way to run what it needs for the problems that it has solved."""
+    return {way: statistics.by_problem(shown.rows, way, metric) for way in shown.styles}
+
+
+def _vary(cases: Mapping[Case, float]) -> bool:
+    """Return whether runs differ at the same value of the parameter of runs."""
+    groups: dict[Any, list[float]] = {}
+    for (_, at), value in cases.items():
+        groups.setdefault(at, []).append(value)
+    return any(max(values) > min(values) * _NEARLY for values in groups.values())
+
+
+def _pairs(found: Mapping[str, Mapping[Case, float]], one: str, other: str) -> list[tuple[float, float]]:
+    return [(value, found[other][case]) for case, value in found[one].items() if case in found[other]]
+
+
+def _the_same(pairs: Sequence[tuple[float, float]]) -> bool:
+    return bool(pairs) and all(x == y for x, y in pairs)
+
+
+def _some_cut(rows: Rows) -> bool:
+    return any(row["status"] == Status.LIMIT for row in rows)
+
+
+def _scatters(shown: _Shown, metric: str, found: Mapping[str, Mapping[Case, float]]) -> Iterator[Drawing]:
+    """Yield scatters of the first way to run against others, where one of the two varies."""
+    name, (first, *others) = METRICS[metric], shown.styles
+    drawn = 0
+    for way in others:
+        pairs = _pairs(found, first, way)
+        if drawn < MOST_PAIRS and pairs and not _the_same(pairs) and (_vary(found[first]) or _vary(found[way])):
+            drawn += 1
+            told = f"A point for each problem that both have solved: {name} of the one against {name} of the other."
+            told += " Below the line the second needs less."
+            draw = partial(plots.scatter, pairs, name, (first, way), shown.styles[first].colour)
+            yield Drawing(f"{metric}-{_file(first)}-{_file(way)}", f"{name}: {first} and {way}", told, draw)
+
+
+def _costs(shown: _Shown, metrics: Sequence[str]) -> Iterator[Drawing]:
+    """Yield costs over what was spent, cycles first; and, if the final costs are asked for, these."""
+    for spent in sorted(statistics.SPENT, key=lambda one: one != "cycles"):
+        bands = statistics.cost_bands(shown.rows, spent)
+        if bands:
+            same = _same({way: (band.spent, band.median) for way, band in bands.items()})
+            told = f"Cost of the best assignment so far: median and quartiles over runs.{same}"
+            draw = partial(plots.cost_over, bands, METRICS[spent], shown.styles, steps=spent == "cycles")
+            yield Drawing(f"cost-over-{spent}", f"Cost over {METRICS[spent]}", told, draw)
+    if "cost" in metrics:
+        costs = {way: list(summary.sample(of, "cost").values) for way, of in _by_way(shown).items()}
+        costs = {way: values for way, values in costs.items() if values}
+        told = "Final costs of all runs: quartiles and median; whiskers reach to the furthest run within 1.5 times the"
+        told += " box, and circles are runs beyond."
+        yield Drawing("final-costs", "Final costs", told, partial(plots.boxes, costs, METRICS["cost"], shown.styles))
+
+
+def _by_way(shown: _Shown) -> dict[str, Rows]:
+    return {way: [row for row in shown.rows if row["label"] == way] for way in shown.styles}
+
+
+def _costs_differ(rows: Rows) -> bool:
+    """Return whether runs on the same problem have ended with different costs, as those of local search do."""
+    found: dict[str, set[Any]] = {}
+    for row in rows:
+        if row["cost"] is not None and row["status"] in {Status.DONE, Status.LIMIT}:
+            found.setdefault(row["digest"], set()).add(row["cost"])
+    return any(len(costs) > 1 for costs in found.values())
 
 
 def _file(label: str) -> str:
@@ -122,163 +321,3 @@ def _file(label: str) -> str:
 def file_name(name: str, part: str) -> str:
     """Return the name of a file about a part of the problems."""
     return f"{name}-{_file(part)}" if part else name
-
-
-def _styles(ways: Sequence[str]) -> dict[str, Style]:
-    return {
-        way: Style(
-            _COLOURS[place % len(_COLOURS)],
-            _MARKERS[place % len(_MARKERS)],
-            _DASHES[(place + place // len(_COLOURS)) % len(_DASHES)],
-        )
-        for place, way in enumerate(ways)
-    }
-
-
-def _scale(axis: Any, values: Sequence[float]) -> None:  # noqa: ANN401 - a setter of matplotlib
-    """Make an axis logarithmic where values differ much."""
-    positive = [value for value in values if value > 0]
-    if positive and len(positive) == len(values) and max(positive) >= _WIDE_RANGE * min(positive):
-        axis("log")
-
-
-def _plain_ticks(axes: Axes) -> None:
-    """Have no numbers between the powers of ten: on small figures they lie upon each other."""
-    for axis in (axes.xaxis, axes.yaxis):
-        if axis.get_scale() == "log":
-            low, high = axis.get_view_interval()
-            if high / low >= 10:  # noqa: PLR2004 - one power of ten
-                axis.set_minor_formatter(NullFormatter())
-
-
-def _places(values: Sequence[Any], axes: Axes, name: str) -> list[float]:
-    """Return where the values of a parameter are on the x-axis: at themselves if they are numbers, else in a row."""
-    axes.set_xlabel(name)
-    if all(isinstance(value, (int, float)) and not isinstance(value, bool) for value in values):
-        if all(isinstance(value, int) for value in values):
-            axes.xaxis.set_major_locator(MaxNLocator(integer=True))
-        return [float(value) for value in values]
-    axes.set_xticks(range(len(values)), [str(value) for value in values])
-    return [float(place) for place in range(len(values))]
-
-
-def _over_parameter(rows: Rows, metric: str, over: str, styles: dict[str, Style], axes: Axes) -> None:
-    values = summary.values_of(rows, over)
-    places = dict(zip(values, _places(values, axes, over), strict=True))
-    found = summary.samples(rows, metric, over)
-    drawn: list[float] = []
-    for way, style in styles.items():
-        here = [(places[value], one) for value in values if (one := found.get((value, way))) and one.values]
-        bands = [(place, statistics.median_interval(one.values, one.problems), one.open_ended) for place, one in here]
-        where, medians = [place for place, *_ in bands], [band.median for _, band, _ in bands]
-        drawn += medians
-        axes.plot(where, medians, color=style.colour, linestyle=style.dashes, label=way)
-        axes.fill_between(
-            where, [band.low for _, band, _ in bands], [band.high for _, band, _ in bands],
-            color=style.colour, alpha=0.15, linewidth=0,
-        )  # fmt: skip
-        for place, band, is_open in bands:
-            face = "white" if is_open else style.colour
-            axes.plot(place, band.median, style.marker, color=style.colour, markerfacecolor=face)
-    _scale(axes.set_yscale, drawn)
-    axes.set_ylabel(METRICS[metric])
-    _legend(axes, styles)
-
-
-def _legend(axes: Axes, styles: dict[str, Style]) -> None:
-    """Draw the legend with lines and markers, however they were drawn."""
-    handles = [
-        mpl.lines.Line2D([], [], color=one.colour, linestyle=one.dashes, marker=one.marker, label=way)
-        for way, one in styles.items()
-    ]
-    axes.legend(handles=handles)
-
-
-def _solved(rows: Rows, over: str, styles: dict[str, Style], axes: Axes) -> None:
-    values = summary.values_of(rows, over)
-    places = _places(values, axes, over)
-    for way, style in styles.items():
-        shares = [_share([row for row in rows if row.get(over) == value and row["label"] == way]) for value in values]
-        axes.plot(places, shares, color=style.colour, linestyle=style.dashes, marker=style.marker, label=way)
-    solutions = [_solutions([row for row in rows if row.get(over) == value]) for value in values]
-    axes.fill_between(places, solutions, color="#999999", alpha=0.2, linewidth=0)
-    axes.set_ylim(-0.03, 1.03)
-    axes.set_ylabel("share of runs")
-    axes.legend()
-
-
-def _share(rows: Rows) -> float:
-    return sum(row["status"] == "done" for row in rows) / len(rows) if rows else float("nan")
-
-
-def _solutions(rows: Rows) -> float:
-    """Return the share of problems with a solution, of those that some way to run has solved."""
-    solved = {row["digest"]: row["verdict"] != "no-solution" for row in rows if row["status"] == "done"}
-    return sum(solved.values()) / len(solved) if solved else float("nan")
-
-
-def _cactus(rows: Rows, metric: str, styles: dict[str, Style], axes: Axes) -> None:
-    found = statistics.cactus(rows, metric)
-    for way, values in found.items():
-        style = styles[way]
-        every = max(1, len(values) // 12)
-        axes.plot(
-            range(1, len(values) + 1), values, color=style.colour, linestyle=style.dashes, marker=style.marker,
-            markevery=every, label=way,
-        )  # fmt: skip
-    _scale(axes.set_yscale, [value for values in found.values() for value in values])
-    axes.set_xlabel("runs with a verdict")
-    axes.set_ylabel(f"{METRICS[metric]}, each at most")
-    axes.legend()
-
-
-def _profile(rows: Rows, metric: str, styles: dict[str, Style], axes: Axes) -> None:
-    for way, points in statistics.performance_profile(rows, metric).items():
-        style = styles[way]
-        factors = [1.0, *(factor for factor, _ in points)]
-        shares = [0.0, *(share for _, share in points)]
-        axes.step(
-            factors, shares, where="post", color=style.colour, linestyle=style.dashes, marker=style.marker,
-            markevery=max(1, len(factors) // 12), label=way,
-        )  # fmt: skip
-    axes.set_xscale("log")
-    axes.set_ylim(-0.03, 1.03)
-    axes.set_xlabel(f"{METRICS[metric]}, as a multiple of the best way's")
-    axes.set_ylabel("share of runs with a verdict")
-    axes.legend(loc="lower right")
-
-
-def _scatter(rows: Rows, metric: str, pair: tuple[str, str], axes: Axes) -> None:
-    one, other = (
-        {
-            (row["digest"], row["seed"], row["repetition"]): float(row[metric])
-            for row in rows
-            if row["label"] == way and row["status"] == "done" and row[metric] is not None
-        }
-        for way in pair
-    )
-    both = [case for case in one if case in other]
-    x, y = [one[case] for case in both], [other[case] for case in both]
-    axes.scatter(x, y, s=14, color=_COLOURS[0], alpha=0.6, linewidths=0)
-    for axis in (axes.set_xscale, axes.set_yscale):
-        _scale(axis, [*x, *y])
-    if both:
-        ends = [min(*x, *y), max(*x, *y)]
-        axes.plot(ends, ends, color="#555555", linewidth=0.8, linestyle="--")
-    axes.set_xlabel(f"{METRICS[metric]} of {pair[0]}")
-    axes.set_ylabel(f"{METRICS[metric]} of {pair[1]}")
-
-
-def _cost_over(rows: Rows, spent: str, styles: dict[str, Style], axes: Axes) -> None:
-    bands = statistics.cost_bands(rows, spent)
-    for way, band in bands.items():
-        style = styles[way]
-        axes.plot(
-            band.spent, band.median, color=style.colour, linestyle=style.dashes, marker=style.marker,
-            markevery=max(1, len(band.spent) // 10), label=way,
-        )  # fmt: skip
-        axes.fill_between(band.spent, band.low, band.high, color=style.colour, alpha=0.15, linewidth=0)
-    _scale(axes.set_xscale, [place for band in bands.values() for place in band.spent])
-    axes.set_xlabel(METRICS[spent])
-    axes.set_ylabel("cost of the best assignment so far")
-    axes.legend()

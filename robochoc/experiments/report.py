@@ -10,7 +10,7 @@ from pathlib import Path
 from robochoc.experiments import summary
 from robochoc.experiments.account import PAIRS_TOLD, Account, headed, invalid
 from robochoc.experiments.export import latex_table
-from robochoc.experiments.figures import Drawing, drawings, file_name
+from robochoc.experiments.figures import Drawing, figures_of, file_name
 from robochoc.experiments.results import Results
 from robochoc.experiments.summary import METRICS
 from robochoc.system.files import write_atomically
@@ -48,7 +48,7 @@ def write_page(results: Results, page: Path, over: str | None = None) -> None:
 
 
 def write_folder(results: Results, folder: Path, over: str | None = None, *, replace: bool = False) -> None:
-    """Write the figures of the report as SVG and PDF, and its table in LaTeX, into `folder`.
+    """Write the figures of the report as SVG and PDF, their captions, and its table in LaTeX, into `folder`.
 
     Raises:
         InvalidInputError: as `write_page`, and if a figure is there already and `replace` is not set.
@@ -59,6 +59,8 @@ def write_folder(results: Results, folder: Path, over: str | None = None, *, rep
         file_name("medians", part) + ".tex": latex_table(rows, headed(report.title, part), report.over).encode()
         for part, rows in report.parts
     }
+    captions = [*report.remarks, *(f"{one.name}: {one.title}. {one.caption}" for one in report.drawings)]
+    files["captions.txt"] = "".join(f"{line}\n" for line in captions).encode()
     for drawing in report.drawings:
         files |= {f"{drawing.name}.svg": drawing.svg(), f"{drawing.name}.pdf": drawing.pdf()}
     there = [name for name in files if (folder / name).exists()]
@@ -74,9 +76,9 @@ class _Report(Account):
 
     def __init__(self, results: Results, over: str | None) -> None:
         super().__init__(results, over)
-        self.drawings: list[Drawing] = [
-            _of_part(drawing, part) for part, rows in self.parts for drawing in drawings(rows, self.over, self.metrics)
-        ]
+        found = [(part, figures_of(rows, self.over, self.metrics, self.width)) for part, rows in self.parts]
+        self.drawings = [_of_part(one, part) for part, figures in found for one in figures.drawings]
+        self.remarks = [f"{part}: {line}" if part else line for part, figures in found for line in figures.remarks]
 
     def page(self) -> str:
         """Return the whole page."""
@@ -95,7 +97,9 @@ class _Report(Account):
         told = "".join(f"<li>{html.escape(line)}</li>" for line in self.answers())
         yield f"<ul>{told}</ul>" if told else ""
         yield "<h2>How runs ended</h2>" + _table(*summary.endings(self.rows))
-        yield '<h2>Figures</h2><div class="figures">'
+        yield "<h2>Figures</h2>"
+        yield "".join(f"<p>{html.escape(line)}</p>" for line in self.remarks)
+        yield '<div class="figures">'
         for drawing in self.drawings:
             caption = f"<b>{html.escape(drawing.title)}.</b> {html.escape(drawing.caption)}"
             yield f"<figure>{_inline(drawing)}<figcaption>{caption}</figcaption></figure>"

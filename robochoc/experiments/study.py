@@ -19,7 +19,7 @@ from __future__ import annotations
 import tomllib
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 import msgspec
 
@@ -36,6 +36,8 @@ LARGEST_FILE = 2**20
 _TOP = ("title", "problems", "runs", "limits", "repeat", "record", "report")
 MOST_REPETITIONS = 1000
 MOST_MEMORY_MB = 2**30
+WIDTH = 4.6
+"""Inches: one column of a paper, and a little more."""
 
 
 class ReportWishes(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
@@ -47,12 +49,16 @@ class ReportWishes(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fie
             problems are in the same.
         metrics: The metrics that are drawn. Empty: those that there are.
         text: What is to be read above the figures.
+        width: How wide figures are, in inches.
+        names: What figures and tables call ways to run: labels, or words in them, and their names.
     """
 
     over: str | None = None
     each: str | None = None
     metrics: tuple[str, ...] = ()
     text: str = ""
+    width: Annotated[float, msgspec.Meta(ge=2, le=20)] = WIDTH
+    names: dict[str, str] = {}
 
 
 class Study(msgspec.Struct, frozen=True, kw_only=True):

@@ -12,6 +12,7 @@ from typing import Any
 
 from robochoc.experiments.task import Status
 from robochoc.model.outcome import Verdict
+from robochoc.model.priorities import natural_key
 
 Rows = Sequence[Mapping[str, Any]]
 
@@ -37,6 +38,8 @@ CENSORED = ("messages", "ncccs", "bytes", "checks", "cycles", "simulated_s", "wa
 OF_RUNS = ("order", "schedule", "delay", "withdraw", "runtime", "channel", "seed")
 """Parameters of runs, over which results can be shown, too."""
 _SEEDS = ("seed", "problem_seed", "scenario_seed")
+_OF_ONE = ("instance", "team")
+"""Parameters that are names of single problems."""
 MOST_TEAMS = 12
 """More problems have no lines of their own, unless it is asked for."""
 _MOST = {"instance": MOST_TEAMS}
@@ -166,6 +169,20 @@ def parts(rows: Rows, each: str | None) -> list[tuple[str, Rows]]:
     return [(f"{name}{value}", [row for row in rows if row.get(each) == value]) for value in values_of(rows, each)]
 
 
+def named(rows: Rows, names: Mapping[str, str]) -> Rows:
+    """Return `rows` with ways to run called by other names: of a whole label, or of words in it.
+
+    Raises:
+        NoSuchColumnError: if two ways to run would have the same name.
+    """
+    if not names:
+        return rows
+    known = {way: names.get(way) or " ".join(names.get(word, word) for word in way.split()) for way in labels(rows)}
+    if len(set(known.values())) < len(known):
+        raise NoSuchColumnError("names: two ways to run would have the same name")
+    return [{**row, "label": known[str(row["label"])]} for row in rows]
+
+
 def _settings(rows: Rows) -> list[str]:
     return list(dict.fromkeys(name for row in rows for name in row.get("settings", ())))
 
@@ -199,8 +216,10 @@ def labels(rows: Rows) -> list[str]:
 
 
 def values_of(rows: Rows, name: str) -> list[Any]:
-    """Return the values of a parameter, in ascending order if they are numbers, else as they come."""
+    """Return the values of a parameter: numbers in ascending order, problems in that of names, others as they come."""
     found = list(dict.fromkeys(row.get(name) for row in rows))
+    if name in _OF_ONE:
+        return sorted(found, key=lambda value: natural_key(str(value)))
     numbers = all(isinstance(value, (int, float)) for value in found)
     return sorted(found) if numbers else found
 

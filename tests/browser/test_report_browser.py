@@ -32,8 +32,9 @@ def test_the_page_shows_figures_tables_and_how_to_repeat_it(results: Path, brows
     with watched_page(browser, viewport={"width": 1200, "height": 800}) as (page, complaints, asked):
         page.goto(page_file.as_uri())
         titles = [one.get_attribute("aria-label") for one in page.query_selector_all("figure svg")]
-        assert titles[:3] == ["messages over agents", "cost over agents", "Solved, over agents"]
+        assert titles[:3] == ["messages over agents", "cost over agents", "Runs solved within messages"]
         assert "Cost over NCCCs" in titles
+        assert "Every run has a verdict." in page.inner_text("body")
         assert page.inner_text("h1") == "Costs"
         assert "Is <b>one</b> better?" in page.inner_text("p")
         assert "32 runs: 8 problems, 4 ways to run." in page.inner_text("body")
@@ -53,6 +54,7 @@ def test_figures_for_a_paper(results: Path, tmp_path: Path) -> None:
     assert done.returncode == 0, done.stderr
     names = {path.name for path in folder.iterdir()}
     assert {"messages-over-agents.svg", "messages-over-agents.pdf", "medians.tex", "cost-over-ncccs.pdf"} <= names
+    assert "cost-over-agents: cost over agents. Median of cost" in (folder / "captions.txt").read_text()
     for path in folder.glob("*.svg"):
         assert etree.parse(path).getroot().tag.endswith("svg")
     assert all(path.read_bytes().startswith(b"%PDF") for path in folder.glob("*.pdf"))

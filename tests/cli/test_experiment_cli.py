@@ -208,6 +208,7 @@ def test_parquet(tmp_path: Path) -> None:
         (["show", "{}", "--over", "tight"], 2, "there is no parameter 'tight'; there are agents,"),
         (["show", "{}", "--metric", "nccs"], 2, "there is no metric 'nccs'; there are messages,"),
         (["report", "{}", "-o", "page.html", "--over", "x"], 1, "there is no parameter 'x'"),
+        (["report", "{}", "-o", "figures.pdf"], 2, "figures in SVG and PDF go to a folder, whose name has no ending"),
         (["run", "{}.toml", "--scheduler", "tcp://x:1", "--dask", "y"], 1, "cannot be read"),
         (["run", "{}.toml", "-o", "/nothing/here.sqlite"], 2, "there is no folder /nothing"),
     ],

@@ -24,6 +24,7 @@ if TYPE_CHECKING:
 FORMATS = ("csv", "json", "latex", "parquet")
 JOURNALS = "journals"
 AGAIN = ("refused", "limit", "memory")
+PAGES = (".html", ".htm", ".md")
 
 
 @click.group()
@@ -176,6 +177,10 @@ def report(results: Path, output: Path, over: str | None, *, force: bool) -> Non
     """  # noqa: D301 - \\b is how click is told to leave the lines as they are
     from robochoc.experiments.results import read_results
 
+    if output.suffix.lower() not in PAGES and output.suffix[1:].isalpha() and not output.is_dir():
+        raise click.UsageError(
+            f"-o {output}: pages end in .html or .md; figures in SVG and PDF go to a folder, whose name has no ending."
+        )
     if output.suffix.lower() == ".md":
         need("tests of pairs", "scipy")
         from robochoc.experiments.markdown import write_markdown

@@ -10,6 +10,7 @@ import pytest
 
 from robochoc.experiments import statistics, summary
 from robochoc.experiments.account import Account
+from robochoc.experiments.export import exported
 from robochoc.experiments.markdown import markdown_page, markdown_table
 from robochoc.experiments.results import Results
 from robochoc.formats.diagnostics import InvalidInputError
@@ -81,6 +82,21 @@ def test_parts_have_tables_of_their_own() -> None:
     assert summary.parts([{"problems": "a", "key": 1}], "problems") == [("a", [{"problems": "a", "key": 1}])]
     with pytest.raises(InvalidInputError, match="no parameter 'delay' of problems"):
         told(SMALL, '[report]\neach = "delay"\n')
+
+
+def test_ways_to_run_have_the_names_that_a_paper_gives_them() -> None:
+    text = '[report]\nnames = { dsa = "DSA", sfb = "SFB", "dsa variant=B" = "DSA-B" }\nmetrics = ["cost"]\n'
+    wished = made(COSTS)._replace(text=text)
+    ways = ["SFB", "syncbb", "DSA variant=A", "DSA-B"]
+    assert tables(told(COSTS, text), "### cost")[0] == ["agents", *ways]
+    assert f" & {' & '.join(ways)} \\\\" in exported(wished, "latex").decode()
+    with pytest.raises(InvalidInputError, match="two ways to run would have the same name"):
+        told(COSTS, '[report]\nnames = { sfb = "x", syncbb = "x" }\n')
+
+
+def test_problems_are_in_the_natural_order_of_their_names() -> None:
+    given = [{"instance": name, "team": name} for name in ("p10", "p2", "p1")]
+    assert [summary.values_of(given, name) for name in ("instance", "team")] == [["p1", "p2", "p10"]] * 2
 
 
 def test_a_wide_table_is_turned() -> None:

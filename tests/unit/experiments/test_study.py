@@ -159,6 +159,7 @@ WRONG = {
     "a range with a dash": (SMALL.replace('"1..3"', '"1-3"'), 8, "a range is written 1..30"),
     "NCCCs of processes": (f'{SMALL}runtime = "processes"\nncccs = 3\n', 10, "--ncccs is a limit for the simulator"),
     "cycles of none": (f"{SMALL}cycles = 3\n", 10, "--cycles is a limit on the simulator's cycles"),
+    "too narrow": (f"{SMALL}[report]\nwidth = 0.5\n", 12, "report: width: expected a number >= 2.0"),
     "unknown wish": (f'{SMALL}[report]\nabove = "x"\n', 13, "there is no such key"),
 }
 

@@ -1,0 +1,207 @@
+"""How figures look: the styles of ways to run, scales, ticks and legends. With `plots.py` all that needs matplotlib.
+
+Lines differ in colour, in dashes and in markers: the colours are those of Okabe and Ito, "Color Universal Design",
+2008, which the colour-blind can tell apart, and the rest serves who prints in grey.
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any, NamedTuple
+
+import matplotlib as mpl
+from matplotlib.axes import Axes
+from matplotlib.axis import Axis
+from matplotlib.figure import Figure
+from matplotlib.ticker import FixedLocator, FuncFormatter, LogLocator, NullFormatter, NullLocator
+
+_COLOURS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#000000", "#e69f00", "#56b4e9", "#7f7f7f")
+_MARKERS = ("o", "s", "^", "D", "v", "P", "X", "*")
+_DASHES = ("-", "--", "-.", ":")
+MOST_WAYS = len(_MARKERS) * len(_DASHES)
+"""Figures show no more ways to run: so many differ in colour and marker, in colour and dashes, and in grey as well."""
+_WIDE_RANGE = 30
+"""Axes of values are logarithmic where the largest is so many times the smallest."""
+_BLOT = 0.05
+"""Marks that are nearer to each other than this share of the axis are one blot."""
+_EVEN = 1.01
+"""Values are in even steps if the largest is less than so many times the smallest."""
+_LETTER, _LINE, _HANDLE = 0.075, 0.17, 0.5
+"""Inches: about the width of a letter, the height of a line of text, and the width of a legend's sample."""
+_LONGEST_TICK, _LONGEST_LABEL, _TURNED = 18, 40, 35
+_FEW_DECADES, _PLAIN = 2, (1e-2, 1e5)
+"""Ticks at 1, 2, 5 on so many powers of ten; numbers within these ends are written out."""
+
+
+class Style(NamedTuple):
+    """How one way to run is drawn."""
+
+    colour: str
+    marker: str
+    dashes: str
+
+
+def styles_of(ways: Sequence[str]) -> dict[str, Style]:
+    """Return a style for each way to run, up to `MOST_WAYS`: any two differ in at least two of its three parts."""
+    styles = {}
+    for place, way in enumerate(ways[:MOST_WAYS]):
+        turn = place // len(_COLOURS)
+        marker, dashes = _MARKERS[(place + 2 * turn) % len(_MARKERS)], _DASHES[(place + turn) % len(_DASHES)]
+        styles[way] = Style(_COLOURS[place % len(_COLOURS)], marker, dashes)
+    return styles
+
+
+def spread(axes: Axes, which: str, values: Sequence[float]) -> None:
+    """Make an axis, x or y, logarithmic where values differ much; with zeros among them linear up to the smallest."""
+    positive = [value for value in values if value > 0]
+    if not positive or min(values) < 0 or max(positive) < _WIDE_RANGE * min(positive):
+        return
+    _logarithmic(axes, which, min(positive), zero=len(positive) < len(values))
+
+
+def _logarithmic(axes: Axes, which: str, smallest: float, *, zero: bool) -> None:
+    setter: Callable[..., Any] = axes.set_xscale if which == "x" else axes.set_yscale
+    if zero:  # what is below the smallest value is as wide as a power of ten
+        setter("symlog", linthresh=smallest, linscale=0.9)
+    else:
+        setter("log")
+
+
+def numbers(values: Sequence[Any]) -> bool:
+    """Return whether all values of a parameter are numbers: else they are kinds, which have no distances."""
+    return all(isinstance(value, (int, float)) and not isinstance(value, bool) for value in values)
+
+
+def tick_numbers(axes: Axes, values: Sequence[float]) -> None:
+    """Place ticks at values of the x-axis, in ascending order, as many as fit; logarithmic where they would be a blot.
+
+    Numbers that grow by factors are apart on a logarithmic axis, and those that grow by steps on a linear one: that
+    on which the nearest two are further apart is taken, if they are too near on the linear one.
+    """
+    places = [float(value) for value in values]
+    at = _shares(places)
+    if len(places) > 2 and places[0] >= 0 and _nearest(at) < _BLOT:  # noqa: PLR2004 - two are always apart
+        smallest = next(value for value in places if value > 0)
+        powers = _shares([1 + math.log10(value / smallest) if value > 0 else 0.0 for value in places])
+        if _nearest(powers) > _nearest(at):
+            at = powers
+            _logarithmic(axes, "x", smallest, zero=places[0] == 0)
+    kept = _that_fit(at, [written(value) for value in places], _figure(axes).get_figwidth())
+    axes.set_xticks([places[one] for one in kept], [written(places[one]) for one in kept])
+    axes.xaxis.set_minor_locator(NullLocator())
+
+
+def _shares(places: Sequence[float]) -> list[float]:
+    """Return where on the axis places are: 0 to 1."""
+    low, width = places[0], places[-1] - places[0] or 1.0
+    return [(place - low) / width for place in places]
+
+
+def _nearest(places: Sequence[float]) -> float:
+    return min(b - a for a, b in itertools.pairwise(places))
+
+
+def _that_fit(at: Sequence[float], texts: Sequence[str], width: float) -> list[int]:
+    """Return which ticks are kept so that their texts do not lie upon each other: in steps, if values are in steps."""
+    letter = _LETTER / (0.8 * width)
+
+    def apart(one: int, other: int) -> bool:
+        return at[other] - at[one] > letter * ((len(texts[one]) + len(texts[other])) / 2 + 1)
+
+    gaps = [b - a for a, b in itertools.pairwise(at)]
+    if gaps and max(gaps) < _EVEN * min(gaps):
+        steps = (range(0, len(at), step) for step in range(1, len(at)))
+        return list(next((step for step in steps if all(itertools.starmap(apart, itertools.pairwise(step)))), [0]))
+    kept: list[int] = []
+    for place in range(len(at)):
+        if not kept or apart(kept[-1], place):
+            kept.append(place)
+    return kept
+
+
+def tick_kinds(axes: Axes, names: Sequence[str], what: str) -> None:
+    """Write names below the x-axis, shortened, and turned where they would lie upon each other: the figure grows."""
+    start, texts = _short(names)
+    axes.set_xlabel(f"{what} ({start}…)" if start and what else what or start)
+    figure, longest = _figure(axes), _LETTER * max(map(len, texts), default=0)
+    if longest + _LETTER <= 0.8 * figure.get_figwidth() / max(1, len(texts)):
+        axes.set_xticks(range(len(texts)), texts)
+    else:
+        axes.set_xticks(range(len(texts)), texts, rotation=_TURNED, ha="right", rotation_mode="anchor")
+        figure.set_figheight(figure.get_figheight() + longest * math.sin(math.radians(_TURNED)))
+    axes.grid(visible=False, axis="x")
+    axes.set_xlim(-0.5, len(texts) - 0.5)
+
+
+def _short(names: Sequence[str]) -> tuple[str, list[str]]:
+    """Return what all names begin with, if it is left out, and short names."""
+    start = ""
+    if len(names) > 1 and max(map(len, names)) > _LONGEST_TICK // 2:
+        letters = itertools.takewhile(lambda column: len(set(column)) == 1, zip(*names, strict=False))
+        start = "".join(column[0] for column in letters)
+        while start and start[-1].isalnum():  # up to the end of a word
+            start = start[:-1]
+    texts = [_cut(name[len(start) :] or name, _LONGEST_TICK) for name in names]
+    return (start, texts) if len(set(texts)) == len(set(names)) else ("", list(names))
+
+
+def _cut(name: str, longest: int) -> str:
+    """Return a name without its middle, if it is too long: names often differ at their ends."""
+    half = longest // 2
+    return name if len(name) <= longest else f"{name[:half]}…{name[1 - half :]}"
+
+
+def written(value: float, _place: object = None) -> str:
+    """Return a number as it stands on an axis."""
+    return f"{value:,.10g}"
+
+
+def plain_ticks(axes: Axes) -> None:
+    """Write numbers as people do: 1, 2, 5, 10 and not 2 x 10^0, and 10,000 for 10000."""
+    for axis in (axes.xaxis, axes.yaxis):
+        if isinstance(axis.get_major_locator(), FixedLocator):
+            continue
+        if axis.get_scale() == "log":
+            _plain_powers(axis)
+        elif axis.get_view_interval()[1] < _PLAIN[1] * 100:
+            axis.set_major_formatter(FuncFormatter(written))
+
+
+def _plain_powers(axis: Axis) -> None:
+    low, high = axis.get_view_interval()
+    if high / low < 10**_FEW_DECADES:
+        axis.set_major_locator(LogLocator(subs=(1, 2, 5)))
+        axis.set_minor_locator(NullLocator())
+    axis.set_minor_formatter(NullFormatter())
+    if low >= _PLAIN[0] and high <= _PLAIN[1] * 10:
+        axis.set_major_formatter(FuncFormatter(written))
+
+
+def _figure(axes: Axes) -> Figure:
+    figure = axes.get_figure(root=True)
+    if figure is None:
+        raise ValueError("the axes are in no figure")
+    return figure
+
+
+def legend(axes: Axes, styles: Mapping[str, Style], *, lines: bool = True) -> None:
+    """Draw the legend above the axes, where it covers nothing; the figure grows by its height."""
+    figure = _figure(axes)
+    handles = [
+        mpl.lines.Line2D(
+            [], [], color=one.colour, linestyle=one.dashes if lines else "", marker=one.marker,
+            label=shortened_label(way),
+        )
+        for way, one in styles.items()
+    ]  # fmt: skip
+    width = _HANDLE + _LETTER * max((len(shortened_label(way)) for way in styles), default=0)
+    columns = max(1, min(len(handles), int(figure.get_figwidth() / width)))
+    figure.legend(handles=handles, loc="outside upper center", ncols=columns)
+    figure.set_figheight(figure.get_figheight() + _LINE * math.ceil(len(handles) / columns))
+
+
+def shortened_label(way: str) -> str:
+    """Return the label of a way to run, as long as a legend has room for."""
+    return _cut(way, _LONGEST_LABEL)
