@@ -32,7 +32,7 @@ def test_the_page_shows_figures_tables_and_how_to_repeat_it(results: Path, brows
     with watched_page(browser, viewport={"width": 1200, "height": 800}) as (page, complaints, asked):
         page.goto(page_file.as_uri())
         titles = [one.get_attribute("aria-label") for one in page.query_selector_all("figure svg")]
-        assert titles[:3] == ["messages over agents", "cost over agents", "Runs solved within messages"]
+        assert titles[:3] == ["messages over agents", "cost over agents", "Solved within messages"]
         assert "Cost over NCCCs" in titles
         assert "Every run has a verdict." in page.inner_text("body")
         assert page.inner_text("h1") == "Costs"

@@ -166,7 +166,7 @@ def test_what_says_nothing_is_left_out() -> None:
     assert figures.remarks == [
         "Every run has a verdict.",
         f"Each way to run needs {need} in all of its runs, within 1 %: no profiles of them are drawn.",
-        f"a and b need {need} in all runs that both have solved.",
+        f"a and b need {need} for all problems that both have solved.",
     ]
     assert "The lines of a and b lie upon each other." in figures.drawings[0].caption
     some = [{**one, "verdict": "no-solution"} if one["n"] > 1 else one for one in given]
