@@ -28,8 +28,8 @@ _BLOT = 0.05
 """Marks that are nearer to each other than this share of the axis are one blot."""
 _EVEN = 1.01
 """Values are in even steps if the largest is less than so many times the smallest."""
-_LETTER, _LINE, _HANDLE = 0.075, 0.17, 0.5
-"""Inches: about the width of a letter, the height of a line of text, and the width of a legend's sample."""
+_LETTER, _LINE, _HANDLE = 0.6 / 72, 1.5 / 72, 4.2 / 72
+"""Inches for a point of the font's size: the width of a letter, the height of a line, and a legend's sample."""
 _LONGEST_TICK, _LONGEST_LABEL, _TURNED = 18, 40, 35
 _FEW_DECADES, _PLAIN = 2, (1e-2, 1e5)
 """Ticks at 1, 2, 5 on so many powers of ten; numbers within these ends are written out."""
@@ -54,11 +54,11 @@ def styles_of(ways: Sequence[str]) -> dict[str, Style]:
 
 
 def spread(axes: Axes, which: str, values: Sequence[float]) -> None:
-    """Make an axis, x or y, logarithmic where values differ much; with zeros among them linear up to the smallest."""
+    """Make an axis, x or y, logarithmic where values differ much; with zeros among them linear near the smallest."""
     positive = [value for value in values if value > 0]
     if not positive or min(values) < 0 or max(positive) < _WIDE_RANGE * min(positive):
         return
-    _logarithmic(axes, which, min(positive), zero=len(positive) < len(values))
+    _logarithmic(axes, which, 10 ** math.ceil(math.log10(min(positive))), zero=len(positive) < len(values))
 
 
 def _logarithmic(axes: Axes, which: str, smallest: float, *, zero: bool) -> None:
@@ -105,7 +105,7 @@ def _nearest(places: Sequence[float]) -> float:
 
 def _that_fit(at: Sequence[float], texts: Sequence[str], width: float) -> list[int]:
     """Return which ticks are kept so that their texts do not lie upon each other: in steps, if values are in steps."""
-    letter = _LETTER / (0.8 * width)
+    letter: float = _LETTER * mpl.rcParams["font.size"] / (0.8 * width)
 
     def apart(one: int, other: int) -> bool:
         return at[other] - at[one] > letter * ((len(texts[one]) + len(texts[other])) / 2 + 1)
@@ -125,8 +125,9 @@ def tick_kinds(axes: Axes, names: Sequence[str], what: str) -> None:
     """Write names below the x-axis, shortened, and turned where they would lie upon each other: the figure grows."""
     start, texts = _short(names)
     axes.set_xlabel(f"{what} ({start}…)" if start and what else what or start)
-    figure, longest = _figure(axes), _LETTER * max(map(len, texts), default=0)
-    if longest + _LETTER <= 0.8 * figure.get_figwidth() / max(1, len(texts)):
+    figure, letter = _figure(axes), _LETTER * mpl.rcParams["font.size"]
+    longest = letter * max(map(len, texts), default=0)
+    if longest + letter <= 0.8 * figure.get_figwidth() / max(1, len(texts)):
         axes.set_xticks(range(len(texts)), texts)
     else:
         axes.set_xticks(range(len(texts)), texts, rotation=_TURNED, ha="right", rotation_mode="anchor")
@@ -196,10 +197,11 @@ def legend(axes: Axes, styles: Mapping[str, Style], *, lines: bool = True) -> No
         )
         for way, one in styles.items()
     ]  # fmt: skip
-    width = _HANDLE + _LETTER * max((len(shortened_label(way)) for way in styles), default=0)
+    size = mpl.rcParams["legend.fontsize"]
+    width = size * (_HANDLE + _LETTER * max((len(shortened_label(way)) for way in styles), default=0))
     columns = max(1, min(len(handles), int(figure.get_figwidth() / width)))
-    figure.legend(handles=handles, loc="outside upper center", ncols=columns)
-    figure.set_figheight(figure.get_figheight() + _LINE * math.ceil(len(handles) / columns))
+    figure.legend(handles=handles, loc="outside upper center", ncols=columns, columnspacing=1.2)
+    figure.set_figheight(figure.get_figheight() + size * _LINE * math.ceil(len(handles) / columns))
 
 
 def shortened_label(way: str) -> str:

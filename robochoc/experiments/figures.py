@@ -16,7 +16,6 @@ from matplotlib.figure import Figure
 from robochoc.experiments import plots, statistics, summary
 from robochoc.experiments.axes import MOST_WAYS, Style, numbers, plain_ticks, styles_of
 from robochoc.experiments.plots import Spot, same_lines
-from robochoc.experiments.statistics import Case
 from robochoc.experiments.study import WIDTH
 from robochoc.experiments.summary import METRICS, Rows
 from robochoc.experiments.task import Status
@@ -30,10 +29,14 @@ _SETTINGS = {
 }  # fmt: skip
 _HEIGHT = 0.64
 """Of the width, without the legend."""
+_NARROW, _SMALL = 4, {"font.size": 8, "legend.fontsize": 7, "lines.markersize": 4}
+"""Figures narrower than so many inches have smaller letters."""
 MOST_KINDS = 12
 """Over more kinds of problems, or instances, nothing is drawn: their names would be too small to be read."""
 MOST_PROFILES, MOST_PAIRS = 2, 4
 """Profiles of more metrics, and scatters of more pairs, nobody looks at."""
+MOST_BOXES = 40
+"""More do not fit side by side."""
 _NEARLY = 1.01
 """Values that differ by no more than this factor, 1 %, are taken for the same."""
 
@@ -62,7 +65,7 @@ class Drawing:
 
     def drawn(self) -> Figure:
         """Return the figure with its axes."""
-        with mpl.rc_context(_SETTINGS):
+        with mpl.rc_context({**_SETTINGS, **(_SMALL if self.width < _NARROW else {})}):
             figure = Figure(figsize=(self.width, _HEIGHT * self.width))
             axes = figure.add_subplot()
             self.draw(axes)
@@ -94,6 +97,11 @@ class _Shown:
     @property
     def values(self) -> list[Any]:
         return summary.values_of(self.rows, self.over)
+
+    @property
+    def grouped(self) -> bool:
+        """Whether the parameter has several values, and not one for each problem."""
+        return 1 < len(self.values) < len({(row.get("case"), row["digest"]) for row in self.rows})
 
 
 def figures_of(rows: Rows, over: str, metrics: Sequence[str], width: float = WIDTH) -> Figures:
@@ -159,8 +167,8 @@ def _told_of(spots: Mapping[str, Sequence[Spot]], values: Sequence[Any], name: s
 
 def _same(lines: Mapping[str, Any]) -> str:
     """Return which lines lie upon each other."""
-    groups = same_lines(lines)
-    return "".join(f" The lines of {listed(group)} lie upon each other." for group in groups)
+    groups = [listed(group) for group in same_lines(lines)]
+    return f" Lines that lie upon each other: {'; '.join(groups)}." if groups else ""
 
 
 def _missing(lines: Mapping[str, Sequence[Any]]) -> str:
@@ -214,7 +222,7 @@ def _profiles(shown: _Shown, metrics: Sequence[str]) -> Iterator[Drawing | str]:
             yield from _profile(shown, metric)
             yield from _scatters(shown, metric, found)
         elif any(found.values()):
-            at = f" at the same {shown.over}" if any("case" in row for row in shown.rows) else ""
+            at = f" at the same value of {shown.over}" if shown.grouped else ""
             need = f"the same number of {METRICS[metric]} in all of its runs{at}, within 1 %"
             yield f"Each way to run needs {need}: no profiles of them are drawn."
     first, *others = shown.styles
@@ -245,15 +253,26 @@ def _profile(shown: _Shown, metric: str) -> Iterator[Drawing]:
         yield Drawing(f"profile-{metric}", f"Performance profile of {name}", told + _same(_lines(factors)), draw)
 
 
+Case = tuple[Any, ...]
+"""What ways to run are compared on: the values of the parameters that are drawn over, and the problem."""
+
+
 def _by_case(shown: _Shown, metric: str) -> dict[str, dict[Case, float]]:
     """Return for each way to run what it needs for the problems that it has solved."""
-    return {way: statistics.by_problem(shown.rows, way, metric) for way in shown.styles}
+    at = {row["digest"]: row.get(shown.over) if shown.grouped else None for row in shown.rows}
+    return {
+        way: {
+            ((at[problem], case), problem): value
+            for (problem, case), value in statistics.by_problem(shown.rows, way, metric).items()
+        }
+        for way in shown.styles
+    }
 
 
 def _vary(cases: Mapping[Case, float]) -> bool:
-    """Return whether runs differ at the same value of the parameter of runs."""
+    """Return whether runs differ at the same value of the parameter."""
     groups: dict[Any, list[float]] = {}
-    for (_, at), value in cases.items():
+    for (at, *_), value in cases.items():
         groups.setdefault(at, []).append(value)
     return any(max(values) > min(values) * _NEARLY for values in groups.values())
 
@@ -294,15 +313,24 @@ def _costs(shown: _Shown, metrics: Sequence[str]) -> Iterator[Drawing]:
             draw = partial(plots.cost_over, bands, METRICS[spent], shown.styles, steps=spent == "cycles")
             yield Drawing(f"cost-over-{spent}", f"Cost over {METRICS[spent]}", told, draw)
     if "cost" in metrics:
-        costs = {way: list(summary.sample(of, "cost").values) for way, of in _by_way(shown).items()}
-        costs = {way: values for way, values in costs.items() if values}
-        told = "Final costs of all runs: quartiles and median; whiskers reach to the furthest run within 1.5 times the"
-        told += " box, and circles are runs beyond."
-        yield Drawing("final-costs", "Final costs", told, partial(plots.boxes, costs, METRICS["cost"], shown.styles))
+        yield from _final_costs(shown)
 
 
-def _by_way(shown: _Shown) -> dict[str, Rows]:
-    return {way: [row for row in shown.rows if row["label"] == way] for way in shown.styles}
+def _final_costs(shown: _Shown) -> Iterator[Drawing]:
+    """Yield boxes of the final costs at each value of the parameter, as far as they have room; problems are one."""
+    values = [None] if shown.over in summary.SINGLE else shown.values
+    if len(values) * len(shown.styles) > MOST_BOXES:
+        return
+    rows = [{**row, shown.over: None} for row in shown.rows] if values == [None] else shown.rows
+    found = summary.samples(rows, "cost", shown.over)
+    groups = {
+        str(value): {way: one.values for way in shown.styles if (one := found.get((value, way))) and one.values}
+        for value in values
+    }
+    told = "Final costs: quartiles and median; whiskers reach to the furthest run within 1.5 times the box, and circles"
+    told += " are runs beyond."
+    draw = partial(plots.boxes, groups, (shown.over, METRICS["cost"]), shown.styles)
+    yield Drawing("final-costs", "Final costs", told, draw)
 
 
 def _costs_differ(rows: Rows) -> bool:

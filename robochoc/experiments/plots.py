@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Hashable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
+import matplotlib as mpl
 from matplotlib.axes import Axes
 from matplotlib.ticker import MaxNLocator
 
@@ -58,7 +60,7 @@ def _line(axes: Axes, x: Sequence[float], y: Sequence[float], style: Style, abov
     wider = min(above, 3)
     axes.plot(
         x, y, color=style.colour, linestyle=style.dashes, marker=style.marker,
-        linewidth=1.4 + 2 * wider, markersize=4.5 + 3 * wider, **more,
+        linewidth=1.4 + 2 * wider, markersize=mpl.rcParams["lines.markersize"] + 3 * wider, **more,
     )  # fmt: skip
 
 
@@ -76,7 +78,7 @@ def over_parameter(
     """
     axes.set_xlabel(names[0])
     shown = {way: style for way, style in styles.items() if spots.get(way)}
-    spread(axes, "y", [spot.median for way in shown for spot in spots[way]])
+    spread(axes, "y", [value for way in shown for spot in spots[way] for value in (spot.low, spot.high)])
     if numbers(values):
         tick_numbers(axes, values)
         above = _lines_above({way: tuple((spot.at, spot.median) for spot in spots[way]) for way in shown})
@@ -201,16 +203,35 @@ def cost_over(bands: Mapping[str, Band], name: str, styles: Styles, axes: Axes, 
     else:
         spread(axes, "x", [end for band in bands.values() for end in (band.spent[0], band.spent[-1])])
     axes.set_xlabel(name)
-    axes.set_ylabel("cost of the best assignment so far")
+    axes.set_ylabel("best cost so far")
     legend(axes, {way: styles[way] for way in bands})
 
 
-def boxes(costs: Mapping[str, Sequence[float]], name: str, styles: Styles, axes: Axes) -> None:
-    """Draw the values of each way to run as a box of quartiles (Tukey, "Exploratory Data Analysis", 1977)."""
-    drawn = axes.boxplot(list(costs.values()), positions=range(len(costs)), widths=0.55)
-    for place, way in enumerate(costs):
-        for part in (drawn["boxes"][place], drawn["medians"][place], *drawn["whiskers"][2 * place : 2 * place + 2]):
-            part.set_color(styles[way].colour)
-        drawn["medians"][place].set_linewidth(2.2)
-    tick_kinds(axes, list(costs), "")
-    axes.set_ylabel(name)
+def boxes(
+    groups: Mapping[str, Mapping[str, Sequence[float]]], names: tuple[str, str], styles: Styles, axes: Axes
+) -> None:
+    """Draw the values of each way to run as a box of quartiles (Tukey, "Exploratory Data Analysis", 1977).
+
+    Boxes of several groups lie side by side; those of one have the names of ways below them.
+    """
+    ways = [way for way in styles if any(way in group for group in groups.values())]
+    alone = len(groups) == 1
+    for at, group in enumerate(groups.values()):
+        for place, way in enumerate(ways):
+            where = place if alone else at + _DODGED * ((place + 0.5) / len(ways) - 0.5)
+            if way in group:
+                _box(axes, where, 0.55 if alone else 0.8 * _DODGED / len(ways), group[way], styles[way].colour)
+    tick_kinds(axes, ways if alone else list(groups), "" if alone else names[0])
+    axes.set_ylabel(names[1])
+    if not alone:
+        legend(axes, {way: styles[way] for way in ways}, lines=False)
+
+
+def _box(axes: Axes, where: float, width: float, values: Sequence[float], colour: str) -> None:
+    drawn = axes.boxplot([values], positions=[where], widths=width)
+    for part in itertools.chain.from_iterable(drawn.values()):
+        part.set_color(colour)
+    for part in drawn["fliers"]:
+        part.set(markeredgecolor=colour, markersize=3)
+    for part in drawn["medians"]:
+        part.set_linewidth(2.2)

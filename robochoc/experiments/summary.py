@@ -38,7 +38,7 @@ CENSORED = ("messages", "ncccs", "bytes", "checks", "cycles", "simulated_s", "wa
 OF_RUNS = ("order", "schedule", "delay", "withdraw", "runtime", "channel", "seed")
 """Parameters of runs, over which results can be shown, too."""
 _SEEDS = ("seed", "problem_seed", "scenario_seed")
-_OF_ONE = ("instance", "team")
+SINGLE = ("instance", "team")
 """Parameters that are names of single problems."""
 MOST_TEAMS = 12
 """More problems have no lines of their own, unless it is asked for."""
@@ -218,7 +218,7 @@ def labels(rows: Rows) -> list[str]:
 def values_of(rows: Rows, name: str) -> list[Any]:
     """Return the values of a parameter: numbers in ascending order, problems in that of names, others as they come."""
     found = list(dict.fromkeys(row.get(name) for row in rows))
-    if name in _OF_ONE:
+    if name in SINGLE:
         return sorted(found, key=lambda value: natural_key(str(value)))
     numbers = all(isinstance(value, (int, float)) for value in found)
     return sorted(found) if numbers else found

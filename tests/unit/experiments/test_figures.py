@@ -159,16 +159,16 @@ def test_ticks_are_at_the_values_that_were_run(values: list[float], scale: str, 
 
 
 def test_what_says_nothing_is_left_out() -> None:
-    given = [row(way, 10 * n + case, 1000 + 4 * n, n=n) for way in "ab" for n in (1, 2) for case in range(3)]
+    given = [row(way, 10 * n + case, 1000 * n + case, n=n) for way in "ab" for n in (1, 2) for case in range(3)]
     figures = figures_of(given, "n", ["messages"])
     assert list(by_name(figures)) == ["messages-over-n"]
-    need = "the same number of messages"
+    need, at = "the same number of messages", " at the same value of n"
     assert figures.remarks == [
         "Every run has a verdict.",
-        f"Each way to run needs {need} in all of its runs, within 1 %: no profiles of them are drawn.",
+        f"Each way to run needs {need} in all of its runs{at}, within 1 %: no profiles of them are drawn.",
         f"a and b need {need} for all problems that both have solved.",
     ]
-    assert "The lines of a and b lie upon each other." in figures.drawings[0].caption
+    assert "Lines that lie upon each other: a and b." in figures.drawings[0].caption
     some = [{**one, "verdict": "no-solution"} if one["n"] > 1 else one for one in given]
     assert list(by_name(figures_of(some, "n", ["messages"]))) == ["messages-over-n", "solutions-over-n"]
     cut = [*given, row("b", 99, 1, "limit", n=1)]
@@ -185,7 +185,7 @@ def test_ways_with_the_same_values_are_both_seen() -> None:
         lines = [line for line in axes_of(figures[name]).get_lines() if len(line.get_xdata()) > 1]
         widths = [line.get_linewidth() for line in lines]
         assert widths[0] > widths[1] > widths[2]
-        assert "The lines of a, b, c and d lie upon each other." in figures[name].caption
+        assert "Lines that lie upon each other: a, b, c and d." in figures[name].caption
     assert "messages-a-b" not in figures
     assert "messages-a-e" in figures
 
@@ -200,8 +200,13 @@ def test_costs_come_first_where_they_differ() -> None:
     ]
     names = list(by_name(figures_of(given, "n", ["messages", "cost"])))
     assert names[:5] == ["cost-over-cycles", "cost-over-messages", "cost-over-ncccs", "final-costs", "messages-over-n"]
-    axes = axes_of(by_name(figures_of(given, "n", ["messages", "cost"]))["final-costs"])
-    assert [one.get_text() for one in axes.get_xticklabels()] == ["a", "b"]
+    groups = axes_of(by_name(figures_of(given, "n", ["messages", "cost"]))["final-costs"])
+    assert ticks(groups) == ["0", "1"]
+    alone = axes_of(
+        by_name(figures_of([{**one, "team": one["digest"]} for one in given], "team", ["cost"]))["final-costs"]
+    )
+    assert ticks(alone) == ["a", "b"]
+    assert len(groups.get_lines()) == 2 * len(alone.get_lines())
     optimal = [{**one, "cost": 5} for one in given]
     names = list(by_name(figures_of(optimal, "n", ["messages", "cost"])))
     assert (names[0], names[-3:]) == ("messages-over-n", ["cost-over-cycles", "cost-over-messages", "cost-over-ncccs"])
