@@ -43,7 +43,7 @@ SINGLE = ("instance", "team")
 MOST_TEAMS = 12
 """More problems have no lines of their own, unless it is asked for."""
 _MOST = {"instance": MOST_TEAMS}
-ONE_BY_ONE = ("instance", "team", "problems")
+ONE_BY_ONE = ("instance", "team")
 """What problems are called by: parameters that are no number or choice."""
 DEFAULT_METRICS = ("messages", "ncccs", "bytes")
 
@@ -253,7 +253,7 @@ Table = tuple[list[str], list[list[str]]]
 def medians(rows: Rows, metric: str, over: str) -> Table:
     """Return the medians of a metric: a line for each value of the parameter `over`, a column for each way to run.
 
-    Over problems, or kinds of them, there is a line for all together, too.
+    Over single problems there is a line for all together, too.
     """
     found = samples(rows, metric, over)
     ways = labels(rows)
