@@ -62,7 +62,7 @@ def _blocks(told: Account, name: str) -> Iterator[str]:
     yield " ".join(told.measured())
     yield "\n".join(f"- {on_one_line(line)}" for line in told.answers())
     yield "## Medians"
-    yield "A `>=` marks a median that limits leave open: they have ended half of its runs or more."
+    yield "A `>=` marks a median that limits leave open: if the runs that they ended had gone on, it could be higher."
     for part, rows in told.parts:
         for metric in told.metrics:
             yield f"### {headed(METRICS[metric], part)}"
