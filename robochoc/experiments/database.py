@@ -16,7 +16,7 @@ from robochoc.formats.diagnostics import Diagnostic, InvalidInputError, encodabl
 
 APPLICATION_ID = 0x726F626F
 """What marks the file as one of ours (SQLite, `PRAGMA application_id`): `robo`."""
-VERSION = 2
+VERSION = 3
 COLUMNS: Mapping[str, str] = {
     "status": "TEXT", "reason": "TEXT", "team": "TEXT", "digest": "TEXT", "robots": "INTEGER", "variables": "INTEGER",
     "constraints": "INTEGER", "verdict": "TEXT", "cost": "TEXT", "bound": "TEXT", "maximises": "INTEGER",

@@ -26,7 +26,7 @@ from robochoc.journal.journal import read_journal
 from tests.support.faults import PROGRAM, running
 from tests.support.limits import wait_until
 from tests.support.program import robochoc_within
-from tests.support.studies import COSTS, SMALL, comparable, results_of, study
+from tests.support.studies import COSTS, SMALL, comparable, finished, results_of, study
 
 slow = pytest.mark.slow
 
@@ -93,7 +93,7 @@ def test_a_journal_called_like_another_place_is_refused(tmp_path: Path) -> None:
 
 
 def test_export(tmp_path: Path) -> None:
-    results_of(COSTS, tmp_path / "costs.sqlite")
+    finished(COSTS, tmp_path / "costs.sqlite")
     path = tmp_path / "costs.sqlite"
     rows = read(path)
     table = list(csv.DictReader(io.StringIO(robochoc_within("experiment", "export", path).stdout)))
@@ -112,7 +112,7 @@ def test_export(tmp_path: Path) -> None:
 
 def test_a_report_in_markdown(tmp_path: Path) -> None:
     pytest.importorskip("scipy")
-    results_of(COSTS + '[report]\neach = "agents"\nover = "cycles"\nmetrics = ["cost"]\n', tmp_path / "costs.sqlite")
+    finished(COSTS + '[report]\neach = "agents"\nover = "cycles"\nmetrics = ["cost"]\n', tmp_path / "costs.sqlite")
     done = robochoc_within("experiment", "report", tmp_path / "costs.sqlite", "-o", tmp_path / "costs.md")
     assert (done.returncode, done.stderr) == (0, f"{tmp_path / 'costs.md'}: written\n")
     assert "### cost: agents 5\n\n| cycles | sfb |" in (tmp_path / "costs.md").read_text()
@@ -159,7 +159,7 @@ STRANGE = {
 @pytest.mark.parametrize("name", STRANGE)
 def test_strange_content_is_a_message(name: str, small: Path) -> None:
     path = small.with_suffix(".sqlite")
-    results_of(SMALL, path)
+    finished(SMALL, path)
     with closing(sqlite3.connect(path)) as database, database:
         database.executescript(STRANGE[name])
     for words in (["show"], ["export"], ["export", "--format", "latex"]):
@@ -169,7 +169,7 @@ def test_strange_content_is_a_message(name: str, small: Path) -> None:
 
 def test_what_has_failed_can_be_run_again(small: Path) -> None:
     path = small.with_suffix(".sqlite")
-    whole = results_of(SMALL, path)
+    whole = finished(SMALL, path)
     with closing(sqlite3.connect(path)) as database, database:
         for status, first in (("invalid", 0), ("crashed", 1), ("refused", 2), ("memory", 3)):
             database.execute(
@@ -193,7 +193,7 @@ def test_results_that_are_removed_meanwhile_are_missed(small: Path) -> None:
 
 def test_parquet(tmp_path: Path) -> None:
     parquet = pytest.importorskip("pyarrow.parquet")
-    results_of(COSTS, tmp_path / "costs.sqlite")
+    finished(COSTS, tmp_path / "costs.sqlite")
     done = robochoc_within("experiment", "export", tmp_path / "costs.sqlite", "-o", tmp_path / "costs.parquet")
     assert done.returncode == 0
     table = parquet.read_table(tmp_path / "costs.parquet").to_pylist()
@@ -216,7 +216,7 @@ def test_parquet(tmp_path: Path) -> None:
 def test_mistakes_are_told(words: list[str], status: int, said: str, tmp_path: Path) -> None:
     if "report" in words:
         pytest.importorskip("matplotlib")
-    results_of(SMALL, tmp_path / "s.sqlite")
+    finished(SMALL, tmp_path / "s.sqlite")
     done = robochoc_within("experiment", *(word.format(tmp_path / "s.sqlite") for word in words), folder=tmp_path)
     assert done.returncode == status
     assert said in done.stderr
@@ -225,7 +225,7 @@ def test_mistakes_are_told(words: list[str], status: int, said: str, tmp_path: P
 
 def test_a_contradiction_ends_with_status_4(small: Path) -> None:
     path = small.with_suffix(".sqlite")
-    digest = results_of(SMALL).rows[0]["digest"]
+    digest = finished(SMALL).rows[0]["digest"]
     with Store(path) as store:
         plan = plan_of(study(SMALL))
         store.begin(study(SMALL), plan)
@@ -254,7 +254,7 @@ def test_compare_a_family_and_folders(tmp_path: Path) -> None:
     assert done.returncode == 0, done.stderr
     assert "messages, median\ntightness" in done.stdout
     assert _counts(tmp_path / "kept.sqlite") == [
-        (row["label"], row["messages"], row["ncccs"]) for row in results_of(SMALL).rows
+        (row["label"], row["messages"], row["ncccs"]) for row in finished(SMALL).rows
     ]
     for size in (2, 3):
         write_team(queens3d(size), tmp_path / f"queens-{size}")

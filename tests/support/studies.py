@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import tomllib
 from collections.abc import Callable
+from functools import cache
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any
 
 from robochoc.experiments.results import Results, read_results
@@ -57,6 +59,24 @@ def results_of(
     with Store(path) as store:
         run_study(study(text), store, jobs, progress=progress)
         return store.results()
+
+
+def finished(text: str, path: Path | None = None) -> Results:
+    """Return the results of a study whose runs are made once in these tests, and copied."""
+    content = _finished(text.partition("[report]")[0])
+    with TemporaryDirectory() as folder:
+        place = path or Path(folder) / "results.sqlite"
+        place.write_bytes(content)
+        return results_of(text, place)
+
+
+@cache
+def _finished(text: str) -> bytes:
+    """Return the file of a study's results."""
+    with TemporaryDirectory() as folder:
+        path = Path(folder) / "results.sqlite"
+        results_of(text, path)
+        return path.read_bytes()
 
 
 def comparable(results: Results | Path) -> list[dict[str, Any]]:

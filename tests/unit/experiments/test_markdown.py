@@ -14,7 +14,7 @@ from robochoc.experiments.export import exported
 from robochoc.experiments.markdown import markdown_page, markdown_table
 from robochoc.experiments.results import Results
 from robochoc.formats.diagnostics import InvalidInputError
-from tests.support.studies import COSTS, SMALL, results_of
+from tests.support.studies import COSTS, SMALL, finished
 
 pytest.importorskip("scipy")
 
@@ -22,7 +22,7 @@ pytest.importorskip("scipy")
 @cache
 def made(text: str) -> Results:
     """Return the results of the study whose file has this text; each is carried out once."""
-    return results_of(text)._replace(text=text)
+    return finished(text)._replace(text=text)
 
 
 def told(text: str, report: str = "") -> str:

@@ -18,7 +18,7 @@ from robochoc.experiments.store import Store, StudyInUseError
 from robochoc.experiments.task import Row, Status, Task
 from robochoc.experiments.workers import LocalWorkers
 from robochoc.formats.diagnostics import InvalidInputError
-from tests.support.studies import COSTS, SMALL, comparable, results_of, study
+from tests.support.studies import COSTS, SMALL, comparable, finished, results_of, study
 
 
 class _EnoughError(Exception):
@@ -26,7 +26,7 @@ class _EnoughError(Exception):
 
 
 def test_a_study_that_was_broken_off_goes_on(tmp_path: Path) -> None:
-    whole = results_of(SMALL)
+    whole = finished(SMALL)
     assert [row["status"] for row in whole.rows] == ["done"] * 12
     path = tmp_path / "broken.sqlite"
     for enough in (1, 4):
@@ -56,9 +56,9 @@ def test_a_changed_study_runs_what_is_new(tmp_path: Path) -> None:
     seen: list[StudyProgress] = []
     found = results_of(changed, path, progress=seen.append)
     assert len(seen) == 9
-    assert comparable(found) == comparable(results_of(changed))
+    assert comparable(found) == comparable(finished(changed))
     seen.clear()
-    assert comparable(results_of(SMALL, path, progress=seen.append)) == comparable(results_of(SMALL))
+    assert comparable(results_of(SMALL, path, progress=seen.append)) == comparable(finished(SMALL))
     assert seen == []
     assert found.text == changed
 
@@ -162,7 +162,7 @@ def test_what_has_crashed_is_tried_again(tmp_path: Path) -> None:
     with Store(path) as store:
         store.begin(study(SMALL), plan)
         store.add([(key, Row(status=Status.CRASHED)) for key in list(plan)[:3]])
-    assert comparable(results_of(SMALL, path)) == comparable(results_of(SMALL))
+    assert comparable(results_of(SMALL, path)) == comparable(finished(SMALL))
 
 
 def test_answers_that_contradict_each_other_stop_the_study(tmp_path: Path) -> None:
@@ -170,7 +170,7 @@ def test_answers_that_contradict_each_other_stop_the_study(tmp_path: Path) -> No
     with Store(path) as store:
         plan = plan_of(study(SMALL))
         store.begin(study(SMALL), plan)
-        digest = results_of(SMALL).rows[0]["digest"]
+        digest = finished(SMALL).rows[0]["digest"]
         wrong = Row(status=Status.DONE, verdict="no-solution", digest=digest, team="wrong")
         store.add([(next(iter(plan)), wrong)])
     with pytest.raises(DisagreementError, match="contradict each other"):
