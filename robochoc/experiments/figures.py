@@ -160,7 +160,7 @@ def _told_of(spots: Mapping[str, Sequence[Spot]], values: Sequence[Any], name: s
     told = f"Median of {name}"
     told += ", and the interval that holds it with 95 % (bootstrap)." if any(s.low < s.high for s in drawn) else "."
     if any(spot.open_ended for spot in drawn):
-        told += " A hollow mark: limits ended half of the runs or more, and the value is a lower bound."
+        told += " A hollow mark: a lower bound, as limits have ended runs."
     lines = {way: tuple((spot.at, spot.median) for spot in line) for way, line in spots.items() if line}
     return told + (_same(lines) if numbers(values) else "") + _missing(spots)
 
@@ -238,6 +238,8 @@ def _profile(shown: _Shown, metric: str) -> Iterator[Drawing]:
     name, found = METRICS[metric], statistics.cactus(shown.rows, metric)
     solved = {way: line for way, line in found.items() if line}
     cut = " Runs that limits have ended are not solved." if _some_cut(shown.rows) else ""
+    if any("case" in row for row in shown.rows):
+        cut += f" A problem counts at each value of {shown.over}."
     lines = _lines(found)
     if len(set(lines.values())) > 1:
         told = f"How many problems are solved within so many {name} each: a cactus plot, its axes exchanged.{cut}"

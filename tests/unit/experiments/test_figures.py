@@ -14,11 +14,11 @@ from robochoc.experiments.axes import MOST_WAYS, styles_of
 from robochoc.experiments.figures import Drawing, Figures, figures_of
 
 
-def row(label: str, case: int, messages: float | None, status: str = "done", **more: object) -> dict[str, Any]:
+def row(label: str, problem: int, messages: float | None, status: str = "done", **more: object) -> dict[str, Any]:
     given = {
         "label": label, "seed": 0, "repetition": 1, "status": status, "runtime": "simulator", "settings": {},
-        "verdict": "solution" if status == "done" else None, "digest": str(case), "messages": messages, "ncccs": None,
-        "cycles": None, "simulated_s": None, "cost": None, "cost_over_time": [],
+        "verdict": "solution" if status == "done" else None, "digest": str(problem), "messages": messages,
+        "ncccs": None, "cycles": None, "simulated_s": None, "cost": None, "cost_over_time": [],
     }  # fmt: skip
     return {**given, **more}
 
@@ -217,7 +217,7 @@ def test_hollow_marks_and_ways_without_a_value_are_told_of() -> None:
     given += [row("b", case, 9 + case, "limit", n=case % 2) for case in range(4)]
     given += [row("c", case, None, "refused", n=case % 2) for case in range(4)]
     drawing = figures_of(given, "n", ["messages"]).drawings[0]
-    assert "A hollow mark: limits ended half" in drawing.caption
+    assert "A hollow mark: a lower bound" in drawing.caption
     assert drawing.caption.endswith("Without a value: c.")
     faces = [line.get_markerfacecolor() for line in axes_of(drawing).get_lines() if len(line.get_xdata()) == 1]
     assert [face == "white" for face in faces] == [False, False, True, True]
@@ -236,3 +236,14 @@ def test_a_need_of_nothing_is_drawn_as_well() -> None:
     assert axes_of(figures["cactus-messages"]).get_xscale() == "symlog"
     assert axes_of(figures["messages-a-b"]).get_yscale() == "symlog"
     assert drawn(figures["cactus-messages"])
+
+
+def test_a_problem_counts_at_each_value_of_a_parameter_of_runs() -> None:
+    given = [
+        row(w, case, 5 + case + at, delay=at, case=at) for w, at in itertools.product("ab", (0, 9)) for case in range(3)
+    ]
+    given[0]["messages"] = 1
+    figures = by_name(figures_of(given, "delay", ["messages"]))
+    assert "A problem counts at each value of delay." in figures["cactus-messages"].caption
+    assert axes_of(figures["cactus-messages"]).get_lines()[0].get_ydata()[-1] == 6
+    assert len(axes_of(figures["messages-a-b"]).collections[0].get_offsets()) == 6
