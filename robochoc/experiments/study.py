@@ -111,9 +111,12 @@ def study_of_tables(name: str, tables: Mapping[str, Any]) -> Study:
 
 
 def toml_of(tables: Mapping[str, Any]) -> str:
-    """Return tables of plain values, lists and tables as TOML. JSON's numbers, words and lists are TOML's, too."""
+    """Return plain values, and then tables, as TOML. JSON's numbers, words and lists are TOML's, too."""
     parts = []
     for name, table in tables.items():
+        if not isinstance(table, Mapping):
+            parts.append(f"{name} = {_toml(table)}")
+            continue
         lines = [f"{key} = {_toml(value)}" for key, value in table.items()]
         parts.append("\n".join([f"[{name}]", *lines, ""]))
     return "\n".join(parts)

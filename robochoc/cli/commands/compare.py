@@ -77,6 +77,8 @@ def compare(
 def _study(problem: Sequence[str], over: str | None, runs: dict[str, Any]) -> Study:
     """Return the study that the command line describes."""
     from robochoc.experiments.study import study_of_tables
+    from robochoc.formats.diagnostics import shortened
+    from robochoc.system.plain_text import on_one_line
 
     protocols = [name for name in runs.pop("protocols").split(",") if name]
     if not protocols:
@@ -91,7 +93,14 @@ def _study(problem: Sequence[str], over: str | None, runs: dict[str, Any]) -> St
     table |= {"order": order.split(",")} if order else {}
     table |= {"settings": settings} if settings else {}
     report = {"over": over} if over else {}
-    tables = {"problems": _problems(problem), "runs": table, "limits": {"timeout": timeout}, "report": report}
+    title = on_one_line(shortened(f"{', '.join(protocols)} on {' '.join(Path(word).name for word in problem)}"))
+    tables = {
+        "title": title,
+        "problems": _problems(problem),
+        "runs": table,
+        "limits": {"timeout": timeout},
+        "report": report,
+    }
     return study_of_tables("compare", tables)
 
 
