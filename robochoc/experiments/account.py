@@ -69,7 +69,8 @@ class Account:
         checked = sum(row["verified"] for row in rows)
         told = f"The answers of {checked:,} runs were checked against every constraint"
         if self.stopped:
-            yield f"{told}. The study was stopped, as two answers contradict each other: {self.stopped}"
+            why = self.stopped.partition("\n")[0]  # the commands that repeat them follow
+            yield f"{told}. The study was stopped: {why}"
         else:
             yield f"{told}, and no two answers to a problem contradict each other."
 

@@ -96,10 +96,10 @@ def _channel(name: str) -> str:
 
 
 def _limits(task: Task) -> dict[str, float]:
-    """Return the limits, and how a file of another tool is read."""
+    """Return the limits of a run, and the cost that stands for infinity in a file of another tool."""
     limits, given = task.limits, task.problem.parameters if task.problem.path else {}
     told = {name: getattr(limits, name) for name in ("timeout", "messages", "ncccs", "cycles")}
-    told |= {name: given.get(name) for name in ("infinity",)}
+    told["infinity"] = given.get("infinity")
     return {name: value for name, value in told.items() if value is not None}
 
 

@@ -124,13 +124,14 @@ def _that_fit(at: Sequence[float], texts: Sequence[str], width: float) -> list[i
 def tick_kinds(axes: Axes, names: Sequence[str], what: str) -> None:
     """Write names below the x-axis, shortened, and turned where they would lie upon each other: the figure grows."""
     start, texts = _short(names)
-    axes.set_xlabel(f"{what} ({start}…)" if start and what else what or start)
+    axes.set_xlabel(literal(f"{what} ({start}…)" if start and what else what or start))
+    marks = [literal(text) for text in texts]
     figure, letter = _figure(axes), _LETTER * mpl.rcParams["font.size"]
     longest = letter * max(map(len, texts), default=0)
     if longest + letter <= 0.8 * figure.get_figwidth() / max(1, len(texts)):
-        axes.set_xticks(range(len(texts)), texts)
+        axes.set_xticks(range(len(texts)), marks)
     else:
-        axes.set_xticks(range(len(texts)), texts, rotation=_TURNED, ha="right", rotation_mode="anchor")
+        axes.set_xticks(range(len(texts)), marks, rotation=_TURNED, ha="right", rotation_mode="anchor")
         figure.set_figheight(figure.get_figheight() + longest * math.sin(math.radians(_TURNED)))
     axes.grid(visible=False, axis="x")
     axes.set_xlim(-0.5, len(texts) - 0.5)
@@ -193,7 +194,7 @@ def legend(axes: Axes, styles: Mapping[str, Style], *, lines: bool = True) -> No
     handles = [
         mpl.lines.Line2D(
             [], [], color=one.colour, linestyle=one.dashes if lines else "", marker=one.marker,
-            label=shortened_label(way),
+            label=literal(shortened_label(way)),
         )
         for way, one in styles.items()
     ]  # fmt: skip
@@ -202,6 +203,11 @@ def legend(axes: Axes, styles: Mapping[str, Style], *, lines: bool = True) -> No
     columns = max(1, min(len(handles), int(figure.get_figwidth() / width)))
     figure.legend(handles=handles, loc="outside upper center", ncols=columns, columnspacing=1.2)
     figure.set_figheight(figure.get_figheight() + size * _LINE * math.ceil(len(handles) / columns))
+
+
+def literal(text: str) -> str:
+    """Return what makes matplotlib write `text` as it stands: between two dollars it would read a formula."""
+    return text.replace("$", r"\$")
 
 
 def shortened_label(way: str) -> str:

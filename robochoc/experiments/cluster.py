@@ -15,6 +15,7 @@ from typing import Self
 
 import msgspec
 from distributed import CancelledError, Client, as_completed
+from distributed.comm import resolve_address
 from distributed.scheduler import KilledWorker
 
 from robochoc.experiments.elsewhere import files_of, run_one
@@ -51,9 +52,10 @@ class ClusterWorkers:
 
     def __enter__(self) -> Self:
         """Connect with the scheduler. Raises `SchedulerLostError` if it cannot be reached."""
-        known = {"scheduler_file": str(self._file)} if self._file else {"address": self._address}
         try:
-            self._client = Client(**known, set_as_default=False, name="robochoc experiment")
+            address = _address_in(self._file) if self._file else self._address
+            resolve_address(address)  # Dask says late, and not in one line, that there can be no such address
+            self._client = Client(address, set_as_default=False, name="robochoc experiment")
         except (OSError, ValueError) as error:
             told = f"the scheduler at {self._file or self._address} cannot be reached: {error}"
             raise SchedulerLostError(told) from None
@@ -85,6 +87,20 @@ class ClusterWorkers:
     def _submit(self, client: Client, task: Task) -> object:
         content = msgspec.json.encode(task)
         return client.submit(run_one, content, files_of(task), key=f"robochoc-{task.key}", pure=False)
+
+
+class _SchedulerFile(msgspec.Struct):
+    """What is needed of a scheduler's JSON file."""
+
+    address: str
+
+
+def _address_in(file: Path) -> str:
+    """Return the address in a scheduler's file. Raises `OSError`, or `ValueError`: it has none."""
+    try:
+        return msgspec.json.decode(file.read_bytes(), type=_SchedulerFile).address
+    except msgspec.MsgspecError as wrong:
+        raise ValueError(f"it is no file of a scheduler: {wrong}") from None
 
 
 def _row(future: object) -> Row:

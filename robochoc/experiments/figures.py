@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import itertools
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -302,7 +303,7 @@ def _scatters(shown: _Shown, metric: str, found: Mapping[str, Mapping[Case, floa
             told = f"A point for each problem that both have solved: {name} of the one against {name} of the other."
             told += " Below the line the second needs less."
             draw = partial(plots.scatter, pairs, name, (first, way), shown.styles[first].colour)
-            yield Drawing(f"{metric}-{_file(first)}-{_file(way)}", f"{name}: {first} and {way}", told, draw)
+            yield Drawing(f"{metric}-{first}-{way}", f"{name}: {first} and {way}", told, draw)
 
 
 def _costs(shown: _Shown, metrics: Sequence[str]) -> Iterator[Drawing]:
@@ -351,3 +352,12 @@ def _file(label: str) -> str:
 def file_name(name: str, part: str) -> str:
     """Return the name of a file about a part of the problems."""
     return f"{name}-{_file(part)}" if part else name
+
+
+def told_apart(names: Sequence[str]) -> list[str]:
+    """Return names of files with a number behind each that would be there twice: `a/b` and `a-b` have the same."""
+    found: dict[str, None] = {}
+    for name in names:
+        numbered = (f"{name}-{number}" for number in itertools.count(2))
+        found[next(one for one in itertools.chain([name], numbered) if one not in found)] = None
+    return list(found)

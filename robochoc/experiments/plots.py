@@ -14,6 +14,7 @@ from matplotlib.ticker import MaxNLocator
 from robochoc.experiments.axes import (
     Style,
     legend,
+    literal,
     numbers,
     shortened_label,
     spread,
@@ -76,7 +77,7 @@ def over_parameter(
 
     Lines join numbers. Kinds of problems are not joined: their ways to run lie side by side.
     """
-    axes.set_xlabel(names[0])
+    axes.set_xlabel(literal(names[0]))
     shown = {way: style for way, style in styles.items() if spots.get(way)}
     spread(axes, "y", [value for way in shown for spot in spots[way] for value in (spot.low, spot.high)])
     if numbers(values):
@@ -117,7 +118,7 @@ def shares(
     styles: Styles, axes: Axes,
 ) -> None:  # fmt: skip
     """Draw the share of runs with a verdict over a parameter, and, in grey, that of problems with a solution."""
-    axes.set_xlabel(names[0])
+    axes.set_xlabel(literal(names[0]))
     if numbers(values):
         tick_numbers(axes, values)
         axes.fill_between(values, solutions, color="#999999", alpha=0.2, linewidth=0)
@@ -185,8 +186,8 @@ def scatter(pairs: Sequence[tuple[float, float]], name: str, ways: tuple[str, st
     low, high = min(values), max(values)
     axes.plot([low, high], [low, high], color="#555555", linewidth=0.8, linestyle="--")
     axes.set_ylim(axes.get_xlim())
-    axes.set_xlabel(f"{name} of {shortened_label(ways[0])}")
-    axes.set_ylabel(f"{name} of {shortened_label(ways[1])}")
+    axes.set_xlabel(literal(f"{name} of {shortened_label(ways[0])}"))
+    axes.set_ylabel(literal(f"{name} of {shortened_label(ways[1])}"))
 
 
 def cost_over(bands: Mapping[str, Band], name: str, styles: Styles, axes: Axes, *, steps: bool) -> None:

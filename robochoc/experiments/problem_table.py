@@ -27,7 +27,8 @@ _SCENARIO: Mapping[str, tuple[type, ...]] = {
 }
 _OF_FILES: Mapping[str, tuple[type, ...]] = {"infinity": (int,), "owner": (str,)}
 _DIGEST_BYTES = 16
-_RANGE = re.compile(r"\d+-\d+")
+_HYPHENED = re.compile(r"\d+-\d+")
+"""What looks like a range, and is none."""
 
 
 MOST_PROBLEMS = 100_000
@@ -100,7 +101,7 @@ def _check_types(parameters: Mapping[str, Any], known: Mapping[str, tuple[type, 
     for key, value in parameters.items():
         if type(value) not in known[key]:
             expected = {int: "an integer", float: "a number", str: "a word", bool: "true or false"}[known[key][0]]
-            hint = "a range is written 1..30" if isinstance(value, str) and _RANGE.fullmatch(value) else HINT
+            hint = "a range is written 1..30" if isinstance(value, str) and _HYPHENED.fullmatch(value) else HINT
             raise place.mistake(key, f"expected {expected}, got {shortened(repr(value))}", hint)
 
 

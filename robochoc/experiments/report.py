@@ -10,7 +10,7 @@ from pathlib import Path
 from robochoc.experiments import summary
 from robochoc.experiments.account import PAIRS_TOLD, Account, headed, invalid
 from robochoc.experiments.export import latex_table
-from robochoc.experiments.figures import Drawing, figures_of, file_name
+from robochoc.experiments.figures import Drawing, figures_of, file_name, told_apart
 from robochoc.experiments.results import Results
 from robochoc.experiments.summary import METRICS
 from robochoc.system.files import write_atomically
@@ -55,9 +55,10 @@ def write_folder(results: Results, folder: Path, over: str | None = None, *, rep
         OSError: if they cannot be written.
     """
     report = _Report(results, over)
+    tables = told_apart([file_name("medians", part) for part, _ in report.parts])
     files = {
-        file_name("medians", part) + ".tex": latex_table(rows, headed(report.title, part), report.over).encode()
-        for part, rows in report.parts
+        f"{name}.tex": latex_table(rows, headed(report.title, part), report.over).encode()
+        for name, (part, rows) in zip(tables, report.parts, strict=True)
     }
     captions = [*report.remarks, *(f"{one.name}: {one.title}. {one.caption}" for one in report.drawings)]
     files["captions.txt"] = "".join(f"{line}\n" for line in captions).encode()
@@ -77,7 +78,9 @@ class _Report(Account):
     def __init__(self, results: Results, over: str | None) -> None:
         super().__init__(results, over)
         found = [(part, figures_of(rows, self.over, self.metrics, self.width)) for part, rows in self.parts]
-        self.drawings = [_of_part(one, part) for part, figures in found for one in figures.drawings]
+        drawings = [_of_part(one, part) for part, figures in found for one in figures.drawings]
+        names = told_apart([one.name for one in drawings])
+        self.drawings = [replace(one, name=name) for one, name in zip(drawings, names, strict=True)]
         self.remarks = [f"{part}: {line}" if part else line for part, figures in found for line in figures.remarks]
 
     def page(self) -> str:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import sqlite3
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 from contextlib import closing, suppress
 from decimal import Decimal
 from pathlib import Path
@@ -26,7 +26,8 @@ class Results(NamedTuple):
         name: The name of the study's file, without the ending.
         title: What the study is called.
         text: The study's file.
-        stopped: Why it was stopped: two answers contradict each other. Empty: it was not.
+        stopped: Why it was stopped, and the commands that repeat it: two answers contradict each other, or the checker
+            refutes one. Empty: it was not.
         planned: How many runs it has, made or not.
         rows: Those that were made, as `read` returns them.
     """
@@ -96,20 +97,27 @@ def results_of(database: sqlite3.Connection) -> Results:
     if not all(isinstance(one, str) for one in found):
         raise TypeError("the study has no name")
     name, title, text, stopped = map(str, found)
-    study_wishes(text)
+    study_wishes(text)  # which raises if the study's file is no longer one
     (planned,) = database.execute("SELECT count(*) FROM plan").fetchone()
     return Results(name, title, text, stopped, planned, tuple(_results(database)))
 
 
-def keys_there(path: Path) -> set[str]:
+def keys_there(path: Path, again: Collection[str] = ()) -> set[str]:
     """Return the keys of all runs that were ever made and are not tried again.
+
+    Args:
+        path: The file of the results.
+        again: Runs that have ended so are tried again, besides those that always are.
 
     Raises:
         InvalidInputError: if the file holds no results of a study.
     """
     with closing(opened(path, writing=False)) as database:
-        found = database.execute("SELECT key, status FROM runs").fetchall()
-    return {key for key, status in found if status not in TRIED_AGAIN}
+        try:
+            found = database.execute("SELECT key, status FROM runs").fetchall()
+        except sqlite3.Error as error:
+            raise invalid(path, f"holds no results of a study: {error}") from None
+    return {key for key, status in found if status not in {*TRIED_AGAIN, *again}}
 
 
 def _results(database: sqlite3.Connection) -> Iterator[dict[str, Any]]:

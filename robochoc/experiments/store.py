@@ -90,6 +90,7 @@ class Store:
             ended = [*TRIED_AGAIN, *again]
             marks = ", ".join("?" * len(ended))
             writing.execute(f"DELETE FROM runs WHERE status IN ({marks})", ended)  # noqa: S608 - as above
+            writing.execute("DELETE FROM journals WHERE key NOT IN (SELECT key FROM runs)")
         return {key for (key,) in self._database.execute("SELECT key FROM runs")}
 
     def add(self, rows: Iterable[tuple[str, Row]]) -> None:

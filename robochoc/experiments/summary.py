@@ -39,12 +39,10 @@ OF_RUNS = ("order", "schedule", "delay", "withdraw", "runtime", "channel", "seed
 """Parameters of runs, over which results can be shown, too."""
 _SEEDS = ("seed", "problem_seed", "scenario_seed")
 SINGLE = ("instance", "team")
-"""Parameters that are names of single problems."""
+"""What single problems are called by: parameters that are no number or choice."""
 MOST_TEAMS = 12
 """More problems have no lines of their own, unless it is asked for."""
 _MOST = {"instance": MOST_TEAMS}
-ONE_BY_ONE = ("instance", "team")
-"""What problems are called by: parameters that are no number or choice."""
 DEFAULT_METRICS = ("messages", "ncccs", "bytes")
 
 
@@ -258,7 +256,7 @@ def medians(rows: Rows, metric: str, over: str) -> Table:
     found = samples(rows, metric, over)
     ways = labels(rows)
     lines = [[str(value), *(cell(found.get((value, way))) for way in ways)] for value in values_of(rows, over)]
-    if over in ONE_BY_ONE and len(lines) > 1:
+    if over in SINGLE and len(lines) > 1:
         lines.append(["all", *(cell(sample([row for row in rows if row["label"] == way], metric)) for way in ways)])
     return [over, *ways], lines
 

@@ -86,7 +86,8 @@ class Place:
             except ValueError as wrong:
                 raise self.mistake(key, str(wrong)) from None
             if not all(map(_is_plain, [one] if numbers is None else numbers)):
-                raise self.mistake(key, f"expected numbers, words, or a list of them, got {shortened(str(one))}")
+                told = f"expected numbers, words, or a list of them (integers up to 2^53), got {shortened(str(one))}"
+                raise self.mistake(key, told)
             found += [one] if numbers is None else numbers
         if not found:
             raise self.mistake(key, "expected at least one value")

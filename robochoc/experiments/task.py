@@ -15,6 +15,7 @@ from robochoc.run.options import CENTRAL, Options, Runtime, ScheduleName, Withdr
 
 Parameter = str | int | float | bool
 Content = bytes
+"""As a name of its own: in a row `bytes` is a count."""
 GIVEN = "given"
 """The priority order of the files."""
 _KEY_BYTES = 16
@@ -166,9 +167,9 @@ class Status(StrEnum):
     """How a run has ended.
 
     `DONE`: with a verdict. `LIMIT`: a limit was reached before. `ENDED`: an incomplete protocol has come to its end,
-    and has found nothing that holds. `REFUSED`: problem, protocol and options do not go
-    together. `INVALID`: there is no such problem. `LOST`: robots were lost. `REFUTED`: the checker refutes the answer.
-    `MEMORY`: the memory did not suffice. `CRASHED`: the process that solved has ended. `ERROR`: something else.
+    and has found nothing that holds. `REFUSED`: problem, protocol and options do not go together. `INVALID`: there is
+    no such problem. `LOST`: robots were lost. `REFUTED`: the checker refutes the answer. `MEMORY`: the memory did not
+    suffice. `CRASHED`: the process that solved has ended. `ERROR`: something else.
     """
 
     DONE = "done"

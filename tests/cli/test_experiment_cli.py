@@ -17,6 +17,7 @@ import pytest
 
 from robochoc.experiments import read
 from robochoc.experiments.plan import plan_of
+from robochoc.experiments.results import journals
 from robochoc.experiments.store import Store
 from robochoc.experiments.task import Row, Status
 from robochoc.formats import write_team
@@ -77,6 +78,11 @@ def test_journals_are_files_that_other_commands_read(tmp_path: Path) -> None:
     assert {file.name for file in files} == {f"{key}.journal" for key in rows}
     for file in files:
         assert read_journal(file.read_bytes()).header.protocol == rows[file.stem]["protocol"]
+    with closing(sqlite3.connect(path)) as database, database:
+        database.execute("UPDATE journals SET content = x'00'")
+        database.execute("UPDATE runs SET status = 'error'")
+    assert robochoc_within("experiment", "run", tmp_path / "study.toml").returncode == 0
+    assert {key for key, content in journals(path) if content != b"\0"} == set(rows)
 
 
 def test_a_journal_called_like_another_place_is_refused(tmp_path: Path) -> None:
@@ -179,7 +185,10 @@ def test_what_has_failed_can_be_run_again(small: Path) -> None:
     assert "10 are there, 2 are to be run" in planned.stdout
     assert robochoc_within("experiment", "run", small).returncode == 0
     assert [row["status"] for row in read(path)] == ["done", "done", "refused", "memory", *["done"] * 8]
-    done = robochoc_within("experiment", "run", small, "--again", "refused", "--again", "memory")
+    again = ["--again", "refused", "--again", "memory"]
+    planned = robochoc_within("experiment", "run", small, "--dry-run", *again)
+    assert "10 are there, 2 are to be run" in planned.stdout
+    done = robochoc_within("experiment", "run", small, *again)
     assert done.returncode == 0
     assert comparable(path) == comparable(whole)
 

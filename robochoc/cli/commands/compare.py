@@ -58,15 +58,13 @@ def compare(
 
         need_figures()
     from robochoc.cli.commands.experiment import carried_out, stored
-    from robochoc.cli.reports.experiment import print_answers, print_endings, print_medians
+    from robochoc.cli.reports.experiment import print_tables
 
     study = _study(problem, over, runs)
     with stored(save) as store:
         carried_out(study, store, jobs)
         results = store.results()
-    print_medians(results.rows, over, ())
-    print_endings(results.rows)
-    print_answers(results.rows, over, ())
+    print_tables(results, over, ())
     if html is not None:
         from robochoc.experiments.report import write_page
 

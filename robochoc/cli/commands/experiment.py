@@ -72,7 +72,7 @@ def run(
     read = read_study(study)
     path = output or study.with_suffix(".sqlite")
     if dry_run:
-        _show_plan(read, path)
+        _show_plan(read, path, again)
         return
     workers = _workers(scheduler, dask)
     if workers and any(setup.runtime != "simulator" for setup, *_ in read.setups):
@@ -231,10 +231,10 @@ def _workers(scheduler: str | None, dask: Path | None) -> Callable[[int | None],
     return partial(ClusterWorkers, scheduler, dask, notice=partial(click.echo, err=True))
 
 
-def _show_plan(study: Study, path: Path) -> None:
+def _show_plan(study: Study, path: Path, again: Sequence[str]) -> None:
     from robochoc.cli.reports.experiment import plan_lines
 
-    for line in plan_lines(study, path):
+    for line in plan_lines(study, path, again):
         click.echo(line)
 
 

@@ -51,8 +51,14 @@ def duration(seconds: float) -> str:
     return f"{seconds / _HOUR_S:.1f} h"
 
 
-def plan_lines(study: Study, path: Path) -> Iterator[str]:
-    """Yield what a study is going to run, how much of it is there, and about how long the rest takes."""
+def plan_lines(study: Study, path: Path, again: Sequence[str] = ()) -> Iterator[str]:
+    """Yield what a study is going to run, how much of it is there, and about how long the rest takes.
+
+    Args:
+        study: The study.
+        path: The file of its results, which need not exist.
+        again: Runs that have ended so are run again, besides those that always are.
+    """
     from robochoc.experiments.plan import TooManyRunsError, plan_of
     from robochoc.experiments.results import keys_there, read
 
@@ -60,8 +66,9 @@ def plan_lines(study: Study, path: Path) -> Iterator[str]:
         plan = plan_of(study)
     except TooManyRunsError as refused:
         raise Failure(USAGE, str(refused)) from None
-    rows = {row["key"]: row for row in read(path)} if path.exists() else {}
-    known = keys_there(path) if rows else set()
+    there_is_a_file = path.exists()
+    rows = {row["key"]: row for row in read(path)} if there_is_a_file else {}
+    known = keys_there(path, again) if there_is_a_file else set()
     missing = [task for key, task in plan.items() if key not in known]
     problems = len({task.problem.identity for task in plan.values()})
     labels = list(dict.fromkeys(task.setup.label for task in plan.values()))
@@ -91,36 +98,36 @@ def ended_line(name: str, ended: Counter[str]) -> str:
 
 
 def print_summary(results: Results, over: str | None, metrics: Sequence[str]) -> None:
-    """Print medians of a study's metrics, and how its runs have ended."""
+    """Print how far a study is, medians of its metrics, and how its runs have ended."""
+    rows, count = results.rows, results.planned
+    there = f"{len(rows):,} of {count:,} runs" if len(rows) < count else f"{len(rows):,} runs"
+    click.echo(f"{on_one_line(results.title)}: {there}")
+    if results.stopped:
+        why, *commands = results.stopped.splitlines()
+        click.echo("\n".join([f"stopped: {on_one_line(why)}", *map(on_one_line, commands)]))
+    if rows:
+        print_tables(results, over, metrics)
+
+
+def print_tables(results: Results, over: str | None, metrics: Sequence[str]) -> None:
+    """Print medians, how runs have ended, and who needs least, as the study wishes where nothing else is asked for."""
+    from robochoc.experiments import summary
     from robochoc.experiments.study import study_wishes
 
-    rows, count, title = results.rows, results.planned, results.title
     wishes = study_wishes(results.text)
-    there = f"{len(rows):,} of {count:,} runs" if len(rows) < count else f"{len(rows):,} runs"
-    click.echo(f"{on_one_line(title)}: {there}")
-    if results.stopped:
-        click.echo(f"stopped: {on_one_line(results.stopped)}")
-    if rows:
-        over, metrics = over or wishes.over, metrics or wishes.metrics
-        print_medians(rows, over, metrics, wishes.each)
-        print_endings(rows)
-        print_answers(rows, over, metrics)
-
-
-def print_medians(rows: Rows, over: str | None, metrics: Sequence[str], each: str | None = None) -> None:
-    """Print a table of medians for each metric; for each value of the parameter `each`, if there is one."""
-    from robochoc.experiments import summary
-
     try:
-        over = summary.parameter_to_draw_over(rows, over)
-        shown = summary.metrics_to_show(rows, metrics, over)
-        parts = summary.parts(summary.by_parameter(rows, over), each)
+        over = summary.parameter_to_draw_over(results.rows, over or wishes.over)
+        rows = summary.named(summary.by_parameter(results.rows, over), wishes.names)
+        shown = summary.metrics_to_show(rows, metrics or wishes.metrics, over)
+        parts = summary.parts(rows, wishes.each)
     except summary.NoSuchColumnError as wrong:
         raise click.UsageError(str(wrong)) from None
     for (part, own), metric in itertools.product(parts, shown):
         where = f", {on_one_line(part)}" if part else ""
         click.echo(f"\n{summary.METRICS[metric]}, median{where}")
         _print_table(*summary.medians(own, metric, over))
+    _print_endings(rows)
+    _print_answers(rows, shown)
 
 
 def _print_table(heads: Sequence[str], lines: Sequence[Sequence[str]]) -> None:
@@ -129,17 +136,15 @@ def _print_table(heads: Sequence[str], lines: Sequence[Sequence[str]]) -> None:
     print_table(heads, [[on_one_line(cell) for cell in line] for line in lines], right=heads[1:])
 
 
-def print_answers(rows: Rows, over: str | None, metrics: Sequence[str]) -> None:
+def _print_answers(rows: Rows, metrics: Sequence[str]) -> None:
     """Print who needs least of each metric, and who does the same as who."""
-    from robochoc.experiments import ranking, summary
+    from robochoc.experiments import ranking
 
-    over = summary.parameter_to_draw_over(rows, over)
-    shown = summary.metrics_to_show(rows, metrics, over)
-    for line in ["", *ranking.answers(summary.by_parameter(rows, over), shown)]:
+    for line in ["", *ranking.answers(rows, metrics)]:
         click.echo(on_one_line(line))
 
 
-def print_endings(rows: Sequence[Mapping[str, Any]]) -> None:
+def _print_endings(rows: Rows) -> None:
     """Print how runs have ended, and with which verdicts, for each way to run."""
     from robochoc.experiments.summary import endings
 

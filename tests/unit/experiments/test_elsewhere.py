@@ -96,6 +96,21 @@ class Cluster:
         return self._stack.enter_context(running(command, self._home / name))
 
 
+@pytest.mark.parametrize(
+    ("content", "said"),
+    [
+        ("{}", "missing required field `address`"),
+        ("[1", "it is no file of a scheduler"),
+        ('{"address": "nonsense"}', "missing port number in address 'nonsense'"),
+    ],
+)
+def test_what_is_no_file_of_a_scheduler_is_told(content: str, said: str, tmp_path: Path) -> None:
+    cluster = pytest.importorskip("robochoc.experiments.cluster")
+    (tmp_path / "cluster.json").write_text(content)
+    with pytest.raises(cluster.SchedulerLostError, match=said), cluster.ClusterWorkers(None, tmp_path / "cluster.json"):
+        pass
+
+
 @pytest.fixture
 def cluster(tmp_path: Path) -> Iterator[Cluster]:
     with ExitStack() as stack:

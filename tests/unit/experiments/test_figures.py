@@ -11,7 +11,7 @@ import pytest
 pytest.importorskip("matplotlib")
 
 from robochoc.experiments.axes import MOST_WAYS, styles_of
-from robochoc.experiments.figures import Drawing, Figures, figures_of
+from robochoc.experiments.figures import Drawing, Figures, figures_of, told_apart
 
 
 def row(label: str, problem: int, messages: float | None, status: str = "done", **more: object) -> dict[str, Any]:
@@ -247,3 +247,16 @@ def test_a_problem_counts_at_each_value_of_a_parameter_of_runs() -> None:
     assert "A problem counts at each value of delay." in figures["cactus-messages"].caption
     assert axes_of(figures["cactus-messages"]).get_lines()[0].get_ydata()[-1] == 6
     assert len(axes_of(figures["messages-a-b"]).collections[0].get_offsets()) == 6
+
+
+def test_labels_are_written_as_they_are() -> None:
+    ways = ["$\\foo$", "a$b$ \\$", "$"]
+    figure = drawn(figures_of(rows("k$i$nd", ["$\\bar$", "b"], ways), "k$i$nd", ["messages"]).drawings[0])
+    axes = figure.axes[0]
+    texts = [axes.xaxis.label, *axes.get_xticklabels(), *figure.legends[0].get_texts()]
+    names = ["k$i$nd", "$\\bar$", "b", *ways]
+    assert [one.get_text() for one in texts] == [name.replace("$", r"\$") for name in names]
+
+
+def test_names_of_files_are_told_apart() -> None:
+    assert told_apart(["a", "b", "a", "a-2", "a"]) == ["a", "b", "a-2", "a-2-2", "a-3"]
