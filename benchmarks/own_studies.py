@@ -15,12 +15,7 @@ NAMES = (
     "sweep-sparse", "sweep-dense", "variants", "awc-and-orders", "dynamic", "optimum", "colouring-cycles", "channels",
     "channels-costs",
 )  # fmt: skip
-"""Other studies repeat what papers claim: docs/explanation/replications.md."""
-
-
-def names() -> tuple[str, ...]:
-    """The names of our own studies."""
-    return NAMES
+"""Our own studies. Others in the folder repeat what papers claim: docs/explanation/replications.md."""
 
 
 def page_of(name: str) -> str:

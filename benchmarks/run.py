@@ -62,11 +62,11 @@ def main() -> None:
     parser.add_argument("--write", action="store_true", help="rewrite the sections of these parts in RESULTS.md")
     options = parser.parse_args()
     chosen: list[str] = options.parts
-    if strange := [part for part in chosen if part not in {*ALL, *own_studies.names()}]:
-        parser.error(f"no part {strange[0]!r}; there are: {', '.join([*ALL, *own_studies.names()])}")
+    if strange := [part for part in chosen if part not in {*ALL, *own_studies.NAMES}]:
+        parser.error(f"no part {strange[0]!r}; there are: {', '.join([*ALL, *own_studies.NAMES])}")
     began = time.monotonic()
     sections = {part: str(_measured(part)) for part in chosen or PARTS if part in ALL}
-    pages = [own_studies.page_of(name) for name in own_studies.names() if name in chosen]
+    pages = [own_studies.page_of(name) for name in own_studies.NAMES if name in chosen]
     if options.write or pages or not chosen:
         kept = _written()
         every = [sections.get(part) or kept.get(part) for part in dict.fromkeys((*kept, *ALL))]
@@ -82,7 +82,7 @@ def _parts() -> str:
         for name, measured in names.items():
             words = str(sys.modules[measured.__module__].__doc__).splitlines()[0]
             lines.append(f"  {name:12} {words.partition(': ')[2]}{kind}")
-    lines += ["studies (a page each, in results/):", *(f"  {name}" for name in own_studies.names())]
+    lines += ["studies (a page each, in results/):", *(f"  {name}" for name in own_studies.NAMES)]
     lines += [
         "decided, not measured any more (see RESULTS.md):",
         *(f"  {name:12} {what}" for name, what in DECIDED.items()),

@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from pathlib import Path
 
 from robochoc.experiments import ranking, statistics, summary
 from robochoc.experiments.results import Results
 from robochoc.experiments.study import study_wishes
-from robochoc.experiments.summary import CENSORED, Rows, Table
-from robochoc.formats.diagnostics import Diagnostic, InvalidInputError, encodable
+from robochoc.experiments.summary import CENSORED, Table
+from robochoc.formats.diagnostics import invalid_input
 
 SIGNIFICANT = 0.05
 MOST_TESTED = 2
@@ -37,16 +36,15 @@ class Account:
     def __init__(self, results: Results, over: str | None) -> None:
         self.name, self.title, self.text, self.stopped, self.planned, rows = results
         if not rows:
-            raise invalid(self.name, "has no results yet", "robochoc experiment run goes on with the study")
+            raise invalid_input(self.name, "has no results yet", "robochoc experiment run goes on with the study")
         wishes = study_wishes(self.text)
         self.introduction, self.width = wishes.text, wishes.width
         try:
-            self.over = summary.parameter_to_draw_over(rows, over or wishes.over)
-            self.rows: Rows = summary.named(summary.by_parameter(rows, self.over), wishes.names)
+            self.over, self.rows = summary.prepared(rows, over or wishes.over, wishes.names)
             self.metrics = summary.metrics_to_show(self.rows, wishes.metrics, self.over)
             self.parts = summary.parts(self.rows, wishes.each)
         except summary.NoSuchColumnError as wrong:
-            raise invalid(self.name, str(wrong), "--over names one, or the table [report] of the study") from None
+            raise invalid_input(self.name, str(wrong), "--over names one, or the table [report] of the study") from None
 
     @property
     def paragraphs(self) -> list[str]:
@@ -103,11 +101,6 @@ class Account:
 def headed(what: str, part: str) -> str:
     """Return a heading, with the part of the problems that it is about."""
     return f"{what}: {part}" if part else what
-
-
-def invalid(what: Path | str, message: str, hint: str) -> InvalidInputError:
-    """Return the error that says what is wrong with a report."""
-    return InvalidInputError([Diagnostic(encodable(str(what)), 0, message, hint)])
 
 
 def _compared(one: statistics.Comparison) -> list[str]:

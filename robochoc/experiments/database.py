@@ -12,7 +12,7 @@ from typing import Any
 import msgspec
 
 from robochoc.experiments.task import CostPoint, RobotLoad, Status
-from robochoc.formats.diagnostics import Diagnostic, InvalidInputError, encodable
+from robochoc.formats.diagnostics import InvalidInputError, invalid_input
 
 APPLICATION_ID = 0x726F626F
 """What marks the file as one of ours (SQLite, `PRAGMA application_id`): `robo`."""
@@ -114,4 +114,4 @@ def invalid(
     path: Path, message: str, hint: str = "name the file that 'robochoc experiment run' writes"
 ) -> InvalidInputError:
     """Return the error that something is wrong with the file."""
-    return InvalidInputError([Diagnostic(encodable(str(path)), 0, message, hint)])
+    return invalid_input(path, message, hint)

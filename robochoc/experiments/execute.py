@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 import os
 import platform
 import time
@@ -14,12 +13,11 @@ from typing import Any, Self
 
 from robochoc import __version__
 from robochoc.communication.run_result import RobotsLostError
+from robochoc.experiments.digests import digest_of_files, digest_of_team
 from robochoc.experiments.observers import CostOverTime, RobotLoads, journal_of, several, written
-from robochoc.experiments.problem_table import digest_of_files
 from robochoc.experiments.task import ProblemSpec, Recording, Row, Status, Task, options_of
-from robochoc.formats.diagnostics import Diagnostic, InvalidInputError
+from robochoc.formats.diagnostics import InvalidInputError, invalid_input
 from robochoc.formats.problems import read_problem
-from robochoc.formats.scenario_writer import team_files
 from robochoc.generators.families import FAMILIES
 from robochoc.generators.scenario import random_scenario
 from robochoc.model.cost_units import Cost, common_units
@@ -35,8 +33,6 @@ from robochoc.verification.checker import RefutedError
 
 KEPT = 4
 """Problems that are kept: the runs of one problem follow each other."""
-_DIGEST_BYTES = 16
-CHANGED = "run the study again"
 _STATUS_OF: tuple[tuple[type[Exception], Status], ...] = (
     (InvalidInputError, Status.INVALID),
     (UnsupportedError, Status.REFUSED),
@@ -103,8 +99,8 @@ class Bench(AbstractContextManager["Bench"]):
                 del self._teams[next(iter(self._teams))]
             team = team_of(problem)
             if problem.digest and digest_of_files(Path(problem.path)) != problem.digest:
-                raise InvalidInputError([Diagnostic(problem.path, 0, "has changed since the study began", CHANGED)])
-            self._teams[identity] = team, digest_of(team)
+                raise invalid_input(problem.path, "has changed since the study began", "run the study again")
+            self._teams[identity] = team, digest_of_team(team)
         return self._teams[identity]
 
 
@@ -126,15 +122,6 @@ def team_of(problem: ProblemSpec) -> Team:
             scenario["kinds"] = scenario["kinds"].split()
         team = random_scenario(team, **scenario)
     return team
-
-
-def digest_of(team: Team) -> str:
-    """Return the digest of what the robots' files would hold: however it came about, it is the same problem."""
-    content = hashlib.blake2b(digest_size=_DIGEST_BYTES)
-    for name, file in team_files(team).items():
-        content.update(f"{name}\0{len(file)}\0".encode())
-        content.update(file)
-    return content.hexdigest()
 
 
 @cache

@@ -37,8 +37,8 @@ def exported(results: Results, form: str) -> bytes:
             return b"".join(msgspec.json.encode(row) + b"\n" for row in rows)
         case "latex":
             wishes = study_wishes(results.text)
-            named = summary.named(rows, wishes.names)
-            return latex_table(named, results.title, wishes.over, wishes.metrics).encode()
+            over, shown = summary.prepared(rows, wishes.over, wishes.names) if rows else ("", rows)
+            return latex_table(shown, results.title, over, wishes.metrics).encode()
         case _:
             return _parquet(rows)
 
@@ -83,14 +83,17 @@ def _latex(text: str) -> str:
     return on_one_line(text).translate(_LATEX)
 
 
-def latex_table(
-    rows: Sequence[Mapping[str, Any]], title: str, over: str | None = None, metrics: Sequence[str] = ()
-) -> str:
-    """Return a table of medians in LaTeX, with the rules of the package booktabs: a block for each metric."""
+def latex_table(rows: Sequence[Mapping[str, Any]], title: str, over: str, metrics: Sequence[str] = ()) -> str:
+    """Return a table of medians in LaTeX, with the rules of the package booktabs: a block for each metric.
+
+    Args:
+        rows: The results, as `summary.prepared` returns them.
+        title: What they are called.
+        over: The parameter of the table's lines.
+        metrics: The metrics. Empty: the usual ones.
+    """
     if not rows:
         return ""
-    over = summary.parameter_to_draw_over(rows, over)
-    rows = summary.by_parameter(rows, over)
     ways = summary.labels(rows)
     lines = [
         f"% {on_one_line(title)}: medians; >= marks those that a limit leaves open. Needs \\usepackage{{booktabs}}.",

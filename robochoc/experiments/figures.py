@@ -7,7 +7,7 @@ import itertools
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from functools import partial
+from functools import cached_property, partial
 from typing import Any, NamedTuple
 
 import matplotlib as mpl
@@ -17,6 +17,7 @@ from matplotlib.figure import Figure
 from robochoc.experiments import plots, statistics, summary
 from robochoc.experiments.axes import MOST_WAYS, Style, numbers, plain_ticks, styles_of
 from robochoc.experiments.plots import Spot, same_lines
+from robochoc.experiments.statistics import Case
 from robochoc.experiments.study import WIDTH
 from robochoc.experiments.summary import METRICS, Rows
 from robochoc.experiments.task import Status
@@ -103,6 +104,12 @@ class _Shown:
     def grouped(self) -> bool:
         """Whether the parameter has several values, and not one for each problem."""
         return 1 < len(self.values) < len({(row.get("case"), row["digest"]) for row in self.rows})
+
+    @cached_property
+    def value_at(self) -> dict[str, Any]:
+        """The value of the parameter for each problem, if problems are grouped by it; else None for all."""
+        grouped = self.grouped
+        return {row["digest"]: row.get(self.over) if grouped else None for row in self.rows}
 
 
 def figures_of(rows: Rows, over: str, metrics: Sequence[str], width: float = WIDTH) -> Figures:
@@ -217,9 +224,11 @@ def _profiles(shown: _Shown, metrics: Sequence[str]) -> Iterator[Drawing | str]:
     """Yield profiles and scatters of some metrics, and which ways need the same."""
     if len(shown.styles) == 1:
         return
-    needs = {metric: _by_case(shown, metric) for metric in metrics}
+    needs = {
+        metric: {way: statistics.by_problem(shown.rows, way, metric) for way in shown.styles} for metric in metrics
+    }
     for metric, found in needs.items():
-        if any(_vary(cases) for cases in found.values()):
+        if any(_vary(shown, cases) for cases in found.values()):
             yield from _profile(shown, metric)
             yield from _scatters(shown, metric, found)
         elif any(found.values()):
@@ -256,27 +265,11 @@ def _profile(shown: _Shown, metric: str) -> Iterator[Drawing]:
         yield Drawing(f"profile-{metric}", f"Performance profile of {name}", told + _same(_lines(factors)), draw)
 
 
-Case = tuple[Any, ...]
-"""What ways to run are compared on: the values of the parameters that are drawn over, and the problem."""
-
-
-def _by_case(shown: _Shown, metric: str) -> dict[str, dict[Case, float]]:
-    """Return for each way to run what it needs for the problems that it has solved."""
-    at = {row["digest"]: row.get(shown.over) if shown.grouped else None for row in shown.rows}
-    return {
-        way: {
-            ((at[problem], case), problem): value
-            for (problem, case), value in statistics.by_problem(shown.rows, way, metric).items()
-        }
-        for way in shown.styles
-    }
-
-
-def _vary(cases: Mapping[Case, float]) -> bool:
+def _vary(shown: _Shown, cases: Mapping[Case, float]) -> bool:
     """Return whether runs differ at the same value of the parameter."""
     groups: dict[Any, list[float]] = {}
-    for (at, *_), value in cases.items():
-        groups.setdefault(at, []).append(value)
+    for (problem, case), value in cases.items():
+        groups.setdefault((shown.value_at[problem], case), []).append(value)
     return any(max(values) > min(values) * _NEARLY for values in groups.values())
 
 
@@ -298,7 +291,8 @@ def _scatters(shown: _Shown, metric: str, found: Mapping[str, Mapping[Case, floa
     drawn = 0
     for way in others:
         pairs = _pairs(found, first, way)
-        if drawn < MOST_PAIRS and pairs and not _the_same(pairs) and (_vary(found[first]) or _vary(found[way])):
+        vary = any(_vary(shown, found[one]) for one in (first, way))
+        if drawn < MOST_PAIRS and pairs and not _the_same(pairs) and vary:
             drawn += 1
             told = f"A point for each problem that both have solved: {name} of the one against {name} of the other."
             told += " Below the line the second needs less."

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 import re
 from collections.abc import Iterable, Iterator, Mapping
 from glob import glob, has_magic
@@ -11,6 +10,7 @@ from typing import Any
 
 import msgspec
 
+from robochoc.experiments.digests import digest_of_files
 from robochoc.experiments.table import HINT, Place
 from robochoc.experiments.task import ProblemSpec
 from robochoc.formats.diagnostics import shortened
@@ -26,7 +26,6 @@ _SCENARIO: Mapping[str, tuple[type, ...]] = {
     "after": (int,),
 }
 _OF_FILES: Mapping[str, tuple[type, ...]] = {"infinity": (int,), "owner": (str,)}
-_DIGEST_BYTES = 16
 _HYPHENED = re.compile(r"\d+-\d+")
 """What looks like a range, and is none."""
 
@@ -136,17 +135,6 @@ def _named(folder: Path, word: str) -> list[Path]:
 
 def _teams(path: Path) -> list[Path]:
     return list(find_teams(path)) if path.is_dir() else [path] if path.is_file() else []
-
-
-def digest_of_files(path: Path) -> str:
-    """Return the digest of the names and contents of a team's files. Raises `OSError`."""
-    content = hashlib.blake2b(digest_size=_DIGEST_BYTES)
-    for file in sorted(path.iterdir()) if path.is_dir() else [path]:
-        if file.is_file():
-            held = file.read_bytes()
-            content.update(f"{file.name}\0{len(held)}\0".encode(errors="surrogateescape"))
-            content.update(held)
-    return content.hexdigest()
 
 
 def _digest(path: Path, place: Place) -> str:

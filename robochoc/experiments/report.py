@@ -2,17 +2,18 @@
 
 from __future__ import annotations
 
+import dataclasses
 import html
 from collections.abc import Iterator, Sequence
-from dataclasses import replace
 from pathlib import Path
 
 from robochoc.experiments import summary
-from robochoc.experiments.account import PAIRS_TOLD, Account, headed, invalid
+from robochoc.experiments.account import PAIRS_TOLD, Account, headed
 from robochoc.experiments.export import latex_table
 from robochoc.experiments.figures import Drawing, figures_of, file_name, told_apart
 from robochoc.experiments.results import Results
 from robochoc.experiments.summary import METRICS
+from robochoc.formats.diagnostics import invalid_input
 from robochoc.system.files import write_atomically
 
 _STYLE = """
@@ -66,7 +67,7 @@ def write_folder(results: Results, folder: Path, over: str | None = None, *, rep
         files |= {f"{drawing.name}.svg": drawing.svg(), f"{drawing.name}.pdf": drawing.pdf()}
     there = [name for name in files if (folder / name).exists()]
     if there and not replace:
-        raise invalid(folder / there[0], "is there already", "--force replaces figures")
+        raise invalid_input(folder / there[0], "is there already", "--force replaces figures")
     folder.mkdir(parents=True, exist_ok=True)
     for name, content in files.items():
         write_atomically(folder / name, content)
@@ -80,7 +81,7 @@ class _Report(Account):
         found = [(part, figures_of(rows, self.over, self.metrics, self.width)) for part, rows in self.parts]
         drawings = [_of_part(one, part) for part, figures in found for one in figures.drawings]
         names = told_apart([one.name for one in drawings])
-        self.drawings = [replace(one, name=name) for one, name in zip(drawings, names, strict=True)]
+        self.drawings = [dataclasses.replace(one, name=name) for one, name in zip(drawings, names, strict=True)]
         self.remarks = [f"{part}: {line}" if part else line for part, figures in found for line in figures.remarks]
 
     def page(self) -> str:
@@ -130,7 +131,9 @@ class _Report(Account):
 
 
 def _of_part(drawing: Drawing, part: str) -> Drawing:
-    return replace(drawing, name=file_name(drawing.name, part), title=f"{drawing.title}: {part}") if part else drawing
+    if not part:
+        return drawing
+    return dataclasses.replace(drawing, name=file_name(drawing.name, part), title=headed(drawing.title, part))
 
 
 def _table(heads: Sequence[str], lines: Sequence[Sequence[str]]) -> str:

@@ -26,9 +26,9 @@ import msgspec
 from robochoc.experiments.problem_table import PROBLEM_KEYS, problems_of
 from robochoc.experiments.run_table import RUN_KEYS, distinct, setups_of
 from robochoc.experiments.summary import METRICS, OF_RUNS
-from robochoc.experiments.table import MAX_INTEGER, Place, mistake
+from robochoc.experiments.table import MAX_INTEGER, Place
 from robochoc.experiments.task import Limits, ProblemSpec, Recording, Setup
-from robochoc.formats.diagnostics import Diagnostic, InvalidInputError, encodable, shortened, suggestion
+from robochoc.formats.diagnostics import invalid_input, shortened, suggestion
 from robochoc.system.decode_errors import describe_decode_error
 
 LARGEST_FILE = 2**20
@@ -96,7 +96,7 @@ def read_study(path: Path) -> Study:
         tables = tomllib.loads(text)
     except (ValueError, RecursionError) as wrong:
         what = "it is nested too deep" if isinstance(wrong, RecursionError) else shortened(str(wrong))
-        raise mistake(Place(path, text), f"is no TOML file: {what}", "docs/guides/experiments.md shows one") from None
+        raise invalid_input(path, f"is no TOML file: {what}", "docs/guides/experiments.md shows one") from None
     return study_of(tables, Place(path, text))
 
 
@@ -232,17 +232,13 @@ def _text(path: Path) -> str:
             content = file.read(LARGEST_FILE + 1)
     except OSError as error:
         hint = "name the TOML file of a study; docs/guides/experiments.md shows one"
-        raise InvalidInputError(
-            [Diagnostic(encodable(str(path)), 0, f"cannot be read: {error.strerror}", hint)]
-        ) from None
+        raise invalid_input(path, f"cannot be read: {error.strerror}", hint) from None
     if len(content) > LARGEST_FILE:
-        raise mistake(
-            Place(path, ""), f"is too large for a study's file, which has up to {LARGEST_FILE:,} bytes", "cut it"
-        )
+        raise invalid_input(path, f"is too large for a study's file, which has up to {LARGEST_FILE:,} bytes", "cut it")
     try:
         return content.decode()
     except UnicodeDecodeError:
-        raise mistake(Place(path, ""), "is not UTF-8", "a study's file is TOML, in UTF-8") from None
+        raise invalid_input(path, "is not UTF-8", "a study's file is TOML, in UTF-8") from None
 
 
 def study_wishes(text: str) -> ReportWishes:

@@ -43,6 +43,7 @@ SINGLE = ("instance", "team")
 MOST_TEAMS = 12
 """More problems have no lines of their own, unless it is asked for."""
 _MOST = {"instance": MOST_TEAMS}
+"""Results are shown over these by themselves only where they have no more values."""
 DEFAULT_METRICS = ("messages", "ncccs", "bytes")
 
 
@@ -140,6 +141,21 @@ def by_parameter(rows: Rows, over: str) -> Rows:
         {**row, over: value, "case": value, "label": label if len(meant[label]) == 1 else row["label"]}
         for row, value, label in zip(rows, values, shorter, strict=True)
     ]
+
+
+def prepared(rows: Rows, over: str | None, names: Mapping[str, str]) -> tuple[str, Rows]:
+    """Return the parameter that tables and figures are over, and the results as they show them.
+
+    Args:
+        rows: The results.
+        over: The parameter that was asked for; see `parameter_to_draw_over`.
+        names: What ways to run are called; see `named`.
+
+    Raises:
+        NoSuchColumnError: as these two.
+    """
+    over = parameter_to_draw_over(rows, over)
+    return over, named(by_parameter(rows, over), names)
 
 
 def _way(row: Mapping[str, Any], over: str) -> str:

@@ -11,10 +11,11 @@ from pathlib import Path
 from typing import Any
 
 from robochoc.experiments.ranges import range_of
-from robochoc.formats.diagnostics import Diagnostic, InvalidInputError, encodable, shortened, suggestion
+from robochoc.formats.diagnostics import InvalidInputError, invalid_input, shortened, suggestion
 
 HINT = "docs/guides/experiments.md describes the file of a study"
 MAX_INTEGER = 2**53
+"""JSON and SQLite hold all integers up to it, and floats have them exactly."""
 MOST_COMBINATIONS = 100_000
 """A table stands for no more."""
 _HEAD = re.compile(r"\s*\[\[?\s*([\w.-]+)\s*\]?\]")
@@ -65,7 +66,7 @@ class Place:
         """Return the error that something is wrong with a key; empty: with the table."""
         named = ".".join(filter(None, (self.table, key)))
         told = f"{shortened(named)}: {message}" if named else message
-        return InvalidInputError([Diagnostic(encodable(str(self.path)), self.line(key), told, hint)])
+        return invalid_input(self.path, told, hint, self.line(key))
 
     def check_keys(self, table: Mapping[str, Any], known: Collection[str]) -> None:
         """Raise `InvalidInputError` for a key that is not known."""
@@ -113,8 +114,3 @@ def _is_plain(value: object) -> bool:
     if isinstance(value, float):
         return math.isfinite(value)
     return isinstance(value, str) or (isinstance(value, int) and abs(value) <= MAX_INTEGER)
-
-
-def mistake(place: Place, message: str, hint: str) -> InvalidInputError:
-    """Return the error that something is wrong with the whole file."""
-    return InvalidInputError([Diagnostic(encodable(str(place.path)), 0, message, hint)])

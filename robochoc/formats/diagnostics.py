@@ -7,6 +7,7 @@ import os
 from collections.abc import Collection, Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
+from pathlib import Path
 
 from robochoc.model.priorities import natural_key
 from robochoc.system.plain_text import on_one_line as on_one_line  # noqa: PLC0414 - from here, too
@@ -35,6 +36,11 @@ class InvalidInputError(Exception):
     def __init__(self, diagnostics: Iterable[Diagnostic]) -> None:
         self.diagnostics = tuple(sorted(diagnostics, key=_place))
         super().__init__("\n".join(map(str, self.diagnostics)))
+
+
+def invalid_input(path: Path | str, message: str, hint: str, line: int = 0) -> InvalidInputError:
+    """Return the error for one mistake in a file, or in what goes by this name."""
+    return InvalidInputError([Diagnostic(encodable(str(path)), line, message, hint)])
 
 
 class MistakeError(Exception):

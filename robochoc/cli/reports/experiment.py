@@ -116,8 +116,7 @@ def print_tables(results: Results, over: str | None, metrics: Sequence[str]) -> 
 
     wishes = study_wishes(results.text)
     try:
-        over = summary.parameter_to_draw_over(results.rows, over or wishes.over)
-        rows = summary.named(summary.by_parameter(results.rows, over), wishes.names)
+        over, rows = summary.prepared(results.rows, over or wishes.over, wishes.names)
         shown = summary.metrics_to_show(rows, metrics or wishes.metrics, over)
         parts = summary.parts(rows, wishes.each)
     except summary.NoSuchColumnError as wrong:

@@ -8,8 +8,8 @@ from pathlib import Path
 import msgspec
 import pytest
 
+from robochoc.experiments.digests import digest_of_files
 from robochoc.experiments.execute import Bench, team_of
-from robochoc.experiments.problem_table import digest_of_files
 from robochoc.experiments.task import Limits, ProblemSpec, Recording, Row, Setup, Status, Task, options_of
 from robochoc.formats.folder import write_team
 from robochoc.generators.queens3d import queens3d
