@@ -31,8 +31,10 @@ _EVEN = 1.01
 _LETTER, _LINE, _HANDLE = 0.6 / 72, 1.5 / 72, 4.2 / 72
 """Inches for a point of the font's size: the width of a letter, the height of a line, and a legend's sample."""
 _LONGEST_TICK, _LONGEST_LABEL, _TURNED = 18, 40, 35
-_FEW_DECADES, _PLAIN = 2, (1e-2, 1e5)
-"""Ticks at 1, 2, 5 on so many powers of ten; numbers within these ends are written out."""
+_FEW_DECADES = 2
+"""Logarithmic axes of fewer powers of ten have ticks at 1, 2 and 5."""
+_LOWEST_PLAIN, _HIGHEST_PLAIN, _HIGHEST_LINEAR = 1e-2, 1e6, 1e7
+"""Numbers between the first two are written out on a logarithmic axis, and below the third on a linear one."""
 
 
 class Style(NamedTuple):
@@ -167,7 +169,7 @@ def plain_ticks(axes: Axes) -> None:
             continue
         if axis.get_scale() == "log":
             _plain_powers(axis)
-        elif axis.get_view_interval()[1] < _PLAIN[1] * 100:
+        elif axis.get_view_interval()[1] < _HIGHEST_LINEAR:
             axis.set_major_formatter(FuncFormatter(written))
 
 
@@ -177,7 +179,7 @@ def _plain_powers(axis: Axis) -> None:
         axis.set_major_locator(LogLocator(subs=(1, 2, 5)))
         axis.set_minor_locator(NullLocator())
     axis.set_minor_formatter(NullFormatter())
-    if low >= _PLAIN[0] and high <= _PLAIN[1] * 10:
+    if low >= _LOWEST_PLAIN and high <= _HIGHEST_PLAIN:
         axis.set_major_formatter(FuncFormatter(written))
 
 

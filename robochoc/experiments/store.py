@@ -1,4 +1,4 @@
-"""What came of a study: one SQLite file, one row a run. docs/guides/experiments.md describes its tables.
+"""What came of a study: one SQLite file, one row a run. docs/guides/experiments.md describes the columns.
 
 The table `runs` has every run that was ever made, by its key: a run is never there twice. The table `plan` has the runs
 of the study as it is now, in its order; the view `results` is both together. So a study that is changed, or was broken

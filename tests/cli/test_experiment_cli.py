@@ -126,6 +126,26 @@ def test_a_report_in_markdown(tmp_path: Path) -> None:
     assert "cost, median, agents 5\ncycles" in shown
 
 
+def test_ways_to_run_have_the_same_names_in_all_tables(tmp_path: Path) -> None:
+    path = tmp_path / "costs.sqlite"
+    names = 'names = { sfb = "SFB", "dsa variant=B" = "DSA-B" }'
+    finished(f'{COSTS}[report]\n{names}\nover = "agents"\n', path)
+    shown = robochoc_within("experiment", "show", path).stdout
+    latex = robochoc_within("experiment", "export", path, "--format", "latex").stdout
+    ways = ["SFB", "syncbb", "dsa variant=A", "DSA-B"]
+    assert " & ".join(["messages, agents", *ways]) in latex
+    assert all(way in shown for way in ways)
+    assert "sfb" not in shown
+
+
+def test_a_dry_run_knows_runs_that_another_plan_has_made(small: Path) -> None:
+    finished(SMALL, small.with_suffix(".sqlite"))
+    with closing(sqlite3.connect(small.with_suffix(".sqlite"))) as database, database:
+        database.execute("DELETE FROM plan")
+    planned = robochoc_within("experiment", "run", small, "--dry-run").stdout
+    assert "12 are there, 0 are to be run" in planned
+
+
 def test_what_a_file_says_does_not_reach_the_terminal_as_it_is(tmp_path: Path) -> None:
     path = tmp_path / "study.toml"
     path.write_text('title = "\\u001b[2J"\n' + SMALL)
