@@ -18,6 +18,9 @@ from robochoc.experiments.task import KEY, Status
 from robochoc.formats.diagnostics import shortened
 from robochoc.system.plain_text import on_one_line
 
+_MOST_DIGITS = 400
+"""Before and behind the point. No cost has more, and to write `1e999999999` out as an integer takes for ever."""
+
 
 class Results(NamedTuple):
     """The results of a study.
@@ -150,7 +153,7 @@ def _is_number(value: object) -> bool:
 def _exact(text: str) -> int | float | Decimal:
     """Return the number that a text is: as a float where that is exactly the same."""
     exact = Decimal(text)
-    if not exact.is_finite():
+    if not exact.is_finite() or abs(exact.adjusted()) > _MOST_DIGITS:
         raise TypeError(f"{shortened(text)} is no cost")
     if exact == int(exact):
         return int(exact)

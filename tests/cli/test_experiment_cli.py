@@ -176,6 +176,7 @@ STRANGE = {
     "an unknown status": "UPDATE runs SET status = 'foo'",
     "no status": "UPDATE runs SET status = NULL",
     "no cost": "UPDATE runs SET cost = 'NaN'",
+    "a cost without end": "UPDATE runs SET cost = '1e999999999'",
     "broken points": "UPDATE runs SET cost_over_time = '[[5]]'",
     "points of a word": "UPDATE runs SET cost_over_time = '\"x\"'",
     "another view": "DROP VIEW results; CREATE VIEW results AS SELECT 1 AS one FROM plan",
