@@ -18,8 +18,8 @@ from robochoc.experiments.task import KEY, Status
 from robochoc.formats.diagnostics import shortened
 from robochoc.system.plain_text import on_one_line
 
-_MOST_DIGITS = 400
-"""Before and behind the point. No cost has more, and to write `1e999999999` out as an integer takes for ever."""
+_MOST_DIGITS = 300
+"""Before and behind the point: floats have no more, nor have costs, and to write `1e999999999` out takes for ever."""
 
 
 class Results(NamedTuple):

@@ -177,6 +177,7 @@ STRANGE = {
     "no status": "UPDATE runs SET status = NULL",
     "no cost": "UPDATE runs SET cost = 'NaN'",
     "a cost without end": "UPDATE runs SET cost = '1e999999999'",
+    "a cost beyond floats": "UPDATE runs SET cost = '1e350'",
     "broken points": "UPDATE runs SET cost_over_time = '[[5]]'",
     "points of a word": "UPDATE runs SET cost_over_time = '\"x\"'",
     "another view": "DROP VIEW results; CREATE VIEW results AS SELECT 1 AS one FROM plan",
