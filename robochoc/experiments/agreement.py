@@ -88,7 +88,7 @@ def repeat(task: Task) -> str:
     words += [word for name, value in setup.settings.items() for word in ("--set", f"{name}={value}")]
     for name, value in _limits(task).items():
         words += [f"--{name}", f"{value:g}"]
-    return "; ".join([*made, shlex.join(words)])
+    return " && ".join([*made, shlex.join(words)])
 
 
 def _channel(name: str) -> str:

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
 FORMATS = ("csv", "json", "latex", "parquet")
 JOURNALS = "journals"
-AGAIN = ("refused", "limit", "memory")
+AGAIN = ("refused", "limit", "memory", "refuted", "done")
 PAGES = (".html", ".htm", ".md")
 
 

@@ -52,8 +52,8 @@ def test_the_commands_leave_the_users_files_alone() -> None:
     problem = ProblemSpec(path="mine", digest="x", scenario={"events": 3, "rate": 0.3, "seed": 1})
     told = repeat(Task(problem=problem, setup=Setup(protocol="dynabt"), limits=Limits(messages=9)))
     assert told == (
-        "robochoc generate scenario mine --events 3 --rate 0.3 --seed 1 -o PROBLEM;"
-        " robochoc solve PROBLEM --protocol dynabt --runtime simulator --messages 9"
+        "robochoc generate scenario mine --events 3 --rate 0.3 --seed 1 -o PROBLEM"
+        " && robochoc solve PROBLEM --protocol dynabt --runtime simulator --messages 9"
     )
     foreign = ProblemSpec(path="w.yaml", digest="x", parameters={"instance": "w.yaml", "infinity": 10, "owner": "(.)"})
     told = repeat(Task(problem=foreign, setup=Setup(protocol="sfb")))
@@ -70,7 +70,7 @@ def test_two_that_differ_are_told_with_the_commands_that_repeat_them() -> None:
     with pytest.raises(DisagreementError) as caught:
         agreement.add(TASK, row("no-solution"))
     assert "abt and abt contradict each other on t" in str(caught.value)
-    assert str(caught.value).count("robochoc generate queens3d --n 2 -o PROBLEM; robochoc solve PROBLEM") == 2
+    assert str(caught.value).count("robochoc generate queens3d --n 2 -o PROBLEM && robochoc solve PROBLEM") == 2
     with pytest.raises(DisagreementError, match="the checker refutes the answer of abt: because"):
         Agreement().add(TASK, Row(status=Status.REFUTED, reason="because"))
 
@@ -114,7 +114,7 @@ def test_the_commands_repeat_the_run(
 ) -> None:
     monkeypatch.chdir(tmp_path)
     task = Task(problem=msgspec.convert(problem, ProblemSpec), setup=msgspec.convert(setup, Setup), seed=5)
-    *made, solved = repeat(task).split("; ")
+    *made, solved = repeat(task).split(" && ")
     for words in made:
         assert robochoc_within(*shlex.split(words)[1:]).returncode == 0, words
     done = robochoc_within(*shlex.split(solved)[1:], "--json")
