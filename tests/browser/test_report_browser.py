@@ -21,14 +21,13 @@ def results(tmp_path_factory: pytest.TempPathFactory) -> Path:
     path = tmp_path_factory.mktemp("study") / "costs.sqlite"
     finished(COSTS + '[report]\ntext = "Is <b>one</b> better?"\nmetrics = ["messages", "cost"]\n', path)
     # Fonts that matplotlib has opened once stay open.
-    assert robochoc_within("experiment", "report", path, "-o", path.with_name("first.html")).returncode == 0
+    done = robochoc_within("experiment", "report", path, "-o", path.with_name("report.html"))
+    assert done.returncode == 0, done.stderr
     return path
 
 
 def test_the_page_shows_figures_tables_and_how_to_repeat_it(results: Path, browser: Any) -> None:  # noqa: ANN401 - Playwright's
     page_file = results.with_name("report.html")
-    done = robochoc_within("experiment", "report", results, "-o", page_file)
-    assert done.returncode == 0, done.stderr
     with watched_page(browser, viewport={"width": 1200, "height": 800}) as (page, complaints, asked):
         page.goto(page_file.as_uri())
         titles = [one.get_attribute("aria-label") for one in page.query_selector_all("figure svg")]
@@ -71,6 +70,7 @@ def test_figures_are_the_same_again(results: Path, tmp_path: Path) -> None:
     assert {path.name: path.read_bytes() for path in folder.iterdir()} == first
 
 
+@pytest.mark.slow  # tests/unit/experiments/test_markdown.py has the tables of parts
 @pytest.mark.usefixtures("results")  # as it says: fonts
 def test_parts_have_figures_and_tables_of_their_own(tmp_path: Path) -> None:
     path = tmp_path / "costs.sqlite"

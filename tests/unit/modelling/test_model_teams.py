@@ -172,7 +172,7 @@ def test_deep_and_wide_terms_are_copied(copied: Callable[[robochoc.Model], roboc
     deep, wide = 1 * x, 1 * x
     for _ in range(99):
         deep = abs(deep - 1)
-    for _ in range(15):
+    for _ in range(12):
         wide = abs(wide) + wide
     model.add(deep >= 0, wide >= 0)
     assert copied(model).team == model.team
