@@ -1,4 +1,4 @@
-"""What a report tells of a study's results, whatever form it has: HTML in `report.py`, Markdown in `markdown.py`."""
+"""The content of a report on a study, for the forms that it has: HTML (`report.py`) and Markdown (`markdown.py`)."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""How figures look: the styles of ways to run, scales, ticks and legends. With `plots.py` all that needs matplotlib.
+"""Styles of lines, scales, ticks and legends of figures. This file, `plots.py` and `figures.py` need matplotlib.
 
 Lines differ in colour, in dashes and in markers: the colours are those of Okabe and Ito, "Color Universal Design",
 2008, which the colour-blind can tell apart, and the rest serves who prints in grey.
@@ -38,7 +38,7 @@ _LOWEST_PLAIN, _HIGHEST_PLAIN, _HIGHEST_LINEAR = 1e-2, 1e6, 1e7
 
 
 class Style(NamedTuple):
-    """How one way to run is drawn."""
+    """The colour, marker and dashes of one way to run."""
 
     colour: str
     marker: str

@@ -90,7 +90,7 @@ class ClusterWorkers:
 
 
 class _SchedulerFile(msgspec.Struct):
-    """What is needed of a scheduler's JSON file."""
+    """The JSON file of a Dask scheduler, as far as it is read: the scheduler's address."""
 
     address: str
 

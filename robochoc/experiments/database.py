@@ -15,7 +15,7 @@ from robochoc.experiments.task import CostPoint, RobotLoad, Status
 from robochoc.formats.diagnostics import InvalidInputError, invalid_input
 
 APPLICATION_ID = 0x726F626F
-"""What marks the file as one of ours (SQLite, `PRAGMA application_id`): `robo`."""
+"""The number by which SQLite files of results are known (`PRAGMA application_id`); in ASCII it is `robo`."""
 VERSION = 3
 COLUMNS: Mapping[str, str] = {
     "status": "TEXT", "reason": "TEXT", "team": "TEXT", "digest": "TEXT", "robots": "INTEGER", "variables": "INTEGER",
@@ -49,7 +49,7 @@ CREATE VIEW IF NOT EXISTS results AS
 TRIED_AGAIN = (Status.CRASHED, Status.LOST, Status.INVALID, Status.ERROR)
 """Runs that ended so are repeated when the study is run again: what was wrong may be mended."""
 STRANGE = (sqlite3.Error, msgspec.MsgspecError, TypeError, ValueError, KeyError, OverflowError, ArithmeticError)
-"""What strange content of a file may raise."""
+"""The errors that reading a file raises where something else than this program has written into it."""
 
 
 def opened(path: Path, *, writing: bool = True) -> sqlite3.Connection:

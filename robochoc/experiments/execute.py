@@ -44,7 +44,7 @@ _STATUS_OF: tuple[tuple[type[Exception], Status], ...] = (
 
 
 class Bench(AbstractContextManager["Bench"]):
-    """What runs one task after the other: it keeps problems and one constraint solver."""
+    """Runs tasks, one after the other. It keeps the last problems, and one process of the constraint solver."""
 
     def __init__(self) -> None:
         self._stack = ExitStack()

@@ -90,7 +90,7 @@ class Figures(NamedTuple):
 
 @dataclass(frozen=True)
 class _Shown:
-    """What figures are of: the rows of the ways to run that have a style, over a parameter."""
+    """The rows that figures are drawn from: of the ways to run that have a style, over one parameter."""
 
     rows: Rows
     over: str
