@@ -69,6 +69,7 @@ OPENERS = MappingProxyType(
         Runtime.PROCESSES: "robochoc.run.runtimes:open_processes",
         Runtime.SIMULATOR: "robochoc.run.runtimes:open_simulator",
         Runtime.NETWORK: "robochoc.run.networked.local_runtime:open_network",
+        Runtime.ARRAYS: "robochoc.run.runtimes:open_arrays",
     }
 )
 """Module and name of each runtime's `OpenSession`."""
@@ -111,6 +112,13 @@ def open_simulator(request: SessionRequest) -> Session:
     options = request.options
     limits = EffortLimits(options.ncccs, options.cycles)
     return Simulation(request.team, request.protocol, _schedule_of(options), limits=limits, **request.common)
+
+
+def open_arrays(request: SessionRequest) -> Session:
+    """Open a session in which all robots are rows of arrays."""
+    from robochoc.communication.arrays.session import ArraysRun  # noqa: PLC0415 - one runtime is enough
+
+    return ArraysRun(request.team, request.protocol, **request.common)
 
 
 def _schedule_of(options: Options) -> Schedule:
