@@ -49,6 +49,7 @@ class TeamCompiler:
         stage: Callable[[str], None],
     ) -> None:
         self._compiler = partial(Compiler, limits, cache, deadline, solver)
+        self._deadline = deadline
         self._stage = stage
 
     def compile(self, team: Team, *, every: bool = False) -> CompiledTeam:
@@ -65,6 +66,8 @@ class TeamCompiler:
             nonlocal solved
             self._stage(f"compiling {robot.name} ({next(number)} of {len(team.robots)})")
             try:
+                if self._deadline is not None and time.monotonic() >= self._deadline:
+                    raise SolverTimeoutError
                 compilation = compiler.compile(robot)
             except SolverTimeoutError:
                 raise OutOfTimeError(f"the time (--timeout) was over while {robot.name} was compiled") from None

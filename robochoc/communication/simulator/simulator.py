@@ -13,7 +13,7 @@ from functools import partial
 
 from robochoc.communication.host import Host
 from robochoc.communication.run_result import Progress, RunResult
-from robochoc.communication.session import Epoch, Session
+from robochoc.communication.session import Epoch, Session, over
 from robochoc.communication.simulator.schedule import Schedule
 from robochoc.journal.events import Observer
 from robochoc.model.message import Envelope
@@ -22,6 +22,7 @@ from robochoc.model.problem import Team
 from robochoc.protocols.protocol import Protocol
 from robochoc.solver.agent_problem import DEFAULT_PARAMETERS, AgentProblem, RunParameters
 from robochoc.solver.compiled_team import CompiledTeam
+from robochoc.solver.team_compiler import OutOfTimeError
 
 PROGRESS_EVERY = 256
 """Packets between two reports of progress."""
@@ -54,6 +55,10 @@ class Simulation(Session):
         progress: Receives the count of messages now and then.
         parameters: What robots are given besides the problem.
         limits: On what the searches take. They are looked at after each packet.
+        deadline: When the time of the run is over, on the monotonic clock.
+
+    Raises:
+        OutOfTimeError: when the deadline comes before all robots are set up; `change` as well.
     """
 
     def __init__(
@@ -66,6 +71,7 @@ class Simulation(Session):
         progress: Callable[[Progress], None] | None = None,
         parameters: RunParameters = DEFAULT_PARAMETERS,
         limits: EffortLimits = NO_LIMITS,
+        deadline: float | None = None,
     ) -> None:
         super().__init__(team)
         self._protocol = protocol
@@ -73,6 +79,7 @@ class Simulation(Session):
         self._observer = observer
         self._progress = progress
         self._limits = limits
+        self._deadline = deadline
         self._lossless = True
         self._checks = self._ncccs = self._sent = 0
         self._verdict: Verdict | None = None
@@ -113,6 +120,7 @@ class Simulation(Session):
         self._hosts = {}
         for name, part in epoch.parts(self._protocol).items():
             if name in before and name not in epoch.restarted:
+                self._check_time(name)
                 self._hosts[name] = before[name]
                 before[name].change(part, epoch.invalidated)
                 self._note_verdict(before[name])
@@ -122,7 +130,13 @@ class Simulation(Session):
     def close(self) -> None:
         """Do nothing: there is nothing to release."""
 
+    def _check_time(self, name: str) -> None:
+        """Raise `OutOfTimeError` if the time was over before the robot `name` could be set up."""
+        if over(self._deadline):
+            raise OutOfTimeError(f"the time (--timeout) was over before {name} knew its problem")
+
     def _host(self, part: AgentProblem) -> Host:
+        self._check_time(part.robot.name)
         host = Host.of(self._protocol, part)
         if self._observer:
             host.observe(self._observer, lambda: self._time(host.checks), self._time)
