@@ -42,7 +42,7 @@ Choices that the paper leaves open, and differences:
 >>> from robochoc.generators.queens3d import queens3d
 >>> result = Simulation(queens3d(2), MaxSum, Concurrent(seed=0)).search()
 >>> result.verdict.value, result.metrics.messages
-('no-solution', {'Domain': 6, 'R': 4})
+('no-solution', {'Domain': 6, 'R': 3})
 """
 
 from __future__ import annotations
