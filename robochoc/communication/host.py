@@ -8,7 +8,6 @@ and reports events to an observer. Every runtime uses it, so the same run counts
 from __future__ import annotations
 
 import math
-import random
 from collections.abc import Callable, Sequence
 from typing import Self, cast
 
@@ -17,6 +16,7 @@ import msgspec
 from robochoc.journal.events import Concluded, Decided, Heard, Observer, Received, Sent, Settled
 from robochoc.model.message import Envelope, Message, encode
 from robochoc.model.outcome import Metrics, Verdict
+from robochoc.protocols.chance import Chance
 from robochoc.protocols.order import PriorityOrder
 from robochoc.protocols.protocol import DynamicProtocol, Protocol, Said
 from robochoc.protocols.settings import settings_of
@@ -156,7 +156,7 @@ class Host:
         protocol = self.protocol
         if parameters.settings:
             protocol.settings = settings_of(type(protocol), parameters.settings)
-        protocol.chance = random.Random(f"{parameters.seed} {self.name}").random  # noqa: S311 - a search is no secret
+        protocol.chance = Chance(parameters.seed, self.name)
 
     def _step(self, act: Callable[[], None]) -> list[Envelope]:
         """Let the protocol act, count its checks, and wrap what it has said."""
