@@ -33,9 +33,9 @@ Choices that the paper leaves open, and differences:
 >>> from robochoc.communication.simulator.schedule import Concurrent
 >>> from robochoc.communication.simulator.simulator import Simulation
 >>> from robochoc.generators.queens3d import queens3d
->>> result = Simulation(queens3d(2), MGM2, Concurrent(seed=0)).search()
+>>> result = Simulation(queens3d(3), MGM2, Concurrent(seed=0)).search()
 >>> result.metrics.messages
-{'Accept': 3, 'Domain': 12, 'Gain': 1200, 'Go': 6, 'Offer': 1200, 'Reject': 208, 'Value': 1200}
+{'Accept': 6, 'Domain': 56, 'Gain': 5600, 'Go': 12, 'Offer': 5600, 'Reject': 446, 'Value': 5600}
 """
 
 from __future__ import annotations

@@ -33,7 +33,7 @@ def fork(values: int = 3) -> Team:
 
 def created(team: Team, name: str) -> AFCTree:
     part = agent_problems(team, tree=True)[name]
-    return AFCTree(LocalProblem(part), PriorityOrder(part.order, part.links))
+    return AFCTree(LocalProblem(part), PriorityOrder(part.order, part.known.links))
 
 
 def agent(team: Team, name: str) -> AFCTree:
