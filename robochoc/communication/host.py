@@ -38,7 +38,7 @@ class Host:
 
         Raises `UnsupportedError` (see `LocalProblem`).
         """
-        return cls(protocol(LocalProblem(part), PriorityOrder(part.order, part.links)), part.parameters)
+        return cls(protocol(LocalProblem(part), _order_of(part)), part.parameters)
 
     def __init__(self, protocol: Protocol, parameters: RunParameters = DEFAULT_PARAMETERS) -> None:
         self.protocol = protocol
@@ -90,7 +90,7 @@ class Host:
 
         A protocol that can goes on with what it knows; any other is begun anew. Raises `UnsupportedError`.
         """
-        problem, order = LocalProblem(part), PriorityOrder(part.order, part.links)
+        problem, order = LocalProblem(part), _order_of(part)
         if isinstance(self.protocol, DynamicProtocol):
             self.protocol.change(problem, order, invalidated)
             self._forget_said()
@@ -226,3 +226,8 @@ class Host:
             observer(Decided(t=self._now(), robot=self.name, assignment=assignment, clock=self.clock))
         if state[1] is not None and state[1] is not verdict:
             observer(Concluded(t=self._now(), robot=self.name, verdict=str(state[1])))
+
+
+def _order_of(part: AgentProblem) -> PriorityOrder:
+    known = part.known
+    return PriorityOrder(known.order, known.links, known.rank)
