@@ -16,7 +16,7 @@ from dataclasses import replace
 from enum import StrEnum
 
 from robochoc.formats import PREDEFINED
-from robochoc.generators.draws import MAX_NODES, MAX_COST, MAX_VALUES, check_bounds, check_places, seeded
+from robochoc.generators.draws import MAX_COST, MAX_NODES, MAX_VALUES, check_bounds, check_places, seeded
 from robochoc.generators.draws import uniform as any_of
 from robochoc.generators.graphs import Graph, uniform
 from robochoc.generators.random_csp import places_told, team_of_edges

@@ -11,7 +11,7 @@ Couplings and fields are decimals: with p places, each multiple of 10**-p in its
 
 from __future__ import annotations
 
-from robochoc.generators.draws import MAX_NODES, MAX_COST, check_bounds, check_places, in_units, seeded, uniform
+from robochoc.generators.draws import MAX_COST, MAX_NODES, check_bounds, check_places, in_units, seeded, uniform
 from robochoc.generators.graphs import grid_edges
 from robochoc.model.assembly import assemble
 from robochoc.model.cost_units import CostUnits

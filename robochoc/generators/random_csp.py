@@ -25,7 +25,7 @@ import itertools
 from collections.abc import Mapping
 from random import Random
 
-from robochoc.generators.draws import MAX_NODES, MAX_COST, MAX_VALUES, check_bounds, check_places, seeded, some
+from robochoc.generators.draws import MAX_COST, MAX_NODES, MAX_VALUES, check_bounds, check_places, seeded, some
 from robochoc.generators.draws import uniform as any_of
 from robochoc.generators.graphs import Edge, Graph, uniform
 from robochoc.model.assembly import assemble

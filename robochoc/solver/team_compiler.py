@@ -65,12 +65,13 @@ class TeamCompiler:
         def compile_robot(robot: Robot) -> CompiledDomain:
             nonlocal solved
             self._stage(f"compiling {robot.name} ({next(number)} of {len(team.robots)})")
+            late = OutOfTimeError(f"the time (--timeout) was over while {robot.name} was compiled")
+            if self._deadline is not None and time.monotonic() >= self._deadline:
+                raise late
             try:
-                if self._deadline is not None and time.monotonic() >= self._deadline:
-                    raise SolverTimeoutError
                 compilation = compiler.compile(robot)
             except SolverTimeoutError:
-                raise OutOfTimeError(f"the time (--timeout) was over while {robot.name} was compiled") from None
+                raise late from None
             solved = solved or compilation.source is not CompiledFrom.DIRECT
             if not (compilation.domain.values or every):
                 raise NoLocalSolutionError(robot.name)

@@ -12,6 +12,7 @@ from dataclasses import dataclass, replace
 from functools import partial
 
 from robochoc.communication.host import Host
+from robochoc.communication.resources import garbage_frozen
 from robochoc.communication.run_result import Progress, RunResult
 from robochoc.communication.session import Epoch, Session, over
 from robochoc.communication.simulator.schedule import Schedule
@@ -23,6 +24,7 @@ from robochoc.protocols.protocol import Protocol
 from robochoc.solver.agent_problem import DEFAULT_PARAMETERS, AgentProblem, RunParameters
 from robochoc.solver.compiled_team import CompiledTeam
 from robochoc.solver.team_compiler import OutOfTimeError
+from robochoc.system.garbage import collection_paused
 
 PROGRESS_EVERY = 256
 """Packets between two reports of progress."""
@@ -84,8 +86,9 @@ class Simulation(Session):
         self._checks = self._ncccs = self._sent = 0
         self._verdict: Verdict | None = None
         self._witness: str | None = None
-        parts = Epoch(self.compiled, parameters=parameters).parts(protocol)
-        self._hosts = {name: self._host(part) for name, part in parts.items()}
+        with collection_paused():
+            parts = Epoch(self.compiled, parameters=parameters).parts(protocol)
+            self._hosts = {name: self._host(part) for name, part in parts.items()}
 
     @property
     def lossless(self) -> bool:
@@ -96,7 +99,8 @@ class Simulation(Session):
         """See `Session.search`; a limit on messages is looked at after each packet."""
         began = time.monotonic()
         if self._verdict is None:
-            self._play(began, timeout, messages)
+            with garbage_frozen():  # robots' problems are none, and they are most of what there is
+                self._play(began, timeout, messages)
         simulated_s, cycles = self._schedule.elapsed_s, self._schedule.cycles
         self._schedule.clear()
         result = RunResult.of(
