@@ -17,7 +17,7 @@ from hypothesis import strategies as st
 from robochoc.generators.queens3d import queens3d
 from robochoc.model.message import Message
 from robochoc.model.wording import Wording, listed
-from robochoc.protocols.dfs import Token
+from robochoc.protocols.dfs_messages import Token
 from robochoc.protocols.first_fit import FirstFit
 from robochoc.protocols.protocol import Protocol
 from robochoc.run import Options, Runtime, Withdrawal
@@ -35,7 +35,7 @@ OURS = [name for name in protocol_names() if protocol_named(name).__module__.sta
 PROTOCOLS: list[type[Protocol]] = [*map(protocol_named, OURS), FirstFit]
 TYPES: list[type[Message]] = sorted(
     {kind for protocol in PROTOCOLS for kind in get_args(protocol.messages) or (protocol.messages,)},
-    key=lambda kind: (kind.__name__, kind.__module__),
+    key=lambda kind: (kind.__name__, kind.__module__.removesuffix("_messages")),
 )
 
 REAL = {
