@@ -225,7 +225,7 @@ class AFCng(Protocol):
         self.view = dict(zip(self.above, values, strict=False))
         self.store.forget_others(self.view)
         place = self.order.rank[self.above[first]]
-        self.checked = [checked if checked < place else place for checked in self.checked]
+        self.checked = [min(place, checked) for checked in self.checked]
         self._revised = False
 
     def _compatible(self, lhs: Mapping[str, Value]) -> bool:
