@@ -32,7 +32,9 @@ MOST_ELSE = 40
 ALWAYS = "what holds whatever the others take"
 VIEWS = ("view", "cpa", "path", "assignments", "context")
 """Attributes in which protocols keep what they know of others' values."""
-_KNOWN = {"problem", "order", "outbox", "value", "verdict", "chance", "settings", "store", "nogoods", "allowed"}
+_KNOWN = {
+    *("problem", "order", "outbox", "said_at", "value", "verdict", "chance", "settings", "store", "nogoods", "allowed")
+}
 """Attributes that are shown elsewhere, or say nothing."""
 
 
@@ -44,7 +46,7 @@ class Inspector:
         self._problem = LocalProblem(part)  # one of its own: what is checked here counts for nobody
         self._own = ValueText(part.interfaces)
         self.agent = part.robot.name
-        self._ranks = {name: rank for rank, name in enumerate(part.order)}
+        self._ranks = part.known.rank
         self._heard: dict[str, Message] = {}
         self._told: dict[str, Value] = {}
 
