@@ -21,7 +21,8 @@ from robochoc.communication.arrays.layout import Layout
 from robochoc.model.message import encode
 from robochoc.model.outcome import Metrics, Verdict
 from robochoc.model.problem import INFINITE
-from robochoc.protocols.cycles import CycleProtocol, Domain, Value
+from robochoc.protocols.cycles import CycleProtocol
+from robochoc.protocols.cycles_messages import Domain, Value
 from robochoc.protocols.settings import settings_of
 from robochoc.run.compatibility import refuse_settings
 from robochoc.run.registry import protocol_named

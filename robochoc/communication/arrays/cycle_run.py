@@ -18,7 +18,8 @@ from robochoc.communication.arrays.layout import Group, Layout
 from robochoc.communication.arrays.tally import Tally
 from robochoc.model.outcome import Metrics, Verdict
 from robochoc.model.problem import INFINITE
-from robochoc.protocols.cycles import CycleSettings, Value
+from robochoc.protocols.cycles_messages import Value
+from robochoc.protocols.cycles_settings import CycleSettings
 
 FEW = 8
 """Up to so many values a loop over them is faster than numpy's along the short axis."""

@@ -9,7 +9,7 @@ import numpy as np
 from robochoc.communication.arrays.cycle_run import CycleRun, count, least, nth
 from robochoc.communication.arrays.kinds import Flags, Integers
 from robochoc.communication.arrays.layout import Group
-from robochoc.protocols.dsa import DSASettings
+from robochoc.protocols.dsa_settings import DSASettings
 
 
 class ArrayDSA(CycleRun):

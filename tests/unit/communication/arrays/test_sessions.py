@@ -86,7 +86,7 @@ def test_a_study_has_the_cost_over_time_of_the_simulator_in_step() -> None:
     assert (arrays.status, arrays.cost, arrays.messages) == (objects.status, objects.cost, objects.messages)
     assert arrays.cpu_s is not None
     assert [point.cost for point in arrays.cost_over_time] == [point.cost for point in objects.cost_over_time]
-    assert [point.messages for point in arrays.cost_over_time][0] == 120
+    assert arrays.cost_over_time[0].messages == 120
 
 
 def test_protocols_with_a_form_say_so_and_no_other_has_one() -> None:
