@@ -164,7 +164,7 @@ def _decided(team: Team, options: Options, *, environment: bool) -> Choice:
     for name, why, otherwise in _candidates(facts):
         if otherwise:
             rejected[name] = "; ".join(filter(None, [rejected.get(name), otherwise]))
-        elif not _accepts(name, team, options):
+        elif not accepts(name, team, options):
             rejected[name] = "it does not accept the team, or the options"
         else:
             rejected.pop(name, None)
@@ -195,7 +195,7 @@ def _candidates(facts: Facts) -> Iterator[tuple[str, str, str]]:
                 yield one.name, "it accepts the team with these options, and what suits it better does not", ""
 
 
-def _accepts(name: str, team: Team, options: Options) -> bool:
+def accepts(name: str, team: Team, options: Options) -> bool:
     """Return whether the protocol called `name` accepts the team and the options."""
     try:
         protocol = protocol_named(name)
