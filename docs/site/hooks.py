@@ -18,7 +18,8 @@ import click
 from msgspec import Struct
 
 from robochoc.cli.group import cli
-from robochoc.protocols.protocol import Protocol, Settings
+from robochoc.protocols.protocol import Protocol
+from robochoc.protocols.settings_base import Settings
 from robochoc.run.registry import installed_protocols
 
 if TYPE_CHECKING:

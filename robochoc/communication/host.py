@@ -8,7 +8,6 @@ and reports events to an observer. Every runtime uses it, so the same run counts
 from __future__ import annotations
 
 import math
-import random
 from collections.abc import Callable, Sequence
 from typing import Self, cast
 
@@ -17,6 +16,7 @@ import msgspec
 from robochoc.journal.events import Concluded, Decided, Heard, Observer, Received, Sent, Settled
 from robochoc.model.message import Envelope, Message, encode
 from robochoc.model.outcome import Metrics, Verdict
+from robochoc.protocols.chance import Chance
 from robochoc.protocols.order import PriorityOrder
 from robochoc.protocols.protocol import DynamicProtocol, Protocol, Said
 from robochoc.protocols.settings import settings_of
@@ -38,7 +38,7 @@ class Host:
 
         Raises `UnsupportedError` (see `LocalProblem`).
         """
-        return cls(protocol(LocalProblem(part), PriorityOrder(part.order, part.links)), part.parameters)
+        return cls(protocol(LocalProblem(part), _order_of(part)), part.parameters)
 
     def __init__(self, protocol: Protocol, parameters: RunParameters = DEFAULT_PARAMETERS) -> None:
         self.protocol = protocol
@@ -90,7 +90,7 @@ class Host:
 
         A protocol that can goes on with what it knows; any other is begun anew. Raises `UnsupportedError`.
         """
-        problem, order = LocalProblem(part), PriorityOrder(part.order, part.links)
+        problem, order = LocalProblem(part), _order_of(part)
         if isinstance(self.protocol, DynamicProtocol):
             self.protocol.change(problem, order, invalidated)
             self._forget_said()
@@ -156,7 +156,7 @@ class Host:
         protocol = self.protocol
         if parameters.settings:
             protocol.settings = settings_of(type(protocol), parameters.settings)
-        protocol.chance = random.Random(f"{parameters.seed} {self.name}").random  # noqa: S311 - a search is no secret
+        protocol.chance = Chance(parameters.seed, self.name)
 
     def _step(self, act: Callable[[], None]) -> list[Envelope]:
         """Let the protocol act, count its checks, and wrap what it has said."""
@@ -226,3 +226,8 @@ class Host:
             observer(Decided(t=self._now(), robot=self.name, assignment=assignment, clock=self.clock))
         if state[1] is not None and state[1] is not verdict:
             observer(Concluded(t=self._now(), robot=self.name, verdict=str(state[1])))
+
+
+def _order_of(part: AgentProblem) -> PriorityOrder:
+    known = part.known
+    return PriorityOrder(known.order, known.links, known.rank)

@@ -1,17 +1,14 @@
-"""Resources of the operating system for a run: enough descriptors, cheap forks, and blocked signals."""
+"""Resources of the operating system for a run: enough descriptors and cheap forks."""
 
 from __future__ import annotations
 
 import gc
 import resource
-import signal
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
 from robochoc.solver.encoding import UnsupportedError
-
-_STOPPING = {signal.SIGINT, signal.SIGTERM}
 
 
 def allow_descriptors(needed: int) -> None:
@@ -59,15 +56,3 @@ def garbage_frozen() -> Iterator[None]:
         yield
     finally:
         gc.unfreeze()
-
-
-@contextmanager
-def signals_held() -> Iterator[None]:
-    """Ctrl-C and SIGTERM wait meanwhile: what is half done would be lost."""
-    before = signal.pthread_sigmask(signal.SIG_BLOCK, ())
-    try:
-        # Within, because it may block them and still raise what a signal just before has to say.
-        signal.pthread_sigmask(signal.SIG_BLOCK, _STOPPING)
-        yield
-    finally:
-        signal.pthread_sigmask(signal.SIG_SETMASK, before)

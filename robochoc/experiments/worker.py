@@ -18,6 +18,7 @@ from robochoc.experiments.execute import Bench
 from robochoc.experiments.frames import read_frame, write_frame
 from robochoc.experiments.task import Status, Task
 from robochoc.system.orphans import signal_when_orphaned
+from robochoc.system.signals import leave_ctrl_c_to_the_parent
 
 _MB = 2**20
 
@@ -30,7 +31,7 @@ def main(descriptor: int, parent: int, memory_mb: int) -> None:
         parent: The process that has started this one.
         memory_mb: How much memory it may use; 0: any.
     """
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # who has started this process decides when it ends
+    leave_ctrl_c_to_the_parent()
     signal_when_orphaned(signal.SIGKILL)
     if os.getppid() != parent:
         return

@@ -19,6 +19,7 @@ import msgspec
 
 from robochoc.experiments.frames import Frames, write_frame
 from robochoc.experiments.task import Row, Status, Task
+from robochoc.system.signals import signals_held
 
 SETUP_S = 60.0
 """Seconds that a run may take beyond its limit: for reading, compiling, and ending. Then its worker is killed."""
@@ -119,8 +120,8 @@ class _Worker:
         self.deadline: float | None = None
         command = [sys.executable, "-P", "-m", "robochoc.experiments.worker"]
         words = [str(theirs.fileno()), str(os.getpid()), str(memory_mb or 0)]
-        with theirs:
-            # In a session of its own, so that Ctrl-C on a terminal is heard by one process: it decides what ends when.
+        # In a session of its own, so that Ctrl-C on a terminal is heard by one process: it decides what ends when.
+        with theirs, signals_held():
             self._process = subprocess.Popen(  # noqa: S603 - our own module
                 [*command, *words],
                 stdin=subprocess.DEVNULL,

@@ -59,74 +59,12 @@ from typing import assert_never, cast
 
 from robochoc.model.message import Message, Value
 from robochoc.model.outcome import Verdict
-from robochoc.model.wording import Wording, listed
-from robochoc.protocols import acts
+from robochoc.protocols.abt_do_messages import AddLink, Counters, Nogood, Ok, Order
 from robochoc.protocols.backtracking import Backtracking
 from robochoc.protocols.nogood import contradicts
 from robochoc.protocols.order import PriorityOrder
 from robochoc.protocols.traits import ENDS_WITH_PROOF, Traits
 from robochoc.solver.compiled import LocalProblem
-
-Counters = tuple[tuple[int, str], ...]
-"""For each place how often robots from there on were reordered, and who did so last; zeros at the end left out."""
-
-
-class Ok(Message, frozen=True):
-    """The sender's value and its number of remaining values, sent to lower-priority neighbours (`ok?`)."""
-
-    value: Value
-    left: int
-
-    act = acts.TELL_VALUE
-
-    def in_words(self, words: Wording) -> str:
-        """Return what the sender says."""
-        return f"{words.own_value(self.value)} from now on; {_not_ruled_out(self.left)}"
-
-
-class Nogood(Message, frozen=True):
-    """A nogood: the receiver cannot take `value` while all assignments in `lhs` hold.
-
-    If the receiver changes its value, the sender has `left` values that no nogood rules out.
-    """
-
-    lhs: dict[str, Value]
-    value: Value
-    left: int
-
-    act = acts.RULE_OUT
-    backtracks = True
-
-    def in_words(self, words: Wording) -> str:
-        """Return what the sender says."""
-        return f"{words.nogood(self.lhs, self.value)}; without that value, {_not_ruled_out(self.left)}"
-
-
-class Order(Message, frozen=True):
-    """A new order of all robots, highest priority first (`order`)."""
-
-    names: tuple[str, ...]
-    counters: Counters
-
-    act = acts.TELL_ORDER
-
-    def in_words(self, _: Wording) -> str:
-        """Return what the sender says."""
-        return f"the order is now {listed(self.names)}"
-
-
-class AddLink(Message, frozen=True):
-    """A request to be sent the receiver's value from now on, while the receiver has higher priority."""
-
-    act = acts.ADD_LINK
-
-    def in_words(self, words: Wording) -> str:
-        """Return what the sender says."""
-        return f"tell me {words.variables(words.receiver)} from now on, whenever you are above me"
-
-
-def _not_ruled_out(left: int) -> str:
-    return f"{left:,} of my values {'is' if left == 1 else 'are'} not ruled out"
 
 
 class CurrentOrder(PriorityOrder):

@@ -51,59 +51,15 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import assert_never, cast
 
-from robochoc.model import message
-from robochoc.model.communicative_acts import Act, Performative
 from robochoc.model.message import Message
 from robochoc.model.problem import INFINITE
-from robochoc.model.wording import Wording, cost_text
-from robochoc.protocols import acts
-from robochoc.protocols.bounding import BoundingProtocol, Context, Entry, Number, Terminate, bounds_in_words
-from robochoc.protocols.dfs import TreeMessage
+from robochoc.protocols.adopt_messages import Cost, Threshold, Value
+from robochoc.protocols.bounding import BoundingProtocol
+from robochoc.protocols.bounding_messages import Entry, Terminate
+from robochoc.protocols.dfs_messages import TreeMessage
 from robochoc.protocols.order import PriorityOrder
 from robochoc.protocols.traits import ENDS_WITH_PROOF, Traits
 from robochoc.solver.compiled import LocalProblem
-
-
-class Value(Message, frozen=True):
-    """The sender's value and the number of its changes so far (VALUE)."""
-
-    value: message.Value
-    counter: int
-
-    act = acts.TELL_VALUE
-
-    def in_words(self, words: Wording) -> str:
-        """Return what the sender says."""
-        return f"{words.own_value(self.value)} from now on (change {self.counter})"
-
-
-class Cost(Message, frozen=True):
-    """Bounds on the cost of the sender's subtree in `context`: lower bound `lb`, upper bound `ub` (COST)."""
-
-    context: Context
-    lb: Number
-    ub: Number
-
-    act = acts.TELL_BOUNDS
-
-    def in_words(self, words: Wording) -> str:
-        """Return what the sender says."""
-        return bounds_in_words(words, self.context, self.lb, self.ub)
-
-
-class Threshold(Message, frozen=True):
-    """The cost up to which the receiver keeps its value, in `context` (THRESHOLD)."""
-
-    threshold: Number
-    context: dict[str, message.Value]
-
-    act = Act(Performative.REQUEST, "the receiver is to keep its value while it costs no more")
-
-    def in_words(self, words: Wording) -> str:
-        """Return what the sender says."""
-        values = {robot: (value, 0) for robot, value in self.context.items()}
-        allowed = cost_text(self.threshold)
-        return f"{words.context(values)}your subtree may cost {allowed} before you try other values"
 
 
 class ADOPT(BoundingProtocol):

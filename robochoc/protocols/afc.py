@@ -44,74 +44,13 @@ from __future__ import annotations
 
 from typing import assert_never, cast
 
-from robochoc.model.communicative_acts import Act, Performative
-from robochoc.model.message import Message, Value
+from robochoc.model.message import Message
 from robochoc.model.outcome import Verdict
-from robochoc.model.wording import Wording
-from robochoc.protocols import acts
+from robochoc.protocols.afc_messages import CPA, Assignments, BacktrackCPA, FcCPA, NotOk
 from robochoc.protocols.order import PriorityOrder
 from robochoc.protocols.protocol import Protocol
 from robochoc.protocols.traits import ENDS_WITH_EITHER, Traits
 from robochoc.solver.compiled import LocalProblem
-
-Assignments = tuple[Value, ...]
-"""A partial assignment: the values of the robots from the first one on, in priority order."""
-
-
-class CPA(Message, frozen=True):
-    """The current partial assignment, to which the receiver adds its value; `sc` is the step counter."""
-
-    assignments: Assignments
-    sc: int
-
-    act = acts.PROPOSE_CPA
-
-    def in_words(self, words: Wording) -> str:
-        """Return what the sender says."""
-        return f"so far {words.partial(self.assignments)}; it is {words.receiver}'s turn"
-
-
-class FcCPA(Message, frozen=True):
-    """A copy of the CPA of step `sc`, for forward checking (`FC_CPA`)."""
-
-    assignments: Assignments
-    sc: int
-
-    act = Act(Performative.INFORM, "a copy of the CPA, for forward checking; the receiver need not extend it")
-
-    def in_words(self, words: Wording) -> str:
-        """Return what the sender says."""
-        return f"so far {words.partial(self.assignments)}; look which of your values still go with it"
-
-
-class NotOk(Message, frozen=True):
-    """An inconsistent partial assignment: no solution extends `assignments`; found at step `sc` (`Not_OK`)."""
-
-    assignments: Assignments
-    sc: int
-
-    act = Act(Performative.DISCONFIRM, "the receiver takes the CPA to be right, and it has no solution")
-
-    def in_words(self, words: Wording) -> str:
-        """Return what the sender says."""
-        return f"no solution has {words.partial(self.assignments)}" if self.assignments else "there is no solution"
-
-
-class BacktrackCPA(Message, frozen=True):
-    """The CPA on its way back: no solution extends `assignments` (`backtrack_CPA`).
-
-    Its last value is the receiver's.
-    """
-
-    assignments: Assignments
-    sc: int
-
-    act = Act(Performative.REJECT_PROPOSAL, "the CPA that was proposed comes back")
-    backtracks = True
-
-    def in_words(self, words: Wording) -> str:
-        """Return what the sender says."""
-        return f"no solution has {words.partial(self.assignments)}: take another value"
 
 
 class AFC(Protocol):

@@ -44,29 +44,12 @@ from collections.abc import Mapping, Sequence
 from typing import assert_never, cast
 
 from robochoc.model.message import Message, Value
-from robochoc.model.wording import Wording
-from robochoc.protocols import acts
-from robochoc.protocols.afc_ng import CPA, AFCng, Nogood, Solved
+from robochoc.protocols.afc_ng import AFCng
+from robochoc.protocols.afc_ng_messages import CPA, Nogood, Solved
+from robochoc.protocols.afc_tree_messages import Accept
 from robochoc.protocols.order import PriorityOrder, PseudoTree
 from robochoc.protocols.traits import ENDS_WITH_PROOF, Traits
 from robochoc.solver.compiled import LocalProblem
-
-
-class Accept(Message, frozen=True):
-    """A message that the sender's whole subtree accepts the receiver's CPA (`accept`).
-
-    `counters` are those of the CPA, from the root down to the receiver; `subtree` holds the values of the subtree.
-    """
-
-    counters: list[int]
-    subtree: dict[str, Value]
-
-    act = acts.ACCEPT
-
-    def in_words(self, words: Wording) -> str:
-        """Return what the sender says."""
-        values = f", with {words.assigned(self.subtree.items())}" if self.subtree else ""
-        return f"all below {words.receiver}, from me down, accept its partial assignment{values}"
 
 
 class AFCTree(AFCng):

@@ -18,51 +18,17 @@ from typing import TypeVar
 
 from robochoc.model import message as wire
 from robochoc.model.outcome import Verdict
-from robochoc.model.wording import Wording
-from robochoc.protocols import acts
+from robochoc.protocols.cycles_messages import Value
+from robochoc.protocols.cycles_settings import CycleSettings
 from robochoc.protocols.findings import Findings, Trail
 from robochoc.protocols.order import PriorityOrder
-from robochoc.protocols.protocol import Protocol, Settings
+from robochoc.protocols.protocol import Protocol
 from robochoc.solver.compiled import LexicographicCost, LocalProblem
 
 T = TypeVar("T")
 
 Then = Callable[[Mapping[str, wire.Message]], None]
 """A function of one message of each robot passed to `listen`, in the order of these robots."""
-
-
-class Value(wire.Message, frozen=True):
-    """The sender's value (`value`)."""
-
-    value: wire.Value
-
-    act = acts.TELL_VALUE
-
-    def in_words(self, words: Wording) -> str:
-        """Return what the sender says."""
-        return f"{words.own_value(self.value)} in this cycle"
-
-
-class Domain(wire.Message, frozen=True):
-    """The sender's domain, sent first; later messages refer to places in it."""
-
-    values: list[wire.Value]
-
-    act = acts.TELL_DOMAIN
-
-    def in_words(self, words: Wording) -> str:
-        """Return what the sender says."""
-        return words.domain(self.values)
-
-
-class CycleSettings(Settings, frozen=True):
-    """`cycles`: the number of cycles after which all robots stop."""
-
-    cycles: int = 100
-
-    def __post_init__(self) -> None:
-        if self.cycles < 1:
-            raise ValueError(f"cycles is {self.cycles}; it must be 1 or more")
 
 
 class CycleProtocol(Protocol):

@@ -56,8 +56,10 @@ import msgspec
 
 from robochoc.model.message import Message, Value
 from robochoc.model.outcome import Verdict
-from robochoc.protocols.dfs import TreeMessage, TreeProtocol
+from robochoc.protocols.dfs import TreeProtocol
+from robochoc.protocols.dfs_messages import TreeMessage
 from robochoc.protocols.dpop_messages import UTIL, VALUE, Dimensions, Domain, Need, Proceed
+from robochoc.protocols.dpop_settings import DPOPSettings
 from robochoc.protocols.dpop_tables import (
     Codes,
     Extent,
@@ -73,28 +75,15 @@ from robochoc.protocols.dpop_tables import (
 )
 from robochoc.protocols.findings import Findings
 from robochoc.protocols.order import PriorityOrder
-from robochoc.protocols.protocol import Settings
 from robochoc.protocols.traits import ENDS_WITH_PROOF, Traits
 from robochoc.solver.compiled import LocalProblem
 from robochoc.solver.encoding import TooLargeError
 from robochoc.solver.exact_costs import EXACT, check_exact
 
-GIB = 1 << 30
 MOST_AXES = 1_000
 """Long before that no table fits anywhere."""
 Scope = tuple[str, ...]
 T = TypeVar("T")
-
-
-class DPOPSettings(Settings, frozen=True):
-    """`memory`: the bytes that the tables of a robot may take. A run that needs more ends before it makes a table."""
-
-    memory: int = GIB
-
-    def __post_init__(self) -> None:
-        """Raise `ValueError` unless `memory` is positive."""
-        if self.memory < 1:
-            raise ValueError(f"memory is a number of bytes, not {self.memory}")
 
 
 class DPOP(TreeProtocol):

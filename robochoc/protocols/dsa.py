@@ -42,23 +42,12 @@ Choices that the paper leaves open, and differences:
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Literal
 
 from robochoc.model.message import Message
-from robochoc.protocols.cycles import NO_GAIN, CycleProtocol, CycleSettings, Value, gain, values_in
+from robochoc.protocols.cycles import NO_GAIN, CycleProtocol, gain, values_in
+from robochoc.protocols.cycles_messages import Value
+from robochoc.protocols.dsa_settings import DSASettings
 from robochoc.protocols.traits import ENDS_WITH_PROOF, Traits
-
-
-class DSASettings(CycleSettings, frozen=True):
-    """`variant`: A, B or C. `probability` (p): the probability of a move. `cycles`: the number of cycles."""
-
-    variant: Literal["A", "B", "C"] = "B"
-    probability: float = 0.7
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        if not 0 < self.probability <= 1:
-            raise ValueError(f"probability is {self.probability:g}; it must be more than 0 and at most 1")
 
 
 class DSA(CycleProtocol):

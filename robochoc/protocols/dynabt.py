@@ -39,20 +39,16 @@ from collections.abc import Mapping
 
 from robochoc.model.message import Value
 from robochoc.model.outcome import Verdict
-from robochoc.protocols import abt
-from robochoc.protocols.abt import ABT, AddLink, Ok
+from robochoc.protocols import abt_messages
+from robochoc.protocols.abt import ABT
+from robochoc.protocols.abt_messages import AddLink, Ok
+from robochoc.protocols.dynabt_messages import Nogood
 from robochoc.protocols.nogood import NOTHING, Explanation, NogoodStore
 from robochoc.protocols.order import PriorityOrder
 from robochoc.protocols.protocol import DynamicProtocol
 from robochoc.protocols.traits import ENDS_WITH_PROOF, Traits
 from robochoc.solver.compiled import LocalProblem
 from robochoc.solver.explanation import Invalidated, domain_key
-
-
-class Nogood(abt.Nogood, frozen=True):
-    """A nogood: the receiver cannot take `value` while all in `lhs` and all constraints in `because` hold."""
-
-    because: list[str]
 
 
 class DynABT(ABT, DynamicProtocol):
@@ -130,7 +126,7 @@ class DynABT(ABT, DynamicProtocol):
     def _nogood(self, lhs: dict[str, Value], value: Value) -> Nogood:
         return Nogood(lhs, value, sorted(self._explanation()))
 
-    def _learn(self, nogood: abt.Nogood) -> None:
+    def _learn(self, nogood: abt_messages.Nogood) -> None:
         because = frozenset(nogood.because) if isinstance(nogood, Nogood) else NOTHING
         for index in self.problem.interchangeable(nogood.value):
             self.store.add(index, nogood.lhs, because)

@@ -24,23 +24,11 @@ from __future__ import annotations
 from typing import cast
 
 from robochoc.model.message import Message, Value
-from robochoc.model.wording import Wording
+from robochoc.protocols.first_fit_messages import Placed
 from robochoc.protocols.order import PriorityOrder
 from robochoc.protocols.protocol import Protocol
 from robochoc.protocols.traits import Traits
 from robochoc.solver.compiled import LocalProblem
-
-
-class Placed(Message, frozen=True):
-    """The sender's value; None if it has withdrawn."""
-
-    value: Value | None
-
-    def in_words(self, words: Wording) -> str:
-        """Return what the sender says."""
-        if self.value is None:
-            return "I withdraw"
-        return f"I fly, with {words.own_value(self.value, 'a value')}"
 
 
 class FirstFit(Protocol):

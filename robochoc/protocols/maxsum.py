@@ -42,7 +42,7 @@ Choices that the paper leaves open, and differences:
 >>> from robochoc.generators.queens3d import queens3d
 >>> result = Simulation(queens3d(2), MaxSum, Concurrent(seed=0)).search()
 >>> result.verdict.value, result.metrics.messages
-('no-solution', {'Domain': 6, 'R': 4})
+('no-solution', {'Domain': 6, 'R': 3})
 """
 
 from __future__ import annotations
@@ -51,67 +51,16 @@ from collections.abc import Mapping, Sequence
 from operator import add, sub
 
 from robochoc.model import message as wire
-from robochoc.model.communicative_acts import Act, Performative
 from robochoc.model.outcome import Verdict
 from robochoc.model.problem import INFINITE
-from robochoc.model.wording import Wording, costs_text
-from robochoc.protocols.cycles import CycleProtocol, CycleSettings, Domain
+from robochoc.protocols.cycles import CycleProtocol
+from robochoc.protocols.cycles_messages import Domain
 from robochoc.protocols.maxsum_factor import Factor, Row
+from robochoc.protocols.maxsum_messages import Q, R
+from robochoc.protocols.maxsum_settings import MaxSumSettings
 from robochoc.protocols.order import PriorityOrder
 from robochoc.protocols.traits import ENDS_WITH_PROOF, Traits
 from robochoc.solver.compiled import LocalProblem
-
-
-class R(wire.Message, frozen=True):
-    """Messages from functions to a variable, a row for each of the sender's functions with the receiver in it.
-
-    A row holds the minimum cost of the function for each of the receiver's values.
-    """
-
-    rows: list[Row]
-
-    act = Act(Performative.INFORM, "the receiver comes to know what each of its values costs")
-
-    def in_words(self, words: Wording) -> str:
-        """Return what the sender says."""
-        many = len(self.rows)
-        by = "our function" if many == 1 else f"our {many:,} functions, one after the other"
-        return f"by {by}, {words.receiver}'s values cost {_rows_in_words(self.rows)}"
-
-
-class Q(wire.Message, frozen=True):
-    """Messages from a variable to functions, a row for each of the receiver's functions, in the order of R.
-
-    A row holds the cost of each of the sender's values by all its other functions.
-    """
-
-    rows: list[Row]
-
-    act = Act(Performative.INFORM, "the receiver comes to know what each value costs elsewhere")
-
-    def in_words(self, words: Wording) -> str:
-        """Return what the sender says."""
-        many = len(self.rows)
-        by = "our function" if many == 1 else f"each of our {many:,} functions in turn"
-        return f"without {by}, {words.sender}'s values cost {_rows_in_words(self.rows)}"
-
-
-def _rows_in_words(rows: Sequence[Row]) -> str:
-    return "; ".join(map(costs_text, rows[:4]))
-
-
-class MaxSumSettings(CycleSettings, frozen=True):
-    """`damping`: the weight of the last Q. `preference`: the maximum for a value. `cycles`: the number of cycles."""
-
-    damping: float = 0.5
-    preference: float = 0.01
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        if not 0 <= self.damping < 1:
-            raise ValueError(f"damping is {self.damping:g}; it must be from 0 to below 1")
-        if not 0 <= self.preference < INFINITE:
-            raise ValueError(f"preference is {self.preference:g}; it must be a number, 0 or more")
 
 
 class MaxSum(CycleProtocol):

@@ -38,31 +38,12 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from robochoc.model import message as wire
-from robochoc.model.communicative_acts import Act, Performative
-from robochoc.model.wording import Wording, cost_text, counted, listed
-from robochoc.protocols.cycles import NO_GAIN, CycleProtocol, Value, gain, values_in
+from robochoc.protocols.cycles import NO_GAIN, CycleProtocol, gain, values_in
+from robochoc.protocols.cycles_messages import Value
+from robochoc.protocols.mgm_messages import Gain
 from robochoc.protocols.order import PriorityOrder
 from robochoc.protocols.traits import ENDS_WITH_PROOF, Traits
 from robochoc.solver.compiled import LexicographicCost, LocalProblem
-
-
-def saving_in_words(broken: int, cost: float) -> str:
-    """Return the gain of a move in words: `1 broken constraint and 3 of cost`, or `nothing`."""
-    saved = [counted(broken, "broken constraint")] if broken else []
-    return listed([*saved, f"{cost_text(cost)} of cost"] if cost else saved) or "nothing"
-
-
-class Gain(wire.Message, frozen=True):
-    """The gain of the sender's best move: broken hard constraints, and costs (`gain`)."""
-
-    broken: int
-    cost: int | float
-
-    act = Act(Performative.INFORM, "the receiver comes to know what the sender's move would save")
-
-    def in_words(self, _: Wording) -> str:
-        """Return what the sender says."""
-        return f"my move would save {saving_in_words(self.broken, self.cost)}"
 
 
 class Gainers(CycleProtocol):

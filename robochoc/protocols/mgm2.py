@@ -33,9 +33,9 @@ Choices that the paper leaves open, and differences:
 >>> from robochoc.communication.simulator.schedule import Concurrent
 >>> from robochoc.communication.simulator.simulator import Simulation
 >>> from robochoc.generators.queens3d import queens3d
->>> result = Simulation(queens3d(2), MGM2, Concurrent(seed=0)).search()
+>>> result = Simulation(queens3d(3), MGM2, Concurrent(seed=0)).search()
 >>> result.metrics.messages
-{'Accept': 3, 'Domain': 12, 'Gain': 1200, 'Go': 6, 'Offer': 1200, 'Reject': 208, 'Value': 1200}
+{'Accept': 6, 'Domain': 56, 'Gain': 5600, 'Go': 12, 'Offer': 5600, 'Reject': 446, 'Value': 5600}
 """
 
 from __future__ import annotations
@@ -44,79 +44,15 @@ from collections.abc import Iterator, Mapping
 from typing import NamedTuple
 
 from robochoc.model import message as wire
-from robochoc.model.communicative_acts import Act, Performative
-from robochoc.model.wording import Wording, counted
-from robochoc.protocols import acts
-from robochoc.protocols.cycles import NO_GAIN, CycleSettings, Domain, Value, gain, values_in
-from robochoc.protocols.mgm import Gain, Gainers, saving_in_words
+from robochoc.protocols.cycles import NO_GAIN, gain, values_in
+from robochoc.protocols.cycles_messages import Domain, Value
+from robochoc.protocols.mgm import Gainers
+from robochoc.protocols.mgm2_messages import Accept, Gains, Go, Offer, Reject
+from robochoc.protocols.mgm2_settings import MGM2Settings
+from robochoc.protocols.mgm_messages import Gain
 from robochoc.protocols.order import PriorityOrder
 from robochoc.protocols.traits import ENDS_WITH_PROOF, Traits
 from robochoc.solver.compiled import LexicographicCost, LocalProblem
-
-Gains = list[list[tuple[int, int | float]]]
-
-
-class Offer(wire.Message, frozen=True):
-    """An offer of a joint move: a row for each of the receiver's values, with a gain for each of the sender's.
-
-    A gain is a pair: broken hard constraints, and costs. None: no offer (`offer`).
-    """
-
-    gains: Gains | None
-
-    act = Act(Performative.PROPOSE, "what both would gain by moving together")
-
-    def in_words(self, _: Wording) -> str:
-        """Return what the sender says."""
-        if self.gains is None:
-            return "I have no offer for you"
-        best = max(saving for row in self.gains for saving in row)
-        many = f"{counted(len(self.gains), 'value')} of yours and {len(self.gains[0]):,} of mine"
-        if best <= (0, 0):
-            return f"let us move together: of {many}, no two would save me anything"
-        return f"let us move together: of {many}, the best two would save me {saving_in_words(*best)}"
-
-
-class Accept(wire.Message, frozen=True):
-    """The acceptance of an offer: the receiver's value at `place`, and the total gain (`accept`)."""
-
-    place: int
-    broken: int
-    cost: int | float
-
-    act = acts.ACCEPT
-
-    def in_words(self, _: Wording) -> str:
-        """Return what the sender says."""
-        saved = saving_in_words(self.broken, self.cost)
-        return f"I take your offer: you take your value number {self.place + 1}, and we save {saved} in all"
-
-
-class Reject(wire.Message, frozen=True):
-    """The rejection of an offer (`reject`)."""
-
-    act = Act(Performative.REJECT_PROPOSAL, "the offer that was proposed is not taken")
-
-    def in_words(self, _: Wording) -> str:
-        """Return what the sender says."""
-        return "I do not take your offer"
-
-
-class Go(wire.Message, frozen=True):
-    """A committed robot's word on the joint move: whether its gain is the largest among its neighbours.
-
-    The paper's messages are `go` and `no go`.
-    """
-
-    go: bool
-
-    act = Act(Performative.INFORM, "the receiver comes to know whether the sender gains most")
-
-    def in_words(self, _: Wording) -> str:
-        """Return what the sender says."""
-        if self.go:
-            return "go: of my neighbours, nobody is to move before us"
-        return "no go: one of my neighbours is to move instead"
 
 
 class JointMove(NamedTuple):
@@ -126,17 +62,6 @@ class JointMove(NamedTuple):
     partner: str
     own: int
     place: int
-
-
-class MGM2Settings(CycleSettings, frozen=True):
-    """`threshold` (q): the probability of being an offerer. `cycles`: the number of cycles."""
-
-    threshold: float = 0.5
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        if not 0 <= self.threshold <= 1:
-            raise ValueError(f"threshold is {self.threshold:g}; it must be from 0 to 1")
 
 
 class MGM2(Gainers):

@@ -8,12 +8,18 @@ from collections.abc import Iterable, Mapping, Sequence
 class PriorityOrder:
     """The names of all robots, the highest priority first. Static, and the same for every robot of a run.
 
-    `tree` is the pseudo-tree that the order induces; None unless the protocol asked for it (`Traits.tree`).
+    `tree` is the pseudo-tree that the order induces; None unless the protocol asked for it (`Traits.tree`). `rank` is
+    the place of each robot; where it is known (`TeamKnowledge`), all robots look it up in the same mapping.
     """
 
-    def __init__(self, names: Sequence[str], links: Mapping[str, Iterable[str]] | None = None) -> None:
+    def __init__(
+        self,
+        names: Sequence[str],
+        links: Mapping[str, Iterable[str]] | None = None,
+        rank: Mapping[str, int] | None = None,
+    ) -> None:
         self.names = tuple(names)
-        self.rank = {name: rank for rank, name in enumerate(self.names)}
+        self.rank = {name: place for place, name in enumerate(self.names)} if rank is None else rank
         self.tree = None if links is None else PseudoTree.induced(self.names, links)
 
     def lowest(self, names: Iterable[str]) -> str:

@@ -12,27 +12,15 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable
 from typing import Any, ClassVar
 
-import msgspec
-
 from robochoc.model.message import Message
 from robochoc.model.outcome import Verdict
 from robochoc.protocols.findings import NOTHING, Findings, Incumbent
 from robochoc.protocols.inspectable import Inspectable
 from robochoc.protocols.order import PriorityOrder
+from robochoc.protocols.settings_base import NO_SETTINGS, Settings
 from robochoc.protocols.traits import Traits
 from robochoc.solver.compiled import LocalProblem
 from robochoc.solver.explanation import Invalidated
-
-
-class Settings(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """The base of a protocol's settings (`--set NAME=VALUE`): fields of simple types, each with its default.
-
-    A subclass's docstring explains its fields; `robochoc protocols NAME` shows it. `__post_init__` raises `ValueError`
-    for values that are not allowed.
-    """
-
-
-NO_SETTINGS = Settings()
 
 
 class Said(tuple[str, Message]):  # noqa: SLOT001 - no subclass of tuple can have slots with anything in them

@@ -35,35 +35,11 @@ from typing import assert_never, cast
 
 from robochoc.model.message import Message, Value
 from robochoc.model.outcome import Verdict
-from robochoc.model.wording import Wording
-from robochoc.protocols import acts
 from robochoc.protocols.order import PriorityOrder
 from robochoc.protocols.protocol import Protocol
+from robochoc.protocols.sbt_messages import CPA, Backtrack
 from robochoc.protocols.traits import ENDS_WITH_EITHER, Traits
 from robochoc.solver.compiled import LocalProblem
-
-
-class CPA(Message, frozen=True):
-    """The current partial assignment: the values of all robots before the receiver, in priority order."""
-
-    assignments: tuple[Value, ...]
-
-    act = acts.PROPOSE_CPA
-
-    def in_words(self, words: Wording) -> str:
-        """Return what the sender says."""
-        return f"so far {words.partial(self.assignments)}; it is {words.receiver}'s turn"
-
-
-class Backtrack(Message, frozen=True):
-    """A request to take the next value: no robot below has a value that agrees with the receiver's."""
-
-    act = acts.REJECT_VALUE
-    backtracks = True
-
-    def in_words(self, words: Wording) -> str:
-        """Return what the sender says."""
-        return f"nobody below {words.receiver} has a value left that goes with its own: take another one"
 
 
 class SBT(Protocol):

@@ -6,7 +6,8 @@ from collections.abc import Mapping
 
 import msgspec
 
-from robochoc.protocols.protocol import Protocol, Settings
+from robochoc.protocols.protocol import Protocol
+from robochoc.protocols.settings_base import Settings
 from robochoc.system.decode_errors import describe_decode_error
 
 

@@ -59,39 +59,16 @@ from robochoc.model.outcome import Verdict
 from robochoc.protocols.findings import NOTHING, Findings, Incumbent
 from robochoc.protocols.interchangeable import expanded, fits
 from robochoc.protocols.order import PriorityOrder
-from robochoc.protocols.protocol import Protocol, Settings
+from robochoc.protocols.protocol import Protocol
 from robochoc.protocols.sfb_bounds import BOUND, ForwardBounds, Rows, max_finite
 from robochoc.protocols.sfb_messages import Above, Below, Charges, CPAs, Domain, Explored, Solution
+from robochoc.protocols.sfb_settings import MIB, SFBSettings
 from robochoc.protocols.traits import ENDS_WITH_PROOF, Traits
 from robochoc.solver.compiled import LocalProblem
 from robochoc.solver.exact_costs import EXACT, check_exact
 
-MIB = 1 << 20
 LARGEST = 4 * MIB
 """No message of several CPAs has more bytes of them, however much memory there is: runtimes have limits, too."""
-
-
-class SFBSettings(Settings, frozen=True):
-    """Limits on the CPAs that are extended and sent at once.
-
-    `batch`: the maximum number of CPAs that are extended at once. `window`: the maximum number of CPA messages of each
-    robot that are sent and not yet explored. `memory`: the bytes that the CPAs in all these messages of all robots may
-    take together.
-
-    Each message has the same share of the memory: memory / (robots * window), 4 MiB at most. Only a message with a
-    single CPA may take more. CPAs that do not fit are not extended yet, or wait at the robot that has extended them (at
-    most one share, or the extensions of a single CPA). With less memory there are more messages, and the verdict is the
-    same. The total traffic is not bounded: it is as large as the search. The first waves are not bounded either: their
-    messages grow with the number of different domains and charges.
-    """
-
-    batch: int = 4096
-    window: int = 1
-    memory: int = 64 * MIB
-
-    def __post_init__(self) -> None:
-        if self.batch < 1 or self.window < 1 or self.memory < 1:
-            raise ValueError("batch, window and memory are 1 or more")
 
 
 class Batch:

@@ -38,73 +38,14 @@ from __future__ import annotations
 import math
 from typing import assert_never, cast
 
-import msgspec
-
 from robochoc.model.message import Message, Value
 from robochoc.model.outcome import Verdict
-from robochoc.model.wording import Wording, cost_text, incumbent_text
-from robochoc.protocols import acts
 from robochoc.protocols.findings import Findings, Incumbent
 from robochoc.protocols.order import PriorityOrder
 from robochoc.protocols.protocol import Protocol
+from robochoc.protocols.syncbb_messages import Backtrack, BestPath, Cost, Path, Terminate
 from robochoc.protocols.traits import ENDS_WITH_PROOF, Traits
 from robochoc.solver.compiled import LocalProblem
-
-Cost = int | float
-
-
-class BestPath(msgspec.Struct, frozen=True, array_like=True):
-    """The best path so far: all robots' values in priority order, and its cost (the bound; `inf`: none yet)."""
-
-    bound: Cost
-    values: tuple[Value, ...] = ()
-
-
-class Path(Message, frozen=True):
-    """The values of all robots before the receiver, in priority order, with the cost that each of them pays."""
-
-    assignments: list[tuple[Value, Cost]]
-    best: BestPath
-
-    act = acts.PROPOSE_CPA
-
-    def in_words(self, words: Wording) -> str:
-        """Return what the sender says."""
-        values = words.partial([value for value, _ in self.assignments])
-        paid = cost_text(sum(cost for _, cost in self.assignments))
-        known = incumbent_text(self.best.bound)
-        return f"so far {values}, which costs {paid}; {known}; it is {words.receiver}'s turn"
-
-
-class Backtrack(Message, frozen=True):
-    """A request to take the next value: every path with the receiver's value costs at least the bound."""
-
-    best: BestPath
-
-    act = acts.REJECT_VALUE
-    backtracks = True
-
-    def in_words(self, words: Wording) -> str:
-        """Return what the sender says."""
-        if math.isinf(self.best.bound):
-            return f"{words.receiver}'s value leads to no solution: take another one"
-        bound = cost_text(self.best.bound)
-        return f"{words.receiver}'s value leads to nothing that costs less than {bound}: take another one"
-
-
-class Terminate(Message, frozen=True):
-    """The end of the search: no path is cheaper than the best one."""
-
-    best: BestPath
-
-    act = acts.TERMINATE
-
-    def in_words(self, words: Wording) -> str:
-        """Return what the sender says."""
-        if math.isinf(self.best.bound):
-            return "the search is over, and there is no solution"
-        values = words.partial(self.best.values)
-        return f"the search is over: nothing costs less than {cost_text(self.best.bound)}, with {values}"
 
 
 class SyncBB(Protocol):

@@ -44,7 +44,7 @@ class Inspector:
         self._problem = LocalProblem(part)  # one of its own: what is checked here counts for nobody
         self._own = ValueText(part.interfaces)
         self.agent = part.robot.name
-        self._ranks = {name: rank for rank, name in enumerate(part.order)}
+        self._ranks = part.known.rank
         self._heard: dict[str, Message] = {}
         self._told: dict[str, Value] = {}
 

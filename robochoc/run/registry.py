@@ -8,7 +8,8 @@ from dataclasses import dataclass
 from typing import cast
 
 from robochoc.protocols.first_fit import FirstFit
-from robochoc.protocols.protocol import DynamicProtocol, Protocol, Settings
+from robochoc.protocols.protocol import DynamicProtocol, Protocol
+from robochoc.protocols.settings_base import Settings
 from robochoc.protocols.traits import Traits
 from robochoc.run.defaults import AUTO, DEFAULT_COST_PROTOCOL, FIRST_FIT
 from robochoc.run.options import CENTRAL

@@ -16,7 +16,7 @@ from collections.abc import Sequence
 from contextlib import suppress
 from typing import Self
 
-from robochoc.communication.resources import signals_held
+from robochoc.system.signals import signals_held
 from robochoc.view.address import loopback_socket, secret_path, url_of
 from robochoc.view.redirect import RedirectFile
 

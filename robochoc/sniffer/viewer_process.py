@@ -21,6 +21,7 @@ from functools import partial
 from typing import NamedTuple
 
 from robochoc.system.orphans import signal_when_orphaned
+from robochoc.system.signals import leave_ctrl_c_to_the_parent
 
 
 class _Parent(NamedTuple):
@@ -48,9 +49,7 @@ class _Parent(NamedTuple):
 def main() -> None:
     """Serve until the parent ends."""
     signal_when_orphaned(signal.SIGKILL)
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C reaches the whole process group, and is left to the parent
-    signal.signal(signal.SIGTERM, signal.SIG_DFL)
-    signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGINT, signal.SIGTERM})
+    leave_ctrl_c_to_the_parent()
     parent = _parent()
     line = parent.line()
     if not line:

@@ -51,6 +51,7 @@ from robochoc.solver.enumeration import (
 from robochoc.solver.failures import SolverLostError, SolverMissingError, SolverTimeoutError
 from robochoc.solver.propagation import propagate
 from robochoc.solver.query import Query, SolvedBy, SolverAnswer
+from robochoc.system.signals import signals_held
 from robochoc.system.temporary_files import temporary_folder
 
 CHUNK = 1 << 20
@@ -254,7 +255,7 @@ class AceProcess:
         # The process reads from this pipe, whose other end only this process has: it ends with this process.
         watched, self._lifeline = os.pipe()
         try:
-            with (self._folder / "stderr").open("wb") as stderr:
+            with (self._folder / "stderr").open("wb") as stderr, signals_held():
                 self._process = subprocess.Popen(  # noqa: S603 - our own module
                     [sys.executable, "-P", "-m", "robochoc.solver.ace_process"]
                     + [str(theirs.fileno()), str(watched), str(self._folder)]

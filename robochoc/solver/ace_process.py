@@ -42,6 +42,7 @@ from robochoc.solver.ace_messages import (
     codes_of,
 )
 from robochoc.system.orphans import signal_when_orphaned
+from robochoc.system.signals import leave_ctrl_c_to_the_parent
 
 JVM_OPTIONS = (
     "-XX:+UseSerialGC",  # two cores, small heaps: the collector with the least to start
@@ -73,7 +74,7 @@ MINIMISE = ("-os=DECREASING",)
 def main() -> None:
     """Serve the parent's tasks until it hangs up."""
     signal_when_orphaned(signal.SIGCONT)  # stopped, it would not see the end of the lifeline
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    leave_ctrl_c_to_the_parent()
     parent = socket.socket(fileno=int(sys.argv[1]))
     folder = Path(sys.argv[3])
     threading.Thread(target=_end_with_the_parent, args=(int(sys.argv[2]), folder), daemon=True).start()

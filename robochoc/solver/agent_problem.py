@@ -5,7 +5,8 @@ An agent gets nothing else, neither in the simulator nor in a process of its own
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from types import MappingProxyType
 from typing import NamedTuple
 
@@ -39,30 +40,65 @@ class RunParameters(NamedTuple):
 DEFAULT_PARAMETERS = RunParameters()
 
 
+@dataclass(frozen=True)
+class TeamKnowledge:
+    """What all robots of a team know of each other. One object serves all robots of a process, and those forked of it.
+
+    Attributes:
+        order: The names of all robots in priority order, the highest first.
+        interfaces: The interface variables of all robots.
+        domains: The declared domains of all interface variables.
+        links: The parents of each robot. For protocols that work on a pseudo-tree.
+        rank: The place of each robot in the order. Not sent to other processes: they make it anew.
+        owners: The robot of each interface variable. Not sent either.
+    """
+
+    order: tuple[str, ...]
+    interfaces: Interfaces
+    domains: Mapping[str, Domain]
+    links: Links | None = None
+    rank: Mapping[str, int] = field(init=False, compare=False, repr=False)
+    owners: Mapping[str, str] = field(init=False, compare=False, repr=False)
+
+    def __post_init__(self) -> None:
+        """Look up both at once for all robots, and not for each: that would take the square of the time."""
+        object.__setattr__(self, "rank", {name: place for place, name in enumerate(self.order)})
+        owners = {variable: robot for robot, shown in self.interfaces.items() for variable in shown}
+        object.__setattr__(self, "owners", owners)
+
+    def __reduce__(self) -> tuple[type[TeamKnowledge], tuple[object, ...]]:
+        """Pickle without what can be made anew."""
+        return TeamKnowledge, (self.order, self.interfaces, dict(self.domains), self.links)
+
+
 class AgentProblem(NamedTuple):
     """The problem of one agent: the knowledge of its robot when the search begins.
 
     Attributes:
         own: The robot itself, with its compiled domain.
-        order: The names of all robots in priority order, the highest first.
-        interfaces: The interface variables of all robots.
+        known: What all robots know of each other.
         copies: The totally known constraints on its variables that lower robots hold. For protocols in which all
             robots of a scope know a constraint.
-        domains: The declared domains of all interface variables.
-        links: The parents of each robot. For protocols that work on a pseudo-tree.
         pkc_holders: The parents that hold a part of a partially known constraint with this robot. Both sides know
             that there is such a constraint. Neither knows the other's part.
         parameters: The parameters of the run.
     """
 
     own: CompiledRobot
-    order: Sequence[str]
-    interfaces: Interfaces
+    known: TeamKnowledge
     copies: tuple[KeyedConstraint, ...] = ()
-    domains: Mapping[str, Domain] = MappingProxyType({})
-    links: Links | None = None
     pkc_holders: tuple[str, ...] = ()
     parameters: RunParameters = DEFAULT_PARAMETERS
+
+    @property
+    def order(self) -> tuple[str, ...]:
+        """The names of all robots in priority order, the highest first."""
+        return self.known.order
+
+    @property
+    def interfaces(self) -> Interfaces:
+        """The interface variables of all robots."""
+        return self.known.interfaces
 
     @property
     def robot(self) -> Robot:
@@ -93,8 +129,9 @@ def agent_problems(
     compiled = ensure_compiled(team)
     team = compiled.team
     shown = {robot.name: robot.interface for robot in team.robots}
-    known = {name: team.variables[name].domain for names in shown.values() for name in names}
+    domains = {name: team.variables[name].domain for names in shown.values() for name in names}
     links = {robot.name: tuple(parent.name for parent in robot.parents) for robot in team.robots} if tree else None
+    everyone = TeamKnowledge(tuple(team.order), shown, domains, links)
     copies: dict[str, list[KeyedConstraint]] = {robot.name: [] for robot in team.robots}
     if shared_scopes:
         for robot in team.robots:
@@ -108,8 +145,6 @@ def agent_problems(
             if child.constraints:
                 pkc_holders[child.name].append(robot.name)
     return {
-        name: AgentProblem(
-            own, team.order, shown, tuple(copies[name]), known, links, tuple(pkc_holders[name]), parameters
-        )
+        name: AgentProblem(own, everyone, tuple(copies[name]), tuple(pkc_holders[name]), parameters)
         for name, own in compiled.robots.items()
     }

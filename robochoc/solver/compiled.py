@@ -53,7 +53,7 @@ class LocalProblem:
 
     def __init__(self, part: AgentProblem) -> None:
         robot = part.robot
-        rank = {name: place for place, name in enumerate(part.order)}
+        rank = part.known.rank
         self.agent = robot.name
         self.parents = tuple(sorted((parent.name for parent in robot.parents), key=rank.__getitem__))
         self.children = tuple(sorted((child.name for child in robot.children), key=rank.__getitem__))
@@ -71,10 +71,9 @@ class LocalProblem:
     def _set_constraints(self, part: AgentProblem, own: OwnValues) -> None:
         """Compile the constraints of `part` for the values `own`, and set all that depends on them."""
         robot, rank = part.robot, self._rank
-        owners = {name: agent for agent, names in part.interfaces.items() for name in names if agent != self.agent}
 
         def ready(known: KeyedConstraint) -> SharedConstraint:
-            constraint = SharedConstraint(known.key, known.constraint, owners, rank, part.interfaces)
+            constraint = SharedConstraint(known.key, known.constraint, part.known, self.agent)
             constraint.compile(own)
             return constraint
 
@@ -209,7 +208,7 @@ class LocalProblem:
                 and constraint.agents
                 and all(a in robots for a in constraint.agents)
             ):
-                checks, charged = constraint.lower_bounds(self._part.domains, MAX_BOUNDED_ROWS)
+                checks, charged = constraint.lower_bounds(self._part.known.domains, MAX_BOUNDED_ROWS)
                 self.checks += checks
                 least.append(charged)
         return _summed(len(self.values), least)

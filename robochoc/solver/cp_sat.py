@@ -31,6 +31,7 @@ from robochoc.solver.weighted import (
     constant_costs,
     weighted_components,
 )
+from robochoc.system.signals import signals_held
 
 NAME = "OR-Tools"
 INSTALL = "pip install 'robochoc[ortools]'"
@@ -164,13 +165,14 @@ class CpSatSolver:
     def _start(self) -> socket.socket:
         ours, theirs = socket.socketpair()
         try:
-            self._process = subprocess.Popen(  # noqa: S603 - our own module
-                [sys.executable, "-P", "-m", "robochoc.solver.cp_sat_process", str(theirs.fileno())],
-                stdin=subprocess.DEVNULL,
-                stdout=subprocess.DEVNULL,
-                stderr=subprocess.DEVNULL,
-                pass_fds=(theirs.fileno(),),
-            )
+            with signals_held():
+                self._process = subprocess.Popen(  # noqa: S603 - our own module
+                    [sys.executable, "-P", "-m", "robochoc.solver.cp_sat_process", str(theirs.fileno())],
+                    stdin=subprocess.DEVNULL,
+                    stdout=subprocess.DEVNULL,
+                    stderr=subprocess.DEVNULL,
+                    pass_fds=(theirs.fileno(),),
+                )
         except BaseException:
             ours.close()
             raise

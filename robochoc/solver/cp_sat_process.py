@@ -22,6 +22,7 @@ import msgspec
 
 from robochoc.solver.cp_sat_messages import LENGTH, CpSatAnswer, CpSatFailed, CpSatTask, FromCpSat
 from robochoc.system.orphans import signal_when_orphaned
+from robochoc.system.signals import leave_ctrl_c_to_the_parent
 
 WORKERS = 1
 """One thread: what is measured is a search, and robots beside it need the other cores."""
@@ -30,7 +31,7 @@ WORKERS = 1
 def main() -> None:
     """Serve the parent's tasks until it hangs up."""
     signal_when_orphaned(signal.SIGKILL)
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    leave_ctrl_c_to_the_parent()
     stream = socket.socket(fileno=int(sys.argv[1])).makefile("rwb")
     tasks: queue.SimpleQueue[CpSatTask] = queue.SimpleQueue()
     threading.Thread(target=_listen, args=(stream, tasks), daemon=True).start()

@@ -64,7 +64,7 @@ class Filters:
         return evaluated, allowed.to_bytes((size + 7) // 8, "little")
 
     def _columns(self, robot: str) -> list[list[int]]:
-        return [sorted(self._part.domains[name]) for name in self._part.interfaces[robot]]
+        return [sorted(self._part.known.domains[name]) for name in self._part.interfaces[robot]]
 
 
 def _place(value: Value, ranks: Sequence[Mapping[int | None, int]]) -> int:

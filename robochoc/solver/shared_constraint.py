@@ -8,6 +8,7 @@ from collections.abc import Container, Iterable, Mapping, Sequence
 
 from robochoc.model.message import Value
 from robochoc.model.problem import Constraint
+from robochoc.solver.agent_problem import TeamKnowledge
 from robochoc.solver.encoding import allows_function, cost_function, max_cost
 
 Conflict = Mapping[str, Value]
@@ -50,32 +51,27 @@ class OwnValues:
 class SharedConstraint:
     """A constraint on the own compiled variable and those of `agents` (in priority order).
 
-    `owners` maps others' variables to who owns them, `known` each robot to its interface; `key` is the constraint's
-    name in explanations.
+    `known` is what all robots know of each other, `own` the robot that checks; `key` is the constraint's name in
+    explanations.
 
     After `compile` it answers which own values go with what the others say. Made at the first look, then kept:
     there is one answer for each combination of the others' variables that the constraint looks at, however many
     values their owners have.
     """
 
-    def __init__(
-        self,
-        key: str,
-        constraint: Constraint,
-        owners: Mapping[str, str],
-        rank: Mapping[str, int],
-        known: Mapping[str, tuple[str, ...]],
-    ) -> None:
+    def __init__(self, key: str, constraint: Constraint, known: TeamKnowledge, own: str) -> None:
         self.key = key
         scope = set(constraint.variables)
-        self.agents = tuple(sorted({owners[name] for name in scope if name in owners}, key=rank.__getitem__))
+        owners = {known.owners[name] for name in scope if name in known.owners} - {own}
+        self.agents = tuple(sorted(owners, key=known.rank.__getitem__))
+        interfaces = known.interfaces
         self._constraint = constraint
         self._scope = scope
         self._seen = [
-            (agent, place) for agent in self.agents for place, name in enumerate(known[agent]) if name in scope
+            (agent, place) for agent in self.agents for place, name in enumerate(interfaces[agent]) if name in scope
         ]
-        self._names = [known[agent][place] for agent, place in self._seen]
-        self._widths = {agent: len(known[agent]) for agent in self.agents}
+        self._names = [interfaces[agent][place] for agent, place in self._seen]
+        self._widths = {agent: len(interfaces[agent]) for agent in self.agents}
         self._masks: dict[OtherValues, int] = {}
         self._costs: dict[OtherValues, list[float]] = {}
         self._conflicts: dict[OtherValues, Conflict] = {}

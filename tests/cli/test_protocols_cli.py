@@ -25,7 +25,8 @@ from robochoc.run.registry import (
 from tests.support.program import robochoc_within
 
 WITHOUT_DOCSTRING = """
-    from robochoc.protocols.first_fit import FirstFit, Placed
+    from robochoc.protocols.first_fit import FirstFit
+    from robochoc.protocols.first_fit_messages import Placed
     from robochoc.protocols.protocol import DynamicProtocol
     from robochoc.protocols.traits import Traits
 

@@ -290,7 +290,7 @@ def statuses(strike: Strike, last: signal.Signals, *, fatal: bool, struck: bool)
         return {own, 0} if last is INT or strike.moment != "staying" else {own}
     if strike.given_up:
         return {0, 3} if strike.target == "solver" else {0, 4}
-    lasting = strike.signum in {KILL, TERM} or (strike.signum is INT and strike.target == "solver")
+    lasting = strike.signum in {KILL, TERM}
     return {0, 4} if lasting and strike.target != "viewer" else {0}
 
 

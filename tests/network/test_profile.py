@@ -35,7 +35,13 @@ from robochoc.formats.extension import MAX_VALUES
 from robochoc.model.problem import Domain, ProblemKind, Robot, Team, Variable
 from robochoc.model.team_edits import without_robots
 from robochoc.protocols.traits import Traits
-from robochoc.solver.agent_problem import DEFAULT_PARAMETERS, AgentProblem, RunParameters, agent_problems
+from robochoc.solver.agent_problem import (
+    DEFAULT_PARAMETERS,
+    AgentProblem,
+    RunParameters,
+    TeamKnowledge,
+    agent_problems,
+)
 from robochoc.solver.compiled_team import CompiledRobot, CompiledTeam
 from robochoc.solver.domain import CompiledDomain
 from tests.support.complex_problems import random_complex_team
@@ -85,18 +91,17 @@ def part_of(robot: Robot, task: Task) -> AgentProblem:
     parameters = RunParameters(task.seed, task.settings, task.aside)
     domains = {name: domain_of(name, ranges) for name, ranges in task.domains.items()}
     own = CompiledRobot(among(robot, task.interfaces), nothing_of)
-    return AgentProblem(own, task.order, task.interfaces, (), domains, task.links, task.secretive, parameters)
+    everyone = TeamKnowledge(tuple(task.order), task.interfaces, domains, task.links)
+    return AgentProblem(own, everyone, (), task.secretive, parameters)
 
 
 def comparable(part: AgentProblem) -> AgentProblem:
     """Without what says the same twice: the names of domains, and what a robot shows that its file implies."""
-    domains = {name: Domain(name, domain.ranges) for name, domain in part.domains.items()}
+    domains = {name: Domain(name, domain.ranges) for name, domain in part.known.domains.items()}
     return part._replace(
         own=part.own.relinked(replace(part.robot, shown=())),
-        domains=domains,
+        known=TeamKnowledge(part.order, dict(part.interfaces), domains, part.known.links),
         pkc_holders=tuple(sorted(part.pkc_holders)),
-        interfaces=dict(part.interfaces),
-        order=tuple(part.order),
     )
 
 
@@ -136,7 +141,7 @@ def test_robots_left_behind_know_what_a_smaller_team_would_tell_them(team: Team,
     for name, task in members.tasks(2, "abt", TREE, DEFAULT_PARAMETERS).items():
         known = part_of(team[name], task)
         assert replace(known.robot, shown=()) == replace(left[name], shown=())
-        assert known.links == expected[name].links
+        assert known.known.links == expected[name].known.links
         assert sorted(known.pkc_holders) == sorted(expected[name].pkc_holders)
         assert set(known.interfaces) == set(expected[name].interfaces)
         for other, shown in expected[name].interfaces.items():  # what others have shown once they go on showing

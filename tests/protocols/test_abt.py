@@ -7,7 +7,8 @@ import doctest
 import robochoc.protocols.abt
 from robochoc.model.outcome import Verdict
 from robochoc.model.problem import Constraint, Relation, Semantics, Team
-from robochoc.protocols.abt import ABT, AddLink, Nogood, Ok
+from robochoc.protocols.abt import ABT
+from robochoc.protocols.abt_messages import AddLink, Nogood, Ok
 from robochoc.protocols.order import PriorityOrder
 from robochoc.solver.agent_problem import agent_problems
 from robochoc.solver.compiled import LocalProblem

@@ -7,8 +7,9 @@ import doctest
 import robochoc.protocols.adopt
 from robochoc.model.outcome import Verdict
 from robochoc.model.problem import INFINITE
-from robochoc.protocols.adopt import ADOPT, Cost, Threshold, Value
-from robochoc.protocols.bounding import Terminate
+from robochoc.protocols.adopt import ADOPT
+from robochoc.protocols.adopt_messages import Cost, Threshold, Value
+from robochoc.protocols.bounding_messages import Terminate
 from tests.support.agents import replies, value
 from tests.support.pseudo_trees import context, placed, priced, root, to
 

@@ -11,7 +11,8 @@ from robochoc.communication.simulator.simulator import Simulation
 from robochoc.model.message import Message
 from robochoc.model.outcome import Verdict
 from robochoc.model.problem import Constraint, Relation, Semantics, Team
-from robochoc.protocols.afc import AFC, CPA, Assignments, BacktrackCPA, FcCPA, FilteredDomain, NotOk
+from robochoc.protocols.afc import AFC, FilteredDomain
+from robochoc.protocols.afc_messages import CPA, Assignments, BacktrackCPA, FcCPA, NotOk
 from robochoc.protocols.order import PriorityOrder
 from robochoc.protocols.sbt import SBT
 from robochoc.solver.agent_problem import agent_problems

@@ -13,7 +13,8 @@ from robochoc.communication.simulator.simulator import Simulation
 from robochoc.model.message import Message, Value
 from robochoc.model.outcome import Verdict
 from robochoc.model.problem import Constraint, Relation, Semantics, Team
-from robochoc.protocols.afc_ng import CPA, AFCng, Nogood, Solved
+from robochoc.protocols.afc_ng import AFCng
+from robochoc.protocols.afc_ng_messages import CPA, Nogood, Solved
 from robochoc.protocols.order import PriorityOrder
 from robochoc.solver.agent_problem import agent_problems
 from robochoc.solver.compiled import LocalProblem

@@ -13,8 +13,10 @@ from robochoc.communication.simulator.simulator import Simulation
 from robochoc.model.message import Value
 from robochoc.model.outcome import Verdict
 from robochoc.model.problem import Team
-from robochoc.protocols.afc_ng import CPA, AFCng, Nogood, Solved
-from robochoc.protocols.afc_tree import Accept, AFCTree
+from robochoc.protocols.afc_ng import AFCng
+from robochoc.protocols.afc_ng_messages import CPA, Nogood, Solved
+from robochoc.protocols.afc_tree import AFCTree
+from robochoc.protocols.afc_tree_messages import Accept
 from robochoc.protocols.order import PriorityOrder
 from robochoc.solver.agent_problem import agent_problems
 from robochoc.solver.compiled import LocalProblem
@@ -31,7 +33,7 @@ def fork(values: int = 3) -> Team:
 
 def created(team: Team, name: str) -> AFCTree:
     part = agent_problems(team, tree=True)[name]
-    return AFCTree(LocalProblem(part), PriorityOrder(part.order, part.links))
+    return AFCTree(LocalProblem(part), PriorityOrder(part.order, part.known.links))
 
 
 def agent(team: Team, name: str) -> AFCTree:

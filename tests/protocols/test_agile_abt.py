@@ -17,7 +17,8 @@ from robochoc.model.message import Message, Value
 from robochoc.model.outcome import Verdict
 from robochoc.model.problem import Constraint, Relation, Semantics, Team
 from robochoc.model.wording import Wording
-from robochoc.protocols.agile_abt import AddLink, AgileABT, Nogood, Ok, Order
+from robochoc.protocols.agile_abt import AgileABT
+from robochoc.protocols.agile_abt_messages import AddLink, Nogood, Ok, Order
 from robochoc.protocols.agile_order import UNKNOWN, Explanation, Proposal, compatible, ordered, proposed, updated
 from robochoc.protocols.order import PriorityOrder
 from robochoc.solver.agent_problem import agent_problems

@@ -8,8 +8,9 @@ import robochoc.protocols.bnb_adopt
 from robochoc.model.message import Message
 from robochoc.model.outcome import Verdict
 from robochoc.model.problem import INFINITE
-from robochoc.protocols.bnb_adopt import BnBADOPT, Cost, Value
-from robochoc.protocols.bounding import Terminate
+from robochoc.protocols.bnb_adopt import BnBADOPT
+from robochoc.protocols.bnb_adopt_messages import Cost, Value
+from robochoc.protocols.bounding_messages import Terminate
 from tests.support.agents import replies, value
 from tests.support.pseudo_trees import context, placed, priced, root, to
 

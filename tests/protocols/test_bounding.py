@@ -11,8 +11,9 @@ from robochoc.communication.simulator.schedule import Concurrent, RandomChannels
 from robochoc.communication.simulator.simulator import Simulation
 from robochoc.model.outcome import PseudoTreeNode, Verdict
 from robochoc.model.problem import INFINITE
-from robochoc.protocols import adopt, bnb_adopt
-from robochoc.protocols.bounding import BoundingProtocol, Terminate
+from robochoc.protocols import adopt, adopt_messages, bnb_adopt, bnb_adopt_messages
+from robochoc.protocols.bounding import BoundingProtocol
+from robochoc.protocols.bounding_messages import Terminate
 from robochoc.run.incumbent import lower_bound
 from tests.support.agents import replies
 from tests.support.brute_force import least_cost
@@ -24,8 +25,8 @@ class Family(NamedTuple):
     """A protocol, and two of its messages."""
 
     protocol: type[BoundingProtocol]
-    value: type[adopt.Value | bnb_adopt.Value]
-    cost: type[adopt.Cost | bnb_adopt.Cost]
+    value: type[adopt_messages.Value | bnb_adopt_messages.Value]
+    cost: type[adopt_messages.Cost | bnb_adopt_messages.Cost]
 
     def middle(self) -> BoundingProtocol:
         """B, after it has begun: below A and, further up, Z; C and D are its children."""
@@ -43,8 +44,8 @@ class Family(NamedTuple):
 
 
 FAMILIES = [
-    Family(adopt.ADOPT, adopt.Value, adopt.Cost),
-    Family(bnb_adopt.BnBADOPT, bnb_adopt.Value, bnb_adopt.Cost),
+    Family(adopt.ADOPT, adopt_messages.Value, adopt_messages.Cost),
+    Family(bnb_adopt.BnBADOPT, bnb_adopt_messages.Value, bnb_adopt_messages.Cost),
 ]
 both = pytest.mark.parametrize("family", FAMILIES, ids=lambda family: family.protocol.__name__)
 

@@ -11,7 +11,8 @@ from robochoc.communication.simulator.schedule import Concurrent
 from robochoc.communication.simulator.simulator import Simulation
 from robochoc.model.outcome import Verdict
 from robochoc.model.problem import Assignment, Constraint, Relation, Semantics, Team
-from robochoc.protocols.cycles import CycleProtocol, Value
+from robochoc.protocols.cycles import CycleProtocol
+from robochoc.protocols.cycles_messages import Value
 from robochoc.protocols.dsa import DSA
 from robochoc.protocols.findings import Trail
 from robochoc.protocols.maxsum import MaxSum

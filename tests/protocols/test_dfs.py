@@ -17,7 +17,8 @@ from robochoc.communication.simulator.simulator import Simulation
 from robochoc.model.message import Message
 from robochoc.model.outcome import PseudoTreeNode, Verdict
 from robochoc.model.problem import Constraint, Relation, Semantics, Team
-from robochoc.protocols.dfs import Back, Token, TreeMessage, TreeProtocol, Wave
+from robochoc.protocols.dfs import TreeProtocol
+from robochoc.protocols.dfs_messages import Back, Token, TreeMessage, Wave
 from robochoc.protocols.findings import Findings
 from robochoc.protocols.order import PriorityOrder
 from robochoc.protocols.traits import Traits

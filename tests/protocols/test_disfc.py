@@ -19,7 +19,8 @@ from robochoc.generators.queens3d import queens3d
 from robochoc.model.message import Message
 from robochoc.model.outcome import Verdict
 from robochoc.model.problem import Constraint, ConstraintModel, Team
-from robochoc.protocols.disfc import AddLink, DisFC, Nogood, Ok
+from robochoc.protocols.disfc import DisFC
+from robochoc.protocols.disfc_messages import AddLink, Nogood, Ok
 from robochoc.protocols.order import PriorityOrder
 from robochoc.solver import filters
 from robochoc.solver.agent_problem import agent_problems

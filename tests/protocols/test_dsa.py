@@ -11,8 +11,9 @@ import robochoc.protocols.dsa
 from robochoc.communication.simulator.schedule import Concurrent
 from robochoc.model.outcome import Verdict
 from robochoc.model.problem import Constraint, Relation, Semantics, Team
-from robochoc.protocols.cycles import Value
-from robochoc.protocols.dsa import DSA, DSASettings
+from robochoc.protocols.cycles_messages import Value
+from robochoc.protocols.dsa import DSA
+from robochoc.protocols.dsa_settings import DSASettings
 from robochoc.protocols.settings import SettingsError, settings_of
 from tests.support.agents import replies, value
 from tests.support.cost_problems import random_cost_team

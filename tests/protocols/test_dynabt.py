@@ -23,8 +23,9 @@ from robochoc.model.problem import (
     Team,
     Variable,
 )
-from robochoc.protocols.abt import AddLink, Ok
-from robochoc.protocols.dynabt import DynABT, Nogood
+from robochoc.protocols.abt_messages import AddLink, Ok
+from robochoc.protocols.dynabt import DynABT
+from robochoc.protocols.dynabt_messages import Nogood
 from robochoc.protocols.order import PriorityOrder
 from robochoc.solver.agent_problem import agent_problems
 from robochoc.solver.compiled import LocalProblem

@@ -14,9 +14,11 @@ from robochoc.communication.simulator.schedule import Concurrent
 from robochoc.model.outcome import Verdict
 from robochoc.model.problem import INFINITE, Constraint, Relation, Semantics, Team
 from robochoc.protocols import maxsum_factor
-from robochoc.protocols.cycles import Domain
-from robochoc.protocols.maxsum import MaxSum, MaxSumSettings, Q, R
+from robochoc.protocols.cycles_messages import Domain
+from robochoc.protocols.maxsum import MaxSum
 from robochoc.protocols.maxsum_factor import Factor
+from robochoc.protocols.maxsum_messages import Q, R
+from robochoc.protocols.maxsum_settings import MaxSumSettings
 from robochoc.protocols.settings import SettingsError, settings_of
 from robochoc.solver import cost_table
 from robochoc.solver.cost_table import CostTable

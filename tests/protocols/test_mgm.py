@@ -9,8 +9,9 @@ import pytest
 
 import robochoc.protocols.mgm
 from robochoc.model.problem import Constraint, Relation, Semantics, Team
-from robochoc.protocols.cycles import Value
-from robochoc.protocols.mgm import MGM, Gain
+from robochoc.protocols.cycles_messages import Value
+from robochoc.protocols.mgm import MGM
+from robochoc.protocols.mgm_messages import Gain
 from tests.support.agents import replies, value
 from tests.support.cost_problems import random_cost_team, random_hard_team
 from tests.support.local_search_runs import (

@@ -11,9 +11,11 @@ import robochoc.protocols.mgm2
 from robochoc.communication.simulator.schedule import Concurrent
 from robochoc.model.message import Message
 from robochoc.model.problem import Constraint, Relation, Semantics, Team
-from robochoc.protocols.cycles import Domain, Value
-from robochoc.protocols.mgm import MGM, Gain
-from robochoc.protocols.mgm2 import MGM2, Accept, Go, Offer, Reject
+from robochoc.protocols.cycles_messages import Domain, Value
+from robochoc.protocols.mgm import MGM
+from robochoc.protocols.mgm2 import MGM2
+from robochoc.protocols.mgm2_messages import Accept, Go, Offer, Reject
+from robochoc.protocols.mgm_messages import Gain
 from robochoc.protocols.settings import SettingsError, settings_of
 from tests.support.agents import replies, value
 from tests.support.cost_problems import random_cost_team, random_hard_team

@@ -31,7 +31,7 @@ def parts_of(team: Team) -> dict[str, AgentProblem]:
 def order_of(team: Team) -> PriorityOrder:
     """The order of `team` with its tree, as a robot is told of it."""
     part = parts_of(team)[team.order[0]]
-    return PriorityOrder(part.order, part.links)
+    return PriorityOrder(part.order, part.known.links)
 
 
 def tree_of(team: Team) -> PseudoTree:
@@ -145,7 +145,7 @@ def test_a_subtree_has_to_agree_with_its_root_s_tree_parent(team: Team) -> None:
 @EVERY
 @given(teams)
 def test_every_robot_induces_the_same_tree(team: Team) -> None:
-    trees = [PriorityOrder(part.order, part.links).tree for part in parts_of(team).values()]
+    trees = [PriorityOrder(part.order, part.known.links).tree for part in parts_of(team).values()]
     assert len({str(tree and tree.parents) for tree in trees}) == 1
 
 

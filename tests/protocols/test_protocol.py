@@ -18,7 +18,8 @@ from robochoc.model.problem import (
     Semantics,
     Variable,
 )
-from robochoc.protocols.abt import ABT, AddLink
+from robochoc.protocols.abt import ABT
+from robochoc.protocols.abt_messages import AddLink
 from robochoc.protocols.order import PriorityOrder
 from robochoc.protocols.requirements import unmet_requirement
 from robochoc.protocols.traits import ENDS_WITH_EITHER, ENDS_WITH_PROOF, UNDECLARED, Traits

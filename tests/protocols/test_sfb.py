@@ -19,8 +19,9 @@ from robochoc.model.problem import INFINITE
 from robochoc.protocols.findings import NOTHING
 from robochoc.protocols.interchangeable import expanded
 from robochoc.protocols.settings import SettingsError, settings_of
-from robochoc.protocols.sfb import LARGEST, SFB, SFBSettings
+from robochoc.protocols.sfb import LARGEST, SFB
 from robochoc.protocols.sfb_messages import Above, Below, CPAs, Explored, Solution
+from robochoc.protocols.sfb_settings import SFBSettings
 from robochoc.solver.agent_problem import RunParameters
 from robochoc.solver.encoding import TooLargeError
 from robochoc.solver.exact_costs import EXACT

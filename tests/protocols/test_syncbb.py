@@ -17,7 +17,8 @@ from robochoc.model.outcome import Verdict
 from robochoc.model.problem import INFINITE, Constraint, Relation, Semantics, Team
 from robochoc.protocols.findings import Findings, Incumbent
 from robochoc.protocols.order import PriorityOrder
-from robochoc.protocols.syncbb import Backtrack, BestPath, Cost, Path, SyncBB, Terminate
+from robochoc.protocols.syncbb import SyncBB
+from robochoc.protocols.syncbb_messages import Backtrack, BestPath, Cost, Path, Terminate
 from robochoc.solver.agent_problem import RunParameters, agent_problems
 from robochoc.solver.compiled import LocalProblem
 from tests.support.agents import replies, value

@@ -8,7 +8,7 @@ import pytest
 import sexpdata
 
 from robochoc.model.message import Envelope, Message, encode
-from robochoc.protocols.abt import Ok
+from robochoc.protocols.abt_messages import Ok
 from robochoc.protocols.protocol import Protocol
 from robochoc.run.registry import protocol_named, protocol_names
 from robochoc.services.identifier import AgentIdentifier

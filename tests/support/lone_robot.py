@@ -22,7 +22,8 @@ from robochoc.communication.network.transport import Transport
 from robochoc.formats import PREDEFINED
 from robochoc.model.message import encode
 from robochoc.model.problem import Constraint, Team
-from robochoc.protocols.abt import ABT, Ok
+from robochoc.protocols.abt import ABT
+from robochoc.protocols.abt_messages import Ok
 from robochoc.protocols.protocol import Protocol
 from robochoc.solver.agent_problem import DEFAULT_PARAMETERS
 from robochoc.solver.compiled_team import CompiledRobot

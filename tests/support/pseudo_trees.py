@@ -8,7 +8,7 @@ from typing import TypeVar
 
 from robochoc.model.message import Message
 from robochoc.model.problem import Constraint, Relation, Semantics, Team
-from robochoc.protocols.bounding import Context
+from robochoc.protocols.bounding_messages import Context
 from robochoc.protocols.dfs import TreeProtocol
 from robochoc.protocols.order import PriorityOrder
 from robochoc.solver.agent_problem import agent_problems

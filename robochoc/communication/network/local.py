@@ -31,7 +31,7 @@ from robochoc.communication.network.robot_process import START_S, NetworkRobotSt
 from robochoc.communication.network.router import RouterError
 from robochoc.communication.network.settings import NetworkSettings
 from robochoc.communication.processes.process_status import describe_end
-from robochoc.communication.resources import require_descriptors, signals_held
+from robochoc.communication.resources import require_descriptors
 from robochoc.communication.run_result import Progress, RunResult
 from robochoc.communication.session import Epoch, Session
 from robochoc.journal.events import Observer
@@ -41,6 +41,7 @@ from robochoc.protocols.protocol import Protocol
 from robochoc.solver.agent_problem import DEFAULT_PARAMETERS, RunParameters
 from robochoc.solver.compiled_team import CompiledTeam
 from robochoc.solver.encoding import UnsupportedError
+from robochoc.system.signals import signals_held
 
 LOOPBACK = "127.0.0.1"
 FAREWELL_S = 1.0

@@ -19,6 +19,7 @@ from robochoc.communication.network.transport import CannotConnectError, Transpo
 from robochoc.protocols.protocol import Protocol
 from robochoc.solver.compiled_team import CompiledRobot
 from robochoc.system.orphans import signal_when_orphaned
+from robochoc.system.signals import leave_ctrl_c_to_the_parent
 
 START_S = 60.0
 """The longest wait for robots to connect, in seconds."""
@@ -39,9 +40,7 @@ class NetworkRobotStart(NamedTuple):
 
 def network_robot_process(given: NetworkRobotStart) -> None:
     """Run one robot in this process. Ctrl-C reaches the whole process group, and is left to the parent."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
-    signal.signal(signal.SIGTERM, signal.SIG_DFL)
-    signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGINT, signal.SIGTERM})
+    leave_ctrl_c_to_the_parent()
     _end_with_the_fork_server()
     if sys.platform == "linux":
         libc = ctypes.CDLL(None)

@@ -22,6 +22,7 @@ from robochoc.authority.identity import Identity
 from robochoc.communication.network.access import access_control, yielding
 from robochoc.communication.network.framing import MASTER
 from robochoc.communication.network.transport import encoded
+from robochoc.system.signals import signals_held
 
 START_S = 60.0
 """The longest wait until the router listens, in seconds. To start Python takes seconds where all cores are busy."""
@@ -96,15 +97,15 @@ class Router:
     def open(self, reach: Mapping[str, Sequence[str]], sniffers: Collection[str] | None = None) -> None:
         """Listen, with these rules (see `access_control`) instead of those before. Raises `RouterError`."""
         self.close()
-        process = subprocess.Popen(  # noqa: S603 - our own module, with this interpreter
-            [sys.executable, "-P", "-m", _PROCESS],  # -P: not what stands in the working directory
-            stdin=subprocess.PIPE,
-            stdout=subprocess.PIPE,
-            stderr=subprocess.STDOUT,
-            env={**os.environ, "RUST_LOG": _LOG_OF_REFUSALS if self._refused else _LOG, "NO_COLOR": "1"},
-            start_new_session=True,
-        )
-        self._process = process
+        with signals_held():
+            self._process = process = subprocess.Popen(  # noqa: S603 - our own module, with this interpreter
+                [sys.executable, "-P", "-m", _PROCESS],  # -P: not what stands in the working directory
+                stdin=subprocess.PIPE,
+                stdout=subprocess.PIPE,
+                stderr=subprocess.STDOUT,
+                env={**os.environ, "RUST_LOG": _LOG_OF_REFUSALS if self._refused else _LOG, "NO_COLOR": "1"},
+                start_new_session=True,
+            )
         if process.stdin is None or process.stdout is None:
             raise RouterError("it has no standard streams")
         process.stdin.write(f"{json.dumps(self._scratch)}\n{json.dumps(self._settings(reach, sniffers))}\n".encode())

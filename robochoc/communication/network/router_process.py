@@ -16,6 +16,7 @@ import zenoh
 
 from robochoc.communication.network.zenoh_config import config
 from robochoc.system.orphans import signal_when_orphaned
+from robochoc.system.signals import leave_ctrl_c_to_the_parent
 
 READY = "listening"
 
@@ -23,7 +24,7 @@ READY = "listening"
 def main() -> None:
     """Be the router until standard input ends."""
     signal_when_orphaned(signal.SIGCONT)  # stopped, it would not see the end of standard input
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    leave_ctrl_c_to_the_parent()
     zenoh.init_log_from_env_or("error")
     scratch, settings = json.loads(sys.stdin.readline()), json.loads(sys.stdin.readline())
     with zenoh.open(config(settings)):

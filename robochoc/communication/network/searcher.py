@@ -38,7 +38,7 @@ from robochoc.model.problem import Constraint, ConstraintModel, ProblemKind
 from robochoc.protocols.findings import NOTHING, Findings
 from robochoc.protocols.protocol import Protocol
 from robochoc.protocols.requirements import unmet_requirement
-from robochoc.solver.agent_problem import AgentProblem, RunParameters
+from robochoc.solver.agent_problem import AgentProblem, RunParameters, TeamKnowledge
 from robochoc.solver.compiled_team import CompiledRobot
 from robochoc.solver.encoding import UnsupportedError
 from robochoc.solver.explanation import KeyedConstraint, held_above
@@ -160,9 +160,8 @@ class Searcher(RobotLoop):
         self._learnt = {sender: [one.constraint for one in theirs] for sender, theirs in known.items()}
         copies = _sorted([one for theirs in known.values() for one in theirs], task.order)
         parameters = RunParameters(task.seed, task.settings, task.aside)
-        return AgentProblem(
-            self._own, task.order, task.interfaces, copies, domains, task.links, task.secretive, parameters
-        )
+        everyone = TeamKnowledge(tuple(task.order), task.interfaces, domains, task.links)
+        return AgentProblem(self._own, everyone, copies, task.secretive, parameters)
 
     def _known(self, sender: str, record: SharedRecord) -> KeyedConstraint:
         """Return a constraint that `sender` holds: it has to be a child, and this robot's variables in the scope."""

@@ -16,8 +16,9 @@ from robochoc.communication.main_guard import require_main_guard
 from robochoc.communication.processes.process_status import ProcessStatus
 from robochoc.communication.processes.robot_link import RobotLink
 from robochoc.communication.processes.robot_process import RobotStart, robot_process
-from robochoc.communication.resources import allow_descriptors, signals_held
+from robochoc.communication.resources import allow_descriptors
 from robochoc.solver.encoding import UnsupportedError
+from robochoc.system.signals import signals_held
 
 StartMethod = Literal["fork", "forkserver"]
 _CONTEXTS: dict[StartMethod, type[ForkContext | ForkServerContext]] = {

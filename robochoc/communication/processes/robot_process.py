@@ -21,6 +21,7 @@ from robochoc.communication.processes.queue_robot import QueueRobot
 from robochoc.protocols.protocol import Protocol
 from robochoc.solver.agent_problem import AgentProblem
 from robochoc.solver.encoding import TooLargeError, UnsupportedError
+from robochoc.system.signals import leave_ctrl_c_to_the_parent
 
 LOWEST_NICE = 19
 _PR_SET_PDEATHSIG = 1
@@ -56,9 +57,7 @@ def robot_process(start: RobotStart, control: socket.socket, inherited: Sequence
         inherited: The parent's ends of control pipes that a fork copied. They are closed here, so that the others see
             the end of the parent.
     """
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
-    signal.signal(signal.SIGTERM, signal.SIG_DFL)
-    signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGINT, signal.SIGTERM})
+    leave_ctrl_c_to_the_parent()
     _end_with_the_parent()
     for copy in inherited:
         copy.close()

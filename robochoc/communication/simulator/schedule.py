@@ -79,6 +79,7 @@ class Concurrent(Schedule):
         self._inboxes: dict[str, list[tuple[int, int, Envelope]]] = {}
         self._last_arrival: dict[tuple[str, str], int] = {}
         self._agenda: list[tuple[int, float, str]] = []
+        self._turns: dict[str, int] = {}
 
     def put(self, envelope: Envelope, checks: int = 0) -> None:  # noqa: ARG002 - they are in its clock
         """Draw the delay; never earlier than the message before it in the same channel."""
@@ -98,12 +99,10 @@ class Concurrent(Schedule):
         """Return all messages in the inbox of the robot that reads its inbox next, or the first of them."""
         while self._agenda:
             due, _, robot = heapq.heappop(self._agenda)
+            if self._turns.get(robot) != due:  # it has had its turn, or has been given another
+                continue
+            del self._turns[robot]
             inbox = self._inboxes[robot]
-            if not inbox:
-                continue
-            if due < self._wakes(robot):  # noted while it was still busy
-                self._note(robot)
-                continue
             self.now = due
             packet = []
             while inbox and inbox[0][0] <= due:
@@ -115,7 +114,7 @@ class Concurrent(Schedule):
 
     def clear(self) -> None:
         """Drop all messages under way. No robot is busy afterwards."""
-        for state in (self._busy_until, self._inboxes, self._last_arrival, self._agenda):
+        for state in (self._busy_until, self._inboxes, self._last_arrival, self._agenda, self._turns):
             state.clear()
         self.now = 0
 
@@ -125,12 +124,12 @@ class Concurrent(Schedule):
         if self._inboxes.get(robot):
             self._note(robot)
 
-    def _wakes(self, robot: str) -> int:
-        """Return when `robot` gets to its inbox: something has arrived, and it is not busy."""
-        return max(self._inboxes[robot][0][0], self._busy_until.get(robot, 0))
-
     def _note(self, robot: str) -> None:
-        heapq.heappush(self._agenda, (self._wakes(robot), self._chance.random(), robot))
+        """Give `robot` its turn at the time when something has arrived and it is not busy; a robot has one at most."""
+        due = max(self._inboxes[robot][0][0], self._busy_until.get(robot, 0))
+        if self._turns.get(robot) != due:
+            self._turns[robot] = due
+            heapq.heappush(self._agenda, (due, self._chance.random(), robot))
 
 
 class Cycles(Schedule):

@@ -42,6 +42,7 @@ class Timed(Schedule):
         self._inboxes: dict[str, list[tuple[int, int, Envelope]]] = {}
         self._last_arrival: dict[tuple[str, str], int] = {}
         self._agenda: list[tuple[int, int, float, int, Envelope | str]] = []
+        self._turns: dict[str, int] = {}
 
     @property
     def elapsed_s(self) -> float:
@@ -71,12 +72,10 @@ class Timed(Schedule):
             if isinstance(what, Envelope):
                 self._transmit(due, what)
                 continue
+            if self._turns.get(what) != due:  # it has had its turn, or has been given another
+                continue
+            del self._turns[what]
             inbox = self._inboxes[what]
-            if not inbox:
-                continue
-            if due < self._wakes(what):  # noted while it was still busy
-                self._wake(what)
-                continue
             self.now = due
             packet = []
             while inbox and inbox[0][0] <= due:
@@ -86,7 +85,7 @@ class Timed(Schedule):
 
     def clear(self) -> None:
         """Drop all messages under way, and reset the time. No robot is busy afterwards."""
-        states = (self._busy_until, self._free_at, self._inboxes, self._last_arrival)
+        states = (self._busy_until, self._free_at, self._inboxes, self._last_arrival, self._turns)
         for state in states:
             state.clear()
         self._agenda.clear()
@@ -112,12 +111,12 @@ class Timed(Schedule):
         if first:
             self._wake(envelope.receiver)
 
-    def _wakes(self, robot: str) -> int:
-        """Return when `robot` gets to its inbox: something has arrived, and it is not busy."""
-        return max(self._inboxes[robot][0][0], self._busy_until.get(robot, 0))
-
     def _wake(self, robot: str) -> None:
-        self._note(self._wakes(robot), _WAKE, self._chance.random(), robot)
+        """Give `robot` its turn at the time when something has arrived and it is not busy; a robot has one at most."""
+        due = max(self._inboxes[robot][0][0], self._busy_until.get(robot, 0))
+        if self._turns.get(robot) != due:
+            self._turns[robot] = due
+            self._note(due, _WAKE, self._chance.random(), robot)
 
     def _note(self, due: int, kind: int, lot: float, what: Envelope | str) -> None:
         """Add to the agenda. Robots that are ready at the same time draw lots. Each one's messages keep their order."""

@@ -8,8 +8,9 @@ from robochoc.communication.host import BadMessageError, Host
 from robochoc.journal.events import AnyEvent, Concluded, Decided, Received, Sent, Settled
 from robochoc.model.message import Envelope, Message, encode
 from robochoc.model.problem import Constraint, Relation, Semantics, Team
-from robochoc.protocols.abt import ABT, AddLink, Nogood, Ok
-from robochoc.protocols.first_fit import Placed
+from robochoc.protocols.abt import ABT
+from robochoc.protocols.abt_messages import AddLink, Nogood, Ok
+from robochoc.protocols.first_fit_messages import Placed
 from robochoc.protocols.order import PriorityOrder
 from robochoc.solver.agent_problem import agent_problems
 from robochoc.solver.compiled import LocalProblem

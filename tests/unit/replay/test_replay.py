@@ -28,7 +28,8 @@ from robochoc.journal.events import (
 )
 from robochoc.journal.journal import Header, Journal, JournalRecorder, read_journal
 from robochoc.model.message import Message, Value
-from robochoc.protocols.abt import ABT, Nogood
+from robochoc.protocols.abt import ABT
+from robochoc.protocols.abt_messages import Nogood
 from robochoc.protocols.dynabt import DynABT
 from robochoc.replay import CannotReplayError, ReplayOptions, ReplayResult, replay
 from robochoc.run import Options, Runtime, Withdrawal

@@ -17,7 +17,7 @@ from hypothesis import strategies as st
 from robochoc.generators.queens3d import queens3d
 from robochoc.model.message import Message
 from robochoc.model.wording import Wording, listed
-from robochoc.protocols.dfs import Token
+from robochoc.protocols.dfs_messages import Token
 from robochoc.protocols.first_fit import FirstFit
 from robochoc.protocols.protocol import Protocol
 from robochoc.run import Options, Runtime, Withdrawal
@@ -35,7 +35,7 @@ OURS = [name for name in protocol_names() if protocol_named(name).__module__.sta
 PROTOCOLS: list[type[Protocol]] = [*map(protocol_named, OURS), FirstFit]
 TYPES: list[type[Message]] = sorted(
     {kind for protocol in PROTOCOLS for kind in get_args(protocol.messages) or (protocol.messages,)},
-    key=lambda kind: (kind.__name__, kind.__module__),
+    key=lambda kind: (kind.__name__, kind.__module__.removesuffix("_messages")),
 )
 
 REAL = {
@@ -137,17 +137,17 @@ REAL = {
     ("sfb", "Solution"): (
         "RX04 says: a solution costs 25, less than all before; by number, robots' values in it are 1, 2, 3, 2 and 1"
     ),
-    ("dsa", "Value"): "RX01 says: X01 = -1 in this cycle",
-    ("mgm", "Gain"): "RX02 says: my move would save 15 of cost",
+    ("dsa", "Value"): "RX01 says: X01 = -3 in this cycle",
+    ("mgm", "Gain"): "RX00 says: my move would save 8 of cost",
     ("mgm2", "Domain"): "RX04 says: X04 is -2, -1 or 4",
     ("mgm2", "Offer"): (
-        "RX02 says: let us move together: of 2 values of yours and 4 of mine, the best two would save me 15 of cost"
+        "RX04 says: let us move together: of 4 values of yours and 3 of mine, the best two would save me 3 of cost"
     ),
-    ("mgm2", "Accept"): "RX03 says: I take your offer: you take your value number 1, and we save 5 of cost in all",
+    ("mgm2", "Accept"): "RX04 says: I take your offer: you take your value number 1, and we save 3 of cost in all",
     ("mgm2", "Reject"): "RX04 says: I do not take your offer",
     ("mgm2", "Go"): "RX03 says: no go: one of my neighbours is to move instead",
     ("maxsum", "R"): "RX02 says: by our function, RX01's values cost 5 and 5",
-    ("maxsum", "Q"): "RX03 says: without our function, RX03's values cost 1 and 0",
+    ("maxsum", "Q"): "RX00 says: without our function, RX00's values cost 0, 1.005, 2 and 2.01",
 }
 
 

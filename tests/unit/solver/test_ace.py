@@ -228,6 +228,17 @@ def test_what_is_plain_needs_no_process() -> None:
         assert solver.pid is None
 
 
+def test_ctrl_c_does_not_break_off_its_start() -> None:
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)  # it may be ignored, and children inherit that
+    try:
+        with AceProcess(always=True) as solver:
+            solver.start()
+            os.kill(pid_of(solver), signal.SIGINT)
+            assert solver.solve(SMALL_NETWORK, deadline=time.monotonic() + HANG_S).found == 3
+    finally:
+        signal.signal(signal.SIGINT, before)
+
+
 def test_processes_go_and_the_next_task_has_another(temporary: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """After so many tasks, when the time is over, and when they are killed; and they leave nothing."""
     monkeypatch.setattr(front, "TASKS", 2)

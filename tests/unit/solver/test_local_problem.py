@@ -138,7 +138,7 @@ def test_what_a_robot_adds_is_the_difference_that_it_makes(batch: int) -> None:
                     continue
                 aside = chance.random() < 0.1
                 names = part.interfaces[name]
-                view[name] = tuple([None if aside else chance.choice(list(part.domains[one])) for one in names])
+                view[name] = tuple([None if aside else chance.choice(list(part.known.domains[one])) for one in names])
                 added = problem.added(name, view)
                 if added is not None:
                     costs = [cost + more for cost, more in zip(costs, added, strict=True)]
@@ -199,7 +199,7 @@ def _compare(part: AgentProblem, chance: Random) -> None:
     problem = LocalProblem(part)
     for index in range(len(problem.values)):
         view = {
-            name: tuple([chance.choice(list(part.domains[variable])) for variable in variables])
+            name: tuple([chance.choice(list(part.known.domains[variable])) for variable in variables])
             for name, variables in part.interfaces.items()
             if chance.random() < 0.8
         }

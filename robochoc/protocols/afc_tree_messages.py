@@ -1,0 +1,24 @@
+"""The message of AFC-tree that is not AFC-ng's (see `afc_tree.py`)."""
+
+from __future__ import annotations
+
+from robochoc.model.message import Message, Value
+from robochoc.model.wording import Wording
+from robochoc.protocols import acts
+
+
+class Accept(Message, frozen=True):
+    """A message that the sender's whole subtree accepts the receiver's CPA (`accept`).
+
+    `counters` are those of the CPA, from the root down to the receiver; `subtree` holds the values of the subtree.
+    """
+
+    counters: list[int]
+    subtree: dict[str, Value]
+
+    act = acts.ACCEPT
+
+    def in_words(self, words: Wording) -> str:
+        """Return what the sender says."""
+        values = f", with {words.assigned(self.subtree.items())}" if self.subtree else ""
+        return f"all below {words.receiver}, from me down, accept its partial assignment{values}"

@@ -1,0 +1,49 @@
+"""The messages of Asynchronous Weak-Commitment search (see `awc.py`)."""
+
+from __future__ import annotations
+
+from robochoc.model.message import Message, Value
+from robochoc.model.wording import Wording, is_withdrawn, listed
+from robochoc.protocols import acts
+
+
+class Ok(Message, frozen=True):
+    """The sender's value and current priority, sent to all neighbours (`ok?`)."""
+
+    value: Value
+    priority: int
+
+    act = acts.TELL_VALUE
+
+    def in_words(self, words: Wording) -> str:
+        """Return what the sender says."""
+        return f"{words.own_value(self.value)} from now on, with priority {self.priority}"
+
+
+class Nogood(Message, frozen=True):
+    """Assignments that cannot all hold, the receiver's among them, with the last known priorities."""
+
+    nogood: dict[str, tuple[Value, int]]
+
+    act = acts.RULE_OUT
+    backtracks = True
+
+    def in_words(self, words: Wording) -> str:
+        """Return what the sender says."""
+        values = {robot: value for robot, (value, _) in self.nogood.items() if not is_withdrawn(value)}
+        facts = [fact for robot, value in values.items() for fact in words.facts(robot, value)]
+        if len(facts) == 1:
+            return f"{facts[0]} cannot stand, whatever the others do"
+        return f"{listed(facts)} cannot {'both' if len(facts) == len('ab') else 'all'} stand"
+
+
+class AddLink(Message, frozen=True):
+    """A new link between sender and receiver because of a nogood: each sends the other its value from now on."""
+
+    act = acts.ADD_LINK
+
+    def in_words(self, words: Wording) -> str:
+        """Return what the sender says."""
+        return (
+            f"from now on let us tell each other {words.variables(words.sender)} and {words.variables(words.receiver)}"
+        )

@@ -1,0 +1,47 @@
+"""What is common to the messages of ADOPT and BnB-ADOPT: contexts, bounds, and the end of the search."""
+
+from __future__ import annotations
+
+import math
+
+from robochoc.model import message
+from robochoc.model.message import Message
+from robochoc.model.wording import Wording, cost_text
+from robochoc.protocols import acts
+
+Entry = tuple[message.Value, int]
+"""A robot's value, and the counter that says how often it has changed (the ID of BnB-ADOPT)."""
+
+
+Context = dict[str, Entry]
+"""The values of robots above, as far as they are known."""
+
+
+Number = int | float
+"""Infinite where something hard is broken, or nothing is known yet; integers stay integers on the wire."""
+
+
+class Terminate(Message, frozen=True):
+    """The end of the search above the receiver: all its ancestors have taken their values in `context` (TERMINATE)."""
+
+    context: Context
+
+    act = acts.TERMINATE
+
+    def in_words(self, words: Wording) -> str:
+        """Return what the sender says."""
+        condition = words.context(self.context).removeprefix("as long as ").removesuffix(", ")
+        return f"all above you have taken their last values{': ' if condition else ''}{condition}"
+
+
+def bounds_in_words(words: Wording, context: Context, lower: Number, upper: Number) -> str:
+    """Return a robot's bounds in words: `as long as V1.1 = 2, my subtree costs at least 3`."""
+    if math.isinf(lower):
+        costs = "has no solution"
+    elif lower == upper:
+        costs = f"costs {cost_text(lower)}"
+    elif math.isinf(upper):
+        costs = f"costs at least {cost_text(lower)}"
+    else:
+        costs = f"costs between {cost_text(lower)} and {cost_text(upper)}"
+    return f"{words.context(context)}my subtree {costs}"

@@ -1,0 +1,50 @@
+"""The messages of DisFC (see `disfc.py`)."""
+
+from __future__ import annotations
+
+from robochoc.model.message import Message
+from robochoc.model.wording import Wording, counted, listed
+from robochoc.protocols import acts
+
+
+class Ok(Message, frozen=True):
+    """A new assignment of the sender, named `counter`; `allowed` is the receiver's domain filtered by it (`ok?`)."""
+
+    counter: int
+    allowed: bytes
+
+    act = acts.TELL_VALUE
+
+    def in_words(self, words: Wording) -> str:
+        """Return what the sender says."""
+        left = counted(sum(byte.bit_count() for byte in self.allowed), "value")
+        return (
+            f"my assignment number {self.counter} stands from now on; it leaves {words.receiver} {left} of its domain"
+        )
+
+
+class Nogood(Message, frozen=True):
+    """A nogood over counters: the receiver's assignment `counter` is ruled out while all in `lhs` hold (`ngd`)."""
+
+    lhs: dict[str, int]
+    counter: int
+
+    act = acts.RULE_OUT
+    backtracks = True
+
+    def in_words(self, words: Wording) -> str:
+        """Return what the sender says."""
+        named = [f"{robot} keeps its assignment number {counter}" for robot, counter in self.lhs.items()]
+        condition = f"as long as {listed(named)}, " if named else ""
+        rest = "" if named else ", whatever the others do"
+        return f"{condition}{words.receiver} cannot keep its assignment number {self.counter}{rest}"
+
+
+class AddLink(Message, frozen=True):
+    """A request of a lower-priority robot to be sent the receiver's assignments from now on (`adl`)."""
+
+    act = acts.ADD_LINK
+
+    def in_words(self, _: Wording) -> str:
+        """Return what the sender says."""
+        return "tell me of each new assignment of yours from now on"
