@@ -82,8 +82,8 @@ _SECTIONS: Sections = {
     type=ORDER_NAME,
     metavar="NAME|FILE",
     help=(
-        f"Priority order of the robots: {', '.join(ORDERS)}, or a file with one robot's name a line."
-        "  [default: given; with --protocol auto what suits it]"
+        f"Priority order of the robots: {', '.join(ORDERS)}, or a file with a name a line."
+        "  [default: given; auto chooses]"
     ),
 )
 @click.option(
