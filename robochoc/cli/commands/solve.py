@@ -309,16 +309,19 @@ def _recorded(folder: Path, options: Options, products: Products, wanted: Wanted
 
 def _run(team: Team, options: Options, recorder: JournalRecorder | None, loop: ClosedLoop | None) -> Outcome:
     """Run with the requested observers: the page, a journal, the progress line, and the ROS sinks."""
+    from robochoc.cli.reports.choice import OrderNote
     from robochoc.cli.reports.progress import progress_line, waiting
     from robochoc.run.options import CENTRAL
     from robochoc.run.orchestrator import solve as run
 
     told = loop and (loop.feedback or (team.dynamic and options.protocol != CENTRAL))
+    note = OrderNote(team, options)
     with progress_line(team.name) as progress:
-        show = shown_and_flushed(recorder, progress)
+        show = shown_and_flushed(recorder, note.watching(progress))
         if loop and loop.feedback and show:
             loop.feedback.idle = waiting(show)
         outcome = run(team, options, observer=recorder, progress=show, environment=loop if told else None)
+    note.tell_if_late(outcome.metrics.wall_s)
     if recorder:
         recorder.outcome = outcome
         recorder.close()  # before anything else goes to where it may be written
