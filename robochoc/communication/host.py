@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
+from functools import cache
 from typing import Self, cast
 
 import msgspec
@@ -18,7 +19,7 @@ from robochoc.model.message import Envelope, Message, encode
 from robochoc.model.outcome import Metrics, Verdict
 from robochoc.protocols.chance import Chance
 from robochoc.protocols.order import PriorityOrder
-from robochoc.protocols.protocol import DynamicProtocol, Protocol, Said
+from robochoc.protocols.protocol import DynamicProtocol, Protocol
 from robochoc.protocols.settings import settings_of
 from robochoc.solver.agent_problem import DEFAULT_PARAMETERS, AgentProblem, RunParameters
 from robochoc.solver.compiled import LocalProblem
@@ -52,7 +53,7 @@ class Host:
         self._stamps: list[int] = []
         self._answers = self._step_began = 0
         self._begun = False
-        self._decoder = msgspec.msgpack.Decoder(protocol.messages)
+        self._decode: Callable[[bytes], Message] = message_decoder(protocol.messages).decode
         self._checks = 0
         self._reported: tuple[int | None, Verdict | None] = (None, None)
         self._heard: float = math.inf
@@ -81,9 +82,11 @@ class Host:
         """
         protocol = self.protocol
         if self._begun and isinstance(protocol, DynamicProtocol):
-            return self._step(lambda: protocol.resume(lossless=lossless))
-        self._begun = True
-        return self._step(protocol.start)
+            protocol.resume(lossless=lossless)
+        else:
+            self._begun = True
+            protocol.start()
+        return self._said()
 
     def change(self, part: AgentProblem, invalidated: Invalidated) -> None:
         """Enter a new epoch: the problem has changed to `part`, and counting begins again.
@@ -118,7 +121,7 @@ class Host:
         What the robot says at once does not carry the clocks of those that follow.
         """
         try:
-            message: Message = self._decoder.decode(envelope.content)
+            message = self._decode(envelope.content)
         except (msgspec.MsgspecError, RecursionError, UnicodeDecodeError) as error:
             raise BadMessageError(f"{envelope.sender} sent {self.name} an invalid message: {error}") from error
         self.clock = max(self.clock, envelope.clock)
@@ -145,7 +148,8 @@ class Host:
 
     def settle(self) -> list[Envelope]:
         """Let the protocol settle after a whole packet, and return its messages."""
-        return self._step(self.protocol.settle)
+        self.protocol.settle()
+        return self._said()
 
     def metrics(self) -> Metrics:
         """Return what this robot has sent and checked so far; `ncccs` is its own clock."""
@@ -158,58 +162,64 @@ class Host:
             protocol.settings = settings_of(type(protocol), parameters.settings)
         protocol.chance = Chance(parameters.seed, self.name)
 
-    def _step(self, act: Callable[[], None]) -> list[Envelope]:
-        """Let the protocol act, count its checks, and wrap what it has said."""
-        act()
+    def _said(self) -> list[Envelope]:
+        """Count the checks of a step that has ended, and wrap what the protocol has said in it."""
         self._tick()
-        self.said_at = [said.checks for said in self._outbox]
-        said = [self._wrap(said, clock) for said, clock in zip(self._outbox, self._stamps, strict=True)]
-        self._forget_said()
+        protocol = self.protocol
+        self.said_at = protocol.said_at
+        envelopes = self._envelopes() if self.said_at else []
         self._step_began = self._checks
         if self._observer:
             self._report_state(self._observer)
             self._observer(Settled(t=self._now(), robot=self.name, clock=self.clock, checks=self._checks))
-        return said
+        return envelopes
 
-    def _wrap(self, said: Said, clock: int) -> Envelope:
-        receiver, message = said
-        content = encode(message)
-        kind = type(message).__name__
-        self.sent[kind] = self.sent.get(kind, 0) + 1
-        self.bytes += len(content)
-        self.largest = max(self.largest, len(content))
-        if self._observer:
-            self._observer(
-                Sent(
-                    t=self._time(said.checks),
-                    sender=self.name,
-                    receiver=receiver,
-                    type=kind,
-                    content=msgspec.structs.asdict(message),
-                    bytes=len(content),
-                    clock=clock,
-                )
-            )
-        return Envelope(self.name, receiver, content, clock)
+    def _envelopes(self) -> list[Envelope]:
+        """Encode and count all messages in the outbox; one that goes to several robots in turn is encoded once."""
+        found = []
+        last: Message | None = None
+        content, kind = b"", ""
+        for (receiver, message), clock, checks in zip(self.protocol.outbox, self._stamps, self.said_at, strict=True):
+            if message is not last:
+                last, content, kind = message, encode(message), type(message).__name__
+                self.largest = max(self.largest, len(content))
+            self.sent[kind] = self.sent.get(kind, 0) + 1
+            self.bytes += len(content)
+            envelope = Envelope(self.name, receiver, content, clock)
+            if self._observer:
+                self._observer(self._sent(envelope, message, checks))
+            found.append(envelope)
+        self._forget_said()
+        return found
+
+    def _sent(self, envelope: Envelope, message: Message, checks: int) -> Sent:
+        return Sent(
+            t=self._time(checks),
+            sender=self.name,
+            receiver=envelope.receiver,
+            type=type(message).__name__,
+            content=msgspec.structs.asdict(message),
+            bytes=len(envelope.content),
+            clock=envelope.clock,
+        )
 
     def _tick(self) -> None:
         """Advance the clock by one for each new check, and stamp the messages of this time with it."""
+        protocol = self.protocol
         before = self.clock - self._checks
         self._answers = len(self._stamps)
-        self._stamps += [before + said.checks for said in self._outbox[self._answers :]]
-        self._checks = self.protocol.problem.checks
+        if len(protocol.said_at) > self._answers:
+            self._stamps += [before + checks for checks in protocol.said_at[self._answers :]]
+        self._checks = protocol.problem.checks
         self.clock = before + self._checks
 
     def _time(self, checks: int) -> float:
         """Return the time at which this number of checks was done."""
         return self._now() if self._then is None else self._then(checks)
 
-    @property
-    def _outbox(self) -> list[Said]:
-        return cast("list[Said]", self.protocol.outbox)
-
     def _forget_said(self) -> None:
         self.protocol.outbox.clear()
+        self.protocol.said_at = []
         self._stamps.clear()
 
     def _report_state(self, observer: Observer) -> None:
@@ -226,6 +236,12 @@ class Host:
             observer(Decided(t=self._now(), robot=self.name, assignment=assignment, clock=self.clock))
         if state[1] is not None and state[1] is not verdict:
             observer(Concluded(t=self._now(), robot=self.name, verdict=str(state[1])))
+
+
+@cache
+def message_decoder(messages: object) -> msgspec.msgpack.Decoder[Message]:
+    """Return the decoder of a protocol's `messages`. It is made once: that takes longer than to decode a few."""
+    return msgspec.msgpack.Decoder(cast("type[Message]", messages))
 
 
 def _order_of(part: AgentProblem) -> PriorityOrder:

@@ -23,16 +23,6 @@ from robochoc.solver.compiled import LocalProblem
 from robochoc.solver.explanation import Invalidated
 
 
-class Said(tuple[str, Message]):  # noqa: SLOT001 - no subclass of tuple can have slots with anything in them
-    """An entry of the outbox: the receiver and the message.
-
-    `checks` is the number of constraint checks that the sender had done when it sent the message. The host computes the
-    message's clock from it: the sender's clock at sending (Meisels et al. 2002), not at the end of its step.
-    """
-
-    checks: int = 0
-
-
 class Protocol(Inspectable, ABC):
     """One robot's side of a protocol.
 
@@ -51,7 +41,10 @@ class Protocol(Inspectable, ABC):
         self.problem = problem
         self.order = order
         self.outbox: list[tuple[str, Message]] = []
-        """Receivers and messages, each pair as a `Said`."""
+        """Receivers and messages."""
+        self.said_at: list[int] = []
+        """Of each message in the outbox: `problem.checks` when the robot sent it. The host computes the message's clock
+        from it: the sender's clock at sending (Meisels et al. 2002), not at the end of its step."""
         self.value: int | None = None
         """The own value, as its place in the compiled domain; None: unassigned."""
         self.verdict: Verdict | None = None
@@ -70,9 +63,8 @@ class Protocol(Inspectable, ABC):
 
     def send(self, receiver: str, message: Message) -> None:
         """Send `message` to `receiver`; its clock does not include later checks."""
-        said = Said((receiver, message))
-        said.checks = self.problem.checks
-        self.outbox.append(said)
+        self.outbox.append((receiver, message))
+        self.said_at.append(self.problem.checks)
 
     def conclude(self, verdict: Verdict) -> None:
         """End the search of the whole team with `verdict`.

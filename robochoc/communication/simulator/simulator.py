@@ -9,11 +9,11 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from functools import partial
 
 from robochoc.communication.host import Host
+from robochoc.communication.resources import garbage_frozen
 from robochoc.communication.run_result import Progress, RunResult
-from robochoc.communication.session import Epoch, Session
+from robochoc.communication.session import Epoch, Session, over
 from robochoc.communication.simulator.schedule import Schedule
 from robochoc.journal.events import Observer
 from robochoc.model.message import Envelope
@@ -22,6 +22,8 @@ from robochoc.model.problem import Team
 from robochoc.protocols.protocol import Protocol
 from robochoc.solver.agent_problem import DEFAULT_PARAMETERS, AgentProblem, RunParameters
 from robochoc.solver.compiled_team import CompiledTeam
+from robochoc.solver.team_compiler import OutOfTimeError
+from robochoc.system.garbage import collection_paused
 
 PROGRESS_EVERY = 256
 """Packets between two reports of progress."""
@@ -54,6 +56,10 @@ class Simulation(Session):
         progress: Receives the count of messages now and then.
         parameters: What robots are given besides the problem.
         limits: On what the searches take. They are looked at after each packet.
+        deadline: When the time of the run is over, on the monotonic clock.
+
+    Raises:
+        OutOfTimeError: when the deadline comes before all robots are set up; `change` as well.
     """
 
     def __init__(
@@ -66,6 +72,7 @@ class Simulation(Session):
         progress: Callable[[Progress], None] | None = None,
         parameters: RunParameters = DEFAULT_PARAMETERS,
         limits: EffortLimits = NO_LIMITS,
+        deadline: float | None = None,
     ) -> None:
         super().__init__(team)
         self._protocol = protocol
@@ -73,12 +80,14 @@ class Simulation(Session):
         self._observer = observer
         self._progress = progress
         self._limits = limits
+        self._deadline = deadline
         self._lossless = True
-        self._checks = self._ncccs = 0
+        self._checks = self._ncccs = self._sent = 0
         self._verdict: Verdict | None = None
         self._witness: str | None = None
-        parts = Epoch(self.compiled, parameters=parameters).parts(protocol)
-        self._hosts = {name: self._host(part) for name, part in parts.items()}
+        with collection_paused():
+            parts = Epoch(self.compiled, parameters=parameters).parts(protocol)
+            self._hosts = {name: self._host(part) for name, part in parts.items()}
 
     @property
     def lossless(self) -> bool:
@@ -89,7 +98,8 @@ class Simulation(Session):
         """See `Session.search`; a limit on messages is looked at after each packet."""
         began = time.monotonic()
         if self._verdict is None:
-            self._play(began, timeout, messages)
+            with garbage_frozen():  # robots' problems are none, and they are most of what there is
+                self._play(began, timeout, messages)
         simulated_s, cycles = self._schedule.elapsed_s, self._schedule.cycles
         self._schedule.clear()
         result = RunResult.of(
@@ -108,11 +118,12 @@ class Simulation(Session):
         """See `Session.change`."""
         self.compiled = epoch.compiled
         self._verdict = self._witness = None
-        self._ncccs = 0
+        self._ncccs = self._sent = 0
         before = self._hosts
         self._hosts = {}
         for name, part in epoch.parts(self._protocol).items():
             if name in before and name not in epoch.restarted:
+                self._check_time(name)
                 self._hosts[name] = before[name]
                 before[name].change(part, epoch.invalidated)
                 self._note_verdict(before[name])
@@ -122,7 +133,13 @@ class Simulation(Session):
     def close(self) -> None:
         """Do nothing: there is nothing to release."""
 
+    def _check_time(self, name: str) -> None:
+        """Raise `OutOfTimeError` if the time was over before the robot `name` could be set up."""
+        if over(self._deadline):
+            raise OutOfTimeError(f"the time (--timeout) was over before {name} knew its problem")
+
     def _host(self, part: AgentProblem) -> Host:
+        self._check_time(part.robot.name)
         host = Host.of(self._protocol, part)
         if self._observer:
             host.observe(self._observer, lambda: self._time(host.checks), self._time)
@@ -132,36 +149,39 @@ class Simulation(Session):
         """Every robot starts before any message arrives; then packet by packet."""
         lossless, self._lossless = self._lossless, False
         for host in self._hosts.values():
-            self._step(host, partial(host.start, lossless=lossless))
+            self._checks = host.checks
+            self._send(host, host.start(lossless=lossless))
         packets = 0
         while self._verdict is None:
             elapsed_s = time.monotonic() - began
             if timeout is not None and elapsed_s > timeout:
                 return
-            if messages is not None and self._sent() >= messages:
+            if messages is not None and self._sent >= messages:
                 return
             if self._limits.ncccs is not None and self._ncccs >= self._limits.ncccs:
                 return
             if self._limits.cycles is not None and self._schedule.next_cycle > self._limits.cycles:
                 return
             if self._progress and packets % PROGRESS_EVERY == 0:
-                self._progress(Progress(self._sent(), elapsed_s))
+                self._progress(Progress(self._sent, elapsed_s))
             packet = self._schedule.get()
             if not packet:
                 self._verdict, self._lossless = Verdict.SOLUTION, True
                 return
             host = self._hosts[packet[0].receiver]
-            self._step(host, partial(host.handle, packet))
+            self._checks = host.checks
+            self._send(host, host.handle(packet))
             packets += 1
 
-    def _step(self, host: Host, act: Callable[[], Sequence[Envelope]]) -> None:
-        """Let `host` act, and send what it says on its way."""
-        self._checks = host.checks
-        envelopes = act()
+    def _send(self, host: Host, envelopes: Sequence[Envelope]) -> None:
+        """Send what `host` has said in its step on its way."""
+        schedule, before = self._schedule, self._checks
+        self._sent += len(envelopes)
         for envelope, checks in zip(envelopes, host.said_at, strict=True):
-            self._schedule.put(envelope, checks - self._checks)
-        self._schedule.done(host.name, host.clock, host.checks - self._checks)
-        self._ncccs = max(self._ncccs, host.clock)
+            schedule.put(envelope, checks - before)
+        clock = host.clock
+        schedule.done(host.name, clock, host.checks - before)
+        self._ncccs = max(self._ncccs, clock)
         self._note_verdict(host)
 
     def _time(self, checks: int) -> float:
@@ -169,11 +189,9 @@ class Simulation(Session):
         return self._schedule.time(checks - self._checks)
 
     def _note_verdict(self, host: Host) -> None:
-        if host.protocol.verdict is not None:
-            self._verdict, self._witness = host.protocol.verdict, host.name
-
-    def _sent(self) -> int:
-        return sum(sum(host.sent.values()) for host in self._hosts.values())
+        verdict = host.protocol.verdict
+        if verdict is not None:
+            self._verdict, self._witness = verdict, host.name
 
 
 def _left(limits: EffortLimits, spent: Metrics) -> EffortLimits:
