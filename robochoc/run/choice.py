@@ -34,6 +34,8 @@ NARROW_CELLS = 65_536
 """No table on a narrow pseudo-tree has more entries."""
 FEW_ROBOTS = 12
 """Up to so many, `sfb` needs fewer messages than `dpop` even on trees (docs/explanation/sfb.md)."""
+MOST_IN_A_TREE = 20_000
+"""With more, a token that names all robots on its way is too long."""
 MANY_ROBOTS = 300
 """With more, what SFB's messages tell of each robot adds up, and local search is all that ends with costs."""
 SPARSE = 8
@@ -79,7 +81,7 @@ RULES = (
     ),
     Rule(
         "dpop",
-        lambda f: f.has_costs and f.robots > FEW_ROBOTS and f.tree.cells <= NARROW_CELLS,
+        lambda f: f.has_costs and FEW_ROBOTS < f.robots <= MOST_IN_A_TREE and f.tree.cells <= NARROW_CELLS,
         "the constraint graph is nearly a tree: tables are small, and messages few",
         f"there are no costs, or {FEW_ROBOTS} robots at most, or tables of more than {NARROW_CELLS:,} entries",
     ),
