@@ -68,8 +68,7 @@ REAL = {
         "Ok",
     ): "Robot1.1 says: my assignment number 2 stands from now on; it leaves Robot1.2 0 values of its domain",
     ("disfc", "Nogood"): (
-        "Robot3.3 says: as long as Robot2.3 keeps its assignment number 1,"
-        " Robot3.2 cannot keep its assignment number 3"
+        "Robot3.3 says: as long as Robot2.3 keeps its assignment number 1, Robot3.2 cannot keep its assignment number 3"
     ),
     ("disfc", "AddLink"): "Robot3.1 says: tell me of each new assignment of yours from now on",
     ("afc", "CPA"): "Robot1.2 says: so far V1.1 = 3 and V1.2 = 1; it is Robot1.3's turn",
