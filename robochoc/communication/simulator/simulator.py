@@ -73,7 +73,7 @@ class Simulation(Session):
         self._progress = progress
         self._limits = limits
         self._lossless = True
-        self._checks = self._ncccs = 0
+        self._checks = self._ncccs = self._sent = 0
         self._verdict: Verdict | None = None
         self._witness: str | None = None
         parts = Epoch(self.compiled, parameters=parameters).parts(protocol)
@@ -107,7 +107,7 @@ class Simulation(Session):
         """See `Session.change`."""
         self.compiled = epoch.compiled
         self._verdict = self._witness = None
-        self._ncccs = 0
+        self._ncccs = self._sent = 0
         before = self._hosts
         self._hosts = {}
         for name, part in epoch.parts(self._protocol).items():
@@ -138,14 +138,14 @@ class Simulation(Session):
             elapsed_s = time.monotonic() - began
             if timeout is not None and elapsed_s > timeout:
                 return
-            if messages is not None and self._sent() >= messages:
+            if messages is not None and self._sent >= messages:
                 return
             if self._limits.ncccs is not None and self._ncccs >= self._limits.ncccs:
                 return
             if self._limits.cycles is not None and self._schedule.next_cycle > self._limits.cycles:
                 return
             if self._progress and packets % PROGRESS_EVERY == 0:
-                self._progress(Progress(self._sent(), elapsed_s))
+                self._progress(Progress(self._sent, elapsed_s))
             packet = self._schedule.get()
             if not packet:
                 self._verdict, self._lossless = Verdict.SOLUTION, True
@@ -160,9 +160,9 @@ class Simulation(Session):
         schedule, before = self._schedule, self._checks
         for envelope, checks in zip(envelopes, host.said_at, strict=True):
             schedule.put(envelope, checks - before)
-        clock = host.clock
-        schedule.done(host.name, clock, host.checks - before)
-        self._ncccs = max(self._ncccs, clock)
+        schedule.done(host.name, host.clock, host.checks - before)
+        self._sent += len(envelopes)
+        self._ncccs = max(self._ncccs, host.clock)
         self._note_verdict(host)
 
     def _time(self, checks: int) -> float:
@@ -173,9 +173,6 @@ class Simulation(Session):
         verdict = host.protocol.verdict
         if verdict is not None:
             self._verdict, self._witness = verdict, host.name
-
-    def _sent(self) -> int:
-        return sum(sum(host.sent.values()) for host in self._hosts.values())
 
 
 def _left(limits: EffortLimits, spent: Metrics) -> EffortLimits:
