@@ -20,11 +20,12 @@ CENTRAL = "central"
 
 
 class Runtime(StrEnum):
-    """The runtime: each robot in its own OS process, all in one thread, or each in a process on a network."""
+    """The runtime: a process for each robot, here or on a network; all robots in one thread; or all in arrays."""
 
     PROCESSES = "processes"
     SIMULATOR = "simulator"
     NETWORK = "network"
+    ARRAYS = "arrays"
 
 
 class ScheduleName(StrEnum):

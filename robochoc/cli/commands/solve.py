@@ -87,11 +87,11 @@ _SECTIONS: Sections = {
 )
 @click.option(
     "--runtime",
-    type=click.Choice(["processes", "simulator", "network"], case_sensitive=False),
+    type=click.Choice(["processes", "simulator", "network", "arrays"], case_sensitive=False),
     default="processes",
     show_default=True,
     metavar="NAME",
-    help="processes: one OS process per robot; simulator: one thread, repeatable; network: processes, TLS, a master.",
+    help="processes: one per robot; simulator: one thread, repeatable; network: with TLS; arrays: numpy, no messages.",
 )
 @click.option(
     "--seed",
