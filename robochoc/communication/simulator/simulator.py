@@ -180,7 +180,6 @@ class Simulation(Session):
         for envelope, checks in zip(envelopes, host.said_at, strict=True):
             schedule.put(envelope, checks - before)
         schedule.done(host.name, host.clock, host.checks - before)
-        self._sent += len(envelopes)
         self._ncccs = max(self._ncccs, host.clock)
         self._note_verdict(host)
 
