@@ -290,9 +290,25 @@ class LocalProblem:
             if constraint.agents[-1:] != (lowest,) or not domains.keys() >= set(constraint.agents):
                 continue
             combinations = [*constraint.combinations(domains, len(self.values))]
-            self.checks += len({others for _, others in combinations}) * len(self.values)
+            self.checks += constraint.evaluate(others for _, others in combinations) * len(self.values)
             found.append((constraint.agents, {place: constraint.mask(others) for place, others in combinations}))
         return found
+
+    def look_ahead(self) -> None:
+        """Evaluate what `allowed` will be asked for, before other robots have told their values.
+
+        That is, the constraints in which one robot is lower than this one, for all values that files declare. Robots
+        do it at the same time. Where values are too many, nothing is done.
+        """
+        own = self._rank[self.agent]
+        declared = self._part.known.domains
+        for constraint in self._constraints:
+            if not constraint.agents or self._rank[constraint.agents[-1]] < own:
+                continue
+            if any(self._rank[agent] > own for agent in constraint.agents[:-1]):
+                continue
+            combinations = constraint.declared(declared, MAX_BOUNDED_ROWS // max(1, len(self.values)))
+            self.checks += constraint.evaluate(combinations) * len(self.values)
 
     def interchangeable(self, value: Value) -> Sequence[int]:
         """Return the places of all own values that agree with `value` wherever that is not None.

@@ -169,6 +169,18 @@ class SharedConstraint:
             self._masks[others] = mask
         return mask
 
+    def declared(self, domains: Mapping[str, Iterable[int]], most: int) -> Iterable[OtherValues]:
+        """Return all that the constraint may see of the others, by their declared `domains`; nothing if over `most`."""
+        columns = [list(domains[name]) for name in self._names]
+        return itertools.product(*columns) if math.prod(map(len, columns)) <= most else ()
+
+    def evaluate(self, combinations: Iterable[OtherValues]) -> int:
+        """Evaluate `combinations`, and return how many there are that were not known before."""
+        before = len(self._masks)
+        for others in combinations:
+            self.mask(others)
+        return len(self._masks) - before
+
     def look(self, view: Mapping[str, Value]) -> int:
         """Return the own values that go with `view`: bit i for the i-th. `UNKNOWN` where `other_values` is None."""
         if self._only is None:
