@@ -44,7 +44,7 @@ COLOURING = Family(
     "3-colouring",
     f"{AGENTS} agents, {EDGES} edges, a solution hidden in each: `colouring.py`",
     colouring,
-    range(5),
+    range(3),
     20,
 )
 LOOSE = Family(
@@ -72,7 +72,7 @@ LOCAL = Family(
     "local search",
     "`robochoc generate coloring --agents 1000 --degree 4`: soft 3-colouring, 200 cycles",
     lambda seed: coloring(1000, 3, 4, seed),
-    range(2),
+    range(1),
     90,
     decided=False,
 )

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import tempfile
 from collections import defaultdict
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from statistics import median
@@ -19,6 +19,8 @@ READING = Path(__file__).with_name("peers.md")
 HEAD = ("library", "algorithm", "how", "answers", "messages", "CPU s", "wall s", "peak MB")
 BEST = ("problems", "library", "algorithm", "how", "CPU s", "wall s")
 CENTRAL_S = 120
+CUT_OFFS = 2
+"""After so many runs over the limit a contestant has no other problem of the family to solve."""
 REFUSED = 2
 """The exit status of our commands, where they are asked for what this version has not."""
 NOT_YET = "not in this version"
@@ -45,7 +47,11 @@ def measured() -> Section:
 
 def _described(family: Family) -> str:
     seeds = list(family.seeds)
-    return f"- *{family.name}*: {family.text}; seeds {seeds[0]}..{seeds[-1]}, limit {family.limit_s:g} s."
+    return f"- *{family.name}*: {family.text}; {_numbers(seeds)}, limit {family.limit_s:g} s."
+
+
+def _numbers(seeds: Sequence[int]) -> str:
+    return f"seeds {seeds[0]}..{seeds[-1]}" if len(seeds) > 1 else f"seed {seeds[0]}"
 
 
 def _results(family: Family) -> dict[Contestant, list[tuple[Result, str]]]:
@@ -59,9 +65,14 @@ def _results(family: Family) -> dict[Contestant, list[tuple[Result, str]]]:
             truth = right(watched(central(folder), CENTRAL_S)) if family.decided else ""
             order = list(found) if turn % 2 == 0 else list(reversed(found))
             for one in order:
-                if not one.missing:
+                if not one.missing and not gives_up([result for result, _ in found[one]]):
                     found[one].append((solved(one, folder, seed, family.limit_s), truth))
     return found
+
+
+def gives_up(results: Sequence[Result]) -> bool:
+    """Whether somebody was cut off so often that the other problems of the family are spared."""
+    return sum(result.answer is None for result in results) >= CUT_OFFS
 
 
 def solved(one: Contestant, folder: Path, seed: int, limit_s: float) -> Result:
@@ -127,7 +138,11 @@ def _answers(family: Family, results: list[tuple[Result, str]], good: list[Resul
         if result not in good:
             what = f"over {family.limit_s:g} s" if result.answer is None else _differs(result.answer.found, truth)
             others[what].append(str(result.seed))
-    return "; ".join([*words, *(f"{what}: seed {', '.join(seeds)}" for what, seeds in others.items())])
+    unsolved = [str(seed) for seed in family.seeds if seed not in {result.seed for result, _ in results}]
+    told = [f"{what}: seed {', '.join(seeds)}" for what, seeds in others.items()]
+    if gives_up([result for result, _ in results]) and unsolved:
+        told.append(f"not run: seed {', '.join(unsolved)}")
+    return "; ".join([*words, *told])
 
 
 def _differs(found: str, truth: str) -> str:

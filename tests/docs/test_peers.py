@@ -100,6 +100,14 @@ def test_answers_are_held_against_the_right_one(load: Any) -> None:  # noqa: ANN
     assert row(load, "TIGHT", ("not in this version", "solution"))[3:] == ("not in this version", *["-"] * 4)
 
 
+def test_who_is_cut_off_twice_is_spared_the_others(load: Any) -> None:  # noqa: ANN401
+    late = (None, "solution")
+    assert row(load, "TIGHT", ("solution", "solution"), late, late)[3] == (
+        "1 of 3 right; over 20 s: seed 1, 2; not run: seed 3, 4"
+    )
+    assert row(load, "TIGHT", late, ("solution", "solution"))[3] == "1 of 2 right; over 20 s: seed 0"
+
+
 def test_local_search_is_told_by_its_costs(load: Any) -> None:  # noqa: ANN401
     assert row(load, "LOCAL", ("110", ""), ("120", ""), (None, ""))[3] == "cost 115 (110..120); over 90 s: seed 2"
 
