@@ -74,7 +74,7 @@ class ArrayProblem:
     Example:
         >>> import numpy as np
         >>> from robochoc.modelling.array_problem import ArrayProblem
-        >>> ring = ArrayProblem(4, 2, [(0, 1), (1, 2), (2, 3), (3, 0)], np.eye(2))
+        >>> ring = ArrayProblem(4, 3, [(0, 1), (1, 2), (2, 3), (3, 0)], np.eye(3))
         >>> ring.solve("dsa", cycles=20).cost
         0
     """

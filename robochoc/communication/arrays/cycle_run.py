@@ -8,12 +8,12 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Iterator
 from functools import cached_property
-from typing import NamedTuple
+from typing import NamedTuple, TypeVar, cast
 
 import numpy as np
 
 from robochoc.communication.arrays.chance import Draws
-from robochoc.communication.arrays.kinds import Flags, Integers
+from robochoc.communication.arrays.kinds import Flags, Floats, Integers
 from robochoc.communication.arrays.layout import Group, Layout
 from robochoc.communication.arrays.tally import Tally
 from robochoc.model.outcome import Metrics, Verdict
@@ -21,6 +21,7 @@ from robochoc.model.problem import INFINITE
 from robochoc.protocols.cycles_messages import Value
 from robochoc.protocols.cycles_settings import CycleSettings
 
+Costs = TypeVar("Costs", Integers, Floats)
 FEW = 8
 """Up to so many values a loop over them is faster than numpy's along the short axis."""
 
@@ -247,11 +248,10 @@ def _fixed(group: Group) -> Integers:
     return np.zeros((group.active, group.size), kind)
 
 
-def least(costs: Integers) -> Integers:
+def least(costs: Costs) -> Costs:
     """Return the least of each row."""
     if costs.shape[1] > FEW:
-        found: Integers = costs.min(axis=1)
-        return found
+        return cast("Costs", costs.min(axis=1))
     found = costs[:, 0].copy()
     for place in range(1, costs.shape[1]):
         np.minimum(found, costs[:, place], out=found)

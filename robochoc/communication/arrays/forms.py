@@ -6,13 +6,19 @@ from types import MappingProxyType
 
 from robochoc.communication.arrays.cycle_run import CycleRun
 from robochoc.communication.arrays.dsa import ArrayDSA
+from robochoc.communication.arrays.maxsum import ArrayMaxSum
 from robochoc.communication.arrays.mgm import ArrayMGM
+from robochoc.communication.arrays.mgm2 import ArrayMGM2
 from robochoc.protocols.dsa import DSA
+from robochoc.protocols.maxsum import MaxSum
 from robochoc.protocols.mgm import MGM
+from robochoc.protocols.mgm2 import MGM2
 from robochoc.protocols.protocol import Protocol
 from robochoc.solver.encoding import UnsupportedError
 
-_FORMS: MappingProxyType[type[Protocol], type[CycleRun]] = MappingProxyType({DSA: ArrayDSA, MGM: ArrayMGM})
+_FORMS: MappingProxyType[type[Protocol], type[CycleRun]] = MappingProxyType(
+    {DSA: ArrayDSA, MGM: ArrayMGM, MGM2: ArrayMGM2, MaxSum: ArrayMaxSum}
+)
 
 
 def form_of(protocol: type[Protocol]) -> type[CycleRun]:

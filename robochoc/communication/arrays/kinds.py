@@ -9,7 +9,7 @@ Integers = NDArray[np.integer]
 """Integers of any width."""
 Floats = NDArray[np.float64]
 Flags = NDArray[np.bool_]
-Places = NDArray[np.intp] | NDArray[np.int32] | NDArray[np.int64]
+Places = NDArray[np.intp] | NDArray[np.int32] | NDArray[np.int64] | Integers
 """Places in other arrays."""
 Index = slice | Places
 """A choice of rows."""

@@ -186,6 +186,18 @@ class Layout:
             for group, lists, neighbours, _ in self.links
         ]
 
+    def link(self, robots: Integers, neighbours: Integers) -> Integers:
+        """Return the places in `neighbours` of links from `robots` to those of their `neighbours`."""
+        keys, order = self._links_sorted
+        found: Integers = order[np.searchsorted(keys, robots.astype(np.int64) * self.many + neighbours)]
+        return found
+
+    @cached_property
+    def _links_sorted(self) -> tuple[Integers, Integers]:
+        keys = segments(self.degrees) * self.many + self.neighbours
+        order = np.argsort(keys, kind="stable")
+        return keys[order], order
+
     def _start(self, group: Group) -> int:
         return int(self.starts[group.first]) if group.many else 0
 

@@ -25,7 +25,7 @@ from tests.support.cost_problems import random_complex_cost_team, random_cost_te
 from tests.support.examples import count, examples
 from tests.support.problems import team_of
 
-PROTOCOLS = ("dsa", "mgm")
+PROTOCOLS = ("dsa", "mgm", "mgm2", "maxsum")
 MAKERS: tuple[Callable[[Random], Team], ...] = (
     random_cost_team,
     random_hard_team,
