@@ -1,4 +1,6 @@
-"""How time and memory grow with the number of robots: python benchmarks/scale.py [--sizes 1000,3000,10000] [--only ...]
+"""How time and memory grow with the number of robots.
+
+    python benchmarks/scale.py [--sizes 1000,3000,10000] [--only dsa]
 
 Each run is a process of its own: `robochoc` as a user runs it. CPU seconds (user and system, with children) and the
 peak of memory of the process, a row for each graph and stage, a column for each size. Nothing is kept.
@@ -54,7 +56,7 @@ def measured(words: Sequence[str]) -> tuple[float, float] | None:
     with subprocess.Popen(command, cwd=ROOT, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL) as process:
         _, status, usage = os.wait4(process.pid, 0)
         process.returncode = os.waitstatus_to_exitcode(status)
-    if process.returncode == 124:  # noqa: PLR2004 - what `timeout` says
+    if process.returncode == 124:
         return None
     if process.returncode:
         raise SystemExit(f"{' '.join(words)} ended with status {process.returncode}")
