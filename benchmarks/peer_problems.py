@@ -98,7 +98,7 @@ def write_problem(team: Team, folder: Path) -> None:
 
 
 def in_tables(team: Team) -> Team:
-    """The same problem, its hard predicates as relations: FRODO's own parser passes over predicates in silence."""
+    """The same problem, its hard predicates as relations: FRODO's first parser reads no predicates."""
     domains = {name: variable.domain for name, variable in team.variables.items()}
     robots = [
         replace(
