@@ -18,7 +18,7 @@ from functools import cached_property
 from typing import TYPE_CHECKING
 
 from robochoc.model.message import Value
-from robochoc.model.problem import INFINITE, ConstraintModel
+from robochoc.model.problem import INFINITE, ConstraintModel, ProblemKind
 from robochoc.solver.agent_problem import AgentProblem
 from robochoc.solver.explanation import KeyedConstraint, held_above, held_below
 from robochoc.solver.filters import Filters
@@ -114,13 +114,22 @@ class LocalProblem:
         broken = self._broken(index, view, since)
         return None if broken is None else broken.conflict_with(view)
 
-    def conflicts_of(self, indices: Sequence[int], view: Mapping[str, Value], since: int = -1) -> dict[int, Conflict]:
-        """Return what `conflict` returns for each of `indices` that is against `view`, with as many checks."""
+    def conflicts_of(
+        self, indices: Sequence[int], view: Mapping[str, Value], since: int = -1
+    ) -> list[tuple[Conflict, list[int]]]:
+        """Return what `conflict` returns for those of `indices` that are against `view`, with as many checks.
+
+        Values with the same conflict come together.
+        """
         if self._table is not None:
-            found = ((index, self.conflict(index, view, since)) for index in indices)
-            return {index: conflict for index, conflict in found if conflict is not None}
+            found: dict[int, tuple[Conflict, list[int]]] = {}
+            for index in indices:
+                conflict = self.conflict(index, view, since)
+                if conflict is not None:
+                    found.setdefault(id(conflict), (conflict, []))[1].append(index)
+            return list(found.values())
         left = sum([1 << index for index in indices])
-        conflicts: dict[int, Conflict] = {}
+        conflicts: list[tuple[Conflict, list[int]]] = []
         for constraint in self._since(since):
             mask = constraint.look(view)
             if mask == UNKNOWN:
@@ -128,11 +137,8 @@ class LocalProblem:
             self.checks += left.bit_count()
             broken = left & ~mask
             if broken:
+                conflicts.append((constraint.conflict_with(view), [i for i in indices if broken >> i & 1]))
                 left &= mask
-                conflict = constraint.conflict_with(view)
-                while broken:
-                    conflicts[broken.bit_length() - 1] = conflict
-                    broken ^= 1 << (broken.bit_length() - 1)
                 if not left:
                     break
         return conflicts
@@ -187,7 +193,8 @@ class LocalProblem:
 
     def costs(self, view: Mapping[str, Value]) -> list[float]:
         """Return the `cost` of every own value: as many checks for each constraint as there are values."""
-        known = [constraint.costs(others) for constraint, others in self._known(view, len(self.values))]
+        known = self._paid(view)
+        self.checks += len(known) * len(self.values)
         return [sum(prices) for prices in zip(self.charges, *known, strict=True)]
 
     def lexicographic_costs(self, view: Mapping[str, Value]) -> list[LexicographicCost]:
@@ -195,8 +202,7 @@ class LocalProblem:
         costs = self.costs(view)
         if INFINITE not in costs:
             return [(0, cost) for cost in costs]
-        known = [constraint.costs(others) for constraint, others in self._known(view, 0)]
-        return [_lexicographic_cost(prices) for prices in zip(self.charges, *known, strict=True)]
+        return [_lexicographic_cost(prices) for prices in zip(self.charges, *self._paid(view), strict=True)]
 
     def scopes(self, robots: Iterable[str]) -> list[tuple[tuple[str, ...], float]]:
         """Return, for each constraint whose other robots are all in `robots`, these robots and its maximum cost.
@@ -263,6 +269,47 @@ class LocalProblem:
                 found.append(table)
         return found
 
+    @property
+    def has_costs(self) -> bool:
+        """Whether something is minimised: costs, or robots that withdraw."""
+        return self._part.robot.kind is ProblemKind.DISWCSP or self._part.parameters.withdrawal_cost is not None
+
+    def allowed(
+        self, domains: Mapping[str, Sequence[Value]], lowest: str
+    ) -> list[tuple[tuple[str, ...], dict[tuple[int, ...], int]]]:
+        """Return what `tables` returns for `lowest`, where there are no costs.
+
+        For each constraint its other robots, and for each combination of places of their values the own values that
+        are consistent with these: bit i for the i-th. No robot may withdraw.
+
+        Raises:
+            UnsupportedError: when these are too many.
+        """
+        found = []
+        for constraint in self._constraints:
+            if constraint.agents[-1:] != (lowest,) or not domains.keys() >= set(constraint.agents):
+                continue
+            combinations = [*constraint.combinations(domains, len(self.values))]
+            self.checks += constraint.evaluate(others for _, others in combinations) * len(self.values)
+            found.append((constraint.agents, {place: constraint.mask(others) for place, others in combinations}))
+        return found
+
+    def look_ahead(self) -> None:
+        """Evaluate what `allowed` will be asked for, before other robots have told their values.
+
+        That is, the constraints in which one robot is lower than this one, for all values that files declare. Robots
+        do it at the same time. Where values are too many, nothing is done.
+        """
+        own = self._rank[self.agent]
+        declared = self._part.known.domains
+        for constraint in self._constraints:
+            if not constraint.agents or self._rank[constraint.agents[-1]] < own:
+                continue
+            if any(self._rank[agent] > own for agent in constraint.agents[:-1]):
+                continue
+            combinations = constraint.declared(declared, MAX_BOUNDED_ROWS // max(1, len(self.values)))
+            self.checks += constraint.evaluate(combinations) * len(self.values)
+
     def interchangeable(self, value: Value) -> Sequence[int]:
         """Return the places of all own values that agree with `value` wherever that is not None.
 
@@ -270,14 +317,21 @@ class LocalProblem:
         (Burke and Brown, "Applying interchangeability to complex local problems in distributed constraint
         reasoning", AAMAS workshop DCR 2006).
         """
+        if None not in value:
+            index = self._place_of.get(value)
+            return () if index is None else (index,)
         wanted = [(place, part) for place, part in enumerate(value) if part is not None]
         return [index for index, own in enumerate(self.values) if all(own[place] == part for place, part in wanted)]
 
-    def _known(self, view: Mapping[str, Value], values: int = 1) -> list[tuple[SharedConstraint, OtherValues]]:
-        """Return each constraint whose other variables are all known, and their values. Count `values` checks each."""
+    def _known(self, view: Mapping[str, Value]) -> list[tuple[SharedConstraint, OtherValues]]:
+        """Return each constraint whose other variables are all known, and their values. Count a check each."""
         known = [(c, others) for c in self._constraints if (others := c.other_values(view)) is not None]
-        self.checks += len(known) * values
+        self.checks += len(known)
         return known
+
+    def _paid(self, view: Mapping[str, Value]) -> list[list[float]]:
+        """Return what each own value pays for each constraint whose other variables are all known. Counts nothing."""
+        return [prices for c in self._constraints if (prices := c.costs_in(view)) is not None]
 
     def _since(self, place: int) -> Sequence[SharedConstraint]:
         """Return the constraints whose lowest robot does not stand higher in the order than `place`."""
@@ -296,6 +350,10 @@ class LocalProblem:
                 if not mask >> index & 1:
                     return constraint
         return None
+
+    @cached_property
+    def _place_of(self) -> dict[Value, int]:
+        return {value: index for index, value in enumerate(self.values)}
 
     @cached_property
     def _filters(self) -> Filters:

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Container, Iterable, Mapping, Sequence
+from collections.abc import Container, Iterable, Iterator, Mapping, Sequence
 
 from robochoc.model.message import Value
 from robochoc.model.problem import Constraint
 from robochoc.solver.agent_problem import TeamKnowledge
-from robochoc.solver.encoding import allows_function, cost_function, max_cost
+from robochoc.solver.encoding import MAX_TUPLES, UnsupportedError, allows_function, cost_function, max_cost
 
 Conflict = Mapping[str, Value]
 """Assignments of other robots that rule out an own value: the left side of a nogood."""
@@ -80,6 +80,8 @@ class SharedConstraint:
         """Where it sees one variable of others: `mask`, by its value."""
         self._masks: dict[OtherValues, int] = {}
         self._costs: dict[OtherValues, list[float]] = {}
+        self._costs_by: dict[int, list[float]] = {}
+        """Where it sees one variable of others: `costs`, by its value."""
         self._conflicts: dict[OtherValues, Conflict] = {}
 
     def compile(self, own: OwnValues) -> None:
@@ -119,6 +121,21 @@ class SharedConstraint:
             prices = self._costs[others] = [paid[code] for code in self.codes]
         return prices
 
+    def costs_in(self, view: Mapping[str, Value]) -> list[float] | None:
+        """Return what each own value pays in `view`; None: a value is unknown, or a robot is withdrawn."""
+        if self._only is None:
+            others = self.other_values(view)
+            return None if others is None else self.costs(others)
+        agent, place = self._only
+        value = view.get(agent)
+        part = None if value is None else value[place]
+        if part is None:
+            return None
+        prices = self._costs_by.get(part)
+        if prices is None:
+            prices = self._costs_by[part] = self.costs((part,))
+        return prices
+
     def lower_bounds(self, domains: Mapping[str, Iterable[int]], wide: int) -> tuple[int, list[float]]:
         """Return the number of checks, and a lower bound on the cost of each own value over the others' `domains`.
 
@@ -137,6 +154,29 @@ class SharedConstraint:
                 break
         return checks, least
 
+    def combinations(
+        self, domains: Mapping[str, Sequence[Value]], size: int
+    ) -> Iterator[tuple[tuple[int, ...], OtherValues]]:
+        """Yield the places of the others' values in `domains`, for each combination, and what the constraint sees.
+
+        Combinations in which a robot has withdrawn are left out; `size` is the number of own values.
+
+        Raises:
+            UnsupportedError: when there are too many.
+        """
+        columns = [domains[agent] for agent in self.agents]
+        entries = math.prod(map(len, columns)) * size
+        if entries > MAX_TUPLES:
+            raise UnsupportedError(
+                f"the table of constraint {self.key} has {entries:,} entries, more than {MAX_TUPLES:,}; split the"
+                " constraint, or choose a protocol that computes without tables"
+            )
+        for place in itertools.product(*(range(len(column)) for column in columns)):
+            chosen = (column[index] for column, index in zip(columns, place, strict=True))
+            others = self.other_values(dict(zip(self.agents, chosen, strict=True)))
+            if others is not None:
+                yield place, others
+
     def mask(self, others: OtherValues) -> int:
         """Return the own values that go with `others`: bit i for the i-th."""
         mask = self._masks.get(others)
@@ -145,6 +185,18 @@ class SharedConstraint:
             mask = sum(1 << index for index, code in enumerate(self.codes) if holds[code])
             self._masks[others] = mask
         return mask
+
+    def declared(self, domains: Mapping[str, Iterable[int]], most: int) -> Iterable[OtherValues]:
+        """Return all that the constraint may see of the others, by their declared `domains`; nothing if over `most`."""
+        columns = [list(domains[name]) for name in self._names]
+        return itertools.product(*columns) if math.prod(map(len, columns)) <= most else ()
+
+    def evaluate(self, combinations: Iterable[OtherValues]) -> int:
+        """Evaluate `combinations`, and return how many there are that were not known before."""
+        before = len(self._masks)
+        for others in combinations:
+            self.mask(others)
+        return len(self._masks) - before
 
     def look(self, view: Mapping[str, Value]) -> int:
         """Return the own values that go with `view`: bit i for the i-th. `UNKNOWN` where `other_values` is None."""
