@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from typing import Self, cast
+from typing import Self
 
 import msgspec
 
@@ -17,9 +17,10 @@ from robochoc.journal.events import Concluded, Decided, Heard, Observer, Receive
 from robochoc.model.message import Envelope, Message, encode
 from robochoc.model.outcome import Metrics, Verdict
 from robochoc.protocols.chance import Chance
+from robochoc.protocols.dynamic import DynamicProtocol
 from robochoc.protocols.order import PriorityOrder
-from robochoc.protocols.protocol import DynamicProtocol, Protocol, Said
-from robochoc.protocols.settings import settings_of
+from robochoc.protocols.protocol import Protocol
+from robochoc.protocols.settings import equip
 from robochoc.solver.agent_problem import DEFAULT_PARAMETERS, AgentProblem, RunParameters
 from robochoc.solver.compiled import LocalProblem
 from robochoc.solver.explanation import Invalidated
@@ -154,16 +155,19 @@ class Host:
     def _equip(self, parameters: RunParameters) -> None:
         """Give the protocol its settings and its random generator."""
         protocol = self.protocol
-        if parameters.settings:
-            protocol.settings = settings_of(type(protocol), parameters.settings)
+        equip(protocol, parameters.settings)
         protocol.chance = Chance(parameters.seed, self.name)
 
     def _step(self, act: Callable[[], None]) -> list[Envelope]:
         """Let the protocol act, count its checks, and wrap what it has said."""
         act()
         self._tick()
-        self.said_at = [said.checks for said in self._outbox]
-        said = [self._wrap(said, clock) for said, clock in zip(self._outbox, self._stamps, strict=True)]
+        protocol = self.protocol
+        self.said_at = protocol.said_at.copy()
+        said = [
+            self._wrap(receiver, message, checks, clock)
+            for (receiver, message), checks, clock in zip(protocol.outbox, self.said_at, self._stamps, strict=True)
+        ]
         self._forget_said()
         self._step_began = self._checks
         if self._observer:
@@ -171,8 +175,7 @@ class Host:
             self._observer(Settled(t=self._now(), robot=self.name, clock=self.clock, checks=self._checks))
         return said
 
-    def _wrap(self, said: Said, clock: int) -> Envelope:
-        receiver, message = said
+    def _wrap(self, receiver: str, message: Message, checks: int, clock: int) -> Envelope:
         content = encode(message)
         kind = type(message).__name__
         self.sent[kind] = self.sent.get(kind, 0) + 1
@@ -181,7 +184,7 @@ class Host:
         if self._observer:
             self._observer(
                 Sent(
-                    t=self._time(said.checks),
+                    t=self._time(checks),
                     sender=self.name,
                     receiver=receiver,
                     type=kind,
@@ -196,7 +199,7 @@ class Host:
         """Advance the clock by one for each new check, and stamp the messages of this time with it."""
         before = self.clock - self._checks
         self._answers = len(self._stamps)
-        self._stamps += [before + said.checks for said in self._outbox[self._answers :]]
+        self._stamps += [before + checks for checks in self.protocol.said_at[self._answers :]]
         self._checks = self.protocol.problem.checks
         self.clock = before + self._checks
 
@@ -204,12 +207,9 @@ class Host:
         """Return the time at which this number of checks was done."""
         return self._now() if self._then is None else self._then(checks)
 
-    @property
-    def _outbox(self) -> list[Said]:
-        return cast("list[Said]", self.protocol.outbox)
-
     def _forget_said(self) -> None:
         self.protocol.outbox.clear()
+        self.protocol.said_at.clear()
         self._stamps.clear()
 
     def _report_state(self, observer: Observer) -> None:

@@ -106,10 +106,10 @@ class ABTDORetro(Backtracking):
         privacy="none",
         use_when="no costs, and no good static order is known",
     )
-    order: CurrentOrder
 
     def __init__(self, problem: LocalProblem, order: PriorityOrder) -> None:
-        super().__init__(problem, CurrentOrder(order.names))
+        self._newest = CurrentOrder(order.names)
+        super().__init__(problem, self._newest)
         self.left: dict[str, int] = {}
         self.higher = set(problem.neighbours)
         self.tells = list(problem.neighbours)
@@ -167,7 +167,7 @@ class ABTDORetro(Backtracking):
         while place > self.order.depth(nogood.lhs) + 1 and self.left.get(names[place - 1], 0) > nogood.left:
             place -= 1
         if place < self.order.rank[sender]:
-            order = self.order.moved(sender, place, self.problem.agent)
+            order = self._newest.moved(sender, place, self.problem.agent)
             self._adopt(order)
             for name in order.names[place:]:
                 if name != self.problem.agent:
@@ -175,10 +175,10 @@ class ABTDORetro(Backtracking):
 
     def _adopt(self, order: Order) -> None:
         """Adopt `order` if it is newer; drop nogoods with robots that are now lower, and inform new lower robots."""
-        if order.counters <= self.order.counters:
+        if order.counters <= self._newest.counters:
             return
         lower = set(self._lower())
-        self.order.adopt(order)
+        self._newest.adopt(order)
         self.owed.update(name for name in self._lower() if name not in lower)
         for name in {name for lhs in self.store for name in lhs if not self._is_higher(name)}:
             self.store.forget(name)

@@ -9,7 +9,7 @@ simulator or on a robot.
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable
+from collections.abc import Callable, MutableSequence
 from typing import Any, ClassVar
 
 from robochoc.model.message import Message
@@ -20,19 +20,10 @@ from robochoc.protocols.order import PriorityOrder
 from robochoc.protocols.settings_base import NO_SETTINGS, Settings
 from robochoc.protocols.traits import Traits
 from robochoc.solver.compiled import LocalProblem
-from robochoc.solver.explanation import Invalidated
+from robochoc.system.compiling import mypyc_attr
 
 
-class Said(tuple[str, Message]):  # noqa: SLOT001 - no subclass of tuple can have slots with anything in them
-    """An entry of the outbox: the receiver and the message.
-
-    `checks` is the number of constraint checks that the sender had done when it sent the message. The host computes the
-    message's clock from it: the sender's clock at sending (Meisels et al. 2002), not at the end of its step.
-    """
-
-    checks: int = 0
-
-
+@mypyc_attr(allow_interpreted_subclasses=True)
 class Protocol(Inspectable, ABC):
     """One robot's side of a protocol.
 
@@ -42,7 +33,7 @@ class Protocol(Inspectable, ABC):
 
     messages: ClassVar[Any]
     traits: ClassVar[Traits] = Traits()
-    settings: Settings = NO_SETTINGS
+    settings: ClassVar[Settings] = NO_SETTINGS
     """The defaults; the host puts what was asked for in their place before `start`."""
     chance: Callable[[], float]
     """Draws from [0, 1): the host's, seeded for each robot. There before `start`."""
@@ -51,7 +42,13 @@ class Protocol(Inspectable, ABC):
         self.problem = problem
         self.order = order
         self.outbox: list[tuple[str, Message]] = []
-        """Receivers and messages, each pair as a `Said`."""
+        """Receivers and messages."""
+        self.said_at: list[int] = []
+        """For each message of the outbox the number of constraint checks that this robot had done when it sent it.
+
+        The host computes the message's clock from it: the sender's clock at sending (Meisels et al. 2002), not at the
+        end of its step.
+        """
         self.value: int | None = None
         """The own value, as its place in the compiled domain; None: unassigned."""
         self.verdict: Verdict | None = None
@@ -70,9 +67,10 @@ class Protocol(Inspectable, ABC):
 
     def send(self, receiver: str, message: Message) -> None:
         """Send `message` to `receiver`; its clock does not include later checks."""
-        said = Said((receiver, message))
-        said.checks = self.problem.checks
-        self.outbox.append(said)
+        # A replay has a list of its own: as a list's, mypyc would not call its `append`.
+        outbox: MutableSequence[tuple[str, Message]] = self.outbox
+        outbox.append((receiver, message))
+        self.said_at.append(self.problem.checks)
 
     def conclude(self, verdict: Verdict) -> None:
         """End the search of the whole team with `verdict`.
@@ -99,27 +97,3 @@ class Protocol(Inspectable, ABC):
     def findings(self) -> Findings:
         """This robot's knowledge of the whole search besides its own value. May be read at any time."""
         return NOTHING
-
-
-class DynamicProtocol(Protocol):
-    """A protocol that continues when the problem changes, with the results that are still valid.
-
-    Between two epochs the host calls `change`, and once all robots have changed, `resume`. Other protocols start again
-    on the changed problem.
-    """
-
-    @abstractmethod
-    def change(self, problem: LocalProblem, order: PriorityOrder, invalidated: Invalidated) -> None:
-        """Adopt the changed problem, and drop all that depends on anything `invalidated`. Send nothing.
-
-        No robot searches meanwhile. A verdict that is still valid after the changes is kept, and ends the epoch at
-        once.
-        """
-
-    @abstractmethod
-    def resume(self, *, lossless: bool) -> None:
-        """Continue the search; called before any message.
-
-        Args:
-            lossless: No message of the epoch before was lost.
-        """

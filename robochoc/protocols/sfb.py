@@ -52,7 +52,7 @@ from __future__ import annotations
 import math
 from collections import deque
 from collections.abc import Sequence
-from typing import assert_never, cast
+from typing import ClassVar, assert_never, cast
 
 from robochoc.model.message import Message
 from robochoc.model.outcome import Verdict
@@ -124,7 +124,7 @@ class SFB(Protocol):
         tables=True,
         use_when="costs: the default; few messages",
     )
-    settings: SFBSettings = SFBSettings()
+    settings: ClassVar[SFBSettings] = SFBSettings()
 
     def __init__(self, problem: LocalProblem, order: PriorityOrder) -> None:
         super().__init__(problem, order)

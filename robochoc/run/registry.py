@@ -7,8 +7,9 @@ from contextlib import suppress
 from dataclasses import dataclass
 from typing import cast
 
+from robochoc.protocols.dynamic import DynamicProtocol
 from robochoc.protocols.first_fit import FirstFit
-from robochoc.protocols.protocol import DynamicProtocol, Protocol
+from robochoc.protocols.protocol import Protocol
 from robochoc.protocols.settings_base import Settings
 from robochoc.protocols.traits import Traits
 from robochoc.run.defaults import DEFAULT_COST_PROTOCOL, FIRST_FIT

@@ -17,6 +17,9 @@ Conflict = Mapping[str, Value]
 OtherValues = tuple[int, ...]
 """The values of other robots' variables in a constraint, in its order."""
 
+Cost = int | float
+"""An integer stays one: as a `float` mypyc would turn it into 3.0, which takes nine bytes on the wire."""
+
 
 class OwnValues:
     """The own compiled domain: `values` of the variables `names`, and what constraints can tell apart in it.
@@ -73,7 +76,7 @@ class SharedConstraint:
         self._names = [interfaces[agent][place] for agent, place in self._seen]
         self._widths = {agent: len(interfaces[agent]) for agent in self.agents}
         self._masks: dict[OtherValues, int] = {}
-        self._costs: dict[OtherValues, list[float]] = {}
+        self._costs: dict[OtherValues, list[Cost]] = {}
         self._conflicts: dict[OtherValues, Conflict] = {}
 
     def compile(self, own: OwnValues) -> None:
@@ -101,11 +104,11 @@ class SharedConstraint:
         return None in values or self._test(values)  # type: ignore[arg-type]
 
     @property
-    def max_cost(self) -> float:
+    def max_cost(self) -> Cost:
         """The most that it charges short of being broken."""
         return max_cost(self._constraint)
 
-    def costs(self, others: OtherValues) -> list[float]:
+    def costs(self, others: OtherValues) -> list[Cost]:
         """Return what each own value pays when the others are as `others` says."""
         prices = self._costs.get(others)
         if prices is None:
@@ -113,12 +116,12 @@ class SharedConstraint:
             prices = self._costs[others] = [paid[code] for code in self.codes]
         return prices
 
-    def lower_bounds(self, domains: Mapping[str, Iterable[int]], wide: int) -> tuple[int, list[float]]:
+    def lower_bounds(self, domains: Mapping[str, Iterable[int]], wide: int) -> tuple[int, list[Cost]]:
         """Return the number of checks, and a lower bound on the cost of each own value over the others' `domains`.
 
         With more than `wide` combinations the bound is 0 without a look.
         """
-        least: list[float] = [0] * len(self.codes)
+        least: list[Cost] = [0] * len(self.codes)
         columns = [list(domains[name]) for name in self._names]
         if math.prod(map(len, columns)) * len(least) > wide:
             return 0, least

@@ -1,0 +1,21 @@
+"""Words for mypyc, which compiles some of the modules (docs/explanation/design.md, "Compiled core").
+
+mypyc knows `mypyc_attr` by its place in `mypy_extensions`. Whoever runs robochoc needs no such package.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import TYPE_CHECKING, TypeVar
+
+T = TypeVar("T")
+
+__all__ = ["mypyc_attr"]
+
+if TYPE_CHECKING:
+    from mypy_extensions import mypyc_attr
+else:
+
+    def mypyc_attr(**_: object) -> Callable[[T], T]:
+        """Return a decorator that does nothing: only mypyc reads what it is given."""
+        return lambda decorated: decorated
