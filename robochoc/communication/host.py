@@ -53,7 +53,7 @@ class Host:
         self._stamps: list[int] = []
         self._answers = self._step_began = 0
         self._begun = False
-        self._decoder = msgspec.msgpack.Decoder(protocol.messages)
+        self._decode: Callable[[bytes], Message] = msgspec.msgpack.Decoder(protocol.messages).decode
         self._checks = 0
         self._reported: tuple[int | None, Verdict | None] = (None, None)
         self._heard: float = math.inf
@@ -82,9 +82,11 @@ class Host:
         """
         protocol = self.protocol
         if self._begun and isinstance(protocol, DynamicProtocol):
-            return self._step(lambda: protocol.resume(lossless=lossless))
-        self._begun = True
-        return self._step(protocol.start)
+            protocol.resume(lossless=lossless)
+        else:
+            self._begun = True
+            protocol.start()
+        return self._said()
 
     def change(self, part: AgentProblem, invalidated: Invalidated) -> None:
         """Enter a new epoch: the problem has changed to `part`, and counting begins again.
@@ -119,7 +121,7 @@ class Host:
         What the robot says at once does not carry the clocks of those that follow.
         """
         try:
-            message: Message = self._decoder.decode(envelope.content)
+            message = self._decode(envelope.content)
         except (msgspec.MsgspecError, RecursionError, UnicodeDecodeError) as error:
             raise BadMessageError(f"{envelope.sender} sent {self.name} an invalid message: {error}") from error
         self.clock = max(self.clock, envelope.clock)
@@ -146,7 +148,8 @@ class Host:
 
     def settle(self) -> list[Envelope]:
         """Let the protocol settle after a whole packet, and return its messages."""
-        return self._step(self.protocol.settle)
+        self.protocol.settle()
+        return self._said()
 
     def metrics(self) -> Metrics:
         """Return what this robot has sent and checked so far; `ncccs` is its own clock."""
@@ -158,49 +161,55 @@ class Host:
         equip(protocol, parameters.settings)
         protocol.chance = Chance(parameters.seed, self.name)
 
-    def _step(self, act: Callable[[], None]) -> list[Envelope]:
-        """Let the protocol act, count its checks, and wrap what it has said."""
-        act()
+    def _said(self) -> list[Envelope]:
+        """Count the checks of a step that has ended, and wrap what the protocol has said in it."""
         self._tick()
         protocol = self.protocol
-        self.said_at = protocol.said_at.copy()
-        said = [
-            self._wrap(receiver, message, checks, clock)
-            for (receiver, message), checks, clock in zip(protocol.outbox, self.said_at, self._stamps, strict=True)
-        ]
-        self._forget_said()
+        self.said_at = protocol.said_at
+        envelopes = self._envelopes() if self.said_at else []
         self._step_began = self._checks
         if self._observer:
             self._report_state(self._observer)
             self._observer(Settled(t=self._now(), robot=self.name, clock=self.clock, checks=self._checks))
-        return said
+        return envelopes
 
-    def _wrap(self, receiver: str, message: Message, checks: int, clock: int) -> Envelope:
-        content = encode(message)
-        kind = type(message).__name__
-        self.sent[kind] = self.sent.get(kind, 0) + 1
-        self.bytes += len(content)
-        self.largest = max(self.largest, len(content))
-        if self._observer:
-            self._observer(
-                Sent(
-                    t=self._time(checks),
-                    sender=self.name,
-                    receiver=receiver,
-                    type=kind,
-                    content=msgspec.structs.asdict(message),
-                    bytes=len(content),
-                    clock=clock,
-                )
-            )
-        return Envelope(self.name, receiver, content, clock)
+    def _envelopes(self) -> list[Envelope]:
+        """Encode and count all messages in the outbox; one that goes to several robots in turn is encoded once."""
+        found = []
+        last: Message | None = None
+        content, kind = b"", ""
+        for (receiver, message), clock, checks in zip(self.protocol.outbox, self._stamps, self.said_at, strict=True):
+            if message is not last:
+                last, content, kind = message, encode(message), type(message).__name__
+                self.largest = max(self.largest, len(content))
+            self.sent[kind] = self.sent.get(kind, 0) + 1
+            self.bytes += len(content)
+            envelope = Envelope(self.name, receiver, content, clock)
+            if self._observer:
+                self._observer(self._sent(envelope, message, checks))
+            found.append(envelope)
+        self._forget_said()
+        return found
+
+    def _sent(self, envelope: Envelope, message: Message, checks: int) -> Sent:
+        return Sent(
+            t=self._time(checks),
+            sender=self.name,
+            receiver=envelope.receiver,
+            type=type(message).__name__,
+            content=msgspec.structs.asdict(message),
+            bytes=len(envelope.content),
+            clock=envelope.clock,
+        )
 
     def _tick(self) -> None:
         """Advance the clock by one for each new check, and stamp the messages of this time with it."""
+        protocol = self.protocol
         before = self.clock - self._checks
         self._answers = len(self._stamps)
-        self._stamps += [before + checks for checks in self.protocol.said_at[self._answers :]]
-        self._checks = self.protocol.problem.checks
+        if len(protocol.said_at) > self._answers:
+            self._stamps += [before + checks for checks in protocol.said_at[self._answers :]]
+        self._checks = protocol.problem.checks
         self.clock = before + self._checks
 
     def _time(self, checks: int) -> float:
@@ -209,7 +218,7 @@ class Host:
 
     def _forget_said(self) -> None:
         self.protocol.outbox.clear()
-        self.protocol.said_at.clear()
+        self.protocol.said_at = []
         self._stamps.clear()
 
     def _report_state(self, observer: Observer) -> None:

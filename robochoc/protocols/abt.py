@@ -142,8 +142,9 @@ class ABT(Backtracking):
             if self.value is None:
                 self._backtrack()
                 continue
+            ok = Ok(self.problem.values[self.value])
             for neighbour in (*self.lower, *self.problem.pkc_parents):
-                self.send(neighbour, Ok(self.problem.values[self.value]))
+                self.send(neighbour, ok)
             return
 
     def _backtrack(self) -> None:
@@ -167,7 +168,7 @@ class ABT(Backtracking):
 
     def _refuse_below(self) -> None:
         """Send nogoods for lower robots' values that the own parts of PKCs forbid; check each pair once."""
-        if self.value is None:
+        if self.value is None or not self.below:
             return
         for child, theirs in list(self.below.items()):
             if self.allowed.get(child) == self.value:

@@ -251,4 +251,4 @@ class ABTDORetro(Backtracking):
 
     def _left(self) -> int:
         """Return the number of own values that no stored nogood rules out."""
-        return sum(self.store[index] is None for index in range(len(self.problem.values)))
+        return self.store.open

@@ -47,7 +47,7 @@ new CPA of the first, and so on. `Solved` ends the search.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from typing import assert_never, cast
 
 from robochoc.model.message import Message, Value
@@ -67,6 +67,7 @@ class AFCng(Protocol):
     - `successors`: the robots that may assign a value after this one.
     - `cpa_receivers`: all robots that are sent its CPAs.
     - `checked`: for each own value, the place in the order up to which all constraints are known to hold in the view.
+    - `_revised`: whether neither the view nor the nogoods have changed since the values were last checked.
     """
 
     messages = CPA | Nogood | Solved
@@ -87,6 +88,7 @@ class AFCng(Protocol):
         self.counter = 0
         self.store = NogoodStore(order, len(problem.values))
         self.checked = [0] * len(problem.values)
+        self._revised = False
         self.solved = False
 
     def start(self) -> None:
@@ -146,16 +148,18 @@ class AFCng(Protocol):
 
     def _check_assign(self) -> None:
         """Backtrack if no value is left; assign a value if this robot holds the CPA without one."""
-        if next(self._left(), None) is None:
+        if not self.store.open:
             self._backtrack()
         elif self.value is None and len(self.view) == len(self.above):
             self._assign()
 
     def _assign(self) -> None:
         """Take the first remaining value and send the CPA on."""
-        self.value = next(self._left())
+        index = self.store.first_open()
+        assert index is not None  # noqa: S101 - for mypy: a value is left
+        self.value = index
         self.counter += 1
-        self._send_cpa((self.problem.values[self.value], self.counter))
+        self._send_cpa((self.problem.values[index], self.counter))
         self._detect_solution()
 
     def _send_cpa(self, own: Assignment) -> None:
@@ -190,36 +194,39 @@ class AFCng(Protocol):
     def _revise(self) -> None:
         """Store a nogood for each value that the view forbids, with the highest possible lowest robot.
 
-        Values are processed by the part of the view they were checked against, so that tables are read in blocks.
+        Values that were checked against the same part of the view are processed together.
         """
+        if self._revised:
+            return
+        self._revised = True
         depth = self._depth()
-        for index in sorted(self._left(), key=self.checked.__getitem__):
-            if self.checked[index] == depth:
-                break
-            conflict = self.problem.conflict(index, self.view, since=self.checked[index])
-            if conflict is None:
-                self.checked[index] = depth
-            else:
-                self.store.add(index, conflict)
-                self.checked[index] = self.order.depth(conflict)
-
-    def _left(self) -> Iterator[int]:
-        """Yield the values that no nogood rules out."""
-        return (index for index in range(len(self.problem.values)) if self.store[index] is None)
+        waiting: dict[int, list[int]] = {}
+        for index in self.store.all_open():
+            place = self.checked[index]
+            if place < depth:
+                waiting.setdefault(place, []).append(index)
+        for place, indices in sorted(waiting.items()):
+            conflicts = self.problem.conflicts_of(indices, self.view, place)
+            for index in indices:
+                conflict = conflicts.get(index)
+                if conflict is None:
+                    self.checked[index] = depth
+                else:
+                    self.store.add(index, conflict)
+                    self.checked[index] = self.order.depth(conflict)
 
     # The view
 
     def _update_agent_view(self, values: Sequence[Value]) -> None:
         """Replace the view by `values` of the highest robots; drop nogoods with other values."""
-        old = self.view
+        first = _first_difference(list(self.view.values()), values)
+        if first is None:
+            return
         self.view = dict(zip(self.above, values, strict=False))
-        changed = [agent for agent in self.above if old.get(agent) != self.view.get(agent)]
-        for agent in changed:
-            if agent in old:
-                self.store.forget(agent, self.view.get(agent))
-        if changed:
-            first = self.order.rank[changed[0]]
-            self.checked = [min(place, first) for place in self.checked]
+        self.store.forget_others(self.view)
+        place = self.order.rank[self.above[first]]
+        self.checked = [min(place, checked) for checked in self.checked]
+        self._revised = False
 
     def _compatible(self, lhs: Mapping[str, Value]) -> bool:
         return all(agent in self.view and not contradicts(value, self.view[agent]) for agent, value in lhs.items())
@@ -238,3 +245,11 @@ class AFCng(Protocol):
     @property
     def _rank(self) -> int:
         return self.order.rank[self.problem.agent]
+
+
+def _first_difference(left: Sequence[Value], right: Sequence[Value]) -> int | None:
+    """Return the first place at which two sequences differ; None if they are equal."""
+    for place, (one, other) in enumerate(zip(left, right, strict=False)):
+        if one != other:
+            return place
+    return None if len(left) == len(right) else min(len(left), len(right))

@@ -29,7 +29,10 @@ class Backtracking(Protocol):
 
     def _choose_value(self, view: Mapping[str, Value]) -> int | None:
         """Return the first value of the domain that no nogood rules out in `view`; None if there is none."""
-        return next((index for index in range(len(self.problem.values)) if self._consistent(index, view)), None)
+        index = self.store.first_open()
+        while index is not None and not self._consistent(index, view):
+            index = self.store.first_open(index + 1)
+        return index
 
     def _consistent(self, index: int, view: Mapping[str, Value]) -> bool:
         """Return whether `view` allows the value at `index`; store a nogood if a constraint is violated."""

@@ -158,7 +158,10 @@ class DisFC(Protocol):
 
     def _choose_value(self) -> int | None:
         """Return the first value that no nogood and no filter rules out; None if there is none."""
-        return next((index for index in range(len(self.places)) if self._consistent(index)), None)
+        index = self.store.first_open()
+        while index is not None and not self._consistent(index):
+            index = self.store.first_open(index + 1)
+        return index
 
     def _backtrack(self) -> None:
         """Resolve the stored nogoods, one for each value, and send the result to its lowest-priority robot."""

@@ -44,11 +44,8 @@ class Protocol(Inspectable, ABC):
         self.outbox: list[tuple[str, Message]] = []
         """Receivers and messages."""
         self.said_at: list[int] = []
-        """For each message of the outbox the number of constraint checks that this robot had done when it sent it.
-
-        The host computes the message's clock from it: the sender's clock at sending (Meisels et al. 2002), not at the
-        end of its step.
-        """
+        """Of each message in the outbox: `problem.checks` when the robot sent it. The host computes the message's clock
+        from it: the sender's clock at sending (Meisels et al. 2002), not at the end of its step."""
         self.value: int | None = None
         """The own value, as its place in the compiled domain; None: unassigned."""
         self.verdict: Verdict | None = None

@@ -32,8 +32,9 @@ MOST_ELSE = 40
 ALWAYS = "what holds whatever the others take"
 VIEWS = ("view", "cpa", "path", "assignments", "context")
 """Attributes in which protocols keep what they know of others' values."""
-_SHOWN = {"value", "verdict", "store", "nogoods", "allowed"}
-_KNOWN = _SHOWN | {"problem", "order", "outbox", "said_at", "chance", "settings"}
+_KNOWN = {
+    *("problem", "order", "outbox", "said_at", "value", "verdict", "chance", "settings", "store", "nogoods", "allowed")
+}
 """Attributes that are shown elsewhere, or say nothing."""
 
 

@@ -22,6 +22,7 @@ from robochoc.solver.agent_problem import AgentProblem
 from robochoc.solver.explanation import KeyedConstraint, held_above, held_below
 from robochoc.solver.filters import Filters
 from robochoc.solver.shared_constraint import (
+    UNKNOWN,
     Conflict,
     Cost,
     OtherValues,
@@ -112,12 +113,35 @@ class LocalProblem:
         variable. Of each robot only what the constraint looks at is named (`None` elsewhere).
         """
         broken = self._broken(index, view, since)
-        return None if broken is None else broken[0].conflict(broken[1])
+        return None if broken is None else broken.conflict_with(view)
+
+    def conflicts_of(self, indices: Sequence[int], view: Mapping[str, Value], since: int = -1) -> dict[int, Conflict]:
+        """Return what `conflict` returns for each of `indices` that is against `view`, with as many checks."""
+        if self._table is not None:
+            found = ((index, self.conflict(index, view, since)) for index in indices)
+            return {index: conflict for index, conflict in found if conflict is not None}
+        left = sum([1 << index for index in indices])
+        conflicts: dict[int, Conflict] = {}
+        for constraint in self._since(since):
+            mask = constraint.look(view)
+            if mask == UNKNOWN:
+                continue
+            self.checks += left.bit_count()
+            broken = left & ~mask
+            if broken:
+                left &= mask
+                conflict = constraint.conflict_with(view)
+                while broken:
+                    conflicts[broken.bit_length() - 1] = conflict
+                    broken ^= 1 << (broken.bit_length() - 1)
+                if not left:
+                    break
+        return conflicts
 
     def conflict_with_key(self, index: int, view: Mapping[str, Value], since: int = -1) -> tuple[Conflict, str] | None:
         """Return what `conflict` returns, with the key of the violated constraint."""
         broken = self._broken(index, view, since)
-        return None if broken is None else (broken[0].conflict(broken[1]), broken[0].key)
+        return None if broken is None else (broken.conflict_with(view), broken.key)
 
     def conflicts(self, index: int, view: Mapping[str, Value]) -> list[tuple[Conflict, str]]:
         """Return what `conflict_with_key` returns, for every constraint that `values[index]` violates."""
@@ -256,20 +280,22 @@ class LocalProblem:
         self.checks += len(known) * values
         return known
 
-    def _broken(self, index: int, view: Mapping[str, Value], since: int) -> tuple[SharedConstraint, OtherValues] | None:
-        """Return the first constraint that `values[index]` breaks, and what it sees in `view`."""
+    def _since(self, place: int) -> Sequence[SharedConstraint]:
+        """Return the constraints whose lowest robot does not stand higher in the order than `place`."""
+        return self._constraints if place < 0 else self._constraints[bisect_left(self._depths, place) :]
+
+    def _broken(self, index: int, view: Mapping[str, Value], since: int) -> SharedConstraint | None:
+        """Return the first constraint that `values[index]` breaks in `view`."""
         if self._table is not None:
             checks, broken = self._table.look(index, view, bisect_left(self._depths, since))
             self.checks += checks
             return broken
-        for place in range(bisect_left(self._depths, since), len(self._constraints)):
-            constraint = self._constraints[place]
-            others = constraint.other_values(view)
-            if others is None:
-                continue
-            self.checks += 1
-            if not constraint.mask(others) >> index & 1:
-                return constraint, others
+        for constraint in self._since(since):
+            mask = constraint.look(view)
+            if mask != UNKNOWN:
+                self.checks += 1
+                if not mask >> index & 1:
+                    return constraint
         return None
 
     @property

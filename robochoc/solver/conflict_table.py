@@ -50,9 +50,7 @@ class ConflictTable:
         self._view: tuple[dict[str, Value], int] | None = None
         self._last = _Look([], [], [])
 
-    def look(
-        self, index: int, view: Mapping[str, Value], first: int = 0
-    ) -> tuple[int, tuple[SharedConstraint, OtherValues] | None]:
+    def look(self, index: int, view: Mapping[str, Value], first: int = 0) -> tuple[int, SharedConstraint | None]:
         """Return how many constraints are checked for the value at `index`, and which one it breaks in `view`, if any.
 
         Constraints before the one numbered `first`, which begins a group, are left out.
@@ -62,7 +60,7 @@ class ConflictTable:
             self._last = self._look(view, self._firsts.index(first))
         checks, broken, constraints = self._last
         place = broken[index]
-        return checks[index], None if place < 0 else constraints[place]
+        return checks[index], None if place < 0 else constraints[place][0]
 
     def _look(self, view: Mapping[str, Value], begin: int) -> _Look:
         checks = np.zeros(self._size, np.int32)

@@ -14,6 +14,9 @@ from robochoc.solver.encoding import allows_function, cost_function, max_cost
 Conflict = Mapping[str, Value]
 """Assignments of other robots that rule out an own value: the left side of a nogood."""
 
+UNKNOWN = -1
+"""No mask: a value that a constraint looks at is unknown, or a robot is withdrawn."""
+
 OtherValues = tuple[int, ...]
 """The values of other robots' variables in a constraint, in its order."""
 
@@ -75,6 +78,9 @@ class SharedConstraint:
         ]
         self._names = [interfaces[agent][place] for agent, place in self._seen]
         self._widths = {agent: len(interfaces[agent]) for agent in self.agents}
+        self._only = self._seen[0] if len(self._seen) == 1 else None
+        self._looks: dict[int, int] = {}
+        """Where it sees one variable of others: `mask`, by its value."""
         self._masks: dict[OtherValues, int] = {}
         self._costs: dict[OtherValues, list[Cost]] = {}
         self._conflicts: dict[OtherValues, Conflict] = {}
@@ -142,6 +148,29 @@ class SharedConstraint:
             mask = sum(1 << index for index, code in enumerate(self.codes) if holds[code])
             self._masks[others] = mask
         return mask
+
+    def look(self, view: Mapping[str, Value]) -> int:
+        """Return the own values that go with `view`: bit i for the i-th. `UNKNOWN` where `other_values` is None."""
+        if self._only is None:
+            others = self.other_values(view)
+            return UNKNOWN if others is None else self.mask(others)
+        agent, place = self._only
+        value = view.get(agent)
+        if value is None:
+            return UNKNOWN
+        part = value[place]
+        if part is None:
+            return UNKNOWN
+        mask = self._looks.get(part)
+        if mask is None:
+            mask = self._looks[part] = self.mask((part,))
+        return mask
+
+    def conflict_with(self, view: Mapping[str, Value]) -> Conflict:
+        """Return what the constraint sees in `view`, which knows all of it, as a nogood's left side."""
+        others = self.other_values(view)
+        assert others is not None  # noqa: S101 - for mypy: it has just been looked at
+        return self.conflict(others)
 
     def own_part(self, index: int) -> Value:
         """Return what the constraint looks at of the own value at `index`; None elsewhere."""

@@ -9,7 +9,6 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from functools import partial
 
 from robochoc.communication.host import Host
 from robochoc.communication.run_result import Progress, RunResult
@@ -132,7 +131,8 @@ class Simulation(Session):
         """Every robot starts before any message arrives; then packet by packet."""
         lossless, self._lossless = self._lossless, False
         for host in self._hosts.values():
-            self._step(host, partial(host.start, lossless=lossless))
+            self._checks = host.checks
+            self._send(host, host.start(lossless=lossless))
         packets = 0
         while self._verdict is None:
             elapsed_s = time.monotonic() - began
@@ -151,17 +151,18 @@ class Simulation(Session):
                 self._verdict, self._lossless = Verdict.SOLUTION, True
                 return
             host = self._hosts[packet[0].receiver]
-            self._step(host, partial(host.handle, packet))
+            self._checks = host.checks
+            self._send(host, host.handle(packet))
             packets += 1
 
-    def _step(self, host: Host, act: Callable[[], Sequence[Envelope]]) -> None:
-        """Let `host` act, and send what it says on its way."""
-        self._checks = host.checks
-        envelopes = act()
+    def _send(self, host: Host, envelopes: Sequence[Envelope]) -> None:
+        """Send what `host` has said in its step on its way."""
+        schedule, before = self._schedule, self._checks
         for envelope, checks in zip(envelopes, host.said_at, strict=True):
-            self._schedule.put(envelope, checks - self._checks)
-        self._schedule.done(host.name, host.clock, host.checks - self._checks)
-        self._ncccs = max(self._ncccs, host.clock)
+            schedule.put(envelope, checks - before)
+        clock = host.clock
+        schedule.done(host.name, clock, host.checks - before)
+        self._ncccs = max(self._ncccs, clock)
         self._note_verdict(host)
 
     def _time(self, checks: int) -> float:
@@ -169,8 +170,9 @@ class Simulation(Session):
         return self._schedule.time(checks - self._checks)
 
     def _note_verdict(self, host: Host) -> None:
-        if host.protocol.verdict is not None:
-            self._verdict, self._witness = host.protocol.verdict, host.name
+        verdict = host.protocol.verdict
+        if verdict is not None:
+            self._verdict, self._witness = verdict, host.name
 
     def _sent(self) -> int:
         return sum(sum(host.sent.values()) for host in self._hosts.values())
