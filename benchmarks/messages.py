@@ -19,7 +19,7 @@ from measure import ROOT, RUNS, say
 from report import Row, Section
 
 PURE = "pure:"
-HARD = "random_csp(20, 10, 0.25, 0.6, 3, connected=True)"
+HARD = "random_csp(20, 10, 0.25, 0.6, 1, connected=True)"
 COSTLY = "random_csp(8, 4, 0.4, 0.0, 2, connected=True, max_cost=10)"
 LARGE = "random_csp(100, 5, 0.04, 0.0, 1, connected=True, max_cost=10)"
 PROBLEMS = {
@@ -70,7 +70,9 @@ def cost(protocol: str, tree: str, problem: str) -> Cost:
     pure = {"ROBOCHOC_PURE": "1"} if tree.startswith(PURE) else {}
     environment = {**os.environ, "PYTHONPATH": str(Path(tree.removeprefix(PURE)).resolve()), **pure}
     command = [sys.executable, "-c", PROGRAM, protocol, problem]
-    done = subprocess.run(command, cwd=tree.removeprefix(PURE), env=environment, stdout=subprocess.PIPE, text=True, check=True)
+    done = subprocess.run(
+        command, cwd=tree.removeprefix(PURE), env=environment, stdout=subprocess.PIPE, text=True, check=True
+    )
     return Cost(*json.loads(done.stdout))
 
 

@@ -16,6 +16,7 @@ from robochoc.formats.validation import check_between_robots, note_valid
 from robochoc.model.priorities import natural_key, priority_order
 from robochoc.model.problem import ProblemKind, Robot, Team
 from robochoc.model.symbols import with_table_everywhere
+from robochoc.system.garbage import collection_paused
 
 _NEXT_STEP = "give a folder with one XML file per robot; 'robochoc generate queens3d --n 4' writes one"
 
@@ -35,6 +36,7 @@ def find_teams(path: Path | str) -> list[Path]:
     return teams
 
 
+@collection_paused()
 def read_team(folder: Path | str) -> Team:
     """Return the team whose robots are the XML files in `folder`, in priority order.
 

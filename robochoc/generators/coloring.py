@@ -16,7 +16,7 @@ from dataclasses import replace
 from enum import StrEnum
 
 from robochoc.formats import PREDEFINED
-from robochoc.generators.draws import MAX_AGENTS, MAX_COST, MAX_VALUES, check_bounds, check_places, seeded
+from robochoc.generators.draws import MAX_COST, MAX_NODES, MAX_VALUES, check_bounds, check_places, seeded
 from robochoc.generators.draws import uniform as any_of
 from robochoc.generators.graphs import Graph, uniform
 from robochoc.generators.random_csp import places_told, team_of_edges
@@ -60,7 +60,7 @@ def coloring(
     Raises:
         ValueError: if there is no such graph. The text says which number to change.
     """
-    check_bounds({"agents": (agents, 1, MAX_AGENTS), "colors": (colors, 1, MAX_VALUES)})
+    check_bounds({"agents": (agents, 1, MAX_NODES), "colors": (colors, 1, MAX_VALUES)})
     if not 0 <= degree <= agents - 1:
         raise ValueError(f"degree is {degree}; among {agents} robots it must be from 0 to {agents - 1}")
     graph = uniform(agents, round(agents * degree / 2), str(float(degree)), connected=connected)

@@ -16,6 +16,11 @@ from robochoc.model.expression import Apply, Constant, Expression
 from robochoc.model.problem import Constraint
 
 MAX_AGENTS = 1000
+"""The maximum of families that look at all pairs of robots, targets or meetings."""
+MAX_NODES = 1_000_000
+"""The maximum number of robots on a graph."""
+MAX_EDGES = 5_000_000
+"""The maximum number of constraints on a graph."""
 MAX_VALUES = 1000
 MAX_COST = 1_000_000
 MAX_CONSTRAINTS = 200_000

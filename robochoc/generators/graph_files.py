@@ -12,7 +12,7 @@ from itertools import chain
 from pathlib import Path
 
 from robochoc.formats import Diagnostic, InvalidInputError
-from robochoc.generators.draws import MAX_AGENTS
+from robochoc.generators.draws import MAX_NODES
 from robochoc.generators.graphs import Edge, Graph
 
 MAX_BYTES = 16 * 1024 * 1024
@@ -54,8 +54,8 @@ def read_graph(path: Path) -> Graph:
     except Exception as error:  # noqa: BLE001 - networkx raises what its parsers raise
         raise _invalid(path, "networkx cannot read it", f"it says: {error}") from None
     numbered = _numbered(nodes)
-    if not 1 <= len(nodes) <= MAX_AGENTS:
-        raise _invalid(path, f"a graph of {len(nodes)} nodes", f"it must have from 1 to {MAX_AGENTS}")
+    if not 1 <= len(nodes) <= MAX_NODES:
+        raise _invalid(path, f"a graph of {len(nodes)} nodes", f"it must have from 1 to {MAX_NODES}")
     for one, other in edges:
         if one == other:
             raise _invalid(path, f"the node {one!s:.100} is linked to itself", "a constraint is between two robots")

@@ -11,13 +11,14 @@ Each is drawn here and not by networkx, whose generators may draw otherwise from
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Iterable
+import heapq
+from collections.abc import Callable, Collection, Iterable, Iterator
 from dataclasses import dataclass
 from enum import StrEnum
 from math import isqrt
 from random import Random
 
-from robochoc.generators.draws import MAX_AGENTS, check_bounds, some
+from robochoc.generators.draws import MAX_EDGES, MAX_NODES, check_bounds, some
 
 MAX_GRAPH_DRAWS = 1000
 """The maximum number of graphs that are drawn to find a connected one."""
@@ -54,7 +55,12 @@ class Graph:
 
 
 def uniform(agents: int, edges: int, label: str, *, connected: bool = False) -> Graph:
-    """Return a graph of exactly so many `edges`, each choice as likely as any other; `connected`: drawn until it is."""
+    """Return a graph of exactly so many `edges`, each choice as likely as any other; `connected`: drawn until it is.
+
+    Raises:
+        ValueError: if there are more than `MAX_EDGES`.
+    """
+    check_bounds({"constraints": (edges, 0, MAX_EDGES)})
 
     def draw(chance: Random) -> list[Edge]:
         return random_graph(chance, agents, edges, connected=connected)
@@ -71,7 +77,8 @@ def scale_free(agents: int, links: int = 2) -> Graph:
     Raises:
         ValueError: if `links` is not from 1 to agents - 1.
     """
-    check_bounds({"agents": (agents, 2, MAX_AGENTS), "links": (links, 1, agents - 1)})
+    check_bounds({"agents": (agents, 2, MAX_NODES), "links": (links, 1, agents - 1)})
+    check_bounds({"constraints": (links * (agents - links), 1, MAX_EDGES)})
 
     def draw(chance: Random) -> list[Edge]:
         edges = []
@@ -104,8 +111,8 @@ def small_world(agents: int, neighbours: int = 4, rewiring: float = 0.1, *, conn
     Raises:
         ValueError: if `neighbours` is odd, or there are not so many others.
     """
-    check_bounds({"agents": (agents, 3, MAX_AGENTS), "neighbours": (neighbours, 2, agents - 1)})
-    check_bounds({"rewiring": (rewiring, 0, 1)})
+    check_bounds({"agents": (agents, 3, MAX_NODES), "neighbours": (neighbours, 2, agents - 1)})
+    check_bounds({"rewiring": (rewiring, 0, 1), "constraints": (agents * neighbours // 2, 1, MAX_EDGES)})
     if neighbours % 2:
         raise ValueError(f"neighbours is {neighbours}; it must be even: as many on either side of the ring")
 
@@ -123,8 +130,8 @@ def _rewired_ring(chance: Random, agents: int, neighbours: int, rewiring: float)
         near[other].add(node)
     for node, other in rings:
         if chance.random() < rewiring and len(near[node]) < agents - 1:
-            free = [one for one in range(agents) if one != node and one not in near[node]]
-            new = free[int(chance.random() * len(free))]
+            linked = sorted((node, *near[node]))
+            new = _other_than(linked, int(chance.random() * (agents - len(linked))))
             near[node].remove(other)
             near[other].remove(node)
             near[node].add(new)
@@ -132,10 +139,19 @@ def _rewired_ring(chance: Random, agents: int, neighbours: int, rewiring: float)
     return [(node + 1, other + 1) for node in range(agents) for other in sorted(near[node]) if node < other]
 
 
+def _other_than(taken: Iterable[int], place: int) -> int:
+    """Return the number at `place` among all from 0 that are not `taken`, which is in ascending order."""
+    for one in taken:
+        if one > place:
+            break
+        place += 1
+    return place
+
+
 def grid(rows: int, columns: int, *, torus: bool = False) -> Graph:
     """Return a grid, numbered row by row. In a `torus` the last row is next to the first one, and so are columns."""
-    check_bounds({"rows": (rows, 1, MAX_AGENTS), "columns": (columns, 1, MAX_AGENTS)})
-    check_bounds({"agents": (rows * columns, 1, MAX_AGENTS)})
+    check_bounds({"rows": (rows, 1, MAX_NODES), "columns": (columns, 1, MAX_NODES)})
+    check_bounds({"agents": (rows * columns, 1, MAX_NODES)})
     edges = grid_edges(rows, columns, torus=torus)
     return Graph(rows * columns, f"{'torus' if torus else 'grid'}{rows}x{columns}", lambda _: list(edges))
 
@@ -159,7 +175,7 @@ def nearest_to_a_square(agents: int) -> int:
 
 def tree(agents: int) -> Graph:
     """Return a tree: agents - 1 edges."""
-    check_bounds({"agents": (agents, 1, MAX_AGENTS)})
+    check_bounds({"agents": (agents, 1, MAX_NODES)})
 
     def draw(chance: Random) -> list[Edge]:
         sequence = [int(chance.random() * agents) + 1 for _ in range(agents - 2)]
@@ -175,14 +191,13 @@ def _tree_of(sequence: list[int], agents: int) -> list[Edge]:
     for node in sequence:
         missing[node] += 1
     edges = []
-    waiting = {node for node in range(1, agents + 1) if not missing[node]}
+    waiting = [node for node in range(1, agents + 1) if not missing[node]]  # ascending, so it is a heap
     for node in sequence:
-        leaf = min(waiting)
-        waiting.remove(leaf)
+        leaf = heapq.heappop(waiting)
         edges.append((min(leaf, node), max(leaf, node)))
         missing[node] -= 1
         if not missing[node]:
-            waiting.add(node)
+            heapq.heappush(waiting, node)
     if agents > 1:
         one, other = sorted(waiting)
         edges.append((one, other))
@@ -200,9 +215,17 @@ def random_graph(chance: Random, agents: int, count: int, *, connected: bool = F
 
 def _edges(chance: Random, agents: int, count: int) -> list[Edge]:
     """Return `count` pairs of robots, in ascending order."""
-    chosen = set(some(chance, agents * (agents - 1) // 2, count))
-    pairs = ((higher, lower) for higher in range(1, agents) for lower in range(higher + 1, agents + 1))
-    return [pair for place, pair in enumerate(pairs) if place in chosen]
+    return list(_pairs_at(some(chance, agents * (agents - 1) // 2, count), agents))
+
+
+def _pairs_at(places: Iterable[int], agents: int) -> Iterator[Edge]:
+    """Yield the pairs at `places`, ascending, in the list of all pairs of robots in ascending order."""
+    higher, first = 1, 0
+    for place in places:
+        while place - first >= agents - higher:
+            first += agents - higher
+            higher += 1
+        yield higher, higher + 1 + place - first
 
 
 def _until_connected(draw: Callable[[], list[Edge]], agents: int, wanted: bool) -> list[Edge]:  # noqa: FBT001 - a fact

@@ -11,7 +11,7 @@ Couplings and fields are decimals: with p places, each multiple of 10**-p in its
 
 from __future__ import annotations
 
-from robochoc.generators.draws import MAX_AGENTS, MAX_COST, check_bounds, check_places, in_units, seeded, uniform
+from robochoc.generators.draws import MAX_COST, MAX_NODES, check_bounds, check_places, in_units, seeded, uniform
 from robochoc.generators.graphs import grid_edges
 from robochoc.model.assembly import assemble
 from robochoc.model.cost_units import CostUnits
@@ -38,8 +38,8 @@ def ising(
     Raises:
         ValueError: if a number is out of its bounds. The text says which.
     """
-    check_bounds({"rows": (rows, 2, MAX_AGENTS), "columns": (columns, 2, MAX_AGENTS)})
-    check_bounds({"rows x columns": (rows * columns, 4, MAX_AGENTS)})
+    check_bounds({"rows": (rows, 2, MAX_NODES), "columns": (columns, 2, MAX_NODES)})
+    check_bounds({"rows x columns": (rows * columns, 4, MAX_NODES)})
     check_bounds({"coupling": (coupling, 0, MAX_COST), "field": (field, 0, MAX_COST)})
     check_places(places)
     beta, rho = in_units(coupling, places), in_units(field, places)

@@ -25,7 +25,7 @@ import itertools
 from collections.abc import Mapping
 from random import Random
 
-from robochoc.generators.draws import MAX_AGENTS, MAX_COST, MAX_VALUES, check_bounds, check_places, seeded, some
+from robochoc.generators.draws import MAX_COST, MAX_NODES, MAX_VALUES, check_bounds, check_places, seeded, some
 from robochoc.generators.draws import uniform as any_of
 from robochoc.generators.graphs import Edge, Graph, uniform
 from robochoc.model.assembly import assemble
@@ -69,7 +69,7 @@ def random_csp(
         >>> len(list(random_csp(10, 3, 0.5, 0.33).constraints()))
         22
     """
-    check_bounds({"agents": (agents, 1, MAX_AGENTS), "domain": (domain, 1, MAX_VALUES), "density": (density, 0, 1)})
+    check_bounds({"agents": (agents, 1, MAX_NODES), "domain": (domain, 1, MAX_VALUES), "density": (density, 0, 1)})
     edges = round(density * (agents * (agents - 1) // 2))
     check_bounds({"tightness": (tightness, 0, 1)})
     _check_sizes(edges, domain, tightness, max_cost)

@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-import gc
 import io
 import os
 from collections.abc import Iterable, Iterator, Sequence
-from contextlib import contextmanager
 from dataclasses import dataclass
 from itertools import pairwise
 from math import isfinite
@@ -21,6 +19,7 @@ from robochoc.journal.entries import READ, Ended, Header, JournalEntry, JournalE
 from robochoc.journal.events import AnyEvent, Began
 from robochoc.model.outcome import Outcome
 from robochoc.system.decode_errors import describe_decode_error
+from robochoc.system.garbage import collection_paused
 
 MOST_ENTRIES = 30_000_000
 """`read_journal` keeps no more: about 10 million messages, of which each takes a kilobyte of memory."""
@@ -60,7 +59,7 @@ def read_journal(content: bytes) -> Journal:
     Raises:
         JournalError: where not even the header can be read.
     """
-    with _without_cycles():
+    with collection_paused():
         follower = Follower(io.BytesIO(content))
         lines = follower.read(MOST_ENTRIES)
         damage = follower.damage
@@ -336,16 +335,3 @@ class _Text:
         if not isfinite(entry.t):
             raise JournalDamagedError(f"{self.place}: its time is no number")
         return (entry,)
-
-
-@contextmanager
-def _without_cycles() -> Iterator[None]:
-    """Pause the cyclic garbage collector: it would visit millions of new entries again and again, and free none."""
-    if not gc.isenabled():
-        yield
-        return
-    gc.disable()
-    try:
-        yield
-    finally:
-        gc.enable()

@@ -98,6 +98,7 @@ class _Links:
         self._rank = {robot: place for place, robot in enumerate(variables)}
         self._held: list[tuple[str, set[str], Constraint]] = []
         self._parents: dict[str, set[str]] = {robot: set() for robot in variables}
+        self._children: dict[str, set[str]] = {robot: set() for robot in variables}
         self._shown: dict[tuple[str, str], set[str]] = defaultdict(set)
         self._with: dict[tuple[str, str], list[Constraint]] = defaultdict(list)
         self._parts: dict[tuple[str, frozenset[str]], Constraint] = {}
@@ -140,6 +141,7 @@ class _Links:
         """Make the two neighbours."""
         higher, lower = sorted((one, other), key=self._rank.__getitem__)
         self._parents[lower].add(higher)
+        self._children[higher].add(lower)
 
     def place(self) -> None:
         """Put every shared constraint under the lowest of its parents, as readers of the files see the order."""
@@ -154,7 +156,7 @@ class _Links:
 
     def children_of(self, robot: str) -> tuple[Child, ...]:
         """Return the children of `robot`, the highest first."""
-        names = [name for name in self._variables if robot in self._parents[name]]
+        names = sorted(self._children[robot], key=self._rank.__getitem__)
         own = [variable.name for variable in self._variables[robot]]
         return tuple(
             Child(

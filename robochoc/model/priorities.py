@@ -52,8 +52,10 @@ def priority_order(parents: Mapping[str, Iterable[str]]) -> tuple[str, ...]:
 def _a_cycle(waiting: Mapping[str, set[str]]) -> list[str]:
     """Walk up through robots that wait for a parent; where the walk meets itself is a cycle."""
     walk = [min(waiting, key=natural_key)]
+    place = {walk[0]: 0}
     while True:
-        above = min(waiting[walk[-1]] & waiting.keys(), key=natural_key)
-        if above in walk:
-            return walk[walk.index(above) :][::-1]
+        above = min((name for name in waiting[walk[-1]] if name in waiting), key=natural_key)
+        if above in place:
+            return walk[place[above] :][::-1]
+        place[above] = len(walk)
         walk.append(above)

@@ -25,7 +25,7 @@ def equip(protocol: Protocol, given: Mapping[str, str]) -> None:
 def settings_of(protocol: type[Protocol], given: Mapping[str, str]) -> Settings:
     """Return the settings of `protocol`: the `given` ones, and defaults for the others. Raises `SettingsError`."""
     known = type(protocol.settings)
-    names = [field.name for field in msgspec.structs.fields(known)]
+    names = known.__struct_fields__
     for name in given:
         if name not in names:
             there = f"it has {', '.join(names)}" if names else "it has no settings"

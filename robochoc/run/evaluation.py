@@ -18,6 +18,7 @@ from robochoc.model.problem import ProblemKind, Team
 from robochoc.run.incumbent import best_known, lower_bound, merged_values, pseudo_tree, robots_without_values
 from robochoc.run.withdrawal import Phase
 from robochoc.solver.compiled_team import CompiledTeam
+from robochoc.system.garbage import collection_paused
 from robochoc.verification.checker import RefutedError, assignment_cost, needlessly_withdrawn, violations
 
 
@@ -162,6 +163,7 @@ def is_proven(phase: Phase, result: RunResult) -> bool:
     return result.verdict is Verdict.SOLUTION and (phase.traits.complete or not phase.traits.costs)
 
 
+@collection_paused()
 def check_with_files(phase: Phase, result: RunResult, team: Team, compiled: CompiledTeam) -> CheckedAssignment | None:
     """Return what a search has found, checked against every constraint of every file.
 

@@ -46,6 +46,7 @@ class SessionRequest:
         observer: Gets all events.
         progress: Gets the number of messages so far, now and then.
         kills: The robots whose processes are to be killed.
+        deadline: When the time of the run is over, on the monotonic clock. None: without a limit.
     """
 
     protocol: type[Protocol]
@@ -55,6 +56,7 @@ class SessionRequest:
     observer: Observer | None = None
     progress: Callable[[Progress], None] | None = None
     kills: KillSchedule | None = None
+    deadline: float | None = None
 
     @property
     def common(self) -> CommonArguments:
@@ -110,7 +112,8 @@ def open_simulator(request: SessionRequest) -> Session:
 
     options = request.options
     limits = EffortLimits(options.ncccs, options.cycles)
-    return Simulation(request.team, request.protocol, _schedule_of(options), limits=limits, **request.common)
+    schedule, deadline = _schedule_of(options), request.deadline
+    return Simulation(request.team, request.protocol, schedule, limits=limits, deadline=deadline, **request.common)
 
 
 def _schedule_of(options: Options) -> Schedule:

@@ -176,7 +176,14 @@ class ThisMachine(Deployment):
         """Open a session of the phase's protocol."""
         context = self._context
         request = SessionRequest(
-            phase.protocol, compiled, phase.parameters, self.options, context.observer, context.progress, context.kills
+            phase.protocol,
+            compiled,
+            phase.parameters,
+            self.options,
+            context.observer,
+            context.progress,
+            context.kills,
+            context.deadline,
         )
         return open_session(request)
 

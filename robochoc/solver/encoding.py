@@ -10,12 +10,14 @@ from __future__ import annotations
 
 import itertools
 import math
+import weakref
 from collections import defaultdict
 from collections.abc import Callable, Hashable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
-from robochoc.model.expression import UndefinedValueError, compile_expression
+from robochoc.model.expression import UndefinedValueError
 from robochoc.model.expression.bounds import ANY_INTEGER, bounds
+from robochoc.model.expression.closures import Closure, compile_expression
 from robochoc.model.problem import INFINITE, Constraint, Function, Predicate, Relation, Semantics, Variable
 from robochoc.solver.splitting import MAX_TRIED, split
 
@@ -164,7 +166,7 @@ def is_soft(constraint: Constraint) -> bool:
 def _truth_on(constraint: Constraint, predicate: Predicate, names: Sequence[str]) -> Callable[[Sequence[int]], bool]:
     """Return whether the predicate of `constraint` is true of values of `names`; where it is undefined, it is not."""
     arguments = _arguments(constraint, names)
-    body = compile_expression(predicate.body, predicate.parameters)
+    body = _body(predicate)
 
     def holds(values: Sequence[int]) -> bool:
         try:
@@ -178,7 +180,7 @@ def _truth_on(constraint: Constraint, predicate: Predicate, names: Sequence[str]
 def _cost_on(constraint: Constraint, function: Function, names: Sequence[str]) -> Callable[[Sequence[int]], float]:
     """Return the cost of values of `names`; where the function is undefined, it is `INFINITE`."""
     arguments = _arguments(constraint, names)
-    body = compile_expression(function.body, function.parameters)
+    body = _body(function)
 
     def cost(values: Sequence[int]) -> float:
         try:
@@ -187,6 +189,19 @@ def _cost_on(constraint: Constraint, function: Function, names: Sequence[str]) -
             return INFINITE
 
     return cost
+
+
+_bodies: dict[int, tuple[weakref.ref[Predicate | Function], Closure]] = {}
+"""Compiled bodies, by the `id` of what they are of. To hash an expression would take as long as to look at it."""
+
+
+def _body(definition: Predicate | Function) -> Closure:
+    """Return the body of `definition` as a function: one for all constraints, and all robots, that have it."""
+    key = id(definition)
+    if key not in _bodies:
+        body = compile_expression(definition.body, definition.parameters)
+        _bodies[key] = weakref.ref(definition, lambda _: _bodies.pop(key, None)), body
+    return _bodies[key][1]
 
 
 def _arguments(constraint: Constraint, names: Sequence[str]) -> Callable[[Sequence[int]], list[int]]:

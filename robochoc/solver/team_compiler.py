@@ -49,6 +49,7 @@ class TeamCompiler:
         stage: Callable[[str], None],
     ) -> None:
         self._compiler = partial(Compiler, limits, cache, deadline, solver)
+        self._deadline = deadline
         self._stage = stage
 
     def compile(self, team: Team, *, every: bool = False) -> CompiledTeam:
@@ -64,10 +65,13 @@ class TeamCompiler:
         def compile_robot(robot: Robot) -> CompiledDomain:
             nonlocal solved
             self._stage(f"compiling {robot.name} ({next(number)} of {len(team.robots)})")
+            late = OutOfTimeError(f"the time (--timeout) was over while {robot.name} was compiled")
+            if self._deadline is not None and time.monotonic() >= self._deadline:
+                raise late
             try:
                 compilation = compiler.compile(robot)
             except SolverTimeoutError:
-                raise OutOfTimeError(f"the time (--timeout) was over while {robot.name} was compiled") from None
+                raise late from None
             solved = solved or compilation.source is not CompiledFrom.DIRECT
             if not (compilation.domain.values or every):
                 raise NoLocalSolutionError(robot.name)

@@ -31,6 +31,8 @@ class Objective:
         self._withdrawal_cost = withdrawal_cost
         self._constraints = [(c.variables, cost_function(c, c.variables)) for c in team.constraints()]
         self._paid: list[float] = [0] * len(self._constraints)
+        self._sum: float = 0
+        self._broken = 0
         self._on: dict[str, list[int]] = {name: [] for name in team.variables}
         self.interfaces = {robot.name: robot.interface for robot in team.robots}
         self._variables = {robot.name: [variable.name for variable in robot.variables] for robot in team.robots}
@@ -38,9 +40,10 @@ class Objective:
             for name in names:
                 self._on[name].append(number)
             if not names:
-                self._paid[number] = price(())
+                self._pay(number, price(()))
         self._values: dict[str, int] = {}
         self._absent = set(self._weights)
+        self._weight = sum(self._weights.values())
 
     def change(self, own: Mapping[str, Mapping[str, int]]) -> None:
         """Set the values of some robots to `own`."""
@@ -50,11 +53,22 @@ class Objective:
                 self._values.pop(name, None)
                 touched.update(dict.fromkeys(self._on[name]))
             self._values.update(values)
-            (self._absent.discard if values else self._absent.add)(robot)
+            if bool(values) is (robot in self._absent):
+                self._weight += -self._weights[robot] if values else self._weights[robot]
+                self._absent ^= {robot}
         for number in touched:
             names, price = self._constraints[number]
             known = all(name in self._values for name in names)
-            self._paid[number] = price([self._values[name] for name in names]) if known else 0
+            self._pay(number, price([self._values[name] for name in names]) if known else 0)
+
+    def _pay(self, number: int, cost: float) -> None:
+        """Set what a constraint costs. The sum goes along: costs are integers, and infinite ones are counted."""
+        for paid, sign in ((self._paid[number], -1), (cost, 1)):
+            if paid == INFINITE:
+                self._broken += sign
+            else:
+                self._sum += sign * paid
+        self._paid[number] = cost
 
     def shown(self, values: Mapping[str, Value]) -> dict[str, dict[str, int]] | None:
         """Return what `values`, as neighbours see them, say of each robot's variables; None if they cannot be those."""
@@ -68,9 +82,9 @@ class Objective:
     @property
     def cost(self) -> float:
         """The cost of the present assignment."""
-        if self._absent and self._withdrawal_cost is None:
+        if self._broken or (self._absent and self._withdrawal_cost is None):
             return INFINITE
-        return sum(self._paid) + sum(self._weights[name] for name in self._absent) * (self._withdrawal_cost or 0)
+        return self._sum + self._weight * (self._withdrawal_cost or 0)
 
     def told(self, cost: float) -> Cost:
         """Return `cost`, which includes withdrawal costs, in the user's numbers."""

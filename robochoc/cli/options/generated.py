@@ -17,6 +17,8 @@ if TYPE_CHECKING:
     from robochoc.model.problem import Team
 
 MAX = 1000
+MAX_NODES = 1_000_000
+"""As `generators/draws.py` has it, which is not imported at the start."""
 Options = dict[str, Any]
 Command = Callable[..., None]
 
@@ -99,7 +101,7 @@ def graph_options(command: Command) -> Command:
     """Add the options of constraint graphs, which `graph_of` takes out again."""
     for option in reversed(
         (
-            click.option("--agents", type=click.IntRange(1, MAX), metavar="N", help="Number of robots."),
+            click.option("--agents", type=click.IntRange(1, MAX_NODES), metavar="N", help="Number of robots."),
             click.option(
                 "--graph",
                 default="random",

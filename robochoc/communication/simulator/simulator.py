@@ -11,8 +11,9 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 from robochoc.communication.host import Host
+from robochoc.communication.resources import garbage_frozen
 from robochoc.communication.run_result import Progress, RunResult
-from robochoc.communication.session import Epoch, Session
+from robochoc.communication.session import Epoch, Session, over
 from robochoc.communication.simulator.schedule import Schedule
 from robochoc.journal.events import Observer
 from robochoc.model.message import Envelope
@@ -21,6 +22,8 @@ from robochoc.model.problem import Team
 from robochoc.protocols.protocol import Protocol
 from robochoc.solver.agent_problem import DEFAULT_PARAMETERS, AgentProblem, RunParameters
 from robochoc.solver.compiled_team import CompiledTeam
+from robochoc.solver.team_compiler import OutOfTimeError
+from robochoc.system.garbage import collection_paused
 
 PROGRESS_EVERY = 256
 """Packets between two reports of progress."""
@@ -53,6 +56,10 @@ class Simulation(Session):
         progress: Receives the count of messages now and then.
         parameters: What robots are given besides the problem.
         limits: On what the searches take. They are looked at after each packet.
+        deadline: When the time of the run is over, on the monotonic clock.
+
+    Raises:
+        OutOfTimeError: when the deadline comes before all robots are set up; `change` as well.
     """
 
     def __init__(
@@ -65,6 +72,7 @@ class Simulation(Session):
         progress: Callable[[Progress], None] | None = None,
         parameters: RunParameters = DEFAULT_PARAMETERS,
         limits: EffortLimits = NO_LIMITS,
+        deadline: float | None = None,
     ) -> None:
         super().__init__(team)
         self._protocol = protocol
@@ -72,12 +80,14 @@ class Simulation(Session):
         self._observer = observer
         self._progress = progress
         self._limits = limits
+        self._deadline = deadline
         self._lossless = True
-        self._checks = self._ncccs = 0
+        self._checks = self._ncccs = self._sent = 0
         self._verdict: Verdict | None = None
         self._witness: str | None = None
-        parts = Epoch(self.compiled, parameters=parameters).parts(protocol)
-        self._hosts = {name: self._host(part) for name, part in parts.items()}
+        with collection_paused():
+            parts = Epoch(self.compiled, parameters=parameters).parts(protocol)
+            self._hosts = {name: self._host(part) for name, part in parts.items()}
 
     @property
     def lossless(self) -> bool:
@@ -88,7 +98,8 @@ class Simulation(Session):
         """See `Session.search`; a limit on messages is looked at after each packet."""
         began = time.monotonic()
         if self._verdict is None:
-            self._play(began, timeout, messages)
+            with garbage_frozen():  # robots' problems are none, and they are most of what there is
+                self._play(began, timeout, messages)
         simulated_s, cycles = self._schedule.elapsed_s, self._schedule.cycles
         self._schedule.clear()
         result = RunResult.of(
@@ -107,11 +118,12 @@ class Simulation(Session):
         """See `Session.change`."""
         self.compiled = epoch.compiled
         self._verdict = self._witness = None
-        self._ncccs = 0
+        self._ncccs = self._sent = 0
         before = self._hosts
         self._hosts = {}
         for name, part in epoch.parts(self._protocol).items():
             if name in before and name not in epoch.restarted:
+                self._check_time(name)
                 self._hosts[name] = before[name]
                 before[name].change(part, epoch.invalidated)
                 self._note_verdict(before[name])
@@ -121,7 +133,13 @@ class Simulation(Session):
     def close(self) -> None:
         """Do nothing: there is nothing to release."""
 
+    def _check_time(self, name: str) -> None:
+        """Raise `OutOfTimeError` if the time was over before the robot `name` could be set up."""
+        if over(self._deadline):
+            raise OutOfTimeError(f"the time (--timeout) was over before {name} knew its problem")
+
     def _host(self, part: AgentProblem) -> Host:
+        self._check_time(part.robot.name)
         host = Host.of(self._protocol, part)
         if self._observer:
             host.observe(self._observer, lambda: self._time(host.checks), self._time)
@@ -138,14 +156,14 @@ class Simulation(Session):
             elapsed_s = time.monotonic() - began
             if timeout is not None and elapsed_s > timeout:
                 return
-            if messages is not None and self._sent() >= messages:
+            if messages is not None and self._sent >= messages:
                 return
             if self._limits.ncccs is not None and self._ncccs >= self._limits.ncccs:
                 return
             if self._limits.cycles is not None and self._schedule.next_cycle > self._limits.cycles:
                 return
             if self._progress and packets % PROGRESS_EVERY == 0:
-                self._progress(Progress(self._sent(), elapsed_s))
+                self._progress(Progress(self._sent, elapsed_s))
             packet = self._schedule.get()
             if not packet:
                 self._verdict, self._lossless = Verdict.SOLUTION, True
@@ -158,6 +176,7 @@ class Simulation(Session):
     def _send(self, host: Host, envelopes: Sequence[Envelope]) -> None:
         """Send what `host` has said in its step on its way."""
         schedule, before = self._schedule, self._checks
+        self._sent += len(envelopes)
         for envelope, checks in zip(envelopes, host.said_at, strict=True):
             schedule.put(envelope, checks - before)
         clock = host.clock
@@ -173,9 +192,6 @@ class Simulation(Session):
         verdict = host.protocol.verdict
         if verdict is not None:
             self._verdict, self._witness = verdict, host.name
-
-    def _sent(self) -> int:
-        return sum(sum(host.sent.values()) for host in self._hosts.values())
 
 
 def _left(limits: EffortLimits, spent: Metrics) -> EffortLimits:

@@ -9,6 +9,7 @@ from random import Random
 import pytest
 
 from robochoc.formats import InvalidInputError
+from robochoc.generators import graph_files
 from robochoc.generators.graph_files import MAX_BYTES, read_graph
 from robochoc.generators.random_csp import random_on
 from tests.support.binary_problems import edges_of
@@ -62,7 +63,6 @@ def test_a_label_is_a_name_that_a_folder_can_have(tmp_path: Path) -> None:
         ("town.gml", "\0\0", "networkx cannot read it"),
         ("town.edgelist", "a\n", "a graph of 0 nodes"),
         ("town.edgelist", "a a\n", "the node a is linked to itself"),
-        ("town.edgelist", "\n".join(f"{one} {one + 1}" for one in range(1001)), "a graph of 1002 nodes"),
         ("town.graphml", "<!DOCTYPE a [<!ENTITY b 'c'>]>" + GRAPHML, "it defines entities"),
         ("town.edges", " " * (MAX_BYTES + 1), "it is too large"),
     ],
@@ -74,6 +74,16 @@ def test_what_is_no_graph_has_one_message(name: str, content: str, said: str, tm
         read_graph(tmp_path / name)
     assert said in str(refused.value)
     assert len(str(refused.value).splitlines()) == 1
+
+
+def test_a_graph_of_too_many_nodes_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    pytest.importorskip("networkx")
+    monkeypatch.setattr(graph_files, "MAX_NODES", 3)
+    (tmp_path / "town.edgelist").write_text("1 2\n2 3\n")
+    assert read_graph(tmp_path / "town.edgelist").agents == 3
+    (tmp_path / "town.edgelist").write_text("1 2\n2 3\n3 4\n")
+    with pytest.raises(InvalidInputError, match="a graph of 4 nodes"):
+        read_graph(tmp_path / "town.edgelist")
 
 
 def test_without_networkx_one_line_says_how_to_get_it(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

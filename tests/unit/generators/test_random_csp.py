@@ -103,7 +103,8 @@ def test_connected_keeps_a_graph_that_is() -> None:
     ("problem", "said"),
     [
         ((0, 3, 0.5, 0.5), "agents is 0"),
-        ((1001, 3, 0.5, 0.5), "agents is 1001"),
+        ((1_000_001, 3, 0.5, 0.5), "agents is 1000001"),
+        ((10_000, 3, 1, 0), "constraints is 49995000"),
         ((3, 0, 0.5, 0.5), "domain is 0"),
         ((3, 3, -0.1, 0.5), "density is -0.1; it must be from 0 to 1"),
         ((3, 3, 1.1, 0.5), "density is 1.1"),

@@ -68,8 +68,7 @@ REAL = {
         "Ok",
     ): "Robot1.1 says: my assignment number 2 stands from now on; it leaves Robot1.2 0 values of its domain",
     ("disfc", "Nogood"): (
-        "Robot3.3 says: as long as Robot2.3 keeps its assignment number 9,"
-        " Robot3.2 cannot keep its assignment number 17"
+        "Robot3.3 says: as long as Robot2.3 keeps its assignment number 1, Robot3.2 cannot keep its assignment number 3"
     ),
     ("disfc", "AddLink"): "Robot3.1 says: tell me of each new assignment of yours from now on",
     ("afc", "CPA"): "Robot1.2 says: so far V1.1 = 3 and V1.2 = 1; it is Robot1.3's turn",
@@ -86,13 +85,13 @@ REAL = {
     ("adopt", "Wave"): "RX03 says: RX00, which has 3 neighbours, wants to be the root",
     ("adopt", "Token"): "RX02 says: you are my child in the tree, which holds RX00, RX02 and RX01 already",
     ("adopt", "Back"): "RX01 says: all below me are in the tree, which holds RX00, RX02 and RX01 by now",
-    ("adopt", "Value"): "RX02 says: X02 = 1 from now on (change 23)",
+    ("adopt", "Value"): "RX03 says: X03 = 3 from now on (change 30)",
     ("adopt", "Cost"): "RX03 says: as long as X02 = -3 and X00 = 5, my subtree costs between 0 and 10",
-    ("adopt", "Threshold"): ("RX02 says: as long as X00 = -3, your subtree may cost 19 before you try other values"),
+    ("adopt", "Threshold"): ("RX02 says: as long as X00 = -3, your subtree may cost 11 before you try other values"),
     ("adopt", "Terminate"): "RX02 says: all above you have taken their last values: X00 = -3 and X02 = 1",
-    ("bnb-adopt", "Value"): "RX02 says: X02 = 1 from now on (change 18); your subtree may cost 8 then",
+    ("bnb-adopt", "Value"): "RX03 says: X03 = 3 from now on (change 20); your subtree may cost 3 then",
     ("bnb-adopt", "Cost"): (
-        "RX03 says: as long as X02 = 3 and X00 = 5, my subtree costs between 0 and 10; tell me my threshold again"
+        "RX03 says: as long as X02 = 1 and X00 = 3, my subtree costs between 0 and 9; tell me my threshold again"
     ),
     ("dpop", "Domain"): "RX00 says: X00 is -3, 0, 3 or 5",
     ("dpop", "Dimensions"): (
