@@ -24,12 +24,14 @@ from robochoc.protocols.settings import equip
 from robochoc.solver.agent_problem import DEFAULT_PARAMETERS, AgentProblem, RunParameters
 from robochoc.solver.compiled import LocalProblem
 from robochoc.solver.explanation import Invalidated
+from robochoc.system.compiling import mypyc_attr
 
 
 class BadMessageError(Exception):
     """The bytes of an envelope are no message of the protocol."""
 
 
+@mypyc_attr(allow_interpreted_subclasses=True)
 class Host:
     """Drives one robot's protocol object."""
 

@@ -55,7 +55,7 @@ Choices that the papers leave open, and differences:
 
 from __future__ import annotations
 
-from typing import assert_never, cast
+from typing import Any, ClassVar, assert_never, cast
 
 from robochoc.model.message import Message, Value
 from robochoc.model.outcome import Verdict
@@ -65,8 +65,10 @@ from robochoc.protocols.nogood import contradicts
 from robochoc.protocols.order import PriorityOrder
 from robochoc.protocols.traits import ENDS_WITH_PROOF, Traits
 from robochoc.solver.compiled import LocalProblem
+from robochoc.system.compiling import mypyc_attr
 
 
+@mypyc_attr(allow_interpreted_subclasses=True)
 class CurrentOrder(PriorityOrder):
     """The newest order that a robot knows."""
 
@@ -89,6 +91,7 @@ class CurrentOrder(PriorityOrder):
         return Order(tuple(names), (*kept, (count + 1, by)))
 
 
+@mypyc_attr(allow_interpreted_subclasses=True)
 class ABTDORetro(Backtracking):
     """One agent of ABT_DO-Retro. State: `view` (Agent_view), `store`, `order`, and `left`.
 
@@ -98,8 +101,8 @@ class ABTDORetro(Backtracking):
     - `owed`: robots that must be sent the value after the packet, even if it has not changed.
     """
 
-    messages = Ok | Nogood | Order | AddLink
-    traits = Traits(
+    messages: ClassVar[Any] = Ok | Nogood | Order | AddLink
+    traits: ClassVar[Traits] = Traits(
         concludes=ENDS_WITH_PROOF,
         paper="Zivan & Meisels 2006; Zivan et al. 2009",
         shared_scopes=True,

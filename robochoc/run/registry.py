@@ -123,8 +123,11 @@ def _fault(loaded: object) -> str:
     """Return why `loaded` cannot be used as a protocol; empty if it can."""
     if not (isinstance(loaded, type) and issubclass(loaded, Protocol)):
         return "is no subclass of Protocol"
-    if loaded.__abstractmethods__:
-        return f"does not define {' and '.join(sorted(loaded.__abstractmethods__))}"
+    # Methods of a compiled class are never marked as abstract.
+    missing = {name for name in ("start", "receive") if getattr(loaded, name) is getattr(Protocol, name)}
+    missing.update(getattr(loaded, "__abstractmethods__", ()))
+    if missing:
+        return f"does not define {' and '.join(sorted(missing))}"
     if not hasattr(loaded, "messages"):
         return "does not declare its messages"
     declared: tuple[object, object] = (loaded.traits, loaded.settings)

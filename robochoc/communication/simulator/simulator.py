@@ -23,6 +23,7 @@ from robochoc.protocols.protocol import Protocol
 from robochoc.solver.agent_problem import DEFAULT_PARAMETERS, AgentProblem, RunParameters
 from robochoc.solver.compiled_team import CompiledTeam
 from robochoc.solver.team_compiler import OutOfTimeError
+from robochoc.system.compiling import mypyc_attr
 from robochoc.system.garbage import collection_paused
 
 PROGRESS_EVERY = 256
@@ -45,6 +46,7 @@ class EffortLimits:
 NO_LIMITS = EffortLimits()
 
 
+@mypyc_attr(allow_interpreted_subclasses=True)
 class Simulation(Session):
     """One team in this thread.
 
