@@ -57,11 +57,12 @@ def attributes_of(thing: object) -> Mapping[str, Any]:
 
 def docstring(module: ModuleType) -> str:
     """Return the docstring of a module; of a compiled one, which has none, that of its source."""
-    if module.__doc__ is not None or module.__file__ is None or not module.__file__.endswith(tuple(EXTENSION_SUFFIXES)):
+    file = getattr(module, "__file__", None) or ""
+    if module.__doc__ or not file.endswith(tuple(EXTENSION_SUFFIXES)):
         return module.__doc__ or ""
     import ast  # noqa: PLC0415 - start-up
 
-    return ast.get_docstring(ast.parse(_source(module.__file__).read_text(encoding="utf-8"))) or ""
+    return ast.get_docstring(ast.parse(_source(file).read_text(encoding="utf-8"))) or ""
 
 
 def _source(compiled: str) -> Path:
