@@ -1,4 +1,4 @@
-"""Solve the 3-colouring problem with raven-csp: `raven_once.py ALGORITHM sim|mp EDGES`, edges as JSON.
+"""Solve a problem with raven-csp: `raven_once.py ALGORITHM sim|mp FILE`, a JSON file of `peer_problems.py`.
 
 Runs in the peer's own Python, which has raven-csp and sympy installed, and no robochoc.
 """
@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import json
 import sys
+from pathlib import Path
 
 from csp.core import CSP  # type: ignore[import-not-found]
 from dcsp.api import run_distributed_search  # type: ignore[import-not-found]
@@ -14,14 +15,22 @@ from dcsp.api import run_distributed_search  # type: ignore[import-not-found]
 
 def main() -> None:
     """Build the problem, search, and print the answer and the count of messages as JSON."""
-    graph = json.loads(sys.argv[3])
+    told = json.loads(Path(sys.argv[3]).read_text())
     problem = CSP()
-    for agent in sorted({agent for edge in graph for agent in edge}):
-        problem.add_variable(f"v{agent}", {0, 1, 2})
-    for i, j in graph:
-        problem.add_constraint(f"c{i}_{j}", f"v{i} != v{j}")
+    for name, values in told["domains"].items():
+        problem.add_variable(name, set(values))
+    for number, (scope, forbidden) in enumerate(told["constraints"]):
+        problem.add_constraint_explicit(f"c{number}", _expression(scope, forbidden), scope)
     result = run_distributed_search(sys.argv[1], problem, runtime=sys.argv[2])
     print(json.dumps({"solved": result.satisfiable, "messages": result.metrics.get("messages_sent")}))
+
+
+def _expression(scope: list[str], forbidden: list[list[int]]) -> str:
+    """An expression over the variables: the shortest that raven-csp, which evaluates it each time, can be given."""
+    pairs = {tuple(pair) for pair in forbidden}
+    if pairs and all(len(set(pair)) == 1 for pair in pairs):
+        return " != ".join(scope)
+    return f"({', '.join(scope)}) not in {pairs or '()'}"
 
 
 if __name__ == "__main__":

@@ -12,17 +12,24 @@ Row = tuple[str, ...]
 
 @dataclass(frozen=True)
 class Section:
-    """One part's results. `notes` say what the figures are; the first row is the head of the table."""
+    """One part's results. `notes` say what the figures are; the first row is the head of the table.
+
+    `captions` are of the tables, in their order; a section of one table needs none.
+    """
 
     part: str
     title: str
     notes: str
     tables: tuple[Sequence[Row], ...]
+    captions: tuple[str, ...] = ()
 
     def __str__(self) -> str:
         """Title, how to repeat it, notes, tables."""
         blocks = [f"## {self.title}", f"Repeat: `python benchmarks/run.py {self.part}`", self.notes]
-        return "\n\n".join([*blocks, *map(table, self.tables)])
+        for number, rows in enumerate(self.tables):
+            blocks += [f"### {caption}" for caption in self.captions[number : number + 1]]
+            blocks.append(table(rows))
+        return "\n\n".join(blocks)
 
 
 def table(rows: Sequence[Row]) -> str:

@@ -30,7 +30,6 @@ from report import Section, machine
 
 PARTS: dict[str, Callable[[], Section]] = {
     "whole": command_time.measured,
-    "peers": peers.measured,
     "startup": start_up.measured,
     "transport": transport.measured,
     "flagship": flagship.measured,
@@ -40,6 +39,8 @@ PARTS: dict[str, Callable[[], Section]] = {
     "flight": flight.measured,
 }
 LONG: dict[str, Callable[[], Section]] = {
+    "peers": peers.measured,
+    "peers_costs": peers.measured_costs,
     "network": network.measured,
     "sniffer": sniffer.measured,
 }

@@ -9,7 +9,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from typing import Self
+from functools import cache
+from typing import Self, cast
 
 import msgspec
 
@@ -55,7 +56,7 @@ class Host:
         self._stamps: list[int] = []
         self._answers = self._step_began = 0
         self._begun = False
-        self._decode: Callable[[bytes], Message] = msgspec.msgpack.Decoder(protocol.messages).decode
+        self._decode: Callable[[bytes], Message] = message_decoder(protocol.messages).decode
         self._checks = 0
         self._reported: tuple[int | None, Verdict | None] = (None, None)
         self._heard: float = math.inf
@@ -237,6 +238,12 @@ class Host:
             observer(Decided(t=self._now(), robot=self.name, assignment=assignment, clock=self.clock))
         if state[1] is not None and state[1] is not verdict:
             observer(Concluded(t=self._now(), robot=self.name, verdict=str(state[1])))
+
+
+@cache
+def message_decoder(messages: object) -> msgspec.msgpack.Decoder[Message]:
+    """Return the decoder of a protocol's `messages`. It is made once: that takes longer than to decode a few."""
+    return msgspec.msgpack.Decoder(cast("type[Message]", messages))
 
 
 def _order_of(part: AgentProblem) -> PriorityOrder:

@@ -57,13 +57,15 @@ class Account:
         there = f"{len(rows):,} of {count:,} runs are there" if len(rows) < count else f"{count:,} runs"
         problems, ways = len({row["digest"] for row in rows if row["digest"]}), len(summary.labels(rows))
         yield f"{there}: {problems:,} problems, {ways} ways to run."
-        simulated = all(row["runtime"] == "simulator" for row in rows)
+        runtimes = {row["runtime"] for row in rows}
+        simulated = runtimes <= {"simulator", "arrays"}
         exact = simulated and _OF_MACHINES.isdisjoint(self.metrics)
         machines, versions = (sorted({row[name] for row in rows if row[name]}) for name in ("machine", "version"))
         where = "" if exact else f" on {'; '.join(machines)}"
         yield f"robochoc {', '.join(versions)}{where}."
         if simulated:
-            yield "All runs were in the simulator: counts are exact, and the same wherever they are repeated."
+            where = "in the simulator or in arrays" if "arrays" in runtimes else "in the simulator"
+            yield f"All runs were {where}: counts are exact, and the same wherever they are repeated."
         checked = sum(row["verified"] for row in rows)
         told = f"The answers of {checked:,} runs were checked against every constraint"
         if self.stopped:

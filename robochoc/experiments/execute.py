@@ -24,7 +24,7 @@ from robochoc.model.cost_units import Cost, common_units
 from robochoc.model.outcome import Outcome, Verdict
 from robochoc.model.problem import ProblemKind, Team
 from robochoc.run.distributed import FOUND_NOTHING, GAVE_UP
-from robochoc.run.options import CENTRAL
+from robochoc.run.options import CENTRAL, Runtime
 from robochoc.run.orchestrator import solve
 from robochoc.run.registry import UnknownProtocolError
 from robochoc.solver.ace import AceProcess
@@ -84,7 +84,8 @@ class Bench(AbstractContextManager["Bench"]):
         cpu = time.process_time()
         options = options_of(task.setup, task.limits, task.seed)
         journal = journal_of(team, options) if Recording.JOURNAL in task.record else None
-        outcome = solve(team, options, observer=several(curve, loads, journal), solver=self._solver)
+        sent = curve.sent if curve and options.runtime is Runtime.ARRAYS else None
+        outcome = solve(team, options, observer=several(curve, loads, journal), progress=sent, solver=self._solver)
         row.cpu_s = None if task.is_timed else time.process_time() - cpu
         _fill(row, outcome, team)
         row.cost_over_time = curve.points() if curve else []

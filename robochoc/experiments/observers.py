@@ -6,6 +6,7 @@ from collections import Counter
 from collections.abc import Callable, Iterator
 from operator import itemgetter
 
+from robochoc.communication.run_result import Progress
 from robochoc.experiments.task import CostPoint, RobotLoad, Task, options_of
 from robochoc.journal.events import AnyEvent, Decided, Given, Heard, Improved, Observer, Sent
 from robochoc.journal.recorder import JournalRecorder, improvements
@@ -43,6 +44,10 @@ class CostOverTime:
                 self._seen.append((event.t, self._messages, self._clock, event))
             case _:
                 pass
+
+    def sent(self, progress: Progress) -> None:
+        """Take in how many messages have been sent, where no event tells each."""
+        self._messages = max(self._messages, progress.messages)
 
     def points(self) -> list[CostPoint]:
         """Return the moments, in their order. None where nothing is minimised."""

@@ -17,7 +17,7 @@ A list, or a range as in `ranges.py`, stands for each of its values; several sta
 from __future__ import annotations
 
 import tomllib
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -29,6 +29,7 @@ from robochoc.experiments.summary import METRICS, OF_RUNS
 from robochoc.experiments.table import MAX_INTEGER, Place
 from robochoc.experiments.task import Limits, ProblemSpec, Recording, Setup
 from robochoc.formats.diagnostics import invalid_input, shortened, suggestion
+from robochoc.run.options import Runtime
 from robochoc.system.decode_errors import describe_decode_error
 
 LARGEST_FILE = 2**20
@@ -151,7 +152,7 @@ def study_of(tables: Mapping[str, Any], place: Place) -> Study:
         problems=tuple(problems),
         setups=tuple((setup, seeds, limit) for setup, (_, seeds, limit) in zip(named, setups, strict=True)),
         repeat=repeat,
-        record=_recordings(tables.get("record", []), place),
+        record=_recordings(tables.get("record", []), place, {setup.runtime for setup in named}),
         report=report,
     )
 
@@ -218,11 +219,14 @@ def _word(table: Mapping[str, Any], name: str, place: Place) -> str:
     return word
 
 
-def _recordings(words: object, place: Place) -> tuple[Recording, ...]:
+def _recordings(words: object, place: Place, runtimes: Collection[str]) -> tuple[Recording, ...]:
     several: Sequence[object] = words if isinstance(words, list) else [words]
     for word in several:
         if not isinstance(word, str) or word not in set(map(str, Recording)):
             raise place.mistake("record", f"expected {' or '.join(Recording)}, got {shortened(str(word))}")
+    for one in (Recording.ROBOTS, Recording.JOURNAL):
+        if one in several and Runtime.ARRAYS in runtimes:
+            raise place.mistake("record", f"{one} is recorded from messages, and the runtime arrays sends none")
     return tuple(one for one in Recording if one in several)
 
 

@@ -219,7 +219,7 @@ def metrics_to_show(rows: Rows, wanted: Sequence[str] = (), over: str = "") -> l
     if wanted:
         return list(wanted)
     usual = [*DEFAULT_METRICS, "cycles", "simulated_s", "cost"]
-    if any(row["runtime"] != "simulator" for row in rows):
+    if any(row["runtime"] not in {"simulator", "arrays"} for row in rows):
         usual.append("wall_s")
     return [name for name in usual if name != over and any(row[name] is not None for row in rows)]
 

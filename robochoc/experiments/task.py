@@ -149,7 +149,7 @@ class Task(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True):
     @property
     def is_timed(self) -> bool:
         """Return whether robots have processes: then nothing else is to run on the machine."""
-        return self.setup.runtime != "simulator"
+        return self.setup.runtime not in {Runtime.SIMULATOR, Runtime.ARRAYS}
 
 
 _NOWHERE = ProblemSpec()

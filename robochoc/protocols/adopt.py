@@ -106,8 +106,9 @@ class ADOPT(BoundingProtocol):
         """Choose a value and send values, thresholds and costs that changed (backTrack)."""
         self._maintain_threshold_invariant()
         self._choose()
+        value = Value(*self.own)
         for name in self.descendants:
-            self.tell(name, Value(*self.own))
+            self.tell(name, value)
         self._maintain_allocation_invariant()
         if self.threshold == self.ub and self.may_end:
             self.terminate()

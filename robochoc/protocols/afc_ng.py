@@ -201,21 +201,18 @@ class AFCng(Protocol):
         if self._revised:
             return
         self._revised = True
-        depth = self._depth()
-        waiting: dict[int, list[int]] = {}
-        for index in self.store.all_open():
-            place = self.checked[index]
-            if place < depth:
-                waiting.setdefault(place, []).append(index)
-        for place, indices in sorted(waiting.items()):
-            conflicts = self.problem.conflicts_of(indices, self.view, place)
+        checked, depth, values = self.checked, self._depth(), self.store.all_open()
+        places = sorted({checked[index] for index in values})
+        for place, indices in [(place, [i for i in values if checked[i] == place]) for place in places]:
+            if place == depth:
+                break
             for index in indices:
-                conflict = conflicts.get(index)
-                if conflict is None:
-                    self.checked[index] = depth
-                else:
+                checked[index] = depth
+            for conflict, ruled_out in self.problem.conflicts_of(indices, self.view, place):
+                lowest = self.order.depth(conflict)
+                for index in ruled_out:
                     self.store.add(index, conflict)
-                    self.checked[index] = self.order.depth(conflict)
+                    checked[index] = lowest
 
     # The view
 
@@ -227,7 +224,7 @@ class AFCng(Protocol):
         self.view = dict(zip(self.above, values, strict=False))
         self.store.forget_others(self.view)
         place = self.order.rank[self.above[first]]
-        self.checked = [min(place, checked) for checked in self.checked]
+        self.checked = [checked if checked < place else place for checked in self.checked]  # noqa: FURB136 - faster
         self._revised = False
 
     def _compatible(self, lhs: Mapping[str, Value]) -> bool:

@@ -100,6 +100,8 @@ class BoundingProtocol(TreeProtocol):
         Bounds whose context contains an old value are dropped.
         """
         news = [name for name, entry in context.items() if self._is_newer(name, entry)]
+        if not news:
+            return [], False
         other = [name for name in news if self.context.get(name, context[name])[0] != context[name][0]]
         fresh = [name for name in news if name not in self.context]
         self.context.update({name: context[name] for name in news})
@@ -111,10 +113,15 @@ class BoundingProtocol(TreeProtocol):
 
     def agrees(self, values: Mapping[str, message.Value]) -> bool:
         """Return whether `values` do not contradict the context (the papers' Compatible)."""
-        return all(self.context[name][0] == value for name, value in values.items() if name in self.context)
+        for name, value in values.items():
+            known = self.context.get(name)
+            if known is not None and known[0] != value:
+                return False
+        return True
 
     def _is_newer(self, name: str, entry: Entry) -> bool:
-        return name != self.problem.agent and (name not in self.context or self.context[name][1] < entry[1])
+        known = self.context.get(name)
+        return name != self.problem.agent if known is None else known[1] < entry[1]
 
     # Bounds
 
@@ -152,7 +159,10 @@ class BoundingProtocol(TreeProtocol):
 
     def cheapest(self, costs: Sequence[float]) -> int:
         """Return the value with the minimum of `costs`; the current value if it is one of several."""
-        return min(range(len(costs)), key=lambda index: (costs[index], index != self.value))
+        least = min(costs)
+        if self.value is not None and costs[self.value] == least:
+            return self.value
+        return costs.index(least)
 
     @property
     def _known(self) -> list[str]:
@@ -191,8 +201,10 @@ class BoundingProtocol(TreeProtocol):
 
     def tell(self, receiver: str, message: Message) -> None:
         """Send a message to `receiver` unless it is equal to the last one of its type sent there."""
-        if self._last.get((receiver, type(message))) != message:
-            self._last[receiver, type(message)] = message
+        key = receiver, type(message)
+        last = self._last.get(key)
+        if last is not message and last != message:
+            self._last[key] = message
             self.send(receiver, message)
 
     def value_notes(self, index: int) -> Mapping[str, float]:

@@ -63,6 +63,7 @@ class DSA(CycleProtocol):
         costs=True,
         shared_scopes=True,
         writes_to_non_neighbours=False,
+        arrays=True,
         privacy="constraints among others",
         use_when="costs, large team: good answers fast, no proof",
     )

@@ -79,6 +79,7 @@ class MaxSum(CycleProtocol):
         complete=False,
         costs=True,
         writes_to_non_neighbours=False,
+        arrays=True,
         privacy="constraints among others",
         use_when="costs, large team, graph with few cycles; no proof",
     )

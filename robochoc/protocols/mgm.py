@@ -87,6 +87,7 @@ class MGM(Gainers):
         costs=True,
         shared_scopes=True,
         writes_to_non_neighbours=False,
+        arrays=True,
         privacy="constraints among others",
         use_when="as DSA, and the cost never rises; ends in a local optimum",
     )

@@ -76,6 +76,7 @@ class MGM2(Gainers):
         costs=True,
         shared_scopes=True,
         writes_to_non_neighbours=False,
+        arrays=True,
         privacy="constraints among others",
         use_when="as MGM: better answers, more messages",
     )

@@ -31,7 +31,7 @@ class PriorityOrder:
 
     def depth(self, names: Iterable[str]) -> int:
         """Return the place of the lowest-priority robot of `names`; -1 if `names` is empty."""
-        return max((self.rank[name] for name in names), default=-1)
+        return max(map(self.rank.__getitem__, names), default=-1)
 
 
 class PseudoTree:

@@ -70,6 +70,8 @@ def _is_delayed(options: Options) -> bool:
     return bool(options.delay) or options.schedule is not ScheduleName.CONCURRENT
 
 
+_WITHOUT_PROCESSES = frozenset({Runtime.SIMULATOR, Runtime.ARRAYS})
+
 OPTION_RULES = (
     OptionRule(
         lambda o: o.channel and o.runtime is not Runtime.SIMULATOR,
@@ -105,7 +107,7 @@ OPTION_RULES = (
         "--verify asks the central solver, which is --protocol central itself",
     ),
     OptionRule(
-        lambda o: o.patience is not None and (o.protocol == CENTRAL or o.runtime is Runtime.SIMULATOR),
+        lambda o: o.patience is not None and (o.protocol == CENTRAL or o.runtime in _WITHOUT_PROCESSES),
         "--patience is for robots with processes, which can be stopped",
         "drop it",
     ),
@@ -150,18 +152,23 @@ OPTION_RULES = (
         "drop --runtime network",
     ),
     OptionRule(
-        lambda o: (o.on_loss or o.spares) and o.runtime is Runtime.SIMULATOR,
+        lambda o: (o.on_loss or o.spares) and o.runtime in _WITHOUT_PROCESSES,
         "--on-loss and --spare are for processes, which can die",
-        "drop --runtime simulator, or write a scenario.xml",
+        "drop --runtime, or write a scenario.xml",
     ),
     OptionRule(
-        lambda o: o.kill and o.runtime is Runtime.SIMULATOR,
-        "--kill ends a robot's process, and the simulator has none",
-        "drop --runtime simulator",
+        lambda o: o.kill and o.runtime in _WITHOUT_PROCESSES,
+        "--kill ends a robot's process, and the simulator and arrays have none",
+        "drop --runtime",
     ),
     OptionRule(
         lambda o: o.spares and o.on_loss is OnLoss.FAIL,
         "--spare brings robots back that died; --on-loss fail ends the run instead",
+    ),
+    OptionRule(
+        lambda o: o.withdraw is not None and o.protocol != CENTRAL and o.runtime is Runtime.ARRAYS,
+        "--withdraw is settled by protocols that have no form as arrays",
+        "add --runtime simulator",
     ),
 )
 """Combinations of options that are refused for every problem."""
@@ -170,6 +177,7 @@ ENVIRONMENT_RULES = (
     _not_while_changing("--protocol central", lambda o: o.protocol == CENTRAL),
     _not_while_changing("--withdraw", lambda o: o.withdraw is not None),
     _not_while_changing("--runtime network", lambda o: o.runtime is Runtime.NETWORK),
+    _not_while_changing("--runtime arrays", lambda o: o.runtime is Runtime.ARRAYS),
 )
 """Further combinations that are refused if an environment changes the problem."""
 
@@ -264,6 +272,12 @@ TEAM_RULES = (
     _not_with_scenario("--withdraw", lambda o: o.withdraw is not None),
     _not_with_scenario("--count", lambda o: o.count),
     _not_with_scenario("--runtime network", lambda o: o.protocol != CENTRAL and o.runtime is Runtime.NETWORK),
+    _not_with_scenario("--runtime arrays", lambda o: o.protocol != CENTRAL and o.runtime is Runtime.ARRAYS),
+    TeamRule(
+        lambda c: c.is_distributed and c.options.runtime is Runtime.ARRAYS and not c.traits.arrays,
+        "{protocol} has no form as arrays",
+        "add --runtime simulator, or choose a protocol that has one ('robochoc protocols --long')",
+    ),
     TeamRule(lambda c: c.unknown_kills, "--kill names a robot that {team} does not have: {case.unknown_kills}"),
     TeamRule(
         lambda c: c.options.count and c.has_costs,

@@ -8,7 +8,7 @@ from enum import StrEnum
 from typing import TYPE_CHECKING, Self
 
 from robochoc.model.orders import Order
-from robochoc.run.defaults import DEFAULT_PROTOCOL
+from robochoc.run.defaults import AUTO
 from robochoc.solver.compile import Limits
 
 if TYPE_CHECKING:
@@ -20,11 +20,12 @@ CENTRAL = "central"
 
 
 class Runtime(StrEnum):
-    """The runtime: each robot in its own OS process, all in one thread, or each in a process on a network."""
+    """The runtime: a process for each robot, here or on a network; all robots in one thread; or all in arrays."""
 
     PROCESSES = "processes"
     SIMULATOR = "simulator"
     NETWORK = "network"
+    ARRAYS = "arrays"
 
 
 class ScheduleName(StrEnum):
@@ -74,7 +75,8 @@ class Options:
     """The options of a run. `run/compatibility.py` decides which of them can be combined.
 
     Attributes:
-        protocol: The name of the protocol by which the robots solve the problem, or `CENTRAL`.
+        protocol: The name of the protocol by which the robots solve the problem, or `CENTRAL`; or `AUTO`, for one that
+            suits it (`run/choice.py`).
         runtime: Where the robots live.
         seed: The seed of the simulator, of `Order.RANDOM`, and of protocols that draw lots.
         timeout: A limit on wall-clock time, in seconds (None: no limit).
@@ -99,9 +101,10 @@ class Options:
         settings: The protocol's settings, as text.
         kill: Robots whose processes are killed, and when.
         filters: The names of the channel filters that messages on a network go through, in this order.
+        chosen: Why the `protocol`, or the `order`, was chosen, where nobody asked for it.
     """
 
-    protocol: str = DEFAULT_PROTOCOL
+    protocol: str = AUTO
     runtime: Runtime = Runtime.PROCESSES
     seed: int = 0
     timeout: float | None = None
@@ -124,6 +127,7 @@ class Options:
     settings: Mapping[str, str] = field(default_factory=dict)
     filters: tuple[str, ...] = ()
     kill: tuple[Kill, ...] = ()
+    chosen: Mapping[str, str] = field(default_factory=dict)
 
     @property
     def survives_losses(self) -> bool:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 from robochoc.model.costs import normalized
 from robochoc.model.problem import ProblemKind, Team
-from robochoc.run.options import Options, ScheduleName, Withdrawal
+from robochoc.run.options import Options, Runtime, ScheduleName, Withdrawal
 from robochoc.verification.objective import Objective, withdrawal_cost
 
 if TYPE_CHECKING:
@@ -20,7 +20,7 @@ def objective_to_record(team: Team, options: Options) -> Callable[[], Objective]
     if team.dynamic or not (minimum or team.kind is ProblemKind.DISWCSP):
         return None
     counted = normalized(team)
-    in_step = options.schedule is ScheduleName.CYCLES
+    in_step = options.schedule is ScheduleName.CYCLES or options.runtime is Runtime.ARRAYS
     return lambda: Objective(counted, withdrawal_cost(counted) if minimum else None, in_step=in_step)
 
 

@@ -17,14 +17,14 @@ from collections.abc import Container, Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING
 
 from robochoc.model.message import Value
-from robochoc.model.problem import INFINITE, ConstraintModel
+from robochoc.model.problem import INFINITE, ConstraintModel, ProblemKind
 from robochoc.solver.agent_problem import AgentProblem
+from robochoc.solver.encoding import Cost
 from robochoc.solver.explanation import KeyedConstraint, held_above, held_below
 from robochoc.solver.filters import Filters
 from robochoc.solver.shared_constraint import (
     UNKNOWN,
     Conflict,
-    Cost,
     OtherValues,
     OwnValues,
     SharedConstraint,
@@ -71,6 +71,7 @@ class LocalProblem:
             self.values = (*self.values, (None,) * len(robot.interface))
             self.charges = (*self.charges, part.parameters.withdrawal_cost * robot.weight)
         self.checks = 0
+        self._places: dict[Value, int] | None = None
         self._rank = rank
         self._part = part
         self._set_constraints(part, OwnValues(robot.interface, self.values))
@@ -115,13 +116,22 @@ class LocalProblem:
         broken = self._broken(index, view, since)
         return None if broken is None else broken.conflict_with(view)
 
-    def conflicts_of(self, indices: Sequence[int], view: Mapping[str, Value], since: int = -1) -> dict[int, Conflict]:
-        """Return what `conflict` returns for each of `indices` that is against `view`, with as many checks."""
+    def conflicts_of(
+        self, indices: Sequence[int], view: Mapping[str, Value], since: int = -1
+    ) -> list[tuple[Conflict, list[int]]]:
+        """Return what `conflict` returns for those of `indices` that are against `view`, with as many checks.
+
+        Values with the same conflict come together.
+        """
         if self._table is not None:
-            found = ((index, self.conflict(index, view, since)) for index in indices)
-            return {index: conflict for index, conflict in found if conflict is not None}
+            found: dict[int, tuple[Conflict, list[int]]] = {}
+            for index in indices:
+                conflict = self.conflict(index, view, since)
+                if conflict is not None:
+                    found.setdefault(id(conflict), (conflict, []))[1].append(index)
+            return list(found.values())
         left = sum([1 << index for index in indices])
-        conflicts: dict[int, Conflict] = {}
+        conflicts: list[tuple[Conflict, list[int]]] = []
         for constraint in self._since(since):
             mask = constraint.look(view)
             if mask == UNKNOWN:
@@ -129,11 +139,8 @@ class LocalProblem:
             self.checks += left.bit_count()
             broken = left & ~mask
             if broken:
+                conflicts.append((constraint.conflict_with(view), [i for i in indices if broken >> i & 1]))
                 left &= mask
-                conflict = constraint.conflict_with(view)
-                while broken:
-                    conflicts[broken.bit_length() - 1] = conflict
-                    broken ^= 1 << (broken.bit_length() - 1)
                 if not left:
                     break
         return conflicts
@@ -264,6 +271,31 @@ class LocalProblem:
                 found.append(table)
         return found
 
+    @property
+    def has_costs(self) -> bool:
+        """Whether something is minimised: costs, or robots that withdraw."""
+        return self._part.robot.kind is ProblemKind.DISWCSP or self._part.parameters.withdrawal_cost is not None
+
+    def allowed(
+        self, domains: Mapping[str, Sequence[Value]], lowest: str
+    ) -> list[tuple[tuple[str, ...], dict[tuple[int, ...], int]]]:
+        """Return what `tables` returns for `lowest`, where there are no costs.
+
+        For each constraint its other robots, and for each combination of places of their values the own values that
+        are consistent with these: bit i for the i-th. No robot may withdraw.
+
+        Raises:
+            UnsupportedError: when these are too many.
+        """
+        found = []
+        for constraint in self._constraints:
+            if constraint.agents[-1:] != (lowest,) or not domains.keys() >= set(constraint.agents):
+                continue
+            combinations = [*constraint.combinations(domains, len(self.values))]
+            self.checks += len({others for _, others in combinations}) * len(self.values)
+            found.append((constraint.agents, {place: constraint.mask(others) for place, others in combinations}))
+        return found
+
     def interchangeable(self, value: Value) -> Sequence[int]:
         """Return the places of all own values that agree with `value` wherever that is not None.
 
@@ -271,6 +303,9 @@ class LocalProblem:
         (Burke and Brown, "Applying interchangeability to complex local problems in distributed constraint
         reasoning", AAMAS workshop DCR 2006).
         """
+        if None not in value:
+            index = self._place_of.get(value)
+            return () if index is None else (index,)
         wanted = [(place, part) for place, part in enumerate(value) if part is not None]
         return [index for index, own in enumerate(self.values) if all(own[place] == part for place, part in wanted)]
 
@@ -297,6 +332,12 @@ class LocalProblem:
                 if not mask >> index & 1:
                     return constraint
         return None
+
+    @property
+    def _place_of(self) -> dict[Value, int]:
+        if self._places is None:
+            self._places = {value: index for index, value in enumerate(self.values)}
+        return self._places
 
     @property
     def _filters(self) -> Filters:

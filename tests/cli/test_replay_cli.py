@@ -24,8 +24,8 @@ THE_SAME = """\
 queens3d-2: abt, runtime simulator, seed 0
   runs                 2
   robots               4
-  steps               33
-  messages            45
+  steps               31
+  messages            41
   the same
 """
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import multiprocessing
 import re
 import sys
 
@@ -14,7 +13,7 @@ from robochoc.journal.events import AnyEvent, Lost
 from robochoc.model.outcome import Verdict
 from robochoc.protocols.protocol import Protocol
 from tests.support.examples import count
-from tests.support.faults import open_descriptors
+from tests.support.faults import open_descriptors, own_children
 from tests.support.faulty_protocols import (
     FLOOD,
     TEAM,
@@ -35,12 +34,11 @@ pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="looks into /pro
 
 def speaking(protocol: type[Protocol], *, timeout: float | None = None) -> tuple[Verdict, dict[str, int]]:
     """Let a team of four speak `protocol`; whatever comes of it, nothing may be left in this process."""
-    before = open_descriptors()
+    before = open_descriptors(), own_children()
     try:
         result = ProcessesRun(TEAM, protocol).run(timeout)
     finally:
-        assert multiprocessing.active_children() == []
-        assert open_descriptors() == before
+        assert (open_descriptors(), own_children()) == before
     return result.verdict, dict(result.metrics.messages)
 
 

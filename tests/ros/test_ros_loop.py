@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-import multiprocessing
+import os
+import signal
 import sys
 from collections.abc import Mapping
 from dataclasses import replace
@@ -21,6 +22,7 @@ from robochoc.ros.source import ReceivedMessage, Source, SourceError
 from robochoc.ros.source_feedback import SourceFeedback
 from robochoc.run import OnLoss, Options, Runtime, Withdrawal, solve
 from robochoc.solver.encoding import UnsupportedError
+from tests.support.faults import own_children
 from tests.support.limits import HANG_S
 from tests.support.moved_clock import MovedClock
 from tests.support.problems import ON_ONE_MACHINE
@@ -138,9 +140,9 @@ class Striking(Says):
 
     def __call__(self, team: Team, epoch: EpochOutcome, left_s: float | None) -> ScenarioEvent | None:
         if not self.summary:
-            victim = next(process for process in multiprocessing.active_children() if process.name == "RB")
-            victim.kill()
-            victim.join()
+            victim = next(pid for pid, name in own_children().items() if name == "RB")
+            os.kill(victim, signal.SIGKILL)
+            os.waitid(os.P_PID, victim, os.WEXITED | os.WNOWAIT)
         return super().__call__(team, epoch, left_s)
 
 
@@ -159,13 +161,15 @@ def test_a_robot_that_dies_while_the_team_waits_is_lost() -> None:
 
 @pytest.mark.parametrize("error", [KeyboardInterrupt, SourceError("the robots cannot be heard any more")])
 def test_no_process_outlives_a_field_that_fails(error: BaseException | type[BaseException]) -> None:
+    before = own_children()
+
     def fails(_team: Team, _epoch: EpochOutcome, _left_s: float | None) -> ScenarioEvent | None:
-        assert len(multiprocessing.active_children()) == 2
+        assert len(own_children()) == len(before) + 2
         raise error
 
     with pytest.raises((KeyboardInterrupt, SourceError)):
         solve(pair(values=3), Options(protocol="dynabt"), environment=fails)
-    assert multiprocessing.active_children() == []
+    assert own_children() == before
 
 
 # A loop with a source

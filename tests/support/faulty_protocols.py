@@ -6,6 +6,7 @@ Run as a program it lets a team speak one of them: `python faulty_protocols.py T
 from __future__ import annotations
 
 import os
+import resource
 import signal
 import sys
 import time
@@ -101,6 +102,15 @@ class TalksToAll(Speaks):
             self.send(robot.name, Word())
 
 
+class HasFewFiles(TalksToAll):
+    """One robot may not open as many files as it needs pipes."""
+
+    def start(self) -> None:
+        if self.is_first:
+            allow_no_more_files()
+        super().start()
+
+
 class Spins(Speaks):
     """Computes for ever, deaf to everything."""
 
@@ -140,5 +150,11 @@ class SaysMuch(Speaks):
             raise ValueError(f"{sender} has been cut short")
 
 
+def allow_no_more_files(_: object = None) -> None:
+    """Whatever this process opens from now on is refused."""
+    resource.setrlimit(resource.RLIMIT_NOFILE, (3, resource.getrlimit(resource.RLIMIT_NOFILE)[1]))
+
+
 if __name__ == "__main__":
-    ProcessesRun(globals()[sys.argv[1]], globals()[sys.argv[2]]).run()
+    observer = allow_no_more_files if "parent-has-few-files" in sys.argv else None
+    ProcessesRun(globals()[sys.argv[1]], globals()[sys.argv[2]], observer=observer).run()

@@ -75,7 +75,7 @@ def run(
         _show_plan(read, path, again)
         return
     workers = _workers(scheduler, dask)
-    if workers and any(setup.runtime != "simulator" for setup, *_ in read.setups):
+    if workers and any(setup.runtime not in {"simulator", "arrays"} for setup, *_ in read.setups):
         click.echo(f"{read.name}: robots that have processes run here, not on the cluster", err=True)
     with stored(path) as store, _cluster_told(workers):
         ended = carried_out(read, store, jobs, workers, again)

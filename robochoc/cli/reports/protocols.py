@@ -54,7 +54,7 @@ def print_protocols(found: Sequence[Row], *, long: bool = False) -> None:
     """Print name, purpose, completeness and use of each protocol, or with `long` all traits; then what is broken."""
     headings = ["name", "for", "complete", "use when"]
     if long:
-        headings = ["name", "for", "complete", "synchronous", "constraints", "dynamic", "privacy", "paper"]
+        headings = ["name", "for", "complete", "synchronous", "constraints", "dynamic", "arrays", "privacy", "paper"]
     print_table(headings, [[row.name, *_cells(row, headings[1:])] for row in found], prose=headings[-1])
     for row in found:
         if row.broken:
@@ -90,6 +90,7 @@ def _in_a_line(traits: Traits) -> str:
         *(["partially known ones too"] if traits.partially_known else []),
         *(["whose parts may cost"] if traits.asymmetric else []),
         *(["goes on when the problem changes"] if traits.dynamic else []),
+        *(["also as arrays (--runtime arrays)"] if traits.arrays else []),
         *([f"use when: {traits.use_when}"] if traits.use_when else []),
         *([f"keeps private: {traits.privacy}"] if traits.privacy else []),
         *([f"paper: {traits.paper}"] if traits.paper else []),
@@ -157,6 +158,7 @@ def _cells(row: Row, headings: Sequence[str]) -> list[str]:
         "synchronous": "-" if row.name == CENTRAL else _yes(holds=traits.synchronous),
         "constraints": ("n-ary" if traits.n_ary else "binary") + (", PKC" if traits.partially_known else ""),
         "dynamic": _yes(holds=traits.dynamic),
+        "arrays": _yes(holds=traits.arrays),
         "privacy": traits.privacy,
         "paper": traits.paper,
         "use when": traits.use_when,

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import array
-import multiprocessing
 import os
 import socket
 from collections import deque
@@ -14,19 +13,21 @@ from robochoc.communication.control import QUEUES_AT_ONCE, FromParent, FromRobot
 from robochoc.communication.processes.queues import READ_BYTES, QueueWriter, unpack
 from robochoc.solver.encoding import UnsupportedError
 
+_DECODER = msgspec.msgpack.Decoder(FromParent)
+_ENCODER = msgspec.msgpack.Encoder()
+"""Made before the fork: once for all robots."""
 _ROOM_FOR_FDS = socket.CMSG_SPACE(QUEUES_AT_ONCE * array.array("i").itemsize)
 
 
 class ControlPipe:
     """The robot's end of its control pipe: orders, with the queues' ends that come with them, and answers."""
 
-    def __init__(self, control: socket.socket) -> None:
+    def __init__(self, name: str, control: socket.socket) -> None:
+        self._name = name
         self._socket = control
         self._writer = QueueWriter(control.fileno())
         self._buffer = bytearray()
         self._fds: deque[int] = deque()
-        self._encode = msgspec.msgpack.Encoder().encode
-        self._decoder = msgspec.msgpack.Decoder(FromParent)
         self.ended = False
 
     def fileno(self) -> int:
@@ -35,7 +36,7 @@ class ControlPipe:
 
     def send(self, message: FromRobot) -> bool:
         """Send `message`; return False when a part of it has to wait until the pipe is writable."""
-        self._writer.put(self._encode(message))
+        self._writer.put(_ENCODER.encode(message))
         return self._writer.flush()
 
     def flush(self) -> bool:
@@ -51,9 +52,8 @@ class ControlPipe:
         except ConnectionResetError:
             chunk, ancillary, flags = b"", [], 0
         if flags & socket.MSG_CTRUNC:
-            name = multiprocessing.current_process().name
             raise UnsupportedError(
-                f"{name} needs more open files than the system allows (raise the limit, see 'ulimit -n')"
+                f"{self._name} needs more open files than the system allows (raise the limit, see 'ulimit -n')"
             )
         for _, _, data in ancillary:
             fds = array.array("i")
@@ -61,7 +61,7 @@ class ControlPipe:
             self._fds.extend(fds)
         self.ended = not chunk
         self._buffer += chunk
-        return [self._decoder.decode(body) for body in unpack(self._buffer)]
+        return [_DECODER.decode(body) for body in unpack(self._buffer)]
 
     def take_fd(self) -> int:
         """Return the next end of a queue that came with the orders."""

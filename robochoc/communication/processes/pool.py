@@ -8,14 +8,16 @@ import socket
 import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack
+from functools import partial
 from multiprocessing.context import ForkContext, ForkServerContext
 from typing import Literal, cast
 
 from robochoc.communication.control import FromRobot, QueueFrom, QueuesTo
 from robochoc.communication.main_guard import require_main_guard
+from robochoc.communication.processes.forked_process import ChildProcess, ForkedProcess, ranges_of
 from robochoc.communication.processes.process_status import ProcessStatus
 from robochoc.communication.processes.robot_link import RobotLink
-from robochoc.communication.processes.robot_process import RobotStart, robot_process
+from robochoc.communication.processes.robot_process import RobotStart, robot_process, served_robot_process
 from robochoc.communication.resources import allow_descriptors
 from robochoc.solver.encoding import UnsupportedError
 from robochoc.system.signals import signals_held
@@ -25,6 +27,7 @@ _CONTEXTS: dict[StartMethod, type[ForkContext | ForkServerContext]] = {
     "fork": ForkContext,
     "forkserver": ForkServerContext,
 }
+STARTED_AT_ONCE = 16
 GRACE_S = 0.5
 """The time that processes have to end by themselves before they are killed, in seconds."""
 _FDS_PER_ROBOT = 4
@@ -43,6 +46,7 @@ class ProcessPool:
         self._context = _CONTEXTS[start_method]()
         self.robots: dict[str, RobotLink] = {}
         self._dismissed: list[RobotLink] = []
+        self._inherited: list[range] = []
         self._selector = selectors.DefaultSelector()
         self._ends = selectors.DefaultSelector()
         self._selector.register(self._ends.fileno(), selectors.EVENT_READ)
@@ -51,30 +55,64 @@ class ProcessPool:
         """Raise the limit on open files as this number of robots needs it."""
         allow_descriptors(robots * _FDS_PER_ROBOT + _FDS_SPARE)
 
-    def start(self, start: RobotStart) -> None:
-        """Start one process. Raises `OSError` when the system does not allow it.
+    def start(self, starts: Sequence[RobotStart]) -> None:
+        """Start processes, at most `STARTED_AT_ONCE`. Raises `OSError` when the system allows no more.
 
-        Signals wait until it has set its own handlers, and until it is known here. They wait for the start of one robot
-        only, and not of a large team.
+        Signals wait until they have set their own handlers, and until they are known here. They do not wait for the
+        start of a large team.
         """
-        with signals_held():
-            self._start(start)
-
-    def _start(self, start: RobotStart) -> None:
-        name = start.part.robot.name
-        ours, theirs = socket.socketpair()
-        forked = self._context.get_start_method() == "fork"
-        inherited = [other.control for other in self.robots.values()] + [ours] if forked else []
-        process = self._context.Process(target=robot_process, name=name, args=(start, theirs, inherited), daemon=True)
-        with theirs:
+        prepared: list[RobotLink] = []
+        with signals_held(), ExitStack() as theirs:
             try:
-                process.start()
-            except BaseException:
-                ours.close()
-                raise
-        link = self.robots[name] = RobotLink(name, process, ours)
-        self._selector.register(link.control, selectors.EVENT_READ, link)
-        self._ends.register(process.sentinel, selectors.EVENT_READ, link)
+                prepared.extend(self._prepared(start, theirs) for start in starts)
+            finally:
+                self._start(prepared)
+
+    def _prepared(self, start: RobotStart, theirs: ExitStack) -> RobotLink:
+        """Return the robot with a process that is still to be started. Its ends of pipes are closed by `theirs`."""
+        name = start.part.robot.name
+        ours, control = socket.socketpair()
+        theirs.enter_context(control)
+        try:
+            return RobotLink(name, self._process(start, control), ours)
+        except BaseException:
+            ours.close()
+            raise
+
+    def _start(self, prepared: Sequence[RobotLink]) -> None:
+        """Start the processes one right after the other: whatever is written between two forks is copied."""
+        started = 0
+        self._inherited[:] = ranges_of(self._own_descriptors(prepared))
+        try:
+            for robot in prepared:
+                robot.process.start()
+                started += 1
+        finally:
+            for robot in prepared[started:]:
+                robot.control.close()
+                robot.process.close()
+            for robot in prepared[:started]:
+                self.robots[robot.name] = robot
+                self._selector.register(robot.control, selectors.EVENT_READ, robot)
+                self._ends.register(robot.process.sentinel, selectors.EVENT_READ, robot)
+
+    def _process(self, start: RobotStart, control: socket.socket) -> ChildProcess:
+        """Return a process that runs the robot with its end of its control pipe."""
+        if self._context.get_start_method() == "fork":
+            return ForkedProcess(partial(robot_process, start, control), [control.fileno()], self._inherited)
+        name = start.part.robot.name
+        return self._context.Process(target=served_robot_process, name=name, args=(start, control), daemon=True)
+
+    def _own_descriptors(self, prepared: Sequence[RobotLink]) -> Iterator[int]:
+        """Yield all ends of pipes: what robots would inherit of them hides from others that an end is gone."""
+        for robot in [*self.robots.values(), *self._dismissed, *prepared]:
+            if isinstance(robot.process, ForkedProcess):
+                yield robot.process.sentinel
+            if robot.control.fileno() >= 0:
+                yield robot.control.fileno()
+        for robot in prepared:
+            if isinstance(robot.process, ForkedProcess):
+                yield from robot.process.kept
 
     # Reading
 

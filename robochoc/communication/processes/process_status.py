@@ -6,8 +6,9 @@ import re
 import signal
 import time
 from enum import Enum, auto
-from multiprocessing.process import BaseProcess
 from pathlib import Path
+
+from robochoc.communication.processes.forked_process import ChildProcess
 
 _EXIT_CODE_S, _DYING_S = 1.0, 60.0
 _EXIT_CODE_POLL_S = 0.001
@@ -50,7 +51,7 @@ def is_computing(pid: int | None) -> bool:
     return status.rpartition(")")[2].split()[0] == "R"
 
 
-def describe_end(process: BaseProcess) -> str:
+def describe_end(process: ChildProcess) -> str:
     """Return in words how `process` ended. Its sentinel is ready; the exit code follows a moment later.
 
     Where all cores are busy, that moment can be seconds for a process with a high `nice` value.

@@ -12,6 +12,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Collection, Sequence
+from itertools import islice
 from typing import assert_never
 
 from robochoc.communication.control import (
@@ -27,8 +28,9 @@ from robochoc.communication.control import (
     Ready,
     sealed,
 )
+from robochoc.communication.host import message_decoder
 from robochoc.communication.master_loop import MasterLoop
-from robochoc.communication.processes.pool import ProcessPool, StartMethod
+from robochoc.communication.processes.pool import STARTED_AT_ONCE, ProcessPool, StartMethod
 from robochoc.communication.processes.process_status import ProcessStatus
 from robochoc.communication.processes.robot_link import RobotLink
 from robochoc.communication.processes.robot_process import RobotStart
@@ -155,20 +157,20 @@ class ProcessesRun(Session, MasterLoop):
         if not unstarted:
             return
         self._pool.make_room(len(unstarted) + len(self._pool.robots))
+        message_decoder(self._protocol.messages)  # before the fork: once for all robots
         with garbage_frozen():
-            for part in unstarted.values():
-                if over(deadline):
-                    break
-                self._start(part)
+            parts = iter(unstarted.values())
+            while (some := list(islice(parts, STARTED_AT_ONCE))) and not over(deadline):
+                self._start(some)
                 self._handle_ends()
 
-    def _start(self, part: AgentProblem) -> None:
+    def _start(self, parts: Sequence[AgentProblem]) -> None:
         observed = self._observer is not None
         try:
-            self._pool.start(RobotStart(part, self._protocol, self.state.epoch, observed))
+            self._pool.start([RobotStart(part, self._protocol, self.state.epoch, observed) for part in parts])
         except OSError as error:
             raise UnsupportedError(
-                f"the system lets only {len(self._pool.robots)} of {len(part.order)} robots have a process:"
+                f"the system lets only {len(self._pool.robots)} of {len(parts[0].order)} robots have a process:"
                 f" {error.strerror} (raise its limits, see 'ulimit -n' and 'ulimit -u', or use the simulator)"
             ) from error
 

@@ -6,7 +6,6 @@ messages that wait when it wakes up are one packet.
 
 from __future__ import annotations
 
-import multiprocessing
 import selectors
 import struct
 from collections.abc import Sequence
@@ -41,12 +40,15 @@ _STAMP = struct.Struct("!IQ")
 class QueueRobot(RobotLoop):
     """The robot of `host`, in a process of its own, with the control pipe `link`.
 
+    It ends when that ends, or when one of the descriptors `parent` can be read.
     Every message is stamped with its epoch. Messages of an epoch that is over are lost.
     """
 
     bundle_bytes = LARGEST_BODY // 4
 
-    def __init__(self, host: Host, link: ControlPipe, epoch: int, *, observed: bool) -> None:
+    def __init__(
+        self, host: Host, link: ControlPipe, epoch: int, *, observed: bool, parent: Sequence[int] = ()
+    ) -> None:
         super().__init__(epoch, observed=observed)
         self._name = host.name
         self._link = link
@@ -55,9 +57,8 @@ class QueueRobot(RobotLoop):
         self._running = True
         self._selector = selectors.DefaultSelector()
         self._selector.register(link, selectors.EVENT_READ, self._read_orders)
-        parent = multiprocessing.parent_process()
-        if parent is not None:
-            self._selector.register(parent.sentinel, selectors.EVENT_READ, self._end)
+        for sentinel in parent:
+            self._selector.register(sentinel, selectors.EVENT_READ, self._end)
         self.confirm(host)
 
     def run(self) -> None:

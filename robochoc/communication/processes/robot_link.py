@@ -7,15 +7,17 @@ import multiprocessing.connection
 import socket
 import time
 from collections.abc import Sequence
-from multiprocessing.process import BaseProcess
 
 import msgspec
 
 from robochoc.communication.control import FromParent, FromRobot
+from robochoc.communication.processes.forked_process import ChildProcess
 from robochoc.communication.processes.process_status import ProcessStatus, describe_end, is_computing, process_status
 from robochoc.communication.processes.queues import QueueReader
 from robochoc.communication.run_result import RobotsLostError
 
+_DECODER = msgspec.msgpack.Decoder(FromRobot)
+_ENCODER = msgspec.msgpack.Encoder()
 _UNRESPONSIVE_S = 10.0
 
 
@@ -25,22 +27,20 @@ class RobotLink:
     `ended` says whether its process is known to have ended.
     """
 
-    def __init__(self, name: str, process: BaseProcess, control: socket.socket) -> None:
+    def __init__(self, name: str, process: ChildProcess, control: socket.socket) -> None:
         self.name = name
         self.process = process
         self.control = control
         self.ended = False
         self._reader = QueueReader(control.fileno())
-        self._decoder = msgspec.msgpack.Decoder(FromRobot)
-        self._encoder = msgspec.msgpack.Encoder()
 
     def receive(self) -> list[FromRobot]:
         """Return the messages that one read of the control pipe brings. Afterwards `hung_up` is up to date."""
-        return [self._decoder.decode(body) for body in self._reader.get()]
+        return [_DECODER.decode(body) for body in self._reader.get()]
 
     def receive_rest(self) -> list[FromRobot]:
         """Return all messages that are left in the control pipe of a process that has ended."""
-        return [self._decoder.decode(body) for body in self._reader.get_all()]
+        return [_DECODER.decode(body) for body in self._reader.get_all()]
 
     @property
     def hung_up(self) -> bool:
@@ -52,7 +52,7 @@ class RobotLink:
 
         Raises `RobotsLostError` when the robot does not read for `_UNRESPONSIVE_S` seconds.
         """
-        body = self._encoder.encode(order)
+        body = _ENCODER.encode(order)
         frame = len(body).to_bytes(4, "big") + body
         deadline = time.monotonic() + _UNRESPONSIVE_S
         while frame:

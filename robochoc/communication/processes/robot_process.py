@@ -6,6 +6,7 @@ It ends when the parent says so, and at once when the parent is gone, however th
 from __future__ import annotations
 
 import ctypes
+import multiprocessing
 import os
 import signal
 import socket
@@ -26,8 +27,8 @@ from robochoc.system.signals import leave_ctrl_c_to_the_parent
 LOWEST_NICE = 19
 _PR_SET_PDEATHSIG = 1
 _PR_SET_NAME = 15
-_libc = ctypes.CDLL(None)
-"""Loaded before the fork: once for all robots."""
+_prctl = ctypes.CDLL(None).prctl if sys.platform == "linux" else None
+"""Looked up before the fork: once for all robots."""
 
 
 class RobotStart(NamedTuple):
@@ -46,7 +47,7 @@ class RobotStart(NamedTuple):
     observed: bool
 
 
-def robot_process(start: RobotStart, control: socket.socket, inherited: Sequence[socket.socket]) -> None:
+def robot_process(start: RobotStart, control: socket.socket, parent: Sequence[int] = ()) -> None:
     """Run one robot in this process until the run ends.
 
     Ctrl-C reaches the whole process group, and is left to the parent.
@@ -54,20 +55,17 @@ def robot_process(start: RobotStart, control: socket.socket, inherited: Sequence
     Args:
         start: What the robot starts with.
         control: Its end of its control pipe.
-        inherited: The parent's ends of control pipes that a fork copied. They are closed here, so that the others see
-            the end of the parent.
+        parent: More descriptors that can be read once the parent is gone.
     """
     leave_ctrl_c_to_the_parent()
     _end_with_the_parent()
-    for copy in inherited:
-        copy.close()
     name = start.part.robot.name
     _set_process_name(name)
-    _set_niceness(name, start.part.order)
-    link = ControlPipe(control)
+    _set_niceness(start.part.known.rank[name], len(start.part.order))
+    link = ControlPipe(name, control)
     try:
         host = Host.of(start.protocol, start.part)
-        QueueRobot(host, link, start.epoch, observed=start.observed).run()
+        QueueRobot(host, link, start.epoch, observed=start.observed, parent=parent).run()
     except UnsupportedError as refusal:
         link.send(Failed(str(refusal), unsupported=True, elsewhere=isinstance(refusal, TooLargeError)))
     except Exception as error:  # noqa: BLE001 - whatever it was, the parent has to know
@@ -76,26 +74,32 @@ def robot_process(start: RobotStart, control: socket.socket, inherited: Sequence
     link.finish()
 
 
+def served_robot_process(start: RobotStart, control: socket.socket) -> None:
+    """Run one robot in a process that a fork server has started: its parent is that server, not ours."""
+    parent = multiprocessing.parent_process()
+    robot_process(start, control, () if parent is None else (parent.sentinel,))
+
+
 def _end_with_the_parent() -> None:
     """Have the kernel kill this process when the parent dies (Linux).
 
     A robot that waits sees its control pipe end. One that computes, or that got no turn on a busy machine, would see it
     late. Strictly, the thread of the parent counts that runs the team, and waits for its end.
     """
-    if sys.platform == "linux":
-        _libc.prctl(_PR_SET_PDEATHSIG, signal.SIGKILL)
+    if _prctl is not None:
+        _prctl(_PR_SET_PDEATHSIG, signal.SIGKILL)
 
 
 def _set_process_name(name: str) -> None:
     """Show the robot's name (its first 15 letters) in lists of processes (Linux)."""
-    if sys.platform == "linux":
-        _libc.prctl(_PR_SET_NAME, name.encode())
+    if _prctl is not None:
+        _prctl(_PR_SET_NAME, name.encode())
 
 
-def _set_niceness(name: str, order: Sequence[str]) -> None:
+def _set_niceness(place: int, robots: int) -> None:
     """Let the scheduler favour robots that come earlier in the priority order: `nice` from 0 to `LOWEST_NICE`.
 
     What a robot decides on the basis of an old view is work for nothing, for all below it. On two cores 121 robots
     need a tenth of the messages this way (docs/explanation/design.md, "Processes").
     """
-    os.nice(LOWEST_NICE * order.index(name) // len(order))
+    os.nice(LOWEST_NICE * place // robots)

@@ -181,9 +181,8 @@ class Simulation(Session):
         self._sent += len(envelopes)
         for envelope, checks in zip(envelopes, host.said_at, strict=True):
             schedule.put(envelope, checks - before)
-        clock = host.clock
-        schedule.done(host.name, clock, host.checks - before)
-        self._ncccs = max(self._ncccs, clock)
+        schedule.done(host.name, host.clock, host.checks - before)
+        self._ncccs = max(self._ncccs, host.clock)
         self._note_verdict(host)
 
     def _time(self, checks: int) -> float:

@@ -62,8 +62,8 @@ def crowd(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return team_folder(CROWD, tmp_path_factory.mktemp("crowd"))
 
 
-def faulty(team: str, protocol: str) -> list[str]:
-    return [sys.executable, str(ROOT / "tests" / "support" / "faulty_protocols.py"), team, protocol]
+def faulty(team: str, *protocol: str) -> list[str]:
+    return [sys.executable, str(ROOT / "tests" / "support" / "faulty_protocols.py"), team, *protocol]
 
 
 # The strikes: each returns the names of robots that it kills
@@ -352,12 +352,19 @@ def test_too_few_open_files(open_files: int, crowd: Path, tmp_path: Path) -> Non
         nothing_is_left(run)
 
 
-def test_too_few_open_files_for_robots_that_talk(tmp_path: Path) -> None:
-    """The parent has enough for the processes, and then it or a robot not for the queues."""
-    with running(faulty("CROWD", "TalksToAll"), tmp_path / "run", open_files=96) as run:
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (["HasFewFiles"], r"UnsupportedError: \S+ needs more open files .*ulimit -n"),
+        (["TalksToAll", "parent-has-few-files"], r"UnsupportedError: .* have a queue to .*ulimit -n"),
+    ],
+)
+def test_too_few_open_files_for_robots_that_talk(arguments: list[str], said: str, tmp_path: Path) -> None:
+    """There are enough for the processes, and then a robot, or the parent, has not enough for the queues."""
+    with running(faulty("CROWD", *arguments), tmp_path / "run") as run:
         run.end()
         assert run.status() == 1
-        assert re.search(r"UnsupportedError: .*ulimit -n", run.errors())
+        assert re.search(said, run.errors())
         assert run.left_behind() == []
 
 

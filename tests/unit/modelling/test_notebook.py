@@ -56,7 +56,7 @@ def test_an_outcome_shows_values_epochs_and_what_it_took() -> None:
     assert "rescue: solution for all 7 robots" in said
     assert "Spare spare 2" in said
     assert "2 +Spare 7 solution" in said
-    assert re.search(r"messages bytes NCCCs checks seconds 128 ", said)
+    assert re.search(r"messages bytes NCCCs checks seconds 131 ", said)
 
 
 def test_users_values_are_shown_and_escaped() -> None:

@@ -8,6 +8,7 @@ from typing import Any
 
 import pytest
 
+from robochoc.communication.kill_schedule import Kill
 from robochoc.communication.simulator.channel import CHANNELS
 from robochoc.model.problem import Constraint, ConstraintModel, ProblemKind, Relation, Semantics, Team
 from robochoc.run import alternatives, solve
@@ -105,6 +106,14 @@ def test_where_no_protocol_does_the_judge_may() -> None:
 
 WLAN = CHANNELS["wlan"]
 REFUSED_OPTIONS: list[tuple[dict[str, Any], str]] = [
+    ({"runtime": Runtime.ARRAYS}, "sfb has no form as arrays; add --runtime simulator, or choose a protocol"),
+    ({"runtime": Runtime.ARRAYS, "protocol": "dsa", "withdraw": Withdrawal.MAXIMAL}, "--withdraw is settled by"),
+    ({"runtime": Runtime.ARRAYS, "delay": 3}, "--delay and --schedule are the simulator's"),
+    ({"runtime": Runtime.ARRAYS, "ncccs": 3}, "--ncccs is a limit for the simulator"),
+    ({"runtime": Runtime.ARRAYS, "patience": 3.0}, "--patience is for robots with processes"),
+    ({"runtime": Runtime.ARRAYS, "spares": 1}, "--on-loss and --spare are for processes, which can die"),
+    ({"runtime": Runtime.ARRAYS, "kill": (Kill("RA", 1),)}, "the simulator and arrays have none"),
+    ({"runtime": Runtime.ARRAYS, "filters": ("signed",)}, "--filter is for messages that cross a network"),
     ({"channel": WLAN, "runtime": Runtime.PROCESSES}, "add --runtime simulator"),
     ({"channel": WLAN, "delay": 3}, "drop --delay and --schedule"),
     ({"delay": 3, "runtime": Runtime.PROCESSES}, "--delay and --schedule are the simulator's"),
@@ -131,5 +140,5 @@ def test_options_that_do_not_go_together_are_refused_in_python_too(options: dict
 
 def test_no_rule_refuses_the_defaults() -> None:
     for runtime in Runtime:
-        refuse_options(Options(runtime=runtime), environment=runtime is not Runtime.NETWORK)
+        refuse_options(Options(runtime=runtime), environment=runtime not in {Runtime.NETWORK, Runtime.ARRAYS})
     refuse_options(Options(protocol="central", count=True))

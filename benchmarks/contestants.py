@@ -1,0 +1,246 @@
+"""Who solves the problems of part `peers`: robochoc, and each other library where it is installed."""
+
+from __future__ import annotations
+
+import csv
+import json
+import os
+import re
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import NamedTuple
+
+from measure import ROBOCHOC
+from peer_problems import COLOURING, COSTS, FILES, LOCAL, RAVEN, TEAM, Family
+from peer_runs import Run
+
+PYTHON_OF_RAVEN = "ROBOCHOC_BENCH_RAVEN"
+PYTHON_OF_PYDCOP = "ROBOCHOC_BENCH_PYDCOP"
+FRODO = "ROBOCHOC_BENCH_FRODO"
+HERE = Path(__file__).parent
+CYCLES = 200
+FORBIDDEN = 10_000
+"""What our exporter to pyDCOP's format charges at least for what is forbidden."""
+
+
+class Answer(NamedTuple):
+    """What a run found: `solution`, `no-solution`, a cost, or what went wrong; and the messages, where counted."""
+
+    found: str
+    messages: int | None = None
+
+
+@dataclass(frozen=True)
+class Contestant:
+    """One algorithm of one library, run in one way.
+
+    `command` is made of a problem's folder; `answer` reads what a run printed or left there. `missing` says why it
+    cannot be run here.
+    """
+
+    library: str
+    algorithm: str
+    way: str
+    command: Callable[[Path], list[str]]
+    answer: Callable[[Path, Run], Answer]
+    missing: str = ""
+
+    @property
+    def name(self) -> str:
+        """In one line."""
+        return f"{self.library}, {self.algorithm}, {self.way}"
+
+
+def contestants(family: Family) -> list[Contestant]:
+    """All that are to solve a family, those that are missing here among them."""
+    return [*_ours(family), *_frodos(family), *_pydcops(family), *_ravens(family), DCOPSOLVER]
+
+
+# robochoc
+
+
+def _ours(family: Family) -> list[Contestant]:
+    if family is LOCAL:
+        cycles = ("--set", f"cycles={CYCLES}")
+        ours = [robochoc(name, "simulator", *cycles) for name in ("dsa", "mgm", "maxsum")]
+        return [*ours, *(robochoc(name, "arrays", *cycles) for name in ("dsa", "mgm", "maxsum"))]
+    if family is COSTS:
+        return [robochoc(name, "simulator") for name in ("dpop", "syncbb", "adopt", "afb", "bnb-adopt", "sfb", "auto")]
+    orders: tuple[tuple[str, ...], ...] = ((), ("--order", "max-degree"))
+    paper = [
+        robochoc(name, runtime, *order)
+        for order in orders
+        for name in ("abt", "afc-ng")
+        for runtime in ("simulator", "processes")
+    ]
+    others = [robochoc(name, runtime) for name in ("sfb", "auto") for runtime in ("simulator", "processes")]
+    return [*paper, *others]
+
+
+def robochoc(protocol: str, runtime: str, *options: str) -> Contestant:
+    """`robochoc solve`, as a user runs it."""
+    words = ["--json", "--runtime", runtime, "--protocol", protocol, *options]
+    order = f", {options[1]}" if "--order" in options else ", given order" if protocol in {"abt", "afc-ng"} else ""
+    return Contestant(
+        "robochoc", protocol, f"{runtime}{order}", lambda folder: [ROBOCHOC, "solve", str(folder / TEAM), *words], _own
+    )
+
+
+def _own(_folder: Path, run: Run) -> Answer:
+    found = json.loads(run.output)
+    return Answer(_verdict(found), found["metrics"]["messages"])
+
+
+def _verdict(found: dict[str, object]) -> str:
+    """A cost where there are costs."""
+    if found.get("cost") is not None:
+        return f"{found['cost']:g}"
+    return str(found["verdict"])
+
+
+def central(folder: Path) -> list[str]:
+    """The command that finds what is right: one model of the whole problem, solved by ACE."""
+    return [ROBOCHOC, "solve", str(folder / TEAM), "--json", "--protocol", "central"]
+
+
+def right(run: Run) -> str:
+    """What that command has found."""
+    return _verdict(json.loads(run.output))
+
+
+# FRODO
+
+
+_FRODOS = {
+    "SynchBB": ("SynchBB/SynchBBagent", "synchbb.SynchBBsolver"),
+    "AFB": ("AFB/AFBagent", "afb.AFBsolver"),
+    "ADOPT": ("ADOPT/ADOPTagent", "adopt.ADOPTsolver"),
+    "DPOP": ("DPOP/DPOPagent", "dpop.DPOPsolver"),
+    "DSA": ("DSA/DSAagent", "localSearch.dsa.DSAsolver"),
+    "MGM": ("MGM/MGMagent", "localSearch.mgm.MGMsolver"),
+    "Max-Sum": ("MaxSum/MaxSumAgent", "maxsum.MaxSumSolver"),
+}
+"""Of each algorithm, FRODO's description of its agents and the class that runs it."""
+_COUNTED = {"threads": "false", "threads, counting": "true"}
+
+
+def _frodos(family: Family) -> list[Contestant]:
+    if family is LOCAL:
+        return [_frodo(name, "threads", family) for name in ("DSA", "MGM", "Max-Sum")]
+    names = {COSTS: ("DPOP", "SynchBB", "ADOPT", "AFB"), COLOURING: ("SynchBB", "AFB", "ADOPT", "DPOP")}
+    return [_frodo(name, way, family) for name in names.get(family, ("SynchBB", "AFB")) for way in _COUNTED]
+
+
+def _frodo(algorithm: str, way: str, family: Family) -> Contestant:
+    agents, solver = _FRODOS[algorithm]
+    home = Path(os.environ.get(FRODO, ""))
+    source = home / "agents" / f"{agents}.xml"
+
+    def command(folder: Path) -> list[str]:
+        description, results = folder / "agents.xml", folder / "frodo.csv"
+        description.write_text(described(source.read_text(), counted=_COUNTED[way]))
+        results.unlink(missing_ok=True)
+        classes = f"{home}/*:{home}/lib/*"
+        words = [algorithm, f"frodo2.algorithms.{solver}", str(description), str(folder / FILES["frodo"])]
+        limit = str(round(family.limit_s))
+        return ["java", "-cp", classes, "frodo2.algorithms.AbstractDCOPsolver", *words, limit, str(results)]
+
+    missing = "" if os.environ.get(FRODO) else f"{FRODO} names no folder of FRODO"
+    if not missing and not source.exists():
+        missing = f"{FRODO}: no agents/{agents}.xml there"
+    return Contestant("FRODO", algorithm, way, command, _of_frodo, missing)
+
+
+def described(text: str, *, counted: str) -> str:
+    """FRODO's description of agents, set to real threads (not simulated time), with or without counting."""
+    for name, value in (
+        ("measureTime", "false"),
+        ("measureMsgs", counted),
+        ("countNCCCs", counted),
+        ("displayGraph", "false"),
+    ):
+        text = re.sub(rf'\b{name}(\s*)=(\s*)"\w+"', rf'{name}\1=\2"{value}"', text)
+    return text
+
+
+def _of_frodo(folder: Path, _run: Run) -> Answer:
+    """The last line of the table that FRODO writes; only its own check of the cost is believed."""
+    rows = list(csv.DictReader((folder / "frodo.csv").read_text().splitlines(), delimiter=";"))
+    last = rows[-1]
+    if last["timed out"] == "1":
+        return Answer("its time is over")
+    cost = last["true cost"]
+    messages = int(last["number of messages"]) or None
+    if cost == "infinity":
+        return Answer("no-solution", messages)
+    return Answer(cost, messages)
+
+
+# pyDCOP
+
+
+def _pydcops(family: Family) -> list[Contestant]:
+    if family is LOCAL:
+        return [_pydcop(name, family, f"stop_cycle:{CYCLES}") for name in ("dsa", "mgm")]
+    if family is COSTS:
+        return [_pydcop(name, family) for name in ("dpop", "syncbb")]
+    return [_pydcop("dba" if family is COLOURING else "syncbb", family)]
+
+
+def _pydcop(algorithm: str, family: Family, *parameters: str) -> Contestant:
+    python = os.environ.get(PYTHON_OF_PYDCOP, "")
+    algo = ["--algo", algorithm, *(word for one in parameters for word in ("--algo_params", one))]
+    limit = str(round(family.limit_s))
+
+    def command(folder: Path) -> list[str]:
+        once = str(HERE / "pydcop_once.py")
+        return [python, once, "--timeout", limit, "solve", *algo, str(folder / FILES["pydcop"])]
+
+    missing = "" if python else f"{PYTHON_OF_PYDCOP} names no Python"
+    return Contestant("pyDCOP", algorithm, "threads", command, _of_pydcop, missing)
+
+
+def _of_pydcop(_folder: Path, run: Run) -> Answer:
+    found = json.loads(run.output[run.output.index("{") :])
+    if found["status"] != "FINISHED":
+        return Answer(f"status {found['status']}")
+    cost = float(found["cost"])
+    return Answer("no-solution" if cost >= FORBIDDEN else f"{cost:g}", found["msg_count"])
+
+
+# raven-csp
+
+
+def _ravens(family: Family) -> list[Contestant]:
+    if family in {COSTS, LOCAL}:
+        return []
+    ways = [("abt", "sim"), ("afc", "sim")]
+    return [_raven(*way) for way in (*ways, *([("abt", "mp")] if family is COLOURING else []))]
+
+
+def _raven(protocol: str, runtime: str) -> Contestant:
+    python = os.environ.get(PYTHON_OF_RAVEN, "")
+    missing = "" if python else f"{PYTHON_OF_RAVEN} names no Python"
+    words = [str(HERE / "raven_once.py"), protocol, runtime]
+    way = {"sim": "simulator", "mp": "processes"}[runtime]
+    return Contestant(
+        "raven-csp", protocol, way, lambda folder: [python, *words, str(folder / RAVEN)], _of_raven, missing
+    )
+
+
+def _of_raven(_folder: Path, run: Run) -> Answer:
+    found = json.loads(run.output)
+    return Answer("solution" if found["solved"] else "no-solution", found["messages"])
+
+
+# DCOPSolver
+
+
+def _nothing(_folder: Path) -> list[str]:
+    return []
+
+
+DCOPSOLVER = Contestant(
+    "DCOPSolver", "-", "-", _nothing, lambda _folder, _run: Answer(""), "it has a window, and no command line"
+)

@@ -1,0 +1,29 @@
+"""Which protocols have a form as arrays."""
+
+from __future__ import annotations
+
+from types import MappingProxyType
+
+from robochoc.communication.arrays.cycle_run import CycleRun
+from robochoc.communication.arrays.dsa import ArrayDSA
+from robochoc.communication.arrays.maxsum import ArrayMaxSum
+from robochoc.communication.arrays.mgm import ArrayMGM
+from robochoc.communication.arrays.mgm2 import ArrayMGM2
+from robochoc.protocols.dsa import DSA
+from robochoc.protocols.maxsum import MaxSum
+from robochoc.protocols.mgm import MGM
+from robochoc.protocols.mgm2 import MGM2
+from robochoc.protocols.protocol import Protocol
+from robochoc.solver.encoding import UnsupportedError
+
+_FORMS: MappingProxyType[type[Protocol], type[CycleRun]] = MappingProxyType(
+    {DSA: ArrayDSA, MGM: ArrayMGM, MGM2: ArrayMGM2, MaxSum: ArrayMaxSum}
+)
+
+
+def form_of(protocol: type[Protocol]) -> type[CycleRun]:
+    """Return the form of `protocol` as arrays. Raises `UnsupportedError` where there is none."""
+    form = _FORMS.get(protocol)
+    if form is None:
+        raise UnsupportedError(f"{protocol.__name__} has no form as arrays; say --runtime simulator")
+    return form

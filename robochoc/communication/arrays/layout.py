@@ -1,0 +1,262 @@
+"""How the robots of a team lie in arrays: those with equally many values together, those with most neighbours first.
+
+Robots are numbered anew for this; `Layout.robots` says who is where. Costs of a value are one whole number: what it
+breaks comes first, what it pays second (`Costs`), so that numbers compare as `LexicographicCost` does.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from functools import cached_property
+
+import numpy as np
+
+from robochoc.communication.arrays.description import Description, Held
+from robochoc.communication.arrays.jagged import columns, narrowest, segments
+from robochoc.communication.arrays.kinds import Flags, Floats, Index, Integers
+from robochoc.solver.encoding import TooLargeError
+from robochoc.solver.exact_costs import check_exact
+
+
+@dataclass(frozen=True)
+class Costs:
+    """How costs are whole numbers: the number of broken constraints, shifted by `bits`, and all other costs.
+
+    A difference of two sums has the same form; its costs may be negative, and are less than half of the unit.
+    """
+
+    bits: int
+    kind: np.dtype[np.integer]
+
+    @classmethod
+    def up_to(cls, total: float, constraints: int) -> Costs:
+        """Return the form for robots with so many constraints, whose costs come to `total` at most.
+
+        Raises:
+            TooLargeError: when there is none.
+        """
+        check_exact(total)
+        bits = (4 * int(total) + 1).bit_length()
+        largest = 4 * (constraints + 1) << bits
+        if largest >= 1 << 62:
+            raise TooLargeError(
+                f"costs could add up to {int(total):,}, and {constraints:,} constraints of a robot could be broken:"
+                " together more than 64 bits hold"
+            )
+        return cls(bits, np.dtype(np.int32 if largest < 1 << 31 else np.int64))
+
+    def of(self, costs: Floats) -> Integers:
+        """Return `costs`, in which `inf` stands for a broken constraint."""
+        broken = np.isinf(costs)
+        return (np.where(broken, 0, costs).astype(np.int64) + (broken.astype(np.int64) << self.bits)).astype(self.kind)
+
+    def broken(self, costs: Integers) -> Integers:
+        """Return the numbers of broken constraints, of sums or of differences."""
+        half = (1 << self.bits) >> 1
+        return (costs.astype(np.int64) + half) >> self.bits
+
+    def paid(self, costs: Integers) -> Integers:
+        """Return what the others cost."""
+        return costs.astype(np.int64) - (self.broken(costs) << self.bits)
+
+
+@dataclass(frozen=True)
+class Column:
+    """A constraint of each of many robots (`lists`, counted within their group).
+
+    The costs of the robot's values are in the row `base` + the sum of `strides` times the others' values.
+    """
+
+    lists: Index
+    base: Integers | int
+    others: tuple[Integers, ...]
+    strides: tuple[int, ...]
+
+    def rows(self, values: Integers) -> Integers:
+        """Return the number of the row of each, where robots have these `values`."""
+        if isinstance(self.base, int) and not self.base and self.strides == (1,):
+            return values.take(self.others[0])
+        total = np.zeros(len(self.others[0]), np.int64) + self.base
+        for other, stride in zip(self.others, self.strides, strict=True):
+            total += values.take(other).astype(np.int64) * stride
+        return total
+
+
+@dataclass(frozen=True)
+class Block:
+    """Constraints of one shape that robots of one group know: a row of costs for each combination of others' values."""
+
+    held: Held
+    rows: Integers
+    columns: tuple[Column, ...]
+
+
+@dataclass
+class Group:
+    """The robots with `size` values: rows `first` to `last` of the team's arrays, the first `active` with neighbours.
+
+    `charges` is what each value costs the robot alone; None: nothing. `fixed` is the same with constraints that look
+    at no other robot. `checks` is what it takes to evaluate all values of each robot.
+    """
+
+    size: int
+    first: int
+    last: int
+    active: int
+    charges: Integers | None
+    fixed: Integers | None = None
+    checks: Integers = field(default_factory=lambda: np.zeros(0, np.int64))
+    blocks: list[Block] = field(default_factory=list)
+
+    @property
+    def many(self) -> int:
+        """The number of robots."""
+        return self.last - self.first
+
+    def values(self, values: Integers) -> Integers:
+        """Return the part of the team's `values` that is this group's."""
+        return values[self.first : self.last]
+
+
+class Layout:
+    """A team's arrays.
+
+    Attributes:
+        description: The team.
+        costs: The form of its costs.
+        robots: The robot in each row.
+        places: The row of each robot; -1 for those without values.
+        groups: The robots with equally many values, the fewest first.
+        degrees: How many neighbours the robot in each row has.
+    """
+
+    def __init__(self, description: Description) -> None:
+        self.description = description
+        sizes, degrees = description.sizes, description.degrees
+        order = np.lexsort((-degrees, sizes))
+        self.robots = order[np.searchsorted(sizes[order], 1) :]
+        self.places = np.full(len(sizes), -1, np.int64)
+        self.places[self.robots] = np.arange(len(self.robots))
+        self.empty = np.flatnonzero(sizes == 0)
+        self.degrees = degrees[self.robots]
+        self.kind = narrowest(int(sizes.max(initial=1)))
+        held = [] if self.empty.size else list(description.held)
+        self.costs = Costs.up_to(*_largest(description, held))
+        self.groups = list(self._groups(held))
+
+    @property
+    def many(self) -> int:
+        """The number of robots with values."""
+        return len(self.robots)
+
+    @cached_property
+    def index(self) -> np.dtype[np.integer]:
+        """The type of integers that number rows."""
+        return np.dtype(np.int32 if self.many < np.iinfo(np.int32).max else np.int64)
+
+    @cached_property
+    def starts(self) -> Integers:
+        """Where the neighbours of each row begin in `neighbours`."""
+        return np.cumsum(self.degrees) - self.degrees
+
+    @cached_property
+    def neighbours(self) -> Integers:
+        """The rows of neighbours: those of the robot in row 0, in priority order, then those of row 1, and so on."""
+        given = self.description
+        starts = np.cumsum(given.degrees) - given.degrees
+        entries = np.repeat(starts[self.robots] - self.starts, self.degrees) + np.arange(self.degrees.sum())
+        rows: Integers = self.places[given.neighbours[entries]].astype(self.index)
+        return rows
+
+    @cached_property
+    def links(self) -> list[tuple[Group, Index, Integers, Integers]]:
+        """Each group's neighbours, column by column: the robots (within the group), neighbours, places of the links."""
+        return [
+            (group, lists, self.neighbours[places + self._start(group)], places + self._start(group))
+            for group in self.groups
+            for lists, places in columns(self.degrees[group.first : group.last])
+        ]
+
+    @cached_property
+    def higher(self) -> list[Flags]:
+        """For each column of `links`, whether the neighbour is before the robot in the order."""
+        return [
+            self.robots[neighbours] < self.robots[group.first : group.last][lists]
+            for group, lists, neighbours, _ in self.links
+        ]
+
+    def link(self, robots: Integers, neighbours: Integers) -> Integers:
+        """Return the places in `neighbours` of links from `robots` to those of their `neighbours`."""
+        keys, order = self._links_sorted
+        found: Integers = order[np.searchsorted(keys, robots.astype(np.int64) * self.many + neighbours)]
+        return found
+
+    @cached_property
+    def _links_sorted(self) -> tuple[Integers, Integers]:
+        keys = segments(self.degrees) * self.many + self.neighbours
+        order = np.argsort(keys, kind="stable")
+        return keys[order], order
+
+    def _start(self, group: Group) -> int:
+        return int(self.starts[group.first]) if group.many else 0
+
+    def _groups(self, held: list[Held]) -> Iterator[Group]:
+        sizes = self.description.sizes[self.robots]
+        of = [(one, one.owners.size and one.tables.shape[-1]) for one in held]
+        for size in np.unique(sizes):
+            first, last = (int(np.searchsorted(sizes, size, side)) for side in ("left", "right"))
+            active = int((self.degrees[first:last] > 0).sum())
+            group = Group(int(size), first, last, active, self._charges(first, last, int(size)))
+            self._fill(group, [one for one, own in of if own == size])
+            yield group
+
+    def _charges(self, first: int, last: int, size: int) -> Integers | None:
+        given = self.description
+        if given.charges is None or not given.charges.any():
+            return None
+        starts = (np.cumsum(given.sizes) - given.sizes)[self.robots[first:last]]
+        return self.costs.of(given.charges[starts[:, None] + np.arange(size)])
+
+    def _fill(self, group: Group, held: list[Held]) -> None:
+        """Give the group its constraints."""
+        group.checks = np.zeros(group.many, np.int64)
+        group.fixed = group.charges
+        for one in held:
+            own = self.places[one.owners] - group.first
+            group.checks += np.bincount(own, minlength=group.many) * group.size
+            rows = self.costs.of(one.tables).reshape(-1, group.size)
+            if one.others.shape[1]:
+                group.blocks.append(self._block(group, one, own, rows))
+            else:
+                fixed = np.zeros((group.many, group.size), self.costs.kind) if group.fixed is None else group.fixed
+                group.fixed = fixed.copy()
+                np.add.at(group.fixed, own, rows[one.which])
+
+    def _block(self, group: Group, held: Held, own: Integers, rows: Integers) -> Block:
+        order = np.argsort(own, kind="stable")
+        shape = held.tables.shape[1:-1]
+        strides = tuple(int(np.prod(shape[place + 1 :])) for place in range(len(shape)))
+        others = self.places[held.others].astype(self.index)
+        per_table = int(np.prod(shape))
+        found = []
+        for lists, places in columns(np.bincount(own, minlength=group.many)):
+            chosen = order[places]
+            base: Integers | int = (held.which[chosen] * per_table).astype(self.index) if len(held.tables) > 1 else 0
+            found.append(Column(lists, base, tuple(np.ascontiguousarray(others[chosen].T)), strides))
+        return Block(held, rows, tuple(found))
+
+
+def _largest(description: Description, held: list[Held]) -> tuple[float, int]:
+    """Return what the costs of a robot's value could add up to, and how many constraints it could break."""
+    many = len(description.sizes)
+    total, constraints = np.zeros(many), np.zeros(many, np.int64)
+    if description.charges is not None and len(description.charges):
+        finite = np.where(np.isinf(description.charges), 0, description.charges)
+        np.maximum.at(total, segments(description.sizes), finite)
+    for one in held:
+        finite = np.where(np.isinf(one.tables), 0, one.tables).reshape(len(one.tables), -1)
+        most = finite.max(axis=1, initial=0)
+        total += np.bincount(one.owners, most[one.which], many)
+        constraints += np.bincount(one.owners, minlength=many)
+    return float(total.max(initial=0)), int(constraints.max(initial=0))

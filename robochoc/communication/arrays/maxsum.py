@@ -1,0 +1,183 @@
+"""Max-Sum for all robots at once: `protocols/maxsum.py`, where the algorithm is explained.
+
+Sums are added up in the order in which the objects do, so that they are rounded alike.
+"""
+
+from __future__ import annotations
+
+from typing import cast
+
+import numpy as np
+
+from robochoc.communication.arrays.cycle_run import CycleRun, least
+from robochoc.communication.arrays.factors import Ports, factors_of, ports_of
+from robochoc.communication.arrays.kinds import Floats, Integers
+from robochoc.communication.arrays.layout import Group, Layout
+from robochoc.communication.arrays.tally import list_bytes
+from robochoc.model.message import encode
+from robochoc.model.outcome import Verdict
+from robochoc.model.problem import INFINITE
+from robochoc.protocols.cycles_messages import Domain
+from robochoc.protocols.cycles_settings import CycleSettings
+from robochoc.protocols.maxsum_messages import Q, R
+from robochoc.protocols.maxsum_settings import MaxSumSettings
+
+_REST = len(encode(R([]))) - 1
+"""Bytes of a message but for its list of rows."""
+_FLOAT = 9
+
+
+class ArrayMaxSum(CycleRun):
+    """A run of Max-Sum."""
+
+    def __init__(
+        self, layout: Layout, settings: CycleSettings, seed: int, *, clocks: bool = True, changes: bool = False
+    ) -> None:
+        super().__init__(layout, settings, seed, clocks=clocks, changes=changes)
+        self._alone = [self._cost_alone(group) for group in layout.groups]
+        self._factors = [] if layout.empty.size else factors_of(layout)
+        self._ports, self._sides = ports_of(layout, self._factors)
+        self._preferred: list[Floats] = []
+
+    def _begin(self) -> None:
+        """Take the cheapest values, tell domains, and make functions (`MaxSum.begin`, `MaxSum._build`)."""
+        self._preferred = [self._prefer(group) for group in self.layout.groups]
+        for group, preferred in zip(self.layout.groups, self._preferred, strict=True):
+            active = slice(group.first, group.first + group.active)
+            self.values[active] = preferred[: group.active].argmin(axis=1).astype(self.layout.kind)
+        self._count_links()
+        lengths = self.layout.description.domain_bytes
+        if isinstance(lengths, np.ndarray):
+            lengths = lengths[self.layout.robots]
+        self.tally.add(Domain.__name__, lengths, self._below)
+        self._count_tables()
+
+    def _step(self) -> None:
+        """Tell R, take values, tell Q (`MaxSum._tell_r`, `MaxSum._decide`)."""
+        self._weigh()
+        self._tell_r()
+        z = self._z()
+        if self.verdict is not None:
+            return
+        for group, costs in zip(self.layout.groups, z, strict=True):
+            active = slice(group.first, group.first + group.active)
+            self.values[active] = costs[: group.active].argmin(axis=1).astype(self.layout.kind)
+        if self.cycle + 1 < self.settings.cycles:
+            self._tell_q(z)
+
+    def _weigh(self) -> None:
+        total = sum(factors.cost(self.values) for factors in self._factors)
+        for group, alone in zip(self.layout.groups, self._alone, strict=True):
+            if alone is not None:
+                total += float(alone[np.arange(group.many), group.values(self.values)].sum())
+        self.note(total)
+
+    # Equations
+
+    def _prefer(self, group: Group) -> Floats:
+        """Return the cost of each value alone, with its preference (gamma)."""
+        rows = np.arange(group.first, group.first + group.active)
+        preferred = np.zeros((group.many, group.size))
+        preference = cast("MaxSumSettings", self.settings).preference
+        for place in range(group.size):
+            preferred[: group.active, place] = preference * self.draws.draw(rows)
+        alone = self._cost_alone(group)
+        return preferred if alone is None else alone + preferred
+
+    def _tell_r(self) -> None:
+        """Compute R of all functions (2)."""
+        for factors, sides in zip(self._factors, self._sides, strict=True):
+            told = [ports.q[rows] for ports, rows in sides]
+            for place, (ports, rows) in enumerate(sides):
+                ports.r[rows] = factors.least(told, place)
+        self.tally.add(R.__name__, self._link_bytes, np.ones_like(self._link_bytes))
+        self._hear(below=True)
+
+    def _z(self) -> list[Floats]:
+        """Return the cost of each value (3)."""
+        found = []
+        for ports, preferred in zip(self._ports, self._preferred, strict=True):
+            z = preferred.copy()
+            for lists, slots in ports.columns():
+                z[lists] += ports.r[slots]
+            found.append(z)
+            hopeless = np.flatnonzero(np.isinf(least(z[: ports.group.active])))
+            if hopeless.size:
+                self.verdict = Verdict.NO_SOLUTION
+                self.witness = int(self.layout.robots[ports.group.first + hopeless[0]])
+        return found
+
+    def _tell_q(self, z: list[Floats]) -> None:
+        """Compute Q of all variables (1), normalised and damped."""
+        damping = cast("MaxSumSettings", self.settings).damping
+        for ports, preferred, costs in zip(self._ports, self._preferred, z, strict=True):
+            fresh = _fresh(ports, preferred, costs)
+            fresh -= least(fresh)[:, None]
+            ports.q = damping * ports.q + (1 - damping) * fresh if self.cycle and damping else fresh
+        self.tally.add(Q.__name__, self._link_bytes, np.ones_like(self._link_bytes))
+        self._hear(below=False)
+
+    # Counts
+
+    def _cost_alone(self, group: Group) -> Floats | None:
+        if group.fixed is None:
+            return None
+        broken, paid = self.layout.costs.broken(group.fixed), self.layout.costs.paid(group.fixed)
+        return np.where(broken > 0, INFINITE, paid.astype(np.float64))
+
+    def _count_links(self) -> None:
+        """Count which robots are above and below each, and how long messages between two are."""
+        layout = self.layout
+        self._below = np.zeros(layout.many, np.int64)
+        higher = np.zeros(len(layout.neighbours), bool)
+        for (group, lists, _, places), flags in zip(layout.links, layout.higher, strict=True):
+            self._below[group.first : group.last][lists] += ~flags
+            higher[places] = flags
+        rows = np.zeros(len(higher), np.int64)
+        for factors in self._factors:
+            for column in factors.rows.T[:-1]:
+                rows += np.bincount(layout.link(factors.rows[:, -1], column), minlength=len(rows))
+        sizes = layout.description.sizes[layout.robots][layout.neighbours]
+        lengths = _REST + list_bytes(rows) + rows * (list_bytes(sizes) + _FLOAT * sizes)
+        self._link_bytes: Integers = lengths[higher]
+
+    def _count_tables(self) -> None:
+        """Count the checks of tables, once all domains are known."""
+        layout = self.layout
+        alone = np.zeros(layout.many, np.int64)
+        for held in layout.description.held:
+            if not held.others.shape[1] and not layout.empty.size:
+                alone += np.bincount(layout.places[held.owners], minlength=layout.many) * held.tables.shape[-1]
+        alone[layout.degrees == 0] = 0
+        self.count_checks(alone)
+        self._hear(below=False)
+        made = layout.description.table_checks
+        if made is None:
+            made = alone
+            for held in layout.description.held:
+                holders = layout.places[held.owners[held.owners > held.others.max(axis=1, initial=-1)]]
+                wide = held.others.shape[1] > 0
+                made = made + np.bincount(holders, minlength=layout.many) * held.tables[0].size * wide
+            self.count_checks(made)
+        else:
+            self.count_checks(np.where(layout.degrees > 0, made[layout.robots], 0))
+
+    def _hear(self, *, below: bool) -> None:
+        """Let clocks rise to those of the robots below, or above, that have spoken."""
+        if self.clocks is not None:
+            heard = self.clocks.copy()
+            for (group, lists, neighbours, _), higher in zip(self.layout.links, self.layout.higher, strict=True):
+                part = heard[group.first : group.last]
+                told = np.where(higher != below, self.clocks.take(neighbours), 0)
+                part[lists] = np.maximum(part[lists], told)
+            self.clocks = heard
+
+
+def _fresh(ports: Ports, preferred: Floats, costs: Floats) -> Floats:
+    """Return, for each meeting, the cost of each value without its function: nothing is subtracted from infinity."""
+    endless = np.flatnonzero(np.isinf(costs).any(axis=1))
+    with np.errstate(invalid="ignore"):
+        fresh: Floats = costs.take(ports.owners, axis=0) - ports.r
+    for slots, total in ports.without(endless, preferred):
+        fresh[slots] = total
+    return fresh

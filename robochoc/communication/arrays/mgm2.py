@@ -1,0 +1,245 @@
+"""MGM-2 for all robots at once: `protocols/mgm2.py`, where the algorithm is explained."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import cast
+
+import numpy as np
+
+from robochoc.communication.arrays.cycle_run import nth
+from robochoc.communication.arrays.kinds import Flags, Integers
+from robochoc.communication.arrays.mgm import ArrayGainers
+from robochoc.communication.arrays.shared import Shared
+from robochoc.communication.arrays.tally import integer_bytes, list_bytes
+from robochoc.model.message import encode
+from robochoc.protocols.cycles_messages import Domain
+from robochoc.protocols.mgm2_messages import Accept, Go, Offer, Reject
+from robochoc.protocols.mgm2_settings import MGM2Settings
+
+_NO_OFFER = len(encode(Offer(None)))
+_ACCEPT = len(encode(Accept(0, 0, 0))) - 3
+"""Bytes of an acceptance but for its three numbers."""
+
+
+@dataclass
+class _Offers:
+    """The offers of one cycle: rows of those who make them and of their receivers, and links in both directions."""
+
+    makers: Integers
+    receivers: Integers
+    links: Integers
+    back: Integers
+
+
+@dataclass
+class _Joint:
+    """Offers between robots of two sizes that reach a robot that makes none: the gain of each joint move, in a row.
+
+    `offers` are their numbers. A row goes through the receiver's values, and for each through the maker's (`width`).
+    """
+
+    offers: Integers
+    gains: Integers
+    width: int
+
+
+class ArrayMGM2(ArrayGainers):
+    """A run of MGM-2."""
+
+    def _begin(self) -> None:
+        self.take_any()
+        lengths = self.layout.description.domain_bytes
+        if isinstance(lengths, np.ndarray):
+            lengths = lengths[self.layout.robots]
+        self.tally.add(Domain.__name__, lengths, self.layout.degrees)
+        if not self.layout.empty.size:
+            self.tell_values()
+
+    def _step(self) -> None:
+        """Go through all phases of a cycle, from values to joint moves."""
+        found = self.burdens()
+        self.hear()
+        offers = self._offer()
+        joint = self._gains(offers, found)
+        self._hear_offers(offers)
+        partners, targets, gains = self._answer(offers, joint)
+        committed = partners >= 0
+        self.count_checks(np.where(committed, 0, self.all_checks))
+        alone, own = self.best_unilateral(found, ~committed)
+        targets, gains = np.where(committed, targets, alone), np.where(committed, gains, own)
+        self.tell_gains(gains)
+        self.hear()
+        moves = self.wins(gains, partners)
+        self._go(np.flatnonzero(committed), partners, moves)
+        self.values = np.where(moves, targets, self.values).astype(self.layout.kind)
+        if self.cycle + 1 < self.settings.cycles:
+            self.tell_values()
+
+    # Phases
+
+    def _offer(self) -> _Offers:
+        """Let robots become offerers by chance, each with a random neighbour (`MGM2._offer`)."""
+        layout = self.layout
+        able = np.flatnonzero(layout.degrees)
+        makers = able[self.draws.draw(able) < cast("MGM2Settings", self.settings).threshold]
+        chosen = (self.draws.draw(makers) * layout.degrees[makers]).astype(np.int64)
+        links = layout.starts[makers] + chosen
+        receivers = layout.neighbours[links].astype(np.int64)
+        return _Offers(makers, receivers, links, layout.link(receivers, makers))
+
+    def _gains(self, offers: _Offers, found: list[Integers]) -> list[_Joint]:
+        """Compute what offers say, and what their receivers make of them (`MGM2._gains`, `MGM2._joint`)."""
+        making = self._flags(offers.makers)
+        sizes, joint = np.full(len(offers.makers), _NO_OFFER), []
+        for number, group in enumerate(self.layout.groups):
+            for other, met in enumerate(self.layout.groups):
+                inside = (self._groups[offers.makers] == number) & (self._groups[offers.receivers] == other)
+                chosen = np.flatnonzero(inside)
+                if not chosen.size:
+                    continue
+                told = self._told(offers, chosen, number, found[number], met.size)
+                sizes[chosen] += self._offer_bytes(told) - 1
+                open_ = ~making[offers.receivers[chosen]]
+                gains = self._joint(offers, chosen[open_], other, found[other])[:, :, None] + told[open_]
+                joint.append(_Joint(chosen[open_], gains.reshape(len(gains), met.size * group.size), group.size))
+        links = int(self.layout.degrees.sum())
+        self.tally.add(Offer.__name__, sizes, np.ones_like(sizes))
+        self.tally.add(Offer.__name__, _NO_OFFER, links - len(sizes))
+        return joint
+
+    def _told(self, offers: _Offers, chosen: Integers, number: int, burdens: Integers, many: int) -> Integers:
+        """Return the gains in the `chosen` offers, which robots of the group of this `number` make."""
+        group = self.layout.groups[number]
+        makers, receivers = offers.makers[chosen] - group.first, self.values[offers.receivers[chosen]]
+        rows = self._shared[number].with_any(offers.links[chosen], self.values, burdens[makers], receivers, many)
+        return self.present(number, burdens)[makers][:, None, None] - rows
+
+    def _joint(self, offers: _Offers, chosen: Integers, number: int, burdens: Integers) -> Integers:
+        """Return what receivers, of the group of this `number`, gain on constraints without the maker."""
+        group = self.layout.groups[number]
+        receivers = offers.receivers[chosen] - group.first
+        left = self._shared[number].without(offers.back[chosen], self.values, burdens[receivers])
+        now = left[np.arange(len(left)), group.values(self.values)[receivers]]
+        gains: Integers = now[:, None] - left
+        return gains
+
+    def _answer(self, offers: _Offers, joint: list[_Joint]) -> tuple[Integers, Integers, Integers]:
+        """Accept the best offers (`MGM2._answer`, `MGM2._commit`); return partners (-1: none), targets and gains."""
+        best, ties = (np.zeros(len(offers.makers), np.int64) for _ in range(2))
+        for one in joint:
+            best[one.offers] = one.gains.max(axis=1)
+            ties[one.offers] = (one.gains == best[one.offers][:, None]).sum(axis=1)
+        accepted, places = self._choose(offers, best, ties)
+        targets, gains = self.values.copy(), np.zeros(self.layout.many, self.layout.costs.kind)
+        partners = np.full(self.layout.many, -1, np.int64)
+        makers, receivers = offers.makers[accepted], offers.receivers[accepted]
+        partners[makers], partners[receivers] = receivers, makers
+        gains[makers] = gains[receivers] = best[accepted]
+        for one in joint:
+            mine = np.flatnonzero(np.isin(accepted, one.offers))
+            rows = np.searchsorted(one.offers, accepted[mine])
+            flags = one.gains[rows] == best[accepted[mine]][:, None]
+            own, place = np.divmod(nth(flags, places[mine]), one.width)
+            targets[receivers[mine]], targets[makers[mine]] = own, place
+        self._tell_answers(offers, makers, targets, gains)
+        return partners, targets, gains
+
+    def _choose(self, offers: _Offers, best: Integers, ties: Integers) -> tuple[Integers, Integers]:
+        """Return the offers that are accepted, and which of its best moves is taken of each."""
+        making = self._flags(offers.makers)
+        order = np.argsort(offers.back, kind="stable")
+        order = order[~making[offers.receivers[order]]]  # by receiver, and there in priority order
+        receivers = offers.receivers[order]
+        starts = np.flatnonzero(np.diff(receivers, prepend=-1))
+        if not len(starts):
+            return starts, starts
+        most = np.maximum.reduceat(best[order], starts)
+        lengths = np.diff(starts, append=len(order))
+        counted = np.where(best[order] == np.repeat(most, lengths), ties[order], 0)
+        sums = np.cumsum(counted)
+        takes = np.flatnonzero(most > 0)
+        total = np.add.reduceat(counted, starts)[takes]
+        before = (sums[starts] - counted[starts])[takes]
+        wanted = before + self.draws.any_of(receivers[starts[takes]], total)
+        found = np.searchsorted(sums, wanted, side="right")
+        return order[found], wanted - (sums[found] - counted[found])
+
+    def _go(self, committed: Integers, partners: Integers, moves: Flags) -> None:
+        """Let partners tell each other whether they gain most; both have to (`MGM2._decide`, `MGM2._go`)."""
+        self.tally.add(Go.__name__, len(encode(Go(True))), len(committed))
+        if self.clocks is not None:
+            self.clocks[committed] = np.maximum(self.clocks[committed], self.clocks[partners[committed]])
+        moves[committed] &= moves[partners[committed]]
+
+    # Counts
+
+    def _offer_bytes(self, told: Integers) -> Integers:
+        costs = self.layout.costs
+        numbers = integer_bytes(costs.broken(told)) + integer_bytes(costs.paid(told)) + 1
+        heads = list_bytes(told.shape[1]) + told.shape[1] * list_bytes(told.shape[2])
+        total: Integers = numbers.sum(axis=(1, 2)) + heads
+        return total
+
+    def _tell_answers(self, offers: _Offers, makers: Integers, targets: Integers, gains: Integers) -> None:
+        """Count answers, and let those who made offers hear them."""
+        costs, told = self.layout.costs, gains[makers]
+        numbers = integer_bytes(targets[makers]) + integer_bytes(costs.broken(told)) + integer_bytes(costs.paid(told))
+        self.tally.add(Accept.__name__, _ACCEPT + numbers, np.ones_like(numbers))
+        self.tally.add(Reject.__name__, len(encode(Reject())), len(offers.makers) - len(makers))
+        self.count_checks(self._joint_checks(offers))
+        if self.clocks is not None:
+            answered = self.clocks[offers.receivers]
+            self.clocks[offers.makers] = np.maximum(self.clocks[offers.makers], answered)
+
+    def _joint_checks(self, offers: _Offers) -> Integers:
+        """Return how many checks receivers have made: on all constraints without the maker, for each offer."""
+        making = self._flags(offers.makers)
+        checks = np.zeros(self.layout.many, np.int64)
+        for number, shared in enumerate(self._shared):
+            mine = (self._groups[offers.receivers] == number) & ~making[offers.receivers]
+            receivers = offers.receivers[mine]
+            made = self.all_checks[receivers] - shared.count(offers.back[mine]) * shared.size
+            np.add.at(checks, receivers, made)
+        return checks
+
+    def _hear_offers(self, offers: _Offers) -> None:
+        """Let clocks rise to those of offers: an offer to a robot before the partner is made before it is computed."""
+        layout = self.layout
+        made = np.zeros(layout.many, np.int64)
+        made[offers.makers] = self._sizes[offers.receivers] * self.all_checks[offers.makers]
+        self.count_checks(made)
+        if self.clocks is None:
+            return
+        said = self.clocks - made
+        before = np.zeros(layout.many, np.int64)
+        before[offers.makers] = layout.robots[offers.receivers]
+        heard = self.clocks.copy()
+        for group, lists, neighbours, _ in layout.links:
+            ranks = layout.robots[group.first : group.last][lists]
+            late = np.where(ranks >= before[neighbours], made[neighbours], 0)
+            part = heard[group.first : group.last]
+            part[lists] = np.maximum(part[lists], said[neighbours] + late)
+        self.clocks = heard
+
+    # What does not change
+
+    def _flags(self, rows: Integers) -> Flags:
+        flags = np.zeros(self.layout.many, bool)
+        flags[rows] = True
+        return flags
+
+    @cached_property
+    def _shared(self) -> list[Shared]:
+        return [Shared(self.layout, group) for group in self.layout.groups]
+
+    @cached_property
+    def _groups(self) -> Integers:
+        """The number of the group of each row."""
+        return np.repeat(np.arange(len(self.layout.groups)), [group.many for group in self.layout.groups])
+
+    @cached_property
+    def _sizes(self) -> Integers:
+        """How many values the robot in each row has."""
+        return self.layout.description.sizes[self.layout.robots]

@@ -1,0 +1,142 @@
+"""A team as arrays, in one thread: a session for protocols that have such a form."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Mapping
+
+import numpy as np
+
+from robochoc.communication.arrays.cycle_run import walk
+from robochoc.communication.arrays.description import described
+from robochoc.communication.arrays.forms import form_of
+from robochoc.communication.arrays.layout import Layout
+from robochoc.communication.run_result import Progress, RunResult
+from robochoc.communication.session import Epoch, Session
+from robochoc.journal.events import Concluded, Decided, Observer
+from robochoc.model.outcome import Verdict
+from robochoc.model.problem import Team
+from robochoc.protocols.cycles import CycleProtocol
+from robochoc.protocols.findings import Findings, Trail
+from robochoc.protocols.protocol import Protocol
+from robochoc.protocols.settings import settings_of
+from robochoc.solver.agent_problem import DEFAULT_PARAMETERS, AgentProblem, RunParameters
+from robochoc.solver.compiled_team import CompiledTeam
+from robochoc.solver.encoding import UnsupportedError
+
+
+class ArraysRun(Session):
+    """One team as arrays. Its problem does not change.
+
+    Args:
+        team: The team, compiled or not.
+        protocol: The protocol that its robots run.
+        observer: Receives what robots decide, cycle by cycle (its time), and no messages.
+        progress: Receives the count of messages after each cycle, before its decisions.
+        parameters: What robots are given besides the problem.
+
+    Raises:
+        UnsupportedError: when the protocol has no form as arrays, or costs or tables are too large.
+    """
+
+    def __init__(
+        self,
+        team: Team | CompiledTeam,
+        protocol: type[Protocol],
+        *,
+        observer: Observer | None = None,
+        progress: Callable[[Progress], None] | None = None,
+        parameters: RunParameters = DEFAULT_PARAMETERS,
+    ) -> None:
+        super().__init__(team)
+        self._observer = observer
+        self._progress = progress
+        form = form_of(protocol)
+        assert issubclass(protocol, CycleProtocol)  # noqa: S101 - for mypy: all that have a form are
+        given = settings_of(protocol, parameters.settings)
+        settings = given if isinstance(given, type(protocol.settings)) else protocol.settings
+        self._layout = _laid_out(Epoch(self.compiled, parameters=parameters).parts(protocol))
+        self._run = form(self._layout, settings, parameters.seed, changes=True)
+        self._names = self._layout.description.names
+
+    @property
+    def lossless(self) -> bool:
+        """See `Session.lossless`."""
+        return True
+
+    def search(self, timeout: float | None = None, messages: int | None = None) -> RunResult:
+        """See `Session.search`; limits are looked at after each cycle."""
+        began = time.monotonic()
+        run = self._run
+        verdict = Verdict.UNKNOWN
+        for _ in walk(run):
+            elapsed_s = time.monotonic() - began
+            self._report(elapsed_s)
+            if not run.over and (
+                (timeout is not None and elapsed_s > timeout) or (messages is not None and self._sent >= messages)
+            ):
+                break
+        else:
+            verdict = run.verdict or Verdict.SOLUTION
+        witness = None if run.witness is None else self._names[run.witness]
+        if self._observer and witness is not None:
+            self._observer(Concluded(t=run.cycle, robot=witness, verdict=str(verdict)))
+        return RunResult(
+            verdict, witness, self._assignments(), run.metrics(time.monotonic() - began), findings=self._findings()
+        )
+
+    def change(self, epoch: Epoch) -> None:  # noqa: ARG002 - of `Session`
+        """Refuse: see `robochoc.run.compatibility`."""
+        raise UnsupportedError("--runtime arrays is for problems that do not change")
+
+    def close(self) -> None:
+        """Do nothing: there is nothing to release."""
+
+    @property
+    def costs(self) -> list[float]:
+        """The cost of the team's values in every cycle so far; `inf` where a hard constraint is broken."""
+        return list(self._run.costs)
+
+    @property
+    def _sent(self) -> int:
+        return sum(self._run.tally.messages.values())
+
+    def _report(self, elapsed_s: float) -> None:
+        """Report the progress, and what robots have decided in the cycle."""
+        run = self._run
+        if self._progress:
+            self._progress(Progress(self._sent, elapsed_s))
+        if not self._observer or not run.changes or len(run.changes) <= run.cycle:
+            return
+        for row, value in zip(*map(np.ndarray.tolist, run.changes[run.cycle]), strict=True):
+            name = self._names[self._layout.robots[row]]
+            clock = 0 if run.clocks is None else int(run.clocks[row])
+            assignment = self.compiled[name].solution(value)
+            self._observer(Decided(t=run.cycle, robot=name, assignment=assignment, clock=clock))
+
+    def _assignments(self) -> dict[str, dict[str, int]]:
+        found: dict[str, dict[str, int]] = {name: {} for name in self._names}
+        for robot, value in zip(self._layout.robots.tolist(), self._run.values.tolist(), strict=True):
+            found[self._names[robot]] = self.compiled[self._names[robot]].solution(value)
+        return found
+
+    def _findings(self) -> dict[str, Findings]:
+        """Return the own values of each robot in every cycle."""
+        run = self._run
+        entries: list[list[tuple[int, int]]] = [[] for _ in range(self._layout.many)]
+        for cycle, (rows, values) in enumerate(run.changes or ()):
+            for row, value in zip(rows.tolist(), values.tolist(), strict=True):
+                entries[row].append((cycle, value))
+        found = dict.fromkeys(self._names, Findings(trail=Trail([], -1)))
+        for row, robot in enumerate(self._layout.robots.tolist()):
+            last = run.cycle if self._layout.degrees[row] else run.settings.cycles
+            found[self._names[robot]] = Findings(trail=Trail(entries[row], last))
+        return found
+
+
+def _laid_out(parts: Mapping[str, AgentProblem]) -> Layout:
+    """Return the team's arrays. Raises `UnsupportedError` when its costs or tables are too large."""
+    try:
+        return Layout(described(parts))
+    except UnsupportedError as large:
+        raise UnsupportedError(f"{large}; --runtime simulator computes without arrays") from None

@@ -1,0 +1,103 @@
+"""What pairs of neighbours share: constraints of a robot in which a neighbour takes part, for many pairs at once."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+
+from robochoc.communication.arrays.kinds import Integers
+from robochoc.communication.arrays.layout import Block, Group, Layout
+
+
+@dataclass(frozen=True)
+class _Position:
+    """The constraints of a block, sorted by the link from their owner to the robot at one position."""
+
+    links: Integers
+    constraints: Integers
+    stride: int
+
+
+class _Constraints:
+    """The constraints of a block: `rows` as in `Column`, and who is at each position."""
+
+    def __init__(self, layout: Layout, block: Block) -> None:
+        held = block.held
+        shape = held.tables.shape[1:-1]
+        self.costs = block.rows
+        self._base = held.which * int(np.prod(shape))
+        self._others = layout.places[held.others]
+        self._strides = np.array([int(np.prod(shape[place + 1 :])) for place in range(len(shape))])
+        owners = layout.places[held.owners]
+        self.positions = []
+        for place, stride in enumerate(self._strides.tolist()):
+            links = layout.link(owners, self._others[:, place])
+            order = np.argsort(links, kind="stable")
+            self.positions.append(_Position(links[order], order, stride))
+
+    def rows(self, values: Integers, constraints: Integers) -> Integers:
+        """Return the number of the row of costs of each of `constraints`, where robots have these `values`."""
+        others = values[self._others[constraints]].astype(np.int64)
+        found: Integers = self._base[constraints] + others @ self._strides
+        return found
+
+
+class _Meeting(NamedTuple):
+    """One constraint for some of the pairs that were asked for (`pairs`); no pair is in it twice."""
+
+    pairs: Integers
+    rows: Integers
+    stride: int
+    costs: Integers
+
+
+class Shared:
+    """The constraints of the robots of one group, by who else takes part."""
+
+    def __init__(self, layout: Layout, group: Group) -> None:
+        self._constraints = [_Constraints(layout, block) for block in group.blocks]
+        self.size = group.size
+
+    def count(self, links: Integers) -> Integers:
+        """Return in how many constraints of its owner the neighbour of each of `links` takes part."""
+        found = np.zeros(len(links), np.int64)
+        for constraints in self._constraints:
+            for position in constraints.positions:
+                first, last = _span(position, links)
+                found += last - first
+        return found
+
+    def without(self, links: Integers, values: Integers, burdens: Integers) -> Integers:
+        """Return `burdens` (of each link's owner) without the constraints in which the neighbour takes part."""
+        left = burdens.copy()
+        for meeting in self._meetings(links, values):
+            left[meeting.pairs] -= meeting.costs[meeting.rows]
+        return left
+
+    def with_any(self, links: Integers, values: Integers, burdens: Integers, own: Integers, many: int) -> Integers:
+        """Return the `burdens` of each link's owner for each of the `many` values that its neighbour may have.
+
+        `own` are the values that the neighbours have now.
+        """
+        found = np.repeat(self.without(links, values, burdens)[:, None, :], many, axis=1)
+        for meeting in self._meetings(links, values):
+            first = meeting.rows - meeting.stride * own[meeting.pairs].astype(np.int64)
+            for value in range(many):
+                found[meeting.pairs, value] += meeting.costs[first + meeting.stride * value]
+        return found
+
+    def _meetings(self, links: Integers, values: Integers) -> Iterator[_Meeting]:
+        for constraints in self._constraints:
+            for position in constraints.positions:
+                first, last = _span(position, links)
+                for number in range(int((last - first).max(initial=0))):
+                    pairs = np.flatnonzero(last - first > number)
+                    met = position.constraints[first[pairs] + number]
+                    yield _Meeting(pairs, constraints.rows(values, met), position.stride, constraints.costs)
+
+
+def _span(position: _Position, links: Integers) -> tuple[Integers, Integers]:
+    return np.searchsorted(position.links, links), np.searchsorted(position.links, links, side="right")

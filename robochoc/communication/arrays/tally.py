@@ -1,0 +1,43 @@
+"""What robots have said in a run of arrays: messages by type, bytes, the largest."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from robochoc.communication.arrays.kinds import Integers
+
+_SHORT_LIST, _LONG_LIST = 16, 65_536
+"""Lists of so many entries have longer heads in msgpack."""
+_SIZES = ((-(2**31), 9), (-(2**15), 5), (-(2**7), 3), (-(2**5), 2), (128, 1), (256, 2), (65_536, 3), (2**32, 5))
+
+
+class Tally:
+    """Counts of messages."""
+
+    def __init__(self) -> None:
+        self.messages: dict[str, int] = {}
+        self.bytes = self.largest = 0
+
+    def add(self, kind: str, sizes: Integers | int, copies: Integers | int) -> None:
+        """Count messages of `kind`: of each of `sizes` in bytes, as many `copies`. Numbers stand for equal ones."""
+        many = int(np.sum(copies))
+        if not many:
+            return
+        self.messages[kind] = self.messages.get(kind, 0) + many
+        self.bytes += int(np.sum(sizes * copies)) if isinstance(sizes, np.ndarray) else sizes * many
+        sent = sizes[np.asarray(copies) > 0] if isinstance(sizes, np.ndarray) and np.ndim(copies) else sizes
+        self.largest = max(self.largest, int(np.max(sent)))
+
+
+def integer_bytes(numbers: Integers) -> Integers:
+    """Return how many bytes each of `numbers` has in msgpack."""
+    bounds = np.array([bound for bound, _ in _SIZES])
+    sizes = np.array([*(size for _, size in _SIZES), 9])
+    found: Integers = sizes[np.searchsorted(bounds, numbers, side="right")]
+    return found
+
+
+def list_bytes(length: Integers | int) -> Integers:
+    """Return how many bytes the head of a list of this `length` has in msgpack."""
+    lengths = np.asarray(length)
+    return np.where(lengths < _SHORT_LIST, 1, np.where(lengths < _LONG_LIST, 3, 5))

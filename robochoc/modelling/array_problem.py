@@ -1,0 +1,253 @@
+"""Problems of very many robots, made from numpy arrays: no files, no objects, one variable for each robot.
+
+They are for the runtime of arrays (docs/guides/arrays.md).
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from robochoc.communication.arrays.cycle_run import CycleRun, walk
+from robochoc.communication.arrays.description import Description, Held
+from robochoc.communication.arrays.forms import form_of
+from robochoc.communication.arrays.kinds import Floats, Integers
+from robochoc.communication.arrays.layout import Layout
+from robochoc.model.message import encode
+from robochoc.model.outcome import Metrics, Verdict
+from robochoc.model.problem import INFINITE
+from robochoc.protocols.cycles import CycleProtocol
+from robochoc.protocols.cycles_messages import Domain, Value
+from robochoc.protocols.settings import settings_of
+from robochoc.run.compatibility import refuse_settings
+from robochoc.run.registry import protocol_named
+from robochoc.solver.encoding import UnsupportedError
+from robochoc.verification.checker import RefutedError
+
+_TABLE = 2
+"""The axes of one table."""
+
+
+@dataclass(frozen=True)
+class ArraySolution:
+    """What a run of arrays comes to.
+
+    Attributes:
+        verdict: `solution`, or `no-solution`, or `unknown`: all cycles break a hard constraint.
+        values: The values of the cheapest cycle, by robot; None where no cycle breaks nothing.
+        cost: What they cost; None where there are none.
+        costs: The cost of every cycle, from 0; `inf` where a hard constraint is broken.
+        metrics: Messages by type, bytes, checks, NCCCs (0 where they were not counted), as in the simulator.
+    """
+
+    verdict: Verdict
+    values: Integers | None
+    cost: int | None
+    costs: tuple[float, ...]
+    metrics: Metrics
+
+
+class ArrayProblem:
+    """A team of robots with one variable each, whose values are 0, 1, ..., and costs between pairs of robots.
+
+    Robots are numbers from 0, the highest in the priority order.
+
+    Args:
+        robots: The number of robots.
+        values: The number of values of each variable.
+        edges: The pairs of robots that a table of costs connects, a row for each.
+        tables: What pairs of values cost: row and column are the values of an edge's first and second robot. One
+            table for all edges, or one for each, or several that `which` chooses from. Whole numbers of 0 or more,
+            and `inf` for what is forbidden.
+        which: The number of the table of each edge.
+        charges: What each value costs each robot alone, a row for each robot.
+        names: The names of the robots, on which their random numbers depend. None: R0, R1, ...
+
+    Raises:
+        ValueError: for arrays that do not fit.
+
+    Example:
+        >>> import numpy as np
+        >>> from robochoc.modelling.array_problem import ArrayProblem
+        >>> ring = ArrayProblem(4, 3, [(0, 1), (1, 2), (2, 3), (3, 0)], np.eye(3))
+        >>> ring.solve("dsa", cycles=20).cost
+        0
+    """
+
+    def __init__(
+        self,
+        robots: int,
+        values: int,
+        edges: ArrayLike,
+        tables: ArrayLike,
+        *,
+        which: ArrayLike | None = None,
+        charges: ArrayLike | None = None,
+        names: Sequence[str] | None = None,
+    ) -> None:
+        self.robots = robots
+        self.values = values
+        self.edges = np.asarray(edges, np.int64).reshape(-1, 2)
+        given = np.asarray(tables, np.float64)
+        self.tables = given[None] if given.ndim == _TABLE else given
+        self.charges = None if charges is None else np.asarray(charges, np.float64)
+        self.names = names
+        several = len(self.tables) > 1
+        self.which = self._numbers(which, several=several)
+        self._check()
+
+    def solve(
+        self,
+        protocol: str = "dsa",
+        *,
+        seed: int = 0,
+        timeout: float | None = None,
+        ncccs: bool = True,
+        **settings: object,
+    ) -> ArraySolution:
+        """Solve the problem by a protocol that has a form as arrays, and check the answer with the tables.
+
+        Args:
+            protocol: The protocol: dsa, mgm, mgm2 or maxsum.
+            seed: The seed of the robots' random numbers.
+            timeout: A limit in seconds, looked at after each cycle.
+            ncccs: Whether NCCCs are counted; that takes a fifth of the time or so.
+            **settings: The protocol's settings, such as `cycles` or `variant`.
+
+        Returns:
+            The cheapest cycle (anytime), and what the run took.
+
+        Raises:
+            UnknownProtocolError: if no such protocol is installed.
+            UnsupportedError: if it has no form as arrays, or a setting is not allowed, or costs are too large.
+            RefutedError: if the answer costs something else than the run says.
+        """
+        began = time.monotonic()
+        run = self.run(protocol, seed=seed, ncccs=ncccs, **settings)
+        for _ in walk(run):
+            if timeout is not None and time.monotonic() - began > timeout and not run.over:
+                run.end()
+                break
+        return self._solution(run, time.monotonic() - began)
+
+    def run(self, protocol: str = "dsa", *, seed: int = 0, ncccs: bool = True, **settings: object) -> CycleRun:
+        """Return a run that has not begun, for those who look at each cycle (`walk`). For the rest see `solve`."""
+        kind = protocol_named(protocol)
+        words = {name: str(value) for name, value in settings.items()}
+        refuse_settings(protocol, kind, words)
+        form = form_of(kind)
+        if not issubclass(kind, CycleProtocol):
+            raise UnsupportedError(f"{protocol} goes through no cycles")
+        known = settings_of(kind, words)
+        return form(self.layout, known if isinstance(known, type(kind.settings)) else kind.settings, seed, clocks=ncccs)
+
+    def cost(self, values: Integers) -> float:
+        """Return what `values` of all robots cost."""
+        first, second = self.edges.T
+        paid = self.tables[self.which, values[first], values[second]].sum()
+        if self.charges is not None:
+            paid += self.charges[np.arange(self.robots), values].sum()
+        return float(paid)
+
+    @cached_property
+    def layout(self) -> Layout:
+        """The problem as runs need it; made once."""
+        return Layout(self._described())
+
+    def __repr__(self) -> str:
+        return f"<array problem: {self.robots:,} robots, {len(self.edges):,} edges, {self.values:,} values>"
+
+    def _described(self) -> Description:
+        held = self._held()
+        keys = held.owners * self.robots + held.others[:, 0]
+        keys = keys[np.diff(keys, prepend=-1) > 0]
+        lengths = [len(encode(Value((value,)))) for value in range(self.values)]
+        alike = len(set(lengths)) == 1
+        return Description(
+            names=self.names or _Names(self.robots),
+            sizes=np.full(self.robots, self.values),
+            degrees=np.bincount(keys // self.robots, minlength=self.robots),
+            neighbours=keys % self.robots,
+            charges=None if self.charges is None else self.charges.ravel(),
+            held=[held],
+            value_bytes=lengths[0] if alike else np.tile(lengths, self.robots),
+            domain_bytes=len(encode(Domain([(value,) for value in range(self.values)]))),
+        )
+
+    def _held(self) -> Held:
+        """Return the constraints, as both robots of each edge know them."""
+        first, second = self.edges.T
+        turned = self.tables.swapaxes(1, 2)
+        alike = bool((turned == self.tables).all())
+        keys = np.concatenate([second * self.robots + first, first * self.robots + second])
+        order = np.argsort(keys, kind="stable")
+        owners, others = np.divmod(keys[order], self.robots)
+        which = np.concatenate([self.which, self.which if alike else self.which + len(self.tables)])[order]
+        tables: Floats = self.tables if alike else np.concatenate([self.tables, turned])
+        return Held(owners, others[:, None], tables, which, np.arange(len(owners)))
+
+    def _solution(self, run: CycleRun, wall_s: float) -> ArraySolution:
+        last = not run.costs or run.costs[-1] <= min(run.costs)
+        rows = run.values if last else run.best
+        values = np.zeros(self.robots, rows.dtype)
+        values[run.layout.robots] = rows
+        cost = min(run.costs, default=INFINITE)
+        if run.costs and self.cost(values) != cost:
+            raise RefutedError(f"the answer costs {self.cost(values):g}, and the run says {cost:g}")
+        found = cost < INFINITE and run.verdict is None
+        verdict = run.verdict or (Verdict.SOLUTION if found else Verdict.UNKNOWN)
+        return ArraySolution(
+            verdict, values if found else None, int(cost) if found else None, tuple(run.costs), run.metrics(wall_s)
+        )
+
+    def _numbers(self, which: ArrayLike | None, *, several: bool) -> Integers:
+        if which is not None:
+            return np.asarray(which, np.int64)
+        return np.arange(len(self.tables)) if several else np.zeros(len(self.edges), np.int64)
+
+    def _check(self) -> None:
+        """Raise `ValueError` for what does not fit."""
+        shape = (self.values, self.values)
+        faults = {
+            "robots and values are numbers of 1 or more": self.robots < 1 or self.values < 1,
+            "an edge is a pair of different robots": bool((self.edges[:, 0] == self.edges[:, 1]).any()),
+            f"robots are numbers below {self.robots:,}": not _within(self.edges, self.robots),
+            f"tables have the shape {shape}, one after the other": self.tables.shape[1:] != shape,
+            "there is a table for each edge": self.which.shape != (len(self.edges),),
+            "`which` names tables by their number": not _within(self.which, len(self.tables)),
+            f"charges have the shape {(self.robots, self.values)}": self.charges is not None
+            and self.charges.shape != (self.robots, self.values),
+            "costs are whole numbers of 0 or more, or inf": not _are_costs(self.tables),
+            "charges are whole numbers of 0 or more": self.charges is not None
+            and not (_are_costs(self.charges) and np.isfinite(self.charges).all()),
+            "each robot has a name": self.names is not None and len(set(self.names)) != self.robots,
+        }
+        for rule, broken in faults.items():
+            if broken:
+                raise ValueError(f"{rule}; these arrays do not fit")
+
+
+def _within(numbers: Integers, end: int) -> bool:
+    return bool(((numbers >= 0) & (numbers < end)).all())
+
+
+def _are_costs(costs: Floats) -> bool:
+    return bool(((costs >= 0) & (np.isinf(costs) | (np.floor(costs) == costs))).all())
+
+
+class _Names(Sequence[str]):
+    """R0, R1, ... without a string for each."""
+
+    def __init__(self, many: int) -> None:
+        self._many = many
+
+    def __len__(self) -> int:
+        return self._many
+
+    def __getitem__(self, place):  # type: ignore[no-untyped-def] # noqa: ANN001, ANN204 - a number is all that is asked
+        return f"R{place}"

@@ -1,0 +1,111 @@
+"""A run of arrays is the run of the objects in the simulator: values of every cycle, findings, counts."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from random import Random
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from robochoc.communication.arrays.session import ArraysRun
+from robochoc.communication.run_result import RunResult
+from robochoc.communication.simulator.schedule import Concurrent
+from robochoc.communication.simulator.simulator import Simulation
+from robochoc.model.outcome import Verdict
+from robochoc.model.problem import INFINITE, Constraint, Relation, Semantics, Team
+from robochoc.run.incumbent import costs_by_cycle
+from robochoc.run.registry import protocol_named
+from robochoc.solver.agent_problem import RunParameters
+from robochoc.solver.compile import Compiler
+from robochoc.solver.compiled_team import CompiledTeam
+from tests.support.complex_problems import random_complex_team
+from tests.support.cost_problems import random_complex_cost_team, random_cost_team, random_hard_team, with_costs
+from tests.support.examples import count, examples
+from tests.support.problems import team_of
+
+PROTOCOLS = ("dsa", "mgm", "mgm2", "maxsum")
+MAKERS: tuple[Callable[[Random], Team], ...] = (
+    random_cost_team,
+    random_hard_team,
+    random_complex_cost_team,
+    random_complex_team,
+)
+COUNTS = ("messages", "bytes", "largest", "checks", "ncccs")
+
+
+def random_settings(protocol: str, chance: Random) -> dict[str, str]:
+    settings = {"cycles": chance.choice(("1", "2", "5", "12"))}
+    if protocol == "dsa":
+        settings |= {"variant": chance.choice("ABC"), "probability": chance.choice(("0.3", "0.7", "1.0"))}
+    if protocol == "mgm2":
+        settings |= {"threshold": chance.choice(("0.0", "0.3", "0.5", "0.9", "1.0"))}
+    if protocol == "maxsum":
+        settings |= {"damping": chance.choice(("0.0", "0.5", "0.9")), "preference": chance.choice(("0.0", "0.01", "5"))}
+    return settings
+
+
+def both(team: Team | CompiledTeam, protocol: str, parameters: RunParameters) -> tuple[RunResult, RunResult]:
+    """What comes of it in the simulator, and in arrays."""
+    objects = Simulation(team, protocol_named(protocol), Concurrent(parameters.seed), parameters=parameters)
+    return objects.search(), ArraysRun(team, protocol_named(protocol), parameters=parameters).search()
+
+
+def assert_same(team: Team | CompiledTeam, protocol: str, parameters: RunParameters) -> RunResult:
+    """Both runs are the same. Where Max-Sum proves that there is no solution, the simulator stops in mid-cycle."""
+    objects, arrays = both(team, protocol, parameters)
+    assert arrays.verdict is objects.verdict
+    if protocol == "maxsum" and objects.verdict is Verdict.NO_SOLUTION:
+        return arrays
+    assert arrays.findings == objects.findings
+    assert (arrays.assignments, arrays.witness) == (objects.assignments, objects.witness)
+    for name in COUNTS:
+        assert getattr(arrays.metrics, name) == getattr(objects.metrics, name), name
+    return arrays
+
+
+@pytest.mark.parametrize("protocol", PROTOCOLS)
+@count("many", 16, 1500)
+def test_random_teams_run_as_in_the_simulator(protocol: str, many: int) -> None:
+    """Domains of several sizes, some empty; n-ary and hard constraints, unary costs, complex robots, robots alone."""
+    with Compiler() as compiler:
+        for seed in range(many):
+            chance = Random(f"{protocol} {seed}")
+            team = CompiledTeam(chance.choice(MAKERS)(chance), lambda robot: compiler.compile(robot).domain)
+            assert_same(team, protocol, RunParameters(seed, random_settings(protocol, chance)))
+
+
+@st.composite
+def loose_teams(draw: st.DrawFn) -> Team:
+    """Pairs with tables of any costs, several on the same robots; links without costs; robots alone; one value."""
+    size = draw(st.integers(1, 6))
+    domains = {name: tuple(range(draw(st.integers(1, 4)))) for name in "ABCDEF"[:size]}
+    names = list(domains)
+    costs = st.sampled_from((0, 0, 1, 2, 70_000, INFINITE))
+    constraints = []
+    for number in range(draw(st.integers(0, 7)) if size > 1 else 0):
+        pair = tuple(draw(st.permutations(names))[:2])
+        rows = tuple((one, other) for one in domains[pair[0]] for other in domains[pair[1]])
+        paid = tuple(draw(costs) for _ in rows)
+        relation = Relation(f"R{number}", 2, Semantics.SOFT, rows, paid, draw(costs))
+        constraints.append(Constraint(f"C{number}", relation, pair, pair))
+    return with_costs(team_of(domains, constraints))
+
+
+@pytest.mark.parametrize("protocol", PROTOCOLS)
+@given(team=loose_teams(), seed=st.integers(0, 2**70), word=st.integers(0, 1000))
+@examples(25, 1000)
+def test_any_costs_and_graphs_run_as_in_the_simulator(protocol: str, team: Team, seed: int, word: int) -> None:
+    assert_same(team, protocol, RunParameters(seed, random_settings(protocol, Random(word))))
+
+
+@pytest.mark.parametrize("protocol", PROTOCOLS)
+def test_the_costs_of_cycles_are_those_of_the_values(protocol: str) -> None:
+    for seed in range(12):
+        team = random_cost_team(Random(seed))
+        run = ArraysRun(team, protocol_named(protocol), parameters=RunParameters(seed, {"cycles": "6"}))
+        result = run.search()
+        trails = {name: found.trail for name, found in result.findings.items() if found.trail}
+        if result.verdict is Verdict.SOLUTION:
+            assert run.costs == list(costs_by_cycle(run.compiled, trails))

@@ -1,0 +1,189 @@
+"""Problems made from numpy arrays: the same runs as of the same team made of objects; arrays that do not fit."""
+
+from __future__ import annotations
+
+import doctest
+import itertools
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+import robochoc.modelling.array_problem
+from robochoc.communication.arrays.chance import Draws
+from robochoc.communication.arrays.cycle_run import walk
+from robochoc.communication.simulator.schedule import Concurrent
+from robochoc.communication.simulator.simulator import Simulation
+from robochoc.model.outcome import Verdict
+from robochoc.model.problem import INFINITE, Constraint, Relation, Semantics, Team
+from robochoc.modelling.array_problem import ArrayProblem
+from robochoc.protocols.chance import Chance
+from robochoc.run.registry import UnknownProtocolError, protocol_named
+from robochoc.solver.agent_problem import RunParameters
+from robochoc.solver.encoding import UnsupportedError
+from robochoc.verification.checker import RefutedError
+from tests.support.cost_problems import cost_of, with_costs
+from tests.support.examples import count
+from tests.support.problems import team_of
+
+PROTOCOLS = ("dsa", "mgm", "mgm2", "maxsum")
+PAIR = [(0, 1)]
+SAME = np.eye(2)
+
+
+def random_arrays(seed: int) -> dict[str, Any]:
+    """Arguments of a small problem: one table, one for each edge, or a choice of some; edges may be there twice."""
+    draw = np.random.default_rng(seed)
+    robots, values, many = (int(draw.integers(low, high)) for low, high in ((2, 7), (1, 5), (0, 10)))
+    edges = [draw.permutation(robots)[:2] for _ in range(many)]
+    kind = draw.integers(3)
+    count_ = {0: 1, 1: max(many, 1), 2: 3}[int(kind)]
+    tables = draw.choice([0, 0, 1, 2, 300, np.inf], (count_, values, values), p=[0.3, 0.2, 0.2, 0.1, 0.1, 0.1])
+    if kind == 0 and draw.random() < 0.5:
+        tables = np.maximum(tables, tables.swapaxes(1, 2))
+    return {
+        "robots": robots,
+        "values": values,
+        "edges": np.array(edges, int).reshape(-1, 2),
+        "tables": tables,
+        "which": draw.integers(count_, size=many),
+        "charges": draw.integers(4, size=(robots, values)) if draw.random() < 0.5 else None,
+    }
+
+
+def team_of_arrays(given: dict[str, Any]) -> Team:
+    """The same team as objects."""
+    robots, values = given["robots"], given["values"]
+    domains = {f"X{number:03}": tuple(range(values)) for number in range(robots)}
+    names = list(domains)
+    constraints = []
+    for number, (edge, which) in enumerate(zip(given["edges"], given["which"], strict=True)):
+        scope = (names[edge[0]], names[edge[1]])
+        constraints.append(soft(f"C{number}", scope, given["tables"][which]))
+    if given["charges"] is not None:
+        constraints += [
+            soft(f"U{name}", (name,), charges) for name, charges in zip(names, given["charges"], strict=True)
+        ]
+    return with_costs(team_of(domains, constraints))
+
+
+def soft(name: str, scope: tuple[str, ...], table: NDArray[np.float64]) -> Constraint:
+    rows = tuple(itertools.product(*(range(size) for size in table.shape)))
+    costs = tuple(INFINITE if np.isinf(table[row]) else int(table[row]) for row in rows)
+    return Constraint(name, Relation(name, len(scope), Semantics.SOFT, rows, costs, 0), scope, scope)
+
+
+@pytest.mark.parametrize("protocol", PROTOCOLS)
+@count("many", 15, 800)
+def test_arrays_run_as_the_team_of_objects(protocol: str, many: int) -> None:
+    for seed in range(many):
+        given = random_arrays(seed)
+        team = team_of_arrays(given)
+        problem = ArrayProblem(**given, names=team.order)
+        run = problem.run(protocol, seed=seed, cycles=5)
+        course = [one.values[run.layout.places].tolist() for one in walk(run)]
+        objects = Simulation(
+            team, protocol_named(protocol), Concurrent(0), parameters=RunParameters(seed, {"cycles": "5"})
+        ).search()
+        assert (run.verdict or Verdict.SOLUTION) is objects.verdict
+        if objects.verdict is Verdict.NO_SOLUTION:
+            continue
+        assert [next(iter(found.values())) for found in objects.assignments.values()] == course[-1]
+        metrics = run.metrics(0)
+        for name in ("messages", "bytes", "largest", "checks", "ncccs"):
+            assert getattr(metrics, name) == getattr(objects.metrics, name), name
+        names = [robot.variables[0].name for robot in team.robots]
+        costs = [cost_of(dict(zip(names, values, strict=True)), list(team.constraints())) for values in course]
+        assert run.costs == costs[: len(run.costs)]
+
+
+def test_without_nccc_counts_all_else_is_the_same() -> None:
+    problem = ArrayProblem(**random_arrays(3))
+    with_, without = problem.solve("mgm2", cycles=9), problem.solve("mgm2", cycles=9, ncccs=False)
+    assert with_.costs == without.costs
+    assert (with_.metrics.ncccs > 0, without.metrics.ncccs) == (True, 0)
+    assert with_.metrics.messages == without.metrics.messages
+
+
+def test_the_answer_is_the_cheapest_cycle() -> None:
+    draw = np.random.default_rng(1)
+    edges = [pair for pair in itertools.combinations(range(12), 2) if draw.random() < 0.5]
+    problem = ArrayProblem(12, 3, edges, np.eye(3))
+    found = problem.solve("dsa", variant="C", probability=1.0, cycles=40)
+    assert found.values is not None
+    assert found.cost == min(found.costs) == problem.cost(found.values)
+    assert found.costs[-1] > min(found.costs)
+    assert len(found.costs) == 41
+
+
+def test_what_cannot_be_is_said() -> None:
+    forbidden = ArrayProblem(2, 2, PAIR, np.full((2, 2), np.inf))
+    found = forbidden.solve("dsa", cycles=3)
+    assert (found.verdict, found.values, found.cost) == (Verdict.UNKNOWN, None, None)
+    assert forbidden.solve("maxsum").verdict is Verdict.NO_SOLUTION
+
+
+def test_robots_may_be_alone() -> None:
+    found = ArrayProblem(3, 2, [], SAME, charges=[[1, 0], [0, 0], [2, 5]]).solve("mgm")
+    assert found.values is not None
+    assert (found.values.tolist(), found.cost, found.metrics.messages) == ([1, 0, 0], 2, {})
+
+
+def test_a_limit_on_time_ends_the_run_after_a_cycle() -> None:
+    assert len(ArrayProblem(2, 2, PAIR, SAME).solve("dsa", timeout=0, cycles=10**9).costs) < 10**6
+
+
+def test_a_wrong_sum_is_refuted(monkeypatch: pytest.MonkeyPatch) -> None:
+    problem = ArrayProblem(2, 2, PAIR, SAME)
+    monkeypatch.setattr(problem, "cost", lambda _: 7.0)
+    with pytest.raises(RefutedError, match="the answer costs 7, and the run says 0"):
+        problem.solve()
+
+
+@pytest.mark.parametrize(
+    ("changed", "said"),
+    [
+        ({"robots": 0}, "numbers of 1 or more"),
+        ({"edges": [(0, 0)]}, "a pair of different robots"),
+        ({"edges": [(0, 2)]}, "numbers below 2"),
+        ({"tables": np.eye(3)}, r"tables have the shape \(2, 2\)"),
+        ({"which": [0, 0]}, "a table for each edge"),
+        ({"which": [1]}, "`which` names tables"),
+        ({"charges": [[1, 2]]}, r"charges have the shape \(2, 2\)"),
+        ({"tables": SAME / 2}, "whole numbers of 0 or more, or inf"),
+        ({"tables": -SAME}, "whole numbers of 0 or more, or inf"),
+        ({"tables": np.full((2, 2), np.nan)}, "whole numbers of 0 or more, or inf"),
+        ({"charges": np.full((2, 2), np.inf)}, "charges are whole numbers"),
+        ({"names": ["A", "A"]}, "each robot has a name"),
+    ],
+)
+def test_arrays_that_do_not_fit_are_refused(changed: dict[str, Any], said: str) -> None:
+    given = {"robots": 2, "values": 2, "edges": PAIR, "tables": SAME, **changed}
+    with pytest.raises(ValueError, match=said):
+        ArrayProblem(**given)
+
+
+def test_protocols_and_settings_are_looked_up() -> None:
+    problem = ArrayProblem(2, 2, PAIR, SAME)
+    assert repr(problem) == "<array problem: 2 robots, 1 edges, 2 values>"
+    with pytest.raises(UnsupportedError, match="ABT has no form as arrays"):
+        problem.solve("abt")
+    with pytest.raises(UnsupportedError, match=r"--set: .*cycle"):
+        problem.solve("dsa", cycle=3)
+    with pytest.raises(UnknownProtocolError):
+        problem.solve("das")
+
+
+def test_the_example_in_the_documentation() -> None:
+    assert doctest.testmod(robochoc.modelling.array_problem).failed == 0
+
+
+def test_all_draw_at_once_what_each_draws() -> None:
+    names = [f"R{number}" for number in range(50)]
+    draws, streams = Draws(-3, names, 50), [Chance(-3, name) for name in names]
+    some = np.arange(0, 50, 3)
+    for rows in (np.arange(50), some, some, np.arange(50)):
+        assert draws.draw(rows).tolist() == [streams[row]() for row in rows]
+    assert draws.any_of(some, np.ones(len(some), np.int64)).tolist() == [0] * len(some)
+    assert draws.any_of(some, np.full(len(some), 7)).tolist() == [int(streams[row]() * 7) for row in some]
