@@ -74,7 +74,8 @@ compiled: $(COMPILED)/.ready  ## robochoc with compiled modules: .venv/compiled/
 
 # The tests stand in a folder without the sources, so that what is imported is what the wheel has installed.
 APART := out/compiled/tests
-ON_BOTH ?= tests/conformance tests/protocols tests/unit/solver tests/unit/communication tests/unit/replay
+ON_BOTH ?= tests/conformance tests/protocols tests/unit/solver tests/unit/communication tests/unit/replay \
+	tests/cli/test_local_signals.py
 ON_PURE ?= tests/unit/communication/test_simulator.py tests/protocols/test_abt.py tests/unit/system
 PYTEST_APART = cd $(APART) && $(abspath $(COMPILED))/bin/pytest -n $(JOBS) --dist worksteal
 test-compiled: compiled  ## the same answers from compiled modules, and from the same wheel with ROBOCHOC_PURE=1

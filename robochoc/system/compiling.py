@@ -1,4 +1,4 @@
-"""Words for mypyc, which compiles some of the modules (docs/explanation/design.md, "Compiled core").
+"""What compiled modules need (docs/explanation/design.md, "Compiled core"). It is not compiled itself.
 
 mypyc knows `mypyc_attr` by its place in `mypy_extensions`. Whoever runs robochoc needs no such package.
 """
@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, TypeVar
 
 T = TypeVar("T")
 
-__all__ = ["mypyc_attr"]
+__all__ = ["answer_signals", "mypyc_attr"]
 
 if TYPE_CHECKING:
     from mypy_extensions import mypyc_attr
@@ -19,3 +19,7 @@ else:
     def mypyc_attr(**_: object) -> Callable[[T], T]:
         """Return a decorator that does nothing: only mypyc reads what it is given."""
         return lambda decorated: decorated
+
+
+def answer_signals() -> None:
+    """Let Python run the handlers of signals: it does so where a function of plain Python begins, such as this one."""
