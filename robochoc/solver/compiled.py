@@ -331,7 +331,7 @@ class LocalProblem:
         self.checks += len(known)
         return known
 
-    def _paid(self, view: Mapping[str, Value]) -> list[list[float]]:
+    def _paid(self, view: Mapping[str, Value]) -> list[list[Cost]]:
         """Return what each own value pays for each constraint whose other variables are all known. Counts nothing."""
         return [prices for c in self._constraints if (prices := c.costs_in(view)) is not None]
 
