@@ -189,20 +189,19 @@ class LocalProblem:
 
     def cost(self, index: int, view: Mapping[str, Value]) -> float:
         """Return the cost of `values[index]` in `view`: its private cost, and constraints without unknown variables."""
-        return sum([c.costs(others)[index] for c, others in self._known(view)], self.charges[index])
+        return sum([prices[index] for prices in self._paid(view, 1)], self.charges[index])
 
     def costs(self, view: Mapping[str, Value]) -> list[float]:
         """Return the `cost` of every own value: as many checks for each constraint as there are values."""
-        known = [constraint.costs(others) for constraint, others in self._known(view, len(self.values))]
-        return [sum(prices) for prices in zip(self.charges, *known, strict=True)]
+        return [sum(prices) for prices in zip(self.charges, *self._paid(view, len(self.values)), strict=True)]
 
     def lexicographic_costs(self, view: Mapping[str, Value]) -> list[LexicographicCost]:
         """Return the lexicographic cost of every own value: comparable also where hard constraints are violated."""
-        costs = self.costs(view)
+        columns = list(zip(self.charges, *self._paid(view, len(self.values)), strict=True))
+        costs = [sum(prices) for prices in columns]
         if INFINITE not in costs:
             return [(0, cost) for cost in costs]
-        known = [constraint.costs(others) for constraint, others in self._known(view, 0)]
-        return [_lexicographic_cost(prices) for prices in zip(self.charges, *known, strict=True)]
+        return [_lexicographic_cost(prices) for prices in columns]
 
     def scopes(self, robots: Iterable[str]) -> list[tuple[tuple[str, ...], float]]:
         """Return, for each constraint whose other robots are all in `robots`, these robots and its maximum cost.
@@ -287,6 +286,16 @@ class LocalProblem:
         known = [(c, others) for c in self._constraints if (others := c.other_values(view)) is not None]
         self.checks += len(known) * values
         return known
+
+    def _paid(self, view: Mapping[str, Value], values: int) -> list[list[float]]:
+        """Return what each own value pays to each constraint without unknown variables. Count `values` checks each."""
+        paid = []
+        for constraint in self._constraints:
+            prices = constraint.costs_in(view)
+            if prices is not None:
+                paid.append(prices)
+        self.checks += len(paid) * values
+        return paid
 
     def _since(self, place: int) -> Sequence[SharedConstraint]:
         """Return the constraints whose lowest robot does not stand higher in the order than `place`."""

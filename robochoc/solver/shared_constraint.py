@@ -80,6 +80,8 @@ class SharedConstraint:
         """Where it sees one variable of others: `mask`, by its value."""
         self._masks: dict[OtherValues, int] = {}
         self._costs: dict[OtherValues, list[float]] = {}
+        self._prices: dict[int, list[float]] = {}
+        """Where it sees one variable of others: `costs`, by its value."""
         self._conflicts: dict[OtherValues, Conflict] = {}
 
     def compile(self, own: OwnValues) -> None:
@@ -117,6 +119,21 @@ class SharedConstraint:
         if prices is None:
             paid = [0 if None in own else self._price((*others, *own)) for own in self._distinct]  # type: ignore[arg-type]
             prices = self._costs[others] = [paid[code] for code in self.codes]
+        return prices
+
+    def costs_in(self, view: Mapping[str, Value]) -> list[float] | None:
+        """Return what each own value pays in `view`; None where `other_values` is."""
+        if self._only is None:
+            others = self.other_values(view)
+            return None if others is None else self.costs(others)
+        agent, place = self._only
+        value = view.get(agent)
+        part = None if value is None else value[place]
+        if part is None:
+            return None
+        prices = self._prices.get(part)
+        if prices is None:
+            prices = self._prices[part] = self.costs((part,))
         return prices
 
     def lower_bounds(self, domains: Mapping[str, Iterable[int]], wide: int) -> tuple[int, list[float]]:
