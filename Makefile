@@ -104,8 +104,8 @@ format: $(READY)
 	$(BIN)/ruff check --fix .
 	$(BIN)/ruff format .
 
-# The long parts (peers, network, sniffer) are not among them, and their sections stay as they are:
-# .venv/bin/python benchmarks/run.py --write peers network sniffer. Nor are the studies: benchmarks/run.py --help names them.
+# The long parts (peers, peers_costs, network, sniffer) are not among them, and their sections stay as they are:
+# .venv/bin/python benchmarks/run.py --write peers peers_costs network sniffer. Nor are the studies: benchmarks/run.py --help names them.
 bench: $(READY)  ## figures into benchmarks/RESULTS.md
 	$(BIN)/python benchmarks/run.py
 

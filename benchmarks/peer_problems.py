@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import itertools
 import json
-from collections.abc import Callable, Iterable
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -16,6 +16,7 @@ from robochoc.formats import write_team
 from robochoc.formats.dialects.registry import dialect_called
 from robochoc.generators.coloring import coloring
 from robochoc.generators.random_csp import random_csp
+from robochoc.model.constraint import INFINITE, Constraint, Domain, Predicate, Relation, Semantics
 from robochoc.model.problem import ProblemKind, Team
 
 TEAM = "team"
@@ -25,12 +26,13 @@ RAVEN = "raven.json"
 
 @dataclass(frozen=True)
 class Family:
-    """Problems of one kind: what they are, how one is made of its seed, and how long a run may take."""
+    """Problems of one kind: what they are, how one is made of its seed, and what a run may take."""
 
     name: str
     text: str
     team: Callable[[int], Team]
     seeds: Iterable[int]
+    cpu_s: int
     limit_s: float
     decided: bool = True
     """Whether each has one right answer. Otherwise the cost tells how good an answer is."""
@@ -44,39 +46,45 @@ COLOURING = Family(
     "3-colouring",
     f"{AGENTS} agents, {EDGES} edges, a solution hidden in each: `colouring.py`",
     colouring,
-    range(5),
-    20,
+    range(3),
+    15,
+    90,
 )
 LOOSE = Family(
     "<20,10,.25,.60>",
     "`robochoc generate random --agents 20 --domain 10 --density 0.25 --tightness 0.6`",
     _random(0.6),
-    range(5),
-    20,
+    range(3),
+    15,
+    90,
 )
 TIGHT = Family(
     "<20,10,.25,.72>",
     "`robochoc generate random --agents 20 --domain 10 --density 0.25 --tightness 0.72`",
     _random(0.72),
     range(5),
-    20,
+    15,
+    90,
 )
 COSTS = Family(
     "costs",
     "`robochoc generate random --agents 10 --domain 5 --density 0.35 --max-cost 100 --connected`",
     lambda seed: random_csp(10, 5, 0.35, 0, seed, connected=True, max_cost=100),
     range(3),
-    20,
+    15,
+    90,
 )
 LOCAL = Family(
     "local search",
     "`robochoc generate coloring --agents 1000 --degree 4`: soft 3-colouring, 200 cycles",
     lambda seed: coloring(1000, 3, 4, seed),
-    range(2),
-    90,
+    range(1),
+    60,
+    120,
     decided=False,
 )
-FAMILIES = (COLOURING, LOOSE, TIGHT, COSTS, LOCAL)
+SATISFACTION = (COLOURING, LOOSE, TIGHT)
+OPTIMISATION = (COSTS, LOCAL)
 
 
 def write_problem(team: Team, folder: Path) -> None:
@@ -84,9 +92,40 @@ def write_problem(team: Team, folder: Path) -> None:
     folder.mkdir(parents=True)
     write_team(team, folder / TEAM)
     for name, file in FILES.items():
-        (folder / file).write_bytes(_exported(team, name))
+        (folder / file).write_bytes(_exported(in_tables(team), name))
     if team.kind is ProblemKind.DISCSP:
         (folder / RAVEN).write_text(json.dumps(_for_raven(team)))
+
+
+def in_tables(team: Team) -> Team:
+    """The same problem, its hard predicates as relations: FRODO's own parser passes over predicates in silence."""
+    domains = {name: variable.domain for name, variable in team.variables.items()}
+    robots = [
+        replace(
+            robot,
+            parents=tuple(
+                replace(parent, constraints=tuple(_in_table(one, domains) for one in parent.constraints))
+                for parent in robot.parents
+            ),
+        )
+        for robot in team.robots
+    ]
+    return replace(team, robots=tuple(robots))
+
+
+def _in_table(constraint: Constraint, domains: Mapping[str, Domain]) -> Constraint:
+    if not isinstance(constraint.definition, Predicate) or constraint.cost != INFINITE:
+        return constraint
+    forbidden = tuple(_forbidden(constraint, domains))
+    relation = Relation(f"R{constraint.name}", len(constraint.variables), Semantics.CONFLICTS, forbidden)
+    return replace(constraint, definition=relation, scope=constraint.variables, parameters=constraint.variables)
+
+
+def _forbidden(constraint: Constraint, domains: Mapping[str, Domain]) -> Iterator[tuple[int, ...]]:
+    scope = constraint.variables
+    for values in itertools.product(*(domains[name] for name in scope)):
+        if not constraint.allows(dict(zip(scope, values, strict=True))):
+            yield values
 
 
 def _exported(team: Team, name: str) -> bytes:
@@ -99,11 +138,6 @@ def _exported(team: Team, name: str) -> bytes:
 
 def _for_raven(team: Team) -> dict[str, Any]:
     """Domains, and for each constraint its variables and the pairs that it forbids."""
-    domains = {name: list(variable.domain) for name, variable in team.variables.items()}
-    constraints = []
-    for constraint in team.constraints():
-        scope = sorted(constraint.variables)
-        pairs = itertools.product(*(domains[name] for name in scope))
-        forbidden = [pair for pair in pairs if not constraint.allows(dict(zip(scope, pair, strict=True)))]
-        constraints.append((scope, forbidden))
-    return {"domains": domains, "constraints": constraints}
+    domains = {name: variable.domain for name, variable in team.variables.items()}
+    constraints = [(one.variables, list(_forbidden(one, domains))) for one in team.constraints()]
+    return {"domains": {name: list(domain) for name, domain in domains.items()}, "constraints": constraints}

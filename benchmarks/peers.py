@@ -1,17 +1,17 @@
-"""Part `peers`: other libraries on the same problems, where they are installed."""
+"""Parts `peers` and `peers_costs`: other libraries on the same problems, where they are installed."""
 
 from __future__ import annotations
 
 import tempfile
 from collections import defaultdict
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from statistics import median
 
 from contestants import Answer, Contestant, central, contestants, right
 from measure import say, spread
-from peer_problems import FAMILIES, Family, write_problem
+from peer_problems import OPTIMISATION, SATISFACTION, Family, write_problem
 from peer_runs import Run, watched
 from report import Row, Section
 
@@ -35,17 +35,31 @@ class Result:
 
 
 def measured() -> Section:
-    """All families, all libraries, in turns."""
-    found = {family: _results(family) for family in FAMILIES}
-    notes = READING.read_text().strip() + "\n\n" + "\n".join(map(_described, FAMILIES))
+    """Part `peers`: satisfaction, and how all is measured."""
+    return _section("peers", "Other libraries on the same problems", READING.read_text().strip(), SATISFACTION)
+
+
+def measured_costs() -> Section:
+    """Part `peers_costs`: costs, and local search."""
+    notes = "As above: the same libraries, in turns, on problems with costs."
+    return _section("peers_costs", "Other libraries on the same problems with costs", notes, OPTIMISATION)
+
+
+def _section(part: str, title: str, notes: str, families: Sequence[Family]) -> Section:
+    found = {family: _results(family) for family in families}
     tables = [fastest(found), *(_table(*one) for one in found.items())]
-    captions = ("Fastest of each library", *(family.name for family in FAMILIES))
-    return Section("peers", "Other libraries on the same problems", notes, tuple(tables), captions)
+    captions = ("Fastest of each library", *(family.name for family in families))
+    return Section(part, title, "\n".join([notes, "", *map(_described, families)]), tuple(tables), captions)
 
 
 def _described(family: Family) -> str:
     seeds = list(family.seeds)
-    return f"- *{family.name}*: {family.text}; seeds {seeds[0]}..{seeds[-1]}, limit {family.limit_s:g} s."
+    limits = f"limit {family.cpu_s} s of CPU, {family.limit_s:g} s in all"
+    return f"- *{family.name}*: {family.text}; {_numbers(seeds)}, {limits}."
+
+
+def _numbers(seeds: Sequence[int]) -> str:
+    return f"seeds {seeds[0]}..{seeds[-1]}" if len(seeds) > 1 else f"seed {seeds[0]}"
 
 
 def _results(family: Family) -> dict[Contestant, list[tuple[Result, str]]]:
@@ -59,14 +73,19 @@ def _results(family: Family) -> dict[Contestant, list[tuple[Result, str]]]:
             truth = right(watched(central(folder), CENTRAL_S)) if family.decided else ""
             order = list(found) if turn % 2 == 0 else list(reversed(found))
             for one in order:
-                if not one.missing:
-                    found[one].append((solved(one, folder, seed, family.limit_s), truth))
+                if not one.missing and not gives_up([result for result, _ in found[one]]):
+                    found[one].append((solved(one, folder, seed, family), truth))
     return found
 
 
-def solved(one: Contestant, folder: Path, seed: int, limit_s: float) -> Result:
+def gives_up(results: Sequence[Result]) -> bool:
+    """Whether somebody was cut off, and is spared the other problems of the family."""
+    return any(result.answer is None for result in results)
+
+
+def solved(one: Contestant, folder: Path, seed: int, family: Family) -> Result:
     """Have one contestant solve the problem in `folder`."""
-    run = watched(one.command(folder), limit_s)
+    run = watched(one.command(folder), family.limit_s, family.cpu_s)
     if run.status is None:
         return Result(seed, run, None)
     try:
@@ -78,10 +97,9 @@ def solved(one: Contestant, folder: Path, seed: int, limit_s: float) -> Result:
 
 
 def agrees(found: str, truth: str) -> bool:
-    """Whether an answer is the right one. To those who know only costs a solution is one of cost 0."""
-    if truth == "solution":
-        return found in {"solution", "0"}
-    return found == truth
+    """Whether an answer is the right one. To those who know only costs, a solution is one of cost 0."""
+    same = {"solution": "0"}
+    return same.get(found, found) == same.get(truth, truth)
 
 
 def _table(family: Family, found: dict[Contestant, list[tuple[Result, str]]]) -> list[Row]:
@@ -125,9 +143,13 @@ def _answers(family: Family, results: list[tuple[Result, str]], good: list[Resul
     others: dict[str, list[str]] = defaultdict(list)
     for result, truth in results:
         if result not in good:
-            what = f"over {family.limit_s:g} s" if result.answer is None else _differs(result.answer.found, truth)
+            what = "over the limit" if result.answer is None else _differs(result.answer.found, truth)
             others[what].append(str(result.seed))
-    return "; ".join([*words, *(f"{what}: seed {', '.join(seeds)}" for what, seeds in others.items())])
+    unsolved = [str(seed) for seed in family.seeds if seed not in {result.seed for result, _ in results}]
+    told = [f"{what}: seed {', '.join(seeds)}" for what, seeds in others.items()]
+    if gives_up([result for result, _ in results]) and unsolved:
+        told.append(f"not run: seed {', '.join(unsolved)}")
+    return "; ".join([*words, *told])
 
 
 def _differs(found: str, truth: str) -> str:

@@ -40,6 +40,7 @@ PARTS: dict[str, Callable[[], Section]] = {
 }
 LONG: dict[str, Callable[[], Section]] = {
     "peers": peers.measured,
+    "peers_costs": peers.measured_costs,
     "network": network.measured,
     "sniffer": sniffer.measured,
 }

@@ -42,6 +42,7 @@ class Problem(Solvable):
         names: The original names of robots and variables, by the team's, where it is from a file of another tool.
             Solutions speak in these.
         notes: What reading such a file has changed, as `robochoc import` tells it: pairs of a keyword and a sentence.
+        ordered: Whether somebody has given the robots their priority order. Files of other tools give none.
 
     Raises:
         InvalidInputError: if the team is invalid. It lists every mistake.
@@ -50,12 +51,17 @@ class Problem(Solvable):
     team: Team
     names: Mapping[str, str] = field(default_factory=dict)
     notes: Sequence[tuple[str, str]] = ()
+    ordered: bool = True
 
     def __post_init__(self) -> None:
         check_team(self.team)
 
     def _team_to_solve(self) -> Team:
         return self.team
+
+    @property
+    def _is_ordered(self) -> bool:
+        return self.ordered
 
     def _robots_called(self, team: Team) -> Mapping[str, str]:
         return robots_called(team, self.names)
@@ -88,7 +94,7 @@ def load(path: Path | str, *more: Path | str, infinity: int | None = None, owner
         'queens3d-4'
     """
     read = read_problem(Path(path), *map(Path, more), infinity=infinity, owner=owner)
-    return Problem(read.team, read.names if read.foreign else {}, read.notes)
+    return Problem(read.team, read.names if read.foreign else {}, read.notes, ordered=not read.foreign)
 
 
 @dataclass

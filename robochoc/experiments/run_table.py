@@ -13,6 +13,7 @@ from robochoc.experiments.task import GIVEN, Limits, Setup, options_of
 from robochoc.formats.diagnostics import shortened, suggestion
 from robochoc.model.orders import Order
 from robochoc.run.compatibility import refuse_options, refuse_settings
+from robochoc.run.defaults import AUTO
 from robochoc.run.options import CENTRAL, Runtime, ScheduleName, Withdrawal
 from robochoc.run.registry import UnknownProtocolError, installed_spelling, protocol_named
 from robochoc.solver.encoding import UnsupportedError
@@ -111,7 +112,7 @@ def _refuse(setup: Setup, limits: Limits, place: Place) -> None:
     """Raise `InvalidInputError` if the options of `setup` do not go together, whatever the problem is."""
     try:
         refuse_options(options_of(setup, limits))
-        if setup.protocol != CENTRAL:
+        if setup.protocol not in {CENTRAL, AUTO}:
             refuse_settings(setup.protocol, protocol_named(setup.protocol), setup.settings)
     except UnknownProtocolError as unknown:
         raise place.mistake("protocol", str(unknown), "robochoc protocols lists them") from None

@@ -79,11 +79,12 @@ class _Form(msgspec.Struct, omit_defaults=True):
     claimed_by: str | None = None
     checked: _CheckedForm | None = None
     names: dict[str, str] = {}
+    chosen: dict[str, str] = {}
 
 
 _SAME = (
     *("team", "protocol", "runtime", "seed", "verdict", "cost", "verified", "count", "reason", "order"),
-    *("bound", "placed_by", "tree", "confirmed", "channel", "claimed_by"),
+    *("bound", "placed_by", "tree", "confirmed", "channel", "claimed_by", "chosen"),
 )
 """The fields that are the same in an outcome and in its JSON form."""
 

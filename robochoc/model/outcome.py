@@ -138,7 +138,7 @@ class Outcome:
 
     Attributes:
         team: The name of the team.
-        protocol: The protocol that was asked for.
+        protocol: The protocol that was asked for, or chosen.
         runtime: The runtime.
         seed: The seed of the run.
         verdict: The answer to the problem.
@@ -153,7 +153,7 @@ class Outcome:
         reason: Why, where it is not obvious: a robot without a local solution, or the limit that was reached.
         count: The number of solutions, if it was asked for.
         lost: The names of the withdrawn robots whose processes died, and that did not come back.
-        order: The name of the priority order that was asked for; `listed` for a list of names.
+        order: The name of the priority order that was asked for, or chosen; `listed` for a list of names.
         bound: A lower bound on the cost of any assignment (an upper one on the utility, where that is maximised); with
             withdrawal, on the weight of the withdrawn robots. None: not known.
         tree: The pseudo-tree that the robots have built, if their protocol builds one.
@@ -167,6 +167,7 @@ class Outcome:
         checked: Across machines: how many constraints were checked, and by whom.
         symbols: The names of the team's symbols, if it has any: the value 2 stands for the one at place 2.
         symbolic: The variables whose values stand for symbols.
+        chosen: Why the `protocol`, or the `order`, was chosen, where nobody asked for it.
     """
 
     team: str
@@ -195,6 +196,7 @@ class Outcome:
     checked: CheckCounts | None = None
     symbols: tuple[str, ...] = ()
     symbolic: tuple[str, ...] = ()
+    chosen: dict[str, str] = field(default_factory=dict)
 
     def labelled(self, assignment: Mapping[str, int]) -> dict[str, int | str]:
         """Return `assignment`, of this outcome or of one of its epochs, with symbols by their names."""

@@ -245,6 +245,10 @@ class Model(Solvable):
     def _team_to_solve(self) -> Team:
         return self.team
 
+    @property
+    def _is_ordered(self) -> bool:
+        return self.given is not None or any(robot.priority for robot in self.robots.values())
+
     def _solution(self, outcome: Outcome, team: Team) -> Solution:
         return Solution.of(outcome, team, dict(self.variables))
 

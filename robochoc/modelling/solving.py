@@ -14,7 +14,8 @@ from robochoc.model.outcome import Outcome
 from robochoc.model.problem import Team
 from robochoc.modelling.places import did_you_mean
 from robochoc.modelling.solution import Solution
-from robochoc.run.defaults import default_protocol
+from robochoc.run.choice import decided
+from robochoc.run.defaults import AUTO
 from robochoc.run.options import CentralSolverName, OnLoss, Options, Runtime, ScheduleName, Withdrawal
 from robochoc.run.orchestrator import solve
 from robochoc.run.registry import installed_spelling
@@ -69,10 +70,11 @@ class Solvable(ABC):
         `if __name__ == "__main__":`. Those of the runtime `processes` import nothing.
 
         Args:
-            protocol: The name of the protocol, in any case. None: the default protocol for the kind of problem.
+            protocol: The name of the protocol, in any case. None, or `auto`: one that suits the problem.
             runtime: `processes`, `simulator` or `network`.
             order: The name of a priority order, such as `dom-deg`, or the names of all robots, the highest priority
-                first. None: the order of the team.
+                first. None: the one that suits a protocol that was chosen; otherwise that of the team, or `max-degree`
+                where nobody has given it one. `given`: that of the team.
             withdraw: Which robots may withdraw if there is no solution for all: `minimum` or `maximal`. None: none may.
             settings: Settings of the protocol, by name.
             observer: It is called with every event of the run.
@@ -121,7 +123,7 @@ class Solvable(ABC):
         team = self._team_to_solve()
         called = self._robots_called(team)
         options = Options(
-            protocol=installed_spelling(protocol) if protocol else default_protocol(team.kind),
+            protocol=installed_spelling(protocol) if protocol else AUTO,
             runtime=_choice("runtime", Runtime, runtime),
             seed=seed,
             timeout=timeout,
@@ -145,6 +147,8 @@ class Solvable(ABC):
             filters=tuple(filters),
             kill=tuple(one._replace(robot=called.get(one.robot, one.robot)) for one in kill),
         )
+        changes = environment is not None
+        options = decided(team, options, environment=changes, ordered=self._is_ordered).options
         return self._solution(solve(team, options, observer=observer, environment=environment), team)
 
     def _repr_html_(self) -> str:
@@ -159,6 +163,11 @@ class Solvable(ABC):
     def _robots_called(self, team: Team) -> Mapping[str, str]:
         """Return the names of the robots in `team` by those that users have for them."""
         return {name: name for name in team.order}
+
+    @property
+    def _is_ordered(self) -> bool:
+        """Whether somebody has given the robots their order."""
+        return True
 
     def _solution(self, outcome: Outcome, team: Team) -> Solution:
         return Solution.of(outcome, team)

@@ -33,6 +33,8 @@ When the first robot has nothing left to extend, the last solution is optimal, o
 
 The proof, and how it compares: docs/explanation/sfb.md.
 
+Without costs a value is consistent or not: CPAs carry bits instead of costs (`sfb_bits`). The rest is the same.
+
 Constraints may be n-ary: the last but one robot of a scope adds the costs that the last one will pay. Costs are read
 from tables that are made before the search (see `LocalProblem.tables`), so all constraint checks are done by then.
 
@@ -52,7 +54,7 @@ from __future__ import annotations
 import math
 from collections import deque
 from collections.abc import Sequence
-from typing import assert_never, cast
+from typing import TYPE_CHECKING, Any, assert_never, cast
 
 from robochoc.model.message import Message
 from robochoc.model.outcome import Verdict
@@ -60,12 +62,17 @@ from robochoc.protocols.findings import NOTHING, Findings, Incumbent
 from robochoc.protocols.interchangeable import expanded, fits
 from robochoc.protocols.order import PriorityOrder
 from robochoc.protocols.protocol import Protocol
-from robochoc.protocols.sfb_bounds import BOUND, ForwardBounds, Rows, max_finite
+from robochoc.protocols.sfb_bits import ForwardBits
 from robochoc.protocols.sfb_messages import Above, Below, Charges, CPAs, Domain, Explored, Solution
 from robochoc.protocols.sfb_settings import MIB, SFBSettings
 from robochoc.protocols.traits import ENDS_WITH_PROOF, Traits
 from robochoc.solver.compiled import LocalProblem
 from robochoc.solver.exact_costs import EXACT, check_exact
+
+if TYPE_CHECKING:
+    from robochoc.protocols.sfb_bounds import ForwardBounds
+
+    Bounds = ForwardBounds | ForwardBits
 
 LARGEST = 4 * MIB
 """No message of several CPAs has more bytes of them, however much memory there is: runtimes have limits, too."""
@@ -77,10 +84,11 @@ class Batch:
     `sent` is the number of its messages that are not yet explored.
     """
 
-    def __init__(self, rows: Rows) -> None:
+    def __init__(self, rows: Any, bounds: Bounds) -> None:  # noqa: ANN401 - rows of either form
         self.rows = rows
         self.ready = rows[:0]
         self.sent = 0
+        self._bounds = bounds
 
     @property
     def left(self) -> bool:
@@ -90,16 +98,16 @@ class Batch:
     @property
     def bound(self) -> int | None:
         """The minimum lower bound of the rows still to be sent; None if there are none."""
-        return min((int(rows[:, BOUND].min()) for rows in (self.rows, self.ready) if len(rows)), default=None)
+        return min((self._bounds.least(rows) for rows in (self.rows, self.ready) if len(rows)), default=None)
 
-    def take(self, count: int, upper_bound: int) -> Rows:
+    def take(self, count: int, upper_bound: int) -> Any:  # noqa: ANN401 - as above
         """Remove the next `count` rows and return those with a lower bound below `upper_bound`."""
         rows, self.rows = self.rows[:count], self.rows[count:]
-        return rows[rows[:, BOUND] < upper_bound]
+        return self._bounds.below(rows, upper_bound)
 
-    def part(self, count: int, upper_bound: int) -> Rows:
+    def part(self, count: int, upper_bound: int) -> Any:  # noqa: ANN401 - as above
         """Return the next `count` ready rows with a lower bound below `upper_bound`; the others keep waiting."""
-        rows = self.ready[self.ready[:, BOUND] < upper_bound]
+        rows = self._bounds.below(self.ready, upper_bound)
         self.ready = rows[count:]
         return rows[:count]
 
@@ -113,7 +121,7 @@ class SFB(Protocol):
     - `bounds`: the costs that this robot adds to CPAs; set once it knows all values, complete with the `ceiling`.
     """
 
-    bounds: ForwardBounds
+    bounds: Bounds
     messages = Above | Below | CPAs | Explored | Solution
     traits = Traits(
         concludes=ENDS_WITH_PROOF,
@@ -222,14 +230,21 @@ class SFB(Protocol):
         """Store all robots' values and evaluate the constraints; the first robot begins the search."""
         own = self.problem.values, tuple(map(_whole, self.problem.costs({})))
         self.domains += [domain for domain, _ in below]
-        self.bounds = ForwardBounds(self.problem, self.order, self.domains)
+        self.bounds = self._made_bounds()
         most += self.bounds.most + max_finite(own[1])
         check_exact(most)
         if self.previous is not None:
             self.send(self.previous, Below.of([own, *below], most))
         else:
             self._count_up_to(most + 1)
-            self.batches.append(Batch(self.bounds.nothing([own[1], *(charges for _, charges in below)])))
+            self.batches.append(Batch(self.bounds.nothing([own[1], *(charges for _, charges in below)]), self.bounds))
+
+    def _made_bounds(self) -> Bounds:
+        if self.problem.has_costs:
+            from robochoc.protocols.sfb_bounds import ForwardBounds  # noqa: PLC0415 - start-up: numpy
+
+            return ForwardBounds(self.problem, self.order, self.domains)
+        return ForwardBits(self.problem, self.order, self.domains)
 
     def _count_up_to(self, ceiling: int) -> None:
         self.bounds.count_up_to(ceiling)
@@ -242,7 +257,7 @@ class SFB(Protocol):
         if not self.ceiling:
             self._count_up_to(cpas.ceiling)
         self.upper_bound = min(self.upper_bound, cpas.least)
-        self.batches.append(Batch(self.bounds.read(cpas.rows, cpas.count)))
+        self.batches.append(Batch(self.bounds.read(cpas.rows, cpas.count), self.bounds))
 
     def _extend(self, batch: Batch) -> None:
         """Extend the next CPAs if none are ready, and send those that may lead to a cheaper solution."""
@@ -258,15 +273,15 @@ class SFB(Protocol):
         if len(rows):
             self.first_sent = True
             batch.sent += 1
-            self.under_way.append((batch, int(rows[:, BOUND].min())))
-            self.send(self.next, CPAs(len(rows), rows.tobytes(), self.upper_bound, self.ceiling))
+            self.under_way.append((batch, self.bounds.least(rows)))
+            self.send(self.next, CPAs(len(rows), self.bounds.packed(rows), self.upper_bound, self.ceiling))
 
     @property
     def share(self) -> int:
         """The bytes that one message of CPAs may take."""
         return min(LARGEST, self.settings.memory // (len(self.order.names) * self.settings.window))
 
-    def _complete(self, rows: Rows) -> None:
+    def _complete(self, rows: Any) -> None:  # noqa: ANN401 - of either form
         """Complete the CPAs, as the last robot; the cheapest one is a solution if it costs less than the best."""
         if len(rows):
             cost, places = self.bounds.completed(rows)
@@ -313,6 +328,11 @@ class SFB(Protocol):
 def _whole(cost: float) -> float:
     """Return `cost` as an integer if it is finite: integers take fewer bytes in a message."""
     return cost if cost == math.inf else int(cost)
+
+
+def max_finite(charges: Sequence[float]) -> int:
+    """Return the largest finite charge."""
+    return int(max((charge for charge in charges if charge < math.inf), default=0))
 
 
 def _same_length(domain: Domain, charges: Charges) -> bool:

@@ -11,7 +11,6 @@ byte each.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from typing import Any, NamedTuple
 
@@ -104,6 +103,18 @@ class ForwardBounds:
         """The bytes of an extended partial assignment."""
         return (self._first + 1 + int(self._starts[-1])) * self._type.itemsize
 
+    def below(self, rows: Rows, upper_bound: int) -> Rows:
+        """Return the `rows` with a lower bound below `upper_bound`."""
+        return rows[rows[:, BOUND] < upper_bound]
+
+    def least(self, rows: Rows) -> int:
+        """Return the minimum lower bound of `rows`."""
+        return int(rows[:, BOUND].min())
+
+    def packed(self, rows: Rows) -> bytes:
+        """Return `rows` as they travel."""
+        return rows.tobytes()
+
     def extended(self, rows: Rows, upper_bound: int) -> Rows:
         """Return all extensions of `rows` by an own value with a lower bound below `upper_bound`.
 
@@ -159,8 +170,3 @@ class ForwardBounds:
     def _first(self) -> int:
         """The column after the values of the robots above: the own value's, or the own vector's first."""
         return VALUES + self.rank
-
-
-def max_finite(charges: Sequence[float]) -> int:
-    """Return the largest finite charge."""
-    return int(max((charge for charge in charges if charge < math.inf), default=0))

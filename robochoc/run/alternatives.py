@@ -32,7 +32,7 @@ def alternatives(team: Team, options: Options, *, complete: bool = False, costs:
         and offer.name != options.protocol
         and offer.protocol.traits.complete >= complete
         and offer.protocol.traits.costs >= costs
-        and _fits(team, replace(options, protocol=offer.name), offer.protocol.traits)
+        and fits(team, replace(options, protocol=offer.name), offer.protocol.traits)
     ]
     if names:
         return f"; these do: {', '.join(names)} (--protocol)"
@@ -42,7 +42,7 @@ def alternatives(team: Team, options: Options, *, complete: bool = False, costs:
     return f"; no protocol that is installed does{' (scale the costs down)' if too_high else ''}"
 
 
-def _fits(team: Team, options: Options, traits: Traits) -> bool:
+def fits(team: Team, options: Options, traits: Traits) -> bool:
     """Return whether a protocol with these traits would take the team, in the search as well."""
     try:
         refuse_unfit(team, options, traits)

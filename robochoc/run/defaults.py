@@ -1,13 +1,10 @@
 """The protocols that are used unless another one is asked for."""
 
+AUTO = "auto"
+"""What stands for a protocol that is chosen for the team (`run/choice.py`). No protocol has this name."""
 DEFAULT_PROTOCOL = "abt"
-"""For a problem without costs."""
+"""For a problem without costs of which nothing else is known."""
 DEFAULT_COST_PROTOCOL = "sfb"
-"""For a problem with costs. It also finds a minimum withdrawal where the protocol asked for cannot."""
+"""For a problem with costs, likewise. It also finds a minimum withdrawal where the protocol asked for cannot."""
 FIRST_FIT = "first-fit"
 """It decides which robots withdraw with `--withdraw maximal`. It cannot be asked for by name."""
-
-
-def default_protocol(kind: str) -> str:
-    """Return the name of the protocol for a problem of this `ProblemKind`."""
-    return DEFAULT_PROTOCOL if kind == "DisCSP" else DEFAULT_COST_PROTOCOL

@@ -8,7 +8,7 @@ from enum import StrEnum
 from typing import TYPE_CHECKING, Self
 
 from robochoc.model.orders import Order
-from robochoc.run.defaults import DEFAULT_PROTOCOL
+from robochoc.run.defaults import AUTO
 from robochoc.solver.compile import Limits
 
 if TYPE_CHECKING:
@@ -75,7 +75,8 @@ class Options:
     """The options of a run. `run/compatibility.py` decides which of them can be combined.
 
     Attributes:
-        protocol: The name of the protocol by which the robots solve the problem, or `CENTRAL`.
+        protocol: The name of the protocol by which the robots solve the problem, or `CENTRAL`; or `AUTO`, for one that
+            suits it (`run/choice.py`).
         runtime: Where the robots live.
         seed: The seed of the simulator, of `Order.RANDOM`, and of protocols that draw lots.
         timeout: A limit on wall-clock time, in seconds (None: no limit).
@@ -100,9 +101,10 @@ class Options:
         settings: The protocol's settings, as text.
         kill: Robots whose processes are killed, and when.
         filters: The names of the channel filters that messages on a network go through, in this order.
+        chosen: Why the `protocol`, or the `order`, was chosen, where nobody asked for it.
     """
 
-    protocol: str = DEFAULT_PROTOCOL
+    protocol: str = AUTO
     runtime: Runtime = Runtime.PROCESSES
     seed: int = 0
     timeout: float | None = None
@@ -125,6 +127,7 @@ class Options:
     settings: Mapping[str, str] = field(default_factory=dict)
     filters: tuple[str, ...] = ()
     kill: tuple[Kill, ...] = ()
+    chosen: Mapping[str, str] = field(default_factory=dict)
 
     @property
     def survives_losses(self) -> bool:

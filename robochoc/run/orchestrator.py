@@ -14,6 +14,7 @@ from robochoc.model.orders import OrderError
 from robochoc.model.outcome import Outcome, Verdict
 from robochoc.model.problem import Team
 from robochoc.model.symbols import symbol_table, symbolic_variables
+from robochoc.run.choice import decided
 from robochoc.run.compatibility import (
     CENTRAL_TRAITS,
     UnfitProtocolError,
@@ -72,6 +73,7 @@ def solve(
     check_team(team)
     environment = environment and with_checked_events(environment)
     refuse_options(options, environment=environment is not None)
+    options = decided(team, options, environment=environment is not None).options
     try:
         context = RunContext(options, observer, progress, solver)
         counted = normalized(team)
@@ -146,6 +148,7 @@ def _header(team: Team, options: Options) -> Outcome:
         seed=options.seed,
         verdict=Verdict.UNKNOWN,
         order="listed" if isinstance(options.order, tuple) else options.order,
+        chosen=dict(options.chosen),
         channel=options.channel.name if options.channel else None,
         symbols=symbol_table(team.robots),
         symbolic=symbolic_variables(team),

@@ -11,7 +11,7 @@ from robochoc.protocols.first_fit import FirstFit
 from robochoc.protocols.protocol import DynamicProtocol, Protocol
 from robochoc.protocols.settings_base import Settings
 from robochoc.protocols.traits import Traits
-from robochoc.run.defaults import DEFAULT_COST_PROTOCOL, FIRST_FIT
+from robochoc.run.defaults import AUTO, DEFAULT_COST_PROTOCOL, FIRST_FIT
 from robochoc.run.options import CENTRAL
 from robochoc.system.entry_points import EntryPoint
 from robochoc.system.installed import (
@@ -61,7 +61,7 @@ def protocol_names() -> tuple[str, ...]:
 
 def installed_spelling(name: str) -> str:
     """Return `name` as its package spells it (`ABT` is `abt`), or `name` itself where it fits none, or several."""
-    names = (*protocol_names(), CENTRAL)
+    names = (*protocol_names(), CENTRAL, AUTO)
     spellings = [one for one in names if one.lower() == name.lower()]
     return spellings[0] if name not in names and len(spellings) == 1 else name
 

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from importlib import import_module
 from pkgutil import resolve_name
 from types import MappingProxyType
 from typing import TYPE_CHECKING, TypedDict, assert_never
@@ -16,6 +17,7 @@ from robochoc.communication.kill_schedule import KillSchedule
 from robochoc.communication.run_result import Progress
 from robochoc.communication.session import Session
 from robochoc.journal.events import Observer
+from robochoc.model.problem import ProblemKind
 from robochoc.protocols.protocol import Protocol
 from robochoc.run.options import Options, Runtime, ScheduleName
 from robochoc.solver.agent_problem import RunParameters
@@ -91,6 +93,7 @@ def open_processes(request: SessionRequest) -> Session:
     """Open a session in which each robot is an OS process."""
     from robochoc.communication.processes.processes import ProcessesRun  # noqa: PLC0415 - one runtime is enough
 
+    _import_tables(request)
     options = request.options
     session = ProcessesRun(
         request.team,
@@ -102,6 +105,13 @@ def open_processes(request: SessionRequest) -> Session:
     if request.kills:
         session.schedule_kills(request.kills, session.kill)
     return session
+
+
+def _import_tables(request: SessionRequest) -> None:
+    """Import what computes with tables, if robots will: here once, and not in each of their processes."""
+    costs = request.team.team.kind is ProblemKind.DISWCSP or request.parameters.withdrawal_cost is not None
+    if costs and request.protocol.traits.tables:
+        import_module("robochoc.solver.cost_table")
 
 
 def open_simulator(request: SessionRequest) -> Session:

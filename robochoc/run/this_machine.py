@@ -99,8 +99,8 @@ class ThisMachine(Deployment):
     def search(self, phase: Phase) -> Search:
         """See `Deployment.search`."""
         team = self._scenario.ordered_team()
-        if phase.takes_over and phase.traits.costs and self.options.order is None:
-            team = with_dom_deg_order(team)  # faster, and no other order was requested
+        if phase.takes_over and phase.traits.costs and not self._order_requested:
+            team = with_dom_deg_order(team)  # faster
         epoch = Epoch(self._compiler.compile(team, every=True), parameters=phase.parameters)
         self._start_events.report(phase.protocol, EpochStart(epoch))
         with self._session(phase, epoch.compiled) as session:
@@ -167,6 +167,10 @@ class ThisMachine(Deployment):
         return replace(answer, metrics=spent, epochs=tuple(self.epochs) if several else ())
 
     # What an epoch needs
+
+    @property
+    def _order_requested(self) -> bool:
+        return self.options.order is not None and "order" not in self.options.chosen
 
     def _compile(self, team: Team) -> CompiledTeam:
         """Compile `team` for its next epoch; in a static problem one robot without a local solution decides."""

@@ -18,7 +18,7 @@ from functools import cached_property
 from typing import TYPE_CHECKING
 
 from robochoc.model.message import Value
-from robochoc.model.problem import INFINITE, ConstraintModel
+from robochoc.model.problem import INFINITE, ConstraintModel, ProblemKind
 from robochoc.solver.agent_problem import AgentProblem
 from robochoc.solver.explanation import KeyedConstraint, held_above, held_below
 from robochoc.solver.filters import Filters
@@ -266,6 +266,31 @@ class LocalProblem:
                 checks, table = cost_table(constraint, domains, len(self.values))
                 self.checks += checks
                 found.append(table)
+        return found
+
+    @property
+    def has_costs(self) -> bool:
+        """Whether something is minimised: costs, or robots that withdraw."""
+        return self._part.robot.kind is ProblemKind.DISWCSP or self._part.parameters.withdrawal_cost is not None
+
+    def allowed(
+        self, domains: Mapping[str, Sequence[Value]], lowest: str
+    ) -> list[tuple[tuple[str, ...], dict[tuple[int, ...], int]]]:
+        """Return what `tables` returns for `lowest`, where there are no costs.
+
+        For each constraint its other robots, and for each combination of places of their values the own values that
+        are consistent with these: bit i for the i-th. No robot may withdraw.
+
+        Raises:
+            UnsupportedError: when these are too many.
+        """
+        found = []
+        for constraint in self._constraints:
+            if constraint.agents[-1:] != (lowest,) or not domains.keys() >= set(constraint.agents):
+                continue
+            combinations = [*constraint.combinations(domains, len(self.values))]
+            self.checks += len({others for _, others in combinations}) * len(self.values)
+            found.append((constraint.agents, {place: constraint.mask(others) for place, others in combinations}))
         return found
 
     def interchangeable(self, value: Value) -> Sequence[int]:

@@ -6,8 +6,6 @@ has at most as many entries as a constraint may have tuples of values to be trie
 
 from __future__ import annotations
 
-import itertools
-import math
 from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
@@ -15,7 +13,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from robochoc.model.message import Value
-from robochoc.solver.encoding import MAX_TUPLES, UnsupportedError
 from robochoc.solver.shared_constraint import OtherValues, SharedConstraint
 
 Array = NDArray[np.float64]
@@ -40,19 +37,10 @@ def cost_table(
     Raises:
         UnsupportedError: when that is too large.
     """
-    columns = [domains[agent] for agent in constraint.agents]
-    entries = math.prod(map(len, columns)) * size
-    if entries > MAX_TUPLES:
-        raise UnsupportedError(
-            f"the table of constraint {constraint.key} has {entries:,} entries, more than {MAX_TUPLES:,}; split the"
-            " constraint, or choose a protocol that computes without tables"
-        )
-    charges = np.zeros([*map(len, columns), size], np.float64)
+    combinations = [*constraint.combinations(domains, size)]
+    charges = np.zeros([*(len(domains[agent]) for agent in constraint.agents), size], np.float64)
     seen: set[OtherValues] = set()
-    for place in itertools.product(*(range(len(column)) for column in columns)):
-        chosen = (column[index] for column, index in zip(columns, place, strict=True))
-        others = constraint.other_values(dict(zip(constraint.agents, chosen, strict=True)))
-        if others is not None:
-            seen.add(others)
-            charges[place] = constraint.costs(others)
+    for place, others in combinations:
+        seen.add(others)
+        charges[place] = constraint.costs(others)
     return len(seen) * size, CostTable(constraint.key, constraint.agents, charges)

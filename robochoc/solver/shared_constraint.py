@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Container, Iterable, Mapping, Sequence
+from collections.abc import Container, Iterable, Iterator, Mapping, Sequence
 
 from robochoc.model.message import Value
 from robochoc.model.problem import Constraint
 from robochoc.solver.agent_problem import TeamKnowledge
-from robochoc.solver.encoding import allows_function, cost_function, max_cost
+from robochoc.solver.encoding import MAX_TUPLES, UnsupportedError, allows_function, cost_function, max_cost
 
 Conflict = Mapping[str, Value]
 """Assignments of other robots that rule out an own value: the left side of a nogood."""
@@ -153,6 +153,29 @@ class SharedConstraint:
             if not any(least):
                 break
         return checks, least
+
+    def combinations(
+        self, domains: Mapping[str, Sequence[Value]], size: int
+    ) -> Iterator[tuple[tuple[int, ...], OtherValues]]:
+        """Yield the places of the others' values in `domains`, for each combination, and what the constraint sees.
+
+        Combinations in which a robot has withdrawn are left out; `size` is the number of own values.
+
+        Raises:
+            UnsupportedError: when there are too many.
+        """
+        columns = [domains[agent] for agent in self.agents]
+        entries = math.prod(map(len, columns)) * size
+        if entries > MAX_TUPLES:
+            raise UnsupportedError(
+                f"the table of constraint {self.key} has {entries:,} entries, more than {MAX_TUPLES:,}; split the"
+                " constraint, or choose a protocol that computes without tables"
+            )
+        for place in itertools.product(*(range(len(column)) for column in columns)):
+            chosen = (column[index] for column, index in zip(columns, place, strict=True))
+            others = self.other_values(dict(zip(self.agents, chosen, strict=True)))
+            if others is not None:
+                yield place, others
 
     def mask(self, others: OtherValues) -> int:
         """Return the own values that go with `others`: bit i for the i-th."""

@@ -58,7 +58,7 @@ def test_names_are_completed(words: tuple[str, ...], found: list[str]) -> None:
 
 def test_all_commands_and_protocols_are_completed() -> None:
     assert completions("") == [*COMMANDS]
-    assert completions("solve", "--protocol", "") == [*protocol_names(), "central"]
+    assert completions("solve", "--protocol", "") == ["auto", *protocol_names(), "central"]
 
 
 def test_folders_of_teams_are_completed_by_the_shell() -> None:

@@ -28,8 +28,12 @@ def test_solve_in_an_order_by_name(four: Path, runtime: str) -> None:
     done = robochoc_within(*words, "--order", "random")
     assert (done.returncode, json.loads(done.stdout)["verdict"]) == (0, "no-solution")
     assert read_journal(journal.read_bytes()).header.order == "random"
-    assert robochoc_within(*words).returncode == 0
+    assert robochoc_within(*words, "--order", "given").returncode == 0
     assert "order" not in entries_of(journal)[0]
+    assert robochoc_within(*words, "--protocol", "abt").returncode == 0
+    assert "order" not in entries_of(journal)[0]
+    assert robochoc_within(*words).returncode == 0
+    assert entries_of(journal)[0]["order"] == "min-width"
 
 
 def test_solve_in_the_order_of_a_file(four: Path) -> None:

@@ -181,7 +181,7 @@ def test_a_run_is_shown_until_ctrl_c_and_its_result_is_told_before(teams: Path, 
 )
 def test_whoever_ends_the_run_ends_the_viewer(teams: Path, tmp_path: Path, signum: int, *, watched: bool) -> None:
     runtime = "simulator" if watched else "processes"  # which leaves the viewer a core to itself
-    command = [PROGRAM, "solve", str(teams / "long"), *LONG, "--sniff", "--runtime", runtime]
+    command = [PROGRAM, "solve", str(teams / "long"), *LONG, "--protocol", "abt", "--sniff", "--runtime", runtime]
     with running(command, tmp_path / "run") as run:
         url = url_of(run)
         if watched:
@@ -206,7 +206,9 @@ def robot_of(run: Run, viewer: int) -> int:
 
 
 def test_a_run_goes_on_without_its_viewer_and_says_so(teams: Path, tmp_path: Path) -> None:
-    with running([PROGRAM, "solve", str(teams / "long"), *LONG, "--sniff"], tmp_path / "run") as run:
+    with running(
+        [PROGRAM, "solve", str(teams / "long"), *LONG, "--protocol", "abt", "--sniff"], tmp_path / "run"
+    ) as run:
         viewer = viewer_of(run)
         run.strike(signal.SIGKILL, viewer)
         wait_until(lambda: run.program("viewer") is None, "the viewer stays")
@@ -218,7 +220,9 @@ def test_a_run_goes_on_without_its_viewer_and_says_so(teams: Path, tmp_path: Pat
 
 
 def test_a_page_outlives_a_run_that_has_failed(teams: Path, tmp_path: Path) -> None:
-    with running([PROGRAM, "solve", str(teams / "long"), *LONG, "--sniff"], tmp_path / "run") as run:
+    with running(
+        [PROGRAM, "solve", str(teams / "long"), *LONG, "--protocol", "abt", "--sniff"], tmp_path / "run"
+    ) as run:
         url = url_of(run)
         viewer = viewer_of(run)
         run.wait_for_robots(10)

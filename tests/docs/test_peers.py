@@ -62,6 +62,12 @@ def test_a_run_is_cut_off_with_all_that_it_started(load: Any) -> None:  # noqa: 
     assert run.wall_s < 30
 
 
+def test_a_run_is_cut_off_when_its_cpu_is_spent(load: Any) -> None:  # noqa: ANN401
+    run = load("peer_runs").watched([sys.executable, "-c", "while True: pass"], 100, 1)
+    assert run.status is None
+    assert run.wall_s < 100
+
+
 @pytest.mark.parametrize("family", FAMILIES)
 def test_absence_is_told(load: Any, family: str) -> None:  # noqa: ANN401
     problems, peers = load("peer_problems"), load("peers")
@@ -92,7 +98,7 @@ def test_answers_are_held_against_the_right_one(load: Any) -> None:  # noqa: ANN
     line = row(
         load, "TIGHT", ("solution", "solution"), ("0", "solution"), ("no-solution", "solution"), (None, "solution")
     )
-    assert line[3] == "2 of 4 right; WRONG (no-solution, not solution): seed 2; over 20 s: seed 3"
+    assert line[3] == "2 of 4 right; WRONG (no-solution, not solution): seed 2; over the limit: seed 3; not run: seed 4"
     assert line[4:] == ("7", "1.25", "1.50", "30")
     assert row(load, "TIGHT", ("0", "no-solution"))[3] == "0 of 1 right; WRONG (0, not no-solution): seed 0"
     assert row(load, "COSTS", ("17", "17"), ("18", "17"))[3] == "1 of 2 right; WRONG (18, not 17): seed 1"
@@ -100,8 +106,13 @@ def test_answers_are_held_against_the_right_one(load: Any) -> None:  # noqa: ANN
     assert row(load, "TIGHT", ("not in this version", "solution"))[3:] == ("not in this version", *["-"] * 4)
 
 
+def test_who_is_cut_off_is_spared_the_others(load: Any) -> None:  # noqa: ANN401
+    line = row(load, "TIGHT", ("solution", "solution"), (None, "solution"))
+    assert line[3] == "1 of 2 right; over the limit: seed 1; not run: seed 2, 3, 4"
+
+
 def test_local_search_is_told_by_its_costs(load: Any) -> None:  # noqa: ANN401
-    assert row(load, "LOCAL", ("110", ""), ("120", ""), (None, ""))[3] == "cost 115 (110..120); over 90 s: seed 2"
+    assert row(load, "LOCAL", ("110", ""), ("120", ""), (None, ""))[3] == "cost 115 (110..120); over the limit: seed 2"
 
 
 def test_only_who_answers_everything_is_fastest(load: Any) -> None:  # noqa: ANN401
@@ -118,6 +129,11 @@ def test_problems_are_written_for_all(load: Any, tmp_path: Path) -> None:  # noq
     problems.write_problem(coloring(2, 2, 1, conflicts="hard"), tmp_path / "hard")
     told = json.loads((tmp_path / "hard" / "raven.json").read_text())
     assert told == {"domains": {"V1": [1, 2], "V2": [1, 2]}, "constraints": [[["V1", "V2"], [[1, 1], [2, 2]]]]}
+    assert b"<predicate" not in (tmp_path / "hard" / "frodo.xml").read_bytes()
+    colouring = load("colouring").colouring(0)
+    tables = problems.in_tables(colouring)
+    assert [one.variables for one in tables.constraints()] == [one.variables for one in colouring.constraints()]
+    assert {one.definition.tuples for one in tables.constraints()} == {((0, 0), (1, 1), (2, 2))}
     problems.write_problem(random_csp(3, 2, 1, 0, max_cost=5), tmp_path / "costs")
     assert {path.name for path in (tmp_path / "costs").iterdir()} == {"team", "frodo.xml", "pydcop.yaml"}
 
@@ -125,11 +141,14 @@ def test_problems_are_written_for_all(load: Any, tmp_path: Path) -> None:  # noq
 def test_a_contestant_solves(load: Any, tmp_path: Path) -> None:  # noqa: ANN401
     load("peer_problems").write_problem(coloring(3, 2, 2, conflicts="hard"), tmp_path / "triangle")
     one = load("contestants").robochoc("abt", "simulator")
-    found = load("peers").solved(one, tmp_path / "triangle", 0, 60)
+    found = load("peers").solved(one, tmp_path / "triangle", 0, load("peer_problems").TIGHT)
     assert found.answer.found == "no-solution"
     assert found.answer.messages > 0
     unknown = load("contestants").robochoc("nobody", "simulator")
-    assert load("peers").solved(unknown, tmp_path / "triangle", 0, 60).answer.found == "not in this version"
+    assert (
+        load("peers").solved(unknown, tmp_path / "triangle", 0, load("peer_problems").TIGHT).answer.found
+        == "not in this version"
+    )
 
 
 def test_frodo_is_set_and_read(load: Any, tmp_path: Path) -> None:  # noqa: ANN401

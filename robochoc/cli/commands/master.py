@@ -234,9 +234,10 @@ def _tell(led: MasterResult, *, as_json: bool) -> None:
 def _header(plan: MasterPlan) -> Header:
     """Return the journal's header for the run."""
     from robochoc.journal.journal import Header
-    from robochoc.run.defaults import DEFAULT_PROTOCOL
+    from robochoc.run.defaults import AUTO, DEFAULT_PROTOCOL
 
-    return Header(team=plan.name, protocol=plan.protocol or DEFAULT_PROTOCOL, runtime="network", seed=plan.seed)
+    name = DEFAULT_PROTOCOL if plan.protocol in {None, AUTO} else plan.protocol
+    return Header(team=plan.name, protocol=name, runtime="network", seed=plan.seed)
 
 
 def _tell_event(event: AnyEvent) -> None:

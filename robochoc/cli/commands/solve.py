@@ -13,8 +13,8 @@ import click
 from robochoc.cli.options.channel import CHANNEL_NAME
 from robochoc.cli.options.channel import NAMES as CHANNELS
 from robochoc.cli.options.local_problems import local_options
-from robochoc.cli.options.order import GIVEN, ORDER_NAME, order_for
 from robochoc.cli.options.order import NAMES as ORDERS
+from robochoc.cli.options.order import ORDER_NAME, order_for
 from robochoc.cli.options.pages import html_option, serve_option
 from robochoc.cli.options.paths import refuse_same_places, teams_at
 from robochoc.cli.options.problems import Problem, reading_options
@@ -44,7 +44,6 @@ from robochoc.cli.reports.closed_loop import flight_told, told_of
 from robochoc.cli.reports.failures import LIMIT, Failure, failures_told, worst
 from robochoc.cli.reports.live_sniffer import Watch, check_chosen, watching
 from robochoc.cli.reports.notes import bound_told, differences_told
-from robochoc.run.defaults import default_protocol
 
 if TYPE_CHECKING:
     from robochoc.cli.reports.closed_loop import FlownMission
@@ -54,6 +53,7 @@ if TYPE_CHECKING:
     from robochoc.model.outcome import Outcome
     from robochoc.model.problem import Team
     from robochoc.ros.closed_loop import ClosedLoop
+    from robochoc.run.choice import Choice
     from robochoc.run.options import Options
 
 
@@ -80,10 +80,11 @@ _SECTIONS: Sections = {
 @click.option(
     "--order",
     type=ORDER_NAME,
-    default=GIVEN,
-    show_default=True,
     metavar="NAME|FILE",
-    help=f"Priority order of the robots: {', '.join(ORDERS)}, or a file with one robot's name a line.",
+    help=(
+        f"Priority order of the robots: {', '.join(ORDERS)}, or a file with a name a line."
+        "  [default: given; auto chooses]"
+    ),
 )
 @click.option(
     "--runtime",
@@ -158,7 +159,7 @@ _SECTIONS: Sections = {
 )
 @kill_option
 @filter_option
-@click.option("--explain", is_flag=True, help="Print the pseudo-tree, if the robots have built one.")
+@click.option("--explain", is_flag=True, help="Print why the protocol was chosen, and the pseudo-tree.")
 @click.option("--count", is_flag=True, help="With --protocol central: count all solutions.")
 @click.option(
     "--with",
@@ -208,7 +209,7 @@ def solve(
     given = {option: value for option, value in named.items() if isinstance(value, Path)}
     options = options_of(settings, environment=bool(ros.situation))
     wanted = Wanted(
-        settings["protocol"], settings["order"], settings.pop("infinity"), settings.pop("owner"),
+        settings["order"], settings.pop("infinity"), settings.pop("owner"),
         as_json=as_json, explain=explain, ros=ros,
     )  # fmt: skip
     products = Products(html, journal, serve, watching(settings["sniff"], open_browser=settings["open_browser"]))
@@ -283,11 +284,13 @@ def _recorded(folder: Path, options: Options, products: Products, wanted: Wanted
         click.echo(f"{on_one_line(str(folder))}: {line.strip()}", err=True)
     team = problem.team
     check_chosen(products.watching, team)
-    protocol = wanted.protocol or default_protocol(team.kind)
     order = order_for(team, wanted.order, problem.names)
-    options = replace(options, protocol=protocol, order=order, kill=_called(options.kill, problem))
+    options = replace(options, order=order, kill=_called(options.kill, problem))
+    from robochoc.run.choice import decided
     from robochoc.run.recording import journal_header, objective_to_record
 
+    choice = decided(team, options, environment=bool(wanted.ros.situation), ordered=not problem.foreign)
+    options = choice.options
     header = partial(journal_header, team, options)
 
     objective = None if wanted.ros.situation else objective_to_record(team, options)
@@ -297,7 +300,7 @@ def _recorded(folder: Path, options: Options, products: Products, wanted: Wanted
     ):
         outcome = _run(team, options, recorder, loop)
         team = loop.team if loop else team
-        _tell(problem._replace(team=team), outcome, wanted)
+        _tell(problem._replace(team=team), outcome, wanted, choice)
         if loop and loop.mission is None:  # the run knew nothing of it
             loop.publish(outcome)
         flight = flight_told(loop, wanted.ros, quiet=wanted.as_json)
@@ -306,23 +309,26 @@ def _recorded(folder: Path, options: Options, products: Products, wanted: Wanted
 
 def _run(team: Team, options: Options, recorder: JournalRecorder | None, loop: ClosedLoop | None) -> Outcome:
     """Run with the requested observers: the page, a journal, the progress line, and the ROS sinks."""
+    from robochoc.cli.reports.choice import OrderNote
     from robochoc.cli.reports.progress import progress_line, waiting
     from robochoc.run.options import CENTRAL
     from robochoc.run.orchestrator import solve as run
 
     told = loop and (loop.feedback or (team.dynamic and options.protocol != CENTRAL))
+    note = OrderNote(team, options)
     with progress_line(team.name) as progress:
-        show = shown_and_flushed(recorder, progress)
+        show = shown_and_flushed(recorder, note.watching(progress))
         if loop and loop.feedback and show:
             loop.feedback.idle = waiting(show)
         outcome = run(team, options, observer=recorder, progress=show, environment=loop if told else None)
+    note.tell_if_late(outcome.metrics.wall_s)
     if recorder:
         recorder.outcome = outcome
         recorder.close()  # before anything else goes to where it may be written
     return outcome
 
 
-def _tell(problem: ReadProblem, outcome: Outcome, wanted: Wanted) -> None:
+def _tell(problem: ReadProblem, outcome: Outcome, wanted: Wanted, choice: Choice) -> None:
     """Print the outcome, in the original names if the problem was imported.
 
     In JSON a team's folder keeps its own names, with the others beside.
@@ -343,6 +349,9 @@ def _tell(problem: ReadProblem, outcome: Outcome, wanted: Wanted) -> None:
         outcome = renamed_outcome(outcome, names)
         click.echo(outcome_report(renamed_team(problem.team, names, outcome.events), outcome))
         if wanted.explain:
+            from robochoc.cli.reports.choice import choice_lines
             from robochoc.cli.reports.pseudo_tree import tree_text
 
+            for line in choice_lines(choice):
+                click.echo(line)
             click.echo(tree_text(outcome))

@@ -17,8 +17,8 @@ NAMES = (GIVEN, "lexicographic", "max-degree", "min-width", "dom-deg", "dfs", "r
 ORDER_NAME = NameOrFile("order", NAMES, {"dom/deg": "dom-deg"})
 
 
-def order_for(team: Team, order: str | Path, names: Mapping[str, str] = {}) -> Order | tuple[str, ...] | None:
-    """Return the order for `team`, or None for the files' own.
+def order_for(team: Team, order: str | Path | None, names: Mapping[str, str] = {}) -> Order | tuple[str, ...] | None:
+    """Return the order for `team`, or None where none was asked for.
 
     Args:
         team: The team.
@@ -33,4 +33,4 @@ def order_for(team: Team, order: str | Path, names: Mapping[str, str] = {}) -> O
 
     if isinstance(order, Path):
         return read_order(order, team, names)
-    return None if order == GIVEN else Order(order)
+    return None if order is None else Order(order)

@@ -21,7 +21,7 @@ from robochoc.cli.options.sections import SectionedCommand
 from robochoc.cli.reports.failures import failures_told
 from robochoc.cli.reports.live_sniffer import Watching
 from robochoc.communication.kill_schedule import Kill
-from robochoc.run.defaults import DEFAULT_COST_PROTOCOL, DEFAULT_PROTOCOL
+from robochoc.run.defaults import AUTO
 
 if TYPE_CHECKING:
     from robochoc.run.options import Options
@@ -46,9 +46,8 @@ class WithdrawalName(click.Choice[str]):
 def protocol_option(*, central: bool) -> Callable[[Command], Command]:
     """Return the option `--protocol NAME`; `central` says that there may also be no protocol, but one model."""
     alone = "; central: no robots, one model of all files" if central else ""
-    default = f"[default: {DEFAULT_PROTOCOL}; with costs {DEFAULT_COST_PROTOCOL}]"
-    words = f"The protocol, as 'robochoc protocols' lists them{alone}.  {default}"
-    return click.option("--protocol", type=ProtocolName(), metavar="NAME", help=words)
+    words = f"The protocol, as 'robochoc protocols' lists them; auto: one that suits the team{alone}."
+    return click.option("--protocol", type=ProtocolName(), default=AUTO, show_default=True, metavar="NAME", help=words)
 
 
 settings_option = click.option(
@@ -170,10 +169,9 @@ class Products:
 
 @dataclass(frozen=True)
 class Wanted:
-    """The request for each team: the protocol (None: by its kind), the order, how files are read, and what is told."""
+    """The request for each team: the order (None: not asked for), how files are read, and what is told."""
 
-    protocol: str | None
-    order: str | Path
+    order: str | Path | None
     infinity: int | None
     owner: str | None
     as_json: bool
@@ -225,8 +223,8 @@ def _take_options(arguments: dict[str, Any]) -> Options:
         channel = channel_for(arguments.pop("channel"))
     withdraw, on_loss = arguments.pop("withdraw"), arguments.pop("on_loss")
     return Options(
-        protocol=arguments["protocol"] or DEFAULT_PROTOCOL,
-        order=None if arguments["order"] == GIVEN else (),  # which one, each team's robots say
+        protocol=arguments["protocol"],
+        order=() if arguments["order"] not in {None, GIVEN} else None,  # which one, each team's robots say
         local=limits(
             arguments.pop("local_solutions"), arguments.pop("local_timeout"), always_ace=arguments.pop("always_ace")
         ),

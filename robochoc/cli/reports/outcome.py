@@ -36,9 +36,17 @@ def outcome_report(team: Team, outcome: Outcome) -> str:
     if outcome.lost:
         lost = sorted(outcome.lost, key=natural_key)
         lines += [f"  {len(lost)} lost:", *_wrapped(lost)]
+    lines += _chosen(outcome)
     order = f", order {outcome.order}" if outcome.order else ""
     lines.append(f"  {outcome.protocols}{order}, {_place(team, outcome)}: {_metrics(outcome)}{_simulated(outcome)}")
     return "\n".join(map(on_one_line, lines))
+
+
+def _chosen(outcome: Outcome) -> list[str]:
+    """Return a line on what was chosen, if something was, and why."""
+    told = {"protocol": outcome.protocol, "order": f"order {outcome.order}"}
+    words = [f"{told[what]}, as {why}" for what, why in outcome.chosen.items()]
+    return [f"  chosen: {'; '.join(words)}"] if words else []
 
 
 def _epochs(outcome: Outcome) -> list[str]:

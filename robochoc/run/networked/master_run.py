@@ -25,8 +25,9 @@ from robochoc.journal.events import Observer
 from robochoc.model.outcome import Outcome, Verdict
 from robochoc.model.problem import Team
 from robochoc.model.symbols import symbol_table, symbolic_variables
+from robochoc.run.choice import decided_unseen
 from robochoc.run.compatibility import refuse_options, refuse_settings, refuse_unfit
-from robochoc.run.defaults import DEFAULT_COST_PROTOCOL, DEFAULT_PROTOCOL, default_protocol
+from robochoc.run.defaults import AUTO, DEFAULT_COST_PROTOCOL, DEFAULT_PROTOCOL
 from robochoc.run.distributed import solve_distributed
 from robochoc.run.networked.address import LOOPBACK, Address
 from robochoc.run.networked.machines import Machines, claimed, first_names, registered_team
@@ -51,7 +52,7 @@ class MasterPlan:
         names: The robots of the team. Without these, and without a `number`, the team is complete when every neighbour
             that a robot names has come.
         number: How many robots the team has.
-        protocol: The protocol's name (None: the default for the team's problem).
+        protocol: The protocol's name (None, or `auto`: one that suits what the robots declare).
         settings: The protocol's settings, as text.
         seed: The seed of protocols that draw lots.
         withdraw: Which robots withdraw when the team has no solution (None: none).
@@ -143,7 +144,9 @@ def run_master(
         raise UnsupportedError(f"{plan.place} is {why}; say how robots call it: --host NAME")
     endpoint = str(plan.place._replace(host=called[0]))
     identity = authority.master_identity(hosts)
-    conditions = replace(plan.conditions, protocol=plan.protocol or "", listen=str(plan.place))
+    conditions = replace(
+        plan.conditions, protocol="" if plan.protocol in {None, AUTO} else plan.protocol, listen=str(plan.place)
+    )
     members = Members(plan.names, plan.number)
     master = Master(
         authority, identity, endpoint, members, conditions, observer=observer, watched=watched, progress=progress
@@ -191,8 +194,8 @@ def _solve(plan: MasterPlan, master: Master, observer: Observer | None) -> Maste
         names = first_names(sorted(master.members.awaited)) or "more robots"
         raise TeamIncompleteError(f"the team is not complete after {plan.gather_s:g} s; awaited: {names}")
     team = registered_team(master, plan.name)
-    name = plan.protocol or default_protocol(team.kind)
-    options, protocol = plan.options(name), protocol_or_first_fit(name)
+    options = decided_unseen(team, plan.options(plan.protocol or AUTO)).options
+    name, protocol = options.protocol, protocol_or_first_fit(options.protocol)
     refuse_settings(name, protocol, options.settings)
     refuse_unfit(team, options, protocol.traits)
     machines = Machines(master, options, plan.name, observer)
@@ -204,6 +207,7 @@ def _solve(plan: MasterPlan, master: Master, observer: Observer | None) -> Maste
         Verdict.UNKNOWN,
         symbols=symbol_table(team.robots),
         symbolic=symbolic_variables(team),
+        chosen=dict(options.chosen),
     )
     outcome = claimed(solve_distributed(machines, protocol, header))
     return MasterResult(outcome, machines.team_seen())
@@ -211,12 +215,13 @@ def _solve(plan: MasterPlan, master: Master, observer: Observer | None) -> Maste
 
 def _refuse_early(plan: MasterPlan) -> None:
     """Refuse what can be refused before any robot has come. Raises `UnsupportedError`."""
-    refuse_options(plan.options(plan.protocol or DEFAULT_PROTOCOL))
+    asked = plan.protocol or AUTO
+    refuse_options(plan.options(asked))
     try:
-        name = plan.protocol or DEFAULT_PROTOCOL
+        name = DEFAULT_PROTOCOL if asked == AUTO else asked
         refuse_settings(name, protocol_or_first_fit(name), plan.settings)
     except UnsupportedError:
-        if plan.protocol:
+        if asked != AUTO:
             raise
         refuse_settings(DEFAULT_COST_PROTOCOL, protocol_or_first_fit(DEFAULT_COST_PROTOCOL), plan.settings)
 

@@ -30,7 +30,7 @@ from tests.support.problems import team_of, teams
     ],
 )
 def test_counts_of_queens_are_exact(n: int, model: str, messages: dict[str, int], ncccs: int, checks: int) -> None:
-    spent = solve(queens3d(n, model), Options(runtime=Runtime.SIMULATOR)).metrics
+    spent = solve(queens3d(n, model), Options(protocol="abt", runtime=Runtime.SIMULATOR)).metrics
     assert (spent.messages, spent.ncccs, spent.checks) == (messages, ncccs, checks)
 
 
@@ -43,7 +43,7 @@ def test_journals_are_as_they_were(file: str) -> None:
 @examples(50)
 def test_a_seed_is_a_run(team: Team, seed: int, schedule: ScheduleName) -> None:
     delay = seed % 30 if schedule is ScheduleName.CONCURRENT else 0
-    options = Options(runtime=Runtime.SIMULATOR, seed=seed, schedule=schedule, delay=delay)
+    options = Options(protocol="abt", runtime=Runtime.SIMULATOR, seed=seed, schedule=schedule, delay=delay)
     once, again = (recorded(team, options) for _ in range(2))
     assert once == again
 
@@ -52,7 +52,7 @@ def test_a_seed_is_a_run(team: Team, seed: int, schedule: ScheduleName) -> None:
 @examples(50)
 def test_metrics_from_the_journal_are_the_hosts(team: Team, seed: int) -> None:
     recorder = JournalRecorder(Header(team=team.name, protocol="abt", runtime="simulator", seed=seed))
-    options = Options(runtime=Runtime.SIMULATOR, seed=seed, withdraw=Withdrawal.MAXIMAL)
+    options = Options(protocol="abt", runtime=Runtime.SIMULATOR, seed=seed, withdraw=Withdrawal.MAXIMAL)
     spent = solve(team, options, observer=recorder).metrics
     read = metrics_of(read_journal(recorder.content()).events)
     assert replace(read, wall_s=spent.wall_s) == spent
@@ -66,7 +66,7 @@ def recorded(team: Team, options: Options) -> list[bytes]:
 
 def test_other_seeds_are_other_runs() -> None:
     counts = {
-        sum(solve(queens3d(4), Options(runtime=Runtime.SIMULATOR, seed=seed)).metrics.messages.values())
+        sum(solve(queens3d(4), Options(protocol="abt", runtime=Runtime.SIMULATOR, seed=seed)).metrics.messages.values())
         for seed in range(5)
     }
     assert len(counts) > 1
@@ -74,13 +74,14 @@ def test_other_seeds_are_other_runs() -> None:
 
 def test_delays_go_into_the_clock() -> None:
     quick, slow = (
-        solve(queens3d(4), Options(runtime=Runtime.SIMULATOR, delay=delay)).metrics.ncccs for delay in (0, 1000)
+        solve(queens3d(4), Options(protocol="abt", runtime=Runtime.SIMULATOR, delay=delay)).metrics.ncccs
+        for delay in (0, 1000)
     )
     assert slow > 10 * quick
 
 
 def test_a_timeout_is_an_unknown() -> None:
-    outcome = solve(queens3d(8), Options(runtime=Runtime.SIMULATOR, timeout=0.05))
+    outcome = solve(queens3d(8), Options(protocol="abt", runtime=Runtime.SIMULATOR, timeout=0.05))
     assert outcome.verdict is Verdict.UNKNOWN
     assert not outcome.assignment
     assert not outcome.verified
@@ -90,7 +91,7 @@ def test_a_timeout_holds_where_a_packet_takes_long() -> None:
     """The first one alone takes half an hour, and proves then that there is no solution."""
     never = Relation("R", 2, Semantics.SUPPORTS, ((-1, -1),))
     team = team_of({"X": range(20_000), "Y": range(20_000)}, [Constraint("C", never, ("X", "Y"), ("X", "Y"))])
-    outcome = solve(team, Options(runtime=Runtime.SIMULATOR, timeout=0.3))
+    outcome = solve(team, Options(protocol="abt", runtime=Runtime.SIMULATOR, timeout=0.3))
     assert outcome.verdict is Verdict.UNKNOWN
 
 
@@ -122,7 +123,10 @@ def test_one_by_one_a_packet_is_the_first_message_of_the_inbox() -> None:
 
 def test_one_by_one_abt_needs_more() -> None:
     team = random_csp(12, 5, 0.5, 0.4, 1, connected=True)
-    found = [solve(team, Options(runtime=Runtime.SIMULATOR, schedule=name)) for name in list(ScheduleName)[:2]]
+    found = [
+        solve(team, Options(protocol="abt", runtime=Runtime.SIMULATOR, schedule=name))
+        for name in list(ScheduleName)[:2]
+    ]
     assert found[0].verdict is found[1].verdict
     assert found[1].metrics.ncccs > found[0].metrics.ncccs
 

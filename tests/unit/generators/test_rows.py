@@ -50,7 +50,7 @@ def test_a_team_of_rows_is_written_and_read_back(tmp_path: Path) -> None:
     ],
 )
 def test_rows_reach_the_verdict_that_cells_reach(n: int, model: str, verdict: Verdict, runtime: Runtime) -> None:
-    outcome = solve(queens3d(n, model, "rows"), Options(runtime=runtime, timeout=HANG_S))
+    outcome = solve(queens3d(n, model, "rows"), Options(protocol="abt", runtime=runtime, timeout=HANG_S))
     assert outcome.verdict is verdict
     assert outcome.verified is (verdict is Verdict.SOLUTION)
     assert (outcome.metrics.memory > 0) is (runtime is Runtime.PROCESSES)
@@ -58,7 +58,9 @@ def test_rows_reach_the_verdict_that_cells_reach(n: int, model: str, verdict: Ve
 
 def test_counts_of_rows_are_exact_and_repeat() -> None:
     """The simulator's, seed 0: 19 messages, of which 5 nogoods, where 16 single robots need 679."""
-    first, again = (solve(queens3d(4, robots="rows"), Options(runtime=Runtime.SIMULATOR)).metrics for _ in range(2))
+    first, again = (
+        solve(queens3d(4, robots="rows"), Options(protocol="abt", runtime=Runtime.SIMULATOR)).metrics for _ in range(2)
+    )
     assert first.messages == again.messages == {"Ok": 14, "Nogood": 5}
     assert (first.ncccs, first.checks, first.bytes) == (again.ncccs, again.checks, again.bytes) == (21, 43, 220)
 

@@ -373,7 +373,7 @@ def test_a_pipe_gets_the_blocks_as_they_come(tmp_path: Path) -> None:
 def test_a_runs_journal_is_small_and_has_everything(runtime: Runtime) -> None:
     team = queens3d(4)
     recorder = JournalRecorder(Header(team=team.name, protocol="abt", runtime=runtime, seed=0))
-    outcome = solve(team, Options(runtime=runtime), observer=recorder)
+    outcome = solve(team, Options(protocol="abt", runtime=runtime), observer=recorder)
     recorder.outcome = outcome
     content = recorder.content()
     journal = read_journal(content)

@@ -46,7 +46,8 @@ def test_load_and_solve() -> None:
     outcome = robochoc.load(str(FOUR)).solve(runtime="simulator")
     assert isinstance(outcome, robochoc.Outcome)
     assert outcome.verdict is robochoc.Verdict.NO_SOLUTION
-    assert (outcome.protocol, outcome.runtime, outcome.assignment) == ("abt", "simulator", {})
+    assert (outcome.protocol, outcome.runtime, outcome.assignment) == ("sfb", "simulator", {})
+    assert list(outcome.chosen) == ["protocol", "order"]
 
 
 def test_processes_if_nothing_is_said() -> None:

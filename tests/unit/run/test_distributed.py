@@ -78,7 +78,7 @@ def losing(*names: str) -> RunResult:
 
 
 def test_a_solution_needs_one_phase() -> None:
-    deployment = MadeUp(Options(), [SOLVED], CheckedAssignment({"a": 1}, 0))
+    deployment = MadeUp(Options(protocol="abt"), [SOLVED], CheckedAssignment({"a": 1}, 0))
     outcome = solve_distributed(deployment, ABT, HEADER)
     assert (outcome.verdict, outcome.assignment, outcome.verified) == (Verdict.SOLUTION, {"a": 1}, True)
     assert [phase.name for phase in deployment.phases] == ["abt"]
@@ -90,7 +90,7 @@ def test_a_solution_needs_one_phase() -> None:
 def test_without_a_solution_another_protocol_decides_who_withdraws(
     withdraw: Withdrawal, second: str, cost: float | None
 ) -> None:
-    options = Options(withdraw=withdraw, settings={"of": "abt"})
+    options = Options(protocol="abt", withdraw=withdraw, settings={"of": "abt"})
     deployment = MadeUp(options, [NOTHING, SOLVED], CheckedAssignment({"a": 1}, 0, ("B",)))
     outcome = solve_distributed(deployment, ABT, HEADER)
     assert outcome.verdict is (Verdict.OPTIMAL if cost else Verdict.SOLUTION)
@@ -114,7 +114,7 @@ def test_a_protocol_with_costs_decides_at_once() -> None:
 
 
 def test_after_a_loss_the_others_search_again_and_all_that_was_sent_counts() -> None:
-    deployment = MadeUp(Options(), [losing("B"), SOLVED], CheckedAssignment({"a": 1}, 0))
+    deployment = MadeUp(Options(protocol="abt"), [losing("B"), SOLVED], CheckedAssignment({"a": 1}, 0))
     outcome = solve_distributed(deployment, ABT, HEADER)
     assert (outcome.lost, outcome.withdrawn) == (("B",), ("B",))
     assert outcome.metrics == SPENT + SPENT
@@ -122,7 +122,7 @@ def test_after_a_loss_the_others_search_again_and_all_that_was_sent_counts() -> 
 
 def test_all_are_lost() -> None:
     with pytest.raises(RobotsLostError):
-        solve_distributed(MadeUp(Options(), [losing("A"), losing("B")], robots="AB"), ABT, HEADER)
+        solve_distributed(MadeUp(Options(protocol="abt"), [losing("A"), losing("B")], robots="AB"), ABT, HEADER)
 
 
 @pytest.mark.parametrize(

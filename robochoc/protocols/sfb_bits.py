@@ -1,0 +1,171 @@
+"""The bounds of `sfb` where there are no costs: a bit says all that a number would.
+
+Without costs the ceiling is 1. So an entry of a vector is 0 if the value is consistent with what has been chosen, and 1
+if not. Here it is a bit, 1 or 0: the vectors of all robots below are one integer, with a field for each robot. Choosing
+a value is one AND of integers. Whether a field is empty, which brings the bound to 1, takes one subtraction for all
+fields together. The rows are those that `sfb_bounds` makes of the same team, in the same order. A row takes fewer
+bytes, so more of them fit into a message.
+
+A row is a pair: the places of the values of all robots above, and the integer. Its lowest field is that of the robot
+that is to extend it. A field has a bit for each value, the first one lowest, and one more above that is 0: a borrow
+stops there (Lamport, "Multiple byte processing with full-word instructions", CACM 18, 1975).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from itertools import accumulate
+
+from robochoc.model.message import Value
+from robochoc.protocols.order import PriorityOrder
+from robochoc.solver.compiled import LocalProblem
+
+Row = tuple[bytes, int]
+Places = tuple[int, ...]
+
+CEILING = 1
+"""Where there are no costs."""
+
+
+class ForwardBits:
+    """What the choices of the robot of `problem` leave the robots below; `domains` are all robots' values.
+
+    See `ForwardBounds`, which has the same methods.
+    """
+
+    def __init__(self, problem: LocalProblem, order: PriorityOrder, domains: Sequence[Sequence[Value]]) -> None:
+        self.rank = order.rank[problem.agent]
+        self.most = 0
+        self._above = [len(domain) for domain in domains[: self.rank]]
+        self._own = len(domains[self.rank])
+        sizes = [len(domain) for domain in domains[self.rank + 1 :]]
+        starts = [0, *accumulate(size + 1 for size in sizes)]
+        self._bits = starts[-1]
+        self._lowest = sum(1 << start for start in starts[:-1])
+        self._guards = sum(1 << start + size for start, size in zip(starts, sizes, strict=False))
+        self._full = self._guards - self._lowest
+        self._place_bytes = 1 if max(map(len, domains)) <= 1 << 8 else 2 if max(map(len, domains)) <= 1 << 16 else 4
+        self._left = [self._full] * self._own
+        self._n_ary: list[tuple[Places, Mapping[Places, list[int]]]] = []
+        above = dict(zip(order.names[: self.rank], domains, strict=False))
+        for place, name in enumerate(order.names[self.rank + 1 :]):
+            for agents, allowed in problem.allowed({**above, name: domains[self.rank + 1 + place]}, lowest=name):
+                ruled_out = self._ruled_out(allowed, starts[place])
+                if len(agents) == 1:
+                    self._left = [left & ~out for left, out in zip(self._left, ruled_out[()], strict=True)]
+                else:
+                    self._n_ary.append((tuple(order.rank[one] for one in agents[:-1]), ruled_out))
+
+    def count_up_to(self, ceiling: int) -> None:
+        """Check the `ceiling`. Raises `ValueError` if there are costs."""
+        if ceiling != CEILING:
+            raise ValueError(f"costs of up to {ceiling - 1}, and the problem has none")
+
+    def nothing(self, charges: Sequence[Sequence[float]]) -> list[Row]:
+        """Return the empty partial assignment, with all values of all robots: `charges` are none."""
+        field = sum(1 << place for place, charge in enumerate(charges[0]) if charge < math.inf)
+        return [(b"", self._full << self._own + 1 | field)]
+
+    def read(self, content: bytes, count: int) -> list[Row]:
+        """Return the `count` partial assignments in `content`. Raises `ValueError` if it is not of that form."""
+        chosen = self.rank * self._place_bytes
+        length = chosen + _bytes(self._bits + self._own + 1)
+        if count < 1 or len(content) != count * length:
+            raise ValueError(f"{len(content)} bytes are not {count} partial assignments")
+        for robot, size in enumerate(self._above):
+            first = robot * self._place_bytes
+            if _largest(content, first, self._place_bytes, length) >= size:
+                raise ValueError("a partial assignment has values that there are not")
+        full = self._full << self._own + 1 | (1 << self._own) - 1
+        rows = []
+        for start in range(0, len(content), length):
+            left = int.from_bytes(content[start + chosen : start + length], "little")
+            if left & ~full:
+                raise ValueError("a partial assignment has values that there are not")
+            rows.append((content[start : start + chosen], left))
+        return rows
+
+    @property
+    def width(self) -> int:
+        """The bytes of an extended partial assignment."""
+        return (self.rank + 1) * self._place_bytes + _bytes(self._bits)
+
+    def below(self, rows: list[Row], upper_bound: int) -> list[Row]:
+        """Return the `rows` with a lower bound below `upper_bound`: all, until there is a solution."""
+        return rows if upper_bound else []
+
+    def least(self, rows: list[Row]) -> int:  # noqa: ARG002 - as `ForwardBounds`
+        """Return the minimum lower bound of `rows`."""
+        return 0
+
+    def packed(self, rows: list[Row]) -> bytes:
+        """Return `rows` as they travel."""
+        size = _bytes(self._bits)
+        return b"".join([chosen + left.to_bytes(size, "little") for chosen, left in rows])
+
+    def extended(self, rows: list[Row], upper_bound: int) -> list[Row]:
+        """Return all extensions of `rows` by an own value that leave each robot below a value.
+
+        Those that leave the other robots the most values come first.
+        """
+        if not upper_bound:
+            return []
+        lowest, guards, own_bits, shift = self._lowest, self._guards, (1 << self._own) - 1, self._own + 1
+        named = [place.to_bytes(self._place_bytes, "little") for place in range(self._own)]
+        found: list[tuple[int, Row]] = []
+        for chosen, fields in rows:
+            left, own = fields >> shift, fields & own_bits
+            tables = [table[self._chosen(chosen, ranks)] for ranks, table in self._n_ary]
+            while own:
+                value = (own & -own).bit_length() - 1
+                own &= own - 1
+                after = left & self._left[value]
+                for table in tables:
+                    after &= ~table[value]
+                if ((after | guards) - lowest) & guards == guards:
+                    found.append((-after.bit_count(), (chosen + named[value], after)))
+        found.sort(key=_count)
+        return [row for _, row in found]
+
+    def completed(self, rows: list[Row]) -> tuple[int, list[int]]:
+        """Return the cost and the values of the first extension of `rows`, of all robots but this one."""
+        size = self._place_bytes
+        for chosen, own in rows:
+            if own:
+                places = [int.from_bytes(chosen[at : at + size], "little") for at in range(0, len(chosen), size)]
+                return 0, [*places, (own & -own).bit_length() - 1]
+        return CEILING, []
+
+    def _ruled_out(self, allowed: Mapping[Places, int], start: int) -> dict[Places, list[int]]:
+        """Return the values that each own value rules out, for a robot whose field begins at `start`.
+
+        `allowed` has the own values that go with the places of the others' values, the lowest robot's last.
+        """
+        found: dict[Places, list[int]] = {}
+        for (*above, place), own in allowed.items():
+            ruled_out = found.setdefault(tuple(above), [0] * self._own)
+            for value in range(self._own):
+                if not own >> value & 1:
+                    ruled_out[value] |= 1 << start + place
+        return found
+
+    def _chosen(self, chosen: bytes, ranks: Places) -> Places:
+        size = self._place_bytes
+        return tuple([int.from_bytes(chosen[rank * size : (rank + 1) * size], "little") for rank in ranks])
+
+
+def _bytes(bits: int) -> int:
+    return (bits + 7) // 8
+
+
+def _count(found: tuple[int, Row]) -> int:
+    return found[0]
+
+
+def _largest(content: bytes, first: int, size: int, length: int) -> int:
+    """Return the largest number of `size` bytes that stands at the place `first` of a row of `length` bytes."""
+    if size == 1:
+        return max(content[first::length])
+    starts = range(first, len(content), length)
+    return max(int.from_bytes(content[start : start + size], "little") for start in starts)

@@ -1,0 +1,180 @@
+"""The facts of a team by which a protocol is chosen (`run/choice.py`). They are read off its constraints."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass
+from functools import cached_property
+
+from robochoc.model.change import team_after_events
+from robochoc.model.orders import Graph, constraint_graph
+from robochoc.model.problem import INFINITE, Constraint, ConstraintModel, ProblemKind, Relation, Team
+from robochoc.solver.encoding import MAX_TUPLES, is_soft
+
+_TWO = 2
+LARGE = 1_000_000
+"""A table on a pseudo-tree with more entries is looked at no further."""
+Sizes = Mapping[str, int]
+"""The number of values of each robot: the combinations that its neighbours see."""
+
+
+@dataclass(frozen=True)
+class Facts:
+    """What is known of a team before it searches.
+
+    Attributes:
+        team: The team with its scenario.
+        environment: Whether something outside changes the problem.
+        compiled_sizes: Returns the sizes of the robots' compiled domains; None if only those declared are known. It is
+            asked where these are large.
+    """
+
+    team: Team
+    environment: bool = False
+    compiled_sizes: Callable[[], Sizes | None] = lambda: None
+
+    @property
+    def robots(self) -> int:
+        """The number of robots."""
+        return len(self.team.robots)
+
+    @property
+    def has_costs(self) -> bool:
+        """Whether costs are minimised."""
+        return self.team.kind is ProblemKind.DISWCSP
+
+    @property
+    def changes(self) -> bool:
+        """Whether the problem changes over time."""
+        return self.team.dynamic or self.environment
+
+    @cached_property
+    def first(self) -> Team:
+        """The team before the first event."""
+        return team_after_events(self.team, 0)
+
+    @cached_property
+    def partially_known(self) -> bool:
+        """Whether a constraint is partially known (PKC), at any time."""
+        epochs = (team_after_events(self.team, events) for events in range(len(self.team.scenario) + 1))
+        return any(one.model is ConstraintModel.PKC for team in epochs for one in team.constraints())
+
+    @cached_property
+    def graph(self) -> Graph:
+        """The neighbours of each robot."""
+        return constraint_graph(self.first)
+
+    @cached_property
+    def links(self) -> int:
+        """The number of pairs of neighbours."""
+        return sum(map(len, self.graph.values())) // _TWO
+
+    @cached_property
+    def declared_sizes(self) -> Sizes:
+        """The number of values of each robot as declared: private constraints may leave fewer."""
+        sizes = {}
+        for robot in self.first.robots:
+            seen = set(robot.interface)
+            sizes[robot.name] = math.prod(len(one.domain) for one in robot.variables if one.name in seen)
+        return sizes
+
+    @cached_property
+    def sizes(self) -> Sizes:
+        """The number of values of each robot: as declared, or where that is much, as compiled."""
+        if self._largest_table(self.declared_sizes) <= MAX_TUPLES:
+            return self.declared_sizes
+        return self.compiled_sizes() or self.declared_sizes
+
+    @property
+    def values(self) -> int:
+        """The number of values of all robots together."""
+        return sum(self.sizes.values())
+
+    @property
+    def largest_domain(self) -> int:
+        """The largest number of values of a robot."""
+        return max(self.sizes.values(), default=0)
+
+    @cached_property
+    def largest_table(self) -> int:
+        """The number of entries of the largest table of one constraint; robots may withdraw."""
+        return self._largest_table(self.sizes)
+
+    @cached_property
+    def forbids(self) -> bool:
+        """Whether a constraint forbids something, so that not every assignment is a solution."""
+        return any(map(_forbids, self.first.constraints()))
+
+    @cached_property
+    def tree(self) -> TreeTables:
+        """The tables of dynamic programming on the pseudo-tree that the robots would build, unless they are large."""
+        return tree_tables(self.graph, self.first.order, self.sizes, LARGE)
+
+    def _largest_table(self, sizes: Sizes) -> int:
+        owner = self.first.owner
+        shared = (one for robot in self.first.robots for one in robot.shared)
+        scopes = ({owner[name] for name in one.variables} for one in shared)
+        return max((math.prod(sizes[name] + 1 for name in scope) for scope in scopes), default=1)
+
+
+def _forbids(constraint: Constraint) -> bool:
+    """Return whether `constraint` may forbid something."""
+    definition = constraint.definition
+    if isinstance(definition, Relation):
+        return not is_soft(constraint) or INFINITE in (*definition.costs, definition.default_cost)
+    return not is_soft(constraint)
+
+
+@dataclass(frozen=True)
+class TreeTables:
+    """`width`: the induced width of a pseudo-tree; `cells`: the entries of the largest table on it."""
+
+    width: int
+    cells: float
+
+
+def tree_tables(graph: Graph, order: tuple[str, ...], sizes: Sizes, enough: float = math.inf) -> TreeTables:
+    """Return the tables of DPOP on the tree that `protocols/dfs.py` builds, which needs no robot for that.
+
+    Args:
+        graph: The neighbours of each robot.
+        order: The priority order, which settles ties.
+        sizes: The number of values of each robot.
+        enough: Where a table has more entries, the rest is not looked at.
+    """
+    rank = {name: place for place, name in enumerate(order)}
+
+    def strength(name: str) -> tuple[int, int]:
+        return -len(graph[name]), rank[name]
+
+    above: dict[str, tuple[str, ...]] = {}
+    for root in sorted(graph, key=strength):
+        branch: dict[str, Iterator[str]] = {}
+        coming: str | None = None if root in above else root
+        while coming is not None or branch:
+            if coming is not None:
+                above[coming] = tuple(other for other in graph[coming] if other in branch)
+                branch[coming] = iter(sorted(graph[coming], key=strength))
+            else:
+                branch.popitem()
+            left = next(reversed(branch.values()), iter(()))
+            coming = next((name for name in left if name not in above), None)
+    return _joined(above, sizes, enough)
+
+
+def _joined(above: dict[str, tuple[str, ...]], sizes: Sizes, enough: float) -> TreeTables:
+    """Return the largest table of a tree in which each robot has the neighbours `above` it, the roots first."""
+    place = {name: number for number, name in enumerate(above)}
+    separators = {name: set(others) for name, others in above.items()}
+    width, cells = 0, 1.0
+    for name in reversed(above):
+        separator = separators.pop(name)
+        width = max(width, len(separator))
+        cells = max(cells, float(min(math.prod(sizes[one] for one in (name, *separator)), 10**300)))
+        if cells > enough:
+            break
+        if separator:
+            parent = max(separator, key=place.__getitem__)
+            separators[parent] |= separator - {parent}
+    return TreeTables(width, cells)

@@ -1,0 +1,224 @@
+"""The choice of a protocol: never one that is refused where another is accepted, and its answer is brute force's."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Callable, Mapping
+from dataclasses import replace
+from math import prod
+from random import Random
+
+import pytest
+
+from robochoc.generators.coloring import coloring
+from robochoc.generators.graphs import grid, tree
+from robochoc.generators.random_csp import random_csp, random_on
+from robochoc.model.orders import Order
+from robochoc.model.outcome import PseudoTreeNode, Verdict
+from robochoc.model.problem import INFINITE, AddAgent, Change, ProblemKind, Team
+from robochoc.run import CENTRAL, Options, Runtime, Withdrawal, choice, solve
+from robochoc.run.choice import decided, decided_unseen
+from robochoc.run.facts import Facts, TreeTables
+from robochoc.run.registry import protocol_named, protocol_names
+from robochoc.solver.encoding import UnsupportedError
+from tests.support.brute_force import solutions
+from tests.support.complex_problems import random_complex_team
+from tests.support.cost_problems import random_complex_cost_team, random_cost_team, with_costs
+from tests.support.examples import count
+from tests.support.loose_problems import any_order, loosened, minimum_cost
+from tests.support.pkc_problems import pkc_pair, pkc_part, random_pkc_team, with_private_parts
+from tests.support.problems import random_team, team_of
+from tests.support.random_changes import random_changing_team, stages
+from tests.support.random_options import random_schedule
+
+
+def changing_costs(team: Team) -> Team:
+    """`team` as a DisWCSP, with those who join it."""
+
+    def costly(change: Change) -> Change:
+        if not isinstance(change, AddAgent):
+            return change
+        return replace(change, robot=replace(change.robot, kind=ProblemKind.DISWCSP))
+
+    events = (replace(event, changes=tuple(map(costly, event.changes))) for event in team.scenario)
+    return replace(with_costs(team), scenario=tuple(events))
+
+
+def separators(tree: Mapping[str, PseudoTreeNode]) -> dict[str, set[str]]:
+    """The robots above each robot that share a constraint with it, or with one below it."""
+
+    def separator(name: str) -> set[str]:
+        above = {*tree[name].pseudo_parents, *filter(None, [tree[name].parent])}
+        below = (other for other, node in tree.items() if node.parent == name)
+        return above.union(*map(separator, below)) - {name}
+
+    return {name: separator(name) for name in tree}
+
+
+KINDS: Mapping[str, Callable[[Random], Team]] = {
+    "satisfaction": random_team,
+    "costs": random_cost_team,
+    "hard constraints alone": lambda chance: with_costs(random_team(chance)),
+    "partially known": random_pkc_team,
+    "partially known costs": lambda chance: with_costs(random_pkc_team(chance)),
+    "private parts": lambda chance: with_private_parts(random_team(chance), chance),
+    "several variables": random_complex_team,
+    "several variables and costs": random_complex_cost_team,
+    "superfluous links": lambda chance: loosened(random_team(chance), chance),
+    "changes": lambda chance: random_changing_team(chance, 3),
+    "changing costs": lambda chance: changing_costs(random_changing_team(chance, 3)),
+    "no links": lambda _: team_of({"A": (0, 1), "B": (1,)}, []),
+}
+SETTINGS: tuple[dict[str, str], ...] = (
+    {},
+    {},
+    {},
+    {"memory": "100000"},
+    {"batch": "2"},
+    {"cycles": "20"},
+    {"none": "1"},
+)
+
+
+def drawn(kind: str, number: int) -> tuple[Team, Options]:
+    chance = Random(f"choice {kind} {number}")
+    team = KINDS[kind](chance)
+    options = replace(
+        random_schedule(chance),
+        order=chance.choice((None, None, Order.GIVEN, any_order(team, chance))),
+        withdraw=chance.choice((None, None, *Withdrawal)),
+        settings=chance.choice(SETTINGS),
+        spares=chance.choice((0, 0, 1)),
+    )
+    if options.spares:
+        same = {name: getattr(options, name) for name in ("order", "withdraw", "spares", "settings")}
+        options = Options(runtime=Runtime.PROCESSES, **same)
+    return team, options
+
+
+def taken(team: Team, options: Options) -> set[str]:
+    """The protocols that accept the team, each asked by its name."""
+    return {name for name in protocol_names() if choice.accepts(name, team, options)}
+
+
+@pytest.mark.parametrize("kind", KINDS)
+@count("many", 25, 1000)
+def test_whatever_some_protocol_accepts_is_not_refused(kind: str, many: int) -> None:
+    for number in range(many):
+        team, options = drawn(kind, number)
+        name = decided(team, options).options.protocol
+        able = taken(team, options)
+        assert name in able or not able, (kind, number)
+        if any(protocol_named(one).traits.complete for one in able):
+            assert protocol_named(name).traits.complete, (kind, number)
+
+
+@pytest.mark.parametrize("kind", [kind for kind in KINDS if "chang" not in kind])
+@count("many", 8, 1000)
+def test_the_answer_is_that_of_brute_force(kind: str, many: int) -> None:
+    seen: Counter[str] = Counter()
+    for number in range(many):
+        team, options = drawn(kind, number)
+        options = replace(options, withdraw=None, spares=0, runtime=Runtime.SIMULATOR)
+        if not taken(team, options):
+            continue
+        outcome = solve(team, replace(options, cache=False))
+        truth = minimum_cost(team)
+        best = Verdict.OPTIMAL if team.kind is ProblemKind.DISWCSP else Verdict.SOLUTION
+        if not protocol_named(outcome.protocol).traits.complete:
+            assert outcome.verdict is not Verdict.OPTIMAL
+            continue
+        assert outcome.verdict is (best if truth < INFINITE else Verdict.NO_SOLUTION), (kind, number)
+        assert truth in {INFINITE, outcome.cost}, (kind, number)
+        assert outcome.chosen["protocol"], (kind, number)
+        seen[outcome.verdict] += 1
+    assert seen or kind == "partially known costs"
+
+
+@count("many", 6, 300)
+def test_each_epoch_of_a_problem_that_changes_is_that_of_brute_force(many: int) -> None:
+    for number in range(many):
+        team, options = drawn("changes", number)
+        outcome = solve(team, replace(Options(runtime=Runtime.SIMULATOR), seed=options.seed))
+        for now, epoch, event in zip(stages(team), outcome.epochs, [*team.scenario, None], strict=True):
+            truth = Verdict.SOLUTION if any(solutions(now)) else Verdict.NO_SOLUTION
+            assert epoch.verdict is truth or (epoch.verdict is Verdict.UNKNOWN and event and event.after is not None)
+
+
+PART = pkc_part("AB", (0, 0))
+
+
+@pytest.mark.parametrize(
+    ("team", "options", "protocol", "order"),
+    [
+        (random_csp(10, 4, 0.5, 0.3), {}, "sfb", Order.MIN_WIDTH),
+        (random_csp(10, 4, 0.5, 0.3), {"order": Order.DFS}, "sfb", Order.DFS),
+        (random_csp(10, 4, 0.5, 0.3), {"order": Order.GIVEN}, "sfb", None),
+        (random_csp(10, 4, 0.5, 0.3), {"withdraw": Withdrawal.MINIMUM}, "sfb", Order.DOM_DEG),
+        (random_csp(10, 4, 0.5, 0.3), {"withdraw": Withdrawal.MAXIMAL}, "sfb", None),
+        (random_csp(10, 4, 0.5, 0, max_cost=9), {}, "sfb", Order.MAX_DEGREE),
+        (random_on(tree(30), 4, 0, max_cost=9), {}, "dpop", None),
+        (random_on(tree(10), 4, 0, max_cost=9), {}, "sfb", Order.MAX_DEGREE),
+        (random_on(grid(20, 20), 4, 0, max_cost=9), {}, "dsa", None),
+        (random_on(grid(20, 20), 4, 0.1, max_cost=9), {}, "sfb", Order.MAX_DEGREE),
+        (coloring(400, 3, 3, conflicts="hard"), {}, "abt", Order.MAX_DEGREE),
+        (pkc_pair(PART, PART), {}, "disfc", None),
+        (random_changing_team(Random("one"), 2), {}, "dynabt", None),
+        (team_of({"A": range(3000), "B": range(3000)}, []), {}, "sfb", Order.MIN_WIDTH),
+        (random_on(tree(300), 300, 0.00001), {}, "afc-ng", Order.MAX_DEGREE),
+    ],
+)
+def test_what_is_chosen(team: Team, options: dict[str, object], protocol: str, order: Order | None) -> None:
+    asked = replace(Options(), **options)  # type: ignore[arg-type]
+    found = decided(team, asked)
+    assert (found.options.protocol, found.options.order) == (protocol, order)
+    assert ("order" in found.options.chosen) is (order is not None and asked.order is None)
+    assert found.facts
+    assert protocol not in dict(found.rejected)
+    assert decided(team, found.options).options == found.options
+
+
+def test_what_was_asked_for_is_not_changed() -> None:
+    team = random_csp(10, 4, 0.5, 0.3)
+    for name in (*protocol_names(), CENTRAL):
+        asked = Options(protocol=name)
+        assert decided(team, asked).options == decided_unseen(team, asked).options == asked
+
+
+def test_an_order_that_nobody_has_given_is_chosen_for_any_protocol() -> None:
+    team = random_csp(10, 4, 0.5, 0.3)
+    options = decided(team, Options(protocol="abt"), ordered=False).options
+    assert options.order is Order.MAX_DEGREE
+    assert list(options.chosen) == ["order"]
+    asked = Options(protocol="abt", order=Order.DFS)
+    assert decided(team, asked, ordered=False).options == asked
+    pkc = pkc_pair(PART, PART)
+    assert decided(pkc, Options(protocol="abt"), ordered=False).options.order is None
+
+
+def test_where_nobody_accepts_the_team_the_refusal_names_who_may() -> None:
+    team = with_costs(pkc_pair(PART, PART))
+    assert not taken(team, Options(withdraw=Withdrawal.MINIMUM))
+    with pytest.raises(UnsupportedError, match="PKC"):
+        solve(team, Options(withdraw=Withdrawal.MINIMUM))
+
+
+def test_of_robots_that_keep_their_constraints_the_kind_is_known() -> None:
+    for team, name in ((random_csp(4, 3, 1, 0.3), "abt"), (random_csp(4, 3, 1, 0, max_cost=5), "sfb")):
+        options = decided_unseen(team, Options(runtime=Runtime.NETWORK)).options
+        assert (options.protocol, options.order) == (name, None)
+        assert options.chosen["protocol"]
+
+
+@count("many", 10, 200)
+def test_the_tree_is_the_one_that_robots_build(many: int) -> None:
+    chance = Random("tree")
+    for _ in range(many):
+        team = random_cost_team(chance)
+        built = solve(team, Options(protocol="dpop", runtime=Runtime.SIMULATOR)).tree
+        if not built:  # a robot alone has no value
+            continue
+        found = separators(built)
+        sizes = Facts(team).declared_sizes
+        cells = [prod(sizes[one] for one in (name, *above)) for name, above in found.items()]
+        assert Facts(team).tree == TreeTables(max(map(len, found.values())), max(cells))
