@@ -17,13 +17,15 @@ from robochoc.communication.search_state import SearchState
 from robochoc.communication.session import over
 
 TICK_S = 0.2
-"""Seconds between two reports of progress, and between two checks of which robots are still there."""
+"""Seconds between two reports of progress."""
 
 
 class MasterLoop(ABC):
     """The loop of a master whose search is in `state`. `progress` receives the count of messages now and then."""
 
     state: SearchState
+    check_s: float = TICK_S
+    """Seconds between two checks of which robots are still there."""
 
     def __init__(self, progress: Callable[[Progress], None] | None = None) -> None:
         self._progress = progress
@@ -82,7 +84,7 @@ class MasterLoop(ABC):
                 return
             waits = (TICK_S, None if deadline is None else deadline - now, self._kills.wait_s(now))
             self._serve(min(wait for wait in waits if wait is not None), deadline)
-            if now - self._checked >= TICK_S:
+            if now - self._checked >= self.check_s:
                 self._checked = now
                 self._check_robots(now)
             if self.state.searching:

@@ -3,12 +3,16 @@
 from __future__ import annotations
 
 import gc
+import os
 import resource
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
 from robochoc.solver.encoding import UnsupportedError
+
+_MOST_TOLD = 1 << 16
+"""More bytes than the system tells of one process."""
 
 
 def allow_descriptors(needed: int) -> None:
@@ -38,11 +42,22 @@ def require_descriptors(free: int) -> None:
 
 def own_memory() -> int:
     """Return the bytes that this process shares with no other. 0 where the system does not report them."""
-    try:
-        lines = Path("/proc/self/smaps_rollup").read_text().splitlines()
-    except OSError:
-        return 0
+    lines = read_text("/proc/self/smaps_rollup").splitlines()
     return sum(int(line.split()[1]) for line in lines if line.startswith("Private_")) * 1024
+
+
+def read_text(path: str) -> str:
+    """Return what the system tells in one of its own small files, or nothing. A `Path` takes four times as long."""
+    try:
+        fd = os.open(path, os.O_RDONLY | os.O_CLOEXEC)
+    except OSError:
+        return ""
+    try:
+        return os.read(fd, _MOST_TOLD).decode()
+    except OSError:  # the process has ended meanwhile
+        return ""
+    finally:
+        os.close(fd)
 
 
 @contextmanager

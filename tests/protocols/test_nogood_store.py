@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from random import Random
 
 import pytest
@@ -31,7 +32,7 @@ class Plain:
     def forget_others(self, view: dict[str, Value]) -> None:
         self.keep_if(lambda lhs: any(name not in view or contradicts(value, view[name]) for name, value in lhs.items()))
 
-    def keep_if(self, stale) -> None:  # type: ignore[no-untyped-def]
+    def keep_if(self, stale: Callable[[LeftSide], bool]) -> None:
         self.kept = {index: one for index, one in self.kept.items() if not stale(one[0])}
 
     def drop(self, keys: Explanation) -> None:

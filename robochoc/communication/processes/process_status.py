@@ -6,9 +6,9 @@ import re
 import signal
 import time
 from enum import Enum, auto
-from pathlib import Path
 
 from robochoc.communication.processes.forked_process import ChildProcess
+from robochoc.communication.resources import read_text
 
 _EXIT_CODE_S, _DYING_S = 1.0, 60.0
 _EXIT_CODE_POLL_S = 0.001
@@ -32,9 +32,8 @@ def process_status(pid: int | None) -> ProcessStatus:
     A process is dying when SIGKILL is pending, or when it has no memory any more. One with a high `nice` value ends
     late on a busy machine: up to seconds after it was killed.
     """
-    try:
-        status = Path(f"/proc/{pid}/status").read_text()
-    except OSError:
+    status = read_text(f"/proc/{pid}/status")
+    if not status:
         return ProcessStatus.RUNNING
     pending = _PENDING_SIGNALS.search(status)
     if "VmSize:" not in status or (pending is not None and bool(int(pending[1], 16) & _SIGKILL_BIT)):
@@ -44,11 +43,8 @@ def process_status(pid: int | None) -> ProcessStatus:
 
 def is_computing(pid: int | None) -> bool:
     """Return whether a process uses the processor, or waits for its turn (Linux)."""
-    try:
-        status = Path(f"/proc/{pid}/stat").read_text()
-    except OSError:
-        return False
-    return status.rpartition(")")[2].split()[0] == "R"
+    fields = read_text(f"/proc/{pid}/stat").rpartition(")")[2].split()
+    return fields[:1] == ["R"]
 
 
 def describe_end(process: ChildProcess) -> str:

@@ -29,12 +29,12 @@ from robochoc.communication.control import (
     sealed,
 )
 from robochoc.communication.host import message_decoder
-from robochoc.communication.master_loop import MasterLoop
+from robochoc.communication.master_loop import TICK_S, MasterLoop
 from robochoc.communication.processes.pool import STARTED_AT_ONCE, ProcessPool, StartMethod
 from robochoc.communication.processes.process_status import ProcessStatus
 from robochoc.communication.processes.robot_link import RobotLink
 from robochoc.communication.processes.robot_process import RobotStart
-from robochoc.communication.processes.stopped import StoppedRobots
+from robochoc.communication.processes.stopped import LONGEST_STEP_S, StoppedRobots
 from robochoc.communication.resources import garbage_frozen
 from robochoc.communication.run_result import Progress, RobotsLostError, RunResult
 from robochoc.communication.search_state import SearchState
@@ -46,6 +46,8 @@ from robochoc.solver.agent_problem import DEFAULT_PARAMETERS, AgentProblem, RunP
 from robochoc.solver.compiled_team import CompiledTeam
 from robochoc.solver.encoding import TooLargeError, UnsupportedError
 
+CHECK_S = 0.001
+"""The time between two checks of which processes are there, for each robot: so they take a small part of it."""
 REPORTS_S = 5.0
 """The longest wait of the parent for reports after the end of an epoch, in seconds."""
 BUSY_REPORTS_S = 60.0
@@ -156,7 +158,9 @@ class ProcessesRun(Session, MasterLoop):
         unstarted, self._unstarted = self._unstarted, {}
         if not unstarted:
             return
-        self._pool.make_room(len(unstarted) + len(self._pool.robots))
+        robots = len(unstarted) + len(self._pool.robots)
+        self._pool.make_room(robots)
+        self.check_s = min(max(TICK_S, robots * CHECK_S), LONGEST_STEP_S)
         message_decoder(self._protocol.messages)  # before the fork: once for all robots
         with garbage_frozen():
             parts = iter(unstarted.values())

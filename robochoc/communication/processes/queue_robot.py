@@ -7,7 +7,6 @@ messages that wait when it wakes up are one packet.
 from __future__ import annotations
 
 import selectors
-import struct
 from collections.abc import Sequence
 from dataclasses import replace
 from typing import assert_never
@@ -32,9 +31,6 @@ from robochoc.communication.processes.queues import LARGEST_BODY, QueueReader, Q
 from robochoc.communication.resources import own_memory
 from robochoc.communication.robot_loop import IDLE_S, RobotLoop
 from robochoc.model.message import Envelope
-
-_STAMP = struct.Struct("!IQ")
-"""Goes before each message: its epoch, and the sender's clock."""
 
 
 class QueueRobot(RobotLoop):
@@ -83,7 +79,7 @@ class QueueRobot(RobotLoop):
             if writer is None:
                 writer = self._writers[envelope.receiver] = QueueWriter()
                 unopened.append(envelope.receiver)
-            writer.put(_STAMP.pack(self.epoch, envelope.clock) + envelope.content)
+            writer.put_stamped(self.epoch, envelope.clock, envelope.content)
             touched[envelope.receiver] = writer
         for start in range(0, len(unopened), QUEUES_AT_ONCE):
             self._say(OpenQueues(unopened[start : start + QUEUES_AT_ONCE]))
@@ -103,10 +99,9 @@ class QueueRobot(RobotLoop):
     def _read(self, sender: str, reader: QueueReader, packet: list[Envelope]) -> None:
         if self._readers.get(sender) is not reader:
             return  # closed by an order that came in the same moment
-        for body in reader.get():
-            epoch, clock = _STAMP.unpack_from(body)
+        for epoch, clock, content in reader.get_stamped():
             if epoch == self.epoch:
-                envelope = Envelope(sender, self._name, body[_STAMP.size :], clock)
+                envelope = Envelope(sender, self._name, content, clock)
                 if self.admit(envelope):
                     packet.append(envelope)
         if reader.ended:  # the sender is gone; the parent decides what that means

@@ -12,8 +12,11 @@ from __future__ import annotations
 import os
 import struct
 from collections.abc import Iterator
+from typing import NamedTuple
 
 _LENGTH = struct.Struct("!i")
+_STAMPED = struct.Struct("!iIQ")
+_STAMP_BYTES = _STAMPED.size - _LENGTH.size
 READ_BYTES = 1 << 16
 LARGEST_BODY = 1 << 26
 """64 MiB: more than any message of ours, and a bound on what a lying peer can make us allocate."""
@@ -21,6 +24,35 @@ LARGEST_BODY = 1 << 26
 
 class CorruptQueueError(Exception):
     """The data is not a sequence of bodies, or one body is larger than `LARGEST_BODY`."""
+
+
+class Stamped(NamedTuple):
+    """A protocol's message on its way: the epoch in which it was sent, the sender's clock, and the content."""
+
+    epoch: int
+    clock: int
+    content: bytes
+
+
+def unpack_stamped(data: bytes) -> tuple[list[Stamped], bytes]:
+    """Return the whole messages at the front of `data`, and what is left: the beginning of another one.
+
+    It does what `unpack` does, for many small messages at once, where each call and each copy counts.
+
+    Raises `CorruptQueueError`.
+    """
+    found = []
+    start, size = 0, len(data)
+    while size - start >= _STAMPED.size:
+        length, epoch, clock = _STAMPED.unpack_from(data, start)
+        if not _STAMP_BYTES <= length <= LARGEST_BODY:
+            raise CorruptQueueError(f"a message of {length} bytes")
+        end = start + _LENGTH.size + length
+        if size < end:
+            break
+        found.append(Stamped(epoch, clock, data[start + _STAMPED.size : end]))
+        start = end
+    return found, data[start:]
 
 
 def unpack(buffer: bytearray) -> Iterator[bytes]:
@@ -43,6 +75,14 @@ def unpack(buffer: bytearray) -> Iterator[bytes]:
         del buffer[:start]
 
 
+def _missing(beginning: bytes) -> int:
+    """Return how many bytes of a message, or of what goes before it, are missing after this `beginning`."""
+    if len(beginning) < _STAMPED.size:
+        return _STAMPED.size - len(beginning)
+    (length,) = _LENGTH.unpack_from(beginning)
+    return _LENGTH.size + int(length) - len(beginning)
+
+
 class QueueReader:
     """The end that takes. `fd` is to be watched for readability; it is non-blocking, and owned by this object."""
 
@@ -50,6 +90,8 @@ class QueueReader:
         self.fd = fd
         self.ended = False
         self._buffer = bytearray()
+        self._left: list[bytes] = []
+        self._missing = 0
         os.set_blocking(fd, False)
 
     def get(self) -> list[bytes]:
@@ -60,6 +102,20 @@ class QueueReader:
         self._read()
         return list(unpack(self._buffer))
 
+    def get_stamped(self) -> list[Stamped]:
+        """Return the messages that one read brings. See `get`; a queue has either bodies or stamped messages."""
+        chunk = self._chunk()
+        if self._left:
+            self._left.append(chunk)
+            self._missing -= len(chunk)
+            if self._missing > 0:  # the parts of a large message are joined once
+                return []
+            chunk = b"".join(self._left)
+        found, left = unpack_stamped(chunk)
+        self._left = [left] if left else []
+        self._missing = _missing(left)
+        return found
+
     def get_all(self) -> list[bytes]:
         """Return all bodies that are left once the writer has ended."""
         while self._read():
@@ -67,15 +123,19 @@ class QueueReader:
         return list(unpack(self._buffer))
 
     def _read(self) -> int:
+        chunk = self._chunk()
+        self._buffer += chunk
+        return len(chunk)
+
+    def _chunk(self) -> bytes:
         try:
             chunk = os.read(self.fd, READ_BYTES)
         except BlockingIOError:
-            return 0
+            return b""
         except ConnectionResetError:
             chunk = b""
         self.ended = not chunk
-        self._buffer += chunk
-        return len(chunk)
+        return chunk
 
     def close(self) -> None:
         """Close the own end."""
@@ -106,6 +166,12 @@ class QueueWriter:
         if not self.broken:
             self._waiting += _LENGTH.pack(len(body))
             self._waiting += body
+
+    def put_stamped(self, epoch: int, clock: int, content: bytes) -> None:
+        """Add a protocol's message; it travels with the next `flush`, and with all others that wait then."""
+        if not self.broken:
+            self._waiting += _STAMPED.pack(_STAMP_BYTES + len(content), epoch, clock)
+            self._waiting += content
 
     def flush(self) -> bool:
         """Write as much as the pipe takes; True when nothing waits any more (for a pipe that is open)."""

@@ -10,7 +10,7 @@ from collections.abc import Iterable, Mapping
 
 REPORT_AFTER_S = 5.0
 """Seconds after which a stopped robot is reported."""
-_LONGEST_STEP_S = 1.0
+LONGEST_STEP_S = 1.0
 """No more is counted between two updates: this process may have been stopped as well, by the same Ctrl-Z."""
 
 
@@ -28,7 +28,7 @@ class StoppedRobots:
 
         A robot that has been stopped for long, or continues after that, is reported by Python's `logging` as a warning.
         """
-        passed = 0.0 if self._updated is None else min(now - self._updated, _LONGEST_STEP_S)
+        passed = 0.0 if self._updated is None else min(now - self._updated, LONGEST_STEP_S)
         self._updated = now
         before = self._stopped_s
         self._stopped_s = {name: before[name] + passed if name in before else 0.0 for name in stopped}
