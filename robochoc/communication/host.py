@@ -37,12 +37,13 @@ class Host:
     """Drives one robot's protocol object."""
 
     @classmethod
-    def of(cls, protocol: type[Protocol], part: AgentProblem) -> Self:
+    def of(cls, protocol: type[Protocol], part: AgentProblem, order: PriorityOrder | None = None) -> Self:
         """Return a host for the robot whose part of the problem is `part`.
 
-        Raises `UnsupportedError` (see `LocalProblem`).
+        `order` is that of `part`, where the robots of one process share it. Raises `UnsupportedError` (see
+        `LocalProblem`).
         """
-        return cls(protocol(LocalProblem(part), _order_of(part)), part.parameters)
+        return cls(protocol(LocalProblem(part), order or order_of(part)), part.parameters)
 
     def __init__(self, protocol: Protocol, parameters: RunParameters = DEFAULT_PARAMETERS) -> None:
         self.protocol = protocol
@@ -91,12 +92,13 @@ class Host:
             protocol.start()
         return self._said()
 
-    def change(self, part: AgentProblem, invalidated: Invalidated) -> None:
+    def change(self, part: AgentProblem, invalidated: Invalidated, order: PriorityOrder | None = None) -> None:
         """Enter a new epoch: the problem has changed to `part`, and counting begins again.
 
-        A protocol that can goes on with what it knows; any other is begun anew. Raises `UnsupportedError`.
+        A protocol that can goes on with what it knows; any other is begun anew. `order` is as in `of`. Raises
+        `UnsupportedError`.
         """
-        problem, order = LocalProblem(part), _order_of(part)
+        problem, order = LocalProblem(part), order or order_of(part)
         if isinstance(self.protocol, DynamicProtocol):
             self.protocol.change(problem, order, invalidated)
             self._forget_said()
@@ -246,6 +248,7 @@ def message_decoder(messages: object) -> msgspec.msgpack.Decoder[Message]:
     return msgspec.msgpack.Decoder(cast("type[Message]", messages))
 
 
-def _order_of(part: AgentProblem) -> PriorityOrder:
+def order_of(part: AgentProblem) -> PriorityOrder:
+    """Return the order in which the robots of a team work, with its pseudo-tree if they know it."""
     known = part.known
     return PriorityOrder(known.order, known.links, known.rank)
