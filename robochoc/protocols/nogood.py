@@ -61,7 +61,7 @@ class NogoodStore:
         return self._by_value[index]
 
     def __iter__(self) -> Iterator[LeftSide]:
-        return (lhs for lhs in self._by_value if lhs is not None)
+        return iter([lhs for lhs in self._by_value if lhs is not None])
 
     def because(self, index: int) -> Explanation:
         """Return the explanation of the nogood against the value at `index`."""
