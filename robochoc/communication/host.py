@@ -8,6 +8,7 @@ and reports events to an observer. Every runtime uses it, so the same run counts
 from __future__ import annotations
 
 import math
+import weakref
 from collections.abc import Callable, Sequence
 from functools import cache
 from typing import Self, cast
@@ -21,7 +22,7 @@ from robochoc.protocols.chance import Chance
 from robochoc.protocols.order import PriorityOrder
 from robochoc.protocols.protocol import DynamicProtocol, Protocol
 from robochoc.protocols.settings import settings_of
-from robochoc.solver.agent_problem import DEFAULT_PARAMETERS, AgentProblem, RunParameters
+from robochoc.solver.agent_problem import DEFAULT_PARAMETERS, AgentProblem, RunParameters, TeamKnowledge
 from robochoc.solver.compiled import LocalProblem
 from robochoc.solver.explanation import Invalidated
 
@@ -244,6 +245,14 @@ def message_decoder(messages: object) -> msgspec.msgpack.Decoder[Message]:
     return msgspec.msgpack.Decoder(cast("type[Message]", messages))
 
 
+_orders: dict[int, tuple[weakref.ref[TeamKnowledge], PriorityOrder]] = {}
+"""By the `id` of what the robots know of each other."""
+
+
 def _order_of(part: AgentProblem) -> PriorityOrder:
-    known = part.known
-    return PriorityOrder(known.order, known.links, known.rank)
+    """Return the order of all robots: one object, with one pseudo-tree, for all of this process."""
+    known, key = part.known, id(part.known)
+    if key not in _orders:
+        order = PriorityOrder(known.order, known.links, known.rank)
+        _orders[key] = weakref.ref(known, lambda _: _orders.pop(key, None)), order
+    return _orders[key][1]
