@@ -8,7 +8,6 @@ and reports events to an observer. Every runtime uses it, so the same run counts
 from __future__ import annotations
 
 import math
-import weakref
 from collections.abc import Callable, Sequence
 from functools import cache
 from typing import Self, cast
@@ -22,7 +21,7 @@ from robochoc.protocols.chance import Chance
 from robochoc.protocols.order import PriorityOrder
 from robochoc.protocols.protocol import DynamicProtocol, Protocol
 from robochoc.protocols.settings import settings_of
-from robochoc.solver.agent_problem import DEFAULT_PARAMETERS, AgentProblem, RunParameters, TeamKnowledge
+from robochoc.solver.agent_problem import DEFAULT_PARAMETERS, AgentProblem, RunParameters
 from robochoc.solver.compiled import LocalProblem
 from robochoc.solver.explanation import Invalidated
 
@@ -35,12 +34,13 @@ class Host:
     """Drives one robot's protocol object."""
 
     @classmethod
-    def of(cls, protocol: type[Protocol], part: AgentProblem) -> Self:
+    def of(cls, protocol: type[Protocol], part: AgentProblem, order: PriorityOrder | None = None) -> Self:
         """Return a host for the robot whose part of the problem is `part`.
 
-        Raises `UnsupportedError` (see `LocalProblem`).
+        `order` is that of `part`, where the robots of one process share it. Raises `UnsupportedError` (see
+        `LocalProblem`).
         """
-        return cls(protocol(LocalProblem(part), _order_of(part)), part.parameters)
+        return cls(protocol(LocalProblem(part), order or order_of(part)), part.parameters)
 
     def __init__(self, protocol: Protocol, parameters: RunParameters = DEFAULT_PARAMETERS) -> None:
         self.protocol = protocol
@@ -89,12 +89,13 @@ class Host:
             protocol.start()
         return self._said()
 
-    def change(self, part: AgentProblem, invalidated: Invalidated) -> None:
+    def change(self, part: AgentProblem, invalidated: Invalidated, order: PriorityOrder | None = None) -> None:
         """Enter a new epoch: the problem has changed to `part`, and counting begins again.
 
-        A protocol that can goes on with what it knows; any other is begun anew. Raises `UnsupportedError`.
+        A protocol that can goes on with what it knows; any other is begun anew. `order` is as in `of`. Raises
+        `UnsupportedError`.
         """
-        problem, order = LocalProblem(part), _order_of(part)
+        problem, order = LocalProblem(part), order or order_of(part)
         if isinstance(self.protocol, DynamicProtocol):
             self.protocol.change(problem, order, invalidated)
             self._forget_said()
@@ -245,14 +246,7 @@ def message_decoder(messages: object) -> msgspec.msgpack.Decoder[Message]:
     return msgspec.msgpack.Decoder(cast("type[Message]", messages))
 
 
-_orders: dict[int, tuple[weakref.ref[TeamKnowledge], PriorityOrder]] = {}
-"""By the `id` of what the robots know of each other."""
-
-
-def _order_of(part: AgentProblem) -> PriorityOrder:
-    """Return the order of all robots: one object, with one pseudo-tree, for all of this process."""
-    known, key = part.known, id(part.known)
-    if key not in _orders:
-        order = PriorityOrder(known.order, known.links, known.rank)
-        _orders[key] = weakref.ref(known, lambda _: _orders.pop(key, None)), order
-    return _orders[key][1]
+def order_of(part: AgentProblem) -> PriorityOrder:
+    """Return the order in which the robots of a team work, with its pseudo-tree if they know it."""
+    known = part.known
+    return PriorityOrder(known.order, known.links, known.rank)

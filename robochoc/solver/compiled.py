@@ -199,10 +199,13 @@ class LocalProblem:
 
     def lexicographic_costs(self, view: Mapping[str, Value]) -> list[LexicographicCost]:
         """Return the lexicographic cost of every own value: comparable also where hard constraints are violated."""
-        costs = self.costs(view)
+        known = self._paid(view)
+        self.checks += len(known) * len(self.values)
+        columns = list(zip(self.charges, *known, strict=True))
+        costs = [sum(prices) for prices in columns]
         if INFINITE not in costs:
             return [(0, cost) for cost in costs]
-        return [_lexicographic_cost(prices) for prices in zip(self.charges, *self._paid(view), strict=True)]
+        return [_lexicographic_cost(prices) for prices in columns]
 
     def scopes(self, robots: Iterable[str]) -> list[tuple[tuple[str, ...], float]]:
         """Return, for each constraint whose other robots are all in `robots`, these robots and its maximum cost.

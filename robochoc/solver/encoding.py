@@ -14,6 +14,7 @@ import weakref
 from collections import defaultdict
 from collections.abc import Callable, Hashable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from operator import itemgetter
 
 from robochoc.model.expression import UndefinedValueError
 from robochoc.model.expression.bounds import ANY_INTEGER, bounds
@@ -137,7 +138,8 @@ def cost_function(constraint: Constraint, names: Sequence[str]) -> Callable[[Seq
     if isinstance(definition, Function):
         return _cost_on(constraint, definition, names)
     arguments = _arguments(constraint, names)
-    return lambda values: definition.cost(arguments(values))
+    listed, other = definition.prices
+    return lambda values: listed.get(arguments(values), other)
 
 
 def max_cost(constraint: Constraint) -> float:
@@ -204,11 +206,14 @@ def _body(definition: Predicate | Function) -> Closure:
     return _bodies[key][1]
 
 
-def _arguments(constraint: Constraint, names: Sequence[str]) -> Callable[[Sequence[int]], list[int]]:
+def _arguments(constraint: Constraint, names: Sequence[str]) -> Callable[[Sequence[int]], tuple[int, ...]]:
     """Return what the definition of `constraint` receives, of values of the variables `names`."""
     place = {name: index for index, name in enumerate(names)}
     terms = [(place[term], 0) if isinstance(term, str) else (None, term) for term in constraint.parameters]
-    return lambda values: [constant if index is None else values[index] for index, constant in terms]
+    places = [index for index, _ in terms if index is not None]
+    if len(places) == len(terms) > 1:
+        return itemgetter(*places)
+    return lambda values: tuple([constant if index is None else values[index] for index, constant in terms])
 
 
 def _forbids_something(constraint: Constraint) -> bool:

@@ -226,3 +226,10 @@ def test_the_list_is_wrapped_to_the_terminal(
     assert all(len(line) <= columns for line in table)
     assert (len(table) == 1 + len(rows())) is (columns == 200)
     assert last.startswith("next: robochoc protocols NAME")
+
+
+def test_how_a_protocol_is_chosen_is_explained() -> None:
+    head, *rules = robochoc_within("protocols", "auto").stdout.splitlines()
+    assert head.startswith("auto: ")
+    assert {rule.split(":")[0].strip() for rule in rules} <= {*protocol_names()}
+    assert rules[-1].startswith("  sfb: ")
