@@ -22,6 +22,8 @@ Example:
 
 from __future__ import annotations
 
+import os
+
 TYPE_CHECKING = False  # to import `typing` would delay the handling of signals (cli/main.py)
 if TYPE_CHECKING:
     from robochoc import journal
@@ -74,6 +76,11 @@ __all__ = [
 ]
 
 __version__ = "0.1.0"
+
+if os.environ.get("ROBOCHOC_PURE", "0") not in {"", "0"}:  # before any other module of ours is imported
+    from robochoc.system.compiled_core import prefer_sources
+
+    prefer_sources()
 
 _FUNCTIONS = "all_different allowed costs cumulative element forbidden function if_then_else maximum minimum"
 _PLACES = {

@@ -18,18 +18,21 @@ from robochoc.journal.events import Concluded, Decided, Heard, Observer, Receive
 from robochoc.model.message import Envelope, Message, encode
 from robochoc.model.outcome import Metrics, Verdict
 from robochoc.protocols.chance import Chance
+from robochoc.protocols.dynamic import DynamicProtocol
 from robochoc.protocols.order import PriorityOrder
-from robochoc.protocols.protocol import DynamicProtocol, Protocol
-from robochoc.protocols.settings import settings_of
+from robochoc.protocols.protocol import Protocol
+from robochoc.protocols.settings import equip
 from robochoc.solver.agent_problem import DEFAULT_PARAMETERS, AgentProblem, RunParameters
 from robochoc.solver.compiled import LocalProblem
 from robochoc.solver.explanation import Invalidated
+from robochoc.system.compiling import mypyc_attr
 
 
 class BadMessageError(Exception):
     """The bytes of an envelope are no message of the protocol."""
 
 
+@mypyc_attr(allow_interpreted_subclasses=True)
 class Host:
     """Drives one robot's protocol object."""
 
@@ -160,8 +163,7 @@ class Host:
     def _equip(self, parameters: RunParameters) -> None:
         """Give the protocol its settings and its random generator."""
         protocol = self.protocol
-        if parameters.settings:
-            protocol.settings = settings_of(type(protocol), parameters.settings)
+        equip(protocol, parameters.settings)
         protocol.chance = Chance(parameters.seed, self.name)
 
     def _said(self) -> list[Envelope]:

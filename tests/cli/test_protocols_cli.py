@@ -27,7 +27,7 @@ from tests.support.program import robochoc_within
 WITHOUT_DOCSTRING = """
     from robochoc.protocols.first_fit import FirstFit
     from robochoc.protocols.first_fit_messages import Placed
-    from robochoc.protocols.protocol import DynamicProtocol
+    from robochoc.protocols.dynamic import DynamicProtocol
     from robochoc.protocols.traits import Traits
 
     class Other(FirstFit, DynamicProtocol):

@@ -24,6 +24,7 @@ from robochoc.protocols.protocol import Protocol
 from robochoc.solver.agent_problem import DEFAULT_PARAMETERS, AgentProblem, RunParameters
 from robochoc.solver.compiled_team import CompiledTeam
 from robochoc.solver.team_compiler import OutOfTimeError
+from robochoc.system.compiling import answer_signals, mypyc_attr
 from robochoc.system.garbage import collection_paused
 
 PROGRESS_EVERY = 256
@@ -46,6 +47,7 @@ class EffortLimits:
 NO_LIMITS = EffortLimits()
 
 
+@mypyc_attr(allow_interpreted_subclasses=True)
 class Simulation(Session):
     """One team in this thread.
 
@@ -161,6 +163,7 @@ class Simulation(Session):
             self._send(host, host.start(lossless=lossless))
         packets = 0
         while self._verdict is None:
+            answer_signals()
             elapsed_s = time.monotonic() - began
             if timeout is not None and elapsed_s > timeout:
                 return
