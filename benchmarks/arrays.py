@@ -1,6 +1,6 @@
 """How fast the runtime of arrays is, and how time and memory grow: random graphs of degree 4, three colours.
 
-python benchmarks/arrays.py [--robots N ...] [--protocols NAME ...] [--cycles N]
+python benchmarks/arrays.py [--robots N ...] [--protocols NAME ...] [--cycles N] [--own-tables]
 
 Each row is a process of its own. Times are of its processor (user and system), memory is the most that it had, numpy
 and Python included. A cycle: the median of all cycles after the first.
@@ -26,19 +26,23 @@ WAYS = ("dsa", "dsa, NCCCs not counted", "mgm", "mgm2", "maxsum")
 COLOURS, HALF_DEGREE = 3, 2
 
 
-def problem(robots: int) -> ArrayProblem:
-    """Return a colouring problem: 2 edges a robot, drawn uniformly; a pair may be drawn twice."""
+def problem(robots: int, *, own_tables: bool) -> ArrayProblem:
+    """Return a colouring problem: 2 edges a robot, drawn uniformly; a pair may be drawn twice.
+
+    With `own_tables` each edge has random costs instead, 0 to 99.
+    """
     draw = np.random.default_rng(robots)
     first = draw.integers(0, robots, HALF_DEGREE * robots)
     second = (first + draw.integers(1, robots, HALF_DEGREE * robots)) % robots
-    return ArrayProblem(robots, COLOURS, np.column_stack([first, second]), np.eye(COLOURS))
+    tables = draw.integers(0, 100, (len(first), COLOURS, COLOURS)) if own_tables else np.eye(COLOURS)
+    return ArrayProblem(robots, COLOURS, np.column_stack([first, second]), tables)
 
 
-def measured(robots: int, way: str, cycles: int) -> dict[str, float]:
+def measured(robots: int, way: str, cycles: int, *, own_tables: bool) -> dict[str, float]:
     """Return what a run takes."""
     protocol, _, rest = way.partition(",")
     began = time.process_time()
-    made = problem(robots)
+    made = problem(robots, own_tables=own_tables)
     run = made.run(protocol, ncccs=not rest, cycles=cycles)
     times = []
     before = time.process_time()
@@ -62,10 +66,11 @@ def main() -> None:
     parser.add_argument("--robots", type=int, nargs="+", default=SIZES)
     parser.add_argument("--protocols", nargs="+", default=WAYS)
     parser.add_argument("--cycles", type=int, default=20)
+    parser.add_argument("--own-tables", action="store_true", help="random costs for each edge")
     parser.add_argument("--one", action="store_true", help=argparse.SUPPRESS)
     given = parser.parse_args()
     if given.one:
-        print(json.dumps(measured(given.robots[0], given.protocols[0], given.cycles)))
+        print(json.dumps(measured(given.robots[0], given.protocols[0], given.cycles, own_tables=given.own_tables)))
         return
     print(
         "| protocol | robots | set-up s | ms a cycle | cycles a second | MB | conflicts at first | in the best cycle |"
@@ -74,6 +79,7 @@ def main() -> None:
     for way in given.protocols:
         for robots in given.robots:
             words = [sys.executable, __file__, "--one", "--robots", str(robots), "--cycles", str(given.cycles)]
+            words += ["--own-tables"] * given.own_tables
             done = subprocess.run([*words, "--protocols", way], capture_output=True, check=True, text=True)
             one = json.loads(done.stdout)
             print(

@@ -54,9 +54,12 @@ def watched(command: Sequence[str], limit_s: float, cpu_s: int = NO_LIMIT, folde
         alarm = threading.Timer(limit_s, stop)
         alarm.start()
         try:
-            _, status, used = os.wait4(process.pid, 0)
+            os.waitid(os.P_PID, process.pid, os.WEXITED | os.WNOWAIT)
         finally:
             alarm.cancel()
+        # Its group still has its number: whoever it has left behind would be in the next one's way.
+        os.killpg(process.pid, signal.SIGKILL)
+        _, status, used = os.wait4(process.pid, 0)
         wall_s = time.perf_counter() - began
         process.returncode = os.waitstatus_to_exitcode(status)
         output.seek(0)

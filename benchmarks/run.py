@@ -17,6 +17,7 @@ import command_time
 import flagship
 import flight
 import journals
+import messages
 import network
 import own_studies
 import peers
@@ -34,6 +35,7 @@ PARTS: dict[str, Callable[[], Section]] = {
     "transport": transport.measured,
     "flagship": flagship.measured,
     "simulator": simulator.measured,
+    "messages": messages.measured,
     "journal": journals.measured,
     "solver": solver.measured,
     "flight": flight.measured,
