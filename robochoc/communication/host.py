@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from functools import cache
-from typing import Self, cast
+from typing import Any, Self, cast
 
 import msgspec
 
