@@ -53,6 +53,9 @@ def test_a_run_is_timed_and_its_output_kept(load: Any) -> None:  # noqa: ANN401
     assert run.cpu_s > 0
     assert 0 < run.wall_s < 60
     assert run.peak_mb > 1
+    small = load("peer_runs").watched(["true"], 60)
+    ballast = b"x" * (100 << 20)
+    assert load("peer_runs").watched(["true"], 60).peak_mb < small.peak_mb + len(ballast) / (1 << 20) / 2
 
 
 def test_a_run_is_cut_off_with_all_that_it_started(load: Any) -> None:  # noqa: ANN401
@@ -176,6 +179,7 @@ def test_frodo_is_set_and_read(load: Any, tmp_path: Path) -> None:  # noqa: ANN4
     for line, answer in (
         ("", ("its time is over", None)),
         ("0;0;infinity\n", ("no-solution", None)),
+        ("0;9;null\n", ("no answer", None)),
         ("0;12;7\n", ("7", 12)),
     ):
         table.write_text(head + line)
