@@ -12,20 +12,9 @@ from report import Row, Section
 
 from robochoc.formats import write_team
 
-QUOTED: tuple[Row, ...] = (
-    ("peer (quoted, not measured here)", "runtime", "wall s"),
-    ("FRODO", "threads in one JVM", "0.3"),
-    ("FRODO, counting messages", "threads in one JVM", "0.6-3"),
-    ("FRODO", "separate processes", "8-9"),
-    ("pyDCOP", "threads", "1.6-13"),
-    ("pyDCOP", "processes", "no answer"),
-    ("raven-csp", "simulated", "0.4"),
-    ("raven-csp", "processes", "0.6"),
-)
-
 
 def measured() -> Section:
-    """Time every command, and put the peers' figures beside."""
+    """Time every command."""
     with tempfile.TemporaryDirectory() as scratch:
         graph = Path(scratch) / f"colouring-{AGENTS}"
         write_team(colouring(), graph)
@@ -33,9 +22,9 @@ def measured() -> Section:
     notes = (
         "Whole-process wall time, from fork to exit, interpreter start and imports included; CPU is of the command "
         f"and all its robots. GRAPH is a random 3-colouring problem: {AGENTS} robots, {EDGES} edges, seed {SEED}. "
-        "Median (min..max)."
+        "Other libraries are measured in part `peers`. Median (min..max)."
     )
-    return Section("whole", "A command from fork to exit", notes, (_HEAD + rows, QUOTED))
+    return Section("whole", "A command from fork to exit", notes, (_HEAD + rows,))
 
 
 _HEAD: list[Row] = [("command", "aim, wall s", "wall s", "CPU s")]

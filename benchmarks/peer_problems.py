@@ -48,7 +48,7 @@ COLOURING = Family(
     colouring,
     range(3),
     15,
-    90,
+    120,
 )
 LOOSE = Family(
     "<20,10,.25,.60>",
@@ -56,7 +56,7 @@ LOOSE = Family(
     _random(0.6),
     range(3),
     15,
-    90,
+    120,
 )
 TIGHT = Family(
     "<20,10,.25,.72>",
@@ -64,7 +64,7 @@ TIGHT = Family(
     _random(0.72),
     range(5),
     15,
-    90,
+    120,
 )
 COSTS = Family(
     "costs",
@@ -72,7 +72,7 @@ COSTS = Family(
     lambda seed: random_csp(10, 5, 0.35, 0, seed, connected=True, max_cost=100),
     range(3),
     15,
-    90,
+    120,
 )
 LOCAL = Family(
     "local search",
@@ -80,7 +80,7 @@ LOCAL = Family(
     lambda seed: coloring(1000, 3, 4, seed),
     range(1),
     60,
-    120,
+    240,
     decided=False,
 )
 SATISFACTION = (COLOURING, LOOSE, TIGHT)
@@ -98,7 +98,7 @@ def write_problem(team: Team, folder: Path) -> None:
 
 
 def in_tables(team: Team) -> Team:
-    """The same problem, its hard predicates as relations: FRODO's own parser passes over predicates in silence."""
+    """The same problem, its hard predicates as relations: FRODO's first parser reads no predicates."""
     domains = {name: variable.domain for name, variable in team.variables.items()}
     robots = [
         replace(

@@ -12,7 +12,6 @@ The course of the search does not depend on delays. No robot knows the total cos
 from __future__ import annotations
 
 from abc import abstractmethod
-from collections import deque
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import TypeVar
 
@@ -44,8 +43,9 @@ class CycleProtocol(Protocol):
         super().__init__(problem, order)
         self.cycle = -1
         self._trail: list[tuple[int, int]] = []
-        self._waiting: dict[str, deque[wire.Message]] = {name: deque() for name in problem.neighbours}
-        self._awaited: Sequence[str] = ()
+        self._waiting: dict[str, list[wire.Message]] = {name: [] for name in problem.neighbours}
+        """A few at most from each: a robot that is ahead soon waits for this one."""
+        self._awaited: dict[str, None] = {}
         self._missing = 0
         self._then: Then | None = None
 
@@ -75,19 +75,20 @@ class CycleProtocol(Protocol):
     def settle(self) -> None:
         """Run all phases whose messages have arrived."""
         while self._then and not self._missing and self.verdict is None:
-            messages = {name: self._waiting[name].popleft() for name in self._awaited}
+            messages = {name: self._waiting[name].pop(0) for name in self._awaited}
             then, self._then = self._then, None
             then(messages)
 
     def listen(self, names: Sequence[str], then: Then) -> None:
         """Wait for a message of each robot in `names`, then call `then` with them."""
-        self._awaited, self._then = names, then
-        self._missing = sum(not self._waiting[name] for name in names)
+        self._awaited, self._then = dict.fromkeys(names), then
+        self._missing = [self._waiting[name] for name in names].count([])
 
     def tell(self, names: Iterable[str], message: wire.Message) -> None:
         """Send the same message to several robots."""
-        for name in names:
-            self.send(name, message)
+        said = [(name, message) for name in names]
+        self.outbox += said
+        self.said_at += [self.problem.checks] * len(said)
 
     def tell_value(self, then: Then) -> None:
         """Send the own value to all neighbours, wait for theirs, then call `then`."""

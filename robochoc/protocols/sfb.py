@@ -154,6 +154,8 @@ class SFB(Protocol):
         elif self.previous is None:
             self._tell_below([])
             self.settle()
+        if self.problem.values and not self.problem.has_costs:
+            self.problem.look_ahead()
 
     def receive(self, sender: str, message: Message) -> None:
         """Dispatch on the message's type. Raises `ValueError` for a message that is not possible at this point."""

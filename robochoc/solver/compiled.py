@@ -193,7 +193,8 @@ class LocalProblem:
 
     def costs(self, view: Mapping[str, Value]) -> list[float]:
         """Return the `cost` of every own value: as many checks for each constraint as there are values."""
-        known = [constraint.costs(others) for constraint, others in self._known(view, len(self.values))]
+        known = self._paid(view)
+        self.checks += len(known) * len(self.values)
         return [sum(prices) for prices in zip(self.charges, *known, strict=True)]
 
     def lexicographic_costs(self, view: Mapping[str, Value]) -> list[LexicographicCost]:
@@ -201,8 +202,7 @@ class LocalProblem:
         costs = self.costs(view)
         if INFINITE not in costs:
             return [(0, cost) for cost in costs]
-        known = [constraint.costs(others) for constraint, others in self._known(view, 0)]
-        return [_lexicographic_cost(prices) for prices in zip(self.charges, *known, strict=True)]
+        return [_lexicographic_cost(prices) for prices in zip(self.charges, *self._paid(view), strict=True)]
 
     def scopes(self, robots: Iterable[str]) -> list[tuple[tuple[str, ...], float]]:
         """Return, for each constraint whose other robots are all in `robots`, these robots and its maximum cost.
@@ -290,9 +290,25 @@ class LocalProblem:
             if constraint.agents[-1:] != (lowest,) or not domains.keys() >= set(constraint.agents):
                 continue
             combinations = [*constraint.combinations(domains, len(self.values))]
-            self.checks += len({others for _, others in combinations}) * len(self.values)
+            self.checks += constraint.evaluate(others for _, others in combinations) * len(self.values)
             found.append((constraint.agents, {place: constraint.mask(others) for place, others in combinations}))
         return found
+
+    def look_ahead(self) -> None:
+        """Evaluate what `allowed` will be asked for, before other robots have told their values.
+
+        That is, the constraints in which one robot is lower than this one, for all values that files declare. Robots
+        do it at the same time. Where values are too many, nothing is done.
+        """
+        own = self._rank[self.agent]
+        declared = self._part.known.domains
+        for constraint in self._constraints:
+            if not constraint.agents or self._rank[constraint.agents[-1]] < own:
+                continue
+            if any(self._rank[agent] > own for agent in constraint.agents[:-1]):
+                continue
+            combinations = constraint.declared(declared, MAX_BOUNDED_ROWS // max(1, len(self.values)))
+            self.checks += constraint.evaluate(combinations) * len(self.values)
 
     def interchangeable(self, value: Value) -> Sequence[int]:
         """Return the places of all own values that agree with `value` wherever that is not None.
@@ -307,11 +323,15 @@ class LocalProblem:
         wanted = [(place, part) for place, part in enumerate(value) if part is not None]
         return [index for index, own in enumerate(self.values) if all(own[place] == part for place, part in wanted)]
 
-    def _known(self, view: Mapping[str, Value], values: int = 1) -> list[tuple[SharedConstraint, OtherValues]]:
-        """Return each constraint whose other variables are all known, and their values. Count `values` checks each."""
+    def _known(self, view: Mapping[str, Value]) -> list[tuple[SharedConstraint, OtherValues]]:
+        """Return each constraint whose other variables are all known, and their values. Count a check each."""
         known = [(c, others) for c in self._constraints if (others := c.other_values(view)) is not None]
-        self.checks += len(known) * values
+        self.checks += len(known)
         return known
+
+    def _paid(self, view: Mapping[str, Value]) -> list[list[float]]:
+        """Return what each own value pays for each constraint whose other variables are all known. Counts nothing."""
+        return [prices for c in self._constraints if (prices := c.costs_in(view)) is not None]
 
     def _since(self, place: int) -> Sequence[SharedConstraint]:
         """Return the constraints whose lowest robot does not stand higher in the order than `place`."""

@@ -80,6 +80,8 @@ class SharedConstraint:
         """Where it sees one variable of others: `mask`, by its value."""
         self._masks: dict[OtherValues, int] = {}
         self._costs: dict[OtherValues, list[float]] = {}
+        self._costs_by: dict[int, list[float]] = {}
+        """Where it sees one variable of others: `costs`, by its value."""
         self._conflicts: dict[OtherValues, Conflict] = {}
 
     def compile(self, own: OwnValues) -> None:
@@ -117,6 +119,21 @@ class SharedConstraint:
         if prices is None:
             paid = [0 if None in own else self._price((*others, *own)) for own in self._distinct]  # type: ignore[arg-type]
             prices = self._costs[others] = [paid[code] for code in self.codes]
+        return prices
+
+    def costs_in(self, view: Mapping[str, Value]) -> list[float] | None:
+        """Return what each own value pays in `view`; None: a value is unknown, or a robot is withdrawn."""
+        if self._only is None:
+            others = self.other_values(view)
+            return None if others is None else self.costs(others)
+        agent, place = self._only
+        value = view.get(agent)
+        part = None if value is None else value[place]
+        if part is None:
+            return None
+        prices = self._costs_by.get(part)
+        if prices is None:
+            prices = self._costs_by[part] = self.costs((part,))
         return prices
 
     def lower_bounds(self, domains: Mapping[str, Iterable[int]], wide: int) -> tuple[int, list[float]]:
@@ -168,6 +185,18 @@ class SharedConstraint:
             mask = sum(1 << index for index, code in enumerate(self.codes) if holds[code])
             self._masks[others] = mask
         return mask
+
+    def declared(self, domains: Mapping[str, Iterable[int]], most: int) -> Iterable[OtherValues]:
+        """Return all that the constraint may see of the others, by their declared `domains`; nothing if over `most`."""
+        columns = [list(domains[name]) for name in self._names]
+        return itertools.product(*columns) if math.prod(map(len, columns)) <= most else ()
+
+    def evaluate(self, combinations: Iterable[OtherValues]) -> int:
+        """Evaluate `combinations`, and return how many there are that were not known before."""
+        before = len(self._masks)
+        for others in combinations:
+            self.mask(others)
+        return len(self._masks) - before
 
     def look(self, view: Mapping[str, Value]) -> int:
         """Return the own values that go with `view`: bit i for the i-th. `UNKNOWN` where `other_values` is None."""

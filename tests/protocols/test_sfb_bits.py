@@ -9,6 +9,7 @@ import pytest
 from robochoc.communication.simulator.schedule import RandomChannels
 from robochoc.communication.simulator.simulator import Simulation
 from robochoc.formats import PREDEFINED
+from robochoc.generators.queens3d import queens3d
 from robochoc.generators.random_csp import random_csp
 from robochoc.journal.events import Sent
 from robochoc.model.outcome import Verdict
@@ -152,3 +153,27 @@ def test_nothing_is_left_once_there_is_a_solution() -> None:
     assert bits.below(rows, 1) == rows
     assert bits.below(rows, 0) == bits.extended(rows, 0) == []
     assert bits.completed([]) == (1, [])
+
+
+@pytest.mark.parametrize(("n", "checks", "ncccs"), [(3, 252, 54), (4, 1216, 144)])
+def test_robots_evaluate_their_constraints_at_the_same_time(n: int, checks: int, ncccs: int) -> None:
+    spent = Simulation(queens3d(n), SFB, RandomChannels(0)).run(60).metrics
+    assert (spent.checks, spent.ncccs) == (checks, ncccs)
+
+
+@count("teams", 20, 1000)
+def test_what_was_looked_at_before_is_not_evaluated_again(teams: int) -> None:
+    chance = Random("ahead")
+    for _ in range(teams):
+        team = chance.choice((random_team, random_complex_team))(chance)
+        parts = agent_problems(compiled_by_brute_force(team), shared_scopes=True)
+        domains = {name: LocalProblem(part).values for name, part in parts.items()}
+        for place, name in enumerate(team.order):
+            above = {other: domains[other] for other in team.order[:place]}
+            robot, other_robot = LocalProblem(parts[name]), LocalProblem(parts[name])
+            robot.look_ahead()
+            looked_at = robot.checks
+            for lowest in team.order[place + 1 :]:
+                known = {**above, lowest: domains[lowest]}
+                assert robot.allowed(known, lowest) == other_robot.allowed(known, lowest)
+            assert other_robot.checks <= robot.checks == looked_at

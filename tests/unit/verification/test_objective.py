@@ -4,8 +4,12 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from robochoc.model.problem import Constraint, Relation, Semantics, Team
+from hypothesis import given
+from hypothesis import strategies as st
+
+from robochoc.model.problem import INFINITE, Constraint, Relation, Semantics, Team
 from robochoc.verification.objective import Objective, withdrawal_cost
+from tests.support.examples import examples
 from tests.support.problems import team_of
 
 PRICE = Relation("P", 2, Semantics.SOFT, ((1, 1),), (4,), 1)
@@ -36,3 +40,25 @@ def test_values_of_another_length_than_the_interface_are_not_of_these_robots() -
 
 def test_no_robot_withdraws_to_save_costs() -> None:
     assert withdrawal_cost(pair()) == 1 + 4 + 4
+
+
+@given(st.lists(st.tuples(st.sampled_from(["RA", "RB", "RC"]), st.integers(0, 3)), max_size=20), st.booleans())
+@examples(60)
+def test_a_cost_that_is_kept_is_the_cost_that_is_summed(changes: list[tuple[str, int]], aside: bool) -> None:  # noqa: FBT001 - hypothesis draws it
+    hard = replace(PRICE, name="H", tuples=((1, 2), (3, 3)), costs=(INFINITE, INFINITE), default_cost=2)
+    scopes = (("A", "B", PRICE), ("B", "C", hard), ("A", "C", hard))
+    team = team_of(
+        dict.fromkeys("ABC", (1, 2, 3)),
+        [Constraint(one + other, by, (one, other), (one, other)) for one, other, by in scopes],
+    )
+    kept, now = Objective(team, 10 if aside else None), dict[str, dict[str, int]]()
+    for robot, value in changes:
+        now[robot] = {robot[1]: value} if value else {}
+        kept.change({robot: now[robot]})
+        fresh = Objective(team, 10 if aside else None)
+        fresh.change(now)
+        values = {name: one for own in now.values() for name, one in own.items()}
+        paid = [c.price(values) for c in team.constraints() if values.keys() >= set(c.variables)]
+        absent = 3 - len(values)
+        wanted = INFINITE if absent and not aside else sum(paid) + 10 * absent
+        assert kept.cost == fresh.cost == wanted
