@@ -9,7 +9,7 @@ READY := $(VENV)/.ready
 PIP := pip install --disable-pip-version-check
 LOCKED := --require-hashes --only-binary :all: -r requirements/build.txt -r
 
-.PHONY: demo demo-11 docs test test-slow test-all test-part coverage fuzz mutate lint type format bench journals lock sbom audit nox test-newest clean
+.PHONY: demo demo-11 docs test test-slow test-all test-part compiled test-compiled coverage fuzz mutate lint type format bench journals lock sbom audit nox test-newest clean
 
 $(RUN): pyproject.toml requirements/build.txt requirements/run.txt
 	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' || { echo "robochoc needs Python 3.11 or newer; say: make PYTHON=python3.12 ..."; exit 1; }
@@ -56,6 +56,34 @@ test-all: test test-slow
 PART ?= 8
 test-part: $(READY)  ## a fixed part of the slow tests, for CI
 	$(PYTEST) -m slow -p tests.support.parts --part $(PART)
+
+# A wheel with compiled modules, in an environment of its own that has what `make test` has. An editable install is always
+# plain Python: a compiled module would stand in for a source that has been edited since.
+COMPILED := $(VENV)/compiled
+WHEEL := out/compiled/wheel
+$(COMPILED)/.ready: requirements/build.txt requirements/dev.txt
+	$(PYTHON) -m venv $(COMPILED)
+	$(COMPILED)/bin/$(PIP) --quiet $(LOCKED) requirements/dev.txt
+	@touch $@
+
+compiled: $(COMPILED)/.ready  ## robochoc with compiled modules: .venv/compiled/bin/robochoc
+	@rm -rf $(WHEEL)
+	ROBOCHOC_COMPILE=1 $(COMPILED)/bin/pip wheel --quiet --no-index --no-deps --no-build-isolation -w $(WHEEL) .
+	$(COMPILED)/bin/pip install --quiet --no-index --no-deps --force-reinstall $(WHEEL)/*.whl
+	$(COMPILED)/bin/robochoc --version | grep compiled
+
+# The tests stand in a folder without the sources, so that what is imported is what the wheel has installed.
+APART := out/compiled/tests
+ON_BOTH ?= tests/conformance tests/protocols tests/unit/solver tests/unit/communication tests/unit/replay \
+	tests/cli/test_local_signals.py
+ON_PURE ?= tests/unit/communication/test_simulator.py tests/protocols/test_abt.py tests/unit/system
+PYTEST_APART = cd $(APART) && $(abspath $(COMPILED))/bin/pytest -n $(JOBS) --dist worksteal
+test-compiled: compiled  ## the same answers from compiled modules, and from the same wheel with ROBOCHOC_PURE=1
+	@rm -rf $(APART) && mkdir -p $(APART)
+	@cp -r benchmarks docs instances requirements tests xsd *.md *.toml *.yml Makefile $(APART)
+	$(PYTEST_APART) $(ON_BOTH) tests/unit/system
+	export ROBOCHOC_PURE=1; $(PYTEST_APART) $(ON_PURE)
+	@rm -rf $(APART)
 
 # TESTS="tests/protocols" measures what some of the tests reach. Left out: signals that meet Python's own start, which is
 # when coverage.py starts as well, and it swallows them. What is killed while it writes its data spoils them: a warning.

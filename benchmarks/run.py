@@ -18,6 +18,7 @@ import crowd
 import flagship
 import flight
 import journals
+import messages
 import network
 import own_studies
 import peers
@@ -36,6 +37,7 @@ PARTS: dict[str, Callable[[], Section]] = {
     "crowd": crowd.measured,
     "flagship": flagship.measured,
     "simulator": simulator.measured,
+    "messages": messages.measured,
     "journal": journals.measured,
     "solver": solver.measured,
     "flight": flight.measured,

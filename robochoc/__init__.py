@@ -4,6 +4,7 @@ Names:
     load: Reads a team's files, and returns a `Problem`.
     Problem: A problem, which `solve()` solves on this machine.
     Model: A problem that is made in Python, with operators.
+    ArrayProblem: A problem of very many robots, made from numpy arrays.
     all_different, allowed, forbidden, costs, function, element, cumulative, minimum, maximum, if_then_else, all_of,
         any_of: Constraints and costs of a model that no operator makes.
     from_cpmpy: Splits a CPMpy model over robots (the extra `cpmpy`).
@@ -21,11 +22,14 @@ Example:
 
 from __future__ import annotations
 
+import os
+
 TYPE_CHECKING = False  # to import `typing` would delay the handling of signals (cli/main.py)
 if TYPE_CHECKING:
     from robochoc import journal
     from robochoc.api import AgentsContainer, Problem, load
     from robochoc.model.outcome import Outcome, Verdict
+    from robochoc.modelling.array_problem import ArrayProblem
     from robochoc.modelling.cpmpy_models import from_cpmpy
     from robochoc.modelling.functions import (
         all_different,
@@ -46,6 +50,7 @@ if TYPE_CHECKING:
 
 __all__ = [
     "AgentsContainer",
+    "ArrayProblem",
     "Model",
     "ModelError",
     "Outcome",
@@ -72,12 +77,18 @@ __all__ = [
 
 __version__ = "0.1.0"
 
+if os.environ.get("ROBOCHOC_PURE", "0") not in {"", "0"}:  # before any other module of ours is imported
+    from robochoc.system.compiled_core import prefer_sources
+
+    prefer_sources()
+
 _FUNCTIONS = "all_different allowed costs cumulative element forbidden function if_then_else maximum minimum"
 _PLACES = {
     **dict.fromkeys(("AgentsContainer", "Problem", "load"), "robochoc.api"),
     **dict.fromkeys(("Outcome", "Verdict"), "robochoc.model.outcome"),
     **dict.fromkeys(_FUNCTIONS.split(), "robochoc.modelling.functions"),
     **dict.fromkeys(("all_of", "any_of"), "robochoc.modelling.terms"),
+    "ArrayProblem": "robochoc.modelling.array_problem",
     "from_cpmpy": "robochoc.modelling.cpmpy_models",
     "Model": "robochoc.modelling.model",
     "ModelError": "robochoc.modelling.places",

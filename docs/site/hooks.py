@@ -21,6 +21,7 @@ from robochoc.cli.group import cli
 from robochoc.protocols.protocol import Protocol
 from robochoc.protocols.settings_base import Settings
 from robochoc.run.registry import installed_protocols
+from robochoc.system.compiled_core import docstring
 
 if TYPE_CHECKING:
     from mkdocs.config.defaults import MkDocsConfig
@@ -154,7 +155,7 @@ def struct_block(item: type[Struct]) -> str:
 def title(kind: type[Protocol]) -> str:
     """Return the first line of the docstring of a protocol's module, which is its full name."""
     module = inspect.getmodule(kind)
-    return (inspect.getdoc(module) or kind.__name__).splitlines()[0].rstrip(".")
+    return ((docstring(module) if module else "") or kind.__name__).splitlines()[0].rstrip(".")
 
 
 def purpose(kind: type[Protocol]) -> str:

@@ -81,10 +81,26 @@ class Commands(click.Group):
             raise click.UsageError(f"{error.message} Did you mean {near[0]!r}?", ctx) from None
 
 
+def _tell_version(context: click.Context, _: click.Parameter, asked: bool) -> None:  # noqa: FBT001 - click's own
+    """Tell the version, and whether compiled modules run."""
+    if asked and not context.resilient_parsing:
+        from robochoc.system.compiled_core import kind_of_core
+
+        click.echo(f"robochoc {__version__} ({kind_of_core()})")
+        context.exit()
+
+
 @click.group(
     cls=Commands, context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100}, epilog=EXIT_STATUS
 )
-@click.version_option(__version__, prog_name="robochoc")
+@click.option(
+    "--version",
+    is_flag=True,
+    expose_value=False,
+    is_eager=True,
+    callback=_tell_version,
+    help="Show the version and exit.",
+)
 def cli() -> None:
     """Distributed constraint solving by teams of robots.
 

@@ -18,28 +18,32 @@ from robochoc.journal.events import Concluded, Decided, Heard, Observer, Receive
 from robochoc.model.message import Envelope, Message, encode
 from robochoc.model.outcome import Metrics, Verdict
 from robochoc.protocols.chance import Chance
+from robochoc.protocols.dynamic import DynamicProtocol
 from robochoc.protocols.order import PriorityOrder
-from robochoc.protocols.protocol import DynamicProtocol, Protocol
-from robochoc.protocols.settings import settings_of
+from robochoc.protocols.protocol import Protocol
+from robochoc.protocols.settings import equip
 from robochoc.solver.agent_problem import DEFAULT_PARAMETERS, AgentProblem, RunParameters
 from robochoc.solver.compiled import LocalProblem
 from robochoc.solver.explanation import Invalidated
+from robochoc.system.compiling import mypyc_attr
 
 
 class BadMessageError(Exception):
     """The bytes of an envelope are no message of the protocol."""
 
 
+@mypyc_attr(allow_interpreted_subclasses=True)
 class Host:
     """Drives one robot's protocol object."""
 
     @classmethod
-    def of(cls, protocol: type[Protocol], part: AgentProblem) -> Self:
+    def of(cls, protocol: type[Protocol], part: AgentProblem, order: PriorityOrder | None = None) -> Self:
         """Return a host for the robot whose part of the problem is `part`.
 
-        Raises `UnsupportedError` (see `LocalProblem`).
+        `order` is that of `part`, where the robots of one process share it. Raises `UnsupportedError` (see
+        `LocalProblem`).
         """
-        return cls(protocol(LocalProblem(part), _order_of(part)), part.parameters)
+        return cls(protocol(LocalProblem(part), order or order_of(part)), part.parameters)
 
     def __init__(self, protocol: Protocol, parameters: RunParameters = DEFAULT_PARAMETERS) -> None:
         self.protocol = protocol
@@ -88,12 +92,13 @@ class Host:
             protocol.start()
         return self._said()
 
-    def change(self, part: AgentProblem, invalidated: Invalidated) -> None:
+    def change(self, part: AgentProblem, invalidated: Invalidated, order: PriorityOrder | None = None) -> None:
         """Enter a new epoch: the problem has changed to `part`, and counting begins again.
 
-        A protocol that can goes on with what it knows; any other is begun anew. Raises `UnsupportedError`.
+        A protocol that can goes on with what it knows; any other is begun anew. `order` is as in `of`. Raises
+        `UnsupportedError`.
         """
-        problem, order = LocalProblem(part), _order_of(part)
+        problem, order = LocalProblem(part), order or order_of(part)
         if isinstance(self.protocol, DynamicProtocol):
             self.protocol.change(problem, order, invalidated)
             self._forget_said()
@@ -158,8 +163,7 @@ class Host:
     def _equip(self, parameters: RunParameters) -> None:
         """Give the protocol its settings and its random generator."""
         protocol = self.protocol
-        if parameters.settings:
-            protocol.settings = settings_of(type(protocol), parameters.settings)
+        equip(protocol, parameters.settings)
         protocol.chance = Chance(parameters.seed, self.name)
 
     def _said(self) -> list[Envelope]:
@@ -244,6 +248,7 @@ def message_decoder(messages: object) -> msgspec.msgpack.Decoder[Message]:
     return msgspec.msgpack.Decoder(cast("type[Message]", messages))
 
 
-def _order_of(part: AgentProblem) -> PriorityOrder:
+def order_of(part: AgentProblem) -> PriorityOrder:
+    """Return the order in which the robots of a team work, with its pseudo-tree if they know it."""
     known = part.known
     return PriorityOrder(known.order, known.links, known.rank)

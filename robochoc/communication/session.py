@@ -13,6 +13,7 @@ from robochoc.protocols.protocol import Protocol
 from robochoc.solver.agent_problem import DEFAULT_PARAMETERS, AgentProblem, RunParameters, agent_problems
 from robochoc.solver.compiled_team import CompiledTeam, ensure_compiled
 from robochoc.solver.explanation import Invalidated
+from robochoc.system.compiling import mypyc_attr
 
 
 class Epoch(NamedTuple):
@@ -41,6 +42,7 @@ class Epoch(NamedTuple):
         return agent_problems(self.compiled, self.parameters, shared_scopes=traits.shared_scopes, tree=traits.tree)
 
 
+@mypyc_attr(allow_interpreted_subclasses=True)
 class Session(ABC):
     """One team and one protocol in one runtime. A context manager.
 

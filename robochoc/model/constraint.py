@@ -114,18 +114,21 @@ class Relation:
             return dict(zip(self.tuples, self.costs, strict=True))
         return dict.fromkeys(self.tuples, 0 if self.semantics is Semantics.SUPPORTS else INFINITE)
 
-    def cost(self, values: Sequence[int]) -> float:
-        """Return the cost of the tuple `values`: 0 or `INFINITE` unless the relation is soft."""
-        listed = self._listed.get(tuple(values))
-        if listed is not None:
-            return listed
+    @property
+    def prices(self) -> tuple[Mapping[tuple[int, ...], float], float]:
+        """The costs of the tuples that are listed, and that of all others: 0 or `INFINITE` unless it is soft."""
         match self.semantics:
             case Semantics.SUPPORTS:
-                return INFINITE
+                return self._listed, INFINITE
             case Semantics.CONFLICTS:
-                return 0
+                return self._listed, 0
             case Semantics.SOFT:
-                return self.default_cost
+                return self._listed, self.default_cost
+
+    def cost(self, values: Sequence[int]) -> float:
+        """Return the cost of the tuple `values`: 0 or `INFINITE` unless the relation is soft."""
+        listed, other = self.prices
+        return listed.get(tuple(values), other)
 
 
 @dataclass(frozen=True)

@@ -116,7 +116,7 @@ class ArrayProblem:
             protocol: The protocol: dsa, mgm, mgm2 or maxsum.
             seed: The seed of the robots' random numbers.
             timeout: A limit in seconds, looked at after each cycle.
-            ncccs: Whether NCCCs are counted; that takes a fifth of the time or so.
+            ncccs: Whether NCCCs are counted; that takes up to a fifth of the time.
             **settings: The protocol's settings, such as `cycles` or `variant`.
 
         Returns:

@@ -44,7 +44,7 @@ nothing changes.
 
 from __future__ import annotations
 
-from typing import assert_never, cast
+from typing import Any, ClassVar, assert_never, cast
 
 from robochoc.model.message import Message, Value
 from robochoc.model.outcome import Verdict
@@ -54,8 +54,10 @@ from robochoc.protocols.nogood import contradicts
 from robochoc.protocols.order import PriorityOrder
 from robochoc.protocols.traits import ENDS_WITH_PROOF, Traits
 from robochoc.solver.compiled import LocalProblem
+from robochoc.system.compiling import mypyc_attr
 
 
+@mypyc_attr(allow_interpreted_subclasses=True)
 class ABT(Backtracking):
     """One agent of ABT. State: `view` (myAgentView), `store` (myNogoodStore), Gamma- and Gamma+.
 
@@ -63,8 +65,8 @@ class ABT(Backtracking):
     which each of these values was last found to be allowed by the own part of the PKC.
     """
 
-    messages = Ok | Nogood | AddLink
-    traits = Traits(
+    messages: ClassVar[Any] = Ok | Nogood | AddLink
+    traits: ClassVar[Traits] = Traits(
         concludes=ENDS_WITH_PROOF,
         paper="Yokoo et al. 1992; Bessiere et al. 2005; PKC: Brito et al. 2009",
         partially_known=True,

@@ -55,7 +55,7 @@ Choices that the papers leave open, and differences:
 
 from __future__ import annotations
 
-from typing import assert_never, cast
+from typing import Any, ClassVar, assert_never, cast
 
 from robochoc.model.message import Message, Value
 from robochoc.model.outcome import Verdict
@@ -65,8 +65,10 @@ from robochoc.protocols.nogood import contradicts
 from robochoc.protocols.order import PriorityOrder
 from robochoc.protocols.traits import ENDS_WITH_PROOF, Traits
 from robochoc.solver.compiled import LocalProblem
+from robochoc.system.compiling import mypyc_attr
 
 
+@mypyc_attr(allow_interpreted_subclasses=True)
 class CurrentOrder(PriorityOrder):
     """The newest order that a robot knows."""
 
@@ -89,6 +91,7 @@ class CurrentOrder(PriorityOrder):
         return Order(tuple(names), (*kept, (count + 1, by)))
 
 
+@mypyc_attr(allow_interpreted_subclasses=True)
 class ABTDORetro(Backtracking):
     """One agent of ABT_DO-Retro. State: `view` (Agent_view), `store`, `order`, and `left`.
 
@@ -98,18 +101,18 @@ class ABTDORetro(Backtracking):
     - `owed`: robots that must be sent the value after the packet, even if it has not changed.
     """
 
-    messages = Ok | Nogood | Order | AddLink
-    traits = Traits(
+    messages: ClassVar[Any] = Ok | Nogood | Order | AddLink
+    traits: ClassVar[Traits] = Traits(
         concludes=ENDS_WITH_PROOF,
         paper="Zivan & Meisels 2006; Zivan et al. 2009",
         shared_scopes=True,
         privacy="none",
         use_when="no costs, and no good static order is known",
     )
-    order: CurrentOrder
 
     def __init__(self, problem: LocalProblem, order: PriorityOrder) -> None:
-        super().__init__(problem, CurrentOrder(order.names))
+        self._newest = CurrentOrder(order.names)
+        super().__init__(problem, self._newest)
         self.left: dict[str, int] = {}
         self.higher = set(problem.neighbours)
         self.tells = list(problem.neighbours)
@@ -167,7 +170,7 @@ class ABTDORetro(Backtracking):
         while place > self.order.depth(nogood.lhs) + 1 and self.left.get(names[place - 1], 0) > nogood.left:
             place -= 1
         if place < self.order.rank[sender]:
-            order = self.order.moved(sender, place, self.problem.agent)
+            order = self._newest.moved(sender, place, self.problem.agent)
             self._adopt(order)
             for name in order.names[place:]:
                 if name != self.problem.agent:
@@ -175,10 +178,10 @@ class ABTDORetro(Backtracking):
 
     def _adopt(self, order: Order) -> None:
         """Adopt `order` if it is newer; drop nogoods with robots that are now lower, and inform new lower robots."""
-        if order.counters <= self.order.counters:
+        if order.counters <= self._newest.counters:
             return
         lower = set(self._lower())
-        self.order.adopt(order)
+        self._newest.adopt(order)
         self.owed.update(name for name in self._lower() if name not in lower)
         for name in {name for lhs in self.store for name in lhs if not self._is_higher(name)}:
             self.store.forget(name)

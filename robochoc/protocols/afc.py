@@ -42,7 +42,7 @@ Choices that the paper leaves open:
 
 from __future__ import annotations
 
-from typing import assert_never, cast
+from typing import Any, ClassVar, assert_never, cast
 
 from robochoc.model.message import Message
 from robochoc.model.outcome import Verdict
@@ -51,16 +51,18 @@ from robochoc.protocols.order import PriorityOrder
 from robochoc.protocols.protocol import Protocol
 from robochoc.protocols.traits import ENDS_WITH_EITHER, Traits
 from robochoc.solver.compiled import LocalProblem
+from robochoc.system.compiling import mypyc_attr
 
 
+@mypyc_attr(allow_interpreted_subclasses=True)
 class AFC(Protocol):
     """One agent of AFC. State: the AgentView (`view`, `sc` and `consistent`), and the filtered `domain`.
 
     If `consistent` is false, no solution extends `view`.
     """
 
-    messages = CPA | FcCPA | NotOk | BacktrackCPA
-    traits = Traits(
+    messages: ClassVar[Any] = CPA | FcCPA | NotOk | BacktrackCPA
+    traits: ClassVar[Traits] = Traits(
         concludes=ENDS_WITH_EITHER,
         paper="Meisels & Zivan 2007",
         privacy="constraints of lower robots",

@@ -48,7 +48,7 @@ new CPA of the first, and so on. `Solved` ends the search.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import assert_never, cast
+from typing import Any, ClassVar, assert_never, cast
 
 from robochoc.model.message import Message, Value
 from robochoc.model.outcome import Verdict
@@ -58,8 +58,10 @@ from robochoc.protocols.order import PriorityOrder
 from robochoc.protocols.protocol import Protocol
 from robochoc.protocols.traits import ENDS_WITH_PROOF, Traits
 from robochoc.solver.compiled import LocalProblem
+from robochoc.system.compiling import mypyc_attr
 
 
+@mypyc_attr(allow_interpreted_subclasses=True)
 class AFCng(Protocol):
     """One agent of AFC-ng. State: `view` and its `counters` (AgentView), `store` (NogoodStore), `counter` (t_i).
 
@@ -70,8 +72,8 @@ class AFCng(Protocol):
     - `_revised`: whether neither the view nor the nogoods have changed since the values were last checked.
     """
 
-    messages = CPA | Nogood | Solved
-    traits = Traits(
+    messages: ClassVar[Any] = CPA | Nogood | Solved
+    traits: ClassVar[Traits] = Traits(
         concludes=ENDS_WITH_PROOF,
         paper="Ezzahir et al. 2009; Wahbi, Ezzahir, Bessiere, Bouyakhf 2013",
         privacy="constraints of lower robots",

@@ -41,7 +41,7 @@ solved; they cost at least one message for each robot.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import assert_never, cast
+from typing import Any, ClassVar, assert_never, cast
 
 from robochoc.model.message import Message, Value
 from robochoc.protocols.afc_ng import AFCng
@@ -50,13 +50,15 @@ from robochoc.protocols.afc_tree_messages import Accept
 from robochoc.protocols.order import PriorityOrder, PseudoTree
 from robochoc.protocols.traits import ENDS_WITH_PROOF, Traits
 from robochoc.solver.compiled import LocalProblem
+from robochoc.system.compiling import mypyc_attr
 
 
+@mypyc_attr(allow_interpreted_subclasses=True)
 class AFCTree(AFCng):
     """One agent of AFC-tree. State besides AFC-ng's: `accepts`, the values of each child's subtree that accepted."""
 
-    messages = CPA | Nogood | Accept | Solved
-    traits = Traits(
+    messages: ClassVar[Any] = CPA | Nogood | Accept | Solved
+    traits: ClassVar[Traits] = Traits(
         concludes=ENDS_WITH_PROOF,
         paper="Wahbi, Ezzahir, Bessiere, Bouyakhf 2013",
         tree=True,

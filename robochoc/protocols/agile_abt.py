@@ -49,7 +49,7 @@ Choices that the paper leaves open, and differences:
 
 from __future__ import annotations
 
-from typing import assert_never, cast
+from typing import Any, ClassVar, assert_never, cast
 
 from robochoc.model.message import Message, Value
 from robochoc.model.outcome import Verdict
@@ -69,8 +69,10 @@ from robochoc.protocols.nogood import LeftSide, NogoodStore, contradicts, joined
 from robochoc.protocols.order import PriorityOrder
 from robochoc.protocols.traits import ENDS_WITH_PROOF, Traits
 from robochoc.solver.compiled import LocalProblem
+from robochoc.system.compiling import mypyc_attr
 
 
+@mypyc_attr(allow_interpreted_subclasses=True)
 class AgileABT(Backtracking):
     """One agent of Agile-ABT.
 
@@ -80,8 +82,8 @@ class AgileABT(Backtracking):
     sent them.
     """
 
-    messages = Ok | Nogood | Order | AddLink
-    traits = Traits(
+    messages: ClassVar[Any] = Ok | Nogood | Order | AddLink
+    traits: ClassVar[Traits] = Traits(
         concludes=ENDS_WITH_PROOF,
         paper="Bessiere et al. 2011",
         shared_scopes=True,

@@ -44,7 +44,7 @@ Choices that the papers leave open:
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
-from typing import NamedTuple, assert_never, cast
+from typing import Any, ClassVar, NamedTuple, assert_never, cast
 
 from robochoc.model.message import Message, Value
 from robochoc.model.outcome import Verdict
@@ -54,6 +54,7 @@ from robochoc.protocols.order import PriorityOrder
 from robochoc.protocols.protocol import Protocol
 from robochoc.protocols.traits import ENDS_WITH_PROOF, Traits
 from robochoc.solver.compiled import LocalProblem
+from robochoc.system.compiling import mypyc_attr
 
 
 class Kept(NamedTuple):
@@ -68,6 +69,7 @@ def agrees(value: Value, known: Value | None) -> bool:
     return known is not None and all(part is None or part == other for part, other in zip(value, known, strict=True))
 
 
+@mypyc_attr(allow_interpreted_subclasses=True)
 class NogoodList:
     """All received nogoods. Each is indexed by one of its assignments that does not hold ("watched").
 
@@ -109,11 +111,12 @@ class NogoodList:
         return awake
 
 
+@mypyc_attr(allow_interpreted_subclasses=True)
 class AWC(Protocol):
     """One agent of AWC. State: `view` (agent_view) and `priorities` of others, `nogoods`, own `priority`."""
 
-    messages = Ok | Nogood | AddLink
-    traits = Traits(
+    messages: ClassVar[Any] = Ok | Nogood | AddLink
+    traits: ClassVar[Traits] = Traits(
         concludes=ENDS_WITH_PROOF,
         paper="Yokoo 1995; Yokoo et al. 1998",
         shared_scopes=True,

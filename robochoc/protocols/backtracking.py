@@ -13,8 +13,10 @@ from robochoc.protocols.nogood import NogoodStore, joined
 from robochoc.protocols.order import PriorityOrder
 from robochoc.protocols.protocol import Protocol
 from robochoc.solver.compiled import LocalProblem
+from robochoc.system.compiling import mypyc_attr
 
 
+@mypyc_attr(allow_interpreted_subclasses=True)
 class Backtracking(Protocol):
     """One agent with a `view` of others' values (myAgentView) and a `store` of nogoods (myNogoodStore).
 

@@ -13,7 +13,7 @@ from __future__ import annotations
 
 from abc import abstractmethod
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from typing import TypeVar
+from typing import ClassVar, TypeVar
 
 from robochoc.model import message as wire
 from robochoc.model.outcome import Verdict
@@ -37,7 +37,7 @@ class CycleProtocol(Protocol):
     `over`. They call `listen` with the robots whose messages they need, and a function that processes these.
     """
 
-    settings: CycleSettings = CycleSettings()
+    settings: ClassVar[CycleSettings] = CycleSettings()
 
     def __init__(self, problem: LocalProblem, order: PriorityOrder) -> None:
         super().__init__(problem, order)

@@ -40,7 +40,7 @@ Choices that the paper leaves open:
 
 from __future__ import annotations
 
-from typing import assert_never, cast
+from typing import Any, ClassVar, assert_never, cast
 
 from robochoc.model.message import Message
 from robochoc.model.outcome import Verdict
@@ -51,8 +51,10 @@ from robochoc.protocols.protocol import Protocol
 from robochoc.protocols.traits import ENDS_WITH_PROOF, Traits
 from robochoc.solver.compiled import LocalProblem
 from robochoc.solver.filters import allows
+from robochoc.system.compiling import mypyc_attr
 
 
+@mypyc_attr(allow_interpreted_subclasses=True)
 class DisFC(Protocol):
     """One agent of DisFC.
 
@@ -63,9 +65,9 @@ class DisFC(Protocol):
     The nogood store has values on its left sides; a counter is stored there as a value with one component.
     """
 
-    messages = Ok | Nogood | AddLink
-    numbered_values = True
-    traits = Traits(
+    messages: ClassVar[Any] = Ok | Nogood | AddLink
+    numbered_values: ClassVar[bool] = True
+    traits: ClassVar[Traits] = Traits(
         concludes=ENDS_WITH_PROOF,
         paper="Brito and Meseguer 2003; PKC: Brito et al. 2009",
         n_ary=False,

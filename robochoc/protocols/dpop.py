@@ -50,7 +50,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from typing import TypeVar, assert_never, cast
+from typing import ClassVar, TypeVar, assert_never, cast
 
 import msgspec
 
@@ -108,7 +108,7 @@ class DPOP(TreeProtocol):
         privacy="constraints of others, but for sums",
         use_when="costs, small induced width: number of messages is linear",
     )
-    settings: DPOPSettings = DPOPSettings()
+    settings: ClassVar[DPOPSettings] = DPOPSettings()
 
     def __init__(self, problem: LocalProblem, order: PriorityOrder) -> None:
         super().__init__(problem, order)

@@ -42,6 +42,7 @@ Choices that the paper leaves open, and differences:
 from __future__ import annotations
 
 from collections.abc import Mapping
+from typing import ClassVar
 
 from robochoc.model.message import Message
 from robochoc.protocols.cycles import NO_GAIN, CycleProtocol, gain, values_in
@@ -54,7 +55,7 @@ class DSA(CycleProtocol):
     """One agent of DSA. A cycle has one phase: all robots send their values."""
 
     messages = Value
-    settings: DSASettings = DSASettings()
+    settings: ClassVar[DSASettings] = DSASettings()
     traits = Traits(
         concludes=ENDS_WITH_PROOF,
         paper="Fitzpatrick & Meertens 2001; Zhang, Wang, Xing, Wittenburg 2005",

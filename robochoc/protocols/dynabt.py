@@ -43,9 +43,9 @@ from robochoc.protocols import abt_messages
 from robochoc.protocols.abt import ABT
 from robochoc.protocols.abt_messages import AddLink, Ok
 from robochoc.protocols.dynabt_messages import Nogood
+from robochoc.protocols.dynamic import DynamicProtocol
 from robochoc.protocols.nogood import NOTHING, Explanation, NogoodStore
 from robochoc.protocols.order import PriorityOrder
-from robochoc.protocols.protocol import DynamicProtocol
 from robochoc.protocols.traits import ENDS_WITH_PROOF, Traits
 from robochoc.solver.compiled import LocalProblem
 from robochoc.solver.explanation import Invalidated, domain_key

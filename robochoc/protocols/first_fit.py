@@ -21,7 +21,7 @@ its constraints with the flying parents allow, or withdraws, and sends its decis
 
 from __future__ import annotations
 
-from typing import cast
+from typing import Any, ClassVar, cast
 
 from robochoc.model.message import Message, Value
 from robochoc.protocols.first_fit_messages import Placed
@@ -29,13 +29,17 @@ from robochoc.protocols.order import PriorityOrder
 from robochoc.protocols.protocol import Protocol
 from robochoc.protocols.traits import Traits
 from robochoc.solver.compiled import LocalProblem
+from robochoc.system.compiling import mypyc_attr
 
 
+@mypyc_attr(allow_interpreted_subclasses=True)
 class FirstFit(Protocol):
     """One robot. `view` holds the values of the parents that fly, `awaited` the parents without a message yet."""
 
-    messages = Placed
-    traits = Traits(concludes=(), paper="paper, Section 5.2", complete=False, writes_to_non_neighbours=False)
+    messages: ClassVar[Any] = Placed
+    traits: ClassVar[Traits] = Traits(
+        concludes=(), paper="paper, Section 5.2", complete=False, writes_to_non_neighbours=False
+    )
 
     def __init__(self, problem: LocalProblem, order: PriorityOrder) -> None:
         super().__init__(problem, order)

@@ -11,8 +11,10 @@ from collections.abc import Iterable, Mapping
 from typing import ClassVar
 
 from robochoc.model.message import Value
+from robochoc.system.compiling import mypyc_attr
 
 
+@mypyc_attr(allow_interpreted_subclasses=True)
 class Inspectable:
     """The base of `Protocol`: optional members that show its state."""
 

@@ -49,6 +49,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from operator import add, sub
+from typing import ClassVar
 
 from robochoc.model import message as wire
 from robochoc.model.outcome import Verdict
@@ -71,7 +72,7 @@ class MaxSum(CycleProtocol):
     """
 
     messages = Domain | R | Q
-    settings: MaxSumSettings = MaxSumSettings()
+    settings: ClassVar[MaxSumSettings] = MaxSumSettings()
     traits = Traits(
         concludes=ENDS_WITH_PROOF,
         paper="Farinelli, Rogers, Petcu, Jennings 2008",

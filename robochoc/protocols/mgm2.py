@@ -41,7 +41,7 @@ Choices that the paper leaves open, and differences:
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from typing import NamedTuple
+from typing import ClassVar, NamedTuple
 
 from robochoc.model import message as wire
 from robochoc.protocols.cycles import NO_GAIN, gain, values_in
@@ -68,7 +68,7 @@ class MGM2(Gainers):
     """One agent of MGM-2. State: neighbours' `domains`, the `view`, and the `partner` that it is committed to."""
 
     messages = Domain | Value | Offer | Accept | Reject | Gain | Go
-    settings: MGM2Settings = MGM2Settings()
+    settings: ClassVar[MGM2Settings] = MGM2Settings()
     traits = Traits(
         concludes=ENDS_WITH_PROOF,
         paper="Maheswaran, Pearce, Tambe 2004",

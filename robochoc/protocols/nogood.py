@@ -61,7 +61,7 @@ class NogoodStore:
         return self._by_value[index]
 
     def __iter__(self) -> Iterator[LeftSide]:
-        return (lhs for lhs in self._by_value if lhs is not None)
+        return iter([lhs for lhs in self._by_value if lhs is not None])
 
     def because(self, index: int) -> Explanation:
         """Return the explanation of the nogood against the value at `index`."""
@@ -109,13 +109,18 @@ class NogoodStore:
         """Drop all nogoods that contain another value of `agent` than `value` (None: any value)."""
         named = self._naming.get(agent)
         if named:
-            self._drop(_stale(named, agent, value))
+            self._drop([lhs for lhs in named.values() if value is None or contradicts(lhs[agent], value)])
 
     def forget_others(self, view: Mapping[str, Value]) -> None:
         """Drop all nogoods that contain another value of a robot than `view`, or a robot that is not in it."""
-        for agent, named in self._naming.items():
-            if named:
-                self._drop(_stale(named, agent, view.get(agent)))
+        stale = {
+            key: lhs
+            for agent, named in self._naming.items()
+            for key, lhs in named.items()
+            if lhs[agent] != (value := view.get(agent)) and (value is None or contradicts(lhs[agent], value))
+        }
+        if stale:
+            self._drop(stale.values())
 
     def drop(self, keys: Explanation) -> None:
         """Drop all nogoods that were derived from anything in `keys`."""
@@ -168,10 +173,3 @@ class NogoodStore:
         if left is right:
             return False
         return (self._order.depth(left), len(left)) < (self._order.depth(right), len(right))
-
-
-def _stale(named: Mapping[int, LeftSide], agent: str, value: Value | None) -> list[LeftSide]:
-    """Return those of `named` that contain another value of `agent` than `value` (None: any value)."""
-    if value is None:
-        return [*named.values()]
-    return [lhs for lhs in named.values() if lhs[agent] != value and contradicts(lhs[agent], value)]

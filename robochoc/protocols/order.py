@@ -4,7 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 
+from robochoc.system.compiling import mypyc_attr
 
+
+@mypyc_attr(allow_interpreted_subclasses=True)
 class PriorityOrder:
     """The names of all robots, the highest priority first. Static, and the same for every robot of a run.
 

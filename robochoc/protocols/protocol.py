@@ -9,7 +9,7 @@ simulator or on a robot.
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable
+from collections.abc import Callable, MutableSequence
 from typing import Any, ClassVar
 
 from robochoc.model.message import Message
@@ -20,9 +20,10 @@ from robochoc.protocols.order import PriorityOrder
 from robochoc.protocols.settings_base import NO_SETTINGS, Settings
 from robochoc.protocols.traits import Traits
 from robochoc.solver.compiled import LocalProblem
-from robochoc.solver.explanation import Invalidated
+from robochoc.system.compiling import mypyc_attr
 
 
+@mypyc_attr(allow_interpreted_subclasses=True)
 class Protocol(Inspectable, ABC):
     """One robot's side of a protocol.
 
@@ -32,7 +33,7 @@ class Protocol(Inspectable, ABC):
 
     messages: ClassVar[Any]
     traits: ClassVar[Traits] = Traits()
-    settings: Settings = NO_SETTINGS
+    settings: ClassVar[Settings] = NO_SETTINGS
     """The defaults; the host puts what was asked for in their place before `start`."""
     chance: Callable[[], float]
     """Draws from [0, 1): the host's, seeded for each robot. There before `start`."""
@@ -63,7 +64,9 @@ class Protocol(Inspectable, ABC):
 
     def send(self, receiver: str, message: Message) -> None:
         """Send `message` to `receiver`; its clock does not include later checks."""
-        self.outbox.append((receiver, message))
+        # A replay has a list of its own: as a list's, mypyc would not call its `append`.
+        outbox: MutableSequence[tuple[str, Message]] = self.outbox
+        outbox.append((receiver, message))
         self.said_at.append(self.problem.checks)
 
     def conclude(self, verdict: Verdict) -> None:
@@ -91,27 +94,3 @@ class Protocol(Inspectable, ABC):
     def findings(self) -> Findings:
         """This robot's knowledge of the whole search besides its own value. May be read at any time."""
         return NOTHING
-
-
-class DynamicProtocol(Protocol):
-    """A protocol that continues when the problem changes, with the results that are still valid.
-
-    Between two epochs the host calls `change`, and once all robots have changed, `resume`. Other protocols start again
-    on the changed problem.
-    """
-
-    @abstractmethod
-    def change(self, problem: LocalProblem, order: PriorityOrder, invalidated: Invalidated) -> None:
-        """Adopt the changed problem, and drop all that depends on anything `invalidated`. Send nothing.
-
-        No robot searches meanwhile. A verdict that is still valid after the changes is kept, and ends the epoch at
-        once.
-        """
-
-    @abstractmethod
-    def resume(self, *, lossless: bool) -> None:
-        """Continue the search; called before any message.
-
-        Args:
-            lossless: No message of the epoch before was lost.
-        """

@@ -31,7 +31,7 @@ Choices that the papers leave open:
 
 from __future__ import annotations
 
-from typing import assert_never, cast
+from typing import Any, ClassVar, assert_never, cast
 
 from robochoc.model.message import Message, Value
 from robochoc.model.outcome import Verdict
@@ -40,13 +40,15 @@ from robochoc.protocols.protocol import Protocol
 from robochoc.protocols.sbt_messages import CPA, Backtrack
 from robochoc.protocols.traits import ENDS_WITH_EITHER, Traits
 from robochoc.solver.compiled import LocalProblem
+from robochoc.system.compiling import mypyc_attr
 
 
+@mypyc_attr(allow_interpreted_subclasses=True)
 class SBT(Protocol):
     """One agent of synchronous backtracking. State: the last `cpa`, and the value that was added to it."""
 
-    messages = CPA | Backtrack
-    traits = Traits(
+    messages: ClassVar[Any] = CPA | Backtrack
+    traits: ClassVar[Traits] = Traits(
         concludes=ENDS_WITH_EITHER,
         paper="Yokoo et al. 1992, 1998; Zivan & Meisels 2003",
         synchronous=True,

@@ -15,6 +15,13 @@ class SettingsError(ValueError):
     """A setting that the protocol does not have, or a value that it does not accept."""
 
 
+def equip(protocol: Protocol, given: Mapping[str, str]) -> None:
+    """Give one robot's protocol the settings that are `given`. Raises `SettingsError`."""
+    if given:
+        # For mypyc the class has the settings, and its objects have no others. Those with settings are not compiled.
+        setattr(protocol, "settings", settings_of(type(protocol), given))  # noqa: B010
+
+
 def settings_of(protocol: type[Protocol], given: Mapping[str, str]) -> Settings:
     """Return the settings of `protocol`: the `given` ones, and defaults for the others. Raises `SettingsError`."""
     known = type(protocol.settings)

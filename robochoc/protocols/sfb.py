@@ -54,7 +54,7 @@ from __future__ import annotations
 import math
 from collections import deque
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any, assert_never, cast
+from typing import TYPE_CHECKING, Any, ClassVar, assert_never, cast
 
 from robochoc.model.message import Message
 from robochoc.model.outcome import Verdict
@@ -132,7 +132,7 @@ class SFB(Protocol):
         tables=True,
         use_when="costs: the default; few messages",
     )
-    settings: SFBSettings = SFBSettings()
+    settings: ClassVar[SFBSettings] = SFBSettings()
 
     def __init__(self, problem: LocalProblem, order: PriorityOrder) -> None:
         super().__init__(problem, order)

@@ -22,6 +22,7 @@ from robochoc.replay.safe_repr import safe_repr
 from robochoc.replay.value_text import NumberedValueText, ValueText, as_value, cut
 from robochoc.solver.agent_problem import AgentProblem
 from robochoc.solver.compiled import LocalProblem
+from robochoc.system.compiled_core import attributes_of
 
 MOST_VALUES = 60
 """Own values that are shown, beside the present one."""
@@ -63,7 +64,7 @@ class Inspector:
         others = self._others(protocol)
         known = self._known(protocol)
         if protocol.numbered_values:
-            pairs = {name: others.value(name, (number,)) for name, number in vars(protocol)["view"].items()}
+            pairs = {name: others.value(name, (number,)) for name, number in attributes_of(protocol)["view"].items()}
         elif known is not None:
             pairs = {name: others.told(name, value) for name, value in known.items()}
         else:
@@ -124,7 +125,7 @@ class Inspector:
 
     def ruling(self, protocol: Protocol, index: int) -> tuple[str, Collection[str]] | None:
         """Return what rules the value at `index` out, with the robots whose values it involves."""
-        store = vars(protocol).get("store")
+        store = attributes_of(protocol).get("store")
         if isinstance(store, NogoodStore):
             lhs = store[index]
             return None if lhs is None else (self._others(protocol).all(lhs) or ALWAYS, lhs)
@@ -151,7 +152,7 @@ class Inspector:
             told["order"] = safe_repr(protocol.order)
         if protocol.verdict is not None:
             told["verdict"] = str(protocol.verdict)
-        for name, thing in vars(protocol).items():
+        for name, thing in attributes_of(protocol).items():
             if name in skipped or (ours and name.startswith("_")) or len(told) == MOST_ELSE:
                 continue
             if not (ours and _is_empty(thing)):
@@ -166,14 +167,15 @@ class Inspector:
 
     def _view_in(self, protocol: Protocol) -> str:
         """Return the name of the attribute that holds others' values; empty if there is none."""
-        return next((name for name in VIEWS if isinstance(vars(protocol).get(name), Mapping | list | tuple)), "")
+        there = attributes_of(protocol)
+        return next((name for name in VIEWS if isinstance(there.get(name), Mapping | list | tuple)), "")
 
     def _known(self, protocol: Protocol) -> dict[str, Value] | None:
         """Return the values of others that the protocol stores; None if it stores none."""
         name = self._view_in(protocol)
         if not name:
             return None
-        return self._pairs(vars(protocol)[name], protocol.order.names)
+        return self._pairs(attributes_of(protocol)[name], protocol.order.names)
 
     def _pairs(self, kept: Mapping[str, object] | Sequence[object], order: Sequence[str]) -> dict[str, Value]:
         """Return the values in `kept`, by name; a sequence holds those of the first robots in `order`."""
@@ -192,7 +194,7 @@ class Inspector:
         return {name: value for name, value in known.items() if len(value) == len(widths.get(name, ()))}
 
     def _nogoods(self, protocol: Protocol) -> list[tuple[str, str]]:
-        store = vars(protocol).get("store")
+        store = attributes_of(protocol).get("store")
         values = protocol.problem.values
         if isinstance(store, NogoodStore):
             others = self._others(protocol)

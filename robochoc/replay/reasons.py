@@ -13,6 +13,7 @@ from robochoc.protocols.protocol import Protocol
 from robochoc.replay.inspection import ALWAYS, MOST_VALUES, Inspector, safely
 from robochoc.replay.steps import RecordedStep
 from robochoc.replay.value_text import as_value
+from robochoc.system.compiled_core import attributes_of
 
 MOST_REASONS = 8
 MOST_BACKTRACKS = 3
@@ -85,7 +86,7 @@ class Reasons:
     # What rules values out
 
     def _store(self) -> NogoodStore | None:
-        store = vars(self._protocol).get("store")
+        store = attributes_of(self._protocol).get("store")
         return store if isinstance(store, NogoodStore) else None
 
     def _ruled_out(self) -> list[str]:

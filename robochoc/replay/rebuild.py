@@ -17,7 +17,8 @@ from robochoc.model.costs import normalized
 from robochoc.model.orders import Order, OrderError, compute_order, with_priorities
 from robochoc.model.problem import Robot, Team
 from robochoc.model.team_edits import ChangeError, keep_interfaces, without_robots
-from robochoc.protocols.protocol import DynamicProtocol, Protocol
+from robochoc.protocols.dynamic import DynamicProtocol
+from robochoc.protocols.protocol import Protocol
 from robochoc.protocols.settings import SettingsError
 from robochoc.replay.steps import RecordedRun
 from robochoc.run.registry import UnknownProtocolError, protocol_by_class, protocol_or_first_fit

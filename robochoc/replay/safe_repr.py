@@ -11,6 +11,7 @@ from robochoc.protocols.order import PriorityOrder
 from robochoc.replay.value_text import cut
 from robochoc.solver.agent_problem import AgentProblem
 from robochoc.solver.compiled import LocalProblem
+from robochoc.system.compiled_core import attributes_of
 
 MAX_DEPTH = 3
 MAX_ENTRIES = 12
@@ -90,7 +91,7 @@ def _fields(thing: object) -> Iterable[tuple[str, object]]:
     names = getattr(type(thing), "_fields", getattr(type(thing), "__struct_fields__", None))
     if isinstance(names, tuple):
         return ((name, getattr(thing, name)) for name in names)
-    return getattr(thing, "__dict__", {}).items()
+    return attributes_of(thing).items()
 
 
 _repr = _Repr()

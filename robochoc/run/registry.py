@@ -7,8 +7,9 @@ from contextlib import suppress
 from dataclasses import dataclass
 from typing import cast
 
+from robochoc.protocols.dynamic import DynamicProtocol
 from robochoc.protocols.first_fit import FirstFit
-from robochoc.protocols.protocol import DynamicProtocol, Protocol
+from robochoc.protocols.protocol import Protocol
 from robochoc.protocols.settings_base import Settings
 from robochoc.protocols.traits import Traits
 from robochoc.run.defaults import AUTO, DEFAULT_COST_PROTOCOL, FIRST_FIT
@@ -122,8 +123,11 @@ def _fault(loaded: object) -> str:
     """Return why `loaded` cannot be used as a protocol; empty if it can."""
     if not (isinstance(loaded, type) and issubclass(loaded, Protocol)):
         return "is no subclass of Protocol"
-    if loaded.__abstractmethods__:
-        return f"does not define {' and '.join(sorted(loaded.__abstractmethods__))}"
+    # Methods of a compiled class are never marked as abstract.
+    missing = {name for name in ("start", "receive") if getattr(loaded, name) is getattr(Protocol, name)}
+    missing.update(getattr(loaded, "__abstractmethods__", ()))
+    if missing:
+        return f"does not define {' and '.join(sorted(missing))}"
     if not hasattr(loaded, "messages"):
         return "does not declare its messages"
     declared: tuple[object, object] = (loaded.traits, loaded.settings)

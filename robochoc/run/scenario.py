@@ -230,7 +230,8 @@ class ScenarioRun:
         self.withdrawn = [name for name in self.withdrawn if name in self._full and name not in joining]
         self.team = without_robots(self._full, self.withdrawn)
         if self._order is not None:
-            stay = [name for name in self._order if name in self.team and name not in joining]
+            new = {*joining}
+            stay = dict.fromkeys(name for name in self._order if name in self.team and name not in new)
             self._order = (*stay, *(name for name in self.team.order if name not in stay))
 
     def _change(self, session: Session, joining: Collection[str]) -> Epoch:

@@ -34,7 +34,7 @@ class RunParameters(NamedTuple):
 
     seed: int = 0
     settings: Mapping[str, str] = MappingProxyType({})
-    withdrawal_cost: float | None = None
+    withdrawal_cost: int | float | None = None
 
 
 DEFAULT_PARAMETERS = RunParameters()

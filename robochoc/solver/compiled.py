@@ -14,12 +14,12 @@ from __future__ import annotations
 import itertools
 from bisect import bisect_left, bisect_right
 from collections.abc import Container, Iterable, Mapping, Sequence
-from functools import cached_property
 from typing import TYPE_CHECKING
 
 from robochoc.model.message import Value
 from robochoc.model.problem import INFINITE, ConstraintModel, ProblemKind
 from robochoc.solver.agent_problem import AgentProblem
+from robochoc.solver.encoding import Cost
 from robochoc.solver.explanation import KeyedConstraint, held_above, held_below
 from robochoc.solver.filters import Filters
 from robochoc.solver.shared_constraint import (
@@ -35,7 +35,7 @@ if TYPE_CHECKING:
     from robochoc.solver.conflict_table import ConflictTable
     from robochoc.solver.cost_table import CostTable
 
-LexicographicCost = tuple[int, float]
+LexicographicCost = tuple[int, Cost]
 """The number of constraints that a value violates, and the cost of all others. Pairs compare as tuples: a violated
 constraint weighs more than any cost, and differences are never `inf - inf`."""
 
@@ -66,11 +66,12 @@ class LocalProblem:
         self.children = tuple(sorted((child.name for child in robot.children), key=rank.__getitem__))
         self._domain = part.domain
         self.values: tuple[Value, ...] = self._domain.values
-        self.charges: tuple[float, ...] = self._domain.costs
+        self.charges: tuple[Cost, ...] = self._domain.costs
         if part.parameters.withdrawal_cost is not None:
             self.values = (*self.values, (None,) * len(robot.interface))
             self.charges = (*self.charges, part.parameters.withdrawal_cost * robot.weight)
         self.checks = 0
+        self._places: dict[Value, int] | None = None
         self._rank = rank
         self._part = part
         self._set_constraints(part, OwnValues(robot.interface, self.values))
@@ -98,6 +99,7 @@ class LocalProblem:
         self.pkc_parents = tuple(parent for parent in self.parents if parent in secretive)
         below = itertools.chain.from_iterable(self._below.values())
         self._filtering = _by_robot([*copies, *below, *parts_above])
+        self._made_filters: Filters | None = None
 
     def solution(self, index: int) -> dict[str, int]:
         """Return the values of all own variables for `values[index]`. Empty if the robot is withdrawn."""
@@ -187,11 +189,11 @@ class LocalProblem:
         """Return how many constraints `values[index]` violates. Those with unknown variables in `view` are left out."""
         return sum(not constraint.mask(others) >> index & 1 for constraint, others in self._known(view))
 
-    def cost(self, index: int, view: Mapping[str, Value]) -> float:
+    def cost(self, index: int, view: Mapping[str, Value]) -> Cost:
         """Return the cost of `values[index]` in `view`: its private cost, and constraints without unknown variables."""
         return sum([c.costs(others)[index] for c, others in self._known(view)], self.charges[index])
 
-    def costs(self, view: Mapping[str, Value]) -> list[float]:
+    def costs(self, view: Mapping[str, Value]) -> list[Cost]:
         """Return the `cost` of every own value: as many checks for each constraint as there are values."""
         known = self._paid(view)
         self.checks += len(known) * len(self.values)
@@ -199,12 +201,15 @@ class LocalProblem:
 
     def lexicographic_costs(self, view: Mapping[str, Value]) -> list[LexicographicCost]:
         """Return the lexicographic cost of every own value: comparable also where hard constraints are violated."""
-        costs = self.costs(view)
+        known = self._paid(view)
+        self.checks += len(known) * len(self.values)
+        columns = list(zip(self.charges, *known, strict=True))
+        costs = [sum(prices) for prices in columns]
         if INFINITE not in costs:
             return [(0, cost) for cost in costs]
-        return [_lexicographic_cost(prices) for prices in zip(self.charges, *self._paid(view), strict=True)]
+        return [_lexicographic_cost(prices) for prices in columns]
 
-    def scopes(self, robots: Iterable[str]) -> list[tuple[tuple[str, ...], float]]:
+    def scopes(self, robots: Iterable[str]) -> list[tuple[tuple[str, ...], Cost]]:
         """Return, for each constraint whose other robots are all in `robots`, these robots and its maximum cost.
 
         That is, short of being broken, and whatever values there are: nothing is checked. See `tables`.
@@ -212,7 +217,7 @@ class LocalProblem:
         known = {*robots}
         return [(c.agents, c.max_cost) for c in self._constraints if known.issuperset(c.agents)]
 
-    def added(self, robot: str, view: Mapping[str, Value]) -> list[float] | None:
+    def added(self, robot: str, view: Mapping[str, Value]) -> list[Cost] | None:
         """Return the additional cost of each own value when `robot`, the lowest in `view`, is known too.
 
         None: no constraint becomes complete.
@@ -231,13 +236,13 @@ class LocalProblem:
         self.checks += len(known) * len(self.values)
         return _summed(len(self.values), [constraint.costs(others) for constraint, others in known])
 
-    def lower_bounds(self, robots: Container[str]) -> list[float]:
+    def lower_bounds(self, robots: Container[str]) -> list[Cost]:
         """Return, for each own value, a lower bound on its cost in constraints whose other robots are all in `robots`.
 
         These may take any values that their files declare. The bound is 0 where robots may withdraw, and for a
         constraint with more than `MAX_BOUNDED_ROWS` combinations of values.
         """
-        least: list[list[float]] = []
+        least: list[list[Cost]] = []
         for constraint in self._constraints:
             if (
                 self._part.parameters.withdrawal_cost is None
@@ -329,7 +334,7 @@ class LocalProblem:
         self.checks += len(known)
         return known
 
-    def _paid(self, view: Mapping[str, Value]) -> list[list[float]]:
+    def _paid(self, view: Mapping[str, Value]) -> list[list[Cost]]:
         """Return what each own value pays for each constraint whose other variables are all known. Counts nothing."""
         return [prices for c in self._constraints if (prices := c.costs_in(view)) is not None]
 
@@ -351,13 +356,17 @@ class LocalProblem:
                     return constraint
         return None
 
-    @cached_property
+    @property
     def _place_of(self) -> dict[Value, int]:
-        return {value: index for index, value in enumerate(self.values)}
+        if self._places is None:
+            self._places = {value: index for index, value in enumerate(self.values)}
+        return self._places
 
-    @cached_property
+    @property
     def _filters(self) -> Filters:
-        return Filters(self._part, self.values, self._filtering)
+        if self._made_filters is None:
+            self._made_filters = Filters(self._part, self.values, self._filtering)
+        return self._made_filters
 
     def _looked_up(self) -> ConflictTable:
         from robochoc.solver.conflict_table import ConflictTable  # noqa: PLC0415 - numpy is for large domains only
@@ -365,12 +374,12 @@ class LocalProblem:
         return ConflictTable(self._constraints, len(self.values))
 
 
-def _summed(size: int, rows: Sequence[Sequence[float]]) -> list[float]:
+def _summed(size: int, rows: Sequence[Sequence[Cost]]) -> list[Cost]:
     """Return the sum of `rows`, each of `size` values."""
     return [sum(prices) for prices in zip(*rows, strict=True)] if rows else [0] * size
 
 
-def _lexicographic_cost(prices: Sequence[float]) -> LexicographicCost:
+def _lexicographic_cost(prices: Sequence[Cost]) -> LexicographicCost:
     """Return the total of `prices`."""
     return prices.count(INFINITE), sum([price for price in prices if price < INFINITE])
 

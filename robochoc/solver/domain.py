@@ -14,7 +14,16 @@ from dataclasses import dataclass
 
 from robochoc.model.message import Value
 from robochoc.model.problem import Constraint, Robot
-from robochoc.solver.encoding import Codes, Component, Network, UnsupportedError, components, cost_function, is_soft
+from robochoc.solver.encoding import (
+    Codes,
+    Component,
+    Cost,
+    Network,
+    UnsupportedError,
+    components,
+    cost_function,
+    is_soft,
+)
 
 MAX_SOLUTIONS = 100_000
 """The default maximum of local solutions of a robot."""
@@ -47,7 +56,7 @@ class CompiledDomain:
     values: tuple[tuple[int, ...], ...]
     solutions: tuple[tuple[int, ...], ...]
     counts: tuple[int, ...]
-    costs: tuple[float, ...]
+    costs: tuple[Cost, ...]
 
     @property
     def total(self) -> int:
@@ -68,10 +77,10 @@ class _Group:
     """Local solutions that look alike: the first of the cheapest, what it costs, and how many there are."""
 
     solution: tuple[int, ...]
-    cost: float
+    cost: Cost
     count: int
 
-    def add(self, solution: tuple[int, ...], cost: float) -> None:
+    def add(self, solution: tuple[int, ...], cost: Cost) -> None:
         self.count += 1
         self.cost, self.solution = min((self.cost, self.solution), (cost, solution))
 

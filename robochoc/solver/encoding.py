@@ -14,12 +14,16 @@ import weakref
 from collections import defaultdict
 from collections.abc import Callable, Hashable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from operator import itemgetter
 
 from robochoc.model.expression import UndefinedValueError
 from robochoc.model.expression.bounds import ANY_INTEGER, bounds
 from robochoc.model.expression.closures import Closure, compile_expression
 from robochoc.model.problem import INFINITE, Constraint, Function, Predicate, Relation, Semantics, Variable
 from robochoc.solver.splitting import MAX_TRIED, split
+
+Cost = int | float
+"""An integer stays one: what is declared as a `float`, mypyc makes one of, and 3.0 takes nine bytes on the wire."""
 
 MAX_TUPLES = 4_000_000
 """The maximum number of tuples of values that a constraint is tried on."""
@@ -124,7 +128,7 @@ def allows_function(constraint: Constraint, names: Sequence[str]) -> Callable[[S
     return _truth_on(constraint, definition, names)
 
 
-def cost_function(constraint: Constraint, names: Sequence[str]) -> Callable[[Sequence[int]], float]:
+def cost_function(constraint: Constraint, names: Sequence[str]) -> Callable[[Sequence[int]], Cost]:
     """Return the cost of `constraint` as a function of the values of `names`.
 
     The function returns 0 where the constraint holds, and `INFINITE` where a hard one is violated.
@@ -137,14 +141,15 @@ def cost_function(constraint: Constraint, names: Sequence[str]) -> Callable[[Seq
     if isinstance(definition, Function):
         return _cost_on(constraint, definition, names)
     arguments = _arguments(constraint, names)
-    return lambda values: definition.cost(arguments(values))
+    listed, other = definition.prices
+    return lambda values: listed.get(arguments(values), other)
 
 
-def max_cost(constraint: Constraint) -> float:
+def max_cost(constraint: Constraint) -> Cost:
     """Return the most that `constraint` charges short of being broken; of a function, what its expression says."""
     match constraint.definition:
         case Relation() as relation:
-            prices: tuple[float, ...] = (*relation.costs, relation.default_cost)
+            prices: tuple[Cost, ...] = (*relation.costs, relation.default_cost)
         case Predicate():
             prices = (constraint.cost,)
         case Function() as function:
@@ -177,12 +182,12 @@ def _truth_on(constraint: Constraint, predicate: Predicate, names: Sequence[str]
     return holds
 
 
-def _cost_on(constraint: Constraint, function: Function, names: Sequence[str]) -> Callable[[Sequence[int]], float]:
+def _cost_on(constraint: Constraint, function: Function, names: Sequence[str]) -> Callable[[Sequence[int]], Cost]:
     """Return the cost of values of `names`; where the function is undefined, it is `INFINITE`."""
     arguments = _arguments(constraint, names)
     body = _body(function)
 
-    def cost(values: Sequence[int]) -> float:
+    def cost(values: Sequence[int]) -> Cost:
         try:
             return body(arguments(values))
         except UndefinedValueError:
@@ -204,11 +209,14 @@ def _body(definition: Predicate | Function) -> Closure:
     return _bodies[key][1]
 
 
-def _arguments(constraint: Constraint, names: Sequence[str]) -> Callable[[Sequence[int]], list[int]]:
+def _arguments(constraint: Constraint, names: Sequence[str]) -> Callable[[Sequence[int]], tuple[int, ...]]:
     """Return what the definition of `constraint` receives, of values of the variables `names`."""
     place = {name: index for index, name in enumerate(names)}
     terms = [(place[term], 0) if isinstance(term, str) else (None, term) for term in constraint.parameters]
-    return lambda values: [constant if index is None else values[index] for index, constant in terms]
+    places = [index for index, _ in terms if index is not None]
+    if len(places) == len(terms) > 1:
+        return itemgetter(*places)
+    return lambda values: tuple([constant if index is None else values[index] for index, constant in terms])
 
 
 def _forbids_something(constraint: Constraint) -> bool:

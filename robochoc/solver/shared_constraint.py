@@ -9,7 +9,7 @@ from collections.abc import Container, Iterable, Iterator, Mapping, Sequence
 from robochoc.model.message import Value
 from robochoc.model.problem import Constraint
 from robochoc.solver.agent_problem import TeamKnowledge
-from robochoc.solver.encoding import MAX_TUPLES, UnsupportedError, allows_function, cost_function, max_cost
+from robochoc.solver.encoding import MAX_TUPLES, Cost, UnsupportedError, allows_function, cost_function, max_cost
 
 Conflict = Mapping[str, Value]
 """Assignments of other robots that rule out an own value: the left side of a nogood."""
@@ -79,8 +79,8 @@ class SharedConstraint:
         self._looks: dict[int, int] = {}
         """Where it sees one variable of others: `mask`, by its value."""
         self._masks: dict[OtherValues, int] = {}
-        self._costs: dict[OtherValues, list[float]] = {}
-        self._costs_by: dict[int, list[float]] = {}
+        self._costs: dict[OtherValues, list[Cost]] = {}
+        self._costs_by: dict[int, list[Cost]] = {}
         """Where it sees one variable of others: `costs`, by its value."""
         self._conflicts: dict[OtherValues, Conflict] = {}
 
@@ -109,19 +109,19 @@ class SharedConstraint:
         return None in values or self._test(values)  # type: ignore[arg-type]
 
     @property
-    def max_cost(self) -> float:
+    def max_cost(self) -> Cost:
         """The most that it charges short of being broken."""
         return max_cost(self._constraint)
 
-    def costs(self, others: OtherValues) -> list[float]:
+    def costs(self, others: OtherValues) -> list[Cost]:
         """Return what each own value pays when the others are as `others` says."""
         prices = self._costs.get(others)
         if prices is None:
-            paid = [0 if None in own else self._price((*others, *own)) for own in self._distinct]  # type: ignore[arg-type]
+            paid: list[Cost] = [0 if None in own else self._price((*others, *own)) for own in self._distinct]  # type: ignore[arg-type]
             prices = self._costs[others] = [paid[code] for code in self.codes]
         return prices
 
-    def costs_in(self, view: Mapping[str, Value]) -> list[float] | None:
+    def costs_in(self, view: Mapping[str, Value]) -> list[Cost] | None:
         """Return what each own value pays in `view`; None: a value is unknown, or a robot is withdrawn."""
         if self._only is None:
             others = self.other_values(view)
@@ -136,12 +136,12 @@ class SharedConstraint:
             prices = self._costs_by[part] = self.costs((part,))
         return prices
 
-    def lower_bounds(self, domains: Mapping[str, Iterable[int]], wide: int) -> tuple[int, list[float]]:
+    def lower_bounds(self, domains: Mapping[str, Iterable[int]], wide: int) -> tuple[int, list[Cost]]:
         """Return the number of checks, and a lower bound on the cost of each own value over the others' `domains`.
 
         With more than `wide` combinations the bound is 0 without a look.
         """
-        least: list[float] = [0] * len(self.codes)
+        least: list[Cost] = [0] * len(self.codes)
         columns = [list(domains[name]) for name in self._names]
         if math.prod(map(len, columns)) * len(least) > wide:
             return 0, least

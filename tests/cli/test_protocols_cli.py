@@ -27,7 +27,7 @@ from tests.support.program import robochoc_within
 WITHOUT_DOCSTRING = """
     from robochoc.protocols.first_fit import FirstFit
     from robochoc.protocols.first_fit_messages import Placed
-    from robochoc.protocols.protocol import DynamicProtocol
+    from robochoc.protocols.dynamic import DynamicProtocol
     from robochoc.protocols.traits import Traits
 
     class Other(FirstFit, DynamicProtocol):
@@ -226,3 +226,10 @@ def test_the_list_is_wrapped_to_the_terminal(
     assert all(len(line) <= columns for line in table)
     assert (len(table) == 1 + len(rows())) is (columns == 200)
     assert last.startswith("next: robochoc protocols NAME")
+
+
+def test_how_a_protocol_is_chosen_is_explained() -> None:
+    head, *rules = robochoc_within("protocols", "auto").stdout.splitlines()
+    assert head.startswith("auto: ")
+    assert {rule.split(":")[0].strip() for rule in rules} <= {*protocol_names()}
+    assert rules[-1].startswith("  sfb: ")

@@ -140,6 +140,7 @@ def test_of_two_orders_the_one_with_the_larger_counters_holds(older: Counters, n
     abt = agent(clique(), "RB")
     replies(abt, ("RA", order("BACDE", *older)), ("RC", order("CBADE", *newer)), ("RA", order("BACDE", *older)))
     assert abt.order.names == names("CBADE")
+    assert isinstance(abt.order, CurrentOrder)
     assert abt.order.counters == newer
 
 

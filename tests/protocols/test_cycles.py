@@ -76,7 +76,7 @@ def test_the_trail_has_an_entry_for_each_change() -> None:
 
 def test_after_so_many_cycles_a_robot_is_silent() -> None:
     robot = robot_of(DSA, chain(names="AB"), "RB")
-    robot.settings = settings_of(DSA, {"cycles": "2"})  # type: ignore[assignment]
+    robot.settings = settings_of(DSA, {"cycles": "2"})  # type: ignore[assignment, misc]
     started(robot)
     assert replies(robot, ("RA", Value((1,))))
     assert replies(robot, ("RA", Value((2,)))) == []

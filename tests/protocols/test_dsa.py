@@ -42,7 +42,7 @@ def colours(values: int = 3) -> Team:
 def middle(*chances: float, variant: str = "A", values: int = 3) -> DSA:
     """B, which begins with the value 1."""
     robot = robot_of(DSA, colours(values), "RB", 0.0, *chances)
-    robot.settings = DSASettings(variant=variant)  # type: ignore[arg-type]
+    robot.settings = DSASettings(variant=variant)  # type: ignore[arg-type, misc]
     started(robot)
     return robot
 

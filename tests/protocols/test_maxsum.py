@@ -52,7 +52,7 @@ def chain(first: Relation = COSTS, second: Relation = COSTS) -> Team:
 def middle(team: Team, **settings: float) -> MaxSum:
     """B, without preferences, once it has told its domain."""
     robot = robot_of(MaxSum, team, "RB")
-    robot.settings = MaxSumSettings(preference=0, **{"damping": 0.0, **settings})  # type: ignore[arg-type]
+    robot.settings = MaxSumSettings(preference=0, **{"damping": 0.0, **settings})  # type: ignore[arg-type, misc]
     assert started(robot) == [("RC", TWO)]
     return robot
 
@@ -119,7 +119,7 @@ def test_damping_keeps_a_share_of_the_last_q() -> None:
 
 def test_preferences_are_drawn_by_lot() -> None:
     robot = robot_of(MaxSum, chain(), "RA", 0.75, 0.5)
-    robot.settings = MaxSumSettings(preference=0.5)
+    robot.settings = MaxSumSettings(preference=0.5)  # type: ignore[misc]
     started(robot)
     assert robot.preferred == [0.375, 0.25]
     assert value(robot) == (2,)

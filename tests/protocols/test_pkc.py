@@ -24,6 +24,7 @@ from robochoc.solver.compiled import LocalProblem
 from robochoc.solver.encoding import UnsupportedError
 from tests.support.agents import replies
 from tests.support.brute_force import solutions
+from tests.support.compiled import plain_python_only
 from tests.support.complex_problems import complex_team, random_complex_team
 from tests.support.examples import count
 from tests.support.limits import HANG_S
@@ -207,6 +208,7 @@ def asked_only(team: Team, seed: int, chance: Random) -> tuple[bool, bool]:
     return elsewhere != team, run(there, ABT, seed).envelopes != before.envelopes
 
 
+@plain_python_only
 @count("teams", 25, 100)
 def test_what_abt_says_depends_on_the_pairs_asked_about_and_on_nothing_else_of_a_part(teams: int) -> None:
     chance = Random("asked")
@@ -214,6 +216,7 @@ def test_what_abt_says_depends_on_the_pairs_asked_about_and_on_nothing_else_of_a
     assert seen[True, True] > teams // 2, seen
 
 
+@plain_python_only
 def test_what_abt_says_of_queens_depends_on_the_pairs_asked_about(private_queens: Team) -> None:
     assert asked_only(private_queens, 1, Random(1)) == (True, True)
 

@@ -29,7 +29,7 @@ def agents(problem: Team, settings: SFBSettings | None = None) -> dict[str, SFB]
     order = PriorityOrder(problem.order)
     found = {name: SFB(LocalProblem(part), order) for name, part in agent_problems(problem, shared_scopes=True).items()}
     for robot in found.values():
-        robot.settings = settings or robot.settings
+        setattr(robot, "settings", settings or robot.settings)  # noqa: B010 - for mypy the class has them
     return found
 
 

@@ -8,6 +8,7 @@ import click
 
 from robochoc.cli.options.names import ProtocolName
 from robochoc.cli.reports.failures import USAGE, Failure
+from robochoc.run.defaults import AUTO
 
 
 @click.command()
@@ -15,7 +16,7 @@ from robochoc.cli.reports.failures import USAGE, Failure
 @click.option("--long", is_flag=True, help="List more traits: constraints, privacy, paper.")
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON object per protocol.")
 def protocols(name: str | None, *, as_json: bool, long: bool) -> None:
-    """List the installed protocols, or explain the protocol NAME.
+    """List the installed protocols, or explain the protocol NAME; auto: how one is chosen.
 
     \b
     for           satisfaction: any solution; optimisation: minimum cost
@@ -30,6 +31,11 @@ def protocols(name: str | None, *, as_json: bool, long: bool) -> None:
     from robochoc.formats import on_one_line
 
     found = rows()
+    if name == AUTO:
+        from robochoc.cli.reports.choice import rules_text
+
+        click.echo(rules_text())
+        return
     if name is None:
         click.echo(protocols_json(found), nl=False) if as_json else print_protocols(found, long=long)
         return

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 from robochoc.cli.reports.progress import print_above
 from robochoc.formats import on_one_line
-from robochoc.run.choice import Choice, faster_order
+from robochoc.run.choice import RULES, Choice, faster_order
 
 if TYPE_CHECKING:
     from robochoc.communication.run_result import Progress
@@ -24,6 +24,12 @@ def choice_lines(choice: Choice) -> Iterator[str]:
         yield f"  the team: {'; '.join(choice.facts)}"
     for name, why in choice.rejected:
         yield on_one_line(f"  not {name}: {why}")
+
+
+def rules_text() -> str:
+    """Return how a protocol is chosen."""
+    head = "auto: no protocol of its own. Of these, the first that suits the team and accepts all options is taken"
+    return "\n".join([head, *(f"  {rule.protocol}: {rule.why}" for rule in RULES)])
 
 
 class OrderNote:

@@ -18,6 +18,7 @@ from robochoc.protocols.traits import Traits
 from robochoc.run.options import CENTRAL
 from robochoc.run.registry import InstalledProtocol, installed_protocols
 from robochoc.solver import central
+from robochoc.system.compiled_core import docstring
 
 _KEYS = {"shared_scopes": "everywhere", "writes_to_non_neighbours": "beyond"}
 """Traits whose keys in `--json` keep their first names."""
@@ -144,7 +145,7 @@ def _object(row: Row, *, explain: bool) -> dict[str, object]:
 def _docstring(row: Row) -> str:
     """Return the docstring of its module; empty if there is none."""
     module = sys.modules.get(row.module)
-    return inspect.cleandoc(module.__doc__ or "") if module else ""
+    return inspect.cleandoc(docstring(module)) if module else ""
 
 
 def _cells(row: Row, headings: Sequence[str]) -> list[str]:

@@ -13,7 +13,7 @@ from typing import NamedTuple, TypeVar, cast
 import numpy as np
 
 from robochoc.communication.arrays.chance import Draws
-from robochoc.communication.arrays.kinds import Flags, Floats, Integers
+from robochoc.communication.arrays.kinds import FEW, Flags, Floats, Integers
 from robochoc.communication.arrays.layout import Group, Layout
 from robochoc.communication.arrays.tally import Tally
 from robochoc.model.outcome import Metrics, Verdict
@@ -22,8 +22,6 @@ from robochoc.protocols.cycles_messages import Value
 from robochoc.protocols.cycles_settings import CycleSettings
 
 Costs = TypeVar("Costs", Integers, Floats)
-FEW = 8
-"""Up to so many values a loop over them is faster than numpy's along the short axis."""
 
 
 class Change(NamedTuple):

@@ -193,6 +193,11 @@ class Layout:
         return found
 
     @cached_property
+    def back(self) -> Integers:
+        """For each link, the place of the link in the other direction."""
+        return self.link(self.neighbours, segments(self.degrees)).astype(self.index)
+
+    @cached_property
     def _links_sorted(self) -> tuple[Integers, Integers]:
         keys = segments(self.degrees) * self.many + self.neighbours
         order = np.argsort(keys, kind="stable")

@@ -87,7 +87,7 @@ class ArrayMGM2(ArrayGainers):
         chosen = (self.draws.draw(makers) * layout.degrees[makers]).astype(np.int64)
         links = layout.starts[makers] + chosen
         receivers = layout.neighbours[links].astype(np.int64)
-        return _Offers(makers, receivers, links, layout.link(receivers, makers))
+        return _Offers(makers, receivers, links, layout.back[links].astype(np.int64))
 
     def _gains(self, offers: _Offers, found: list[Integers]) -> list[_Joint]:
         """Compute what offers say, and what their receivers make of them (`MGM2._gains`, `MGM2._joint`)."""

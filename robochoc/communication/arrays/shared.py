@@ -14,9 +14,12 @@ from robochoc.communication.arrays.layout import Block, Group, Layout
 
 @dataclass(frozen=True)
 class _Position:
-    """The constraints of a block, sorted by the link from their owner to the robot at one position."""
+    """The constraints of a block, sorted by the link from their owner to the robot at one position.
 
-    links: Integers
+    Those of link n are from `starts[n]` to `starts[n + 1]`.
+    """
+
+    starts: Integers
     constraints: Integers
     stride: int
 
@@ -36,7 +39,8 @@ class _Constraints:
         for place, stride in enumerate(self._strides.tolist()):
             links = layout.link(owners, self._others[:, place])
             order = np.argsort(links, kind="stable")
-            self.positions.append(_Position(links[order], order, stride))
+            starts = np.searchsorted(links[order], np.arange(len(layout.neighbours) + 1))
+            self.positions.append(_Position(starts.astype(layout.index), order, stride))
 
     def rows(self, values: Integers, constraints: Integers) -> Integers:
         """Return the number of the row of costs of each of `constraints`, where robots have these `values`."""
@@ -100,4 +104,4 @@ class Shared:
 
 
 def _span(position: _Position, links: Integers) -> tuple[Integers, Integers]:
-    return np.searchsorted(position.links, links), np.searchsorted(position.links, links, side="right")
+    return position.starts[links].astype(np.int64), position.starts[links + 1].astype(np.int64)

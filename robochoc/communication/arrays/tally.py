@@ -8,6 +8,8 @@ from robochoc.communication.arrays.kinds import Integers
 
 _SHORT_LIST, _LONG_LIST = 16, 65_536
 """Lists of so many entries have longer heads in msgpack."""
+_LEAST_BYTE, _LARGEST_BYTE = -32, 127
+"""Integers from the one to the other have one byte."""
 _SIZES = ((-(2**31), 9), (-(2**15), 5), (-(2**7), 3), (-(2**5), 2), (128, 1), (256, 2), (65_536, 3), (2**32, 5))
 
 
@@ -31,6 +33,8 @@ class Tally:
 
 def integer_bytes(numbers: Integers) -> Integers:
     """Return how many bytes each of `numbers` has in msgpack."""
+    if not numbers.size or (numbers.min() >= _LEAST_BYTE and numbers.max() <= _LARGEST_BYTE):
+        return np.ones(numbers.shape, np.int64)
     bounds = np.array([bound for bound, _ in _SIZES])
     sizes = np.array([*(size for _, size in _SIZES), 9])
     found: Integers = sizes[np.searchsorted(bounds, numbers, side="right")]

@@ -14,8 +14,10 @@ from collections.abc import Sequence
 from itertools import count
 
 from robochoc.model.message import Envelope
+from robochoc.system.compiling import mypyc_attr
 
 
+@mypyc_attr(allow_interpreted_subclasses=True)
 class Schedule(ABC):
     """The messages under way. `now` is the time, in the schedule's own unit."""
 
@@ -59,6 +61,7 @@ class Schedule(ABC):
         return 0
 
 
+@mypyc_attr(allow_interpreted_subclasses=True)
 class Concurrent(Schedule):
     """All robots compute at the same time, and time is counted in constraint checks. The default.
 
@@ -132,6 +135,7 @@ class Concurrent(Schedule):
             heapq.heappush(self._agenda, (due, self._chance.random(), robot))
 
 
+@mypyc_attr(allow_interpreted_subclasses=True)
 class Cycles(Schedule):
     """All robots go in step: in each cycle, each takes in all that was sent to it in the cycle before.
 
@@ -175,6 +179,7 @@ class Cycles(Schedule):
         self.now = 0
 
 
+@mypyc_attr(allow_interpreted_subclasses=True)
 class RandomChannels(Schedule):
     """Any channel may come next, so any message may be slow for any time: a hard test, not a model. A packet a step.
 

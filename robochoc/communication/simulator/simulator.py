@@ -10,7 +10,7 @@ import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
-from robochoc.communication.host import Host
+from robochoc.communication.host import Host, order_of
 from robochoc.communication.resources import garbage_frozen
 from robochoc.communication.run_result import Progress, RunResult
 from robochoc.communication.session import Epoch, Session, over
@@ -19,10 +19,12 @@ from robochoc.journal.events import Observer
 from robochoc.model.message import Envelope
 from robochoc.model.outcome import Metrics, Verdict
 from robochoc.model.problem import Team
+from robochoc.protocols.order import PriorityOrder
 from robochoc.protocols.protocol import Protocol
 from robochoc.solver.agent_problem import DEFAULT_PARAMETERS, AgentProblem, RunParameters
 from robochoc.solver.compiled_team import CompiledTeam
 from robochoc.solver.team_compiler import OutOfTimeError
+from robochoc.system.compiling import answer_signals, mypyc_attr
 from robochoc.system.garbage import collection_paused
 
 PROGRESS_EVERY = 256
@@ -45,6 +47,7 @@ class EffortLimits:
 NO_LIMITS = EffortLimits()
 
 
+@mypyc_attr(allow_interpreted_subclasses=True)
 class Simulation(Session):
     """One team in this thread.
 
@@ -85,6 +88,7 @@ class Simulation(Session):
         self._checks = self._ncccs = self._sent = 0
         self._verdict: Verdict | None = None
         self._witness: str | None = None
+        self._order: PriorityOrder | None = None
         with collection_paused():
             parts = Epoch(self.compiled, parameters=parameters).parts(protocol)
             self._hosts = {name: self._host(part) for name, part in parts.items()}
@@ -125,7 +129,7 @@ class Simulation(Session):
             if name in before and name not in epoch.restarted:
                 self._check_time(name)
                 self._hosts[name] = before[name]
-                before[name].change(part, epoch.invalidated)
+                before[name].change(part, epoch.invalidated, self._order_of(part))
                 self._note_verdict(before[name])
             else:
                 self._hosts[name] = self._host(part)
@@ -140,10 +144,16 @@ class Simulation(Session):
 
     def _host(self, part: AgentProblem) -> Host:
         self._check_time(part.robot.name)
-        host = Host.of(self._protocol, part)
+        host = Host.of(self._protocol, part, self._order_of(part))
         if self._observer:
             host.observe(self._observer, lambda: self._time(host.checks), self._time)
         return host
+
+    def _order_of(self, part: AgentProblem) -> PriorityOrder:
+        """Return the order of an epoch's robots: one object for all of them, as its tree is as large as the team."""
+        if self._order is None or self._order.rank is not part.known.rank:
+            self._order = order_of(part)
+        return self._order
 
     def _play(self, began: float, timeout: float | None, messages: int | None) -> None:
         """Every robot starts before any message arrives; then packet by packet."""
@@ -153,6 +163,7 @@ class Simulation(Session):
             self._send(host, host.start(lossless=lossless))
         packets = 0
         while self._verdict is None:
+            answer_signals()
             elapsed_s = time.monotonic() - began
             if timeout is not None and elapsed_s > timeout:
                 return

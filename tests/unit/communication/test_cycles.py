@@ -22,7 +22,7 @@ from tests.support import golden
 from tests.support.cost_problems import random_cost_team
 from tests.support.examples import examples
 
-IN_STEP = Options(runtime=Runtime.SIMULATOR, schedule=ScheduleName.CYCLES)
+IN_STEP = Options(protocol="abt", runtime=Runtime.SIMULATOR, schedule=ScheduleName.CYCLES)
 
 
 @given(

@@ -9,16 +9,20 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from robochoc.communication.simulator.schedule import Concurrent, Cycles, RandomChannels, Schedule
+from robochoc.communication.simulator.simulator import Simulation
 from robochoc.generators.queens3d import queens3d
 from robochoc.generators.random_csp import random_csp
 from robochoc.journal.journal import Header, JournalRecorder, lines_of, metrics_of, read_journal
 from robochoc.model.message import Envelope
 from robochoc.model.outcome import Verdict
 from robochoc.model.problem import Constraint, Relation, Semantics, Team
+from robochoc.protocols.dsa import DSA
 from robochoc.run import Options, Runtime, ScheduleName, Withdrawal, solve
+from robochoc.solver.agent_problem import RunParameters
 from tests.support import golden
 from tests.support.examples import examples
 from tests.support.problems import team_of, teams
+from tests.support.steps import steps_of
 
 
 @pytest.mark.parametrize(
@@ -119,6 +123,18 @@ def test_one_by_one_a_packet_is_the_first_message_of_the_inbox() -> None:
         while packet := taken(schedule):
             read.append([envelope.content.decode() for envelope in packet])
         assert read == packets
+
+
+def test_a_cycle_takes_no_longer_than_those_before() -> None:
+    """A robot has one turn in the agenda, and not one for each message that came while it was busy."""
+    team = random_csp(12, 3, 0.5, 0.3, 1, connected=True)
+
+    def taken_by(cycles: int) -> int:
+        parameters = RunParameters(settings={"cycles": str(cycles)})
+        return steps_of(Simulation(team, DSA, Concurrent(0), parameters=parameters).search)
+
+    ten, thirty, fifty = (taken_by(cycles) for cycles in (10, 30, 50))
+    assert fifty - thirty < 1.1 * (thirty - ten)
 
 
 def test_one_by_one_abt_needs_more() -> None:

@@ -24,6 +24,7 @@ from robochoc.replay.safe_repr import MAX_LENGTH, safe_repr
 from robochoc.replay.value_text import ValueText
 from robochoc.run import Options, Runtime
 from robochoc.run.registry import protocol_named, protocol_names
+from tests.support.compiled import plain_python_only
 from tests.support.problems import random_team, team_of
 from tests.support.replays import in_text, random_run, recorded, with_events
 
@@ -262,6 +263,7 @@ class Broken(ABT):
         self.problem.values = None  # type: ignore[assignment]
 
 
+@plain_python_only
 def test_a_robot_that_breaks_what_is_looked_at_has_a_state_nevertheless() -> None:
     then = states(pair(), "RB", options=ReplayOptions(protocols={"ABT": Broken}))[-1]
     assert (then.value, then.domain) == ({"B": 2}, [])

@@ -84,7 +84,7 @@ def drawn(kind: str, number: int) -> tuple[Team, Options]:
     chance = Random(f"choice {kind} {number}")
     team = KINDS[kind](chance)
     options = replace(
-        random_schedule(chance),
+        chance.choice((random_schedule(chance), random_schedule(chance), Options(runtime=Runtime.ARRAYS))),
         order=chance.choice((None, None, Order.GIVEN, any_order(team, chance))),
         withdraw=chance.choice((None, None, *Withdrawal)),
         settings=chance.choice(SETTINGS),

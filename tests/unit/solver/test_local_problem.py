@@ -122,6 +122,33 @@ def test_the_first_conflict_is_the_one_that_is_explained(batch: int, monkeypatch
             _compare(part, chance)
 
 
+@pytest.mark.parametrize("few", [1, 1000], ids=["table", "masks"])
+def test_conflicts_of_several_values_are_those_of_each_with_as_many_checks(
+    few: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Also where robots are unknown or withdrawn, and from any place in the order on."""
+    monkeypatch.setattr(compiled, "MIN_TABLE_VALUES", few)
+    chance = Random("conflicts of several")
+    seen = Counter[int]()
+    for _ in range(30):
+        team = random_complex_team(chance)
+        for part in agent_problems(_any_domains(team, chance), shared_scopes=True).values():
+            problem, again = LocalProblem(part), LocalProblem(part)
+            view: dict[str, Value] = {
+                name: tuple([chance.choice([None, *part.known.domains[one]]) for one in names])
+                for name, names in part.interfaces.items()
+                if chance.random() < 0.8
+            }
+            indices = [index for index in range(len(problem.values)) if chance.random() < 0.7]
+            for since in (-1, *range(len(part.order))):
+                told = {i: conflict for conflict, some in problem.conflicts_of(indices, view, since) for i in some}
+                each = {index: again.conflict(index, view, since) for index in indices}
+                assert told == {index: conflict for index, conflict in each.items() if conflict is not None}
+                assert problem.checks == again.checks
+                seen[len(told)] += 1
+    assert len(seen) > 2
+
+
 @pytest.mark.parametrize("batch", range(2))
 def test_what_a_robot_adds_is_the_difference_that_it_makes(batch: int) -> None:
     """Robots become known from the highest one on; constraints that wait for none are in the costs from the start."""

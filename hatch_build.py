@@ -1,0 +1,89 @@
+"""Puts compiled modules into the wheel, where there is a C compiler: docs/explanation/design.md, "Compiled core".
+
+`pyproject.toml` lists the modules. Their sources are in the wheel as well. Without a compiler, or where mypyc fails,
+the wheel has the sources alone. An editable install has always these alone, and needs no time for it.
+
+ROBOCHOC_COMPILE=1: a build that cannot compile fails. ROBOCHOC_COMPILE=0: nothing is compiled.
+"""
+
+from __future__ import annotations
+
+import os
+import shlex
+import shutil
+import subprocess
+import sys
+import sysconfig
+import tempfile
+from pathlib import Path
+from typing import Any
+
+from hatchling.builders.hooks.plugin.interface import BuildHookInterface
+
+NEEDED = ["msgspec>=0.18", "mypy[mypyc]>=1.13"]
+"""mypyc sees the types of what is imported: without msgspec it would know nothing of messages."""
+MYPY = ["--config-file=", "--follow-imports=silent", "--ignore-missing-imports"]
+
+
+class CompiledCore(BuildHookInterface):  # type: ignore[type-arg]
+    """hatchling asks it for what it needs, and lets it work before the wheel is packed."""
+
+    def dependencies(self) -> list[str]:
+        """Return what a build needs besides hatchling: nothing where nothing can be compiled."""
+        return NEEDED if may_compile() else []
+
+    def initialize(self, version: str, build_data: dict[str, Any]) -> None:
+        """Compile, and add what has been made to the wheel. Raises `RuntimeError` where it must not fail, and does."""
+        if version == "editable" or not may_compile():
+            return
+        self._folder = Path(tempfile.mkdtemp(prefix="robochoc-compiled-"))
+        failure = _compiled(Path(self.root), self._folder, self.config["modules"])
+        if failure:
+            if _asked():
+                raise RuntimeError(f"mypyc or the C compiler has failed:\n{failure}")
+            return
+        made = [*self._folder.glob("*.so"), *self._folder.glob("robochoc/**/*.so")]
+        build_data["force_include"].update({str(path): str(path.relative_to(self._folder)) for path in made})
+        build_data.update(pure_python=False, infer_tag=True)
+
+    def finalize(self, version: str, build_data: dict[str, Any], artifact_path: str) -> None:  # noqa: ARG002 - hatchling's
+        """Remove what has been packed."""
+        shutil.rmtree(getattr(self, "_folder", ""), ignore_errors=True)
+
+
+def _asked() -> bool:
+    return os.environ.get("ROBOCHOC_COMPILE") == "1"
+
+
+def may_compile() -> bool:
+    """Return whether to compile: it is asked for, or there is a compiler with Python's headers."""
+    if os.environ.get("ROBOCHOC_COMPILE") in {"0", "1"}:
+        return _asked()
+    compiler = shlex.split(os.environ.get("CC") or sysconfig.get_config_var("CC") or "cc")[0]
+    headers = Path(sysconfig.get_path("include"), "Python.h")
+    return shutil.which(compiler) is not None and headers.exists()
+
+
+def _compiled(root: Path, folder: Path, modules: list[str]) -> str:
+    """Compile the modules in a copy of the package; return what went wrong, or nothing."""
+    shutil.copytree(root / "robochoc", folder / "robochoc", ignore=shutil.ignore_patterns("__pycache__", "*.so"))
+    words = [sys.executable, __file__, *modules]
+    done = subprocess.run(words, cwd=folder, capture_output=True, text=True, check=False)  # noqa: S603 - ourselves
+    return "" if done.returncode == 0 else done.stdout + done.stderr
+
+
+def _compile_here(modules: list[str]) -> None:
+    """Compile the modules in this folder, each beside its source. Whatever goes wrong ends the process."""
+    from mypyc.build import mypycify  # noqa: PLC0415 - where nothing is compiled it need not be there
+    from setuptools import Distribution  # noqa: PLC0415 - the same
+
+    files = [f"{module.replace('.', '/')}.py" for module in modules]
+    extensions = mypycify([*MYPY, *files], group_name="robochoc", debug_level="0")
+    command = Distribution({"ext_modules": extensions}).get_command_obj("build_ext")
+    command.inplace = True  # type: ignore[attr-defined]
+    command.ensure_finalized()
+    command.run()
+
+
+if __name__ == "__main__":
+    _compile_here(sys.argv[1:])

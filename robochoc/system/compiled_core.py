@@ -1,0 +1,71 @@
+"""Which core runs: modules that mypyc has compiled, or the same modules in plain Python.
+
+A wheel that was built where there was a C compiler has both (`hatch_build.py`). The compiled ones are taken, unless
+`ROBOCHOC_PURE` is set to something but 0. Child processes inherit it.
+"""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Mapping, Sequence
+from importlib.machinery import EXTENSION_SUFFIXES, ModuleSpec, PathFinder, SourceFileLoader
+from importlib.util import find_spec, spec_from_file_location
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+_ONE_OF_THEM = "robochoc.protocols.protocol"
+
+
+class PurePython:
+    """A finder of modules that takes robochoc's modules from their sources, where there are compiled ones as well."""
+
+    @staticmethod
+    def find_spec(name: str, path: Sequence[str] | None = None, target: ModuleType | None = None) -> ModuleSpec | None:
+        """Return where the source of the module is; None: the usual finders are asked."""
+        if not name.startswith("robochoc."):
+            return None
+        found = PathFinder.find_spec(name, path, target)
+        if found is None or not is_compiled(found):
+            return None
+        source = _source(found.origin or "")
+        return spec_from_file_location(name, source, loader=SourceFileLoader(name, str(source)))
+
+
+def prefer_sources() -> None:
+    """Let this process take all modules of robochoc that it has not imported yet from their sources."""
+    sys.meta_path.insert(0, PurePython)
+
+
+def is_compiled(found: ModuleSpec) -> bool:
+    """Return whether a module is one that mypyc has compiled."""
+    return (found.origin or "").endswith(tuple(EXTENSION_SUFFIXES))
+
+
+def kind_of_core() -> str:
+    """Return `compiled core` or `pure Python`."""
+    found = find_spec(_ONE_OF_THEM)
+    return "compiled core" if found is not None and is_compiled(found) else "pure Python"
+
+
+def attributes_of(thing: object) -> Mapping[str, Any]:
+    """Return the attributes of an object, as `vars` does; also of one whose class is compiled and has no `__dict__`."""
+    names: Sequence[str] = getattr(type(thing), "__mypyc_attrs__", ())
+    found = {name: getattr(thing, name) for name in names if name != "__dict__" and hasattr(thing, name)}
+    return {**found, **getattr(thing, "__dict__", {})}
+
+
+def docstring(module: ModuleType) -> str:
+    """Return the docstring of a module; of a compiled one, which has none, that of its source."""
+    file = getattr(module, "__file__", None) or ""
+    if module.__doc__ or not file.endswith(tuple(EXTENSION_SUFFIXES)):
+        return module.__doc__ or ""
+    import ast  # noqa: PLC0415 - start-up
+
+    return ast.get_docstring(ast.parse(_source(file).read_text(encoding="utf-8"))) or ""
+
+
+def _source(compiled: str) -> Path:
+    """Return the source beside a compiled module."""
+    path = Path(compiled)
+    return path.with_name(f"{path.name.partition('.')[0]}.py")

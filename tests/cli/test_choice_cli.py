@@ -1,0 +1,90 @@
+"""`robochoc solve` where protocol or order are chosen: what is said of it."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+
+import robochoc
+from robochoc.cli.reports.choice import LONG_S, OrderNote
+from robochoc.communication.run_result import Progress
+from robochoc.formats import write_team
+from robochoc.generators.queens3d import queens3d
+from robochoc.model.orders import Order
+from robochoc.run import Options, Withdrawal
+from tests.support.program import ROOT, robochoc_within
+
+PATROL = ROOT / "docs" / "examples" / "patrol"
+
+
+@pytest.fixture
+def four(tmp_path: Path) -> Path:
+    write_team(queens3d(4), tmp_path / "four")
+    return tmp_path / "four"
+
+
+def test_what_was_chosen_is_said_with_the_reason_and_more_on_request(four: Path) -> None:
+    said = robochoc_within("solve", four, "--runtime", "simulator", "--explain").stdout
+    assert "  chosen: sfb, as " in said
+    assert "; order min-width, as " in said
+    assert "  the team: 16 robots, 76 pairs of neighbours; any solution will do; 64 values in all" in said
+    assert "  not dpop: there are no costs" in said
+    assert "  not sfb" not in said
+
+
+def test_nothing_is_said_of_a_choice_where_all_was_asked_for(four: Path) -> None:
+    words = ["solve", four, "--runtime", "simulator", "--protocol", "abt"]
+    assert "chosen" not in robochoc_within(*words, "--explain").stdout
+    result = json.loads(robochoc_within(*words, "--json").stdout)
+    assert not {"chosen", "order"} & result.keys()
+
+
+def test_a_file_of_another_tool_gives_no_order(tmp_path: Path) -> None:
+    robochoc_within("export", PATROL, "--format", "pydcop", "-o", tmp_path / "patrol.yaml")
+    words = ["solve", tmp_path / "patrol.yaml", "--runtime", "simulator", "--protocol", "syncbb", "--json"]
+    result = json.loads(robochoc_within(*words).stdout)
+    assert (result["order"], result["chosen"]) == ("max-degree", {"order": "nobody has given the robots an order"})
+    assert not {"chosen", "order"} & json.loads(robochoc_within(*words, "--order", "given").stdout).keys()
+
+
+def test_a_model_gives_an_order_if_a_robot_has_a_priority() -> None:
+    for priority, order in ((0, Order.MAX_DEGREE), (1, None)):
+        model = robochoc.Model("three")
+        x, y, z = (model.robot(name, priority=priority).variable("v", range(3)) for name in "abc")
+        model.add(x < y, y < z)
+        assert model.solve("abt", runtime="simulator").order == order
+    team = queens3d(4)
+    assert robochoc.Model.of(team).solve("abt", runtime="simulator").order is None
+    assert robochoc.Problem(team).solve("abt", runtime="simulator").order is None
+
+
+def test_it_is_said_once_that_another_order_is_usually_faster(capsys: pytest.CaptureFixture[str]) -> None:
+    note = OrderNote(queens3d(4), Options(protocol="abt"))
+    show = note.watching(lambda _: None)
+    assert show is not None
+    show(Progress(0, 2 * LONG_S, "compiling"))
+    show(Progress(9, LONG_S / 2, ""))
+    assert capsys.readouterr().err == ""
+    show(Progress(9, LONG_S, ""))
+    show(Progress(9, LONG_S, ""))
+    note.tell_if_late(LONG_S)
+    said = capsys.readouterr().err
+    assert (
+        said == "queens3d-4: in the files' order; --order max-degree is usually faster, and --protocol auto chooses\n"
+    )
+
+
+@pytest.mark.parametrize(
+    "options",
+    [
+        Options(protocol="abt", order=Order.DFS),
+        Options(protocol="sfb", chosen={"protocol": "it suits"}, order=Order.MIN_WIDTH),
+        Options(protocol="dpop"),
+        Options(protocol="abt", withdraw=Withdrawal.MAXIMAL),
+    ],
+)
+def test_it_is_not_said_where_it_is_not_so(options: Options, capsys: pytest.CaptureFixture[str]) -> None:
+    OrderNote(queens3d(4), options).tell_if_late(LONG_S)
+    assert capsys.readouterr().err == ""
