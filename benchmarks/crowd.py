@@ -20,7 +20,7 @@ from robochoc.formats import write_team
 from robochoc.generators.coloring import Conflicts, coloring
 
 ROBOTS = (250, 1000)
-TURNS = 2
+TURNS = 3
 LOOK_S = 0.5
 """Seconds between two looks at the memory of all processes."""
 _WORDS = ("--protocol", "abt", "--runtime", "processes")
