@@ -77,7 +77,7 @@ APART := out/compiled/tests
 ON_BOTH ?= tests/conformance tests/protocols tests/unit/solver tests/unit/communication tests/unit/replay \
 	tests/cli/test_local_signals.py
 ON_PURE ?= tests/unit/communication/test_simulator.py tests/protocols/test_abt.py tests/unit/system
-PYTEST_APART = cd $(APART) && $(abspath $(COMPILED))/bin/pytest -n $(JOBS) --dist worksteal
+PYTEST_APART = cd $(APART) && $(abspath $(COMPILED))/bin/python -m pytest -n $(JOBS) --dist worksteal
 test-compiled: compiled  ## the same answers from compiled modules, and from the same wheel with ROBOCHOC_PURE=1
 	@rm -rf $(APART) && mkdir -p $(APART)
 	@cp -r benchmarks docs instances requirements tests xsd *.md *.toml *.yml Makefile $(APART)

@@ -172,6 +172,8 @@ def _of_frodo(folder: Path, _run: Run) -> Answer:
         return Answer("its time is over")
     cost = last["true cost"]
     messages = int(last["number of messages"]) or None
+    if cost == "null":
+        return Answer("no answer")
     if cost == "infinity":
         return Answer("no-solution", messages)
     return Answer(cost, messages)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import tempfile
 from collections import defaultdict
 from collections.abc import Iterable, Sequence
@@ -46,10 +47,17 @@ def measured_costs() -> Section:
 
 
 def _section(part: str, title: str, notes: str, families: Sequence[Family]) -> Section:
-    found = {family: _results(family) for family in families}
+    loads: list[float] = []
+    found = {family: _results(family, loads) for family in families}
+    described = [*map(_described, families), "", load_told(loads)]
     tables = [fastest(found), *(_table(*one) for one in found.items())]
     captions = ("Fastest of each library", *(family.name for family in families))
-    return Section(part, title, "\n".join([notes, "", *map(_described, families)]), tuple(tables), captions)
+    return Section(part, title, "\n".join([notes, "", *described]), tuple(tables), captions)
+
+
+def load_told(loads: Sequence[float]) -> str:
+    """Return what else the machine had to do: the least and the greatest of its loads at the start of each problem."""
+    return f"The machine's load meanwhile: {min(loads):.0f} to {max(loads):.0f} on {os.cpu_count()} cores."
 
 
 def _described(family: Family) -> str:
@@ -62,11 +70,12 @@ def _numbers(seeds: Sequence[int]) -> str:
     return f"seeds {seeds[0]}..{seeds[-1]}" if len(seeds) > 1 else f"seed {seeds[0]}"
 
 
-def _results(family: Family) -> dict[Contestant, list[tuple[Result, str]]]:
+def _results(family: Family, loads: list[float]) -> dict[Contestant, list[tuple[Result, str]]]:
     """Of each contestant its results, each with the right answer (empty where a problem has no single one)."""
     found: dict[Contestant, list[tuple[Result, str]]] = {one: [] for one in contestants(family)}
     for turn, seed in enumerate(family.seeds):
         say(f"{family.name}, seed {seed}")
+        loads.append(os.getloadavg()[0])
         with tempfile.TemporaryDirectory() as scratch:
             folder = Path(scratch) / "problem"
             write_problem(family.team(seed), folder)

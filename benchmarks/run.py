@@ -14,6 +14,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 import command_time
+import crowd
 import flagship
 import flight
 import journals
@@ -33,6 +34,7 @@ PARTS: dict[str, Callable[[], Section]] = {
     "whole": command_time.measured,
     "startup": start_up.measured,
     "transport": transport.measured,
+    "crowd": crowd.measured,
     "flagship": flagship.measured,
     "simulator": simulator.measured,
     "messages": messages.measured,

@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from functools import cache
-from typing import Self, cast
+from typing import Any, Self, cast
 
 import msgspec
 
@@ -228,7 +228,7 @@ class Host:
 
     def _report_state(self, observer: Observer) -> None:
         """Tell of a value, a verdict or a best assignment that is new since the last report."""
-        best = self.protocol.incumbent
+        best: Any = self.protocol.incumbent  # as an `Incumbent`, mypyc would make a float of its cost
         if best is not None and best.cost < self._heard:
             self._heard = best.cost
             observer(Heard(t=self._now(), robot=self.name, cost=best.cost, values=best.values))

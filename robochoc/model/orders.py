@@ -10,6 +10,7 @@ Nothing here reads or writes: a team goes in, the same problem comes out with ot
 
 from __future__ import annotations
 
+import heapq
 import math
 from collections import defaultdict
 from collections.abc import Iterator, Mapping, Sequence
@@ -127,12 +128,17 @@ def _min_width(graph: Graph) -> tuple[str, ...]:
     """
     place = {name: number for number, name in enumerate(_lexicographic(graph))}
     left = {name: set(others) for name, others in graph.items()}
+    waiting = [(len(others), -place[name], name) for name, others in left.items()]
+    heapq.heapify(waiting)
     backwards = []
-    while left:
-        last = min(left, key=lambda name: (len(left[name]), -place[name]))
-        backwards.append(last)
+    while waiting:
+        degree, _, last = heapq.heappop(waiting)
+        if last not in left or degree != len(left[last]):
+            continue  # it stands in the heap again, with fewer
         for other in left.pop(last):
             left[other].discard(last)
+            heapq.heappush(waiting, (len(left[other]), -place[other], other))
+        backwards.append(last)
     return tuple(reversed(backwards))
 
 

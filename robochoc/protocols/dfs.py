@@ -111,12 +111,14 @@ class TreeProtocol(Protocol):
     def _visit(self, parent: str | None, visited: Sequence[str]) -> None:
         """Process the first visit of the token: neighbours that it has visited are above."""
         self.parent = parent
-        self.pseudo_parents = self._sorted(name for name in self.problem.neighbours if name in {*visited} - {parent})
+        above = {*visited} - {parent}
+        self.pseudo_parents = self._sorted(name for name in self.problem.neighbours if name in above)
         self._go_on([*visited, self.problem.agent])
 
     def _go_on(self, visited: list[str]) -> None:
         """Send the token to an unvisited neighbour, or back if all are in the tree."""
-        left = [name for name in self.problem.neighbours if name not in visited]
+        met = {*visited}
+        left = [name for name in self.problem.neighbours if name not in met]
         if left:
             child = max(left, key=self._election.strength)
             self.children = self._sorted((*self.children, child))

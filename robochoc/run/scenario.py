@@ -35,6 +35,7 @@ from robochoc.model.team_edits import ChangeError, without_robots
 from robochoc.solver.agent_problem import DEFAULT_PARAMETERS, RunParameters
 from robochoc.solver.compiled_team import CompiledTeam
 from robochoc.solver.explanation import Invalidated, invalidated_by
+from robochoc.solver.team_compiler import OutOfTimeError
 
 Compile = Callable[[Team], CompiledTeam]
 
@@ -52,6 +53,10 @@ Returns:
 """
 
 
+NOT_SEARCHED = RunResult.of(Verdict.UNKNOWN, None, {}, (), 0)
+"""The result where there was no time left."""
+
+
 class EpochStart(NamedTuple):
     """An epoch that begins: its number, and what has opened it in a few words."""
 
@@ -63,7 +68,8 @@ class EpochStart(NamedTuple):
 class FinishedEpoch(NamedTuple):
     """An epoch whose search is over.
 
-    `team` is its team as the files have it, `epoch` the same as the robots worked on it, with compiled domains.
+    `team` is its team as the files have it, `epoch` the same as the robots worked on it, with compiled domains. Where
+    the time was over before they could, `epoch` is the one before it.
     """
 
     team: Team
@@ -150,13 +156,17 @@ class ScenarioRun:
             self._update_team(joining)
             if result.lost and not self.team.robots and self._next is None:
                 return
-            epoch = self._change(session, joining)
+            try:
+                epoch = self._change(session, joining)
+            except OutOfTimeError:
+                yield FinishedEpoch(self.team, epoch, opened, NOT_SEARCHED)
+                return
 
     def _search(self, session: Session) -> RunResult:
         if not self.team.robots:  # all have left, and others may come: no constraint is broken
             return RunResult.of(Verdict.SOLUTION, None, {}, (), 0)
         if self.is_over:
-            return RunResult.of(Verdict.UNKNOWN, None, {}, (), 0)
+            return NOT_SEARCHED
         limits = [self._messages, self._next.after if self._next else None]
         enough = min((limit for limit in limits if limit is not None), default=None)
         result = session.search(self._left_s(), enough)
@@ -230,7 +240,8 @@ class ScenarioRun:
         self.withdrawn = [name for name in self.withdrawn if name in self._full and name not in joining]
         self.team = without_robots(self._full, self.withdrawn)
         if self._order is not None:
-            stay = [name for name in self._order if name in self.team and name not in joining]
+            new = {*joining}
+            stay = dict.fromkeys(name for name in self._order if name in self.team and name not in new)
             self._order = (*stay, *(name for name in self.team.order if name not in stay))
 
     def _change(self, session: Session, joining: Collection[str]) -> Epoch:

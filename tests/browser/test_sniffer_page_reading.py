@@ -170,7 +170,7 @@ def test_why_there_is_no_state_is_told(page: Page) -> None:
       const nothing = { step: 0, value: {}, view: [], domain: [], nogoods: [], why: [] };
       source.states = async () => [{ ...nothing, more: { replay: "ends here: no `Ok`" } }];
     }""")
-    page.evaluate(f"Sniffer.page.robot({robot('Robot2.2')}); Sniffer.page.time.go(90)")
+    page.evaluate(f"Sniffer.page.robot({robot('Robot2.2')}); Sniffer.page.time.go(91)")
     until(lambda: "cannot be worked out further: no Ok" in page.inner_text("#robot"), "not said")
     assert page.inner_text("#robot .notice code") == "Ok"
     assert "its last step before this moment" in page.inner_text("#robot")

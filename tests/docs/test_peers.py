@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import importlib
 import json
+import os
 import sys
 from pathlib import Path
 from types import ModuleType
@@ -52,6 +53,9 @@ def test_a_run_is_timed_and_its_output_kept(load: Any) -> None:  # noqa: ANN401
     assert run.cpu_s > 0
     assert 0 < run.wall_s < 60
     assert run.peak_mb > 1
+    small = load("peer_runs").watched(["true"], 60)
+    ballast = b"x" * (100 << 20)
+    assert load("peer_runs").watched(["true"], 60).peak_mb < small.peak_mb + len(ballast) / (1 << 20) / 2
 
 
 def test_a_run_is_cut_off_with_all_that_it_started(load: Any) -> None:  # noqa: ANN401
@@ -60,6 +64,18 @@ def test_a_run_is_cut_off_with_all_that_it_started(load: Any) -> None:  # noqa: 
     run = load("peer_runs").watched([sys.executable, "-c", endless], 0.2)
     assert run.status is None
     assert run.wall_s < 30
+
+
+def test_nobody_is_left_behind(load: Any, tmp_path: Path) -> None:  # noqa: ANN401
+    """A child that holds a pipe for writing: its reader is at the end once the child is gone."""
+    pipe = tmp_path / "pipe"
+    os.mkfifo(pipe)
+    child = "import subprocess, sys; subprocess.Popen(['sh', '-c', 'exec sleep 1000'], stdout=open(sys.argv[1], 'w'))"
+    reader = os.open(pipe, os.O_RDONLY | os.O_NONBLOCK)
+    load("peer_runs").watched([sys.executable, "-c", child, str(pipe)], 60)
+    os.set_blocking(reader, True)
+    assert os.read(reader, 1) == b""
+    os.close(reader)
 
 
 def test_a_run_is_cut_off_when_its_cpu_is_spent(load: Any) -> None:  # noqa: ANN401
@@ -163,6 +179,7 @@ def test_frodo_is_set_and_read(load: Any, tmp_path: Path) -> None:  # noqa: ANN4
     for line, answer in (
         ("", ("its time is over", None)),
         ("0;0;infinity\n", ("no-solution", None)),
+        ("0;9;null\n", ("no answer", None)),
         ("0;12;7\n", ("7", 12)),
     ):
         table.write_text(head + line)
@@ -182,6 +199,11 @@ def test_pydcop_and_raven_are_read(load: Any, tmp_path: Path) -> None:  # noqa: 
     for solved, verdict in ((True, "solution"), (False, "no-solution")):
         output = json.dumps({"solved": solved, "messages": 9})
         assert read["raven-csp"](tmp_path, run._replace(output=output)) == (verdict, 9)
+
+
+def test_the_load_of_the_machine_is_told(load: Any) -> None:  # noqa: ANN401
+    told = load("peers").load_told([3.2, 90.7, 12.0])
+    assert told == f"The machine's load meanwhile: 3 to 91 on {os.cpu_count()} cores."
 
 
 def test_tables_of_a_section_may_have_captions(load: Any) -> None:  # noqa: ANN401

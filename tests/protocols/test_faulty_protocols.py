@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import re
 import sys
+from collections.abc import Callable
 
 import pytest
 
 from robochoc.communication.processes.processes import ProcessesRun
+from robochoc.communication.processes.robot_link import RobotLink
 from robochoc.communication.run_result import RobotsLostError
 from robochoc.journal.events import AnyEvent, Lost
 from robochoc.model.outcome import Verdict
@@ -28,6 +30,7 @@ from tests.support.faulty_protocols import (
     Spins,
     TalksNonsense,
 )
+from tests.support.limits import HANG_S
 
 pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="looks into /proc")
 
@@ -81,6 +84,28 @@ def test_a_message_of_a_megabyte() -> None:
 def test_deaf_robots_do_not_outlive_the_time_limit() -> None:
     verdict, _ = speaking(Spins, timeout=0.5)
     assert verdict is Verdict.UNKNOWN
+
+
+class ReadsOneReportAtATime(ProcessesRun):
+    """Its time for reports is over after each of them."""
+
+    def _serve_until(self, done: Callable[[], bool], deadline: float | None) -> None:
+        if self.state.verdict is None:
+            return super()._serve_until(done, deadline)
+        silent = len(self._silent())
+        while silent and len(self._silent()) == silent:
+            self._serve(HANG_S, None)
+        return None
+
+    def _serve(self, patience_s: float, _deadline: float | None) -> None:
+        for robot in self._pool.readable(patience_s)[:1]:
+            for message in self._pool.receive(robot):
+                self._handle(robot, message)
+
+
+def test_reports_that_only_wait_to_be_read_are_waited_for(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(RobotLink, "is_computing", False)
+    assert ReadsOneReportAtATime(TEAM, Speaks).run().verdict is Verdict.SOLUTION
 
 
 @count("runs", 5, 50)

@@ -20,7 +20,7 @@ from robochoc.protocols.maxsum_factor import Factor
 from robochoc.protocols.maxsum_messages import Q, R
 from robochoc.protocols.maxsum_settings import MaxSumSettings
 from robochoc.protocols.settings import SettingsError, settings_of
-from robochoc.solver import cost_table
+from robochoc.solver import shared_constraint
 from robochoc.solver.cost_table import CostTable
 from robochoc.solver.encoding import UnsupportedError
 from tests.support.agents import replies, value
@@ -253,7 +253,7 @@ def test_tables_in_lists_and_in_numpy_say_the_same(arity: int, monkeypatch: pyte
 
 
 def test_a_table_that_is_too_large_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(cost_table, "MAX_TUPLES", 3)
+    monkeypatch.setattr(shared_constraint, "MAX_TUPLES", 3)
     robot = middle(chain())
     with pytest.raises(UnsupportedError, match="has 4 entries, more than 3"):
         replies(robot, ("RA", TWO))

@@ -114,7 +114,8 @@ def test_what_a_changing_problem_cannot_have_is_refused(options: Options, named:
 
 def test_when_the_time_is_over_nothing_that_comes_is_heeded(monkeypatch: pytest.MonkeyPatch) -> None:
     clock = MovedClock()
-    monkeypatch.setattr("robochoc.run.context.time", clock)
+    for module in ("run.context", "solver.team_compiler", "communication.session"):
+        monkeypatch.setattr(f"robochoc.{module}.time", clock)
 
     class Slow(Says):
         def __call__(self, team: Team, epoch: EpochOutcome, left_s: float | None) -> ScenarioEvent | None:

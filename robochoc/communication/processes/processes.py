@@ -284,11 +284,13 @@ class ProcessesRun(Session, MasterLoop):
         return self.state.result(wall_s)
 
     def _await_reports(self, *, late: bool) -> None:
-        """Wait for reports. A robot that computes while there is no verdict is waited for until the time is over.
+        """Wait for reports, as long as some come: where robots are many, those of the last wait to be read.
 
+        A robot that computes while there is no verdict is waited for until the time is over.
         So is a robot that is stopped, until patience is over. With a verdict the limit is `BUSY_REPORTS_S`.
         """
         began = time.monotonic()
+        before = len(self._silent())
         while True:
             now = time.monotonic()
             until = now + (LATE_REPORTS_S if late else REPORTS_S)
@@ -298,7 +300,8 @@ class ProcessesRun(Session, MasterLoop):
             silent = [self._pool.robots[name] for name in self._silent()]
             if late or over(self._deadline):
                 return
-            if any(robot.status is ProcessStatus.STOPPED for robot in silent):
+            if len(silent) < before or any(robot.status is ProcessStatus.STOPPED for robot in silent):
+                before = len(silent)
                 continue
             enough = self.state.verdict is not None and time.monotonic() - began > BUSY_REPORTS_S
             if enough or not any(robot.is_computing for robot in silent):

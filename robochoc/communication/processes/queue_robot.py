@@ -36,17 +36,26 @@ from robochoc.model.message import Envelope
 class QueueRobot(RobotLoop):
     """The robot of `host`, in a process of its own, with the control pipe `link`.
 
-    It ends when that ends, or when one of the descriptors `parent` can be read.
+    It ends when that ends, or when one of the descriptors `parent` can be read. It reports how much memory it has to
+    itself if it is `measured`.
     Every message is stamped with its epoch. Messages of an epoch that is over are lost.
     """
 
     bundle_bytes = LARGEST_BODY // 4
 
     def __init__(
-        self, host: Host, link: ControlPipe, epoch: int, *, observed: bool, parent: Sequence[int] = ()
+        self,
+        host: Host,
+        link: ControlPipe,
+        epoch: int,
+        *,
+        observed: bool,
+        measured: bool = True,
+        parent: Sequence[int] = (),
     ) -> None:
         super().__init__(epoch, observed=observed)
         self._name = host.name
+        self._measured = measured
         self._link = link
         self._readers: dict[str, QueueReader] = {}
         self._writers: dict[str, QueueWriter] = {}
@@ -146,7 +155,7 @@ class QueueRobot(RobotLoop):
     def _report_end(self) -> None:
         if self._host is not None:
             protocol = self._host.protocol
-            metrics = replace(self._host.metrics(), memory=own_memory())
+            metrics = replace(self._host.metrics(), memory=own_memory() if self._measured else 0)
             self._say(Report(self.epoch, protocol.assignment, metrics, protocol.findings))
 
     def _change(self, order: Change) -> None:

@@ -63,7 +63,7 @@ def test_a_run_reports_it(caplog: pytest.LogCaptureFixture) -> None:
 @pytest.mark.parametrize(
     ("options", "why"),
     [
-        (Options(kill=(Kill("RA", 1),), runtime=Runtime.SIMULATOR), "the simulator has none"),
+        (Options(kill=(Kill("RA", 1),), runtime=Runtime.SIMULATOR), "the simulator and arrays have none"),
         (Options(kill=(Kill("RA", 1),), protocol="central"), "--kill is for robots .*not for --protocol central"),
         (Options(kill=(Kill("RZ", 1),)), "names a robot that .* does not have"),
     ],

@@ -70,7 +70,7 @@ def test_work_grows_as_the_team_does(stage: str, tmp_path: Path) -> None:
     assert twice < TWICE * once
 
 
-@pytest.mark.parametrize("protocol", ["abt", "dsa", "mgm", "maxsum", "dpop"])
+@pytest.mark.parametrize("protocol", ["abt", "afc-ng", "afc-tree", "dsa", "mgm", "mgm2", "maxsum", "dpop"])
 def test_the_memory_of_robots_grows_as_the_team_does(protocol: str) -> None:
     def memory(agents: int) -> int:
         team = ring(agents)
