@@ -194,8 +194,10 @@ def test_a_seed_repeats_a_run(four: Path) -> None:
 
 @pytest.mark.parametrize("runtime", ["processes", "simulator"])
 def test_a_limit_is_status_3(tmp_path: Path, runtime: str) -> None:
-    write_team(queens3d(9), tmp_path / "nine")
-    done = robochoc_within("solve", tmp_path / "nine", "--timeout", "0.3", "--json", "--runtime", runtime)
+    write_team(queens3d(10), tmp_path / "ten")
+    done = robochoc_within(
+        "solve", tmp_path / "ten", *("--protocol", "abt", "--timeout", "0.3", "--json", "--runtime", runtime)
+    )
     assert done.returncode == 3
     assert json.loads(done.stdout)["verdict"] == "unknown"
 

@@ -103,7 +103,7 @@ class Strike:
         return self.signum is STOP and self.then is None
 
     def command(self, folder: Path, home: Path) -> list[str]:
-        options = ["--runtime", self.runtime, "--json", "--journal", str(home / "run.journal")]
+        options = ["--protocol", "abt", "--runtime", self.runtime, "--json", "--journal", str(home / "run.journal")]
         if self.team == "rows":
             options += ["--ace", "--no-cache", "--verify"]
         if self.watched:

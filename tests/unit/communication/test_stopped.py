@@ -119,7 +119,7 @@ def wake(session: ProcessesRun) -> None:
 
 @pytest.mark.slow
 def test_the_command_gives_a_stopped_robot_up(team: Path, tmp_path: Path) -> None:
-    command = [PROGRAM, "solve", str(team), "--timeout", "60", "--patience", "0.5"]
+    command = [PROGRAM, "solve", str(team), "--protocol", "abt", "--timeout", "60", "--patience", "0.5"]
     with running(command, tmp_path / "run") as run:
         run.strike(signal.SIGSTOP, run.wait_for_robots(COUNT)[20])
         run.end()
@@ -131,7 +131,19 @@ def test_the_command_gives_a_stopped_robot_up(team: Path, tmp_path: Path) -> Non
 
 @pytest.mark.slow
 def test_one_that_goes_on_in_time_is_told_of_and_not_lost(team: Path, tmp_path: Path) -> None:
-    command = [PROGRAM, "solve", str(team), "--timeout", "90", "--patience", "60", "--messages", "2000"]
+    command = [
+        PROGRAM,
+        "solve",
+        str(team),
+        "--protocol",
+        "abt",
+        "--timeout",
+        "90",
+        "--patience",
+        "60",
+        "--messages",
+        "2000",
+    ]
     with running(command, tmp_path / "run") as run:
         robot = run.wait_for_robots(COUNT)[20]
         run.strike(signal.SIGSTOP, robot)
