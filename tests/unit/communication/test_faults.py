@@ -341,9 +341,9 @@ def test_nobody_reads_the_output(tmp_path: Path) -> None:
         os.close(writer)
 
 
-@pytest.mark.parametrize("open_files", [64, *(pytest.param(count, marks=slow) for count in (100, 180))])
+@pytest.mark.parametrize("open_files", [64, *(pytest.param(count, marks=slow) for count in (90, 120))])
 def test_too_few_open_files(open_files: int, crowd: Path, tmp_path: Path) -> None:
-    """At 180 the parent has more than half of the robots started, at 64 a few."""
+    """At 120 the parent has more than half of the robots started, at 64 a few."""
     with running(solving(crowd), tmp_path / "run", open_files=open_files) as run:
         run.end()
         assert run.status() == 2
