@@ -1,4 +1,4 @@
-"""How fast the runtime of arrays is, and how time and memory grow: random graphs of degree 4, three colours.
+"""Measure the runtime of arrays, and how time and memory grow: random graphs of degree 4, three colours.
 
 python benchmarks/arrays.py [--robots N ...] [--protocols NAME ...] [--cycles N] [--own-tables]
 

@@ -1,4 +1,4 @@
-"""Who solves the problems of part `peers`: robochoc, and each other library where it is installed."""
+"""Commands that solve the problems of part `peers`: robochoc's, and of each other library that is installed."""
 
 from __future__ import annotations
 
@@ -21,11 +21,11 @@ FRODO = "ROBOCHOC_BENCH_FRODO"
 HERE = Path(__file__).parent
 CYCLES = 200
 FORBIDDEN = 10_000
-"""What our exporter to pyDCOP's format charges at least for what is forbidden."""
+"""The least cost that a broken hard constraint has in files that we export for pyDCOP."""
 
 
 class Answer(NamedTuple):
-    """What a run found: `solution`, `no-solution`, a cost, or what went wrong; and the messages, where counted."""
+    """The answer of a run (`solution`, `no-solution`, a cost, or the error), and its number of messages, if counted."""
 
     found: str
     messages: int | None = None
@@ -105,7 +105,7 @@ def central(folder: Path) -> list[str]:
 
 
 def right(run: Run) -> str:
-    """What that command has found."""
+    """Return the answer that the command has printed."""
     return _verdict(json.loads(run.output))
 
 

@@ -56,7 +56,7 @@ print(json.dumps([least, sum(spent.messages.values()), spent.ncccs, spent.checks
 
 
 class Cost(NamedTuple):
-    """What one search has taken: CPU seconds, and its counts."""
+    """The CPU seconds of one search, and its counts."""
 
     cpu_s: float
     messages: int

@@ -35,7 +35,7 @@ class Family:
     cpu_s: int
     limit_s: float
     decided: bool = True
-    """Whether each has one right answer. Otherwise the cost tells how good an answer is."""
+    """True if each problem has one right answer. If not, answers are compared by their cost."""
 
 
 def _random(tightness: float) -> Callable[[int], Team]:

@@ -27,7 +27,7 @@ NOT_YET = "not in this version"
 
 @dataclass(frozen=True)
 class Result:
-    """What one contestant made of one problem."""
+    """The run of one contestant on one problem, and its answer."""
 
     seed: int
     run: Run
