@@ -1,0 +1,149 @@
+"""A conflict by CPMpy (https://cpmpy.readthedocs.io): a minimal unsatisfiable subset over assumptions, one a rule.
+
+Imported by the process of a search for conflicts alone: CPMpy and its solver take their memory and their time.
+"""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Callable, Sequence
+from functools import reduce
+from typing import Any
+
+from robochoc.app.conflicts.rules import minimal, rule_of, with_only
+from robochoc.app.sketch.building import model_of
+from robochoc.app.sketch.sketch import Sketch
+from robochoc.model.constraint import Constraint, Relation
+from robochoc.model.expression import Apply, Expression
+from robochoc.model.expression import Constant as Integer
+from robochoc.model.problem import INFINITE
+
+MOST_ROWS = 2_000_000
+"""A table that would be longer is too large."""
+
+
+FEW = 8
+"""Up to so many rules are left out in turn, each time from the beginning: a solver simplifies more without assumptions.
+With more, all are assumptions of one model, and the solver says which of them it has used."""
+
+
+class UntranslatedError(ValueError):
+    """A rule is none that CPMpy is told here."""
+
+
+def minimal_by_cpmpy(sketch: Sketch, rules: Sequence[str]) -> tuple[str, ...] | None:
+    """Return rules that cannot hold together, but without any one of them they can; None: all can.
+
+    Raises:
+        ImportError: if CPMpy, or its solver OR-Tools, is not installed.
+        UntranslatedError: if a rule is none that CPMpy is told here.
+    """
+    import cpmpy  # noqa: PLC0415 - an extra
+    from cpmpy.tools.explain import mus  # noqa: PLC0415 - the same
+
+    team = model_of(with_only(sketch, rules)).team
+    variables = {
+        name: cpmpy.intvar(min(one.domain), max(one.domain), name=name) for name, one in team.variables.items()
+    }
+    hard = [cpmpy.InDomain(variables[name], [*one.domain]) for name, one in team.variables.items()]
+    domains = {name: sorted(one.domain) for name, one in team.variables.items()}
+    said = {rule: parts for rule in rules if (parts := _as_a_whole(sketch, rule, variables))}
+    whole = frozenset(said)
+    for constraint in team.constraints():
+        rule = rule_of(constraint.name, rules)
+        if rule is None:
+            raise UntranslatedError(constraint.name)
+        if rule not in whole:
+            said.setdefault(rule, []).append(_said(constraint, variables, domains))
+    softs = {rule: cpmpy.all(said[rule]) for rule in rules if rule in said}
+    if len(softs) <= FEW:
+        return minimal([*softs], lambda some: cpmpy.Model(hard, *(softs[one] for one in some)).solve(solver="ortools"))
+    if cpmpy.Model(hard, *softs.values()).solve(solver="ortools"):
+        return None
+    # Each rule is one Boolean, so that it stays whole.
+    marks = {rule: cpmpy.boolvar(name=f"rule {rule}") for rule in softs}
+    hard += [mark.implies(softs[rule]) for rule, mark in marks.items()]
+    found = {str(one) for one in mus([*marks.values()], hard=hard, solver="ortools")}
+    return tuple(rule for rule, mark in marks.items() if str(mark) in found)
+
+
+def _as_a_whole(sketch: Sketch, name: str, variables: dict[str, Any]) -> list[Any]:
+    """Return a rule that is one global constraint: that all are different. Empty: it is another one."""
+    import cpmpy  # noqa: PLC0415 - an extra
+
+    rule = sketch.rule(name)
+    if rule is None or rule.kind != "different":
+        return []
+    return [cpmpy.AllDifferent([variables[f"{robot}.{rule.decision}"] for robot in sketch.bound(rule)])]
+
+
+def _said(constraint: Constraint, variables: dict[str, Any], domains: dict[str, list[int]]) -> Any:  # noqa: ANN401 - CPMpy's
+    import cpmpy  # noqa: PLC0415 - an extra
+
+    definition = constraint.definition
+    if isinstance(definition, Relation):
+        scope = [variables[name] for name in constraint.variables]
+        rows = []
+        for number, row in enumerate(itertools.product(*(domains[name] for name in constraint.variables))):
+            if number >= MOST_ROWS:
+                raise UntranslatedError(constraint.name)
+            if constraint.price(dict(zip(constraint.variables, row, strict=True))) < INFINITE:
+                rows.append(row)
+        return cpmpy.Table(scope, rows) if rows else cpmpy.BoolVal(False)
+    actual = [variables[one] if isinstance(one, str) else one for one in constraint.parameters]
+    return _translated(definition.body, dict(zip(definition.parameters, actual, strict=True)))
+
+
+def _translated(expression: Expression, given: dict[str, Any]) -> Any:  # noqa: ANN401 - CPMpy's expressions
+    if isinstance(expression, Integer):
+        return expression.value
+    if not isinstance(expression, Apply):
+        return given[expression.name]
+    operator = _OPERATORS.get(expression.operator)
+    if operator is None:
+        raise UntranslatedError(expression.operator)
+    return operator(*(_translated(one, given) for one in expression.arguments))
+
+
+def _in(value: Any, *members: Any) -> Any:  # noqa: ANN401 - CPMpy's expressions
+    import cpmpy  # noqa: PLC0415 - an extra
+
+    return cpmpy.any([value == member for member in members])
+
+
+def _if(condition: Any, then: Any, otherwise: Any) -> Any:  # noqa: ANN401 - CPMpy's expressions
+    if isinstance(condition, bool):
+        return then if condition else otherwise
+    return condition * then + (~condition) * otherwise
+
+
+def _equal(first: Any, *others: Any) -> Any:  # noqa: ANN401 - CPMpy's expressions
+    return reduce(lambda one, other: one & other, [first == other for other in others])
+
+
+def _not(one: Any) -> Any:  # noqa: ANN401 - CPMpy's expressions
+    return (not one) if isinstance(one, bool) else ~one
+
+
+_OPERATORS: dict[str, Callable[..., Any]] = {
+    "neg": lambda one: -one,
+    "abs": abs,
+    "sqr": lambda one: one * one,
+    "add": lambda *given: reduce(lambda one, other: one + other, given),
+    "sub": lambda one, other: one - other,
+    "mul": lambda *given: reduce(lambda one, other: one * other, given),
+    "div": lambda one, other: one // other,
+    "mod": lambda one, other: one % other,
+    "dist": lambda one, other: abs(one - other),
+    "eq": _equal,
+    "ne": lambda one, other: one != other,
+    "lt": lambda one, other: one < other,
+    "le": lambda one, other: one <= other,
+    "gt": lambda one, other: one > other,
+    "ge": lambda one, other: one >= other,
+    "in": _in,
+    "if": _if,
+    "not": _not,
+    "and": lambda *given: reduce(lambda one, other: one & other, given),
+    "or": lambda *given: reduce(lambda one, other: one | other, given),
+}

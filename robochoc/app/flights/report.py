@@ -1,0 +1,228 @@
+"""The report of a run: one HTML file to hand on, which needs no network and no robochoc to be read.
+
+Names come from files that others wrote. They reach HTML as escaped text only, and the page's Content-Security-Policy
+lets no script run but those of the scene and of the conversation, which stand in frames of their own.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Sequence
+from contextlib import suppress
+from dataclasses import dataclass
+from datetime import UTC, datetime
+from html import escape
+from importlib.resources import files
+from string import Template
+from typing import Any
+
+import msgspec
+
+from robochoc.app.flights.answer import broken
+from robochoc.app.runs.options import RESULT
+from robochoc.app.runs.run import Run
+from robochoc.app.sketch.building import decided
+from robochoc.app.sketch.sketch import Sketch, Value
+from robochoc.app.sketch.words import listed, sentence, value_words, weight_of
+from robochoc.app.texts import LANGUAGE, say
+from robochoc.modelling.places import ModelError
+from robochoc.system.plain_text import printable
+
+_MOST_VALUES = 12
+"""Values of a decision that are listed."""
+_MOST_LINKS = 4
+_SCRIPTS = re.compile(rb"script-src ([^;]*);")
+_HEAD_BYTES = 4096
+"""A page's policy stands in so many bytes, at its beginning."""
+
+
+@dataclass(frozen=True)
+class Pages:
+    """The pages that a report contains: the scene, and the conversation. None: it has none."""
+
+    flight: bytes | None = None
+    conversation: bytes | None = None
+
+
+def report(sketch: Sketch, run: Run, pages: Pages, version: str) -> bytes:
+    """Return the report of a run, UTF-8.
+
+    Args:
+        sketch: What the run was made from.
+        run: The run.
+        pages: What can be looked at.
+        version: That of robochoc.
+    """
+    parts = [
+        _frame("report.flight", pages.flight),
+        _answer(sketch, run),
+        _rules(sketch, run),
+        _team(sketch),
+        _talk(run),
+        _frame("report.conversation", pages.conversation),
+        _again(run, version),
+    ]
+    template = Template((files(__package__) / "report.html").read_text(encoding="utf-8"))
+    return template.substitute(
+        language=LANGUAGE,
+        policy=escape(_policy(pages)),
+        title=_text(say("report.title", name=sketch.name)),
+        name=_text(sketch.name),
+        when=_text(_when(run)),
+        summary=_text(summary(sketch, run)),
+        parts="\n".join(filter(None, parts)),
+    ).encode()
+
+
+def summary(sketch: Sketch, run: Run) -> str:
+    """Return what came of a run, in a sentence."""
+    result = run.result
+    if result is None:
+        return say("report.no-answer")
+    robots = len(sketch.robots) - len(result.withdrawn)
+    words = (
+        [say(f"report.verdict.{result.verdict}", robots=robots)] if result.verdict in _VERDICTS else [result.verdict]
+    )
+    if result.withdrawn:
+        words.append(say("report.withdrawn", names=listed(result.withdrawn)))
+    if result.cost:
+        words.append(say("report.cost", cost=f"{result.cost:,}"))
+    return " ".join(words)
+
+
+_VERDICTS = frozenset({"solution", "optimal", "no-solution", "unknown"})
+
+
+def values_of(sketch: Sketch, run: Run) -> dict[tuple[str, str], Value]:
+    """Return what robots have decided, by robot and decision."""
+    with suppress(ModelError, ValueError, TypeError, KeyError):
+        return decided(sketch, run.result.assignment if run.result else {})
+    return {}
+
+
+def _answer(sketch: Sketch, run: Run) -> str:
+    if run.result and not sketch.decisions:
+        told = [[name, value] for name, value in run.result.assignment.items()]
+        return _section("report.answer", _table([say("report.decision"), say("report.values")], told)) if told else ""
+    values = values_of(sketch, run)
+    if not values:
+        return ""
+    rows: list[list[object]] = []
+    for robot in sketch.robots:
+        own = [(decision, values.get((robot.name, decision.name))) for decision in sketch.decisions]
+        rows.append(
+            [robot.name, *("" if value is None else value_words(sketch, decision, value) for decision, value in own)]
+        )
+    headings = [say("report.robot"), *(decision.name for decision in sketch.decisions)]
+    return _section("report.answer", _table(headings, rows))
+
+
+def _rules(sketch: Sketch, run: Run) -> str:
+    if not sketch.rules:
+        return ""
+    found = {one.rule.id: one for one in broken(sketch, values_of(sketch, run))}
+    items = []
+    for rule in sketch.rules:
+        marks = [f'<span class="soft">{_text(weight_of(rule))}</span>']
+        if one := found.get(rule.id):
+            links = listed([" - ".join(robots) for robots in one.links], _MOST_LINKS)
+            key = "report.broken" if one.cost is None else "report.broken-costs"
+            marks.append(f'<span class="bad">{_text(say(key, links=links, cost=one.cost))}</span>')
+        items.append(f"<li>{_text(sentence(sketch, rule))} {' '.join(marks)}</li>")
+    return _section("report.rules", f"<ol>{''.join(items)}</ol>")
+
+
+def _team(sketch: Sketch) -> str:
+    area = sketch.area
+    told = say("report.map", columns=area.columns, rows=area.rows, blocked=len(area.blocked))
+    decisions = []
+    for decision in sketch.decisions:
+        values = [value_words(sketch, decision, value) for value in sketch.values(decision)]
+        who = say("list.all") if not decision.robots else listed(sketch.deciders(decision))
+        decisions.append([decision.name, say(f"kind.{decision.kind}"), listed(values, _MOST_VALUES), who])
+    headings = [say(f"report.{key}") for key in ("decision", "kind", "values", "who")]
+    robots = [
+        [robot.name, say("value.place", column=robot.at.x + 1, row=robot.at.y + 1), robot.weight, robot.rank]
+        for robot in sketch.robots
+    ]
+    own = [say(f"report.{key}") for key in ("robot", "stands", "weight", "rank")]
+    story = f"<p>{_text(sketch.story)}</p>" if sketch.story else ""
+    return _section(
+        "report.team", f"{story}<p>{_text(told)}</p>{_table(headings, decisions)}{_table(own, robots, fold=True)}"
+    )
+
+
+def _talk(run: Run) -> str:
+    result = run.result
+    if result is None:
+        return ""
+    facts = [
+        (say("report.protocol"), result.protocol),
+        (say("report.chosen"), result.chosen.get("protocol", say("report.asked-for"))),
+        (say("report.order"), result.order or say("report.given")),
+        (say("report.runtime"), result.runtime),
+        (say("report.messages"), f"{result.messages:,}"),
+        (say("report.bytes"), f"{result.metrics.bytes:,}"),
+        (say("report.ncccs"), f"{result.metrics.ncccs:,}"),
+        (say("report.seconds"), f"{result.metrics.wall_s:.2f} s"),
+    ]
+    kinds = [[kind, f"{count:,}"] for kind, count in sorted(_types(run).items())]
+    table = _table([say("report.type"), say("report.messages")], kinds) if kinds else ""
+    return _section("report.talk", _facts(facts) + table)
+
+
+def _again(run: Run, version: str) -> str:
+    seed = run.result.seed if run.result else run.record.options.seed
+    facts = [(say("report.seed"), str(seed)), (say("report.version"), f"robochoc {version}")]
+    steps = _text(say("report.again-how"))
+    return _section("report.again", f"<p>{steps}</p><pre><code>{_text(run.command)}</code></pre>{_facts(facts)}")
+
+
+def _types(run: Run) -> dict[str, int]:
+    """Return how many messages of each type there were, if the result tells."""
+    with suppress(OSError, msgspec.MsgspecError, KeyError, TypeError):
+        whole: dict[str, Any] = msgspec.json.decode((run.folder / RESULT).read_bytes().splitlines()[0])
+        return {str(kind): int(count) for kind, count in whole["metrics"]["messages_by_type"].items()}
+    return {}
+
+
+def _frame(key: str, page: bytes | None) -> str:
+    """Return a page in a frame that can do nothing but draw itself."""
+    if page is None:
+        return ""
+    inside = escape(page.decode())
+    frame = f'<iframe sandbox="allow-scripts allow-downloads" title="{_text(say(key))}" srcdoc="{inside}"></iframe>'
+    return f'<section class="wide"><h2>{_text(say(key))}</h2>{frame}</section>'
+
+
+def _policy(pages: Pages) -> str:
+    """Return the report's policy. A frame's page is bound by it, too: it lists their scripts."""
+    found = [_SCRIPTS.search(page[:_HEAD_BYTES]) for page in (pages.flight, pages.conversation) if page]
+    scripts = " ".join(match[1].decode() for match in found if match) or "'none'"
+    return (
+        f"default-src 'none'; script-src {scripts}; style-src 'unsafe-inline'; img-src data: blob:;"
+        " frame-src 'self'; base-uri 'none'; form-action 'none'"
+    )
+
+
+def _section(key: str, content: str) -> str:
+    return f"<section><h2>{_text(say(key))}</h2>{content}</section>"
+
+
+def _facts(facts: Iterable[tuple[str, str]]) -> str:
+    return f"<dl>{''.join(f'<dt>{_text(name)}</dt><dd>{_text(fact)}</dd>' for name, fact in facts)}</dl>"
+
+
+def _table(headings: Sequence[str], rows: Sequence[Sequence[object]], *, fold: bool = False) -> str:
+    head = "".join(f'<th scope="col">{_text(heading)}</th>' for heading in headings)
+    body = "".join(f"<tr>{''.join(f'<td>{_text(str(cell))}</td>' for cell in row)}</tr>" for row in rows)
+    table = f'<div class="table"><table><thead><tr>{head}</tr></thead><tbody>{body}</tbody></table></div>'
+    return f"<details><summary>{_text(say('report.robots'))}</summary>{table}</details>" if fold else table
+
+
+def _when(run: Run) -> str:
+    return datetime.fromtimestamp(run.record.started, UTC).strftime("%Y-%m-%d %H:%M UTC")
+
+
+def _text(text: str) -> str:
+    return escape(printable(text))

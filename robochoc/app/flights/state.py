@@ -1,0 +1,114 @@
+"""The state of a team as one file: the team and its last run, to be opened again elsewhere.
+
+It is the archive of the team (`sketch.files.zipped`), which every version opens, with the run beside:
+
+TEAM/...             the team's files, and how it was drawn
+TEAM/run/1/...       the run: how it was started, its answer, what was said
+"""
+
+from __future__ import annotations
+
+import io
+import zipfile
+from pathlib import Path
+
+import msgspec
+
+from robochoc.app.flights.names import file_name
+from robochoc.app.runs.options import JOURNAL, RESULT
+from robochoc.app.runs.run import RECORD, SKETCH, Record, Run
+from robochoc.app.sketch.checks import troubles
+from robochoc.app.sketch.files import zipped
+from robochoc.app.sketch.opening import DAMAGED
+from robochoc.app.sketch.sketch import Sketch
+
+MAX_BYTES = 256 << 20
+"""Bytes of a run, unpacked."""
+_FILES = (RECORD, SKETCH, RESULT, JOURNAL)
+_PLACE = "run/1"
+_FIRST = "00001"
+
+
+def team_archive(run: Run) -> bytes:
+    """Return the team of a run as a ZIP archive of its folder; with its sketch, if it was drawn here.
+
+    Raises:
+        InvalidInputError: if the sketch has errors.
+        OSError: if a file cannot be read.
+    """
+    sketch = run.sketch
+    if sketch.decisions:
+        return zipped(sketch)
+    content = io.BytesIO()
+    with zipfile.ZipFile(content, "w", zipfile.ZIP_DEFLATED) as archive:
+        for file in sorted(run.team.rglob("*.xml")):
+            _add(archive, f"{file_name(sketch.name)}/{file.relative_to(run.team).as_posix()}", file)
+    return content.getvalue()
+
+
+def packed(run: Run) -> bytes:
+    """Return a run and its team as one file. Raises as `team_archive`."""
+    content = io.BytesIO(team_archive(run))
+    with zipfile.ZipFile(content, "a", zipfile.ZIP_DEFLATED) as archive:
+        for name in _FILES:
+            if file := run.artefact(name):
+                _add(archive, f"{file_name(run.sketch.name)}/{_PLACE}/{name}", file)
+    return content.getvalue()
+
+
+def _add(archive: zipfile.ZipFile, name: str, file: Path) -> None:
+    """Add a file; it has no time, so that the same makes the same archive."""
+    archive.writestr(zipfile.ZipInfo(name), file.read_bytes(), zipfile.ZIP_DEFLATED)
+
+
+def unpack_run(file: Path, folder: Path) -> bool:
+    """Put the run of a packed state into `folder`, a team's that has none yet.
+
+    Args:
+        file: What `packed` returned; or any other file: nothing is done then.
+        folder: The team's folder.
+
+    Returns:
+        Whether there was a run, and it is whole.
+
+    Raises:
+        OSError: if it cannot be written.
+    """
+    try:
+        with zipfile.ZipFile(file) as archive:
+            found = _found(archive)
+    except DAMAGED:
+        return False
+    if RECORD not in found or SKETCH not in found or not _is_sound(found):
+        return False
+    place = folder / "runs" / _FIRST
+    place.mkdir(mode=0o700, parents=True)
+    for name, piece in found.items():
+        (place / name).write_bytes(piece)
+    return True
+
+
+def _found(archive: zipfile.ZipFile) -> dict[str, bytes]:
+    """Return the files of the run. Names are compared, never used as paths."""
+    found: dict[str, bytes] = {}
+    left = MAX_BYTES
+    for entry in archive.infolist():
+        _, _, inside = entry.filename.partition("/")
+        name = inside.removeprefix(f"{_PLACE}/")
+        if name == inside or name not in _FILES or name in found:
+            continue
+        with archive.open(entry) as stream:  # what an entry says of its own size need not be true
+            found[name] = stream.read(left + 1)
+        left -= len(found[name])
+        if left < 0:
+            return {}
+    return found
+
+
+def _is_sound(found: dict[str, bytes]) -> bool:
+    try:
+        msgspec.json.decode(found[RECORD], type=Record)
+        sketch = msgspec.json.decode(found[SKETCH], type=Sketch)
+    except (msgspec.DecodeError, RecursionError, UnicodeError):
+        return False
+    return not any(trouble.is_error for trouble in troubles(sketch))

@@ -1,0 +1,98 @@
+"""Makes the recordings of a lesson: each run once, in the simulator. `robochoc app` itself never does."""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from itertools import pairwise
+
+import robochoc
+from robochoc.app.lessons.lesson import ROBOTS, Lesson, RunSpec, TeamSpec
+from robochoc.app.lessons.recording import Message, Recording, Turn
+from robochoc.journal.entries import Header
+from robochoc.journal.events import AnyEvent
+from robochoc.modelling.model import Model
+from robochoc.replay import states_of
+from robochoc.run.choice import decided
+from robochoc.run.options import Options
+from robochoc.sniffer.page_data import PageData
+from robochoc.sniffer.trace import Trace
+
+LEVEL = "level"
+AUTO = "auto"
+
+
+def recorded(lesson: Lesson) -> dict[str, Recording]:
+    """Return the runs of a lesson, made now."""
+    return {name: _recorded(lesson.teams[run.team], run) for name, run in lesson.runs.items()}
+
+
+def model_of(spec: TeamSpec) -> Model:
+    """Return the team as a model: what is solved."""
+    model = robochoc.Model("lesson")
+    names = [f"R{place + 1}" for place in range(spec.chain)] if spec.chain else ROBOTS
+    robots = {name: model.robot(name, priority=len(names) - place) for place, name in enumerate(names)}
+    level = {name: robots[name].variable(LEVEL, list(spec.levels(name))) for name in names}
+    for one, other in pairwise(names) if spec.chain else spec.apart:
+        rule = level[one] != level[other]
+        if spec.partly_known:
+            robots[one].knows(rule)
+        else:
+            model.add(rule, cost=spec.broken_costs or None)
+    if spec.low:
+        model.minimize(sum(level.values()))
+    if spec.changes:
+        model.after_solution().remove_value(level[names[-1]], spec.values[-1])
+    return model
+
+
+def _recorded(spec: TeamSpec, run: RunSpec) -> Recording:
+    model = model_of(spec)
+    if run.protocol == AUTO:
+        choice = decided(model.team, Options(protocol=AUTO))
+        return Recording(choice.options.protocol, choice.options.chosen["protocol"])
+    events: list[AnyEvent] = []
+    found = model.solve(
+        run.protocol,
+        "simulator",
+        order=ROBOTS,
+        settings=run.settings,
+        seed=run.seed,
+        schedule=run.schedule,
+        observer=events.append,
+    )
+    events.sort(key=lambda event: event.t)
+    messages, turns = _told(events, run)
+    return Recording(
+        run.protocol,
+        messages=messages,
+        turns=turns,
+        verdict=str(found.verdict),
+        cost=None if found.cost is None else int(found.cost),
+    )
+
+
+def _told(events: list[AnyEvent], run: RunSpec) -> tuple[tuple[Message, ...], tuple[Turn, ...]]:
+    """Return the messages and turns, in the words that the sniffer and the replay have for them."""
+    header = Header(team="lesson", protocol=run.protocol, runtime="simulator", seed=run.seed)
+    trace = Trace(header)
+    trace.add(events)
+    trace.end()
+    why = {robot: [tuple(state.why) for state in states_of(events, robot, header=header)] for robot in ROBOTS}
+    decisions, done, levels = dict(trace.decisions), defaultdict[str, int](int), dict[str, int]()
+    turns = []
+    for step in range(min(run.turns or len(trace.steps.t), len(trace.steps.t))):
+        robot = trace.robots[trace.steps.robot[step]]
+        if step in decisions:
+            levels[robot] = decisions[step][f"{robot}.{LEVEL}"]
+        reasons = why[robot][done[robot]] if step in decisions else ()
+        done[robot] += 1
+        turns.append(Turn(robot, tuple(trace.packet(step)), tuple(trace.said(step)), levels.get(robot), reasons))
+    data = PageData(trace)
+    count = max((*turns[-1].said, *(one for turn in turns for one in (*turn.said, *turn.heard))), default=-1) + 1
+    return tuple(_message(data, one) for one in range(count)), tuple(turns)
+
+
+def _message(data: PageData, number: int) -> Message:
+    trace, of = data.trace, data.trace.messages
+    sender, to = trace.robots[of.sender[number]], trace.robots[of.receiver[number]]
+    return Message(sender, to, trace.kinds[of.kind[number]], data.words(number).removeprefix(f"{sender} says: "))

@@ -1,0 +1,27 @@
+"""Who is told when something changes."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+
+class Listeners:
+    """Callbacks that are called when there is news. Call it to tell all of them."""
+
+    def __init__(self) -> None:
+        self._callbacks: list[Callable[[], None]] = []
+
+    def add(self, callback: Callable[[], None]) -> Callable[[], None]:
+        """Call `callback` from now on; return what ends that."""
+        self._callbacks.append(callback)
+
+        def end() -> None:
+            if callback in self._callbacks:
+                self._callbacks.remove(callback)
+
+        return end
+
+    def __call__(self) -> None:
+        """Tell all. Who is added or removed meanwhile is told the next time, or once more."""
+        for callback in [*self._callbacks]:
+            callback()

@@ -1,0 +1,268 @@
+"""The page "Compare": two or more protocols on this team, or on a family like it, and the pictures of it."""
+
+from __future__ import annotations
+
+from functools import cache
+from importlib.resources import files
+
+from nicegui import run, ui
+
+from robochoc.app.pages.compare.lines import show_lines
+from robochoc.app.pages.compare.served import REPORT
+from robochoc.app.pages.shell import while_shown
+from robochoc.app.projects import Project
+from robochoc.app.sketch.sketch import Sketch
+from robochoc.app.studies.families import Family
+from robochoc.app.studies.question import MOST_RUNS, MOST_SECONDS, Possible, Question, possible, study_of
+from robochoc.app.studies.study import ENDED, Facts, Stage, study_on
+from robochoc.app.texts import say
+from robochoc.formats import InvalidInputError
+from robochoc.modelling.places import ModelError
+from robochoc.solver.encoding import UnsupportedError
+
+_LOOK_S = 0.2
+_TEAM, _FAMILY = "team", "family"
+_FEWEST = 2
+
+
+def build_compare(project: Project) -> None:
+    """Fill the current container with the page."""
+    ui.add_css(_style())
+    with ui.element("div"):
+        _heading("h1", "compare.title")
+        ui.label(say("compare.intro")).classes("soft")
+    if not project.sketch.robots or not project.sketch.decisions:
+        with ui.element("div").classes("panel"):
+            ui.label(say("compare.empty"))
+            ui.link(say("compare.empty-remedy"), f"/team/{project.id}/model")
+        return
+    ComparePage(project)
+
+
+class ComparePage:
+    """The page, as one tab shows it."""
+
+    def __init__(self, project: Project) -> None:
+        self._project = project
+        self._study = study_on(project)
+        self._sketch: Sketch | None = None
+        self._possible: Possible | None = None
+        self._boxes: dict[str, ui.checkbox] = {}
+        self._text: ui.label | None = None
+        self._start: ui.button | None = None
+        self._shown: object = None
+        self._progress_of: Facts | None = None
+        with ui.element("div").classes("compare"):
+            self._asked = ui.element("section").classes("panel compare-part")
+            self._told = ui.element("section").classes("compare-told").props("aria-live=polite")
+        self._looking = ui.timer(_LOOK_S, self._look)
+        while_shown(project.on_change(self._looking.activate))
+        while_shown(self._study.on_change(self._follow))
+        with self._asked:
+            ui.label(say("compare.looking")).classes("soft")
+        self._follow()
+
+    async def _look(self) -> None:
+        """Look what can be compared: of large teams that takes its time."""
+        self._looking.deactivate()
+        sketch = self._project.sketch
+        if sketch == self._sketch:
+            return
+        self._sketch = sketch
+        found = await run.io_bound(_looked_at, sketch)
+        if found is None or self._sketch is not sketch:
+            return
+        self._asked.clear()
+        self._boxes, self._text, self._start = {}, None, None
+        with self._asked:
+            if isinstance(found, str):
+                ui.label(say("compare.failed", message=found)).classes("error")
+            else:
+                self._possible = found
+                self._build_question(sketch, found)
+
+    # What is asked
+
+    def _build_question(self, sketch: Sketch, found: Possible) -> None:
+        last = self._study.facts.question if self._study.facts else None
+        names = [name for name, _ in found.protocols]
+        chosen = [name for name in last.protocols if name in names] if last else []
+        self._build_protocols(found, chosen if len(chosen) >= _FEWEST else [*found.usual])
+        self._build_problems(sketch, found.family, of_family=bool(last and last.family and found.family))
+        with ui.element("div").classes("compare-row"):
+            self._runs = _number("compare.runs", last.runs if last else 10, MOST_RUNS)
+            self._timeout = _number("compare.timeout", last.timeout if last else 20, MOST_SECONDS)
+        self._wrong = ui.label().classes("error").props("role=alert")
+        with ui.element("div").classes("compare-row"):
+            self._start = (
+                ui.button(say("compare.start"), on_click=self._begin, color=None)
+                .props("no-caps unelevated")
+                .classes("go")
+            )
+        self._build_study()
+        self._follow_start()
+
+    def _build_protocols(self, found: Possible, chosen: list[str]) -> None:
+        with ui.element("fieldset"):
+            with ui.element("legend"):
+                ui.label(say("compare.protocols"))
+            ui.label(say("compare.protocols-hint")).classes("soft small")
+            with ui.element("div").classes("compare-protocols"):
+                complete = "compare.costs-complete" if found.costs else "compare.complete"
+                for name, is_complete in found.protocols:
+                    box = ui.checkbox(name, value=name in chosen, on_change=self._show_study)
+                    box.props("dense").classes("protocol")
+                    with box:
+                        ui.tooltip(say(complete if is_complete else "compare.incomplete"))
+                    self._boxes[name] = box
+
+    def _build_problems(self, sketch: Sketch, family: Family | None, *, of_family: bool) -> None:
+        with ui.element("fieldset"):
+            with ui.element("legend"):
+                ui.label(say("compare.problems"))
+            kinds = {_TEAM: say("compare.team"), **({_FAMILY: say("compare.family")} if family else {})}
+            self._kind = ui.radio(kinds, value=_FAMILY if of_family else _TEAM, on_change=self._kind_chosen)
+            self._kind.props("dense inline")
+            self._hints = {
+                _TEAM: say("compare.team-ranked-hint" if sketch.is_ranked else "compare.team-hint"),
+                _FAMILY: say(family.key, **family.named) if family else "",
+            }
+            self._hint = ui.label(self._hints[self._kind.value]).classes("soft small")
+            if family is None:
+                ui.label(say("compare.family-none")).classes("soft small")
+
+    def _build_study(self) -> None:
+        with ui.element("details").classes("compare-study"):
+            with ui.element("summary"):
+                ui.label(say("compare.study"))
+            ui.label(say("compare.study-hint")).classes("soft small")
+            with ui.element("pre"):
+                self._text = ui.label()
+            copy = ui.button(say("compare.copy"), icon="content_copy", on_click=self._copy)
+            copy.props("no-caps flat dense")
+        self._show_study()
+
+    def _kind_chosen(self) -> None:
+        self._hint.set_text(self._hints[self._kind.value])
+        self._show_study()
+
+    def _question(self) -> Question:
+        return Question(
+            tuple(name for name, box in self._boxes.items() if box.value),
+            family=self._kind.value == _FAMILY,
+            runs=_within(self._runs.value, MOST_RUNS),
+            timeout=_within(self._timeout.value, MOST_SECONDS),
+        )
+
+    def _show_study(self) -> None:
+        if self._sketch is not None and self._possible is not None and self._text is not None:
+            self._text.set_text(study_of(self._sketch, self._question(), self._possible.family))
+
+    def _copy(self) -> None:
+        ui.clipboard.write(self._text.text if self._text else "")
+        ui.notify(say("compare.copied"))
+
+    def _begin(self) -> None:
+        question = self._question()
+        few = len(question.protocols) < _FEWEST
+        self._wrong.set_text(say("compare.few") if few else "")
+        if not few and self._sketch is not None:
+            self._study.start(self._sketch, question)
+
+    # What came of it
+
+    def _follow(self) -> None:
+        """Show how far it is, and what came of it."""
+        self._follow_start()
+        facts = self._study.facts
+        state = facts and (facts.stage, facts.done, facts.message, id(facts))
+        if state == self._shown:
+            return
+        self._shown = state
+        if facts is not None and facts is self._progress_of and facts.stage not in ENDED:
+            self._advance(facts)  # in place: a button that is made anew loses the click that is on its way
+            return
+        self._progress_of = None
+        self._told.clear()
+        with self._told:
+            if facts is not None:
+                self._show(facts)
+
+    def _follow_start(self) -> None:
+        if self._start is not None:
+            self._start.set_enabled(not self._study.running)
+            self._start.set_text(say("compare.again" if self._study.facts else "compare.start"))
+
+    def _show(self, facts: Facts) -> None:
+        match facts.stage:
+            case Stage.PREPARING | Stage.RUNNING | Stage.REPORTING:
+                self._show_progress(facts)
+            case Stage.STOPPED:
+                _message(say("compare.stopped", done=facts.done, total=facts.total))
+            case Stage.FAILED:
+                _message(say("compare.failed", message=facts.message), bad=True)
+            case Stage.DONE if self._study.report is not None:
+                show_lines(facts.lines)
+                self._show_report()
+            case Stage.DONE:
+                show_lines(facts.lines)
+                _message(say("compare.no-pictures", message=facts.message))
+
+    def _show_progress(self, facts: Facts) -> None:
+        with ui.element("div").classes("panel compare-part"):
+            self._words = ui.label()
+            self._bar = ui.linear_progress(show_value=False)
+            with ui.element("div").classes("compare-row"):
+                stop = ui.button(say("compare.stop"), icon="stop", on_click=self._study.stop)
+                stop.props("no-caps outline dense")
+        self._progress_of = facts
+        self._advance(facts)
+
+    def _advance(self, facts: Facts) -> None:
+        words = {
+            Stage.PREPARING: say("compare.preparing"),
+            Stage.RUNNING: say("compare.progress", done=facts.done, total=facts.total),
+            Stage.REPORTING: say("compare.reporting"),
+        }[facts.stage]
+        self._words.set_text(words)
+        self._bar.props["aria-label"] = words
+        self._bar.set_value(facts.done / max(facts.total, 1))
+
+    def _show_report(self) -> None:
+        with ui.element("div").classes("compare-head"):
+            _heading("h2", "compare.report")
+            link = ui.element("a").props(f"href={REPORT} target=_blank rel=noopener")
+            with link:
+                ui.label(say("compare.open"))
+        frame = ui.element("iframe").classes("compare-report")
+        frame.props(f"src={REPORT} sandbox=allow-same-origin").props["title"] = say("compare.report")
+
+
+def _looked_at(sketch: Sketch) -> Possible | str:
+    try:
+        return possible(sketch)
+    except (ModelError, InvalidInputError, UnsupportedError, ValueError) as mistake:
+        return str(mistake)
+
+
+def _message(text: str, *, bad: bool = False) -> None:
+    with ui.element("div").classes("panel"):
+        ui.label(text).classes("error" if bad else "")
+
+
+def _number(key: str, value: int, most: int) -> ui.number:
+    return ui.number(label=say(key), value=value, min=1, max=most, precision=0).props("dense outlined").classes("count")
+
+
+def _within(value: float | None, most: int) -> int:
+    return min(max(int(value or 1), 1), most)
+
+
+def _heading(tag: str, key: str) -> None:
+    with ui.element(tag):
+        ui.label(say(key))
+
+
+@cache
+def _style() -> str:
+    return (files(__package__) / "compare.css").read_text(encoding="utf-8")

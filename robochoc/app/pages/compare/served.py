@@ -1,0 +1,28 @@
+"""The report of a study, served as it is: a whole document, with a policy of its own, for a frame of the page."""
+
+from __future__ import annotations
+
+from fastapi import Response
+from fastapi.responses import FileResponse
+from nicegui import app
+
+from robochoc.app.projects import Projects
+from robochoc.app.studies.study import end_studies, study_on
+
+REPORT = "study/report.html"
+"""Its address, relative to the pages of its team."""
+
+
+def install_reports(projects: Projects) -> None:
+    """Install the address of reports, and end studies with the server."""
+    app.on_shutdown(end_studies)
+
+    @app.get("/team/{name}/" + REPORT)
+    async def report(name: str) -> Response:  # in the event loop, as all that opens teams: there is one of each
+        try:
+            file = study_on(projects.open(name)).report
+        except (KeyError, ValueError):
+            file = None
+        if file is None:
+            return Response(status_code=404)
+        return FileResponse(file, media_type="text/html", headers={"Content-Security-Policy": "frame-ancestors 'self'"})

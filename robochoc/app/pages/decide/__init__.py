@@ -1,0 +1,1 @@
+"""The page `decide` of a team."""

@@ -1,0 +1,111 @@
+"""No solution: who would have to step aside, and which rules are in each other's way, to be clicked away."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import partial
+
+import msgspec
+from nicegui import run, ui
+
+from robochoc.app.conflicts.found import Conflict, ConflictSearch, Finder
+from robochoc.app.pages.shell import told, while_shown
+from robochoc.app.projects import Project
+from robochoc.app.sketch.edits import EditError, with_rule, with_rule_switched
+from robochoc.app.sketch.sketch import MAX_COST, Sketch, SketchRule
+from robochoc.app.sketch.words import sentence
+from robochoc.app.texts import say
+
+_USUAL_COST = 10
+
+
+class Doors:
+    """The two doors out of a team without a solution.
+
+    `decide` lets the team decide again, with `withdraw` so that robots may step aside.
+    """
+
+    def __init__(self, project: Project, sketch: Sketch, decide: Callable[..., None]) -> None:
+        self._project, self._sketch, self._decide = project, sketch, decide
+        self._search: ConflictSearch | None = None
+        with ui.element("section").classes("panel doors"):
+            with ui.element("h2"):
+                ui.label(say("decide.doors"))
+            with ui.element("div").classes("two"):
+                self._door("decide.door-aside", partial(decide, withdraw=True))
+                self._door("decide.door-conflict", self._look)
+            self._found = ui.element("div").classes("found").props("aria-live=polite")
+        while_shown(self._end)
+
+    def _door(self, key: str, does: Callable[[], object]) -> None:
+        with ui.element("button").classes("card door").props("type=button").on("click", does):
+            with ui.element("h3"):
+                ui.label(say(key))
+            ui.label(say(f"{key}-help")).classes("soft")
+
+    def _end(self) -> None:
+        if self._search:
+            self._search.stop()
+
+    async def _look(self) -> None:
+        self._end()
+        self._search = ConflictSearch(self._sketch)
+        self._tell(say("decide.searching"))
+        conflict = await run.io_bound(self._search.found)
+        if conflict is not None and not self._found.is_deleted:
+            self._show(conflict)
+
+    def _tell(self, text: str) -> None:
+        self._found.clear()
+        with self._found:
+            ui.label(text)
+
+    def _show(self, conflict: Conflict) -> None:
+        if conflict.rules:
+            one = len(conflict.rules) == 1
+            self._tell(say("decide.conflict-one") if one else say("decide.conflict", count=len(conflict.rules)))
+            with self._found:
+                with ui.element("ul").classes("rules"):
+                    for name in conflict.rules:
+                        self._rule(name)
+                ui.label(say("decide.by-cpmpy" if conflict.finder is Finder.CPMPY else "decide.by-own")).classes("soft")
+        elif conflict.why:
+            self._tell(say("decide.conflict-failed", why=conflict.why))
+        elif conflict.late:
+            self._tell(say("decide.conflict-late"))
+        else:
+            self._tell(say("decide.conflict-none" if conflict.rules is None else "decide.conflict-empty"))
+
+    def _rule(self, name: str) -> None:
+        rule = self._sketch.rule(name)
+        if rule is None:
+            return
+        words = sentence(self._sketch, rule)
+        with ui.element("li"):
+            ui.label(words).classes("words")
+            with ui.element("div").classes("acts"):
+                off = ui.button(say("decide.off"), on_click=partial(self._switch_off, rule))
+                off.props("flat dense no-caps").props["aria-label"] = say("decide.off-one", rule=words)
+                cost = ui.number(value=_USUAL_COST, min=1, max=MAX_COST, precision=0).classes("cost")
+                cost.props("dense outlined").props["aria-label"] = say("decide.cost")
+                soften = ui.button(say("decide.soften"), on_click=lambda: self._soften(rule, cost.value))
+                soften.props("flat dense no-caps")
+                soften.props["aria-label"] = say("decide.soften-one", cost=_USUAL_COST, rule=words)
+
+    def _switch_off(self, rule: SketchRule) -> None:
+        self._change(lambda sketch: with_rule_switched(sketch, rule.id, on=False))
+
+    def _soften(self, rule: SketchRule, cost: float | None) -> None:
+        def softer(sketch: Sketch) -> Sketch:
+            now = sketch.rule(rule.id)  # as it is by now: somebody may have changed or removed it
+            return sketch if now is None else with_rule(sketch, msgspec.structs.replace(now, cost=int(cost or 0)))
+
+        self._change(softer)
+
+    def _change(self, change: Callable[[Sketch], Sketch]) -> None:
+        try:
+            self._project.edit(change)
+        except EditError as error:
+            ui.notify(told(error), type="negative")
+        else:
+            self._decide()

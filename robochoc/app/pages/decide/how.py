@@ -1,0 +1,79 @@
+"""How a team decides: protocol, runtime, seed and time limit, folded away below the button."""
+
+from __future__ import annotations
+
+from nicegui import run, ui
+
+from robochoc.app.projects import Project
+from robochoc.app.runs.fitting import Fitting, fitting
+from robochoc.app.runs.options import MAX_SEED, RunOptions
+from robochoc.app.sketch.sketch import MAX_LABEL
+from robochoc.app.texts import say
+from robochoc.run.defaults import AUTO
+from robochoc.run.options import Runtime
+from robochoc.solver.encoding import UnsupportedError
+
+_MOST_REASONS = 12
+
+
+class How:
+    """The options, folded. `options` are those that are set."""
+
+    def __init__(self, project: Project) -> None:
+        self._project = project
+        self._looked_at: object = None
+        with ui.expansion(say("decide.how"), on_value_change=self._look).classes("how") as self._fold:
+            with ui.element("div").classes("fields"):
+                self._protocol = ui.select({AUTO: say("decide.auto")}, value=AUTO, label=say("decide.protocol"))
+                names = {Runtime.SIMULATOR: "simulator", Runtime.PROCESSES: "processes"}
+                choices = {str(key): say(f"decide.{name}-help") for key, name in names.items()}
+                self._runtime = ui.select(choices, value=str(Runtime.SIMULATOR), label=say("decide.runtime"))
+                self._seed = ui.number(say("decide.seed"), value=0, min=0, max=MAX_SEED, precision=0)
+                self._limit = ui.number(say("decide.limit-s"), min=0.1, placeholder=say("decide.no-limit"))
+            self._why = ui.element("div").classes("why")
+
+    def options(self, *, withdraw: bool = False, scene: bool = False) -> RunOptions:
+        """Return what is set. What cannot be is left to the usual."""
+        limit, seed = self._limit.value, self._seed.value
+        return RunOptions(
+            protocol=str(self._protocol.value or AUTO)[:MAX_LABEL],
+            runtime=str(Runtime(self._runtime.value or Runtime.SIMULATOR)),
+            seed=int(min(max(seed or 0, 0), MAX_SEED)),
+            timeout=float(limit) if limit and limit > 0 else None,
+            withdraw=withdraw,
+            scene=scene,
+        )
+
+    async def _look(self) -> None:
+        """Find out which protocols fit, when it is unfolded and the team is another than before."""
+        sketch = self._project.sketch
+        if not self._fold.value or self._looked_at is sketch:
+            return
+        self._looked_at = sketch
+        self._tell(say("decide.looking"))
+        try:
+            found = await run.io_bound(fitting, sketch)
+        except (ValueError, UnsupportedError) as misfit:
+            self._tell(say("decide.fits-none", why=str(misfit)))
+            return
+        if found is not None:  # the server is about to end
+            self._show(found)
+
+    def _tell(self, text: str) -> None:
+        self._why.clear()
+        with self._why:
+            ui.label(text).classes("soft")
+
+    def _show(self, found: Fitting) -> None:
+        words = {True: "decide.complete", False: "decide.incomplete"}
+        fit = {name: say(words[complete], name=name) for name, complete in found.protocols}
+        chosen = self._protocol.value if self._protocol.value in fit else AUTO
+        self._protocol.set_options({AUTO: say("decide.auto"), **fit}, value=chosen)
+        self._tell(say("decide.auto-would", protocol=found.chosen, why=found.why))
+        with self._why:
+            ui.label("; ".join(found.facts)).classes("soft")
+            if found.rejected:
+                with ui.expansion(say("decide.not-others")), ui.element("ul"):
+                    for name, why in found.rejected[:_MOST_REASONS]:
+                        with ui.element("li"):
+                            ui.label(say("decide.not-one", name=name, why=why)).classes("soft")

@@ -1,0 +1,226 @@
+"""The page `decide` of a team: one button; what the robots say to each other; the answer in words."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import cache, partial
+from importlib.resources import files
+
+from nicegui import run as background
+from nicegui import ui
+
+from robochoc.app.pages.decide.answer import headline, table_html, took
+from robochoc.app.pages.decide.conflict import Doors
+from robochoc.app.pages.decide.how import How
+from robochoc.app.pages.decide.picture import falling_svg, team_svg, values_of
+from robochoc.app.pages.shell import while_shown
+from robochoc.app.projects import Project
+from robochoc.app.runs.paid import paid
+from robochoc.app.runs.result import RunResult
+from robochoc.app.runs.run import Run, State
+from robochoc.app.runs.runs import runs_of
+from robochoc.app.sketch.checks import troubles
+from robochoc.app.sketch.sketch import Kind, Sketch, Value
+from robochoc.app.sketch.words import sentence
+from robochoc.app.texts import say
+
+_FLYING = frozenset({Kind.LEVEL, Kind.PLACE})
+PURPOSE = "decide"
+
+
+def build_decide(project: Project) -> None:
+    """Fill the current container with the page."""
+    ui.add_css(_style())
+    _Page(project)
+
+
+class _Page:
+    """What one browser tab shows of a team that decides."""
+
+    def __init__(self, project: Project) -> None:
+        self._project, self._runs = project, runs_of(project)
+        self._run: Run | None = None
+        self._end_following: Callable[[], None] | None = None
+        self._answered: tuple[object, ...] = ()
+        with ui.element("h1"):
+            ui.label(say("decide.title"))
+        with ui.element("section").classes("decide-top"):
+            with ui.element("div").classes("go"):
+                self._go = ui.button(say("decide.button"), on_click=self._press, color=None)
+                self._go.props("unelevated no-caps size=lg")
+                self._status = ui.label("").classes("status").props("role=status")
+                self._facts = ui.label("").classes("soft facts")
+            self._not_ready = ui.element("div").classes("not-ready")
+            self._how = How(project)
+        with ui.element("div").classes("decide-body"):
+            with ui.element("section").classes("panel team-picture"):
+                self._picture = ui.html("", sanitize=False)
+                self._falling = ui.html("", sanitize=False).classes("cost-line")
+            self._answer = ui.element("section").classes("panel answer")
+        self._below = ui.element("div").classes("decide-below")
+        while_shown(project.on_change(self._follow_team))
+        while_shown(self._runs.on_start(self._follow_latest))
+        while_shown(self._end)
+        self._follow_latest()
+        self._follow_team()
+
+    # What happens
+
+    def _press(self) -> None:
+        if self._run is not None and self._run.state is State.RUNNING:
+            self._run.stop()
+            self._go.set_text(say("decide.stopping"))
+            self._go.disable()
+        else:
+            self._decide()
+
+    def _decide(self, *, withdraw: bool = False) -> None:
+        sketch = self._project.sketch
+        flies = any(decision.kind in _FLYING for decision in sketch.decisions)
+        self._runs.start(self._how.options(withdraw=withdraw, scene=flies), purpose=PURPOSE)
+
+    def _follow_latest(self) -> None:
+        """Show the run that was started last, perhaps in another tab."""
+        self._end()
+        self._run = self._runs.latest_for(PURPOSE)
+        self._end_following = self._run.on_change(self._show) if self._run else None
+        self._show()
+
+    def _end(self) -> None:
+        if self._end_following:
+            self._end_following()
+
+    def _follow_team(self) -> None:
+        """Say what keeps the team from deciding, or that it is another than the one that has decided."""
+        errors = [trouble for trouble in troubles(self._project.sketch) if trouble.is_error]
+        self._not_ready.clear()
+        if errors:
+            with self._not_ready:
+                ui.label(say("decide.not-ready")).classes("error")
+                with ui.element("ul"):
+                    for trouble in errors[:3]:
+                        with ui.element("li"):
+                            ui.label(f"{trouble.text} {trouble.remedy}")
+                ui.link(say("decide.to-model"), f"/team/{self._project.id}/model")
+        running = self._run is not None and self._run.state is State.RUNNING
+        self._go.set_enabled(running or not errors)
+        self._show()
+
+    # What is shown
+
+    def _show(self) -> None:
+        shown, sketch = self._run, self._sketch()
+        running = shown is not None and shown.state is State.RUNNING
+        self._show_button(running=running)
+        self._show_live(shown, sketch)
+        changed = shown is not None and sketch != self._project.sketch
+        now = (shown, shown and shown.state, shown and shown.result, changed)
+        if now != self._answered:
+            self._answered = now
+            self._show_answer(shown, sketch, changed=changed)
+
+    def _sketch(self) -> Sketch:
+        try:
+            return self._run.sketch if self._run else self._project.sketch
+        except (OSError, ValueError):  # its files are damaged
+            return self._project.sketch
+
+    def _show_button(self, *, running: bool) -> None:
+        if running and self._go.text != say("decide.stopping"):
+            self._go.set_text(say("decide.stop"))
+            self._go.enable()
+        elif not running:
+            self._go.set_text(say("decide.again" if self._run else "decide.button"))
+            self._go.set_enabled(not any(self._not_ready))
+        self._status.set_text(say("decide.running") if running else "")
+
+    def _show_live(self, shown: Run | None, sketch: Sketch) -> None:
+        if shown is None:
+            self._picture.set_content(team_svg(sketch, {}))
+            return
+        live, result = shown.live, shown.result
+        running = shown.state is State.RUNNING
+        values: dict[str, Value] = {}
+        for some in [*live.values.values()]:
+            values |= some
+        if result is not None:
+            values = result.assignment
+        unsettled = frozenset(robot.name for robot in sketch.robots if result is None and not live.settled(robot.name))
+        aside = frozenset(result.withdrawn if result else ())
+        spoken = dict(live.recent) if running else {}
+        picture = team_svg(sketch, values_of(sketch, values), unsettled=unsettled, aside=aside, spoken=spoken)
+        self._picture.set_content(picture)
+        self._falling.set_content(falling_svg([*live.costs]))
+        facts = [say("decide.live", messages=f"{live.messages:,}", seconds=f"{shown.seconds:.0f}")] if running else []
+        if running and live.costs:
+            facts.append(say("decide.best-now", cost=f"{live.costs[-1][1]:g}"))
+        self._facts.set_text(" · ".join(facts))
+
+    def _show_answer(self, shown: Run | None, sketch: Sketch, *, changed: bool) -> None:
+        self._answer.clear()
+        self._below.clear()
+        with self._answer:
+            if shown is None:
+                ui.label(say("decide.nothing")).classes("soft")
+                return
+            if shown.state is State.RUNNING and shown.result is None:
+                ui.label(say("decide.running")).classes("soft")
+                return
+            with ui.element("h2").classes("headline").props("aria-live=polite"):
+                ui.label(headline(shown))
+            if shown.result is None:
+                return
+            ui.label(took(shown)).classes("soft")
+            if shown.message and shown.state is State.ENDED:
+                ui.label(say("decide.beside", why=shown.message)).classes("error")
+            if why := shown.result.chosen.get("protocol"):
+                ui.label(say("decide.why-chosen", protocol=shown.result.protocol, why=why)).classes("soft")
+            if changed:
+                ui.label(say("decide.changed")).classes("changed")
+            if shown.result.assignment:
+                ui.html(table_html(sketch, shown.result), sanitize=False).classes("values")
+        with self._below:
+            if shown.result.verdict == "no-solution":
+                Doors(self._project, sketch, self._decide)
+            if shown.result.assignment:
+                costs = ui.element("div")
+                ui.timer(0, partial(self._show_costs, costs, sketch, shown.result), once=True)
+            _command(shown)
+
+    async def _show_costs(self, where: ui.element, sketch: Sketch, result: RunResult) -> None:
+        costs = await background.io_bound(paid, sketch, result.assignment)
+        if not costs or where.is_deleted:
+            return
+        with where, ui.element("section").classes("panel"):
+            with ui.element("h2"):
+                ui.label(say("decide.costs"))
+            with ui.element("ul").classes("rules"):
+                for name, cost in sorted(costs.items(), key=lambda one: -one[1]):
+                    rule = sketch.rule(name)
+                    if rule is not None:
+                        with ui.element("li"):
+                            ui.label(sentence(sketch, rule)).classes("words")
+                            says = say("decide.rule-paid", cost=f"{cost:g}") if cost else say("decide.rule-kept")
+                            ui.label(says).classes("cost-paid" if cost else "soft")
+
+
+def _command(shown: Run) -> None:
+    with ui.element("section").classes("panel command"):
+        with ui.element("h2"):
+            ui.label(say("decide.command"))
+        ui.label(say("decide.command-where", folder=str(shown.folder))).classes("soft")
+        with ui.element("div").classes("line"):
+            with ui.element("pre").props("tabindex=0"):
+                ui.label(shown.command)
+            copy = ui.button(icon="content_copy", on_click=lambda: _copy(shown.command)).props("flat round dense")
+            copy.props["aria-label"] = say("decide.copy")
+
+
+def _copy(command: str) -> None:
+    ui.clipboard.write(command)
+    ui.notify(say("decide.copied"))
+
+
+@cache
+def _style() -> str:
+    return (files(__package__) / "decide.css").read_text(encoding="utf-8")

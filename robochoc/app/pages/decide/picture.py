@@ -1,0 +1,137 @@
+"""A team that decides, as an SVG: what each has decided so far, and who has spoken in the last second."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from html import escape
+
+from robochoc.app.sketch.sketch import Cell, Decision, Kind, Sketch, Value
+from robochoc.app.texts import say
+
+UNIT = 56
+"""The size of a cell."""
+MOST_MESSAGES = 200
+"""Lines between robots that have spoken. With more, nobody sees them apart."""
+MOST_NAMED = 60
+"""Of more robots, only the values are written."""
+_BRIEF = 12
+_FEW_LETTERS = 3
+_HALF = 19
+"""Half the height of what stands for a robot."""
+Says = Mapping[str, str]
+
+
+def values_of(sketch: Sketch, assignment: Mapping[str, Value]) -> dict[str, str]:
+    """Return what each robot has decided, in short, by its name: places as column and row."""
+    said: dict[str, list[str]] = {}
+    for decision in sketch.decisions:
+        for robot in sketch.deciders(decision):
+            value = assignment.get(f"{robot}.{decision.name}")
+            if value is not None:
+                said.setdefault(robot, []).append(_short(sketch, decision, value))
+    return {robot: " · ".join(values) for robot, values in said.items()}
+
+
+def _short(sketch: Sketch, decision: Decision, value: Value) -> str:
+    if decision.kind is Kind.PLACE and isinstance(value, int):
+        cell = sketch.area.cell(value)
+        return f"({cell.x + 1}, {cell.y + 1})"
+    return str(value)
+
+
+def team_svg(
+    sketch: Sketch,
+    says: Says,
+    *,
+    unsettled: frozenset[str] = frozenset(),
+    aside: frozenset[str] = frozenset(),
+    spoken: Mapping[tuple[str, str], int] = {},
+) -> str:
+    """Return the picture. All that users have named is escaped in it.
+
+    Args:
+        sketch: The team.
+        says: What stands at each robot.
+        unsettled: Whose values may still change: they are grey.
+        aside: Who steps aside.
+        spoken: How many messages went from whom to whom in the last second.
+    """
+    where = _places(sketch)
+    left = min((x for x, _ in where.values()), default=0) - UNIT
+    right = max((x for x, _ in where.values()), default=0) + UNIT
+    top = min((y for _, y in where.values()), default=0) - UNIT * 0.7
+    bottom = max((y for _, y in where.values()), default=0) + UNIT * 0.9
+    parts = [*_messages(where, spoken), *_robots(where, says, unsettled, aside)]
+    label = say("decide.picture", count=len(where))
+    return (
+        f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="{left:.0f} {top:.0f} {right - left:.0f} {bottom - top:.0f}" '
+        f'role="img" aria-label="{escape(label)}">{"".join(parts)}</svg>'
+    )
+
+
+def _places(sketch: Sketch) -> dict[str, tuple[float, float]]:
+    """Return where each robot is drawn: columns and rows in which nobody stands are left out.
+
+    Those in one cell stand beside each other.
+    """
+    columns = {x: place for place, x in enumerate(sorted({robot.at.x for robot in sketch.robots}))}
+    rows = {y: place for place, y in enumerate(sorted({robot.at.y for robot in sketch.robots}))}
+    taken: dict[Cell, int] = {}
+    where: dict[str, tuple[float, float]] = {}
+    for robot in sketch.robots:
+        beside = taken[robot.at] = taken.get(robot.at, -1) + 1
+        x, y = columns[robot.at.x] * UNIT * 1.5, -rows[robot.at.y] * UNIT * 1.3
+        where[robot.name] = x + beside * UNIT * 0.4, y + beside * 8
+    return where
+
+
+def _messages(where: Mapping[str, tuple[float, float]], spoken: Mapping[tuple[str, str], int]) -> Iterator[str]:
+    most = sorted(spoken.items(), key=lambda one: -one[1])[:MOST_MESSAGES]
+    for (sender, receiver), count in most:
+        if sender in where and receiver in where:
+            (x, y), (to_x, to_y) = where[sender], where[receiver]
+            bend_x, bend_y = (x + to_x) / 2 - (to_y - y) * 0.12, (y + to_y) / 2 + (to_x - x) * 0.12
+            width = min(4.0, 1 + count**0.5 / 4)
+            yield f'<path class="said" d="M{x:.0f} {y:.0f}Q{bend_x:.0f} {bend_y:.0f} {to_x:.0f} {to_y:.0f}" '
+            yield f'stroke-width="{width:.1f}"/>'
+
+
+def _robots(
+    where: Mapping[str, tuple[float, float]], says: Says, unsettled: frozenset[str], aside: frozenset[str]
+) -> Iterator[str]:
+    named = len(where) <= MOST_NAMED
+    for robot, (x, y) in where.items():
+        kind = "aside" if robot in aside else "unsettled" if robot in unsettled or robot not in says else "settled"
+        says_now = _brief(says.get(robot, "?" if robot not in aside else "-"))
+        few = len(says_now) <= _FEW_LETTERS
+        width = 2 * _HALF if few else max(2 * _HALF, 6.4 * len(says_now) + 16)
+        size = 15 if few else 11
+        yield f'<g class="{kind}"><rect x="{x - width / 2:.0f}" y="{y - _HALF:.0f}" width="{width:.0f}" '
+        yield f'height="{2 * _HALF}" rx="{_HALF}"/>'
+        yield f'<text class="value" x="{x:.0f}" y="{y + size * 0.36:.1f}" font-size="{size}">{escape(says_now)}</text>'
+        if named:
+            yield f'<text class="who" x="{x:.0f}" y="{y + 33:.0f}">{escape(_brief(robot))}</text>'
+        yield f"<title>{escape(robot)}: {escape(says.get(robot, '?'))}</title></g>"
+
+
+def _brief(text: str) -> str:
+    return text if len(text) <= _BRIEF else f"{text[: _BRIEF - 1]}…"
+
+
+def falling_svg(costs: list[tuple[float, float]]) -> str:
+    """Return how the cost has fallen, as a small line; empty without at least two points."""
+    if len(costs) < 2:  # noqa: PLR2004 - a line
+        return ""
+    first, last = costs[0][0], costs[-1][0]
+    low, high = costs[-1][1], max(cost for _, cost in costs)
+    width, height = 240, 48
+    across, along = max(last - first, 1e-9), max(high - low, 1e-9)
+    path = ""
+    for time_s, cost in costs:
+        x, y = (time_s - first) / across * width, height - (cost - low) / along * height
+        path += f"H{x:.1f}V{y:.1f}" if path else f"M{x:.1f} {y:.1f}"
+    return (
+        f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="-3 -3 {width + 6} {height + 6}" role="img" '
+        f'aria-label="{escape(say("decide.falling", first=f"{costs[0][1]:g}", last=f"{low:g}"))}">'
+        f'<path class="falling" d="{path}"/></svg>'
+    )

@@ -1,0 +1,1 @@
+"""The page `fly` of a team."""

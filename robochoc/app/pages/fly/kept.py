@@ -1,0 +1,94 @@
+"""What a run has left, served as it is: its pages for frames of this application, and files to be saved.
+
+/team/ID/kept/RUN/flight.html, conversation.html      whole documents, with policies of their own
+/team/ID/kept/RUN/report.html, flight.mcap, team.zip, state.zip
+"""
+
+from __future__ import annotations
+
+import asyncio
+from pathlib import Path
+
+from fastapi import Response
+from fastapi.responses import FileResponse
+from nicegui import app
+
+from robochoc import __version__
+from robochoc.app.flights.making import CONVERSATION, FLIGHT, RECORDING
+from robochoc.app.flights.names import file_name
+from robochoc.app.flights.report import Pages, report
+from robochoc.app.flights.state import packed, team_archive
+from robochoc.app.projects import Projects
+from robochoc.app.runs.run import Run
+from robochoc.app.runs.runs import runs_of
+from robochoc.formats import InvalidInputError
+
+REPORT = "report.html"
+TEAM = "team.zip"
+STATE = "state.zip"
+MOST_IN_REPORT = 24 << 20
+"""Bytes of a page that a report contains: with a larger one it could hardly be sent to anybody."""
+_HEADERS = {"Content-Security-Policy": "frame-ancestors 'self'"}
+
+
+def address(team: str, run: Run, file: str) -> str:
+    """Return where a file of a run is, below the application's own address."""
+    return f"/team/{team}/kept/{run.id}/{file}"
+
+
+def beside(run: Run, file: str) -> str:
+    """Return the same as a relative address, for pages of the team: frames and links that scripts set need it."""
+    return f"kept/{run.id}/{file}"
+
+
+def install_kept(projects: Projects) -> None:
+    """Install the addresses of files."""
+
+    @app.get("/team/{name}/kept/{number}/{file}")
+    async def kept(name: str, number: str, file: str) -> Response:
+        try:
+            run = runs_of(projects.open(name)).find(number)
+        except (KeyError, ValueError):
+            run = None
+        if run is None:
+            return Response(status_code=404)
+        if file in {FLIGHT, CONVERSATION}:
+            return _page(run.artefact(file))
+        try:
+            return await asyncio.to_thread(_made, run, file)
+        except InvalidInputError as mistakes:
+            return Response(str(mistakes), status_code=409, media_type="text/plain")
+        except (OSError, ValueError):
+            return Response(status_code=404)
+
+
+def _page(file: Path | None) -> Response:
+    return Response(status_code=404) if file is None else FileResponse(file, media_type="text/html", headers=_HEADERS)
+
+
+def _made(run: Run, file: str) -> Response:
+    """Return a file that is made when somebody asks for it, or a recording. It takes its time."""
+    sketch = run.sketch
+    match file:
+        case "report.html":
+            content = report(sketch, run, Pages(_content(run, FLIGHT), _content(run, CONVERSATION)), __version__)
+            return Response(content, media_type="text/html", headers=_HEADERS)
+        case "team.zip":
+            return _saved(team_archive(run), "application/zip", file_name(sketch.name, ".zip"))
+        case "state.zip":
+            return _saved(packed(run), "application/zip", file_name(sketch.name, ".robochoc.zip"))
+        case "flight.mcap" if recording := run.artefact(RECORDING):
+            return FileResponse(
+                recording, media_type="application/octet-stream", filename=file_name(sketch.name, ".mcap")
+            )
+        case _:
+            return Response(status_code=404)
+
+
+def _saved(content: bytes, kind: str, name: str) -> Response:
+    return Response(content, media_type=kind, headers={"Content-Disposition": f'attachment; filename="{name}"'})
+
+
+def _content(run: Run, name: str) -> bytes | None:
+    file = run.artefact(name)
+    return file.read_bytes() if file and file.stat().st_size <= MOST_IN_REPORT else None

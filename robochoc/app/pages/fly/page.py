@@ -1,0 +1,210 @@
+"""The page `fly` of a team: its flight, its conversation, and what can be handed on."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import cache
+from importlib.resources import files
+
+from nicegui import ui
+
+from robochoc.app.flights.making import CONVERSATION, FLIGHT, MOST_MESSAGES, Making, Stage, flies, making_of
+from robochoc.app.flights.report import summary
+from robochoc.app.pages.fly.kept import beside
+from robochoc.app.pages.fly.stage import Stage as Frames
+from robochoc.app.pages.fly.tell import build_tell
+from robochoc.app.pages.shell import while_shown
+from robochoc.app.projects import Project
+from robochoc.app.runs.run import Run, State
+from robochoc.app.runs.runs import runs_of
+from robochoc.app.sketch.sketch import Sketch
+from robochoc.app.texts import say
+
+_TICK_S = 0.5
+
+
+def build_fly(project: Project) -> None:
+    """Fill the current container with the page."""
+    ui.add_css(_style())
+    _Page(project)
+
+
+class _Page:
+    """The page, which follows the run that it shows; without `?run=`, that is the last one."""
+
+    def __init__(self, project: Project) -> None:
+        self._project = project
+        self._runs = runs_of(project)
+        request = ui.context.client.request
+        self._asked = request.query_params.get("run", "") if request else ""
+        self._shown: tuple[str, State] | None = None
+        self._leave: Callable[[], None] = _nothing
+        self._body = ui.element("div").classes("fly")
+        self._follow()
+        while_shown(self._runs.on_start(self._follow))
+        while_shown(self._left)
+
+    def _left(self) -> None:
+        self._leave()
+
+    def _run(self) -> Run | None:
+        return (self._runs.find(self._asked) if self._asked else None) or self._runs.latest_for("decide")
+
+    def _follow(self) -> None:
+        """Show the run as it is now, where that is not what is shown."""
+        run = self._run()
+        shown = (run.id, run.state) if run else None
+        if shown == self._shown and shown is not None:
+            return
+        self._leave()
+        self._leave = run.on_change(self._follow) if run and run.state is State.RUNNING else _nothing
+        self._shown = shown
+        self._body.clear()
+        with self._body:
+            self._build(run)
+
+    def _build(self, run: Run | None) -> None:
+        if run is None:
+            _told("fly.nothing", "fly.nothing-remedy", "fly.to-decide", f"/team/{self._project.id}/decide")
+            return
+        try:
+            sketch = run.sketch
+        except (OSError, ValueError) as damaged:
+            _title()
+            ui.label(say("fly.damaged", why=damaged)).classes("error")
+            return
+        if run.state is State.RUNNING:
+            _title()
+            with ui.row(align_items="center").props("role=status"):
+                ui.spinner(size="1.4rem")
+                ui.label(say("fly.running"))
+        elif run.state is State.FAILED:
+            why = say("fly.failed", why=run.message)
+            _told(why, "fly.nothing-remedy", "fly.to-decide", f"/team/{self._project.id}/decide")
+        else:
+            self._result(run, sketch)
+
+    def _result(self, run: Run, sketch: Sketch) -> None:
+        with ui.element("div").classes("fly-head"):
+            with ui.element("div"):
+                _title()
+                ui.label(summary(sketch, run)).classes("soft")
+            self._choice(run)
+        if sketch != self._project.sketch:
+            ui.label(say("fly.old")).classes("note")
+        making = making_of(run)
+        if not flies(sketch):
+            _note("fly.no-places", "fly.no-places-remedy", "fly.to-model", f"/team/{self._project.id}/model")
+        elif not making.has_answer:
+            ui.label(say("fly.no-answer")).classes("note")
+        shown = _Made(making)
+        build_tell(making, shown.frames)
+        self._leave = shown.leave
+
+    def _choice(self, run: Run) -> None:
+        """Let earlier runs be chosen, where there are some."""
+        runs = [one for one in self._runs.all() if one.state in {State.ENDED, State.STOPPED}]
+        if len(runs) < 2:  # noqa: PLR2004 - nothing to choose
+            return
+        options = {one.id: say("fly.run", number=int(one.id), summary=_verdict(one)) for one in runs}
+
+        def choose(name: str) -> None:
+            ui.navigate.to(f"/team/{self._project.id}/fly?run={name}")
+
+        select = ui.select(options, value=run.id, on_change=lambda event: choose(event.value), label=say("fly.choose"))
+        select.props("dense outlined").classes("fly-choice")
+
+
+class _Made:
+    """The frames of a run, which appear as soon as they are made, and what is said until then."""
+
+    def __init__(self, making: Making) -> None:
+        self._making = making
+        self._line = ui.element("div").classes("fly-line").props("role=status")
+        with self._line:
+            self._spinner = ui.spinner(size="1.4rem")
+            self._says = ui.label("")
+            self._cancel = ui.button(say("fly.cancel"), on_click=self._stop).props("flat no-caps dense")
+            self._again = ui.button(say("fly.again"), on_click=self._begin).props("flat no-caps dense")
+        self._troubles = ui.element("div")
+        self.frames = Frames(flies=making.has_flight, talks=making.has_conversation)
+        self._timer = ui.timer(_TICK_S, self._tell_time)
+        self._release: Callable[[], None] = _nothing
+        self._begin()
+
+    def leave(self) -> None:
+        """Nobody looks any more."""
+        self._release()
+
+    def _begin(self) -> None:
+        self._release()
+        self._release = self._making.wanted(self._told)
+        self._told()
+
+    def _stop(self) -> None:
+        self._making.cancel()
+        self._told()
+
+    def _told(self) -> None:
+        making, stage = self._making, self._making.stage
+        works = stage in {Stage.FLIGHT, Stage.CONVERSATION}
+        self._line.set_visibility(stage is not Stage.DONE)
+        self._spinner.set_visibility(works)
+        self._cancel.set_visibility(works)
+        self._again.set_visibility(stage is Stage.WAITING)
+        self._timer.active = works
+        self._tell_time()
+        flight = beside(making.run, FLIGHT) if making.flight else None
+        talk = beside(making.run, CONVERSATION) if making.conversation else None
+        self.frames.show(flight, talk)
+        self.frames.set_visibility(making.has_flight or making.has_conversation)
+        self._troubles.clear()
+        with self._troubles:
+            for place, why in making.troubles.items():
+                ui.label(say(f"fly.trouble.{place}", why=why)).classes("error")
+            if making.is_cut and talk:
+                ui.label(say("fly.cut", most=f"{MOST_MESSAGES:,}")).classes("soft")
+
+    def _tell_time(self) -> None:
+        stage = self._making.stage
+        if stage is Stage.WAITING:
+            self._says.set_text(say("fly.cancelled"))
+        elif stage is not Stage.DONE:
+            self._says.set_text(say(f"fly.making.{stage}", seconds=int(self._making.seconds)))
+
+
+def _nothing() -> None:
+    pass
+
+
+def _title() -> None:
+    with ui.element("h1"):
+        ui.label(say("fly.title"))
+
+
+def _verdict(run: Run) -> str:
+    return run.result.verdict if run.result else say("report.no-answer")
+
+
+def _told(what: str, remedy: str, link: str, address: str) -> None:
+    """Say what keeps the page from being filled, and where to go."""
+    _title()
+    ui.label(say(what) if what.startswith("fly.") else what)
+    _remedy(remedy, link, address)
+
+
+def _note(what: str, remedy: str, link: str, address: str) -> None:
+    with ui.element("div").classes("note"):
+        ui.label(say(what))
+        _remedy(remedy, link, address)
+
+
+def _remedy(remedy: str, link: str, address: str) -> None:
+    with ui.element("p"):
+        ui.label(say(remedy)).classes("soft")
+    ui.link(say(link), address)
+
+
+@cache
+def _style() -> str:
+    return (files(__package__) / "fly.css").read_text(encoding="utf-8")

@@ -1,0 +1,100 @@
+"""The part "Tell others": a report, a recording, the team's files, all of it, and a link."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+
+from nicegui import ui
+
+from robochoc.app.flights.making import RECORDING, CannotMakeError, Making, can_record, flies
+from robochoc.app.flights.names import file_name
+from robochoc.app.pages.fly.kept import REPORT, STATE, TEAM, beside
+from robochoc.app.pages.fly.stage import Stage
+from robochoc.app.texts import say
+
+
+def build_tell(making: Making, stage: Stage | None) -> None:
+    """Fill the current container."""
+    run = making.run
+    name = run.sketch.name
+    with ui.element("section").classes("tell").props("aria-labelledby=tell-title"):
+        with ui.element("h2").props("id=tell-title"):
+            ui.label(say("tell.title"))
+        with ui.element("ul").classes("cards"):
+            with _card("tell.report", "tell.report-hint"):
+                _link(say("tell.get"), "tell.report", beside(run, REPORT), file_name(name, ".html"))
+                _link(say("tell.report-open"), "tell.report", beside(run, REPORT))
+            _recording(making)
+            with _card("tell.team", "tell.team-hint"):
+                _link(say("tell.get"), "tell.team", beside(run, TEAM), file_name(name, ".zip"))
+            with _card("tell.state", "tell.state-hint"):
+                _link(say("tell.get"), "tell.state", beside(run, STATE), file_name(name, ".robochoc.zip"))
+            with _card("tell.link", "tell.link-hint"):
+                _copy(run.id, stage)
+
+
+def _recording(making: Making) -> None:
+    with _card("tell.recording", "tell.recording-hint"):
+        if not making.has_answer or not flies(making.run.sketch):
+            ui.label(say("tell.recording-nothing")).classes("soft")
+        elif not can_record():
+            ui.label(say("tell.recording-missing")).classes("soft")
+        else:
+            button = _button("tell.get", "tell.recording")
+
+            async def record() -> None:
+                button.props("loading")
+                try:
+                    await making.recording()
+                except (CannotMakeError, OSError, ValueError) as why:
+                    ui.notify(say("tell.not-made", why=why), type="negative")
+                else:
+                    ui.run_javascript(f"location.assign({json.dumps(beside(making.run, RECORDING))})")
+                finally:
+                    button.props(remove="loading")
+
+            button.on_click(record)
+
+
+def _copy(run: str, stage: Stage | None) -> None:
+    address = json.dumps(f"fly?run={run}")
+    there = f"getElement({stage.id}).link({address})" if stage else f"new URL({address}, location.href).href"
+    button = _button("tell.copy", "tell.link", lambda: ui.notify(say("tell.copied")))
+    button.on("click", js_handler=f"() => navigator.clipboard?.writeText({there})")
+
+
+class _card:  # noqa: N801 - a context manager, as NiceGUI's are
+    """A card with a title and a hint; inside, what can be done."""
+
+    def __init__(self, title: str, hint: str) -> None:
+        with ui.element("li").classes("card told"):
+            with ui.element("h3"):
+                ui.label(say(title))
+            ui.label(say(hint)).classes("soft")
+            self._does = ui.element("div").classes("does")
+
+    def __enter__(self) -> None:
+        self._does.__enter__()
+
+    def __exit__(self, *_: object) -> None:
+        self._does.__exit__()
+
+
+def _link(text: str, what: str, address: str, saved_as: str | None = None) -> None:
+    """Add a link that looks like a button. With `saved_as`, the file is saved, else it is opened in a tab."""
+    link = ui.element("a").classes("button")
+    link._props["href"] = address  # noqa: SLF001 - `props` would parse it
+    link._props["aria-label"] = f"{say(what)}: {text}"  # noqa: SLF001
+    if saved_as:
+        link._props["download"] = saved_as  # noqa: SLF001
+    else:
+        link.props("target=_blank rel=noopener")
+    with link:
+        ui.label(text)
+
+
+def _button(key: str, what: str, does: Callable[[], object] | None = None) -> ui.button:
+    button = ui.button(say(key), on_click=does).props("flat no-caps dense").classes("button")
+    button._props["aria-label"] = f"{say(what)}: {say(key)}"  # noqa: SLF001 - `props` would parse it
+    return button

@@ -1,0 +1,111 @@
+"""The first page: examples, a file, an empty map, and the user's own teams."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from contextlib import suppress
+from functools import partial
+
+from nicegui import ui
+
+from robochoc.app.pages.opening import build_opening
+from robochoc.app.pages.pictures import thumbnail
+from robochoc.app.projects import Projects
+from robochoc.app.runs.runs import runs_of
+from robochoc.app.sketch.examples import examples, title_of
+from robochoc.app.sketch.sketch import Sketch
+from robochoc.app.texts import say
+
+_MOST_SHOWN = 60
+
+
+def build_gallery(projects: Projects) -> None:
+    """Fill the page."""
+    with ui.element("div"):
+        with ui.element("h1"):
+            ui.label(say("gallery.title"))
+        ui.label(say("gallery.intro")).classes("soft")
+    with ui.element("ul").classes("cards"):
+        _card(say("gallery.new"), say("gallery.new-hint"), lambda: _begin(projects, Sketch()), icon="add")
+        build_opening(projects, open_team)
+        _card(say("lesson.title"), say("lesson.title-hint"), lambda: ui.navigate.to("/lessons"), icon="school")
+    _heading("gallery.examples")
+    with ui.element("ul").classes("cards"):
+        for key, sketch in examples().items():
+            _card(title_of(key), sketch.story, partial(_begin, projects, sketch), sketch=sketch)
+    _heading("gallery.yours")
+    _own(projects)
+
+
+def open_team(name: str) -> None:
+    """Show the page on which a team is modelled."""
+    ui.navigate.to(f"/team/{name}/model")
+
+
+def _begin(projects: Projects, sketch: Sketch) -> None:
+    open_team(projects.add(sketch).id)
+
+
+@ui.refreshable
+def _own(projects: Projects) -> None:
+    names = projects.store.ids()[:_MOST_SHOWN]
+    if not names:
+        ui.label(say("gallery.none")).classes("soft")
+    with ui.element("ul").classes("cards"):
+        for name in names:
+            _own_card(projects, name)
+
+
+def _own_card(projects: Projects, name: str) -> None:
+    sketch: Sketch | None
+    try:
+        sketch = projects.store.now(name)
+    except (KeyError, ValueError):
+        sketch = None
+    title = name if sketch is None else sketch.name
+    says = say("app.damaged") if sketch is None else counted(len(sketch.robots))
+    with _card(title, says, partial(open_team, name), sketch=sketch):
+        button = ui.button(icon="close", on_click=partial(_ask_to_remove, projects, name, title)).classes("remove")
+        button.props(f'flat round dense size=sm aria-label="{say("gallery.remove", name=title)}"')
+
+
+def _ask_to_remove(projects: Projects, name: str, title: str) -> None:
+    def remove() -> None:
+        dialog.close()
+        with suppress(KeyError, ValueError):  # it is gone already, or damaged: nothing runs
+            for run in runs_of(projects.open(name)).all():
+                run.stop()
+        projects.remove(name)
+        _own.refresh()
+
+    with ui.dialog(value=True) as dialog, ui.card():
+        ui.label(say("gallery.remove-question", name=title))
+        with ui.row():
+            ui.button(say("gallery.remove-yes"), on_click=remove).props("no-caps color=negative")
+            ui.button(say("gallery.remove-no"), on_click=dialog.close).props("no-caps flat autofocus")
+
+
+def counted(robots: int) -> str:
+    """Return how many robots there are, in words."""
+    return say("gallery.robot") if robots == 1 else say("gallery.robots", count=robots)
+
+
+def _heading(key: str) -> None:
+    with ui.element("h2"):
+        ui.label(say(key))
+
+
+def _card(
+    title: str, says: str, does: Callable[[], object], *, sketch: Sketch | None = None, icon: str = ""
+) -> ui.element:
+    item = ui.element("li").classes("item")
+    with item, ui.element("button").classes("card").props("type=button").on("click", does):
+        if sketch is not None:
+            thumbnail(sketch)
+        elif icon:
+            with ui.element("span").classes("picture").props("aria-hidden=true"):
+                ui.icon(icon, size="2.5rem")
+        with ui.element("h3"):
+            ui.label(title)
+        ui.label(says).classes("soft")
+    return item

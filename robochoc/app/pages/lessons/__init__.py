@@ -1,0 +1,1 @@
+"""The pages of the lessons: the list, and one lesson."""

@@ -1,0 +1,209 @@
+"""The page "Model": the board on which a team is drawn, and beside it what robots decide, and by which rules."""
+
+from __future__ import annotations
+
+from functools import cache
+from importlib.resources import files
+
+from nicegui import run, ui
+
+from robochoc.app.pages.model.board import SELECT, Board, Clicked, Moved, Told
+from robochoc.app.pages.model.clicks import with_cell_clicked, with_robot_clicked
+from robochoc.app.pages.model.decisions_panel import DecisionsPanel
+from robochoc.app.pages.model.desk import Desk
+from robochoc.app.pages.model.map_fields import MapFields
+from robochoc.app.pages.model.parts import TroubleLines
+from robochoc.app.pages.model.picture import LinksDrawn, links_of, robots_of
+from robochoc.app.pages.model.robots_panel import RobotsPanel, without_robots
+from robochoc.app.pages.model.rules_panel import RulesPanel
+from robochoc.app.pages.model.sources import Sources
+from robochoc.app.pages.shell import while_shown
+from robochoc.app.projects import Project
+from robochoc.app.sketch.checks import troubles
+from robochoc.app.sketch.edits import with_cell_blocked, with_robot, with_robot_moved
+from robochoc.app.sketch.sketch import Cell, Sketch
+from robochoc.app.sketch.troubles import About, Trouble
+from robochoc.app.texts import say
+
+TOOLS = {SELECT: "near_me", "add": "add_circle_outline", "block": "block"}
+"""The tools, and their icons."""
+_QUIET_S = 0.15
+"""After so long without an edit, what is wrong is looked at."""
+
+
+def build_model(project: Project) -> None:
+    """Fill the current container with the page."""
+    ui.add_css(_style())
+    ModelPage(project)
+
+
+class ModelPage:
+    """The page, as one tab shows it."""
+
+    def __init__(self, project: Project) -> None:
+        self._desk = desk = Desk(project)
+        self._tool = SELECT
+        self._looked_at: Sketch | None = None
+        self._looking = False
+        with ui.element("div").classes("model"):
+            with ui.element("section").classes("stage").props(f'aria-label="{say("board.map")}"'):
+                self._build_stage()
+            with ui.element("div").classes("side"):
+                self._robots = RobotsPanel(desk)
+                self._decisions = DecisionsPanel(desk)
+                self._rules = RulesPanel(desk)
+        self._sources = Sources(desk)
+        desk.on_look(self._follow)
+        desk.point = self._light
+        while_shown(project.on_change(self._changed))
+        self._timer = ui.timer(_QUIET_S, self._look, active=False)
+        self._changed()
+
+    def _build_stage(self) -> None:
+        with ui.element("div").classes("toolbar panel"):
+            tools = {name: say(f"tool.{name}") for name in TOOLS}
+            self._tools = ui.toggle(tools, value=SELECT, on_change=lambda event: self._use(event.value))
+            self._tools.props("no-caps unelevated").classes("segments")
+            MapFields(self._desk)
+        self._hint = ui.label().classes("guide").props("role=status")
+        with ui.element("div").classes("panel map-box"):
+            told = Told(
+                robot=self._robot,
+                cell=self._cell,
+                moved=self._moved,
+                removed=self._removed,
+                rule=self._desk.open,
+                cleared=self._cleared,
+            )
+            self._board = Board(told)
+        self._wrong = ui.label().classes("error").props("role=alert")
+        self._wrong.set_visibility(False)
+        self._desk.tell = self._tell
+        self._lines = TroubleLines()
+
+    # What is clicked, dragged and typed on the board
+
+    def _use(self, tool: str) -> None:
+        self._tool = tool
+        self._board.use(tool)
+        self._guide()
+
+    def _robot(self, clicked: Clicked) -> None:
+        desk = self._desk
+        rule = None if desk.opened is None else desk.sketch.rule(desk.opened)
+        if rule is not None:
+            desk.do(lambda sketch: with_robot_clicked(sketch, rule, clicked.name))
+        elif clicked.more:
+            others = [name for name in desk.selected if name != clicked.name]
+            desk.select(others if clicked.name in desk.selected else [*others, clicked.name])
+        else:
+            desk.select([] if desk.selected == [clicked.name] else [clicked.name])
+
+    def _cell(self, cell: Cell) -> None:
+        desk = self._desk
+        if self._tool == "add":
+            if desk.do(lambda sketch: with_robot(sketch, cell)):
+                desk.select([desk.sketch.robots[-1].name])
+        elif self._tool == "block":
+            desk.do(lambda sketch: with_cell_blocked(sketch, cell, blocked=cell not in sketch.area.blocked))
+        elif desk.cells_of is not None or desk.opened is not None:
+            desk.do(lambda sketch: with_cell_clicked(sketch, cell, desk.cells_of, desk.opened))
+        elif desk.sketch.robots:
+            desk.select([])
+        else:  # with an empty map, a click means the one thing that can be done first
+            self._tools.set_value("add")
+            self._cell(cell)
+
+    def _moved(self, moved: Moved) -> None:
+        self._desk.do(lambda sketch: with_robot_moved(sketch, moved.name, Cell(moved.x, moved.y)))
+
+    def _removed(self, name: str) -> None:
+        selected = self._desk.selected
+        names = tuple(selected) if name in selected else (name,)
+        self._desk.do(lambda sketch: without_robots(sketch, names))
+
+    def _cleared(self) -> None:
+        self._desk.selected = []
+        self._desk.open(None)
+
+    # What is shown
+
+    def _changed(self) -> None:
+        """Show the team as it stands. What is wrong with it, and large pictures, come a little later."""
+        self._desk.forget_gone()
+        self._follow()
+        self._board.show(self._desk.sketch, robots=robots_of(self._desk.sketch, self._desk.troubles))
+        self._timer.activate()
+        self._sources.changed()
+
+    def _follow(self) -> None:
+        self._robots.follow()
+        self._decisions.follow()
+        self._rules.follow()
+        self._board.choose(self._shown_as_chosen())
+        self._light()
+        self._guide()
+
+    def _shown_as_chosen(self) -> list[str]:
+        rule = None if self._desk.opened is None else self._desk.sketch.rule(self._desk.opened)
+        return [*self._desk.sketch.bound(rule)] if rule is not None else self._desk.selected
+
+    def _light(self) -> None:
+        self._board.light(self._desk.pointed or self._desk.opened)
+
+    def _guide(self) -> None:
+        """Say what to do next."""
+        desk = self._desk
+        key = f"guide.{self._tool}"
+        if not desk.sketch.robots:
+            key = "guide.empty"
+        elif desk.cells_of is not None:
+            key = "guide.cells"
+        elif desk.opened is not None:
+            key = "guide.rule"
+        elif self._tool == SELECT and not desk.sketch.decisions:
+            key = "guide.decide"
+        elif self._tool == SELECT and not desk.sketch.rules:
+            key = "guide.rules"
+        self._hint.set_text(say(key))
+
+    def _tell(self, wrong: str) -> None:
+        self._wrong.set_text(wrong)
+        self._wrong.set_visibility(bool(wrong))
+        if wrong:  # the board may show what could not be done
+            self._board.show(self._desk.sketch, robots=robots_of(self._desk.sketch, self._desk.troubles))
+
+    async def _look(self) -> None:
+        """Look at what is wrong, and whom rules link, beside the event loop: of large teams it takes its time."""
+        self._timer.deactivate()
+        if self._looking:
+            return
+        self._looking = True
+        try:
+            while self._looked_at is not self._desk.sketch:
+                sketch = self._desk.sketch
+                found = await run.io_bound(_looked_at, sketch)
+                if found is None:  # the application ends
+                    return
+                self._looked_at = sketch
+                if sketch is self._desk.sketch:
+                    self._show(*found)
+        finally:
+            self._looking = False
+
+    def _show(self, wrong: list[Trouble], links: LinksDrawn) -> None:
+        desk = self._desk
+        desk.troubles = wrong
+        self._rules.left_out = links.left_out
+        self._board.show(desk.sketch, robots=robots_of(desk.sketch, wrong), links=links.drawn)
+        self._lines.show([one for one in wrong if one.about in {About.MAP, About.TEAM} and desk.sketch.robots])
+        self._follow()
+
+
+def _looked_at(sketch: Sketch) -> tuple[list[Trouble], LinksDrawn]:
+    return troubles(sketch), links_of(sketch)
+
+
+@cache
+def _style() -> str:
+    return (files(__package__) / "model.css").read_text(encoding="utf-8")

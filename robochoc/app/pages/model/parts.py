@@ -1,0 +1,113 @@
+"""Small parts that the panels of the page "Model" are made of."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Hashable, Iterator, Sequence
+from contextlib import contextmanager
+from typing import Any, Protocol
+
+from nicegui import ui
+from nicegui.element import Element
+from nicegui.elements.mixins.validation_element import ValidationElement
+
+from robochoc.app.sketch.troubles import Trouble
+from robochoc.app.texts import say
+
+
+class Card(Protocol):
+    """An entry of a list that shows the sketch as it stands."""
+
+    element: Element
+
+    def follow(self) -> None:
+        """Show the sketch as it stands."""
+
+
+class Cards:
+    """A list of cards, one for each key. Cards stay what they are while the sketch changes: nobody's typing is lost."""
+
+    def __init__(self, container: Element, make: Callable[..., Card]) -> None:
+        self._container, self._make = container, make
+        self._cards: dict[Hashable, Card] = {}
+
+    def follow(self, keys: Sequence[Hashable]) -> None:
+        """Show a card for each key, in their order."""
+        for key in [key for key in self._cards if key not in set(keys)]:
+            self._cards.pop(key).element.delete()
+        for place, key in enumerate(keys):
+            if key not in self._cards:
+                with self._container:
+                    self._cards[key] = self._make(key)
+                if place != len(self._cards) - 1:
+                    self._cards[key].element.move(target_index=place)
+        for card in [*self._cards.values()]:
+            card.follow()
+
+
+class TroubleLines:
+    """Lines that tell what is wrong with the element above them, and what to do."""
+
+    def __init__(self) -> None:
+        self._box = ui.element("div").classes("troubles").props("role=status")
+        self._shown: list[Trouble] = []
+
+    def show(self, troubles: list[Trouble]) -> None:
+        """Show these, and no others."""
+        if troubles == self._shown:
+            return
+        self._shown = troubles
+        self._box.clear()
+        with self._box:
+            for trouble in troubles:
+                with ui.element("p").classes("trouble" if trouble.is_error else "trouble hint"):
+                    ui.icon("error_outline" if trouble.is_error else "lightbulb").props("aria-hidden=true")
+                    with ui.element("span"):
+                        line(trouble.text)
+                        line(trouble.remedy, "soft")
+
+
+def line(text: str, classes: str = "") -> ui.label:
+    """Add a text to what is in a line."""
+    return ui.label(text).classes(f"run {classes}")
+
+
+@contextmanager
+def panel(key: str) -> Iterator[Element]:
+    """Add a part of the panel, under its heading."""
+    with ui.element("section").classes("panel part").props(f'aria-label="{say(key)}"') as section:
+        with ui.element("h2"):
+            ui.label(say(key))
+        yield section
+
+
+def icon_button(icon: str, says: str, does: Callable[[], object]) -> ui.button:
+    """Add a button that is only an icon. `says` is for who hears it, and for who waits on it."""
+    button = ui.button(icon=icon, on_click=does).props("flat round dense size=sm").classes("quiet")
+    name_it(button, says)
+    return button
+
+
+def name_it(element: Element, says: str) -> None:
+    """Give an element a name for screen readers, whatever is in that name, and a tooltip."""
+    if element.props.get("aria-label") != says:
+        element.props["aria-label"] = says
+        element.props["title"] = says
+        element.update()
+
+
+def number_field(key: str, least: int, most: int, changed: Callable[[int], str | None]) -> ui.number:
+    """Add a field for an integer. `changed` makes the edit, and returns what is wrong with it."""
+
+    def check(value: float | None) -> str | None:
+        if value is None or value != int(value) or not least <= value <= most:
+            return say("model.number", least=least, most=most)
+        return changed(int(value))
+
+    field = ui.number(say(key), min=least, max=most, precision=0, validation=check)
+    return field.props("dense outlined debounce=300").classes("number")
+
+
+def put(field: ValidationElement[Any], value: object) -> None:
+    """Show a value in a field, unless it is there, or somebody types what is wrong so far."""
+    if field.value != value and not field.error:
+        field.set_value(value)

@@ -1,0 +1,132 @@
+"""What the board draws of a sketch: its robots with their marks, and its rules as links between them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from itertools import chain, islice
+from typing import TypedDict
+
+import msgspec
+
+from robochoc.app.sketch.palette import Links
+from robochoc.app.sketch.rules import PALETTE
+from robochoc.app.sketch.sketch import Sketch, SketchRobot, SketchRule
+from robochoc.app.sketch.troubles import About, Trouble
+from robochoc.app.sketch.words import sentence, short, weight_of
+from robochoc.app.texts import say
+
+COLOURS = 8
+"""Colours of rules, `--rule-0` and on in the style. They are used in turn."""
+MOST_LINKS = 12_000
+"""Links that are drawn. Of more, nothing could be told apart; the list of rules says what is not drawn."""
+MOST_LOOKED_AT = 300
+"""Robots of a rule among neighbours: to find out who is near whom, every two of them are looked at."""
+
+MOST_PAIRS = 300
+"""Lines between every two robots of a rule. If there are more, it is drawn as what is around all of them."""
+
+_PAIR = 2
+_SHAPES = {Links.EACH: "dots", Links.GROUP: "hull"}
+
+
+class DrawnRobot(TypedDict):
+    """A robot as the board draws it."""
+
+    name: str
+    x: int
+    y: int
+    mark: str
+    says: str
+    trouble: bool
+
+
+class DrawnLink(TypedDict):
+    """A rule as the board draws it. `of` has the places of its robots among all robots, pair by pair for lines."""
+
+    rule: str
+    color: int
+    shape: str
+    of: list[int]
+    words: str
+    sentence: str
+    soft: bool
+
+
+class LinksDrawn(msgspec.Struct, frozen=True):
+    """The links of a sketch, and the rules that have too many to be drawn."""
+
+    drawn: list[DrawnLink]
+    left_out: frozenset[str]
+
+
+def colour_of(rule: SketchRule) -> int:
+    """Return the number of a rule's colour. It stays the same while the rule does."""
+    digits = "".join(letter for letter in rule.id[1:6] if letter.isascii() and letter.isdigit())
+    return (int(digits or "1") - 1) % COLOURS
+
+
+def robots_of(sketch: Sketch, troubles: Iterable[Trouble] = ()) -> list[DrawnRobot]:
+    """Return the robots as they are drawn. Whoever has a trouble has a mark."""
+    bad: dict[str, list[str]] = {}
+    for trouble in troubles:
+        if trouble.about is About.ROBOT:
+            bad.setdefault(trouble.element, []).append(f"{trouble.text} {trouble.remedy}")
+    return [_robot(robot, bad.get(robot.name, [])) for robot in sketch.robots]
+
+
+def _robot(robot: SketchRobot, bad: list[str]) -> DrawnRobot:
+    at = say("value.place", column=robot.at.x + 1, row=robot.at.y + 1)
+    facts = [robot.name, at]
+    facts += [say("model.says-weight", weight=robot.weight)] if robot.weight != 1 else []
+    facts += [say("model.says-rank", rank=robot.rank)] if robot.rank else []
+    says = ". ".join([", ".join(facts), *bad])
+    return DrawnRobot(name=robot.name, x=robot.at.x, y=robot.at.y, mark=mark_of(robot), says=says, trouble=bool(bad))
+
+
+def mark_of(robot: SketchRobot) -> str:
+    """Return what stands beside a robot: how much it counts, and how high it ranks, where that is special."""
+    weight = f"\N{MULTIPLICATION SIGN}{robot.weight}" if robot.weight != 1 else ""
+    rank = f"{'▲' if robot.rank > 0 else '▼'}{abs(robot.rank)}" if robot.rank else ""
+    return " ".join(filter(None, (weight, rank)))
+
+
+def links_of(sketch: Sketch) -> LinksDrawn:
+    """Return the rules as links. Rules that are off, or make no sense yet, have none."""
+    place = {robot.name: index for index, robot in enumerate(sketch.robots)}
+    drawn: list[DrawnLink] = []
+    left_out: set[str] = set()
+    room = MOST_LINKS
+    for rule in sketch.rules:
+        if not rule.on or rule.kind not in PALETTE or sketch.decision(rule.decision) is None:
+            continue
+        groups = _groups(sketch, rule, room)
+        if groups is None:
+            left_out.add(rule.id)
+        elif groups:
+            room -= len(groups)
+            drawn.append(_link(sketch, rule, [place[name] for name in chain(*groups)], is_whole=len(groups[0]) > _PAIR))
+    return LinksDrawn(drawn, frozenset(left_out))
+
+
+def _groups(sketch: Sketch, rule: SketchRule, room: int) -> list[tuple[str, ...]] | None:
+    """Return a rule's links, or nothing if they are too many."""
+    entry, bound = PALETTE[rule.kind], sketch.bound(rule)
+    if entry.links is Links.PAIRS and len(bound) * (len(bound) - 1) // 2 > MOST_PAIRS:
+        return [bound]
+    if entry.links is Links.NEIGHBOURS and len(bound) > MOST_LOOKED_AT:
+        return None
+    groups = [*islice(entry.groups(sketch, rule), room + 1)]
+    return groups if len(groups) <= room else None
+
+
+def _link(sketch: Sketch, rule: SketchRule, of: list[int], *, is_whole: bool) -> DrawnLink:
+    entry = PALETTE[rule.kind]
+    return DrawnLink(
+        rule=rule.id,
+        color=colour_of(rule),
+        shape="hull" if is_whole else _SHAPES.get(entry.links, "arrows" if entry.has_order else "lines"),
+        of=of,
+        words=short(sketch, rule),
+        sentence=f"{sentence(sketch, rule)} {weight_of(rule)}".strip(),
+        soft=rule.cost is not None or entry.graded,
+    )

@@ -1,0 +1,208 @@
+"""What can be changed of a rule that is open: whom it is about, what fills its openings, its cost, who knows of it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import partial
+
+import msgspec
+from nicegui import ui
+
+from robochoc.app.pages.model.desk import Desk
+from robochoc.app.pages.model.pair_table import PairTable
+from robochoc.app.pages.model.parts import number_field, put
+from robochoc.app.sketch import sketch as limits
+from robochoc.app.sketch.edits import with_rule
+from robochoc.app.sketch.palette import Form, Links, Opening, PaletteRule
+from robochoc.app.sketch.sketch import Decision, SketchRule
+from robochoc.app.sketch.words import value_words
+from robochoc.app.texts import say
+
+_SLIDER = 20
+"""A slider goes so far; a larger number is typed. It goes further where a number is further already."""
+_FIRST_COST = 1
+
+
+class RuleForm:
+    """The fields of a rule. Each change is made at once."""
+
+    def __init__(self, desk: Desk, rule: str, entry: PaletteRule) -> None:
+        self._desk, self._id, self._entry = desk, rule, entry
+        self._following = False
+        self._follow: list[Callable[[SketchRule, Decision], None]] = []
+        with ui.element("div").classes("fields form"):
+            self._about()
+            self._robots()
+            for opening in entry.openings:
+                self._opening(opening)
+            if not entry.graded:
+                self._cost()
+            self._private()
+            with ui.element("div").classes("wide end"):
+                ui.button(say("model.done"), icon="check", on_click=lambda: desk.open(None)).props("flat dense no-caps")
+
+    def follow(self) -> None:
+        """Show the sketch as it stands."""
+        rule = self._desk.sketch.rule(self._id)
+        decision = None if rule is None else self._desk.sketch.decision(rule.decision)
+        if rule is not None and decision is not None:
+            self._following = True  # what fields show now, nobody has chosen
+            for follow in self._follow:
+                follow(rule, decision)
+            self._following = False
+
+    def _change(self, **changes: object) -> str | None:
+        rule = self._desk.sketch.rule(self._id)
+        if rule is None or self._following:
+            return None
+        made = msgspec.structs.replace(rule, **changes)
+        if made == rule:
+            return None
+        return self._desk.edit(lambda sketch: with_rule(sketch, made))
+
+    def _set(self, name: str, value: object) -> str | None:
+        rule = self._desk.sketch.rule(self._id)
+        return None if rule is None else self._change(settings={**rule.settings, name: value})
+
+    def _about(self) -> None:
+        def fitting() -> list[str]:
+            return [one.name for one in self._desk.sketch.decisions if one.kind in self._entry.kinds]
+
+        choice = ui.select([], label=say("model.about")).props("dense outlined").classes("wide")
+        choice.on_value_change(lambda event: self._change(decision=event.value) if event.value else None)
+
+        def follow(rule: SketchRule, _: Decision) -> None:
+            names = fitting()
+            choice.set_visibility(len(names) > 1)
+            if rule.decision in names and (choice.options != names or choice.value != rule.decision):
+                choice.set_options(names, value=rule.decision)
+
+        self._follow.append(follow)
+
+    def _robots(self) -> None:
+        leads = self._entry.has_order and self._entry.links is Links.STAR
+        key = "model.rule-robots-leader" if leads else "model.rule-robots"
+        choice = ui.select([], multiple=True, label=say(key), with_input=True).classes("wide")
+        choice.props(f'dense outlined use-chips hint="{say("model.rule-robots-hint")}"')
+        choice.on_value_change(lambda event: self._change(robots=tuple(event.value or ())))
+
+        def follow(rule: SketchRule, decision: Decision) -> None:
+            names = [*self._desk.sketch.deciders(decision)]
+            chosen = [name for name in rule.robots if name in names]
+            if choice.options != names or choice.value != chosen:
+                choice.set_options(names, value=chosen)
+
+        self._follow.append(follow)
+
+    def _opening(self, opening: Opening) -> None:
+        match opening.form:
+            case Form.NUMBER:
+                self._number(opening)
+            case Form.VALUE:
+                self._values(opening, several=False)
+            case Form.VALUES:
+                self._values(opening, several=True)
+            case Form.TABLE:
+                self._table(opening)
+
+    def _number(self, opening: Opening) -> None:
+        key = f"opening.{opening.name}"
+        slider, field = _slider_and_field(key, opening.least, opening.most, partial(self._set, opening.name))
+
+        def follow(rule: SketchRule, _: Decision) -> None:
+            given = rule.settings.get(opening.name)
+            if isinstance(given, int):
+                _show_number(slider, field, given, opening.most)
+
+        self._follow.append(follow)
+
+    def _values(self, opening: Opening, *, several: bool) -> None:
+        label = say(f"opening.{opening.name}")
+        choice = ui.select({}, label=label, multiple=several, with_input=True).classes("wide")
+        choice.props("dense outlined use-chips" if several else "dense outlined")
+
+        def changed(value: object) -> None:
+            if value is not None:
+                self._set(opening.name, [*value] if isinstance(value, list) else value)
+
+        choice.on_value_change(lambda event: changed(event.value))
+
+        def follow(rule: SketchRule, decision: Decision) -> None:
+            sketch = self._desk.sketch
+            options = {value: value_words(sketch, decision, value) for value in sketch.values(decision)}
+            given: object = rule.settings.get(opening.name)
+            if several:
+                given = [one for one in given if one in options] if isinstance(given, list) else []
+            elif not isinstance(given, (int, str)) or given not in options:
+                given = None
+            if choice.options != options or choice.value != given:
+                choice.set_options(options, value=given)
+
+        self._follow.append(follow)
+
+    def _table(self, opening: Opening) -> None:
+        table = PairTable(lambda rows: self._set(opening.name, rows))
+
+        def follow(rule: SketchRule, decision: Decision) -> None:
+            sketch = self._desk.sketch
+            words = [value_words(sketch, decision, value) for value in sketch.values(decision)]
+            bound = (*sketch.bound(rule), "", "")[:2]
+            table.show(sketch.values(decision), words, rule.settings.get(opening.name), bound)
+
+        self._follow.append(follow)
+
+    def _cost(self) -> None:
+        with ui.element("div").classes("wide"):
+            choice = ui.toggle({"must": say("model.must"), "cost": say("model.costs")}).props("no-caps unelevated")
+            choice.classes("segments")
+        choice.on_value_change(lambda event: self._costs_or_must(must=event.value == "must"))
+        with ui.element("div").classes("wide fields") as box:
+            slider, field = _slider_and_field("model.cost", 1, limits.MAX_COST, lambda value: self._change(cost=value))
+
+        def follow(rule: SketchRule, _: Decision) -> None:
+            choice.set_value("must" if rule.cost is None else "cost")
+            box.set_visibility(rule.cost is not None)
+            if rule.cost is not None:
+                _show_number(slider, field, rule.cost, limits.MAX_COST)
+
+        self._follow.append(follow)
+
+    def _costs_or_must(self, *, must: bool) -> None:
+        rule = self._desk.sketch.rule(self._id)
+        if rule is not None:
+            self._change(cost=None if must else rule.cost or _FIRST_COST)
+
+    def _private(self) -> None:
+        with ui.element("div").classes("wide"):
+            switch = ui.switch(say("model.private"), on_change=lambda event: self._change(private=bool(event.value)))
+            ui.label(say("model.private-hint")).classes("soft small")
+
+        def follow(rule: SketchRule, _: Decision) -> None:
+            switch.set_value(rule.private)
+
+        self._follow.append(follow)
+
+
+def _slider_and_field(
+    key: str, least: int, most: int, changed: Callable[[int], str | None]
+) -> tuple[ui.slider, ui.number]:
+    """Add a slider, and a field beside it for what is further than it goes."""
+
+    def _let_go(value: object) -> None:
+        if isinstance(value, int) and least <= value <= most:
+            changed(value)
+
+    slider = ui.slider(min=least, max=min(most, _SLIDER), step=1).props("label").classes("slide")
+    slider.props["aria-label"] = say(key)
+    slider.on("change", lambda event: _let_go(event.args))  # when it is let go: one step to be undone
+    field = number_field(key, least, most, changed)
+    return slider, field
+
+
+def _show_number(slider: ui.slider, field: ui.number, value: int, most: int) -> None:
+    reach = min(most, max(_SLIDER, value))
+    if slider.props.get("max") != reach:
+        slider.props["max"] = reach
+        slider.update()
+    slider.set_value(value)
+    put(field, value)

@@ -1,0 +1,65 @@
+"""Opening a file: the browser sends it, it is read in a thread, and what is wrong with it is told."""
+
+from __future__ import annotations
+
+import tempfile
+from collections.abc import Callable
+from contextlib import suppress
+from pathlib import Path
+
+from nicegui import run, ui
+from nicegui.events import UploadEventArguments
+
+from robochoc.app.flights.state import unpack_run
+from robochoc.app.projects import Projects
+from robochoc.app.sketch.opening import MAX_BYTES, ForeignTeam, opened
+from robochoc.app.sketch.sketch import Sketch
+from robochoc.app.texts import say
+from robochoc.formats import InvalidInputError
+from robochoc.system.plain_text import on_one_line
+from robochoc.system.temporary_files import temporary_folder
+
+_LONGEST_NAME = 100
+
+
+def build_opening(projects: Projects, show: Callable[[str], None]) -> None:
+    """Add the card that opens a file; `show` is called with the id of the team that is made of it."""
+    item = ui.element("li").classes("item")
+    with item, ui.element("button").classes("card").props("type=button") as card:
+        with ui.element("span").classes("picture").props("aria-hidden=true"):
+            ui.icon("upload_file", size="2.5rem")
+        with ui.element("h3"):
+            ui.label(say("gallery.file"))
+        ui.label(say("gallery.file-hint")).classes("soft")
+        wrong = ui.label().classes("error").props("role=alert")
+
+    async def take(event: UploadEventArguments) -> None:
+        wrong.set_text("")
+        upload.reset()
+        with tempfile.TemporaryDirectory(prefix="robochoc-", dir=temporary_folder()) as folder:
+            file = Path(folder) / (Path(event.file.name or "").name[-_LONGEST_NAME:] or "team")
+            await event.file.save(file)
+            try:
+                found = await run.io_bound(opened, file)
+            except (InvalidInputError, OSError) as error:
+                wrong.set_text(on_one_line(str(error).replace(f"{folder}/", "")))
+                return
+            if isinstance(found, Sketch):
+                project = projects.add(found)
+                with suppress(OSError):  # what a state has beside its team
+                    await run.io_bound(unpack_run, file, project.folder)
+                show(project.id)
+        if isinstance(found, ForeignTeam):
+            made = await run.io_bound(projects.store.add_foreign, found)
+            if made is not None:  # the server is about to end
+                show(made)
+
+    with item:
+        upload = ui.upload(
+            on_upload=take,
+            on_rejected=lambda: wrong.set_text(say("gallery.too-large", most=MAX_BYTES >> 20)),
+            auto_upload=True,
+            max_file_size=MAX_BYTES,
+        ).classes("hidden")
+    # In the browser: it opens the dialog for a click alone.
+    card.on("click", js_handler=f"() => getElement({upload.id}).$el.querySelector('input[type=file]').click()")

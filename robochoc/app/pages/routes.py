@@ -1,0 +1,109 @@
+"""Which page is where."""
+
+from __future__ import annotations
+
+import shlex
+from collections.abc import Callable
+from pathlib import Path
+
+from nicegui import app, ui
+
+from robochoc.app.faults import words
+from robochoc.app.lessons.progress import Progress
+from robochoc.app.pages.compare.page import build_compare
+from robochoc.app.pages.compare.served import install_reports
+from robochoc.app.pages.decide.page import build_decide
+from robochoc.app.pages.fly.kept import install_kept
+from robochoc.app.pages.fly.page import build_fly
+from robochoc.app.pages.gallery import build_gallery
+from robochoc.app.pages.lessons.lesson_page import build_lesson
+from robochoc.app.pages.lessons.list_page import build_lessons
+from robochoc.app.pages.model.page import build_model
+from robochoc.app.pages.shell import AREAS, shell
+from robochoc.app.pages.whatif.page import build_whatif
+from robochoc.app.projects import Project, Projects
+from robochoc.app.runs.runs import end_all
+from robochoc.app.sketch.picture import picture
+from robochoc.app.texts import say
+
+_BUILD: dict[str, Callable[[Project], None]] = {
+    "model": build_model,
+    "decide": build_decide,
+    "whatif": build_whatif,
+    "fly": build_fly,
+    "compare": build_compare,
+}
+
+
+def install(projects: Projects) -> None:
+    """Install all pages."""
+    app.on_shutdown(projects.save)
+    install_kept(projects)
+    app.on_shutdown(end_all)
+    install_reports(projects)
+
+    app.on_page_exception(_fault)
+
+    @ui.page("/")
+    def gallery() -> None:
+        with shell(""):
+            build_gallery(projects)
+
+    @ui.page("/team/{name}/{area}")
+    def team(name: str, area: str) -> None:
+        try:
+            project = projects.open(name)
+        except (KeyError, ValueError) as missing:
+            _missing(damaged=isinstance(missing, ValueError))
+            return
+        chosen = area if area in AREAS else AREAS[0]
+        if (foreign := project.foreign) is not None:
+            with shell(project.sketch.name):
+                _not_drawn_here(project, foreign)
+            return
+        with shell(project.sketch.name, project, chosen):
+            _BUILD[chosen](project)
+
+    progress = Progress(projects.store.folder)
+
+    @ui.page("/lessons")
+    def lessons() -> None:
+        with shell(say("lesson.title")):
+            build_lessons(progress)
+
+    @ui.page("/lessons/{number}")
+    def one_lesson(number: str) -> None:
+        with shell(say("lesson.title")):
+            build_lesson(number, progress)
+
+    @ui.page("/{_path:path}")
+    def anything_else(_path: str) -> None:
+        _missing(damaged=False)
+
+
+def _fault(error: Exception) -> None:
+    with shell(""):
+        with ui.element("h1"):
+            ui.label(say("app.fault-page"))
+        ui.label(words(error))
+        ui.link(say("app.home"), "/")
+
+
+def _not_drawn_here(project: Project, files: Path) -> None:
+    """Show a team that was not drawn here, and the command that decides it: its files say more than a picture."""
+    with ui.element("h1"):
+        ui.label(project.sketch.name)
+    ui.label(say("app.foreign", robots=len(project.sketch.robots))).classes("prose")
+    with ui.element("span").classes("panel"):
+        ui.html(picture(project.sketch), sanitize=False)
+    ui.label(say("app.foreign-command"))
+    ui.label(shlex.join(["robochoc", "solve", str(files), "--html", "scene.html"])).classes("panel command-text")
+    ui.link(say("app.home"), "/")
+
+
+def _missing(*, damaged: bool) -> None:
+    with shell(""):
+        with ui.element("h1"):
+            ui.label(say("app.damaged" if damaged else "app.gone"))
+        ui.label(say("app.gone-remedy"))
+        ui.link(say("app.home"), "/")

@@ -1,0 +1,175 @@
+"""How the team has decided again: who does something else now, and how many messages it took."""
+
+from __future__ import annotations
+
+from nicegui import ui
+
+from robochoc.app.pages.whatif.outcome import Fate, Outcome, Row
+from robochoc.app.pages.whatif.story import Kept, Story
+from robochoc.app.projects import Project
+from robochoc.app.runs.run import Run, State
+from robochoc.app.sketch.sketch import Kind
+from robochoc.app.sketch.words import listed
+from robochoc.app.texts import say
+
+
+class Answer:
+    """The part of the page below the map. It is made anew when there is something new to tell."""
+
+    def __init__(self, project: Project, story: Story) -> None:
+        self._project, self._story = project, story
+        self._shown: object = None
+        self._box = ui.element("div").classes("whatif-result")
+
+    def look(self) -> None:
+        """Tell how far it is, while the team decides."""
+        if self._story.running:
+            self.follow()
+
+    def follow(self) -> None:
+        """Show what there is."""
+        story = self._story
+        state = story.running, story.outcome, story.message, story.run, story.run and story.run.state
+        messages = _messages(story) if story.running else 0
+        if (state, messages) == self._shown:
+            return
+        self._shown = state, messages
+        self._box.clear()
+        with self._box:
+            if story.running:
+                self._running(messages)
+            elif story.outcome is not None and story.kept is not None and story.run is not None:
+                self._told(story.outcome, story.kept, story.run)
+            elif why := _failure(story):
+                with ui.element("div").classes("panel"):
+                    ui.label(why).classes("error")
+
+    def _running(self, messages: int) -> None:
+        with ui.element("div").classes("panel whatif-row"):
+            ui.spinner(size="1.4rem").props("aria-hidden=true")
+            text = say("whatif.running-messages", messages=f"{messages:,}") if messages else say("whatif.running")
+            ui.label(text).classes("grow")
+            ui.button(say("whatif.stop"), icon="stop", on_click=self._story.stop).props("no-caps outline dense")
+
+    def _told(self, found: Outcome, kept: Kept, run: Run) -> None:
+        with ui.element("div").classes("panel whatif-part"):
+            with ui.element("h2"):
+                ui.label(_headline(found))
+            ui.label(" ".join(kept.happened)).classes("soft")
+            if kept.anew:
+                ui.label(say("whatif.all-anew", why=kept.anew)).classes("soft")
+            if costs := _costs(found):
+                ui.label(costs)
+            with ui.element("div").classes("whatif-columns"):
+                _table(found)
+                self._figures(found, kept)
+            with ui.element("div").classes("whatif-row"):
+                if self._can_keep(kept):
+                    keep = ui.button(say("whatif.keep"), icon="check", on_click=self._keep, color=None)
+                    keep.props("no-caps unelevated").classes("go")
+                if any(one.kind in {Kind.LEVEL, Kind.PLACE} for one in kept.after.decisions):
+                    ui.link(say("whatif.fly"), f"/team/{self._project.id}/fly?run={run.id}").classes("flight")
+                    ui.label(say("whatif.flight-hint")).classes("soft small grow")
+                else:
+                    ui.label(say("whatif.no-flight")).classes("soft small grow")
+            with ui.element("details").classes("whatif-command"):
+                with ui.element("summary"):
+                    ui.label(say("whatif.command"))
+                with ui.element("pre"):
+                    ui.label(run.command)
+
+    def _can_keep(self, kept: Kept) -> bool:
+        return bool(self._story.changes) and self._story.after() == kept.after
+
+    def _keep(self) -> None:
+        self._story.keep()
+        ui.notify(say("whatif.kept"))
+
+    def _figures(self, found: Outcome, kept: Kept) -> None:
+        beside = self._story.beside.result if self._story.beside else None
+        anew = None if beside is None or kept.anew else beside.messages
+        again = found.after.messages
+        with ui.element("div").classes("whatif-figures"):
+            with ui.element("h3"):
+                ui.label(say("whatif.messages"))
+            most = max(again, anew or 0, 1)
+            if anew is None:
+                _bar(say("whatif.deciding-anew"), again, most)
+                if not kept.anew:
+                    ui.label(say("whatif.compared-anew", again=f"{again:,}", protocol=found.protocol)).classes("soft")
+                return
+            _bar(say("whatif.going-on"), again, most)
+            _bar(say("whatif.deciding-anew"), anew, most)
+            key = "zero" if not again else "less" if again < anew else "more"
+            text = say(f"whatif.compared-{key}", again=f"{again:,}", anew=f"{anew:,}", protocol=found.protocol)
+            ui.label(text).classes("soft")
+
+
+def _headline(found: Outcome) -> str:
+    if found.after.verdict == "no-solution":
+        return say("whatif.unsolved")
+    if not found.after.solved:
+        return say("whatif.unknown")
+    if not found.before.solved:
+        return say("whatif.unsolved-before")
+    if not found.moved:
+        return say("whatif.changes-none")
+    key = "whatif.changes-one" if len(found.moved) == 1 else "whatif.changes"
+    return say(key, changed=len(found.moved), count=found.stayed, names=listed(found.moved))
+
+
+def _costs(found: Outcome) -> str:
+    before, after = found.before, found.after
+    if not (before.solved and after.solved) or not (before.cost or after.cost):
+        return ""
+    return say("whatif.costs", before=before.cost, after=after.cost)
+
+
+def _table(found: Outcome) -> None:
+    several = len({row.decision for row in found.rows}) > 1
+    heads = ["who", *(["what"] if several else []), "before", "after"]
+    with ui.element("div").classes("whatif-table"), ui.element("table"):
+        with ui.element("thead"), ui.element("tr"):
+            for head in heads:
+                with ui.element("th").props("scope=col"):
+                    ui.label(say(f"whatif.{head}"))
+            with ui.element("th").props(f'scope=col aria-label="{say("whatif.moved")}"'):
+                pass
+        with ui.element("tbody"):
+            for row in found.rows:
+                _line(row, several=several)
+
+
+def _line(row: Row, *, several: bool) -> None:
+    with ui.element("tr").classes(f"fate-{row.fate}"):
+        with ui.element("th").props("scope=row"):
+            ui.label(row.robot)
+        cells = [*([row.decision] if several else []), row.before or say("whatif.nobody")]
+        cells += [row.after or say("whatif.nobody"), "" if row.fate is Fate.OPEN else say(f"whatif.{row.fate}")]
+        for text in cells:
+            with ui.element("td"):
+                ui.label(text)
+
+
+def _bar(name: str, count: int, most: int) -> None:
+    with ui.element("div").classes("whatif-bar"):
+        ui.label(name)
+        with ui.element("div").classes("track").props("aria-hidden=true"):
+            ui.element("div").classes("fill").style(f"width: {100 * count / most:.1f}%")
+        ui.label(f"{count:,}").classes("number")
+
+
+def _messages(story: Story) -> int:
+    return sum(run.live.messages for run in (story.run, story.beside) if run)
+
+
+def _failure(story: Story) -> str:
+    """Return why there is no outcome; empty: nobody has asked for one."""
+    if story.message:
+        return say("whatif.failed", message=story.message)
+    for run in (story.run, story.beside):
+        if run is not None and run.state is State.FAILED:
+            return say("whatif.failed", message=run.message)
+        if run is not None and run.state is State.STOPPED:
+            return say("whatif.stopped")
+    return say("whatif.unknown") if story.run else ""

@@ -1,0 +1,190 @@
+"""The page "What if": something happens to the team, and it decides again."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import cache, partial
+from importlib.resources import files
+
+from nicegui import run, ui
+
+from robochoc.app.pages.model.board import Board, Clicked, Told
+from robochoc.app.pages.model.picture import LinksDrawn, links_of, robots_of
+from robochoc.app.pages.shell import told, while_shown
+from robochoc.app.pages.whatif.answer import Answer
+from robochoc.app.pages.whatif.story import story_of
+from robochoc.app.projects import Project
+from robochoc.app.sketch.changes import FULL, LEAST_BATTERY, AnyChange, Battery, Blocked, Fails, Joins
+from robochoc.app.sketch.checks import troubles
+from robochoc.app.sketch.edits import EditError
+from robochoc.app.sketch.sketch import Cell, Sketch
+from robochoc.app.texts import say
+
+_LOOK_S = 0.25
+_LINK_S = 0.05
+
+
+def build_whatif(project: Project) -> None:
+    """Fill the current container with the page."""
+    ui.add_css(_style())
+    with ui.element("div"):
+        _heading("h1", "whatif.title")
+        ui.label(say("whatif.intro")).classes("soft")
+    sketch = project.sketch
+    if not sketch.robots or not sketch.decisions:
+        with ui.element("div").classes("panel"):
+            ui.label(say("whatif.empty"))
+            ui.link(say("whatif.empty-remedy"), f"/team/{project.id}/model")
+        return
+    WhatIfPage(project)
+
+
+class WhatIfPage:
+    """The page, as one tab shows it."""
+
+    def __init__(self, project: Project) -> None:
+        self._project = project
+        self._story = story_of(project)
+        self._linked: Sketch | None = None
+        with ui.element("div").classes("whatif"):
+            with ui.element("section").classes("panel map-box").props(f'aria-label="{say("whatif.map")}"'):
+                self._board = Board(Told(robot=self._robot_clicked, cell=self._cell_clicked), movable=False)
+            with ui.element("div").classes("whatif-side"):
+                self._build_happenings()
+                self._build_list()
+        with ui.element("section").classes("whatif-answer").props("aria-live=polite"):
+            self._answer = Answer(project, self._story)
+        self._linking = ui.timer(_LINK_S, self._link, active=False)
+        ui.timer(_LOOK_S, self._answer.look)
+        while_shown(project.on_change(self._follow))
+        while_shown(self._story.on_change(self._follow))
+        self._follow()
+
+    def _build_happenings(self) -> None:
+        with ui.element("section").classes("panel whatif-part"):
+            _heading("h2", "whatif.pick")
+            ui.label(say("whatif.pick-hint")).classes("soft")
+            with ui.element("div").classes("whatif-row"):
+                self._robots = ui.select([], label=say("whatif.robot"), on_change=self._robot_chosen)
+                self._robots.props("dense outlined options-dense").classes("grow")
+                _act("whatif.fail", "heart_broken", lambda: self._happen(lambda: Fails(self._chosen())))
+            with ui.element("div").classes("whatif-row"):
+                self._slider = ui.slider(min=0, max=FULL, step=5, value=50).classes("grow")
+                self._slider.props(f'label aria-label="{say("whatif.battery")}"')
+                _button = _act("whatif.battery-set", "battery_3_bar", self._battery_set, percent=50)
+            self._slider.on_value_change(
+                lambda event: _button.set_text(say("whatif.battery-set", percent=int(event.value)))
+            )
+            ui.label(say("whatif.battery-hint", least=LEAST_BATTERY)).classes("soft small")
+            with ui.element("div").classes("whatif-row"):
+                self._column, self._row = (
+                    ui.number(label=say(key), value=1, min=1, precision=0).props("dense outlined").classes("short")
+                    for key in ("whatif.column", "whatif.row")
+                )
+                _act("whatif.block", "block", lambda: self._happen(lambda: Blocked(self._chosen_cell())))
+                _act("whatif.join", "add_circle_outline", lambda: self._happen(lambda: Joins(self._chosen_cell())))
+            self._wrong = ui.label().classes("error").props("role=alert")
+
+    def _build_list(self) -> None:
+        with ui.element("section").classes("panel whatif-part"):
+            _heading("h2", "whatif.list")
+            self._list = ui.element("ol").classes("whatif-list")
+            self._none = ui.label(say("whatif.none")).classes("soft")
+            with ui.element("div").classes("whatif-row"):
+                self._decide = ui.button(say("whatif.decide"), on_click=self._story.decide, color=None).props(
+                    "no-caps unelevated"
+                )
+                self._decide.classes("go")
+                self._clear = ui.button(say("whatif.clear"), on_click=self._story.clear).props("no-caps flat")
+
+    # What is chosen, and what happens
+
+    def _robot_clicked(self, clicked: Clicked) -> None:
+        if clicked.name in (self._robots.options or []):
+            self._robots.set_value(clicked.name)
+
+    def _robot_chosen(self) -> None:
+        self._board.choose([self._robots.value] if self._robots.value else [])
+
+    def _cell_clicked(self, cell: Cell) -> None:
+        self._column.set_value(cell.x + 1)
+        self._row.set_value(cell.y + 1)
+
+    def _chosen(self) -> str:
+        return str(self._robots.value or "")
+
+    def _chosen_cell(self) -> Cell:
+        return Cell(int(self._column.value or 0) - 1, int(self._row.value or 0) - 1)
+
+    def _battery_set(self) -> None:
+        self._happen(lambda: Battery(self._chosen(), min(max(int(self._slider.value), 0), FULL)))
+
+    def _happen(self, change: Callable[[], AnyChange]) -> None:
+        self._wrong.set_text("")
+        try:
+            self._story.add(change())
+        except EditError as error:
+            self._wrong.set_text(told(error))
+
+    # What is shown
+
+    def _follow(self) -> None:
+        words = self._story.words()
+        after = self._story.after()
+        names = [robot.name for robot in after.robots]
+        if names != self._robots.options:
+            kept = self._robots.value if self._robots.value in names else next(iter(names), None)
+            self._robots.set_options(names, value=kept)
+        self._show_list(words)
+        self._none.set_visibility(not words)
+        self._clear.set_enabled(bool(words))
+        self._decide.set_enabled(bool(words) and not self._story.running)
+        self._board.show(after, robots=robots_of(after))
+        self._robot_chosen()
+        self._answer.follow()
+        self._linking.activate()
+
+    def _show_list(self, words: list[str]) -> None:
+        self._list.clear()
+        self._list.set_visibility(bool(words))
+        with self._list:
+            for place, text in enumerate(words):
+                with ui.element("li"), ui.element("div").classes("whatif-item"):
+                    ui.label(text).classes("grow")
+                    back = ui.button(icon="undo", on_click=partial(self._story.take_back, place))
+                    back.props("flat round dense").props["aria-label"] = say("whatif.back", what=text)
+
+    async def _link(self) -> None:
+        """Draw the rules, and say what is wrong: of large teams that takes its time."""
+        self._linking.deactivate()
+        after = self._story.after()
+        if self._linked == after:
+            return
+        self._linked = after
+        found = await run.io_bound(_looked_at, after)
+        if found is not None and self._linked is after:
+            links, wrong = found
+            self._board.show(after, robots=robots_of(after), links=links.drawn)
+            self._wrong.set_text(say("whatif.wrong", text=wrong) if wrong else "")
+
+
+def _looked_at(sketch: Sketch) -> tuple[LinksDrawn, str]:
+    wrong = next((trouble.text for trouble in troubles(sketch) if trouble.is_error), "")
+    return links_of(sketch), wrong
+
+
+def _heading(tag: str, key: str) -> None:
+    with ui.element(tag):
+        ui.label(say(key))
+
+
+def _act(key: str, icon: str, does: Callable[[], object], **named: object) -> ui.button:
+    return ui.button(say(key, **named), icon=icon, on_click=does).props("no-caps outline dense").classes("act")
+
+
+@cache
+def _style() -> str:
+    return "\n".join((files("robochoc.app.pages") / path).read_text(encoding="utf-8") for path in _STYLES)
+
+
+_STYLES = ("model/model.css", "whatif/whatif.css")

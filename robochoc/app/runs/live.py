@@ -1,0 +1,134 @@
+"""What can be seen of a run while it goes on, from its journal: who speaks, what is decided, what it costs."""
+
+from __future__ import annotations
+
+import time
+from collections import Counter, deque
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import BinaryIO
+
+from robochoc.app.sketch.sketch import Value
+from robochoc.journal.entries import JournalError
+from robochoc.journal.events import Began, Decided, Heard, Sent
+from robochoc.journal.reader import Follower
+from robochoc.model.problem import INFINITE
+from robochoc.verification.objective import Objective
+
+RECENT_S = 1.0
+"""Messages are shown for so long."""
+SETTLED_S = 1.0
+"""A value that stays for so long looks settled."""
+AT_ONCE = 5_000
+"""So many entries are read in one go."""
+MOST_COSTS = 300
+"""Points of the falling cost that are kept."""
+
+
+@dataclass
+class Live:
+    """The facts.
+
+    Attributes:
+        messages: How many were sent so far.
+        values: Each robot's present values, by `ROBOT.DECISION`.
+        since: When each robot has changed them last, on the monotonic clock.
+        costs: The costs of the answers so far: seconds since the start, and the cost. They fall.
+        recent: The messages of the last second: how many went from whom to whom.
+    """
+
+    messages: int = 0
+    values: dict[str, dict[str, Value]] = field(default_factory=dict)
+    since: dict[str, float] = field(default_factory=dict)
+    costs: list[tuple[float, float]] = field(default_factory=list)
+    recent: Counter[tuple[str, str]] = field(default_factory=Counter)
+
+    def settled(self, robot: str) -> bool:
+        """Return whether a robot has kept its values for a while."""
+        return robot in self.since and time.monotonic() - self.since[robot] >= SETTLED_S
+
+
+class LiveReader:
+    """Follows the journal at `file`, which need not be there yet, and keeps `live` up to date. Memory is bounded.
+
+    `label` says what the code of a variable's value stands for; `objective`, what assignments cost (None: nothing is
+    minimised, or the problem changes).
+    """
+
+    def __init__(
+        self, file: Path, live: Live, label: Callable[[str, int], Value], objective: Objective | None = None
+    ) -> None:
+        self._file = file
+        self._live = live
+        self._label = label
+        self._objective = objective
+        self._best: float = INFINITE
+        self._open: BinaryIO | None = None
+        self._follower: Follower | None = None
+        self._began = time.monotonic()
+        self._bunches: deque[tuple[float, Counter[tuple[str, str]]]] = deque()
+
+    def advance(self) -> bool:
+        """Read what is new, up to a limit; return whether there was something."""
+        if self._follower is None and self._file.is_file():
+            self._open = self._file.open("rb")
+            self._follower = Follower(self._open)
+        if self._follower is None:
+            return False
+        try:
+            entries = self._follower.read(AT_ONCE)
+        except JournalError:  # not even its beginning is there: the run has its own words on that
+            return False
+        now = time.monotonic()
+        bunch: Counter[tuple[str, str]] = Counter()
+        for entry in entries:
+            match entry:
+                case Sent():
+                    bunch[entry.sender, entry.receiver] += 1
+                case Decided():
+                    self._decided(entry, now)
+                case Heard():
+                    self._improved(entry.cost, now)
+                case Began():
+                    self._live.values.clear()
+                case _:
+                    pass
+        self._spoken(bunch, now)
+        return bool(entries)
+
+    def close(self) -> None:
+        """Close the file."""
+        self._follower = None
+        if self._open:
+            self._open.close()
+            self._open = None
+
+    def _decided(self, event: Decided, now: float) -> None:
+        values = {name: self._label(name, value) for name, value in event.assignment.items()}
+        if self._live.values.get(event.robot) != values:
+            self._live.values[event.robot] = values
+            self._live.since[event.robot] = now
+            if self._objective:
+                self._objective.change({event.robot: event.assignment})
+                self._improved(self._objective.cost, now)
+
+    def _improved(self, cost: float, now: float) -> None:
+        if self._objective is None or cost >= self._best:
+            return
+        self._best = cost
+        costs = self._live.costs
+        costs.append((now - self._began, float(self._objective.told(cost))))
+        if len(costs) > MOST_COSTS:  # every other point is enough, but the last one
+            del costs[1:-1:2]
+
+    def _spoken(self, bunch: Counter[tuple[str, str]], now: float) -> None:
+        self._live.messages += bunch.total()
+        if bunch:
+            self._bunches.append((now, bunch))
+        while self._bunches and now - self._bunches[0][0] > RECENT_S:
+            self._bunches.popleft()
+        recent: Counter[tuple[str, str]] = Counter()
+        for _, said in self._bunches:
+            recent.update(said)
+        self._live.recent = recent

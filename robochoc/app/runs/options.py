@@ -1,0 +1,61 @@
+"""How a team is to decide, and the command line that says so."""
+
+from __future__ import annotations
+
+import shlex
+from collections.abc import Sequence
+
+import msgspec
+
+from robochoc.model.orders import Order
+from robochoc.run.defaults import AUTO
+from robochoc.run.options import Runtime
+
+RESULT = "result.json"
+JOURNAL = "run.journal"
+SCENE = "scene.html"
+MAX_SEED = 2**31 - 1
+
+
+class RunOptions(msgspec.Struct, frozen=True):
+    """How a team is to decide.
+
+    Attributes:
+        protocol: The protocol; `auto`: one that suits the team.
+        runtime: `simulator` or `processes`.
+        seed: The seed of what is random.
+        timeout: A limit in seconds. None: no limit.
+        withdraw: Whether robots may step aside where there is no solution: as few as possible, by weight.
+        scene: Whether the 3D scene of it is written.
+        more: Further arguments of `robochoc solve`.
+    """
+
+    protocol: str = AUTO
+    runtime: str = Runtime.SIMULATOR
+    seed: int = 0
+    timeout: float | None = None
+    withdraw: bool = False
+    scene: bool = False
+    more: tuple[str, ...] = ()
+
+    def arguments(self, team: str, *, ranked: bool = False) -> list[str]:
+        """Return the arguments of `robochoc` that let the folder `team` decide, in the folder of a run.
+
+        Where the team is `ranked`, robots decide in their own order, and no protocol chooses another one.
+        """
+        said = ["solve", team, "--json", "--journal", JOURNAL]
+        said += ["--protocol", self.protocol, "--runtime", self.runtime, "--seed", str(self.seed)]
+        if ranked:
+            said += ["--order", Order.GIVEN]
+        if self.timeout is not None:
+            said += ["--timeout", f"{self.timeout:g}"]
+        if self.withdraw:
+            said.append("--withdraw")
+        if self.scene:
+            said += ["--html", SCENE]
+        return [*said, *self.more]
+
+
+def command_line(arguments: Sequence[str]) -> str:
+    """Return a command line as it can be typed in a shell, for arguments of `robochoc`."""
+    return shlex.join(["robochoc", *arguments])

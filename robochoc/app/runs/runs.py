@@ -1,0 +1,150 @@
+"""The runs of a team: they are started, watched, stopped, and found again after the server has died."""
+
+from __future__ import annotations
+
+import asyncio
+import shutil
+import time
+from collections.abc import Callable
+from contextlib import suppress
+from pathlib import Path
+from threading import Lock
+from typing import Protocol
+from weakref import WeakKeyDictionary
+
+import msgspec
+
+from robochoc.app.listeners import Listeners
+from robochoc.app.runs.options import RunOptions
+from robochoc.app.runs.run import RECORD, SKETCH, Record, Run, State, run_of
+from robochoc.app.runs.watching import Watched
+from robochoc.app.sketch.building import model_of
+from robochoc.app.sketch.sketch import Sketch
+from robochoc.modelling.model import Model
+
+MOST_KEPT = 30
+"""Runs of a team. Older ones are removed."""
+_USUAL = RunOptions()
+
+
+class Team(Protocol):
+    """What decides: `Project` is one."""
+
+    @property
+    def sketch(self) -> Sketch:
+        """The team as it stands."""
+
+    @property
+    def folder(self) -> Path:
+        """Where its runs are kept, in the folder `runs`."""
+
+
+class Runs:
+    """The runs of one team. `runs_of` returns the one object for each team that is open."""
+
+    def __init__(self, project: Team) -> None:
+        self._project = project
+        self._folder = project.folder / "runs"
+        self._listeners = Listeners()
+        self._runs = [run_of(one.parent) for one in sorted(self._folder.glob(f"*/{RECORD}"))]
+
+    @property
+    def latest(self) -> Run | None:
+        """The run that was started last."""
+        return self._runs[-1] if self._runs else None
+
+    def latest_for(self, purpose: str) -> Run | None:
+        """Return the run that was started last for a purpose, such as `decide`."""
+        return next((run for run in self.all() if run.record.purpose == purpose), None)
+
+    def all(self) -> list[Run]:
+        """Return all runs, the last one first."""
+        return self._runs[::-1]
+
+    def find(self, name: str) -> Run | None:
+        """Return the run of that id."""
+        return next((run for run in self._runs if run.id == name), None)
+
+    def start(
+        self,
+        options: RunOptions = _USUAL,
+        *,
+        sketch: Sketch | None = None,
+        model: Callable[[Sketch], Model] = model_of,
+        purpose: str = "decide",
+    ) -> Run:
+        """Let the team decide. The run has begun when this returns; all work is done in a thread and a process.
+
+        Args:
+            options: How.
+            sketch: The team. None: as it stands.
+            model: Makes a model of the sketch.
+            purpose: What for: a word for `latest_for`.
+        """
+        chosen = self._project.sketch if sketch is None else sketch
+        folder = self._new_folder()
+        run = Run(folder, Record(options, purpose=purpose, started=time.time()), chosen)
+        run.record.arguments = options.arguments(run.team.name, ranked=chosen.is_ranked)
+        with suppress(RuntimeError):  # there is no loop: listeners are called by the thread that watches
+            run.told_by(asyncio.get_running_loop().call_soon_threadsafe)
+        (folder / SKETCH).write_bytes(msgspec.json.encode(chosen))
+        run.save()
+        self._runs.append(run)
+        self._forget_old()
+        watched = Watched(run, model)
+        run.watched_by = watched
+        with _LOCK:
+            _WATCHED.append(watched)
+        watched.start(_ended)
+        self._listeners()
+        return run
+
+    def on_start(self, callback: Callable[[], None]) -> Callable[[], None]:
+        """Call `callback` when a run is started; return what ends that."""
+        return self._listeners.add(callback)
+
+    def _new_folder(self) -> Path:
+        self._folder.mkdir(mode=0o700, exist_ok=True)  # the team's folder is gone if the team was removed
+        taken = [int(one.name) for one in self._folder.iterdir() if one.name.isdecimal()]
+        number = max(taken, default=0) + 1
+        while True:
+            try:
+                (self._folder / f"{number:05}").mkdir(mode=0o700)
+            except FileExistsError:
+                number += 1
+            else:
+                return self._folder / f"{number:05}"
+
+    def _forget_old(self) -> None:
+        over = [run for run in self._runs if run.state is not State.RUNNING]
+        for run in over[: max(0, len(self._runs) - MOST_KEPT)]:
+            self._runs.remove(run)
+            shutil.rmtree(run.folder, ignore_errors=True)
+
+
+_LOCK = Lock()
+_WATCHED: list[Watched] = []
+_RUNS: WeakKeyDictionary[Team, Runs] = WeakKeyDictionary()
+
+
+def runs_of(project: Team) -> Runs:
+    """Return the runs of a team, the same object for all pages that show it."""
+    if project not in _RUNS:
+        _RUNS[project] = Runs(project)
+    return _RUNS[project]
+
+
+def end_all() -> None:
+    """End all that runs: the server does."""
+    with _LOCK:
+        running = [*_WATCHED]
+    for one in running:
+        one.kill()
+    for one in running:
+        one.join()
+
+
+def _ended(watched: Watched) -> None:
+    with _LOCK:
+        if watched in _WATCHED:
+            _WATCHED.remove(watched)

@@ -1,0 +1,131 @@
+"""A sketch as a `robochoc.Model`, and with it as a team, its files, and its solution."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+
+from robochoc.app.sketch.palette import Applied
+from robochoc.app.sketch.rules import PALETTE
+from robochoc.app.sketch.sketch import Decision, Kind, Sketch, SketchRule
+from robochoc.model.problem import Team
+from robochoc.modelling.building import built, saved_order
+from robochoc.modelling.model import Model
+from robochoc.modelling.robots import ModelRobot
+from robochoc.modelling.terms import Term, Variable
+
+WAYPOINT = "waypoint"
+"""The topic that says where a robot is to go, after the robot's name: ROS wants one for each."""
+
+
+def model_of(sketch: Sketch) -> Model:
+    """Return the model of a sketch. `checks.troubles` says first what keeps it from being one.
+
+    Constraints are called by their rule and its robots, such as `R1.North.South`.
+
+    Raises:
+        ModelError: if the sketch has a mistake.
+    """
+    model = Model(sketch.name)
+    for drawn in sketch.robots:
+        model.robot(drawn.name, priority=drawn.rank, weight=drawn.weight)
+    for decision in sketch.decisions:
+        for name in sketch.deciders(decision):
+            model.robots[name].variable(decision.name, [*sketch.values(decision)])
+    for drawn in sketch.robots:
+        tell_where(sketch, model.robots[drawn.name])
+    for rule in sketch.rules:
+        if rule.on:
+            _add(model, sketch, rule)
+    return model
+
+
+def decided(
+    sketch: Sketch, assignment: Mapping[str, int | str], model: Model | None = None
+) -> dict[tuple[str, str], int | str]:
+    """Return what robots have decided, in the words of the sketch.
+
+    Args:
+        sketch: The sketch.
+        assignment: Values by variables as commands tell them (`solve --json`): a text is a name without blanks there.
+        model: The model that was solved, if it is another one than the sketch's own.
+
+    Returns:
+        Values of the sketch, by robot and decision. What the sketch does not have is left out.
+    """
+    model = model_of(sketch) if model is None else model
+    found: dict[tuple[str, str], int | str] = {}
+    for decision in sketch.decisions:
+        for name in sketch.deciders(decision):
+            variable = model.robots[name].variables[decision.name]
+            told = assignment.get(variable.name)
+            words = {model.symbols.all[code] if variable.codes.symbolic else code: code for code in variable.codes.ever}
+            if told in words:
+                value = variable.codes.value(words[told])
+                found[name, decision.name] = value if isinstance(value, (int, str)) else str(value)
+    return found
+
+
+def saved_team(sketch: Sketch) -> Team:
+    """Return the team of a sketch as its files say it. Raises `ModelError` if the sketch has a mistake."""
+    model = model_of(sketch)
+    order = saved_order(model.team)
+    return model.team if order == model.team.order else built(model, order)
+
+
+def applied(sketch: Sketch, rule: SketchRule) -> Iterator[tuple[str, tuple[str, ...]]]:
+    """Yield each constraint that a rule becomes: its name, and its robots."""
+    for robots in PALETTE[rule.kind].groups(sketch, rule):
+        yield name_of(rule, robots), robots
+
+
+def name_of(rule: SketchRule, robots: Sequence[str]) -> str:
+    """Return the name of the constraint that `rule` becomes for these robots, as the palette links them."""
+    few = 3
+    return ".".join([rule.id, *robots]) if len(robots) < few else rule.id
+
+
+def _add(model: Model, sketch: Sketch, rule: SketchRule) -> None:
+    for name, robots in applied(sketch, rule):
+        state(model, rule, name, term_of(model, sketch, rule, robots), robots)
+
+
+def term_of(model: Model, sketch: Sketch, rule: SketchRule, robots: Sequence[str]) -> Term:
+    """Return what a rule says of the robots of one link, over the variables of a model."""
+    term = PALETTE[rule.kind].condition(Applied(sketch, rule), [model.robots[robot][rule.decision] for robot in robots])
+    assert isinstance(term, Term), "variables of a model make terms"  # noqa: S101
+    return term
+
+
+def state(model: Model, rule: SketchRule, name: str, term: Term, robots: Sequence[str]) -> None:
+    """Add the constraint that a rule becomes for the robots of one link."""
+    if PALETTE[rule.kind].graded:
+        model.minimize(term)
+    elif rule.private and len(robots) > 1:  # partially known: the other one has no part, and never learns this one
+        model.robots[robots[0]].knows(term, cost=rule.cost, name=name)
+    else:
+        model.add(term, cost=rule.cost, name=name)
+
+
+def tell_where(sketch: Sketch, robot: ModelRobot) -> None:
+    """Let a robot say where its decisions send it: to a cell, and to a height."""
+    variables: dict[Kind, Variable] = {}
+    for decision in _decided_by(sketch, robot.name):
+        variables.setdefault(decision.kind, robot.variables[decision.name])
+    place, level = variables.get(Kind.PLACE), variables.get(Kind.LEVEL)
+    if place is None and level is None:
+        return
+    drawn = sketch.robot(robot.name)
+    assert drawn is not None, "the robot is one of the sketch"  # noqa: S101
+    columns = sketch.area.columns
+    robot.topic(
+        f"{robot.name}/{WAYPOINT}",
+        x=drawn.at.x + 1 if place is None else place % columns + 1,
+        y=drawn.at.y + 1 if place is None else place // columns + 1,
+        z=1 if level is None else level,
+    )
+
+
+def _decided_by(sketch: Sketch, name: str) -> Iterator[Decision]:
+    for decision in sketch.decisions:
+        if name in sketch.deciders(decision):
+            yield decision

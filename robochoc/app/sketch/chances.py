@@ -1,0 +1,138 @@
+"""Rules that must hold and never can: seen cheaply, for robots alone and for two of them. The rest, solving finds."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from itertools import product
+from math import prod
+
+from robochoc.app.sketch.fits import Facts
+from robochoc.app.sketch.palette import Applied, Links, PaletteRule
+from robochoc.app.sketch.rules import PALETTE
+from robochoc.app.sketch.sketch import SketchRule
+from robochoc.app.sketch.troubles import About, Severity, Trouble, shortened
+from robochoc.solver.domain import MAX_SOLUTIONS
+
+MAX_PAIRS = 10_000
+"""Pairs of values that are tried for two robots; what has more is left to solving."""
+MAX_TRIED = 100_000
+"""Pairs of values that are tried for a sketch."""
+MAX_LOOKED_AT = 5_000
+"""Links of two robots that are looked at."""
+
+Values = frozenset[int | str]
+Own = dict[tuple[str, str], Values]
+"""The values that rules about one robot alone leave it, by robot and decision."""
+_Link = tuple[str, str, str]
+"""A decision, and two robots."""
+
+
+def hopeless(facts: Facts) -> Iterator[Trouble]:
+    """Yield rules that cannot hold."""
+    hard = [rule for rule in facts.sound if rule.cost is None and not PALETTE[rule.kind].graded]
+    own: Own = {}
+    found = [*_alone(facts, [rule for rule in hard if PALETTE[rule.kind].links is Links.EACH], own)]
+    yield from found
+    if found:
+        return
+    found = [*_of_two(facts, hard, own)]
+    yield from found
+    lost = {trouble.element for trouble in found}
+    for rule in hard:
+        if rule.id not in lost:
+            yield from _of_all(facts, rule, own)
+
+
+def _alone(facts: Facts, rules: list[SketchRule], own: Own) -> Iterator[Trouble]:
+    """Take from `own` what each rule forbids. Yield the rules that leave a robot nothing."""
+    for rule in rules:
+        given, entry = Applied(facts.sketch, rule), PALETTE[rule.kind]
+        for (robot,) in entry.groups(facts.sketch, rule):
+            left = _left(facts, own, robot, rule.decision)
+            own[robot, rule.decision] = kept = _kept(entry, given, left)
+            if left and not kept:
+                yield _hint(rule, "alone", robot=shortened(robot), decision=shortened(rule.decision))
+                break
+
+
+def _kept(entry: PaletteRule, given: Applied, left: Values) -> Values:
+    return frozenset(value for value in left if entry.holds(given, (value,)))
+
+
+def _left(facts: Facts, own: Own, robot: str, decision: str) -> Values:
+    found = own.get((robot, decision))
+    return frozenset(facts.values[decision]) if found is None else found
+
+
+def _of_two(facts: Facts, rules: list[SketchRule], own: Own) -> Iterator[Trouble]:
+    """Yield the last rule of those that two robots cannot keep together."""
+    links: dict[_Link, list[tuple[int, bool]]] = {}
+    for place, rule in enumerate(rules):
+        entry = PALETTE[rule.kind]
+        if entry.links not in {Links.EACH, Links.GROUP}:
+            for one, other in entry.groups(facts.sketch, rule):
+                links.setdefault((rule.decision, *sorted((one, other))), []).append((place, one > other))  # type: ignore[arg-type] # two
+                if len(links) > MAX_LOOKED_AT:
+                    return
+    tried: dict[object, bool] = {}
+    told: set[str] = set()
+    budget = MAX_TRIED
+    for (decision, one, other), applied in links.items():
+        left = _left(facts, own, one, decision), _left(facts, own, other, decision)
+        key = (*left, *applied)
+        if key not in tried:
+            size = prod(map(len, left))
+            if size > min(MAX_PAIRS, budget):
+                continue
+            budget -= size
+            tried[key] = _can_hold(facts, left, [(rules[place], turned) for place, turned in applied])
+        last = rules[applied[-1][0]]
+        if not tried[key] and last.id not in told:
+            told.add(last.id)
+            others = ", ".join(rules[place].id for place, _ in applied)
+            yield _hint(last, "two", one=shortened(one), other=shortened(other), rules=others)
+
+
+def _can_hold(facts: Facts, left: tuple[Values, Values], applied: list[tuple[SketchRule, bool]]) -> bool:
+    asked = [(PALETTE[rule.kind], Applied(facts.sketch, rule), turned) for rule, turned in applied]
+    return any(
+        all(entry.holds(given, pair[::-1] if turned else pair) for entry, given, turned in asked)
+        for pair in product(*left)
+    )
+
+
+def _of_all(facts: Facts, rule: SketchRule, own: Own) -> Iterator[Trouble]:
+    """Yield a rule that asks too much of all of its robots together."""
+    robots = facts.sketch.bound(rule)
+    left = [_left(facts, own, robot, rule.decision) for robot in robots]
+    if rule.kind == "different":
+        values = len(frozenset().union(*{*left}))
+        if values < len(robots):
+            yield _hint(rule, "crowded", count=len(robots), values=values, decision=shortened(rule.decision))
+    if rule.kind == "at-least":
+        wanted = Applied(facts.sketch, rule)
+        able = sum(wanted.value("value") in values for values in left)
+        if able < wanted.number("count"):
+            yield _hint(rule, "at-least", count=able, wanted=wanted.number("count"))
+
+
+def large(facts: Facts) -> Iterator[Trouble]:
+    """Yield robots whose decisions together have too many combinations, one of those that decide the same."""
+    told: dict[tuple[str, ...], list[str]] = {}
+    for robot in facts.sketch.robots:
+        decisions = tuple(name for name, robots in facts.deciders.items() if robot.name in robots)
+        if prod(len(facts.values[name]) for name in decisions) > MAX_SOLUTIONS:
+            told.setdefault(decisions, []).append(robot.name)
+    for decisions, robots in told.items():
+        named: dict[str, str | int] = {
+            "robot": shortened(robots[0]),
+            "robots": len(robots),
+            "decisions": ", ".join(map(shortened, decisions)),
+            "count": prod(len(facts.values[name]) for name in decisions),
+            "most": MAX_SOLUTIONS,
+        }
+        yield Trouble(About.ROBOT, robots[0], "trouble.robot-large", named, Severity.HINT)
+
+
+def _hint(rule: SketchRule, key: str, **named: str | int) -> Trouble:
+    return Trouble(About.RULE, rule.id, f"trouble.never-{key}", named | {"rule": shortened(rule.id)}, Severity.HINT)

@@ -1,0 +1,23 @@
+"""All that is wrong with a sketch."""
+
+from __future__ import annotations
+
+from robochoc.app.sketch import chances, fits, shape
+from robochoc.app.sketch.sketch import Sketch
+from robochoc.app.sketch.troubles import Trouble
+
+
+def troubles(sketch: Sketch) -> list[Trouble]:
+    """Return what is wrong with a sketch, errors first. Where there is no error, `building.model_of` makes its model.
+
+    Hints tell what is a team, but can hardly be meant: rules that can never hold, or too many combinations.
+    """
+    found = [*shape.of_bounds(sketch)]
+    if found:
+        return found
+    found += [*shape.of_names(sketch), *shape.of_robots(sketch), *shape.of_decisions(sketch)]
+    facts = fits.Facts(sketch)
+    found += [*facts.unfit.values(), *fits.of_secrets(facts), *fits.of_number(facts)]
+    if not any(trouble.is_error for trouble in found):
+        found += [*chances.hopeless(facts), *chances.large(facts)]
+    return sorted(found, key=lambda trouble: not trouble.is_error)

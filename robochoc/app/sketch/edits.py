@@ -1,0 +1,197 @@
+"""Edits of a sketch. Each returns another sketch, or says what is wrong with it, and with which element.
+
+An edit never leaves behind what points to nothing: with a robot go its places in rules, with a decision its rules.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+import msgspec
+
+from robochoc.app.sketch import sketch as limits
+from robochoc.app.sketch.resizing import resized
+from robochoc.app.sketch.sketch import Cell, Decision, Sketch, SketchRobot, SketchRule
+from robochoc.formats.names import MAX_WEIGHT, RESERVED, is_name
+
+
+class EditError(ValueError):
+    """An edit that cannot be: the `key` of its text in the catalogue, what the text names, and the element."""
+
+    def __init__(self, key: str, element: str = "", **named: object) -> None:
+        super().__init__(key)
+        self.key, self.element, self.named = key, element, named
+
+
+def renamed(sketch: Sketch, name: str) -> Sketch:
+    """Give the team another name."""
+    return msgspec.structs.replace(sketch, name=_name(name, "team", ()))
+
+
+# Robots
+
+
+def with_robot(sketch: Sketch, at: Cell, name: str | None = None) -> Sketch:
+    """Add a robot at a cell. Without a name it gets a free one."""
+    if len(sketch.robots) >= limits.MAX_ROBOTS:
+        raise EditError("edit.too-many-robots", most=limits.MAX_ROBOTS)
+    check_cell(sketch, at)
+    taken = {robot.name for robot in sketch.robots}
+    chosen = _free_name("Drone", taken) if name is None else _name(name, "robot", taken)
+    return msgspec.structs.replace(sketch, robots=(*sketch.robots, SketchRobot(chosen, at)))
+
+
+def without_robot(sketch: Sketch, name: str) -> Sketch:
+    """Remove a robot, from decisions and rules, too. What was about it alone goes with it."""
+    robots = tuple(robot for robot in sketch.robots if robot.name != name)
+    decisions = tuple(
+        msgspec.structs.replace(one, robots=_without(one.robots, name))
+        for one in sketch.decisions
+        if one.robots != (name,)
+    )
+    rules = tuple(
+        msgspec.structs.replace(rule, robots=_without(rule.robots, name))
+        for rule in sketch.rules
+        if rule.robots != (name,)
+    )
+    return _without_lost_rules(msgspec.structs.replace(sketch, robots=robots, decisions=decisions, rules=rules))
+
+
+def with_robot_moved(sketch: Sketch, name: str, to: Cell) -> Sketch:
+    """Let a robot stand at another cell."""
+    check_cell(sketch, to, name)
+    return _with_robot(sketch, name, lambda robot: msgspec.structs.replace(robot, at=to))
+
+
+def with_robot_renamed(sketch: Sketch, name: str, new: str) -> Sketch:
+    """Give a robot another name, everywhere."""
+    chosen = _name(new, name, {robot.name for robot in sketch.robots} - {name})
+    swapped = {name: chosen}
+
+    def said(names: Sequence[str]) -> tuple[str, ...]:
+        return tuple(swapped.get(one, one) for one in names)
+
+    return msgspec.structs.replace(
+        _with_robot(sketch, name, lambda robot: msgspec.structs.replace(robot, name=chosen)),
+        decisions=tuple(msgspec.structs.replace(one, robots=said(one.robots)) for one in sketch.decisions),
+        rules=tuple(msgspec.structs.replace(rule, robots=said(rule.robots)) for rule in sketch.rules),
+    )
+
+
+def with_importance(sketch: Sketch, name: str, *, weight: int | None = None, rank: int | None = None) -> Sketch:
+    """Say how much a robot counts when somebody has to step aside, and how high it ranks."""
+    if weight is not None and not 1 <= weight <= MAX_WEIGHT:
+        raise EditError("edit.weight", name, most=MAX_WEIGHT)
+    if rank is not None and abs(rank) > MAX_WEIGHT:
+        raise EditError("edit.rank", name, most=MAX_WEIGHT)
+    changes = {key: value for key, value in (("weight", weight), ("rank", rank)) if value is not None}
+    return _with_robot(sketch, name, lambda robot: msgspec.structs.replace(robot, **changes))
+
+
+# The map
+
+
+def with_area(sketch: Sketch, columns: int, rows: int) -> Sketch:
+    """Make the map smaller or larger. Robots that would be outside move to its edge; cells stay where they are."""
+    most = limits.MAX_SIDE
+    if not (1 <= columns <= most and 1 <= rows <= most):
+        raise EditError("edit.map", "map", most=most)
+    return resized(sketch, columns, rows)
+
+
+def with_cell_blocked(sketch: Sketch, cell: Cell, *, blocked: bool) -> Sketch:
+    """Block a cell of the map, or free it: nobody can decide to be there."""
+    check_cell(sketch, cell)
+    cells = sketch.area.blocked | {cell} if blocked else sketch.area.blocked - {cell}
+    return msgspec.structs.replace(sketch, area=msgspec.structs.replace(sketch.area, blocked=cells))
+
+
+# Decisions
+
+
+def with_decision(sketch: Sketch, decision: Decision, *, instead_of: str | None = None) -> Sketch:
+    """Add a decision, or put it in the place of another one. Rules that no longer fit it are told by `checks`."""
+    others = {one.name for one in sketch.decisions} - {instead_of}
+    if instead_of is None and len(sketch.decisions) >= limits.MAX_DECISIONS:
+        raise EditError("edit.too-many-decisions", most=limits.MAX_DECISIONS)
+    name = _name(decision.name, instead_of or "decision", others)
+    if len(decision.values) > limits.MAX_VALUES:
+        raise EditError("edit.too-many-values", name, most=limits.MAX_VALUES)
+    made = msgspec.structs.replace(decision, name=name, values=tuple(dict.fromkeys(decision.values)))
+    if instead_of is None:
+        return msgspec.structs.replace(sketch, decisions=(*sketch.decisions, made))
+    rules = tuple(
+        msgspec.structs.replace(rule, decision=name) if rule.decision == instead_of else rule for rule in sketch.rules
+    )
+    decisions = tuple(made if one.name == instead_of else one for one in sketch.decisions)
+    return msgspec.structs.replace(sketch, decisions=decisions, rules=rules)
+
+
+def without_decision(sketch: Sketch, name: str) -> Sketch:
+    """Remove a decision, with the rules about it."""
+    decisions = tuple(one for one in sketch.decisions if one.name != name)
+    return _without_lost_rules(msgspec.structs.replace(sketch, decisions=decisions))
+
+
+# Rules
+
+
+def with_rule(sketch: Sketch, rule: SketchRule) -> Sketch:
+    """Add a rule, or put it in the place of the one of the same name. Without a name it gets a free one."""
+    if rule.cost is not None and not 1 <= rule.cost <= limits.MAX_COST:
+        raise EditError("edit.cost", rule.id, most=limits.MAX_COST)
+    if sketch.rule(rule.id) is not None:
+        rules = tuple(rule if one.id == rule.id else one for one in sketch.rules)
+        return msgspec.structs.replace(sketch, rules=rules)
+    if len(sketch.rules) >= limits.MAX_RULES:
+        raise EditError("edit.too-many-rules", most=limits.MAX_RULES)
+    made = msgspec.structs.replace(rule, id=_free_name("R", {one.id for one in sketch.rules}))
+    return msgspec.structs.replace(sketch, rules=(*sketch.rules, made))
+
+
+def without_rule(sketch: Sketch, name: str) -> Sketch:
+    """Remove a rule."""
+    return msgspec.structs.replace(sketch, rules=tuple(rule for rule in sketch.rules if rule.id != name))
+
+
+def with_rule_switched(sketch: Sketch, name: str, *, on: bool) -> Sketch:
+    """Let a rule count, or not."""
+    rules = tuple(msgspec.structs.replace(rule, on=on) if rule.id == name else rule for rule in sketch.rules)
+    return msgspec.structs.replace(sketch, rules=rules)
+
+
+# What edits share
+
+
+def _with_robot(sketch: Sketch, name: str, change: Callable[[SketchRobot], SketchRobot]) -> Sketch:
+    robots = tuple(change(robot) if robot.name == name else robot for robot in sketch.robots)
+    return msgspec.structs.replace(sketch, robots=robots)
+
+
+def _without_lost_rules(sketch: Sketch) -> Sketch:
+    known = {decision.name for decision in sketch.decisions}
+    return msgspec.structs.replace(sketch, rules=tuple(rule for rule in sketch.rules if rule.decision in known))
+
+
+def _without(names: Sequence[str], name: str) -> tuple[str, ...]:
+    return tuple(one for one in names if one != name)
+
+
+def check_cell(sketch: Sketch, cell: Cell, element: str = "map") -> None:
+    """Raise `EditError` for a cell that is not on the map."""
+    if not sketch.area.has(cell):
+        raise EditError("edit.outside", element, columns=sketch.area.columns, rows=sketch.area.rows)
+
+
+def _name(name: str, element: str, taken: Sequence[str] | set[str]) -> str:
+    """Return a name that a user gave. Raises `EditError` if it cannot be one, or there is one already."""
+    chosen = name.strip()
+    if not is_name(chosen) or chosen == RESERVED or len(chosen) > limits.MAX_LABEL:
+        raise EditError("edit.name", element, name=chosen[: limits.MAX_LABEL])
+    if chosen in taken:
+        raise EditError("edit.name-taken", element, name=chosen)
+    return chosen
+
+
+def _free_name(stem: str, taken: set[str]) -> str:
+    return next(f"{stem}{number}" for number in range(1, len(taken) + 2) if f"{stem}{number}" not in taken)

@@ -1,0 +1,152 @@
+"""Whether each rule of a sketch fits it: its decision, its robots, and what fills its openings."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from robochoc.app.sketch import sketch as limits
+from robochoc.app.sketch.palette import Form, Links, Opening, PaletteRule
+from robochoc.app.sketch.rules import PALETTE
+from robochoc.app.sketch.shape import repeated, strangers
+from robochoc.app.sketch.sketch import Setting, Sketch, SketchRule
+from robochoc.app.sketch.troubles import About, Trouble, shortened
+from robochoc.app.texts import say
+
+MAX_GROUP = 300
+"""Robots of one constraint: no file says it of many more."""
+MAX_LINKS = 20_000
+"""Constraints that all rules become together."""
+_PAIR = 2
+
+Named = dict[str, str | int]
+
+
+class Facts:
+    """What checks of many rules ask of a sketch again and again."""
+
+    def __init__(self, sketch: Sketch) -> None:
+        self.sketch = sketch
+        self.robots = {robot.name for robot in sketch.robots}
+        self.deciders = {decision.name: {*sketch.deciders(decision)} for decision in sketch.decisions}
+        self.values = {decision.name: {*sketch.values(decision)} for decision in sketch.decisions}
+        self.unfit = {rule.id: found for rule in sketch.rules if rule.on and (found := _first(self, rule))}
+        self.sound = [rule for rule in sketch.rules if rule.on and rule.id not in self.unfit]
+
+    def bound(self, rule: SketchRule) -> int:
+        """Return how many robots a rule binds, all of whom take its decision."""
+        return len(rule.robots or self.deciders[rule.decision])
+
+
+def _first(facts: Facts, rule: SketchRule) -> Trouble | None:
+    """Return what is wrong with a rule first."""
+    return next(_of_rule(facts, rule), None)
+
+
+def _of_rule(facts: Facts, rule: SketchRule) -> Iterator[Trouble]:
+    entry, decision = PALETTE.get(rule.kind), facts.sketch.decision(rule.decision)
+    if entry is None:
+        yield _trouble(rule, "kind", kind=shortened(rule.kind))
+    elif decision is None:
+        yield _trouble(rule, "decision", decision=shortened(rule.decision))
+    elif decision.kind not in entry.kinds:
+        yield _trouble(rule, "fit", decision=shortened(decision.name), kind=say(f"kind.{decision.kind}").lower())
+    else:
+        yield from _of_robots(facts, rule, entry)
+        for opening in entry.openings:
+            key = _of_opening(rule.settings.get(opening.name), opening, facts.values[decision.name])
+            if key:
+                named: Named = {"what": say(f"opening.{opening.name}").lower(), "decision": shortened(decision.name)}
+                yield _trouble(rule, key, least=opening.least, most=opening.most, **named)
+        if rule.cost is not None and not 1 <= rule.cost <= limits.MAX_COST:
+            yield _trouble(rule, "cost", most=limits.MAX_COST)
+
+
+def _trouble(rule: SketchRule, key: str, **named: str | int) -> Trouble:
+    return Trouble(About.RULE, rule.id, f"trouble.rule-{key}", named | {"rule": shortened(rule.id)})
+
+
+def _of_robots(facts: Facts, rule: SketchRule, entry: PaletteRule) -> Iterator[Trouble]:
+    """Yield what is wrong with the robots that a rule binds."""
+    stranger, twice = strangers(rule.robots, facts.robots), repeated(rule.robots)
+    idle = strangers(rule.robots, facts.deciders[rule.decision])
+    count = facts.bound(rule)
+    group = entry.links is Links.GROUP
+    if stranger is not None:
+        yield _trouble(rule, "robot-unknown", robot=shortened(stranger))
+    elif twice is not None:
+        yield _trouble(rule, "robot-twice", robot=shortened(twice))
+    elif idle is not None:
+        yield _trouble(rule, "robot-idle", robot=shortened(idle), decision=shortened(rule.decision))
+    elif count < entry.fewest:
+        yield _trouble(rule, "few", count=count, fewest=entry.fewest)
+    elif entry.most is not None and count > entry.most:
+        yield _trouble(rule, "many", count=count, most=entry.most)
+    elif group and count > MAX_GROUP:
+        yield _trouble(rule, "many", count=count, most=MAX_GROUP)
+    elif group and rule.private and count > _PAIR:
+        yield _trouble(rule, "private-many", count=count)
+
+
+def _of_opening(given: Setting | None, opening: Opening, values: set[int | str]) -> str | None:
+    """Return what is wrong with what fills an opening. None: nothing."""
+    match opening.form:
+        case Form.NUMBER:
+            fits = isinstance(given, int) and opening.least <= given <= opening.most
+            return None if fits else "number"
+        case Form.VALUE:
+            return None if _is_value(given, values) else "value"
+        case Form.VALUES:
+            if not isinstance(given, list) or not given:
+                return "values-none"
+            return None if all(_is_value(one, values) for one in given) else "values"
+        case Form.TABLE:
+            return _of_table(given, values)
+
+
+def _of_table(given: Setting | None, values: set[int | str]) -> str | None:
+    if not isinstance(given, list) or not given:
+        return "table-none"
+    for row in given:
+        if not isinstance(row, list) or len(row) != _PAIR or not all(_is_value(one, values) for one in row):
+            return "table-row"
+    return None
+
+
+def _is_value(given: object, values: set[int | str]) -> bool:
+    return isinstance(given, (int, str)) and given in values
+
+
+def of_secrets(facts: Facts) -> Iterator[Trouble]:
+    """Yield private rules of two in a team that has costs: no protocol keeps secrets then.
+
+    What only one robot takes part in, nobody else learns anyway.
+    """
+    if any(rule.cost is not None or PALETTE[rule.kind].graded for rule in facts.sound):
+        for rule in facts.sound:
+            if rule.private and PALETTE[rule.kind].links is not Links.EACH:
+                yield _trouble(rule, "private-cost")
+
+
+def of_number(facts: Facts) -> Iterator[Trouble]:
+    """Yield the rule with which there are too many constraints."""
+    total = 0
+    for rule in facts.sound:
+        total += _links(facts, rule)
+        if total > MAX_LINKS:
+            yield _trouble(rule, "links", count=total, most=MAX_LINKS)
+            return
+
+
+def _links(facts: Facts, rule: SketchRule) -> int:
+    """Return how many constraints a rule becomes. They are counted one by one only where that can be too many."""
+    entry, count = PALETTE[rule.kind], facts.bound(rule)
+    most = count * (count - 1) // 2
+    match entry.links:
+        case Links.PAIRS:
+            return most
+        case Links.NEIGHBOURS:
+            return most if most <= MAX_LINKS // 10 else sum(1 for _ in entry.groups(facts.sketch, rule))
+        case Links.GROUP:
+            return 1
+        case _:
+            return count

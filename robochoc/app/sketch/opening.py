@@ -1,0 +1,176 @@
+"""Opening what somebody has on disk: a folder of a team, an archive of one, or a file of another tool."""
+
+from __future__ import annotations
+
+import re
+import stat
+import tempfile
+import zipfile
+import zlib
+from dataclasses import dataclass, replace
+from pathlib import Path, PurePosixPath
+
+from robochoc.app.sketch.files import MAX_SKETCH, sketch_in
+from robochoc.app.sketch.sketch import Sketch
+from robochoc.formats import Diagnostic, InvalidInputError, read_team, write_team
+from robochoc.formats.diagnostics import invalid_input
+from robochoc.formats.dialects.dialect import ImportOptions
+from robochoc.formats.dialects.registry import beginning_of, read_foreign, recognise, unknown_format
+from robochoc.formats.folder import SKETCH_FILE
+from robochoc.model.problem import Team
+from robochoc.system.temporary_files import temporary_folder
+
+MAX_FILES = 2_000
+"""Files of a team that are opened. What has more, commands decide without pictures."""
+MAX_BYTES = 64 << 20
+"""Bytes of all files of a team, or of a file of another tool."""
+_PARTS = re.compile(r"(?:(?!late\d*/)[^/]+/)?((?:late\d*/)?[^/]+\.xml|sketch\.json)")
+"""What is taken of an archive: files of a team, which may all be in one folder."""
+DAMAGED = (zipfile.BadZipFile, zlib.error, EOFError, NotImplementedError, RuntimeError, ValueError, OSError)
+"""What reading a damaged archive raises."""
+
+
+@dataclass(frozen=True)
+class ForeignTeam:
+    """A team that was not drawn here, or not only: it can be solved, flown and compared, but not edited by hand.
+
+    Attributes:
+        path: What was opened.
+        team: The team.
+        changed: It was drawn here, and its files were changed by hand since.
+        notes: What has been changed when it was imported, in sentences.
+    """
+
+    path: Path
+    team: Team
+    changed: bool = False
+    notes: tuple[str, ...] = ()
+
+    @property
+    def name(self) -> str:
+        """Its name."""
+        return self.team.name
+
+    @property
+    def robots(self) -> tuple[str, ...]:
+        """The names of its robots."""
+        return tuple(robot.name for robot in self.team.robots)
+
+    @property
+    def variables(self) -> int:
+        """How many variables it has."""
+        return len(self.team.variables)
+
+    @property
+    def constraints(self) -> int:
+        """How many constraints it has."""
+        return sum(1 for _ in self.team.constraints())
+
+    def save(self, folder: Path, *, replace: bool = False) -> None:
+        """Write its XML files into `folder`. Raises `InvalidInputError` as `files.save` does."""
+        write_team(self.team, folder, replace=replace)
+
+
+def opened(path: Path, *more: Path) -> Sketch | ForeignTeam:
+    """Return what is at `path`: the sketch if a team was drawn here and is as it was, or else a team that is as it is.
+
+    Args:
+        path: A team's folder, a ZIP archive of one, or a file that `robochoc import` reads.
+        *more: Further files of the same problem, for formats with several.
+
+    Raises:
+        InvalidInputError: if it is nothing of these, too large, or has mistakes.
+        OSError: if it cannot be read.
+    """
+    if path.is_dir() and not more:
+        return _folder(path)
+    for file in (path, *more):
+        if beginning_of(file) is None:
+            raise invalid_input(file, "it is no file that can be read", "choose a team's folder, or a file")
+        if file.stat().st_size > MAX_BYTES:
+            raise _too_large(file)
+    if not more and zipfile.is_zipfile(path):
+        return _archive(path)
+    if recognise(path) is None:
+        if path.suffix.lower() == ".xml":
+            raise invalid_input(path, "it is of no format that is read here", "of a robot, open the team's folder")
+        raise unknown_format(path)
+    imported = read_foreign([path, *more], ImportOptions())
+    return ForeignTeam(path, imported.team, notes=tuple(note.text for note in imported.notes))
+
+
+def _folder(folder: Path) -> Sketch | ForeignTeam:
+    xml = _xml_in(folder)
+    sketch, was_drawn = sketch_in(folder, xml)
+    return sketch or ForeignTeam(folder, read_team(folder), changed=was_drawn)
+
+
+def _xml_in(folder: Path) -> dict[str, bytes]:
+    """Return the XML files of a team's folder, those of robots that join included, by their paths there."""
+    found: dict[str, bytes] = {}
+    total = 0
+    for place in [folder, *folder.glob("late*")]:
+        for file in place.glob("*.xml") if place.is_dir() else ():
+            status = file.stat()
+            total += status.st_size
+            if len(found) >= MAX_FILES or total > MAX_BYTES:
+                raise _too_large(folder)
+            if stat.S_ISREG(status.st_mode):  # of anything else, reading the team tells
+                found[file.relative_to(folder).as_posix()] = file.read_bytes()
+    return found
+
+
+def _archive(path: Path) -> Sketch | ForeignTeam:
+    with tempfile.TemporaryDirectory(prefix="robochoc-", dir=temporary_folder()) as place:
+        folder = Path(place) / (path.stem or "team")
+        folder.mkdir()
+        try:
+            _unpack(path, folder)
+        except InvalidInputError:
+            raise
+        except DAMAGED as damaged:
+            raise invalid_input(path, f"it is damaged: {damaged}", "make the archive again") from None
+        try:
+            found = _folder(folder)
+        except InvalidInputError as invalid:
+            raise InvalidInputError(_without(place, invalid)) from None
+    return found if isinstance(found, Sketch) else ForeignTeam(path, found.team, found.changed)
+
+
+def _unpack(path: Path, folder: Path) -> None:
+    """Write the files of a team that are in an archive into a folder, within bounds. No path leads out of it."""
+    taken: set[str] = set()
+    left = MAX_BYTES
+    with zipfile.ZipFile(path) as archive:
+        for member in archive.infolist():
+            match = _PARTS.fullmatch(member.filename)
+            if match is None or member.is_dir() or ".." in PurePosixPath(member.filename).parts:
+                continue
+            if match[1] in taken or len(taken) > MAX_FILES:
+                raise _too_large(path) if len(taken) > MAX_FILES else _two_teams(path, match[1])
+            taken.add(match[1])
+            most = min(left, MAX_SKETCH) if match[1] == SKETCH_FILE else left
+            with archive.open(member) as source:
+                content = source.read(most + 1)
+            if len(content) > most:
+                raise _too_large(path)
+            left -= len(content)
+            target = folder / match[1]
+            target.parent.mkdir(exist_ok=True)
+            target.write_bytes(content)
+    if not taken:
+        raise invalid_input(path, "there is no team in it: no XML file", "choose an archive of one team's folder")
+
+
+def _too_large(path: Path) -> InvalidInputError:
+    hint = "'robochoc solve' decides it without pictures"
+    return invalid_input(path, f"it is too large: at most {MAX_FILES:,} files and {MAX_BYTES >> 20} MiB", hint)
+
+
+def _two_teams(path: Path, name: str) -> InvalidInputError:
+    return invalid_input(path, f"{name} is in it twice", "choose an archive of one team's folder")
+
+
+def _without(place: str, invalid: InvalidInputError) -> list[Diagnostic]:
+    """Return mistakes with paths in the archive, and not in the folder where it was looked at."""
+    return [replace(one, file=one.file.removeprefix(place).lstrip("/\\")) for one in invalid.diagnostics]

@@ -1,0 +1,208 @@
+"""The palette: every rule that a user can apply without writing a formula.
+
+A rule of the palette says which decisions it fits, what its words leave open, which robots it links in the picture, and
+what it is as a constraint, over terms of a `robochoc.Model`, or over written Python, which the user can copy
+(`written`). Over values it is true or false. Its words are in the catalogue of texts (`app/texts`), under `rule.KEY`.
+"""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from enum import StrEnum
+from typing import cast
+
+from robochoc.app.sketch.sketch import NUMBERED, Kind, Sketch, SketchRule
+from robochoc.app.sketch.written import Each, Operand, Written
+from robochoc.modelling import functions
+from robochoc.modelling.terms import Term
+
+ALL_KINDS = frozenset(Kind)
+PLACES = frozenset({Kind.PLACE})
+NAMED = ALL_KINDS - NUMBERED
+
+
+class Form(StrEnum):
+    """What fills an opening in a rule's words."""
+
+    NUMBER = "number"
+    """An integer from `least` to `most`."""
+    VALUE = "value"
+    """A value of the decision."""
+    VALUES = "values"
+    """Some values of the decision."""
+    TABLE = "table"
+    """Pairs of values, clicked together."""
+
+
+class Links(StrEnum):
+    """Whom a rule links, and so what is drawn, and what is a constraint of its own."""
+
+    EACH = "each"
+    """It is about every robot by itself."""
+    PAIRS = "pairs"
+    """About every two of them."""
+    NEIGHBOURS = "neighbours"
+    """About every two that stand near each other: within the setting `radius`."""
+    STAR = "star"
+    """About the first robot and every other one."""
+    CHAIN = "chain"
+    """About every robot and the next one in the rule's order."""
+    GROUP = "group"
+    """About all of them at once."""
+
+
+@dataclass(frozen=True)
+class Opening:
+    """What a rule's words leave open: `name` is its name among the rule's settings."""
+
+    name: str
+    form: Form
+    least: int = 0
+    most: int = 1_000
+    default: int | None = None
+
+
+@dataclass(frozen=True)
+class Applied:
+    """A rule as it stands in a sketch."""
+
+    sketch: Sketch
+    rule: SketchRule
+
+    def number(self, name: str) -> int:
+        """Return a setting that is a number."""
+        value = self.rule.settings[name]
+        if not isinstance(value, int):
+            raise TypeError(f"{name} is {value!r}, no number")
+        return value
+
+    def value(self, name: str) -> int | str:
+        """Return a setting that is a value."""
+        value = self.rule.settings[name]
+        if not isinstance(value, (int, str)):
+            raise TypeError(f"{name} is {value!r}, no value")
+        return value
+
+    def values(self, name: str) -> list[int | str]:
+        """Return a setting that is a list of values."""
+        values = self.rule.settings[name]
+        if not isinstance(values, list):
+            raise TypeError(f"{name} is {values!r}, no list")
+        return [value for value in values if isinstance(value, (int, str))]
+
+    def rows(self, name: str) -> list[tuple[int | str, int | str]]:
+        """Return a setting that is a table of pairs."""
+        rows = self.rule.settings[name]
+        if not isinstance(rows, list):
+            raise TypeError(f"{name} is {rows!r}, no table")
+        return [(row[0], row[1]) for row in rows if isinstance(row, list)]
+
+    @property
+    def kind(self) -> Kind:
+        """What the rule's decision is about."""
+        decision = self.sketch.decision(self.rule.decision)
+        assert decision is not None, "a rule is applied to a decision that there is"  # noqa: S101
+        return decision.kind
+
+
+@dataclass(frozen=True)
+class PaletteRule:
+    """A rule of the palette.
+
+    Attributes:
+        key: Its name.
+        kinds: The kinds of decisions that it fits.
+        links: Whom it links.
+        openings: What its words leave open.
+        condition: Makes the condition over the decisions of the robots of one link: of one, of two, or of all of them.
+            Of a rule that is graded, it makes the cost.
+        fewest: How many robots it binds at least.
+        most: How many at most. None: any number.
+        graded: It has costs by degrees, and can never be broken.
+        has_order: The order of its robots matters.
+    """
+
+    key: str
+    kinds: frozenset[Kind]
+    links: Links
+    condition: Callable[[Applied, Sequence[Operand]], Operand]
+    openings: tuple[Opening, ...] = ()
+    fewest: int = 2
+    most: int | None = None
+    graded: bool = False
+    has_order: bool = False
+
+    def holds(self, given: Applied, values: Sequence[int | str]) -> bool:
+        """Return whether robots with these values, in the order of a link, keep the rule. A graded one holds always."""
+        return self.graded or bool(self.condition(given, cast("Sequence[Operand]", values)))
+
+    def groups(self, sketch: Sketch, rule: SketchRule) -> Iterator[tuple[str, ...]]:
+        """Yield the robots of each link: one constraint, and one line in the picture."""
+        bound = sketch.bound(rule)
+        match self.links:
+            case Links.EACH:
+                yield from ((name,) for name in bound)
+            case Links.PAIRS:
+                yield from ((one, other) for index, one in enumerate(bound) for other in bound[index + 1 :])
+            case Links.NEIGHBOURS:
+                yield from _neighbours(sketch, bound, rule.settings.get("radius", 0))
+            case Links.STAR:
+                yield from ((bound[0], other) for other in bound[1:])
+            case Links.CHAIN:
+                yield from itertools.pairwise(bound)
+            case Links.GROUP:
+                if bound:
+                    yield bound
+
+
+def allowed(pair: Sequence[Operand], rows: list[tuple[int | str, int | str]]) -> Operand:
+    """Return that a pair of decisions is one of `rows`."""
+    if isinstance(pair[0], Written):
+        return Written.call("robochoc.allowed", [*pair], rows)
+    if isinstance(pair[0], Term):
+        return functions.allowed([*pair], rows)
+    return cast("Operand", cast("object", tuple(pair)) in rows)
+
+
+def within(one: Operand, values: list[int | str]) -> Operand:
+    """Return that a decision is one of `values`."""
+    return one.is_in(values) if isinstance(one, (Written, Term)) else cast("Operand", cast("object", one) in values)
+
+
+def count(group: Sequence[Operand], value: int | str) -> Operand:
+    """Return how many of the decisions are `value`."""
+    if isinstance(group[0], Each):
+        return Written(f"sum({equal(group[0], value)} for a in {group[0].over})")
+    if isinstance(group[0], Written):
+        return Written.call("sum", [equal(one, value) for one in group])
+    return cast("Operand", sum(cast("list[int]", [equal(one, value) for one in group])))
+
+
+def equal(one: object, other: object) -> Operand:
+    """Return the condition that two are the same."""
+    return cast("Operand", one == other)
+
+
+def unequal(one: object, other: object) -> Operand:
+    """Return the condition that two differ."""
+    return cast("Operand", one != other)
+
+
+def _neighbours(sketch: Sketch, bound: Sequence[str], radius: object) -> Iterator[tuple[str, str]]:
+    """Yield the pairs that stand near each other. The map is cut into squares: only those around one are looked at."""
+    reach = radius if isinstance(radius, int) else 0
+    side = max(1, reach)
+    standing = {robot.name: robot.at for robot in sketch.robots}
+    places = [standing[name] for name in bound]
+    squares: dict[tuple[int, int], list[int]] = {}
+    for index, here in enumerate(places):
+        squares.setdefault((here.x // side, here.y // side), []).append(index)
+    for index, here in enumerate(places):
+        column, row = here.x // side, here.y // side
+        around = itertools.product(range(column - 1, column + 2), range(row - 1, row + 2))
+        for other in sorted(one for square in around for one in squares.get(square, ()) if one > index):
+            there = places[other]
+            if (here.x - there.x) ** 2 + (here.y - there.y) ** 2 <= reach * reach:
+                yield bound[index], bound[other]

@@ -1,0 +1,189 @@
+"""Teams on disk: every one is a folder with its sketch, and is saved by itself, all of it or nothing.
+
+FOLDER/ID/history.json    the sketch, and what can be undone
+FOLDER/ID/runs/           what was decided and flown
+FOLDER/.lock              held by the one application that has the folder open
+"""
+
+from __future__ import annotations
+
+import fcntl
+import os
+import secrets
+import shutil
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from math import ceil, sqrt
+from pathlib import Path
+from typing import TypeVar
+
+import msgspec
+
+from robochoc.app.sketch.history import History
+from robochoc.app.sketch.opening import ForeignTeam
+from robochoc.app.sketch.shape import is_sound
+from robochoc.app.sketch.sketch import MAX_ROBOTS, MAX_SIDE, Area, Cell, Sketch, SketchRobot
+
+_HISTORY = "history.json"
+_TEAM = "team"
+_LOCK = ".lock"
+_ID_BYTES = 6
+MAX_BYTES = 64 << 20
+"""A larger file is none of ours. What would be larger is kept with fewer steps that can be undone."""
+
+
+class InUseError(OSError):
+    """Another application has the folder open."""
+
+
+class _Now(msgspec.Struct):
+    """The part of a history that the gallery shows."""
+
+    now: Sketch
+
+
+_Read = TypeVar("_Read", History, _Now)
+
+
+class Store:
+    """The teams in `folder`, which is made if it is not there."""
+
+    def __init__(self, folder: Path) -> None:
+        self.folder = folder
+        folder.mkdir(parents=True, exist_ok=True, mode=0o700)
+
+    @contextmanager
+    def held(self) -> Iterator[None]:
+        """Keep other applications out: two that both save what they have in memory would undo each other's edits.
+
+        The lock is the kernel's: it ends with the process, however that ends.
+
+        Raises:
+            InUseError: if another one has it.
+        """
+        lock = os.open(self.folder / _LOCK, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o600)
+        try:
+            try:
+                fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            except BlockingIOError:
+                why = "use its page, or end it, or say another folder with --folder"
+                raise InUseError(f"{self.folder} is open in another 'robochoc app': {why}") from None
+            yield
+        finally:
+            os.close(lock)
+
+    def ids(self) -> list[str]:
+        """Return the teams, the one that was changed last first."""
+        found: list[tuple[int, str]] = []
+        for file in self.folder.glob(f"*/{_HISTORY}"):
+            with suppress(OSError):  # it is being removed
+                found.append((file.stat().st_mtime_ns, file.parent.name))
+        return [name for _, name in sorted(found, reverse=True)]
+
+    def add(self, sketch: Sketch) -> str:
+        """Keep a sketch as a new team; return its id."""
+        while True:
+            name = secrets.token_hex(_ID_BYTES)
+            try:
+                (self.folder / name).mkdir(mode=0o700)
+            except FileExistsError:
+                continue
+            try:
+                self.save(name, History(sketch))
+            except BaseException:
+                self.remove(name)
+                raise
+            return name
+
+    def foreign(self, name: str) -> Path | None:
+        """Return the files of a team that was not drawn here; None: it was. Raises `KeyError` for what is no id."""
+        files = self.path(name) / _TEAM
+        return files if files.is_dir() else None
+
+    def add_foreign(self, team: ForeignTeam) -> str:
+        """Keep a team that was not drawn here; return its id."""
+        name = self.add(drawn(team))
+        try:
+            team.save(self.path(name) / _TEAM)
+        except BaseException:
+            self.remove(name)
+            raise
+        return name
+
+    def load(self, name: str) -> History:
+        """Return a team. Steps that are beyond all bounds, which no edit makes, cannot be undone.
+
+        Raises:
+            KeyError: if there is none of that id.
+            ValueError: if its file is damaged.
+        """
+        history = self._read(name, History)
+        if all(is_sound(sketch) for sketch in (*history.before, *history.after)):
+            return history
+        return History(history.now)
+
+    def now(self, name: str) -> Sketch:
+        """Return a team without what can be undone, which is faster. Raises what `load` raises."""
+        return self._read(name, _Now).now
+
+    def _read(self, name: str, kind: type[_Read]) -> _Read:
+        file = self.path(name) / _HISTORY
+        if not file.is_file():
+            raise KeyError(name)
+        try:
+            if file.stat().st_size > MAX_BYTES:
+                raise ValueError(f"{file}: it is too large")
+            read = msgspec.json.decode(file.read_bytes(), type=kind)
+        except (msgspec.DecodeError, RecursionError, OSError) as damaged:
+            raise ValueError(f"{file}: {damaged}") from None
+        if not is_sound(read.now):
+            raise ValueError(f"{file}: it is beyond all bounds")
+        return read
+
+    def save(self, name: str, history: History) -> None:
+        """Keep a team as it stands now."""
+        file = self.path(name) / _HISTORY
+        fresh = file.with_suffix(f".{os.getpid()}.new")
+        try:
+            with fresh.open("wb") as out:
+                out.write(_within_bounds(history))
+                out.flush()
+                os.fsync(out.fileno())
+            fresh.replace(file)
+        except BaseException:
+            with suppress(OSError):
+                fresh.unlink(missing_ok=True)
+            raise
+
+    def remove(self, name: str) -> None:
+        """Remove a team, and all that was decided by it."""
+        shutil.rmtree(self.path(name), ignore_errors=True)
+
+    def path(self, name: str) -> Path:
+        """Return a team's folder. Raises `KeyError` for what is no id."""
+        if not (name.isascii() and name.isalnum() and len(name) == 2 * _ID_BYTES):
+            raise KeyError(name)
+        return self.folder / name
+
+
+def _within_bounds(history: History) -> bytes:
+    """Return a history as its file has it, without its oldest steps where it would be too large."""
+    while len(content := msgspec.json.encode(history)) > MAX_BYTES and (history.before or history.after):
+        before, after = history.before, history.after
+        history = History(history.now, before[(len(before) + 1) // 2 :], after[(len(after) + 1) // 2 :])
+    return content
+
+
+def drawn(team: ForeignTeam) -> Sketch:
+    """Return a picture of a team that was not drawn here: its robots, side by side. Their files say all the rest."""
+    robots = team.robots[:MAX_ROBOTS]
+    columns = min(MAX_SIDE, max(8, ceil(sqrt(len(robots)))))
+    rows = max(6, ceil(len(robots) / columns))
+    return Sketch(
+        team.name,
+        Area(columns, rows),
+        tuple(
+            SketchRobot(name, Cell(number % columns, rows - 1 - number // columns))
+            for number, name in enumerate(robots)
+        ),
+    )

@@ -1,0 +1,101 @@
+"""What is compared, and the study that says so: a TOML file of `robochoc experiment` (docs/guides/experiments.md)."""
+
+from __future__ import annotations
+
+import msgspec
+
+from robochoc.app.sketch.building import model_of
+from robochoc.app.sketch.sketch import MAX_LABEL, Sketch
+from robochoc.app.sketch.words import listed
+from robochoc.app.studies.families import Family, family_of
+from robochoc.app.texts import say
+from robochoc.experiments.study import toml_of
+from robochoc.formats.names import is_name
+from robochoc.model.problem import ProblemKind
+from robochoc.run.choice import accepts, decided
+from robochoc.run.options import Options, Runtime
+from robochoc.run.registry import installed_protocols
+
+MOST_RUNS = 100
+MOST_SECONDS = 600
+_COMMON = ("afc-ng", "abt", "sfb", "dpop", "afb")
+"""Protocols that are chosen beside what `auto` takes, the first that fits."""
+
+
+class Question(msgspec.Struct, frozen=True):
+    """What is asked.
+
+    Attributes:
+        protocols: The protocols, two at least.
+        family: Whether the problems are of the family that is most like the team. Else it is the team.
+        runs: Runs of each protocol, or problems of each kind.
+        timeout: The limit of a run in seconds.
+    """
+
+    protocols: tuple[str, ...]
+    family: bool = False
+    runs: int = 10
+    timeout: int = 20
+
+
+class Possible(msgspec.Struct, frozen=True):
+    """What can be compared on a team.
+
+    Attributes:
+        protocols: The protocols that fit, complete ones first, and whether each is complete.
+        usual: Two of them to begin with.
+        costs: Whether there are costs.
+        family: The family most like it, if there is one.
+    """
+
+    protocols: tuple[tuple[str, bool], ...]
+    usual: tuple[str, ...]
+    costs: bool
+    family: Family | None
+
+
+def possible(sketch: Sketch) -> Possible:
+    """Return what can be compared. Raises `ModelError` for what is no team that can decide."""
+    team = model_of(sketch).team
+    options = Options(runtime=Runtime.SIMULATOR)
+    known = [(one.name, one.protocol.traits.complete) for one in installed_protocols() if one.protocol]
+    fit = sorted(
+        ((name, complete) for name, complete in known if accepts(name, team, options)),
+        key=lambda one: (not one[1], one[0]),
+    )
+    chosen = decided(team, options).options.protocol
+    names = [name for name, _ in fit]
+    beside = next((name for name in (*_COMMON, *names) if name in names and name != chosen), None)
+    usual = tuple(name for name in (chosen, beside) if name in names)
+    return Possible(tuple(fit), usual, team.kind is ProblemKind.DISWCSP, family_of(sketch))
+
+
+def folder_of(sketch: Sketch) -> str:
+    """Return the name of the team's folder beside a study."""
+    return sketch.name if is_name(sketch.name) and len(sketch.name) <= MAX_LABEL else "team"
+
+
+def number_of_runs(question: Question, family: Family | None) -> int:
+    """Return how many runs there are in all."""
+    kinds = family.points if question.family and family else 1
+    return len(question.protocols) * question.runs * kinds
+
+
+def title_of(sketch: Sketch, question: Question) -> str:
+    """Return what heads the report."""
+    key = "compare.title-family" if question.family else "compare.title-team"
+    return say(key, protocols=listed(question.protocols), team=folder_of(sketch))
+
+
+def study_of(sketch: Sketch, question: Question, family: Family | None) -> str:
+    """Return the study, as the text of its file."""
+    seeds = f"1..{question.runs}"
+    runs: dict[str, object] = {"protocol": [*question.protocols]}
+    if question.family and family:
+        problems: dict[str, object] = {"family": family.name, **family.options, "seed": seeds}
+    else:
+        problems = {"path": [folder_of(sketch)]}
+        runs |= {} if sketch.is_ranked else {"order": "random"}
+        runs["seed"] = seeds
+    tables = {"problems": problems, "runs": runs, "limits": {"timeout": question.timeout}}
+    return toml_of({"title": title_of(sketch, question), **tables})

@@ -1,0 +1,46 @@
+"""A search can be asked to stop with the best that it has so far, as if its time was over: by the signal `STOP`.
+
+    kill -USR1 PID
+
+Ctrl-C and SIGTERM end the program, and no answer is told.
+"""
+
+from __future__ import annotations
+
+import signal
+import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+STOP = signal.SIGUSR1
+
+
+class _Request:
+    """Whether somebody has asked this process."""
+
+    made = False
+
+
+@contextmanager
+def stop_heard() -> Iterator[None]:
+    """Let the signal `STOP` ask for it, meanwhile. Elsewhere than in the main thread nothing is heard."""
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+
+    def hear(*_: object) -> None:
+        _Request.made = True
+
+    before = signal.signal(STOP, hear)
+    mask = signal.pthread_sigmask(signal.SIG_UNBLOCK, {STOP})  # whoever has started us may have held it back
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, mask)
+        signal.signal(STOP, before)
+        _Request.made = False
+
+
+def stop_requested() -> bool:
+    """Return whether somebody has asked for it."""
+    return _Request.made

@@ -1,0 +1,49 @@
+"""`kill -USR1`: a search stops as if its time was over, and tells the best so far."""
+
+from __future__ import annotations
+
+import json
+import signal
+from pathlib import Path
+
+import pytest
+
+from robochoc.app.sketch.building import model_of
+from robochoc.journal.events import Heard
+from robochoc.journal.reader import Follower
+from robochoc.system.stopping import STOP, stop_heard, stop_requested
+from tests.support.faults import PROGRAM, running
+from tests.support.limits import wait_until
+from tests.support.slot_sketches import slots
+
+
+@pytest.mark.parametrize("runtime", [pytest.param("simulator", marks=pytest.mark.slow), "processes"])
+def test_that_it_tells_the_best_so_far(tmp_path: Path, runtime: str) -> None:
+    team, journal = tmp_path / "team", tmp_path / "run.journal"
+    model_of(slots(14, 14)).save(team)
+    command = [PROGRAM, "solve", str(team), "--protocol", "syncbb", "--runtime", runtime, "--json"]
+    with running([*command, "--journal", str(journal)], tmp_path) as run:
+        wait_until(journal.is_file, "it never began")
+        with journal.open("rb") as file:
+            follower = Follower(file)
+            wait_until(lambda: any(isinstance(line, Heard) for line in follower.read()), "nothing was found")
+        run.strike(STOP)
+        run.end()
+        assert run.status() == 3, run.errors()
+        assert "somebody has asked to stop" in run.errors()
+        assert run.left_behind() == []
+    result = json.loads((tmp_path / "stdout").read_bytes())
+    assert result["verdict"] == "unknown"
+    assert result["reason"] == "somebody has asked to stop"
+    assert result["cost"] == sum(range(1, 15))
+    assert len(result["assignment"]) == 14
+
+
+def test_that_it_is_heard_meanwhile_only() -> None:
+    before = signal.getsignal(STOP)
+    with stop_heard():
+        assert not stop_requested()
+        signal.raise_signal(STOP)
+        assert stop_requested()
+    assert not stop_requested()
+    assert signal.getsignal(STOP) is before

@@ -1,0 +1,67 @@
+"""Which rules are in each other's way: against trying all values, by CPMpy and by our own solver."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Sequence
+from random import Random
+
+import pytest
+
+from robochoc.app.conflicts.found import Conflict, ConflictSearch, Finder
+from robochoc.app.conflicts.process import found_in
+from robochoc.app.conflicts.rules import candidates, minimal, rule_of
+from tests.support.rule_teams import can_hold, random_rules
+from tests.support.slot_sketches import slots
+
+
+@pytest.mark.parametrize("way", ["assumptions", "leaving out", "own"])
+def test_that_it_cannot_hold_and_each_proper_subset_can(way: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    use_cpmpy = way != "own"
+    if use_cpmpy:
+        pytest.importorskip("cpmpy")
+    monkeypatch.setattr("robochoc.app.conflicts.by_cpmpy.FEW", 0 if way == "assumptions" else 8)
+    sizes = set()
+    for seed in range(60):
+        sketch = random_rules(Random(seed))
+        names = [rule.id for rule in candidates(sketch)]
+        conflict = found_in(sketch, 60, use_cpmpy=use_cpmpy)
+        assert conflict.finder is (Finder.CPMPY if use_cpmpy else Finder.OWN)
+        assert (conflict.rules is None) is can_hold(sketch, names), seed
+        if conflict.rules is None:
+            continue
+        assert set(conflict.rules) <= set(names)
+        assert not can_hold(sketch, conflict.rules), seed
+        for fewer in itertools.combinations(conflict.rules, len(conflict.rules) - 1):
+            assert can_hold(sketch, fewer), seed
+        sizes.add(len(conflict.rules))
+    assert {1, 2} <= sizes
+
+
+def test_that_soft_rules_and_those_that_are_off_are_in_nobodys_way() -> None:
+    sketch = slots(3, 3)
+    assert [rule.id for rule in candidates(sketch)] == ["R1"]
+
+
+def test_that_rules_are_left_out_one_by_one() -> None:
+    def holds(some: Sequence[str]) -> bool:
+        return not {"b", "d"} <= {*some}
+
+    assert minimal("abcde", holds) == ("b", "d")
+    assert minimal("abc", holds) is None
+
+
+def test_that_constraints_are_told_apart_by_the_longest_name() -> None:
+    assert rule_of("R1.A.B", ["R1", "R1.A", "R10"]) == "R1.A"
+    assert rule_of("R10", ["R1", "R10"]) == "R10"
+    assert rule_of("R2", ["R1"]) is None
+
+
+class TestSearch:
+    def test_that_it_is_found_in_a_process_of_its_own(self) -> None:
+        assert ConflictSearch(slots(3, 2)).found().rules == ("R1",)
+
+    def test_that_one_that_was_stopped_finds_nothing(self) -> None:
+        search = ConflictSearch(slots(3, 2))
+        search.stop()
+        assert search.found() == Conflict(None, late=True)

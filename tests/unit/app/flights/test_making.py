@@ -1,0 +1,80 @@
+"""What is made of a run, by commands in processes of their own."""
+
+from __future__ import annotations
+
+import asyncio
+import signal
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from robochoc.app.flights.making import Making, Stage, flies, making_of
+from robochoc.app.runs.options import JOURNAL
+from robochoc.app.sketch.sketch import Kind, Sketch
+from tests.support.kept_runs import cube, kept_run
+
+
+def test_only_who_decides_heights_or_places_flies() -> None:
+    assert flies(cube())
+    assert not flies(cube(kind=Kind.SLOT))
+    assert flies(Sketch())  # of files that were not drawn here
+
+
+def test_all_pages_share_what_is_made_of_a_run(tmp_path: Path) -> None:
+    run = kept_run(tmp_path, cube())
+    making = making_of(run)
+    assert making_of(run) is making
+
+
+async def _made(making: Making) -> list[Stage]:
+    """Make all of it; return the stages, as they were told."""
+    stages: list[Stage] = []
+    over = asyncio.Event()
+
+    def told() -> None:
+        stages.append(making.stage)
+        if making.stage is Stage.DONE:
+            over.set()
+
+    making.wanted(told)
+    await over.wait()
+    return stages
+
+
+@pytest.mark.slow
+def test_a_run_without_its_teams_files_is_flown_and_a_damaged_journal_told(tmp_path: Path) -> None:
+    making = Making(kept_run(tmp_path, cube()))
+    assert asyncio.run(_made(making)) == [Stage.FLIGHT, Stage.CONVERSATION, Stage.DONE]
+    assert making.flight, making.troubles
+    assert making.flight.read_bytes().startswith(b"<!doctype html>")
+    assert making.run.artefact("flight.json")
+    assert JOURNAL in making.troubles[Stage.CONVERSATION]
+    assert not making.has_conversation
+    # What is there is not made again.
+    assert asyncio.run(_made(Making(making.run)))[0] is Stage.CONVERSATION
+
+
+def test_the_work_ends_when_nobody_wants_it_any_more(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    making = Making(kept_run(tmp_path, cube()))
+    begun: list[asyncio.subprocess.Process] = []
+    has_begun = asyncio.Event()
+    really = asyncio.create_subprocess_exec
+
+    async def begin(*arguments: str, **options: Any) -> asyncio.subprocess.Process:  # noqa: ANN401 - asyncio's
+        begun.append(await really(*arguments, **options))
+        has_begun.set()
+        return begun[0]
+
+    monkeypatch.setattr(asyncio, "create_subprocess_exec", begin)
+
+    async def cancelled() -> int:
+        one, other = making.wanted(lambda: None), making.wanted(lambda: None)
+        await has_begun.wait()
+        one()
+        assert making.stage is Stage.FLIGHT
+        other()
+        return await begun[0].wait()
+
+    assert asyncio.run(cancelled()) == -signal.SIGKILL
+    assert (making.stage, making.flight) == (Stage.WAITING, None)

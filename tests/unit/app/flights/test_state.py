@@ -1,0 +1,101 @@
+"""The state of a team as one file: packed here, opened there."""
+
+from __future__ import annotations
+
+import io
+import zipfile
+from pathlib import Path
+
+import msgspec
+import pytest
+
+from robochoc.app.flights.state import MAX_BYTES, packed, unpack_run
+from robochoc.app.runs.runs import Runs
+from robochoc.app.sketch.opening import opened
+from robochoc.app.sketch.sketch import MAX_ROBOTS, Cell, Sketch, SketchRobot
+from tests.support.kept_runs import cube, kept_run
+
+
+class Team:
+    """A team that is no project."""
+
+    def __init__(self, sketch: Sketch, folder: Path) -> None:
+        self.sketch = sketch
+        self.folder = folder
+
+
+def _file(folder: Path, content: bytes) -> Path:
+    file = folder / "Cube.robochoc.zip"
+    file.write_bytes(content)
+    return file
+
+
+def _changed(content: bytes, **entries: bytes) -> bytes:
+    """Return an archive with other contents for the files of the run of these names (`_` is a dot)."""
+    changed = io.BytesIO()
+    with zipfile.ZipFile(io.BytesIO(content)) as old, zipfile.ZipFile(changed, "w", zipfile.ZIP_DEFLATED) as new:
+        for name in old.namelist():
+            key = name.rpartition("/")[2].replace(".", "_")
+            new.writestr(name, entries.get(key, old.read(name)) if "/run/" in name else old.read(name))
+    return changed.getvalue()
+
+
+def test_what_is_packed_is_the_same_elsewhere(tmp_path: Path) -> None:
+    run = kept_run(tmp_path / "here", cube())
+    file = _file(tmp_path, packed(run))
+    assert opened(file) == run.sketch
+    assert unpack_run(file, tmp_path / "there")
+    again = Runs(Team(Sketch(), tmp_path / "there")).latest
+    assert again is not None
+    assert (again.sketch, again.result, again.state) == (run.sketch, run.result, run.state)
+    assert again.record == run.record
+    assert (again.folder / "run.journal").read_bytes() == b"what was said"
+
+
+def test_the_same_run_makes_the_same_file(tmp_path: Path) -> None:
+    run = kept_run(tmp_path, cube())
+    assert packed(run) == packed(run)
+
+
+def test_a_file_without_a_run_makes_none(tmp_path: Path) -> None:
+    assert not unpack_run(_file(tmp_path, b"no archive"), tmp_path / "there")
+    empty = io.BytesIO()
+    zipfile.ZipFile(empty, "w").close()
+    assert not unpack_run(_file(tmp_path, empty.getvalue()), tmp_path / "there")
+    assert not (tmp_path / "there").exists()
+
+
+@pytest.mark.parametrize("missing", ["run.json", "sketch.json"])
+def test_a_damaged_run_is_left_out(tmp_path: Path, missing: str) -> None:
+    content = packed(kept_run(tmp_path, cube()))
+    broken = _changed(content, **{missing.replace(".", "_"): b"{"})
+    assert not unpack_run(_file(tmp_path, broken), tmp_path / "there")
+
+
+def test_a_run_of_too_many_robots_is_left_out(tmp_path: Path) -> None:
+    many = msgspec.structs.replace(
+        cube(), robots=tuple(SketchRobot(f"R{number}", Cell(0, 0)) for number in range(MAX_ROBOTS + 1))
+    )
+    content = _changed(packed(kept_run(tmp_path, cube())), sketch_json=msgspec.json.encode(many))
+    assert not unpack_run(_file(tmp_path, content), tmp_path / "there")
+
+
+def test_names_in_an_archive_are_no_paths(tmp_path: Path) -> None:
+    content = io.BytesIO(packed(kept_run(tmp_path / "here", cube())))
+    with zipfile.ZipFile(content, "a") as archive:
+        for name in ("Cube/run/1/../../../../evil", "/run/1/evil", "Cube/run/1/run.json/../evil", "Cube/run/1/x.html"):
+            archive.writestr(name, b"evil")
+    assert unpack_run(_file(tmp_path, content.getvalue()), tmp_path / "there")
+    assert sorted(one.name for one in (tmp_path / "there").rglob("*") if one.is_file()) == [
+        "result.json",
+        "run.journal",
+        "run.json",
+        "sketch.json",
+    ]
+
+
+def test_a_bomb_is_not_unpacked(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    assert MAX_BYTES < 1 << 30
+    monkeypatch.setattr("robochoc.app.flights.state.MAX_BYTES", 1 << 20)
+    content = _changed(packed(kept_run(tmp_path, cube())), run_journal=bytes(1 << 22))
+    assert not unpack_run(_file(tmp_path, content), tmp_path / "there")

@@ -1,0 +1,167 @@
+"""Runs are started, watched, stopped, and found again."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+import threading
+import time
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+import msgspec
+import pytest
+
+from robochoc.app.runs.options import RunOptions
+from robochoc.app.runs.run import RECORD, Record, Run, State
+from robochoc.app.runs.runs import Runs, end_all
+from robochoc.app.sketch.sketch import Cell, Decision, Kind, Sketch, SketchRobot, SketchRule
+from tests.support.slot_sketches import slots
+
+WAIT_S = 60
+
+
+@dataclass(eq=False)
+class Team:
+    """A team that is no project."""
+
+    sketch: Sketch
+    folder: Path
+
+
+@pytest.fixture(autouse=True)
+def nothing_runs_on() -> Iterator[None]:
+    """End what a test has started."""
+    yield
+    end_all()
+
+
+def until(run: Run, holds: Callable[[], bool]) -> None:
+    """Wait for news until `holds`."""
+    news = threading.Event()
+    end = run.on_change(news.set)
+    limit = time.monotonic() + WAIT_S
+    while not holds() and time.monotonic() < limit:
+        news.wait(1)
+        news.clear()
+    end()
+    assert holds()
+
+
+def ended(run: Run) -> Run:
+    until(run, lambda: run.state is not State.RUNNING)
+    return run
+
+
+class TestRun:
+    def test_that_the_answer_is_that_of_the_command_line(self, tmp_path: Path) -> None:
+        runs = Runs(Team(slots(3, 3), tmp_path))
+        run = ended(runs.start(RunOptions(protocol="syncbb")))
+        assert run.state is State.ENDED
+        assert run.result is not None
+        assert (run.result.verdict, run.result.cost, run.result.protocol) == ("optimal", 6, "syncbb")
+        assert {run.result.value(f"Drone{number}", "slot") for number in (1, 2, 3)} == {1, 2, 3}
+        assert run.live.messages == run.result.messages > 0
+        assert run.command.startswith("robochoc solve Berths --json --journal run.journal --protocol syncbb")
+        assert run.artefact("run.journal") == run.folder / "run.journal"
+        assert run.artefact("../run.journal") == run.folder / "run.journal"
+        assert run.artefact("scene.html") is None
+        again = Runs(Team(Sketch(), tmp_path)).latest
+        assert again is not None
+        assert (again.state, again.result, again.sketch) == (run.state, run.result, run.sketch)
+
+    @pytest.mark.parametrize("above", ["A", "B"])
+    def test_that_who_is_above_decides_first(self, tmp_path: Path, above: str) -> None:
+        robots = tuple(SketchRobot(name, Cell(0, 0), rank=int(name == above)) for name in "AB")
+        slot, rule = Decision("slot", Kind.SLOT, (1, 2)), SketchRule("R1", "different", "slot")
+        run = ended(Runs(Team(Sketch("pair", robots=robots, decisions=(slot,), rules=(rule,)), tmp_path)).start())
+        assert run.result is not None
+        assert run.result.value(above, "slot") == 1
+        assert "--order given" in run.command
+
+    def test_that_one_that_is_stopped_tells_its_best_so_far(self, tmp_path: Path) -> None:
+        runs = Runs(Team(slots(14, 14), tmp_path))
+        run = runs.start(RunOptions(protocol="syncbb"))
+        until(run, lambda: bool(run.live.costs))
+        run.stop()
+        ended(run)
+        assert run.state is State.STOPPED
+        assert run.result is not None
+        assert (run.result.verdict, run.result.reason) == ("unknown", "somebody has asked to stop")
+        assert run.result.cost == sum(range(1, 15))
+        assert len(run.result.assignment) == 14
+
+    def test_that_what_cannot_be_fails_with_one_clear_message(self, tmp_path: Path) -> None:
+        runs = Runs(Team(slots(3, 3), tmp_path))
+        run = ended(runs.start(RunOptions(protocol="abt")))
+        assert run.state is State.FAILED
+        assert "abt" in run.message
+        assert "\n" not in run.message
+        wrong = msgspec.structs.replace(
+            slots(2, 2), rules=(SketchRule("R1", "never", "slot", settings={"value": "x"}),)
+        )
+        run = ended(runs.start(sketch=wrong))
+        assert run.state is State.FAILED
+        assert run.message
+
+    def test_that_values_are_told_as_the_user_says_them_and_a_hostile_name_stays_in_its_folder(
+        self, tmp_path: Path
+    ) -> None:
+        decision = Decision("task", Kind.TASK, ("two words", "<b>it's</b>"))
+        rule = SketchRule("R1", "different", "task")
+        sketch = slots(2, 2, name="../../--help")
+        sketch = msgspec.structs.replace(sketch, decisions=(decision,), rules=(rule,))
+        home = tmp_path / "deep" / "in"
+        home.mkdir(parents=True)
+        runs = Runs(Team(sketch, home))
+        run = ended(runs.start())
+        assert run.result is not None
+        assert {*run.result.assignment.values()} == {*decision.values}
+        assert {value for values in run.live.values.values() for value in values.values()} == {*decision.values}
+        again = Runs(Team(sketch, home)).latest
+        assert again is not None
+        assert again.result == run.result
+        assert [one.name for one in tmp_path.iterdir()] == ["deep"]
+
+
+class TestAfterTheServersDeath:
+    def test_that_broken_runs_are_told_as_such(self, tmp_path: Path) -> None:
+        for number, record in enumerate((b"{", msgspec.json.encode(Record(RunOptions())))):
+            folder = tmp_path / "runs" / f"{number:05}"
+            folder.mkdir(parents=True)
+            (folder / RECORD).write_bytes(record)
+        second, first = Runs(Team(slots(2, 2), tmp_path)).all()
+        assert (first.state, first.message) == (State.FAILED, "broken")
+        assert (second.state, second.message) == (State.FAILED, "lost")
+
+    @pytest.mark.slow
+    @pytest.mark.skipif(sys.platform != "linux", reason="the kernel tells of a parent's death there")
+    def test_that_no_process_is_left_by_kill_9(self, tmp_path: Path) -> None:
+        program = (
+            "import sys, time\n"
+            "from pathlib import Path\n"
+            "from robochoc.app.runs.options import RunOptions\n"
+            "from robochoc.app.runs.runs import Runs\n"
+            "from tests.support.slot_sketches import slots\n"
+            "class Team: sketch = slots(14, 14); folder = Path(sys.argv[1])\n"
+            "run = Runs(Team()).start(RunOptions(protocol='syncbb', runtime='processes'))\n"
+            "while run.live.messages == 0: time.sleep(0.05)\n"
+            "print(run.pid, flush=True)\n"
+            "time.sleep(600)\n"
+        )
+        with subprocess.Popen([sys.executable, "-c", program, str(tmp_path)], stdout=subprocess.PIPE) as server:
+            assert server.stdout
+            group = int(server.stdout.readline())
+            os.killpg(group, 0)
+            server.send_signal(signal.SIGKILL)
+        ended_by = threading.Event()
+        for _ in range(WAIT_S * 10):
+            try:
+                os.killpg(group, 0)
+            except ProcessLookupError:
+                return
+            ended_by.wait(0.1)
+        pytest.fail("there are processes left")
