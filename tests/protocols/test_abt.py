@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import doctest
 
-import robochoc.protocols.abt
+import robochoc.protocols.satisfaction.abt
 from robochoc.model.outcome import Verdict
 from robochoc.model.problem import Constraint, Relation, Semantics, Team
-from robochoc.protocols.abt import ABT
-from robochoc.protocols.abt_messages import AddLink, Nogood, Ok
 from robochoc.protocols.order import PriorityOrder
+from robochoc.protocols.satisfaction.abt import ABT
+from robochoc.protocols.satisfaction.messages.abt import AddLink, Ok
+from robochoc.protocols.satisfaction.messages.nogood import Nogood
 from robochoc.solver.agent_problem import agent_problems
 from robochoc.solver.compiled import LocalProblem
 from tests.support.agents import replies, value
@@ -134,4 +135,4 @@ def test_of_two_conflicts_the_one_with_the_highest_lowest_robot_is_kept() -> Non
 
 
 def test_the_docstring_shows_what_happens() -> None:
-    assert doctest.testmod(robochoc.protocols.abt).failed == 0
+    assert doctest.testmod(robochoc.protocols.satisfaction.abt).failed == 0

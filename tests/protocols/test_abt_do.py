@@ -13,9 +13,9 @@ from robochoc.journal.events import Event, Sent
 from robochoc.model.message import Message
 from robochoc.model.outcome import Verdict
 from robochoc.model.problem import Constraint, Relation, Semantics, Team
-from robochoc.protocols.abt_do import ABTDORetro, CurrentOrder
-from robochoc.protocols.abt_do_messages import AddLink, Counters, Nogood, Ok, Order
 from robochoc.protocols.order import PriorityOrder
+from robochoc.protocols.satisfaction.abt_do import ABTDORetro, CurrentOrder
+from robochoc.protocols.satisfaction.messages.abt_do import AddLink, Counters, Nogood, Ok, Order
 from robochoc.solver.agent_problem import agent_problems
 from robochoc.solver.compiled import LocalProblem
 from tests.support.agents import replies, value

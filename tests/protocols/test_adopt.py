@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import doctest
 
-import robochoc.protocols.adopt
+import robochoc.protocols.optimization.adopt
 from robochoc.model.outcome import Verdict
 from robochoc.model.problem import INFINITE
-from robochoc.protocols.adopt import ADOPT
-from robochoc.protocols.adopt_messages import Cost, Threshold, Value
-from robochoc.protocols.bounding_messages import Terminate
+from robochoc.protocols.optimization.adopt import ADOPT
+from robochoc.protocols.optimization.messages.adopt import Cost, Threshold, Value
+from robochoc.protocols.optimization.messages.bounding import Terminate
 from tests.support.agents import replies, value
 from tests.support.pseudo_trees import context, placed, priced, root, to
 
@@ -201,4 +201,4 @@ def test_what_is_paid_is_looked_up_only_when_a_neighbour_above_has_another_value
 
 
 def test_the_docstring_shows_what_happens() -> None:
-    assert doctest.testmod(robochoc.protocols.adopt).failed == 0
+    assert doctest.testmod(robochoc.protocols.optimization.adopt).failed == 0

@@ -6,14 +6,14 @@ import doctest
 import math
 from collections.abc import Mapping
 
-import robochoc.protocols.afb
+import robochoc.protocols.optimization.afb
 from robochoc.model.message import Value
 from robochoc.model.outcome import Verdict
 from robochoc.model.problem import INFINITE, Constraint, Relation, Semantics, Team
-from robochoc.protocols.afb import AFB
-from robochoc.protocols.afb_bounds import Cost
-from robochoc.protocols.afb_messages import CPA, FBCPA, FBEstimate, NewSolution, Terminate
 from robochoc.protocols.findings import Findings, Incumbent
+from robochoc.protocols.optimization.afb import AFB
+from robochoc.protocols.optimization.afb_bounds import Cost
+from robochoc.protocols.optimization.messages.afb import CPA, FBCPA, FBEstimate, NewSolution, Terminate
 from robochoc.protocols.order import PriorityOrder
 from robochoc.solver.agent_problem import DEFAULT_PARAMETERS, RunParameters, agent_problems
 from robochoc.solver.compiled import LocalProblem
@@ -355,4 +355,4 @@ def test_the_bound_counts_what_the_present_value_is_expected_to_cost_until_its_c
 
 
 def test_the_docstring_shows_what_happens() -> None:
-    assert doctest.testmod(robochoc.protocols.afb).failed == 0
+    assert doctest.testmod(robochoc.protocols.optimization.afb).failed == 0

@@ -11,10 +11,10 @@ from robochoc.communication.simulator.simulator import Simulation
 from robochoc.model.message import Message
 from robochoc.model.outcome import Verdict
 from robochoc.model.problem import Constraint, Relation, Semantics, Team
-from robochoc.protocols.afc import AFC, FilteredDomain
-from robochoc.protocols.afc_messages import CPA, Assignments, BacktrackCPA, FcCPA, NotOk
 from robochoc.protocols.order import PriorityOrder
-from robochoc.protocols.sbt import SBT
+from robochoc.protocols.satisfaction.afc import AFC, FilteredDomain
+from robochoc.protocols.satisfaction.messages.afc import CPA, Assignments, BacktrackCPA, FcCPA, NotOk
+from robochoc.protocols.satisfaction.sbt import SBT
 from robochoc.solver.agent_problem import agent_problems
 from robochoc.solver.compiled import LocalProblem
 from tests.support.brute_force import solutions

@@ -4,18 +4,21 @@ from __future__ import annotations
 
 import doctest
 from random import Random
+from typing import ClassVar
 
 import pytest
 
-import robochoc.protocols.afc_ng
+import robochoc.protocols.satisfaction.afc_ng
+from robochoc.communication.host import message_decoder
 from robochoc.communication.simulator.schedule import RandomChannels
 from robochoc.communication.simulator.simulator import Simulation
-from robochoc.model.message import Message, Value
+from robochoc.model.message import Message, Value, encode
 from robochoc.model.outcome import Verdict
 from robochoc.model.problem import Constraint, Relation, Semantics, Team
-from robochoc.protocols.afc_ng import AFCng
-from robochoc.protocols.afc_ng_messages import CPA, Nogood, Solved
 from robochoc.protocols.order import PriorityOrder
+from robochoc.protocols.satisfaction.afc_ng import AFCng, first_difference
+from robochoc.protocols.satisfaction.messages.afc_ng import CPA, Solved
+from robochoc.protocols.satisfaction.messages.nogood import Nogood
 from robochoc.solver.agent_problem import agent_problems
 from robochoc.solver.compiled import LocalProblem
 from tests.support.agents import replies, value
@@ -39,7 +42,7 @@ def agent(team: Team, name: str) -> AFCng:
 
 def cpa(*assignments: tuple[int, int]) -> CPA:
     """A CPA of robots with one variable each: their values and counters."""
-    return CPA([((value,), counter) for value, counter in assignments])
+    return CPA(tuple(((value,), counter) for value, counter in assignments))
 
 
 def test_the_first_robot_begins() -> None:
@@ -135,9 +138,9 @@ def test_nogoods_stay_when_only_a_variable_that_does_not_matter_to_them_has_chan
     owned = {"R1": ("A", "B"), "R2": ("C",), "R3": ("D",)}
     constraints = [Constraint("C", DIFFERENT, pair, pair) for pair in (("A", "D"), ("B", "C"))]
     afc = agent(complex_team(owned, dict.fromkeys("ABCD", (1, 2)), constraints), "R3")
-    replies(afc, ("R1", CPA([((1, 1), 1)])))
+    replies(afc, ("R1", CPA((((1, 1), 1),))))
     checks = afc.problem.checks
-    replies(afc, ("R1", CPA([((1, 2), 2)])))
+    replies(afc, ("R1", CPA((((1, 2), 2),))))
     assert list(afc.store) == [{"R1": (1, None)}]
     assert afc.problem.checks == checks + 1
 
@@ -260,5 +263,36 @@ def test_all_robots_hold_the_values_of_a_solution_when_it_is_found() -> None:
     assert sum("Solved" in result.metrics.messages for result in results) > 50
 
 
+class IsSharedAsItTravels(AFCng):
+    """Has to say what its receivers would decode, as in the simulator they get it as it is."""
+
+    heard: ClassVar[list[Message]] = []
+
+    def send(self, receiver: str, message: Message) -> None:
+        assert message_decoder(self.messages).decode(encode(message)) == message
+        super().send(receiver, message)
+
+    def receive(self, sender: str, message: Message) -> None:
+        self.heard.append(message)
+        super().receive(sender, message)
+
+
+def test_receivers_of_a_cpa_share_it_in_the_simulator() -> None:
+    IsSharedAsItTravels.heard.clear()
+    Simulation(different("ABCD", "AC AD BC BD", 2), IsSharedAsItTravels, RandomChannels(0)).run()
+    heard = IsSharedAsItTravels.heard
+    cpas = [message for message in heard if isinstance(message, CPA)]
+    assert len(cpas) > len({message.assignments for message in cpas}) == len({id(message) for message in cpas})
+
+
+def test_long_partial_assignments_are_compared_as_short_ones() -> None:
+    chance = Random("long")
+    for _ in range(200):
+        left = (((1,), 1),) * chance.randrange(200)
+        right = left[: chance.randrange(len(left) + 1)] + (((1,), chance.randrange(1, 3)),) * chance.randrange(3)
+        differ = [place for place, (one, other) in enumerate(zip(left, right, strict=False)) if one != other]
+        assert first_difference(left, right) == min([*differ, len(left), len(right)])
+
+
 def test_the_docstring_shows_what_happens() -> None:
-    assert doctest.testmod(robochoc.protocols.afc_ng).failed == 0
+    assert doctest.testmod(robochoc.protocols.satisfaction.afc_ng).failed == 0

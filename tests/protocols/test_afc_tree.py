@@ -7,17 +7,18 @@ from random import Random
 
 import pytest
 
-import robochoc.protocols.afc_tree
+import robochoc.protocols.satisfaction.afc_tree
 from robochoc.communication.simulator.schedule import Concurrent, RandomChannels
 from robochoc.communication.simulator.simulator import Simulation
 from robochoc.model.message import Value
 from robochoc.model.outcome import Verdict
 from robochoc.model.problem import Team
-from robochoc.protocols.afc_ng import AFCng
-from robochoc.protocols.afc_ng_messages import CPA, Nogood, Solved
-from robochoc.protocols.afc_tree import AFCTree
-from robochoc.protocols.afc_tree_messages import Accept
 from robochoc.protocols.order import PriorityOrder
+from robochoc.protocols.satisfaction.afc_ng import AFCng
+from robochoc.protocols.satisfaction.afc_tree import AFCTree
+from robochoc.protocols.satisfaction.messages.afc_ng import CPA, Solved
+from robochoc.protocols.satisfaction.messages.afc_tree import Accept
+from robochoc.protocols.satisfaction.messages.nogood import Nogood
 from robochoc.solver.agent_problem import agent_problems
 from robochoc.solver.compiled import LocalProblem
 from robochoc.verification.checker import violations
@@ -46,7 +47,7 @@ def agent(team: Team, name: str) -> AFCTree:
 
 def cpa(*assignments: tuple[int, int]) -> CPA:
     """A CPA of robots with one variable each: their values and counters."""
-    return CPA([((value,), counter) for value, counter in assignments])
+    return CPA(tuple(((value,), counter) for value, counter in assignments))
 
 
 def test_every_root_begins() -> None:
@@ -72,8 +73,9 @@ def test_a_tree_child_without_a_constraint_with_the_sender_gets_its_cpa() -> Non
 
 
 def test_a_cpa_holds_the_values_of_one_branch_only() -> None:
-    assert agent(fork(), "RD").above == ["RA", "RC"]
-    said = replies(agent(fork(), "RD"), ("RC", cpa((1, 1), (2, 1))))
+    afc = agent(fork(), "RD")
+    said = replies(afc, ("RC", cpa((1, 1), (2, 1))))
+    assert afc.view == {"RA": (1,), "RC": (2,)}
     assert said == [("RC", Accept([1, 1], {"RD": (1,)}))]
 
 
@@ -204,4 +206,4 @@ def test_branches_are_searched_at_the_same_time() -> None:
 
 
 def test_the_docstring_shows_what_happens() -> None:
-    assert doctest.testmod(robochoc.protocols.afc_tree).failed == 0
+    assert doctest.testmod(robochoc.protocols.satisfaction.afc_tree).failed == 0

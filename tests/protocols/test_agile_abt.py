@@ -9,18 +9,27 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-import robochoc.protocols.agile_abt
-import robochoc.protocols.agile_order
+import robochoc.protocols.satisfaction.agile_abt
+import robochoc.protocols.satisfaction.agile_order
 from robochoc.communication.simulator.schedule import Concurrent, RandomChannels
 from robochoc.communication.simulator.simulator import Simulation
 from robochoc.model.message import Message, Value
 from robochoc.model.outcome import Verdict
 from robochoc.model.problem import Constraint, Relation, Semantics, Team
 from robochoc.model.wording import Wording
-from robochoc.protocols.agile_abt import AgileABT
-from robochoc.protocols.agile_abt_messages import AddLink, Nogood, Ok, Order
-from robochoc.protocols.agile_order import UNKNOWN, Explanation, Proposal, compatible, ordered, proposed, updated
 from robochoc.protocols.order import PriorityOrder
+from robochoc.protocols.satisfaction.agile_abt import AgileABT
+from robochoc.protocols.satisfaction.agile_order import (
+    UNKNOWN,
+    Explanation,
+    Proposal,
+    compatible,
+    ordered,
+    proposed,
+    updated,
+)
+from robochoc.protocols.satisfaction.messages.agile_abt import AddLink, Ok, Order
+from robochoc.protocols.satisfaction.messages.nogood import Nogood
 from robochoc.solver.agent_problem import agent_problems
 from robochoc.solver.compiled import LocalProblem
 from tests.support.agents import replies, value
@@ -366,5 +375,5 @@ def test_set_link_waits_until_the_listener_is_below() -> None:
 
 
 def test_the_docstrings_show_what_happens() -> None:
-    assert doctest.testmod(robochoc.protocols.agile_abt).failed == 0
-    assert doctest.testmod(robochoc.protocols.agile_order).failed == 0
+    assert doctest.testmod(robochoc.protocols.satisfaction.agile_abt).failed == 0
+    assert doctest.testmod(robochoc.protocols.satisfaction.agile_order).failed == 0

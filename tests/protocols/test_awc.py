@@ -9,9 +9,9 @@ import pytest
 from robochoc.model.message import Value
 from robochoc.model.outcome import Verdict
 from robochoc.model.problem import Constraint, Relation, Semantics, Team
-from robochoc.protocols.awc import AWC, Kept, NogoodList
-from robochoc.protocols.awc_messages import AddLink, Nogood, Ok
 from robochoc.protocols.order import PriorityOrder
+from robochoc.protocols.satisfaction.awc import AWC, Kept, NogoodList
+from robochoc.protocols.satisfaction.messages.awc import AddLink, Nogood, Ok
 from robochoc.solver.agent_problem import agent_problems
 from robochoc.solver.compiled import LocalProblem
 from tests.support.agents import replies, value

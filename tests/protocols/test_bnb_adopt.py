@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import doctest
 
-import robochoc.protocols.bnb_adopt
+import robochoc.protocols.optimization.bnb_adopt
 from robochoc.model.message import Message
 from robochoc.model.outcome import Verdict
 from robochoc.model.problem import INFINITE
-from robochoc.protocols.bnb_adopt import BnBADOPT
-from robochoc.protocols.bnb_adopt_messages import Cost, Value
-from robochoc.protocols.bounding_messages import Terminate
+from robochoc.protocols.optimization.bnb_adopt import BnBADOPT
+from robochoc.protocols.optimization.messages.bnb_adopt import Cost, Value
+from robochoc.protocols.optimization.messages.bounding import Terminate
 from tests.support.agents import replies, value
 from tests.support.pseudo_trees import context, placed, priced, root, to
 
@@ -205,4 +205,4 @@ def test_another_robot_that_finds_all_values_infinite_says_so() -> None:
 
 
 def test_the_docstring_shows_what_happens() -> None:
-    assert doctest.testmod(robochoc.protocols.bnb_adopt).failed == 0
+    assert doctest.testmod(robochoc.protocols.optimization.bnb_adopt).failed == 0

@@ -11,9 +11,11 @@ from robochoc.communication.simulator.schedule import Concurrent, RandomChannels
 from robochoc.communication.simulator.simulator import Simulation
 from robochoc.model.outcome import PseudoTreeNode, Verdict
 from robochoc.model.problem import INFINITE
-from robochoc.protocols import adopt, adopt_messages, bnb_adopt, bnb_adopt_messages
-from robochoc.protocols.bounding import BoundingProtocol
-from robochoc.protocols.bounding_messages import Terminate
+from robochoc.protocols.optimization import adopt, bnb_adopt
+from robochoc.protocols.optimization.bounding import BoundingProtocol
+from robochoc.protocols.optimization.messages import adopt as adopt_messages
+from robochoc.protocols.optimization.messages import bnb_adopt as bnb_adopt_messages
+from robochoc.protocols.optimization.messages.bounding import Terminate
 from robochoc.run.incumbent import lower_bound
 from tests.support.agents import replies
 from tests.support.brute_force import least_cost
@@ -130,22 +132,21 @@ def test_a_robot_alone_with_no_value_that_is_allowed_ends_the_search(family: Fam
 @pytest.mark.parametrize("longest", [0, 50, None])
 @pytest.mark.parametrize("protocol", [adopt.ADOPT, bnb_adopt.BnBADOPT])
 def test_when_nobody_speaks_all_have_ended_and_the_roots_bounds_are_the_least_cost(
-    monkeypatch: pytest.MonkeyPatch, protocol: type[BoundingProtocol], longest: int | None, batch: int
+    protocol: type[BoundingProtocol], longest: int | None, batch: int
 ) -> None:
     ends: list[BoundingProtocol] = []
-    begin = protocol.begin
 
     def noted(robot: BoundingProtocol) -> None:
         ends.append(robot)
-        begin(robot)
+        protocol.begin(robot)
 
-    monkeypatch.setattr(protocol, "begin", noted)
+    noting = type("Noting", (protocol,), {"begin": noted})  # a compiled class cannot be patched
     chance = Random(f"quiet {longest} {batch}")
     for seed in range(10 if batch else 5):
         team = random_cost_team(chance)
         ends.clear()
         schedule = RandomChannels(seed) if longest is None else Concurrent(seed, longest)
-        result = Simulation(team, protocol, schedule).search()
+        result = Simulation(team, noting, schedule).search()
         if least_cost(team) == INFINITE:
             assert result.verdict is Verdict.NO_SOLUTION
         else:

@@ -11,14 +11,14 @@ from robochoc.communication.simulator.schedule import Concurrent
 from robochoc.communication.simulator.simulator import Simulation
 from robochoc.model.outcome import Verdict
 from robochoc.model.problem import Assignment, Constraint, Relation, Semantics, Team
-from robochoc.protocols.cycles import CycleProtocol
-from robochoc.protocols.cycles_messages import Value
-from robochoc.protocols.dsa import DSA
 from robochoc.protocols.findings import Trail
-from robochoc.protocols.maxsum import MaxSum
-from robochoc.protocols.mgm import MGM
-from robochoc.protocols.mgm2 import MGM2
+from robochoc.protocols.inference.maxsum import MaxSum
+from robochoc.protocols.local_search.dsa import DSA
+from robochoc.protocols.local_search.mgm import MGM
+from robochoc.protocols.local_search.mgm2 import MGM2
 from robochoc.protocols.settings import SettingsError, settings_of
+from robochoc.protocols.shared.cycles import CycleProtocol
+from robochoc.protocols.shared.messages.cycles import Value
 from robochoc.run import Options, Runtime, Withdrawal, solve
 from robochoc.run.incumbent import best_known
 from robochoc.run.registry import protocol_named

@@ -1,4 +1,4 @@
-"""The pseudo-tree that robots build: the rules of `protocols/dfs.py` one by one, and what it promises, on any graph."""
+"""The pseudo-tree that robots build: the rules of `shared/dfs.py` one by one, and what it promises, on any graph."""
 
 from __future__ import annotations
 
@@ -14,13 +14,16 @@ from hypothesis import strategies as st
 from robochoc.communication.run_result import RunResult
 from robochoc.communication.simulator.schedule import Concurrent, RandomChannels, Schedule
 from robochoc.communication.simulator.simulator import Simulation
+from robochoc.generators.graphs import grid
+from robochoc.generators.random_csp import random_on
+from robochoc.journal.events import Event, Sent
 from robochoc.model.message import Message
 from robochoc.model.outcome import PseudoTreeNode, Verdict
 from robochoc.model.problem import Constraint, Relation, Semantics, Team
-from robochoc.protocols.dfs import TreeProtocol
-from robochoc.protocols.dfs_messages import Back, Token, TreeMessage, Wave
 from robochoc.protocols.findings import Findings
 from robochoc.protocols.order import PriorityOrder
+from robochoc.protocols.shared.dfs import TreeProtocol
+from robochoc.protocols.shared.messages.dfs import Back, Token, TreeMessage, Wave
 from robochoc.protocols.traits import Traits
 from robochoc.run import Options, Runtime, solve
 from robochoc.solver.agent_problem import agent_problems
@@ -181,6 +184,56 @@ def test_a_token_passes_twice_between_a_robot_and_its_parent_and_a_wave_along_ea
     assert messages.get("Hello", 0) == edges
 
 
+@given(chance=st.randoms(use_true_random=False))
+@examples(100)
+def test_the_token_names_who_is_in_the_tree_while_a_neighbour_has_not_heard_so(chance: Random) -> None:
+    """No others, and each with the number of these neighbours: not counted are leaves, which need no list."""
+    team = random_graph(chance)
+    met = neighbours_of(team)
+    heard: dict[str, set[str]] = {}
+    parents: dict[str, str] = {}
+
+    def root(name: str) -> str:
+        """Each part of the team has its own, and a token of its own."""
+        return root(parents[name]) if name in parents else name
+
+    def look(event: Event) -> None:
+        if not isinstance(event, Sent) or event.type not in {"Token", "Back"}:
+            return
+        name = event.sender
+        if name not in heard:  # a root, or the first time that the token is here
+            heard[name] = {parents[name]} if name in parents else set()
+        heard[name] |= met[name] & heard.keys()
+        wanted = {
+            one: sum(
+                other != parents.get(one) and len(met[other]) > 1 and one not in heard.get(other, ())
+                for other in met[one]
+            )
+            for one in heard
+            if root(one) == root(name)
+        }
+        assert event.content["visited"] == {one: number for one, number in wanted.items() if number}
+        if event.type == "Token":
+            heard[name].add(event.receiver)
+            parents[event.receiver] = name
+
+    Simulation(team, Greeter, schedule_of(chance), observer=look).search()
+
+
+def test_on_a_path_the_token_names_one_robot_at_most() -> None:
+    """So bytes grow as the team does, where the names of all in the tree would grow with its square."""
+    path = random_on(grid(1, 300), 2, 0.0)
+    lists: list[int] = []
+
+    def look(event: Event) -> None:
+        if isinstance(event, Sent) and event.type in {"Token", "Back"}:
+            lists.append(len(event.content["visited"]))
+
+    Simulation(path, Greeter, Concurrent(0), observer=look).search()
+    assert len(lists) == 2 * 299
+    assert max(lists) == 1
+
+
 @count("teams", 40, 150)
 def test_each_begins_once_and_what_comes_early_is_kept_for_then(teams: int) -> None:
     chance = Random("early")
@@ -283,14 +336,14 @@ def test_who_gets_the_own_wave_back_from_all_neighbours_is_the_root_and_sends_th
     assert replies(greeter, *others) == []
     own = Wave(3, "RB")
     assert replies(greeter, ("RA", own), ("RC", own)) == []
-    assert replies(greeter, ("RD", own)) == [("RD", Token(["RB"]))]
+    assert replies(greeter, ("RD", own)) == [("RD", Token({"RB": 2}))]
 
 
 def test_the_token_comes_back_when_all_neighbours_are_in_the_tree() -> None:
     greeter = started("RC")
     replies(greeter, ("RB", Wave(3, "RB")), ("RD", Wave(3, "RD")))
-    said = replies(greeter, ("RD", Token(["RB", "RD"])))
-    assert said[0] == ("RD", Back(["RB", "RD", "RC"]))
+    said = replies(greeter, ("RD", Token({"RB": 1, "RD": 1})))
+    assert said[0] == ("RD", Back({"RC": 1}))
     assert greeter.findings.place == PseudoTreeNode("RD", ("RB",))
 
 
@@ -298,12 +351,12 @@ def test_a_robot_begins_when_all_below_it_have_their_places() -> None:
     greeter = started("RD")
     waves = (("RB", Wave(3, "RB")), ("RC", Wave(2, "RC")), ("RE", Wave(1, "RE")))
     replies(greeter, *waves)
-    assert replies(greeter, ("RB", Token(["RB"])), ("RC", Hello())) == [("RC", Token(["RB", "RD"]))]
-    assert replies(greeter, ("RC", Back(["RB", "RD", "RC"]))) == [("RE", Token(["RB", "RD", "RC"]))]
+    assert replies(greeter, ("RB", Token({"RB": 2})), ("RC", Hello())) == [("RC", Token({"RB": 1, "RD": 1}))]
+    assert replies(greeter, ("RC", Back({"RC": 1}))) == [("RE", Token({"RC": 1}))]
     assert not greeter.placed
     assert greeter.decided == 0
-    said = replies(greeter, ("RE", Back(["RB", "RD", "RC", "RE"])))
-    assert said[0] == ("RB", Back(["RB", "RD", "RC", "RE"]))
+    said = replies(greeter, ("RE", Back({"RC": 1})))
+    assert said[0] == ("RB", Back({"RC": 1}))
     assert [receiver for receiver, message in said if message == Hello()] == ["RB", "RC", "RE"]
     assert greeter.greeted == ["RC"]
     assert greeter.decided == 1

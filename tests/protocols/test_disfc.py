@@ -10,7 +10,7 @@ from random import Random
 import msgspec
 import pytest
 
-import robochoc.protocols.disfc
+import robochoc.protocols.satisfaction.disfc
 from robochoc.communication.processes.processes import ProcessesRun
 from robochoc.communication.simulator.schedule import Concurrent
 from robochoc.communication.simulator.simulator import Simulation
@@ -19,9 +19,9 @@ from robochoc.generators.queens3d import queens3d
 from robochoc.model.message import Message
 from robochoc.model.outcome import Verdict
 from robochoc.model.problem import Constraint, ConstraintModel, Team
-from robochoc.protocols.disfc import DisFC
-from robochoc.protocols.disfc_messages import AddLink, Nogood, Ok
 from robochoc.protocols.order import PriorityOrder
+from robochoc.protocols.satisfaction.disfc import DisFC
+from robochoc.protocols.satisfaction.messages.disfc import AddLink, Nogood, Ok
 from robochoc.solver import filters
 from robochoc.solver.agent_problem import agent_problems
 from robochoc.solver.compiled import LocalProblem
@@ -217,7 +217,7 @@ def test_a_filter_that_is_too_short_allows_nothing_more() -> None:
 
 
 def test_the_docstring_shows_what_happens() -> None:
-    assert doctest.testmod(robochoc.protocols.disfc).failed == 0
+    assert doctest.testmod(robochoc.protocols.satisfaction.disfc).failed == 0
 
 
 # The truth

@@ -12,7 +12,7 @@ from robochoc.system.compiled_core import docstring
 
 @pytest.mark.parametrize("name", ["abt_do", "afc", "awc", "dynabt", "first_fit", "sbt"])
 def test_the_example_shows_what_happens(name: str) -> None:
-    module = import_module(f"robochoc.protocols.{name}")
+    module = import_module(f"robochoc.protocols.satisfaction.{name}")
     example = doctest.DocTestParser().get_doctest(docstring(module), {**vars(module)}, name, module.__file__, 0)
     done = doctest.DocTestRunner().run(example)
     assert done.attempted

@@ -6,15 +6,15 @@ import doctest
 import itertools
 from collections.abc import Sequence
 
-import robochoc.protocols.dpop
+import robochoc.protocols.inference.dpop
 from robochoc.communication.simulator.schedule import RandomChannels
 from robochoc.communication.simulator.simulator import Simulation
 from robochoc.model.expression import Type, parse
 from robochoc.model.message import Message
 from robochoc.model.outcome import Verdict
 from robochoc.model.problem import INFINITE, Constraint, Predicate, Relation, Semantics
-from robochoc.protocols.dpop import DPOP
-from robochoc.protocols.dpop_messages import UTIL, VALUE, Dimensions, Need, Proceed
+from robochoc.protocols.inference.dpop import DPOP
+from robochoc.protocols.inference.messages.dpop import UTIL, VALUE, Dimensions, Need, Proceed
 from robochoc.run import Options, Runtime, solve
 from tests.support.agents import replies, value
 from tests.support.cost_problems import with_costs
@@ -180,4 +180,4 @@ def test_messages_are_as_many_as_the_tree_says() -> None:
 
 
 def test_the_docstring_shows_what_happens() -> None:
-    assert doctest.testmod(robochoc.protocols.dpop).failed == 0
+    assert doctest.testmod(robochoc.protocols.inference.dpop).failed == 0

@@ -16,8 +16,8 @@ from robochoc.communication.processes.queue_robot import QueueRobot
 from robochoc.journal.events import AnyEvent, Sent
 from robochoc.model.expression import Type, parse
 from robochoc.model.problem import Constraint, Predicate, Team
-from robochoc.protocols import dpop_tables
-from robochoc.protocols.dpop_tables import (
+from robochoc.protocols.inference import dpop_tables
+from robochoc.protocols.inference.dpop_tables import (
     Extent,
     IncomingTable,
     Table,
@@ -27,7 +27,7 @@ from robochoc.protocols.dpop_tables import (
     packed_costs,
     project,
 )
-from robochoc.protocols.dpop_tables import width_of as width_for
+from robochoc.protocols.inference.dpop_tables import width_of as width_for
 from robochoc.run import Options, Runtime, solve
 from tests.support.cost_problems import with_costs
 from tests.support.problems import ON_ONE_MACHINE, team_of

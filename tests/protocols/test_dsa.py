@@ -7,14 +7,14 @@ from random import Random
 
 import pytest
 
-import robochoc.protocols.dsa
+import robochoc.protocols.local_search.dsa
 from robochoc.communication.simulator.schedule import Concurrent
 from robochoc.model.outcome import Verdict
 from robochoc.model.problem import Constraint, Relation, Semantics, Team
-from robochoc.protocols.cycles_messages import Value
-from robochoc.protocols.dsa import DSA
-from robochoc.protocols.dsa_settings import DSASettings
+from robochoc.protocols.local_search.dsa import DSA
+from robochoc.protocols.local_search.settings.dsa import DSASettings
 from robochoc.protocols.settings import SettingsError, settings_of
+from robochoc.protocols.shared.messages.cycles import Value
 from tests.support.agents import replies, value
 from tests.support.cost_problems import random_cost_team
 from tests.support.examples import count
@@ -156,4 +156,4 @@ def test_there_are_three_variants() -> None:
 
 
 def test_the_example_in_the_documentation() -> None:
-    assert doctest.testmod(robochoc.protocols.dsa).failed == 0
+    assert doctest.testmod(robochoc.protocols.local_search.dsa).failed == 0

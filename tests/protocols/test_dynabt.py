@@ -23,10 +23,10 @@ from robochoc.model.problem import (
     Team,
     Variable,
 )
-from robochoc.protocols.abt_messages import AddLink, Ok
-from robochoc.protocols.dynabt import DynABT
-from robochoc.protocols.dynabt_messages import Nogood
 from robochoc.protocols.order import PriorityOrder
+from robochoc.protocols.satisfaction.dynabt import DynABT
+from robochoc.protocols.satisfaction.messages.abt import AddLink, Ok
+from robochoc.protocols.satisfaction.messages.dynabt import Nogood
 from robochoc.solver.agent_problem import agent_problems
 from robochoc.solver.compiled import LocalProblem
 from robochoc.solver.explanation import Invalidated

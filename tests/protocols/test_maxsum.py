@@ -9,17 +9,17 @@ from random import Random
 import numpy as np
 import pytest
 
-import robochoc.protocols.maxsum
+import robochoc.protocols.inference.maxsum
 from robochoc.communication.simulator.schedule import Concurrent
 from robochoc.model.outcome import Verdict
 from robochoc.model.problem import INFINITE, Constraint, Relation, Semantics, Team
-from robochoc.protocols import maxsum_factor
-from robochoc.protocols.cycles_messages import Domain
-from robochoc.protocols.maxsum import MaxSum
-from robochoc.protocols.maxsum_factor import Factor
-from robochoc.protocols.maxsum_messages import Q, R
-from robochoc.protocols.maxsum_settings import MaxSumSettings
+from robochoc.protocols.inference import maxsum_factor
+from robochoc.protocols.inference.maxsum import MaxSum
+from robochoc.protocols.inference.maxsum_factor import Factor
+from robochoc.protocols.inference.messages.maxsum import Q, R
+from robochoc.protocols.inference.settings.maxsum import MaxSumSettings
 from robochoc.protocols.settings import SettingsError, settings_of
+from robochoc.protocols.shared.messages.cycles import Domain
 from robochoc.solver import shared_constraint
 from robochoc.solver.cost_table import CostTable
 from robochoc.solver.encoding import UnsupportedError
@@ -275,4 +275,4 @@ def test_settings_that_make_no_sense_are_refused(name: str, given: str, rule: st
 
 
 def test_the_example_in_the_documentation() -> None:
-    assert doctest.testmod(robochoc.protocols.maxsum).failed == 0
+    assert doctest.testmod(robochoc.protocols.inference.maxsum).failed == 0

@@ -7,11 +7,11 @@ from random import Random
 
 import pytest
 
-import robochoc.protocols.mgm
+import robochoc.protocols.local_search.mgm
 from robochoc.model.problem import Constraint, Relation, Semantics, Team
-from robochoc.protocols.cycles_messages import Value
-from robochoc.protocols.mgm import MGM
-from robochoc.protocols.mgm_messages import Gain
+from robochoc.protocols.local_search.messages.mgm import Gain
+from robochoc.protocols.local_search.mgm import MGM
+from robochoc.protocols.shared.messages.cycles import Value
 from tests.support.agents import replies, value
 from tests.support.cost_problems import random_cost_team, random_hard_team
 from tests.support.local_search_runs import (
@@ -103,4 +103,4 @@ def test_the_cost_never_rises_and_the_end_is_a_local_optimum(batch: int) -> None
 
 
 def test_the_example_in_the_documentation() -> None:
-    assert doctest.testmod(robochoc.protocols.mgm).failed == 0
+    assert doctest.testmod(robochoc.protocols.local_search.mgm).failed == 0

@@ -7,16 +7,16 @@ from random import Random
 
 import pytest
 
-import robochoc.protocols.mgm2
+import robochoc.protocols.local_search.mgm2
 from robochoc.communication.simulator.schedule import Concurrent
 from robochoc.model.message import Message
 from robochoc.model.problem import Constraint, Relation, Semantics, Team
-from robochoc.protocols.cycles_messages import Domain, Value
-from robochoc.protocols.mgm import MGM
-from robochoc.protocols.mgm2 import MGM2
-from robochoc.protocols.mgm2_messages import Accept, Go, Offer, Reject
-from robochoc.protocols.mgm_messages import Gain
+from robochoc.protocols.local_search.messages.mgm import Gain
+from robochoc.protocols.local_search.messages.mgm2 import Accept, Go, Offer, Reject
+from robochoc.protocols.local_search.mgm import MGM
+from robochoc.protocols.local_search.mgm2 import MGM2
 from robochoc.protocols.settings import SettingsError, settings_of
+from robochoc.protocols.shared.messages.cycles import Domain, Value
 from tests.support.agents import replies, value
 from tests.support.cost_problems import random_cost_team, random_hard_team
 from tests.support.local_search_runs import (
@@ -212,4 +212,4 @@ def test_the_threshold_is_a_probability(threshold: str) -> None:
 
 
 def test_the_example_in_the_documentation() -> None:
-    assert doctest.testmod(robochoc.protocols.mgm2).failed == 0
+    assert doctest.testmod(robochoc.protocols.local_search.mgm2).failed == 0

@@ -8,8 +8,8 @@ from random import Random
 import pytest
 
 from robochoc.model.message import Value
-from robochoc.protocols.nogood import NOTHING, Explanation, LeftSide, NogoodStore, contradicts
 from robochoc.protocols.order import PriorityOrder
+from robochoc.protocols.satisfaction.nogood import NOTHING, Explanation, LeftSide, NogoodStore, contradicts
 
 ROBOTS = ("A", "B", "C", "D")
 SIZE = 6
@@ -66,9 +66,9 @@ def test_the_index_changes_nothing(seed: int) -> None:
             store.forget(agent, told)
             plain.forget(agent, told)
         elif what < 0.9:
-            view = {name: any_value(chance) for name in ROBOTS if chance.random() < 0.8}
-            store.forget_others(view)
-            plain.forget_others(view)
+            view = [(any_value(chance), 1) for _ in ROBOTS[: chance.randrange(len(ROBOTS) + 1)]]
+            store.forget_others(view, ORDER.rank)
+            plain.forget_others({name: value for name, (value, _) in zip(ROBOTS, view, strict=False)})
         else:
             store.drop(keys)
             plain.drop(keys)

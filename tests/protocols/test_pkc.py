@@ -15,9 +15,10 @@ from robochoc.formats.team import read_team
 from robochoc.generators.queens3d import queens3d
 from robochoc.model.outcome import Verdict
 from robochoc.model.problem import ConstraintModel, Team
-from robochoc.protocols.abt import ABT
-from robochoc.protocols.abt_messages import Nogood, Ok
 from robochoc.protocols.order import PriorityOrder
+from robochoc.protocols.satisfaction.abt import ABT
+from robochoc.protocols.satisfaction.messages.abt import Ok
+from robochoc.protocols.satisfaction.messages.nogood import Nogood
 from robochoc.run import Options, Runtime, Withdrawal, solve
 from robochoc.solver.agent_problem import agent_problems
 from robochoc.solver.compiled import LocalProblem

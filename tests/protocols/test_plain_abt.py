@@ -11,7 +11,7 @@ from robochoc.communication.simulator.simulator import Simulation
 from robochoc.generators.random_csp import random_csp
 from robochoc.model.outcome import Verdict
 from robochoc.model.problem import Relation, Team
-from robochoc.protocols.abt import ABT
+from robochoc.protocols.satisfaction.abt import ABT
 from tests.support.plain_abt import Conflicts, search
 
 WITHIN = 0.02

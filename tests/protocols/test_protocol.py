@@ -18,10 +18,10 @@ from robochoc.model.problem import (
     Semantics,
     Variable,
 )
-from robochoc.protocols.abt import ABT
-from robochoc.protocols.abt_messages import AddLink
 from robochoc.protocols.order import PriorityOrder
 from robochoc.protocols.requirements import unmet_requirement
+from robochoc.protocols.satisfaction.abt import ABT
+from robochoc.protocols.satisfaction.messages.abt import AddLink
 from robochoc.protocols.traits import ENDS_WITH_EITHER, ENDS_WITH_PROOF, UNDECLARED, Traits
 from robochoc.solver.agent_problem import agent_problems
 from robochoc.solver.compiled import LocalProblem

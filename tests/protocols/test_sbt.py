@@ -12,8 +12,8 @@ from robochoc.model.message import Message
 from robochoc.model.outcome import Verdict
 from robochoc.model.problem import Constraint, Relation, Semantics, Team
 from robochoc.protocols.order import PriorityOrder
-from robochoc.protocols.sbt import SBT
-from robochoc.protocols.sbt_messages import CPA, Backtrack
+from robochoc.protocols.satisfaction.messages.sbt import CPA, Backtrack
+from robochoc.protocols.satisfaction.sbt import SBT
 from robochoc.solver.agent_problem import agent_problems
 from robochoc.solver.compiled import LocalProblem
 from tests.support.brute_force import solutions

@@ -9,7 +9,7 @@ from random import Random
 
 import pytest
 
-import robochoc.protocols.sfb
+import robochoc.protocols.optimization.sfb
 from robochoc.communication.simulator.schedule import RandomChannels
 from robochoc.communication.simulator.simulator import Simulation
 from robochoc.journal.events import Received, Sent
@@ -17,11 +17,11 @@ from robochoc.model.message import Message, encode
 from robochoc.model.outcome import Verdict
 from robochoc.model.problem import INFINITE
 from robochoc.protocols.findings import NOTHING
-from robochoc.protocols.interchangeable import expanded
+from robochoc.protocols.optimization.interchangeable import expanded
+from robochoc.protocols.optimization.messages.sfb import Above, Below, CPAs, Explored, Solution
+from robochoc.protocols.optimization.settings.sfb import SFBSettings
+from robochoc.protocols.optimization.sfb import LARGEST, SFB
 from robochoc.protocols.settings import SettingsError, settings_of
-from robochoc.protocols.sfb import LARGEST, SFB
-from robochoc.protocols.sfb_messages import Above, Below, CPAs, Explored, Solution
-from robochoc.protocols.sfb_settings import SFBSettings
 from robochoc.solver.agent_problem import RunParameters
 from robochoc.solver.encoding import TooLargeError
 from robochoc.solver.exact_costs import EXACT
@@ -394,4 +394,4 @@ def test_the_bound_is_never_more_than_the_least_cost_and_is_it_in_the_end(teams:
 
 
 def test_the_docstring_shows_what_happens() -> None:
-    assert doctest.testmod(robochoc.protocols.sfb).failed == 0
+    assert doctest.testmod(robochoc.protocols.optimization.sfb).failed == 0

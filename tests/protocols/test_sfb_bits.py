@@ -14,10 +14,10 @@ from robochoc.generators.random_csp import random_csp
 from robochoc.journal.events import Sent
 from robochoc.model.outcome import Verdict
 from robochoc.model.problem import Constraint, Team
+from robochoc.protocols.optimization.sfb import SFB
+from robochoc.protocols.optimization.sfb_bits import ForwardBits
+from robochoc.protocols.optimization.sfb_bounds import VALUES, ForwardBounds
 from robochoc.protocols.order import PriorityOrder
-from robochoc.protocols.sfb import SFB
-from robochoc.protocols.sfb_bits import ForwardBits
-from robochoc.protocols.sfb_bounds import VALUES, ForwardBounds
 from robochoc.solver.agent_problem import RunParameters, agent_problems
 from robochoc.solver.compiled import LocalProblem
 from tests.support.brute_force import solutions

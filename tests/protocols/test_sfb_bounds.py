@@ -8,8 +8,8 @@ import pytest
 
 from robochoc.communication.simulator.schedule import RandomChannels
 from robochoc.communication.simulator.simulator import Simulation
-from robochoc.protocols.sfb import SFB
-from robochoc.protocols.sfb_messages import Explored
+from robochoc.protocols.optimization.messages.sfb import Explored
+from robochoc.protocols.optimization.sfb import SFB
 from tests.support.agents import replies
 from tests.support.pseudo_trees import priced
 from tests.support.sfb_robots import CHAIN, cpas, introduced, rows, team

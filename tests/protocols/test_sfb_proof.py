@@ -15,10 +15,10 @@ from robochoc.communication.simulator.simulator import Simulation
 from robochoc.journal.events import Sent
 from robochoc.model.outcome import Verdict
 from robochoc.model.problem import INFINITE, Team
+from robochoc.protocols.optimization.messages.sfb import Explored, Solution
+from robochoc.protocols.optimization.sfb import SFB
+from robochoc.protocols.optimization.sfb_bounds import BOUND, COST, VALUES
 from robochoc.protocols.order import PriorityOrder
-from robochoc.protocols.sfb import SFB
-from robochoc.protocols.sfb_bounds import BOUND, COST, VALUES
-from robochoc.protocols.sfb_messages import Explored, Solution
 from robochoc.solver.agent_problem import RunParameters, agent_problems
 from robochoc.solver.compiled import LocalProblem
 from tests.support.agents import replies

@@ -9,16 +9,16 @@ from random import Random
 
 import pytest
 
-import robochoc.protocols.syncbb
+import robochoc.protocols.optimization.syncbb
 from robochoc.communication.simulator.schedule import Concurrent
 from robochoc.communication.simulator.simulator import Simulation
 from robochoc.model.message import Value
 from robochoc.model.outcome import Verdict
 from robochoc.model.problem import INFINITE, Constraint, Relation, Semantics, Team
 from robochoc.protocols.findings import Findings, Incumbent
+from robochoc.protocols.optimization.messages.syncbb import Backtrack, BestPath, Cost, Path, Terminate
+from robochoc.protocols.optimization.syncbb import SyncBB
 from robochoc.protocols.order import PriorityOrder
-from robochoc.protocols.syncbb import SyncBB
-from robochoc.protocols.syncbb_messages import Backtrack, BestPath, Cost, Path, Terminate
 from robochoc.solver.agent_problem import RunParameters, agent_problems
 from robochoc.solver.compiled import LocalProblem
 from tests.support.agents import replies, value
@@ -204,4 +204,4 @@ def test_one_robot_acts_at_a_time_so_all_checks_stand_in_a_row() -> None:
 
 
 def test_the_docstring_shows_what_happens() -> None:
-    assert doctest.testmod(robochoc.protocols.syncbb).failed == 0
+    assert doctest.testmod(robochoc.protocols.optimization.syncbb).failed == 0

@@ -1,0 +1,183 @@
+"""Max-Sum.
+
+Local message passing on the factor graph; here it minimises costs, so it is a min-sum. Each robot's variable is a node,
+and so is each function: the sum of all constraints over the same robots. R, from function to variable, is the minimum
+cost of each value by that function, given the other variables' messages. Q, from variable to function, is the cost of
+each value by all other functions. A robot takes the value with the lowest sum.
+
+- **When to use**: costs, a large team, a graph with few cycles.
+- **Guarantees**: incomplete; it stops after `cycles` cycles. On a graph without cycles the result is optimal;
+  elsewhere it is an estimate that need not converge. The result is the best cycle (anytime). A robot all of whose
+  values cost `inf` proves that there is no solution.
+- **Parameters (`--set`)**: `damping` (the weight of the last Q in a new one; default 0.5), `preference` (the maximum
+  random charge of a value; default 0.01), `cycles` (default 100).
+- **References**: Farinelli, Rogers, Petcu, Jennings: "Decentralised coordination of low-power embedded devices using
+  the max-sum algorithm", AAMAS 2008, Section 4; for damping: Cohen, Galiki, Zivan: "Governing convergence of Max-sum
+  on DCOPs through damping and splitting", AIJ 279, 2020.
+
+The methods have the names of the first paper's equations:
+
+    Q, from variable to function (1)   `_q`
+    R, from function to variable (2)   `Factor.r`
+    Z, and the value (3)               `_z`, `_decide`
+    preferences gamma                  `preferred`
+
+A function is held by the lowest-priority robot of its scope, the only one that knows the constraint. Messages between
+nodes of one robot are not sent. In a cycle all functions send R, then all variables send Q. All that one robot sends
+another in a phase is one message, with a row for each function that contains both. First, robots send their domains to
+the holders of their functions.
+
+Ties: if values are interchangeable, such as colours, all their costs would stay equal. So each value of each robot has
+a small random charge, its preference (the paper's gamma).
+
+Choices that the paper leaves open, and differences:
+
+- Q is damped.
+- Q is normalised to a minimum of 0 (in the paper: to a sum of 0), as entries may be infinite: a value that violates a
+  hard constraint whatever others do costs `inf`. Nothing is subtracted from `inf`, so such a value stays ruled out.
+- Constraints may be n-ary, up to a maximum size of their tables.
+
+>>> from robochoc.communication.simulator.schedule import Concurrent
+>>> from robochoc.communication.simulator.simulator import Simulation
+>>> from robochoc.generators.queens3d import queens3d
+>>> result = Simulation(queens3d(2), MaxSum, Concurrent(seed=0)).search()
+>>> result.verdict.value, result.metrics.messages
+('no-solution', {'Domain': 6, 'R': 3})
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from operator import add, sub
+from typing import ClassVar
+
+from robochoc.model import message as wire
+from robochoc.model.outcome import Verdict
+from robochoc.model.problem import INFINITE
+from robochoc.protocols.inference.maxsum_factor import Factor, Row
+from robochoc.protocols.inference.messages.maxsum import Q, R
+from robochoc.protocols.inference.settings.maxsum import MaxSumSettings
+from robochoc.protocols.order import PriorityOrder
+from robochoc.protocols.shared.cycles import CycleProtocol
+from robochoc.protocols.shared.messages.cycles import Domain
+from robochoc.protocols.traits import ENDS_WITH_PROOF, Traits
+from robochoc.solver.compiled import LocalProblem
+
+
+class MaxSum(CycleProtocol):
+    """One agent of Max-Sum: its variable, and the functions of which it is the lowest robot.
+
+    Robots in `above` receive R from this robot and send Q to it; robots in `below` send R and receive Q. `factors` are
+    the own functions. `edges` holds the last Q to each function: the own ones first, then those of each robot below.
+    """
+
+    messages = Domain | R | Q
+    settings: ClassVar[MaxSumSettings] = MaxSumSettings()
+    traits = Traits(
+        concludes=ENDS_WITH_PROOF,
+        paper="Farinelli, Rogers, Petcu, Jennings 2008",
+        complete=False,
+        costs=True,
+        writes_to_non_neighbours=False,
+        arrays=True,
+        privacy="constraints among others",
+        use_when="costs, large team, graph with few cycles; no proof",
+    )
+
+    def __init__(self, problem: LocalProblem, order: PriorityOrder) -> None:
+        super().__init__(problem, order)
+        place = order.rank[problem.agent]
+        self.above = tuple(name for name in problem.neighbours if order.rank[name] < place)
+        self.below = tuple(name for name in problem.neighbours if order.rank[name] > place)
+        self.factors: list[Factor] = []
+        self.preferred: Row = []
+        self.edges: list[Row] = []
+        self._own: list[Row] = []
+
+    def begin(self) -> None:
+        """Take the value with the lowest own charge, and send the domain to the holders of the own functions."""
+        preference = self.settings.preference
+        self.preferred = [cost + preference * self.chance() for cost in self.problem.costs({})]
+        self.take(_cheapest(self.preferred))
+        self.tell(self.below, Domain(list(self.problem.values)))
+        self.listen(self.above, self._build)
+
+    def _build(self, messages: Mapping[str, wire.Message]) -> None:
+        """Make the own functions from the received domains. All Q are 0 at first."""
+        domains = {name: message.values for name, message in messages.items() if isinstance(message, Domain)}
+        self.factors = Factor.joined(self.problem.tables(domains))
+        self.edges = [[0.0] * len(self.preferred) for _ in self.factors]
+        zeros = {name: [[0.0] * len(values)] * len(self._with(name)) for name, values in domains.items()}
+        self._tell_r(zeros)
+
+    def _hear_q(self, messages: Mapping[str, wire.Message]) -> None:
+        """Process all Q of the cycle."""
+        self._tell_r({name: told.rows for name, told in messages.items() if isinstance(told, Q)})
+
+    def _tell_r(self, messages: Mapping[str, Sequence[Row]]) -> None:
+        """Send R from the own functions to their variables; the own variable needs no message."""
+        rows = {name: iter(told) for name, told in messages.items()}
+        said: dict[str, list[Row]] = {name: [] for name in self.above}
+        self._own = []
+        for factor, own in zip(self.factors, self.edges, strict=False):
+            answers = factor.r([*[next(rows[name]) for name in factor.agents], own])
+            self._own.append(answers.pop())
+            for name, row in zip(factor.agents, answers, strict=True):
+                said[name].append(row)
+        for name in self.above:
+            self.send(name, R(said[name]))
+        self.listen(self.below, self._decide)
+
+    def _decide(self, messages: Mapping[str, wire.Message]) -> None:
+        """Take the value with the lowest cost by all R, and send Q."""
+        told = {name: said.rows for name, said in messages.items() if isinstance(said, R)}
+        rows = [*self._own, *(row for rows in told.values() for row in rows)]
+        z = self._z(rows)
+        if min(z) == INFINITE:
+            self.conclude(Verdict.NO_SOLUTION)
+            return
+        self.take(_cheapest(z))
+        if self.over:
+            return
+        self.edges = self._q(rows, z)
+        done = len(self.factors)
+        for name, answered in told.items():
+            self.send(name, Q(self.edges[done : done + len(answered)]))
+            done += len(answered)
+        self.listen(self.above, self._hear_q)
+
+    def _z(self, rows: Sequence[Row]) -> Row:
+        """Return the cost of each value: its preference and the sum of all `rows` (Z)."""
+        z = self.preferred
+        for row in rows:
+            z = list(map(add, z, row))  # not `sum`, which rounds as the version of Python has it
+        return z
+
+    def _q(self, rows: Sequence[Row], z: Row) -> list[Row]:
+        """Return, for each of `rows`, the cost of each value without that row (Q)."""
+        if INFINITE in z:
+            fresh = [self._z([*rows[:place], *rows[place + 1 :]]) for place in range(len(rows))]
+        else:
+            fresh = [list(map(sub, z, row)) for row in rows]
+        damping = self.settings.damping
+        if self.cycle == 1 or not damping:
+            return [_from_zero(row) for row in fresh]
+        rest = 1 - damping
+        return [
+            [damping * old + rest * new for old, new in zip(before, _from_zero(row), strict=True)]
+            for before, row in zip(self.edges, fresh, strict=True)
+        ]
+
+    def _with(self, name: str) -> list[Factor]:
+        return [factor for factor in self.factors if name in factor.agents]
+
+
+def _from_zero(row: Row) -> Row:
+    """Return `row` with a minimum of 0."""
+    least = min(row)
+    return [entry - least for entry in row]
+
+
+def _cheapest(row: Row) -> int:
+    """Return the place of the minimum, the first of several."""
+    return row.index(min(row))

@@ -1,0 +1,1 @@
+"""What these protocols send: the messages of `dpop.py` are in `messages/dpop.py`."""

@@ -1,0 +1,91 @@
+"""The Distributed Stochastic Algorithm (DSA), variants A, B and C.
+
+Local search in cycles. In each cycle a robot looks for its best value against its neighbours' values of the cycle
+before, and takes it with a probability, so that not all neighbours move at once. The gain is the cost that a move
+saves. Variant A moves only if it gains. B also moves if it gains nothing and is in conflict. C also moves if it gains
+nothing at all.
+
+- **When to use**: costs, a large team: good answers fast.
+- **Guarantees**: incomplete; it stops after `cycles` cycles, without a proof of optimality. The result is the best
+  cycle (anytime). A robot with an empty domain proves that there is no solution.
+- **Parameters (`--set`)**: `variant` (A, B or C; default B), `probability` (p; default 0.7), `cycles` (default 100). B
+  was the best of the three on colouring problems (Zhang and others): sideways moves leave plateaus, and it settles
+  where there is no conflict.
+- **References**: Fitzpatrick, Meertens: "An experimental assessment of a stochastic, anytime, decentralized, soft
+  colourer for sparse graphs", SAGA 2001; Zhang, Wang, Xing, Wittenburg: "Distributed stochastic search and distributed
+  breakout: properties, comparison and applications to constraint optimization problems in sensor networks", AIJ 161,
+  2005, Section 3.
+
+Its Algorithm 1, line by line:
+
+    randomly choose a value                                        `begin`
+    while no termination condition is met: send the value, if      `tell_value`
+      it is new, collect neighbours' new values
+    select and assign the next value (Table 1)                     `_choose`
+
+Choices that the paper leaves open, and differences:
+
+- The value is sent in each cycle, even if it has not changed, so that neighbours know that the cycle is over.
+- A robot is in conflict when a shared constraint is violated or charges any cost.
+- Constraints may be n-ary; each robot of a scope counts the whole cost of the constraint.
+- Fewer violated hard constraints are always better.
+- One of several best values is chosen at random.
+
+>>> from robochoc.communication.simulator.schedule import Concurrent
+>>> from robochoc.communication.simulator.simulator import Simulation
+>>> from robochoc.generators.queens3d import queens3d
+>>> result = Simulation(queens3d(4), DSA, Concurrent(seed=0)).search()
+>>> result.metrics.messages
+{'Value': 15200}
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import ClassVar
+
+from robochoc.model.message import Message
+from robochoc.protocols.local_search.settings.dsa import DSASettings
+from robochoc.protocols.shared.cycles import NO_GAIN, CycleProtocol, gain, values_in
+from robochoc.protocols.shared.messages.cycles import Value
+from robochoc.protocols.traits import ENDS_WITH_PROOF, Traits
+
+
+class DSA(CycleProtocol):
+    """One agent of DSA. A cycle has one phase: all robots send their values."""
+
+    messages = Value
+    settings: ClassVar[DSASettings] = DSASettings()
+    traits = Traits(
+        concludes=ENDS_WITH_PROOF,
+        paper="Fitzpatrick & Meertens 2001; Zhang, Wang, Xing, Wittenburg 2005",
+        complete=False,
+        costs=True,
+        shared_scopes=True,
+        writes_to_non_neighbours=False,
+        arrays=True,
+        privacy="constraints among others",
+        use_when="costs, large team: good answers fast, no proof",
+    )
+
+    def begin(self) -> None:
+        """Take a random value."""
+        self.take(self.any_value())
+        self.tell_value(self._choose)
+
+    def _choose(self, messages: Mapping[str, Message]) -> None:
+        """Move or stay, with all neighbours' values known."""
+        burdens = self.problem.lexicographic_costs(values_in(messages))
+        now, least = burdens[self.present], min(burdens)
+        index = self.present
+        if gain(now, least) > NO_GAIN or self._moves_sideways(now != (0, self.problem.charges[index])):
+            best = [place for place, burden in enumerate(burdens) if burden == least and place != index]
+            if best and self.chance() < self.settings.probability:
+                index = self.any_of(best)
+        self.take(index)
+        if not self.over:
+            self.tell_value(self._choose)
+
+    def _moves_sideways(self, conflict: bool) -> bool:  # noqa: FBT001 - the variants' only question
+        """Return whether the variant allows a move that gains nothing."""
+        return self.settings.variant == "C" or (self.settings.variant == "B" and conflict)

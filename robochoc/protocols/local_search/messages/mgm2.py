@@ -1,0 +1,74 @@
+"""The messages of MGM-2 (see `mgm2.py`)."""
+
+from __future__ import annotations
+
+from robochoc.model import message as wire
+from robochoc.model.communicative_acts import Act, Performative
+from robochoc.model.wording import Wording, counted
+from robochoc.protocols import acts
+from robochoc.protocols.local_search.messages.mgm import saving_in_words
+
+Gains = list[list[tuple[int, int | float]]]
+
+
+class Offer(wire.Message, frozen=True):
+    """An offer of a joint move: a row for each of the receiver's values, with a gain for each of the sender's.
+
+    A gain is a pair: broken hard constraints, and costs. None: no offer (`offer`).
+    """
+
+    gains: Gains | None
+
+    act = Act(Performative.PROPOSE, "what both would gain by moving together")
+
+    def in_words(self, _: Wording) -> str:
+        """Return what the sender says."""
+        if self.gains is None:
+            return "I have no offer for you"
+        best = max(saving for row in self.gains for saving in row)
+        many = f"{counted(len(self.gains), 'value')} of yours and {len(self.gains[0]):,} of mine"
+        if best <= (0, 0):
+            return f"let us move together: of {many}, no two would save me anything"
+        return f"let us move together: of {many}, the best two would save me {saving_in_words(*best)}"
+
+
+class Accept(wire.Message, frozen=True):
+    """The acceptance of an offer: the receiver's value at `place`, and the total gain (`accept`)."""
+
+    place: int
+    broken: int
+    cost: int | float
+
+    act = acts.ACCEPT
+
+    def in_words(self, _: Wording) -> str:
+        """Return what the sender says."""
+        saved = saving_in_words(self.broken, self.cost)
+        return f"I take your offer: you take your value number {self.place + 1}, and we save {saved} in all"
+
+
+class Reject(wire.Message, frozen=True):
+    """The rejection of an offer (`reject`)."""
+
+    act = Act(Performative.REJECT_PROPOSAL, "the offer that was proposed is not taken")
+
+    def in_words(self, _: Wording) -> str:
+        """Return what the sender says."""
+        return "I do not take your offer"
+
+
+class Go(wire.Message, frozen=True):
+    """A committed robot's word on the joint move: whether its gain is the largest among its neighbours.
+
+    The paper's messages are `go` and `no go`.
+    """
+
+    go: bool
+
+    act = Act(Performative.INFORM, "the receiver comes to know whether the sender gains most")
+
+    def in_words(self, _: Wording) -> str:
+        """Return what the sender says."""
+        if self.go:
+            return "go: of my neighbours, nobody is to move before us"
+        return "no go: one of my neighbours is to move instead"

@@ -1,0 +1,110 @@
+"""Maximum Gain Message (MGM).
+
+Local search in cycles: distributed breakout (Yokoo, Hirayama 1996) without weights. All robots send their values, then
+the gain of their best move. Among neighbours only the one with the largest gain moves. So a move saves the team what it
+saves the robot.
+
+- **When to use**: as DSA, if the cost must never rise. It ends in a local optimum.
+- **Guarantees**: incomplete; it stops after `cycles` cycles, without a proof of optimality. The cost never rises from
+  one cycle to the next (anytime). A robot with an empty domain proves that there is no solution.
+- **Parameters (`--set`)**: `cycles` (default 100).
+- **References**: Maheswaran, Pearce, Tambe: "Distributed algorithms for DCOP: a graphical-game-based approach", PDCS
+  2004, Section 3; Pearce, "Local optimization in cooperative agent networks", PhD thesis, 2007.
+
+The paper's procedure (Algorithm MGM, `allNeighbors`, `currentContext`):
+
+    SendValueMessage, GetValueMessages   `tell_value`, `_weigh`
+    BestUnilateralGain                   `_weigh`
+    SendGainMessage, GetGainMessages     `_weigh`, `_move`
+    if gain > max(neighbours' gains)     `_move`
+
+Choices that the paper leaves open:
+
+- The first value is chosen at random, and so is one of several best values.
+- If neighbours have the same gain, the first one in the priority order moves.
+- Constraints may be n-ary, as all robots of a scope are neighbours.
+- A gain is a pair, violated hard constraints first. So the search also works on plain DisCSPs.
+
+>>> from robochoc.communication.simulator.schedule import Concurrent
+>>> from robochoc.communication.simulator.simulator import Simulation
+>>> from robochoc.generators.queens3d import queens3d
+>>> result = Simulation(queens3d(4), MGM, Concurrent(seed=0)).search()
+>>> result.metrics.messages
+{'Gain': 15200, 'Value': 15200}
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from robochoc.model import message as wire
+from robochoc.protocols.local_search.messages.mgm import Gain
+from robochoc.protocols.order import PriorityOrder
+from robochoc.protocols.shared.cycles import NO_GAIN, CycleProtocol, gain, values_in
+from robochoc.protocols.shared.messages.cycles import Value
+from robochoc.protocols.traits import ENDS_WITH_PROOF, Traits
+from robochoc.solver.compiled import LexicographicCost, LocalProblem
+
+
+class Gainers(CycleProtocol):
+    """The common base of MGM and MGM-2: a cycle begins with values, and gains decide which neighbour moves.
+
+    `target` is the value of this robot's best move, and `gain` the gain of that move.
+    """
+
+    def __init__(self, problem: LocalProblem, order: PriorityOrder) -> None:
+        super().__init__(problem, order)
+        self.target = 0
+        self.gain: LexicographicCost = NO_GAIN
+
+    def best_unilateral(self, view: Mapping[str, wire.Value]) -> None:
+        """Find the best move of this robot alone, which may be to stay (BestUnilateralGain)."""
+        burdens = self.problem.lexicographic_costs(view)
+        least = min(burdens)
+        self.gain = gain(burdens[self.present], least)
+        self.target = self.present
+        if self.gain > NO_GAIN:
+            self.target = self.any_of([place for place, burden in enumerate(burdens) if burden == least])
+
+    def wins(self, gains: Mapping[str, wire.Message]) -> bool:
+        """Return whether the own gain is positive and the largest; ties go to the first robot in the order."""
+        rank = self.order.rank
+        return self.gain > NO_GAIN and all(
+            (self.gain, rank[name]) > ((told.broken, told.cost), rank[self.problem.agent])
+            for name, told in gains.items()
+            if isinstance(told, Gain)
+        )
+
+
+class MGM(Gainers):
+    """One agent of MGM. A cycle has two phases: all robots send their values, then their gains."""
+
+    messages = Value | Gain
+    traits = Traits(
+        concludes=ENDS_WITH_PROOF,
+        paper="Maheswaran, Pearce, Tambe 2004",
+        complete=False,
+        costs=True,
+        shared_scopes=True,
+        writes_to_non_neighbours=False,
+        arrays=True,
+        privacy="constraints among others",
+        use_when="as DSA, and the cost never rises; ends in a local optimum",
+    )
+
+    def begin(self) -> None:
+        """Take a random value."""
+        self.take(self.any_value())
+        self.tell_value(self._weigh)
+
+    def _weigh(self, messages: Mapping[str, wire.Message]) -> None:
+        """Send the gain of the best own move, with all neighbours' values known."""
+        self.best_unilateral(values_in(messages))
+        self.tell(self.problem.neighbours, Gain(*self.gain))
+        self.listen(self.problem.neighbours, self._move)
+
+    def _move(self, messages: Mapping[str, wire.Message]) -> None:
+        """Move if the own gain is the largest, with all neighbours' gains known."""
+        self.take(self.target if self.wins(messages) else self.present)
+        if not self.over:
+            self.tell_value(self._weigh)

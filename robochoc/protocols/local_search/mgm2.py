@@ -1,0 +1,188 @@
+"""Coordinated Maximum Gain Message (MGM-2).
+
+MGM in which two neighbours may also move together. In each cycle a robot is an offerer with probability `threshold`
+(the paper's q). An offerer sends one random neighbour an offer: its gain for each pair of their values. The receiver
+adds its gain on constraints that the offerer has no part in, so shared constraints count once. It accepts the best
+offer if its total gain is positive; then both robots are committed to the joint move. As in MGM, the robot with the
+largest gain among its neighbours moves. A committed pair moves if both have the largest gain, each among its neighbours
+without the partner.
+
+- **When to use**: as MGM, for better answers with more messages.
+- **Guarantees**: incomplete; it stops after `cycles` cycles, without a proof of optimality. The cost never rises from
+  one cycle to the next (anytime). A robot with an empty domain proves that there is no solution.
+- **Parameters (`--set`)**: `threshold` (q; default 0.5), `cycles` (default 100).
+- **References**: Maheswaran, Pearce, Tambe: "Distributed algorithms for DCOP: a graphical-game-based approach", PDCS
+  2004, Section 3 (SCA-2 and MGM-2); Pearce, "Local optimization in cooperative agent networks", PhD thesis, 2007.
+
+The phases of a cycle:
+
+    value messages                              `tell_value`, `_offer`
+    offers (offerers), to one neighbour each    `_offer`, `_answer`
+    accept, reject                              `_answer`, `_hear_answer`
+    gain messages                               `_tell_gain`, `_decide`
+    go, no go (of two that are committed)       `_decide`, `_go`
+
+Choices that the paper leaves open, and differences:
+
+- An offer contains all pairs of values, also those with which the offerer alone does not gain. Without them, as in the
+  paper, some moves that save the team costs are missed. With them, a team in which no robot or pair can gain is at a
+  2-optimum.
+- A robot that is no offerer, or has no offer for a neighbour, says so, as its neighbours wait for all offers.
+- First values, equally good values and equal gains are treated as in `mgm`. Constraints may be n-ary.
+
+>>> from robochoc.communication.simulator.schedule import Concurrent
+>>> from robochoc.communication.simulator.simulator import Simulation
+>>> from robochoc.generators.queens3d import queens3d
+>>> result = Simulation(queens3d(3), MGM2, Concurrent(seed=0)).search()
+>>> result.metrics.messages
+{'Accept': 6, 'Domain': 56, 'Gain': 5600, 'Go': 12, 'Offer': 5600, 'Reject': 446, 'Value': 5600}
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from typing import ClassVar, NamedTuple
+
+from robochoc.model import message as wire
+from robochoc.protocols.local_search.messages.mgm import Gain
+from robochoc.protocols.local_search.messages.mgm2 import Accept, Gains, Go, Offer, Reject
+from robochoc.protocols.local_search.mgm import Gainers
+from robochoc.protocols.local_search.settings.mgm2 import MGM2Settings
+from robochoc.protocols.order import PriorityOrder
+from robochoc.protocols.shared.cycles import NO_GAIN, gain, values_in
+from robochoc.protocols.shared.messages.cycles import Domain, Value
+from robochoc.protocols.traits import ENDS_WITH_PROOF, Traits
+from robochoc.solver.compiled import LexicographicCost, LocalProblem
+
+
+class JointMove(NamedTuple):
+    """A joint move: its gain, the partner, and the places of both values."""
+
+    gain: LexicographicCost
+    partner: str
+    own: int
+    place: int
+
+
+class MGM2(Gainers):
+    """One agent of MGM-2. State: neighbours' `domains`, the `view`, and the `partner` that it is committed to."""
+
+    messages = Domain | Value | Offer | Accept | Reject | Gain | Go
+    settings: ClassVar[MGM2Settings] = MGM2Settings()
+    traits = Traits(
+        concludes=ENDS_WITH_PROOF,
+        paper="Maheswaran, Pearce, Tambe 2004",
+        complete=False,
+        costs=True,
+        shared_scopes=True,
+        writes_to_non_neighbours=False,
+        arrays=True,
+        privacy="constraints among others",
+        use_when="as MGM: better answers, more messages",
+    )
+
+    def __init__(self, problem: LocalProblem, order: PriorityOrder) -> None:
+        super().__init__(problem, order)
+        self.domains: dict[str, list[wire.Value]] = {}
+        self.view: dict[str, wire.Value] = {}
+        self.partner: str | None = None
+        self._wins = False
+
+    def begin(self) -> None:
+        """Take a random value and send the domain."""
+        self.take(self.any_value())
+        self.tell(self.problem.neighbours, Domain(list(self.problem.values)))
+        self.listen(self.problem.neighbours, self._meet)
+
+    def _meet(self, messages: Mapping[str, wire.Message]) -> None:
+        """Begin the first cycle, with all neighbours' domains known."""
+        self.domains = {name: message.values for name, message in messages.items() if isinstance(message, Domain)}
+        self.tell_value(self._offer)
+
+    def _offer(self, messages: Mapping[str, wire.Message]) -> None:
+        """Become an offerer or not, with all neighbours' values known."""
+        self.view = values_in(messages)
+        self.partner = None
+        if self.chance() < self.settings.threshold:
+            neighbours = self.problem.neighbours
+            self.partner = neighbours[int(self.chance() * len(neighbours))]
+        for name in self.problem.neighbours:
+            self.send(name, Offer(self._gains(name) if name == self.partner else None))
+        self.listen(self.problem.neighbours, self._answer)
+
+    def _gains(self, partner: str) -> Gains:
+        """Return the gain for each of the partner's values and each own value."""
+        rows = [self.problem.lexicographic_costs({**self.view, partner: value}) for value in self.domains[partner]]
+        now = rows[self.domains[partner].index(self.view[partner])][self.present]
+        return [[gain(now, burden) for burden in row] for row in rows]
+
+    def _answer(self, messages: Mapping[str, wire.Message]) -> None:
+        """Answer all offers: an offerer rejects them; other robots accept the best if it gains anything."""
+        offers = {name: told.gains for name, told in messages.items() if isinstance(told, Offer) and told.gains}
+        if self.partner is not None:
+            self.tell(offers, Reject())
+            self.listen((self.partner,), self._hear_answer)
+        else:
+            self.partner = self._commit(offers)
+            self.tell([name for name in offers if name != self.partner], Reject())
+            self._tell_gain()
+
+    def _commit(self, offers: Mapping[str, Gains]) -> str | None:
+        """Accept the best offer if its total gain is positive; return its sender."""
+        moves = [move for name, gains in offers.items() for move in self._joint(name, gains)]
+        self.gain = max((move.gain for move in moves), default=NO_GAIN)
+        if self.gain <= NO_GAIN:
+            return None
+        move = self.any_of([move for move in moves if move.gain == self.gain])
+        self.target = move.own
+        self.send(move.partner, Accept(move.place, *move.gain))
+        return move.partner
+
+    def _joint(self, offerer: str, gains: Gains) -> Iterator[JointMove]:
+        """Yield all offered moves with the total gain of both robots.
+
+        To the offerer's gain it adds the gain on constraints that the offerer has no part in.
+        """
+        burdens = self.problem.lexicographic_costs(
+            {name: value for name, value in self.view.items() if name != offerer}
+        )
+        now = burdens[self.present]
+        for own, (burden, row) in enumerate(zip(burdens, gains, strict=True)):
+            broken, cost = gain(now, burden)
+            for place, offered in enumerate(row):
+                yield JointMove((broken + offered[0], cost + offered[1]), offerer, own, place)
+
+    def _hear_answer(self, messages: Mapping[str, wire.Message]) -> None:
+        """Commit to the partner if it accepted the offer; otherwise use the best own move."""
+        (answer,) = messages.values()
+        if isinstance(answer, Accept):
+            self.target, self.gain = answer.place, (answer.broken, answer.cost)
+        else:
+            self.partner = None
+        self._tell_gain()
+
+    def _tell_gain(self) -> None:
+        if self.partner is None:
+            self.best_unilateral(self.view)
+        self.tell(self.problem.neighbours, Gain(*self.gain))
+        self.listen(self.problem.neighbours, self._decide)
+
+    def _decide(self, messages: Mapping[str, wire.Message]) -> None:
+        """Move alone, or send the partner `Go`, with all neighbours' gains known."""
+        wins = self.wins({name: told for name, told in messages.items() if name != self.partner})
+        if self.partner is None:
+            self._end_cycle(move=wins)
+        else:
+            self.send(self.partner, Go(wins))
+            self._wins = wins
+            self.listen((self.partner,), self._go)
+
+    def _go(self, messages: Mapping[str, wire.Message]) -> None:
+        """Make the joint move if both robots allow it."""
+        (told,) = messages.values()
+        self._end_cycle(move=self._wins and isinstance(told, Go) and told.go)
+
+    def _end_cycle(self, *, move: bool) -> None:
+        self.take(self.target if move else self.present)
+        if not self.over:
+            self.tell_value(self._offer)

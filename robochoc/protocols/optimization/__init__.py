@@ -1,0 +1,1 @@
+"""Protocols that search for the least cost, and prove it: one file each."""

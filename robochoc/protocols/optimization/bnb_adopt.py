@@ -1,0 +1,167 @@
+"""Branch-and-Bound ADOPT (BnB-ADOPT+).
+
+Complete search for minimum cost on a pseudo-tree: ADOPT's messages and bounds, with depth-first branch and bound
+instead of best-first search. A robot keeps its value until LB(d) reaches the cost of the best known complete solution
+(UB), or its threshold (TH). It sends far fewer messages than ADOPT, as it does not return to the same values again and
+again.
+
+- **When to use**: costs, a sparse graph, little memory.
+- **Guarantees**: complete; it terminates with an optimum, or with a proof that there is no solution.
+- **Parameters**: none.
+- **References**: Yeoh, Felner, Koenig: "BnB-ADOPT: an asynchronous branch-and-bound DCOP algorithm", JAIR 38, 2010,
+  Section 4; for redundant messages: Gutierrez, Meseguer: "Saving redundant messages in BnB-ADOPT", AAAI 2010.
+
+The methods have the names of the procedures:
+
+    Start          `begin`                 InitSelf        `_merge`, `_choose`
+    When Received  `handle`                InitChild       `forget` (in `bounding`, as the next ones)
+    Backtrack      `decide`, `act`         PriorityMerge   `merge`
+                                           Compatible      `agrees`
+
+Choices that the papers leave open, and differences:
+
+- Constraints may be n-ary, and there may be several trees (see `adopt`, also for hard constraints and unknown values
+  of neighbours above). Heuristic values h are 0.
+- A context grows as values become known; there is no initial value that all robots know. A value that was unknown
+  before does not invalidate the threshold.
+- Bounds are computed when the inbox has been drained, also for InitSelf. The ID grows when the value changes. SCP of a
+  child contains the robots that its contexts have named.
+- A value is repeated only to a child that requests its threshold after InitSelf dropped it (ThReq). A lower threshold
+  alone is not sent. A higher one is, even with the same value: otherwise the child would wait for its parent, and its
+  parent for the child.
+- When UB <= LB, the robot takes the value with the least UB, as another one with the same LB may cost more.
+- Terminate contains the final values above. The search of the subtree continues with these, without a threshold, until
+  UB <= LB there, too: since the parent's bounds were computed, the robot may have taken other values in other
+  contexts. Before it sends Terminate, a robot sends its final value to all neighbours below, as robots further down
+  may need it.
+
+Termination: at quiescence all robots have terminated. Otherwise there is a highest robot that has not; its TH is
+infinite, and UB > LB. All contexts agree, so LB(d) < UB for its value d, and for some child lb < ub and lb < TH of the
+child. By the child's last message, LB < UB there, and LB < TH; so LB(d) < min(TH, UB) for its value d, and so on, down
+to a leaf, where LB = UB: a contradiction.
+
+>>> from robochoc.communication.simulator.schedule import Concurrent
+>>> from robochoc.communication.simulator.simulator import Simulation
+>>> from robochoc.generators.queens3d import queens3d
+>>> result = Simulation(queens3d(2), BnBADOPT, Concurrent(seed=0)).run()
+>>> result.verdict.value
+'no-solution'
+"""
+
+from __future__ import annotations
+
+from typing import Any, ClassVar, assert_never, cast
+
+import msgspec
+
+from robochoc.model.message import Message
+from robochoc.model.problem import INFINITE
+from robochoc.protocols.optimization.bounding import BoundingProtocol
+from robochoc.protocols.optimization.messages.bnb_adopt import Cost, Value
+from robochoc.protocols.optimization.messages.bounding import Context, Number, Terminate
+from robochoc.protocols.order import PriorityOrder
+from robochoc.protocols.shared.messages.dfs import TreeMessage
+from robochoc.protocols.traits import ENDS_WITH_PROOF, Traits
+from robochoc.solver.compiled import LocalProblem
+from robochoc.system.compiling import mypyc_attr
+
+
+@mypyc_attr(allow_interpreted_subclasses=True)
+class BnBADOPT(BoundingProtocol):
+    """One agent of BnB-ADOPT+. State besides the bounds: `threshold` (TH).
+
+    `sent_values` are the last Values sent to each child, `sent_cost` the last Cost, without its request.
+    """
+
+    messages: ClassVar[Any] = TreeMessage | Value | Cost | Terminate
+    traits: ClassVar[Traits] = Traits(
+        concludes=ENDS_WITH_PROOF,
+        paper="Yeoh, Felner, Koenig 2010; Gutierrez & Meseguer 2010",
+        costs=True,
+        shared_scopes=True,
+        writes_to_non_neighbours=False,
+        privacy="constraints among others",
+        use_when="costs, sparse graph, little memory",
+    )
+
+    def __init__(self, problem: LocalProblem, order: PriorityOrder) -> None:
+        super().__init__(problem, order)
+        self.threshold: Number = INFINITE
+        self.threshold_request = False
+        self.sent_values: dict[str, Value] = {}
+        self.sent_cost: Cost | None = None
+        self._moved = False
+
+    def handle(self, sender: str, message: Message) -> None:
+        """Dispatch on the message's type."""
+        if self.terminated:
+            return
+        match cast("Value | Cost | Terminate", message):
+            case Value(value, counter, threshold):
+                self._merge({sender: (value, counter)})
+                if sender == self.parent:
+                    self.threshold = threshold
+                    self.threshold_request = False
+            case Cost() as cost:
+                self._merge(cost.context)
+                self.bound(sender, cost.context, cost.lb, cost.ub)
+                if cost.threshold_request:
+                    self.sent_values.pop(sender, None)
+            case Terminate(context):
+                self._merge(context)
+                self.threshold = INFINITE
+                self.last_values = True
+            case never:
+                assert_never(never)
+
+    def _merge(self, context: Context) -> None:
+        """Merge a context; if it changed, choose the value again and reset TH (InitSelf)."""
+        news, changed = self.merge(context)
+        self._moved = self._moved or bool(news)
+        if changed:
+            self.threshold = INFINITE
+            self.threshold_request = True
+
+    def act(self) -> None:
+        """Choose a value and send values and costs that changed (Backtrack)."""
+        self._choose()
+        for child in self.children:
+            self._tell_value(child)
+        for name in self.pseudo_children:
+            self.tell(name, Value(*self.own))
+        if self.ub <= self.lb and self.may_end:
+            self.terminate()
+        elif not self.may_end:
+            self._tell_cost()
+
+    def _choose(self) -> None:
+        if self.ub <= self.lb:
+            self.take(self.cheapest(self.upper))
+        elif self._moved or self.lower[self.index] >= min(self.threshold, self.ub):
+            self.take(self.cheapest(self.lower))
+        self._moved = False
+
+    # What is said
+
+    def _tell_value(self, child: str) -> None:
+        """Send `child` a new value, a higher threshold, or a threshold that it requested."""
+        value, last = Value(*self.own, self._share(child)), self.sent_values.get(child)
+        if last is None or last.counter < value.counter or last.threshold < value.threshold:
+            self.sent_values[child] = value
+            self.send(child, value)
+
+    def _share(self, child: str) -> Number:
+        """Return the part of the threshold left for `child` if other children cost their lower bounds."""
+        limit = min(self.threshold, self.ub)
+        if limit == INFINITE:
+            return INFINITE
+        others = sum(bounds.lb[self.index] for name, bounds in self.bounds.items() if name != child)
+        return max(0, limit - self.delta[self.index] - others)
+
+    def _tell_cost(self) -> None:
+        """Send the parent new bounds, bounds in a new context, or a request for the threshold."""
+        cost = Cost(dict(self.context), self.lb, self.ub)
+        if self.parent is not None and (self.threshold_request or cost != self.sent_cost):
+            self.sent_cost = cost
+            self.send(self.parent, msgspec.structs.replace(cost, threshold_request=self.threshold_request))
+            self.threshold_request = False

@@ -1,0 +1,52 @@
+"""The messages of ADOPT (see `adopt.py`)."""
+
+from __future__ import annotations
+
+from robochoc.model import message
+from robochoc.model.communicative_acts import Act, Performative
+from robochoc.model.message import Message
+from robochoc.model.wording import Wording, cost_text
+from robochoc.protocols import acts
+from robochoc.protocols.optimization.messages.bounding import Context, Number, bounds_in_words
+
+
+class Value(Message, frozen=True):
+    """The sender's value and the number of its changes so far (VALUE)."""
+
+    value: message.Value
+    counter: int
+
+    act = acts.TELL_VALUE
+
+    def in_words(self, words: Wording) -> str:
+        """Return what the sender says."""
+        return f"{words.own_value(self.value)} from now on (change {self.counter})"
+
+
+class Cost(Message, frozen=True):
+    """Bounds on the cost of the sender's subtree in `context`: lower bound `lb`, upper bound `ub` (COST)."""
+
+    context: Context
+    lb: Number
+    ub: Number
+
+    act = acts.TELL_BOUNDS
+
+    def in_words(self, words: Wording) -> str:
+        """Return what the sender says."""
+        return bounds_in_words(words, self.context, self.lb, self.ub)
+
+
+class Threshold(Message, frozen=True):
+    """The cost up to which the receiver keeps its value, in `context` (THRESHOLD)."""
+
+    threshold: Number
+    context: dict[str, message.Value]
+
+    act = Act(Performative.REQUEST, "the receiver is to keep its value while it costs no more")
+
+    def in_words(self, words: Wording) -> str:
+        """Return what the sender says."""
+        values = {robot: (value, 0) for robot, value in self.context.items()}
+        allowed = cost_text(self.threshold)
+        return f"{words.context(values)}your subtree may cost {allowed} before you try other values"

@@ -1,0 +1,45 @@
+"""The messages of BnB-ADOPT (see `bnb_adopt.py`)."""
+
+from __future__ import annotations
+
+import math
+
+from robochoc.model import message
+from robochoc.model.message import Message
+from robochoc.model.problem import INFINITE
+from robochoc.model.wording import Wording, cost_text
+from robochoc.protocols import acts
+from robochoc.protocols.optimization.messages.bounding import Context, Number, bounds_in_words
+
+
+class Value(Message, frozen=True):
+    """The sender's value, the number of its changes (ID), and the receiver's threshold (TH)."""
+
+    value: message.Value
+    counter: int
+    threshold: Number = INFINITE
+
+    act = acts.TELL_VALUE
+
+    def in_words(self, words: Wording) -> str:
+        """Return what the sender says."""
+        change = f"{words.own_value(self.value)} from now on (change {self.counter})"
+        if math.isinf(self.threshold):
+            return change
+        return f"{change}; your subtree may cost {cost_text(self.threshold)} then"
+
+
+class Cost(Message, frozen=True):
+    """Bounds `lb` and `ub` on the cost of the sender's subtree in `context`, and a threshold request (ThReq)."""
+
+    context: Context
+    lb: Number
+    ub: Number
+    threshold_request: bool = False
+
+    act = acts.TELL_BOUNDS
+
+    def in_words(self, words: Wording) -> str:
+        """Return what the sender says."""
+        asked = "; tell me my threshold again" if self.threshold_request else ""
+        return f"{bounds_in_words(words, self.context, self.lb, self.ub)}{asked}"

@@ -1,0 +1,162 @@
+"""Synchronous Branch and Bound (SyncBB).
+
+Branch and bound, distributed. One path, the values of the robots so far and the cost of each, goes from robot to robot
+in priority order. Its holder adds the first own value with which it costs less than the bound n, the cost of the best
+path so far, and sends it on; without such a value, it sends the path back. A path that reaches the last robot is the
+new best one. One robot acts at a time, so no message is ever obsolete.
+
+- **When to use**: as a simple baseline with costs.
+- **Guarantees**: complete; it terminates with an optimum, or with a proof that there is no solution. The best path is
+  optimal once the first robot has no value left. Space is linear.
+- **Parameters**: none.
+- **Reference**: Hirayama, Yokoo: "Distributed partial constraint satisfaction problem", CP 1997. The paper's cost is
+  the largest number of constraints that one robot violates; here it is the sum of all costs.
+
+The methods:
+
+    extend the path   `_extend`     backtrack   `_backtrack`
+
+Choices that the paper leaves open:
+
+- Constraints may be n-ary. The lowest-priority robot of the scope pays them, when it holds the path.
+- `Backtrack` contains no values but those of the best path, as the robot before still has its own.
+- The last robot looks for further, cheaper values before it sends the path back.
+- A path that costs as much as a new bound goes back at once.
+- A robot with an empty domain reports it at once.
+- The first robot sends the best path to the others at the end, and each takes its value in it.
+
+>>> from robochoc.communication.simulator.schedule import Concurrent
+>>> from robochoc.communication.simulator.simulator import Simulation
+>>> from robochoc.generators.queens3d import queens3d
+>>> result = Simulation(queens3d(4), SyncBB, Concurrent(seed=0)).run()
+>>> result.verdict.value, result.witness
+('no-solution', 'Robot1.1')
+"""
+
+from __future__ import annotations
+
+import math
+from typing import assert_never, cast
+
+from robochoc.model.message import Message, Value
+from robochoc.model.outcome import Verdict
+from robochoc.protocols.findings import Findings, Incumbent
+from robochoc.protocols.optimization.messages.syncbb import Backtrack, BestPath, Cost, Path, Terminate
+from robochoc.protocols.order import PriorityOrder
+from robochoc.protocols.protocol import Protocol
+from robochoc.protocols.traits import ENDS_WITH_PROOF, Traits
+from robochoc.solver.compiled import LocalProblem
+
+
+class SyncBB(Protocol):
+    """One agent of SyncBB. State: the last `path` and its cost (`paid`), and the `best` path.
+
+    `over`: this robot knows that the best path is optimal.
+    """
+
+    messages = Path | Backtrack | Terminate
+    traits = Traits(
+        concludes=ENDS_WITH_PROOF,
+        paper="Hirayama & Yokoo 1997",
+        synchronous=True,
+        costs=True,
+        privacy="constraints of lower robots",
+        use_when="a simple baseline with costs",
+    )
+
+    def __init__(self, problem: LocalProblem, order: PriorityOrder) -> None:
+        super().__init__(problem, order)
+        self.rank = order.rank[problem.agent]
+        self.path: list[tuple[Value, Cost]] = []
+        self.paid: Cost = 0
+        self.best = BestPath(math.inf)
+        self.over = False
+        self._view: dict[str, Value] = {}
+
+    def start(self) -> None:
+        """Create the path, as the first robot; other robots wait for it."""
+        if not self.problem.values:
+            self.conclude(Verdict.NO_SOLUTION)
+        elif self.rank == 0:
+            self._extend(0)
+
+    def receive(self, sender: str, message: Message) -> None:  # noqa: ARG002 - only neighbours in the order speak
+        """Dispatch on the message's type."""
+        if self.verdict is not None:
+            return
+        match cast("Path | Backtrack | Terminate", message):
+            case Path(assignments, best):
+                self.best = best
+                self.path = assignments
+                self.paid = sum(cost for _, cost in assignments)
+                names = zip(self.order.names, assignments, strict=False)
+                self._view = {name: value for name, (value, _) in names}
+                self._extend(0)
+            case Backtrack(best):
+                self.best = best
+                self._extend(0 if self.value is None else self.value + 1)
+            case Terminate(best):
+                self.best = best
+                self._take_best()
+            case never:
+                assert_never(never)
+
+    @property
+    def incumbent(self) -> Incumbent | None:
+        """The best path."""
+        return (
+            Incumbent(self.best.bound, dict(zip(self.order.names, self.best.values, strict=True)))
+            if self._known
+            else None
+        )
+
+    @property
+    def findings(self) -> Findings:
+        """The best path; for the first robot also a lower bound on all paths."""
+        return Findings(best=self.incumbent, bound=self._lower_bound if self.rank == 0 else None)
+
+    def _extend(self, first: int) -> None:
+        """Add the first value from place `first` on with a path cheaper than the best; otherwise backtrack."""
+        for index in range(first, len(self.problem.values)):
+            if self.paid >= self.best.bound:
+                break
+            cost = self.problem.cost(index, self._view)
+            if self.paid + cost < self.best.bound:
+                self.value = index
+                path = [*self.path, (self.problem.values[index], cost)]
+                if self.rank + 1 < len(self.order.names):
+                    self.send(self.order.names[self.rank + 1], Path(path, self.best))
+                    return
+                self.best = BestPath(self.paid + cost, tuple(value for value, _ in path))
+        self._backtrack()
+
+    def _backtrack(self) -> None:
+        """Send the path back to the robot before; the first robot ends the search."""
+        self.value = None
+        if self.rank > 0:
+            self.send(self.order.names[self.rank - 1], Backtrack(self.best))
+        elif self._known:
+            self._take_best()
+            for robot in self.order.names[1:]:
+                self.send(robot, Terminate(self.best))
+        else:
+            self.conclude(Verdict.NO_SOLUTION)
+
+    def _take_best(self) -> None:
+        """Decide for the own value in the best path, at the end of the search."""
+        self.over = True
+        self.value = self.problem.values.index(self.best.values[self.rank])
+
+    @property
+    def _lower_bound(self) -> Cost | None:
+        """A lower bound on every path, known to the first robot; None before it begins."""
+        if self.over:
+            return self.best.bound
+        if self.value is None:
+            return None
+        return min(self.best.bound, *self.problem.charges[self.value :])
+
+    @property
+    def _known(self) -> bool:
+        """Whether there is a best path."""
+        return self.best.bound < math.inf

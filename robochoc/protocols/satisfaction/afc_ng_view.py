@@ -1,0 +1,33 @@
+"""What a robot of AFC-ng knows of others: the current partial assignment, looked up by robot."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from itertools import islice
+
+from robochoc.model.message import Value
+from robochoc.protocols.satisfaction.messages.afc_ng import Assignment
+
+
+class AgentView(Mapping[str, Value]):
+    """The values in `assignments`, by robot: they belong to the first robots of `line`, whose places are `places`.
+
+    All robots of a process share a line; the assignments are those of the message that they came with.
+    """
+
+    def __init__(self, line: Sequence[str], places: Mapping[str, int]) -> None:
+        self.assignments: tuple[Assignment, ...] = ()
+        self._line = line
+        self._places = places
+
+    def __getitem__(self, agent: str) -> Value:
+        place = self._places[agent]
+        if place >= len(self.assignments):
+            raise KeyError(agent)
+        return self.assignments[place][0]
+
+    def __iter__(self) -> Iterator[str]:
+        return islice(self._line, len(self.assignments))
+
+    def __len__(self) -> int:
+        return len(self.assignments)

@@ -1,0 +1,1 @@
+"""What these protocols send: the messages of `abt.py` are in `messages/abt.py`."""

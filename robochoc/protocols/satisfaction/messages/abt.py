@@ -1,0 +1,29 @@
+"""The messages of Asynchronous Backtracking (see `abt.py`)."""
+
+from __future__ import annotations
+
+from robochoc.model.message import Message, Value
+from robochoc.model.wording import Wording
+from robochoc.protocols import acts
+
+
+class Ok(Message, frozen=True):
+    """The sender's value, sent to lower-priority neighbours and to robots that share a PKC with it (`ok?`)."""
+
+    value: Value
+
+    act = acts.TELL_VALUE
+
+    def in_words(self, words: Wording) -> str:
+        """Return what the sender says."""
+        return f"{words.own_value(self.value)} from now on"
+
+
+class AddLink(Message, frozen=True):
+    """A request of a lower-priority robot to be sent the receiver's value from now on (`adl`)."""
+
+    act = acts.ADD_LINK
+
+    def in_words(self, words: Wording) -> str:
+        """Return what the sender says."""
+        return f"tell me {words.variables(words.receiver)} from now on"

@@ -1,0 +1,52 @@
+"""The messages of Agile-ABT (see `agile_abt.py`)."""
+
+from __future__ import annotations
+
+from robochoc.model.message import Message, Value
+from robochoc.model.wording import Wording, counted, listed
+from robochoc.protocols import acts
+from robochoc.protocols.satisfaction.agile_order import (
+    TerminationVector,
+)
+
+
+class Ok(Message, frozen=True):
+    """The sender's value and explanation: while `lhs` holds, it has `left` of its `size` values left (`ok?`)."""
+
+    value: Value
+    lhs: dict[str, Value]
+    left: int
+    size: int
+
+    act = acts.TELL_VALUE
+
+    def in_words(self, words: Wording) -> str:
+        """Return what the sender says."""
+        left = f"I have {self.left} of {counted(self.size, 'value')} left"
+        return f"{words.own_value(self.value)} from now on; {words.condition(self.lhs)}{left}"
+
+
+class Order(Message, frozen=True):
+    """A new order (`order`): the robots by their places in the first one, and its termination vector."""
+
+    places: tuple[int, ...]
+    termination: TerminationVector
+
+    act = acts.TELL_ORDER
+
+    def in_words(self, words: Wording) -> str:
+        """Return what the sender says."""
+        if self.places and not 0 <= min(self.places) <= max(self.places) < len(words.order):
+            numbers = listed([str(place + 1) for place in self.places])
+            return f"the order is now, by the places of the first one, {numbers}"
+        return f"the order is now {listed([words.order[place] for place in self.places])}"
+
+
+class AddLink(Message, frozen=True):
+    """A request to be sent the receiver's value from now on, while the receiver has higher priority (`adl`)."""
+
+    act = acts.ADD_LINK
+
+    def in_words(self, words: Wording) -> str:
+        """Return what the sender says."""
+        return f"tell me {words.variables(words.receiver)} from now on, whenever I am below you"

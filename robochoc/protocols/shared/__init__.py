@@ -1,0 +1,1 @@
+"""What protocols of several families are built on: the pseudo-tree (`dfs.py`), and synchronous cycles (`cycles.py`)."""

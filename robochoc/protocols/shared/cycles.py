@@ -1,0 +1,143 @@
+"""The common base of synchronous local search protocols.
+
+All robots go through cycles, and each cycle has phases. In each phase a robot sends one message to each robot that
+waits for one, then waits for one from each robot that it listens to, and continues when it has all of them. Messages
+need no number, as they arrive in the order of their phases from each robot. A message from a neighbour that is ahead is
+stored until its phase.
+
+The course of the search does not depend on delays. No robot knows the total cost, so each robot records its values
+(`Trail`); the collected trails give the cheapest cycle.
+"""
+
+from __future__ import annotations
+
+from abc import abstractmethod
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from typing import ClassVar, TypeVar
+
+from robochoc.model import message as wire
+from robochoc.model.outcome import Verdict
+from robochoc.protocols.findings import Findings, Trail
+from robochoc.protocols.order import PriorityOrder
+from robochoc.protocols.protocol import Protocol
+from robochoc.protocols.shared.messages.cycles import Value
+from robochoc.protocols.shared.settings.cycles import CycleSettings
+from robochoc.solver.compiled import LexicographicCost, LocalProblem
+
+T = TypeVar("T")
+
+Then = Callable[[Mapping[str, wire.Message]], None]
+"""A function of one message of each robot passed to `listen`, in the order of these robots."""
+
+
+class CycleProtocol(Protocol):
+    """One agent of a synchronous local search. State: `cycle`, and the own value in it.
+
+    Subclasses take a first value and send it in `begin`; then they `take` one value per cycle until the search is
+    `over`. They call `listen` with the robots whose messages they need, and a function that processes these.
+    """
+
+    settings: ClassVar[CycleSettings] = CycleSettings()
+
+    def __init__(self, problem: LocalProblem, order: PriorityOrder) -> None:
+        super().__init__(problem, order)
+        self.cycle = -1
+        self._trail: list[tuple[int, int]] = []
+        self._waiting: dict[str, list[wire.Message]] = {name: [] for name in problem.neighbours}
+        """A few at most from each: a robot that is ahead soon waits for this one."""
+        self._names: tuple[str, ...] = ()
+        self._awaited: frozenset[str] = frozenset()
+        self._missing = 0
+        self._then: Then | None = None
+
+    @abstractmethod
+    def begin(self) -> None:
+        """Begin the search, for a robot that has values and neighbours."""
+
+    def start(self) -> None:
+        """Start; an empty domain ends the search, a robot without neighbours takes its cheapest value."""
+        if not self.problem.values:
+            self.conclude(Verdict.NO_SOLUTION)
+        elif not self.problem.neighbours:
+            burdens = self.problem.lexicographic_costs({})
+            self.take(burdens.index(min(burdens)))
+            self.cycle = self.settings.cycles
+        else:
+            self.begin()
+            self.settle()
+
+    def receive(self, sender: str, message: wire.Message) -> None:
+        """Store the message for its phase."""
+        waiting = self._waiting[sender]
+        if not waiting and sender in self._awaited:
+            self._missing -= 1
+        waiting.append(message)
+
+    def settle(self) -> None:
+        """Run all phases whose messages have arrived."""
+        while self._then and not self._missing and self.verdict is None:
+            messages = {name: self._waiting[name].pop(0) for name in self._names}
+            then, self._then = self._then, None
+            then(messages)
+
+    def listen(self, names: Sequence[str], then: Then) -> None:
+        """Wait for a message of each robot in `names`, then call `then` with them."""
+        if names is not self._names:  # in most phases they are the same
+            self._names, self._awaited = tuple(names), frozenset(names)
+        self._then = then
+        self._missing = [self._waiting[name] for name in names].count([])
+
+    def tell(self, names: Iterable[str], message: wire.Message) -> None:
+        """Send the same message to several robots."""
+        said = [(name, message) for name in names]
+        self.outbox += said
+        self.said_at += [self.problem.checks] * len(said)
+
+    def tell_value(self, then: Then) -> None:
+        """Send the own value to all neighbours, wait for theirs, then call `then`."""
+        self.tell(self.problem.neighbours, Value(self.problem.values[self.present]))
+        self.listen(self.problem.neighbours, then)
+
+    def take(self, index: int) -> None:
+        """Set the own value of the next cycle; it may be the current one."""
+        self.cycle += 1
+        if index != self.value:
+            self.value = index
+            self._trail.append((self.cycle, index))
+
+    def any_value(self) -> int:
+        """Return a random value of the whole domain, with which the search begins."""
+        return self.any_of(range(len(self.problem.values)))
+
+    def any_of(self, choices: Sequence[T]) -> T:
+        """Return a random one of `choices`; with a single choice, no random number is drawn."""
+        return choices[0] if len(choices) == 1 else choices[int(self.chance() * len(choices))]
+
+    @property
+    def present(self) -> int:
+        """The own value, once there is one."""
+        assert self.value is not None  # noqa: S101 - for mypy: `begin` takes one
+        return self.value
+
+    @property
+    def over(self) -> bool:
+        """Whether this was the last cycle."""
+        return self.cycle >= self.settings.cycles
+
+    @property
+    def findings(self) -> Findings:
+        """The own value in every cycle."""
+        return Findings(trail=Trail(list(self._trail), self.cycle))
+
+
+NO_GAIN: LexicographicCost = (0, 0)
+
+
+def gain(before: LexicographicCost, after: LexicographicCost) -> LexicographicCost:
+    """Return the reduction from `before` to `after`; the pairs of differences compare lexicographically."""
+    return before[0] - after[0], before[1] - after[1]
+
+
+def values_in(messages: Mapping[str, wire.Message]) -> dict[str, wire.Value]:
+    """Return the values in the messages of a phase in which every robot sends a `Value`."""
+    return {name: message.value for name, message in messages.items() if isinstance(message, Value)}

@@ -1,0 +1,209 @@
+"""Pseudo-trees that the robots build themselves: leader election, then a distributed depth-first search.
+
+Each connected component elects the robot with the most neighbours: waves of all candidates spread, and only the
+strongest candidate's wave survives (the echo algorithm with extinction; Tel, "Introduction to Distributed Algorithms",
+2nd edition, 2000, Section 7.2). From there a token visits all robots depth first (Cheung, "Graph traversal techniques
+and the maximum flow problem in distributed computation", IEEE TSE 9(4), 1983). There it bounces off robots that it has
+visited, two more messages for each edge outside the tree. Here it names visited robots, and is never sent to one of
+them: two messages for each robot but the root (as in Makki, Havas: "Distributed
+algorithms for depth-first search", IPL 60, 1996). It names each only until its last neighbour has heard of it: with the
+name goes the number of neighbours that have not. On a path that is one name at a time, on a tree those of one branch.
+A robot sends the token to its unvisited neighbour with the most neighbours. Ties go to the robot of higher priority.
+
+Neighbours are then on one branch, as in every depth-first search of an undirected graph. So are all robots of an n-ary
+constraint, as they are all neighbours. The cost: 2 messages for each robot for the token, and at least 2 for each edge
+for the election.
+"""
+
+from __future__ import annotations
+
+from abc import abstractmethod
+from collections.abc import Iterable, Mapping, Sequence
+
+from robochoc.model.message import Message
+from robochoc.model.outcome import PseudoTreeNode, Verdict
+from robochoc.protocols.findings import Findings
+from robochoc.protocols.order import PriorityOrder
+from robochoc.protocols.protocol import Protocol
+from robochoc.protocols.shared.messages.dfs import Back, Token, Wave
+from robochoc.solver.compiled import LocalProblem
+from robochoc.system.compiling import mypyc_attr
+
+
+@mypyc_attr(allow_interpreted_subclasses=True)
+class TreeProtocol(Protocol):
+    """One agent that first takes its place in a pseudo-tree, and then runs a protocol on it.
+
+    `parent` (None: a root), `pseudo_parents`, `children` and `pseudo_children` are known, in priority order, from
+    `begin` on. Then `handle` is called for each message and `decide` for each packet. Messages that arrive before
+    `begin` are stored until then. Children may begin before their parents, never after.
+    """
+
+    def __init__(self, problem: LocalProblem, order: PriorityOrder) -> None:
+        super().__init__(problem, order)
+        self.parent: str | None = None
+        self.pseudo_parents: tuple[str, ...] = ()
+        self.children: tuple[str, ...] = ()
+        self.pseudo_children: tuple[str, ...] = ()
+        self.placed = False
+        """Whether this robot, and all below it, have their places in the tree."""
+        self._election = _Election(problem.agent, problem.neighbours, order)
+        self._met: set[str] = set()
+        """The neighbours that this robot knows to be in the tree."""
+        self._early: list[tuple[str, Message]] = []
+
+    @abstractmethod
+    def begin(self) -> None:
+        """Begin the search; the place in the tree is known."""
+
+    @abstractmethod
+    def handle(self, sender: str, message: Message) -> None:
+        """Process one message of the search."""
+
+    def decide(self) -> None:
+        """Decide, after all waiting messages were processed."""
+
+    def start(self) -> None:
+        """Start the own election wave; a robot with an empty domain ends the search."""
+        if not self.problem.values:
+            self.conclude(Verdict.NO_SOLUTION)
+        elif not self.problem.neighbours:
+            self._visit(None, {})
+            self.settle()
+        else:
+            self._propagate(self._election.stand())
+
+    def receive(self, sender: str, message: Message) -> None:
+        """Process the messages that build the tree; store messages of the search until `begin`."""
+        if self.verdict is not None:
+            return
+        match message:
+            case Wave():
+                self._propagate(self._election.receive(sender, message))
+                if self._election.won:
+                    self._visit(None, {})
+            case Token(visited):
+                self._visit(sender, visited)
+            case Back(visited):
+                self._go_on(self._heard(visited))
+            case _ if self.placed:
+                self.handle(sender, message)
+            case _:
+                self._early.append((sender, message))
+
+    def settle(self) -> None:
+        """Call `decide` if the place in the tree is known."""
+        if self.placed and self.verdict is None:
+            self.decide()
+
+    @property
+    def ancestors(self) -> tuple[str, ...]:
+        """The neighbours above: the parent and the pseudo-parents."""
+        return self.pseudo_parents if self.parent is None else (self.parent, *self.pseudo_parents)
+
+    @property
+    def descendants(self) -> tuple[str, ...]:
+        """The neighbours below: the children and the pseudo-children."""
+        return (*self.children, *self.pseudo_children)
+
+    @property
+    def findings(self) -> Findings:
+        """The place in the tree."""
+        return Findings(place=PseudoTreeNode(self.parent, self.pseudo_parents) if self.placed else None)
+
+    def _propagate(self, waves: Sequence[tuple[str, Wave]]) -> None:
+        for receiver, wave in waves:
+            self.send(receiver, wave)
+
+    def _visit(self, parent: str | None, visited: Mapping[str, int]) -> None:
+        """Process the first visit of the token: neighbours that it has visited are above.
+
+        A robot whose only neighbour is its parent needs no list, so it is none of those that have to hear.
+        """
+        self.parent = parent
+        neighbours = self.problem.neighbours
+        left = visited if len(neighbours) == 1 else self._heard(visited)
+        self._met.update([] if parent is None else [parent])
+        self.pseudo_parents = self._sorted(self._met - {parent})
+        unaware = sum(name != parent and self._election.degree(name) > 1 for name in neighbours)
+        self._go_on({**left, self.problem.agent: unaware} if unaware else left)
+
+    def _heard(self, visited: Mapping[str, int]) -> Mapping[str, int]:
+        """Note which neighbours are `visited`; return these robots without those that nobody else has to hear of."""
+        new = [name for name in self.problem.neighbours if name in visited and name not in self._met]
+        if not new:
+            return visited
+        self._met.update(new)
+        counts = {**visited, **{name: visited[name] - 1 for name in new}}
+        return {name: unaware for name, unaware in counts.items() if unaware}
+
+    def _go_on(self, visited: Mapping[str, int]) -> None:
+        """Send the token to an unvisited neighbour, or back if all are in the tree."""
+        left = [name for name in self.problem.neighbours if name not in self._met]
+        if left:
+            child = max(left, key=self._election.strength)
+            self._met.add(child)
+            self.children = self._sorted((*self.children, child))
+            self.send(child, Token(dict(visited)))
+            return
+        known = {*self.ancestors, *self.children}
+        self.pseudo_children = self._sorted(name for name in self.problem.neighbours if name not in known)
+        if self.parent is not None:
+            self.send(self.parent, Back(dict(visited)))
+        self.placed = True
+        self.begin()
+        early, self._early = self._early, []
+        for sender, message in early:
+            self.receive(sender, message)
+
+    def _sorted(self, names: Iterable[str]) -> tuple[str, ...]:
+        return tuple(sorted(names, key=self.order.rank.__getitem__))
+
+
+class _Election:
+    """One agent's part in the election: the strongest known `candidate`, and the neighbour its wave came from.
+
+    `_heard` are the neighbours from which that candidate's wave has arrived; after the last one, the wave is returned.
+    """
+
+    def __init__(self, agent: str, neighbours: Sequence[str], order: PriorityOrder) -> None:
+        self._neighbours = neighbours
+        self._order = order
+        self._degrees = {agent: len(neighbours)}
+        self._agent = self._candidate = agent
+        self._from: str | None = None
+        self._heard: set[str] = set()
+        self.won = False
+
+    def strength(self, name: str) -> tuple[int, int]:
+        """Return a key that orders candidates: more neighbours first, then higher priority."""
+        return self._degrees[name], -self._order.rank[name]
+
+    def degree(self, name: str) -> int:
+        """Return the number of neighbours of a neighbour."""
+        return self._degrees[name]
+
+    def stand(self) -> list[tuple[str, Wave]]:
+        """Return the own wave for all neighbours."""
+        return [(name, self._wave) for name in self._neighbours]
+
+    def receive(self, sender: str, wave: Wave) -> list[tuple[str, Wave]]:
+        """Return the messages that answer a wave; the wave of a weaker candidate gets no answer."""
+        self._degrees[wave.candidate] = wave.neighbours
+        answers: list[tuple[str, Wave]] = []
+        if self.strength(wave.candidate) > self.strength(self._candidate):
+            self._candidate, self._from, self._heard = wave.candidate, sender, set()
+            answers = [(name, self._wave) for name in self._neighbours if name != sender]
+        if wave.candidate != self._candidate:
+            return answers
+        self._heard.add(sender)
+        if len(self._heard) == len(self._neighbours):
+            if self._from is None:
+                self.won = True
+            else:
+                answers.append((self._from, self._wave))
+        return answers
+
+    @property
+    def _wave(self) -> Wave:
+        return Wave(self._degrees[self._candidate], self._candidate)

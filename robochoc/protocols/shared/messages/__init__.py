@@ -1,0 +1,1 @@
+"""What is sent: the messages of `dfs.py` are in `messages/dfs.py`."""

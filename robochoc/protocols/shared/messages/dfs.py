@@ -1,0 +1,63 @@
+"""The messages by which robots build a pseudo-tree (see `dfs.py`)."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+import msgspec
+
+from robochoc.model.communicative_acts import Act, Performative
+from robochoc.model.message import Message
+from robochoc.model.wording import Wording, counted, listed
+
+
+class Wave(Message, frozen=True):
+    """An election wave of `candidate`, with its number of neighbours.
+
+    The candidate becomes the root if its wave returns from all neighbours.
+    """
+
+    neighbours: int
+    candidate: str
+
+    act = Act(Performative.PROPOSE, "a candidate for the root, for the receiver to prefer or to drop")
+
+    def in_words(self, _: Wording) -> str:
+        """Return what the sender says."""
+        return f"{self.candidate}, which has {counted(self.neighbours, 'neighbour')}, wants to be the root"
+
+
+Visited = dict[str, Annotated[int, msgspec.Meta(ge=1)]]
+"""Robots in the tree, each with the number of its neighbours that have not heard so; without those that all know of."""
+
+
+class Token(Message, frozen=True):
+    """The token of the depth-first search: the receiver becomes the sender's child; `visited` are in the tree."""
+
+    visited: Visited
+
+    act = Act(Performative.REQUEST, "the receiver is to go on with the tree")
+
+    def in_words(self, _: Wording) -> str:
+        """Return what the sender says."""
+        return f"you are my child in the tree{_news(self.visited)}"
+
+
+class Back(Message, frozen=True):
+    """The token on its way back: all robots below the sender are in the tree; `visited` are in the tree."""
+
+    visited: Visited
+
+    act = Act(Performative.INFORM, "what `Token` asked for is done: who is in the tree by now")
+
+    def in_words(self, _: Wording) -> str:
+        """Return what the sender says."""
+        return f"all below me are in the tree{_news(self.visited)}"
+
+
+def _news(visited: Visited) -> str:
+    return f", where not all know of {listed(visited)} yet" if visited else ""
+
+
+TreeMessage = Wave | Token | Back
+"""The messages that every `TreeProtocol` receives besides its own."""
