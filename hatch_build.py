@@ -22,6 +22,7 @@ from hatchling.builders.hooks.plugin.interface import BuildHookInterface
 
 NEEDED = ["msgspec>=0.18", "mypy[mypyc]>=1.13"]
 """mypyc sees the types of what is imported: without msgspec it would know nothing of messages."""
+NEXT = "A C compiler and Python's headers are needed. Without ROBOCHOC_COMPILE=1, a build without them is plain Python."
 MYPY = ["--config-file=", "--follow-imports=silent", "--ignore-missing-imports"]
 
 
@@ -40,7 +41,7 @@ class CompiledCore(BuildHookInterface):  # type: ignore[type-arg]
         failure = _compiled(Path(self.root), self._folder, self.config["modules"])
         if failure:
             if _asked():
-                raise RuntimeError(f"mypyc or the C compiler has failed:\n{failure}")
+                raise RuntimeError(f"mypyc or the C compiler has failed:\n{failure}\n{NEXT}")
             return
         made = [*self._folder.glob("*.so"), *self._folder.glob("robochoc/**/*.so")]
         build_data["force_include"].update({str(path): str(path.relative_to(self._folder)) for path in made})

@@ -24,6 +24,7 @@ Exit status:
 
 COMMANDS = {
     "animate": ("animate", "Write or show the 3D scene of a saved result."),
+    "app": ("app", "Model, decide and fly in a browser, without a formula."),
     "authority": ("authority", "Enrol and revoke robots for runs on several machines."),
     "cache": ("cache", "Show or clear the cache of solved local problems."),
     "compare": ("compare", "Compare protocols on problems: a table, a picture."),

@@ -7,7 +7,7 @@ message. When it closes the pipe, the robot ends.
 
 from __future__ import annotations
 
-from multiprocessing.reduction import ForkingPickler
+import pickle
 
 import msgspec
 
@@ -131,7 +131,7 @@ class Wave(_Control, frozen=True):
 
 def sealed(part: AgentProblem, invalidated: Invalidated) -> bytes:
     """Return the content of a `Change`."""
-    return bytes(ForkingPickler.dumps((part, invalidated)))
+    return pickle.dumps((part, invalidated))
 
 
 def unsealed(change: bytes) -> tuple[AgentProblem, Invalidated]:
@@ -139,7 +139,7 @@ def unsealed(change: bytes) -> tuple[AgentProblem, Invalidated]:
 
     A process is started with the same means (`multiprocessing`); no message of a protocol ever comes here.
     """
-    part, invalidated = ForkingPickler.loads(change)
+    part, invalidated = pickle.loads(change)  # noqa: S301 - our own, as said above
     return part, invalidated
 
 

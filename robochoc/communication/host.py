@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from functools import cache
-from typing import Any, Self, cast
+from typing import Any, Self, cast, get_args
 
 import msgspec
 
@@ -27,9 +27,41 @@ from robochoc.solver.compiled import LocalProblem
 from robochoc.solver.explanation import Invalidated
 from robochoc.system.compiling import mypyc_attr
 
+_MOST_SHARED = 1 << 22
+"""Bytes of messages that are kept for those who may share them."""
+_SIZE_OF_A_MESSAGE = 256
+"""What a message takes besides its content, about."""
+
 
 class BadMessageError(Exception):
     """The bytes of an envelope are no message of the protocol."""
+
+
+class UnderWay:
+    """Messages of this process whose receivers may share them (`Message.shareable`), by their content: the last ones.
+
+    What is not among them any more is decoded, and is the same.
+    """
+
+    def __init__(self) -> None:
+        self._messages: dict[bytes, Message] = {}
+        self._size = 0
+
+    def get(self, content: bytes) -> Message | None:
+        """Return the message with this content; None: it has to be decoded."""
+        return self._messages.get(content)
+
+    def keep(self, content: bytes, message: Message) -> None:
+        """Keep `message`, and drop the oldest ones if they are too large together."""
+        messages = self._messages
+        if content in messages:
+            return
+        messages[content] = message
+        self._size += len(content) + _SIZE_OF_A_MESSAGE
+        while self._size > _MOST_SHARED and len(messages) > 1:
+            oldest = next(iter(messages))
+            del messages[oldest]
+            self._size -= len(oldest) + _SIZE_OF_A_MESSAGE
 
 
 @mypyc_attr(allow_interpreted_subclasses=True)
@@ -57,8 +89,11 @@ class Host:
         self._stamps: list[int] = []
         self._answers = self._step_began = 0
         self._begun = False
+        self.under_way: UnderWay | None = None
+        """Where robots that share a process find what may be shared (the simulator's); otherwise it is decoded."""
         self._decode: Callable[[bytes], Message] = message_decoder(protocol.messages).decode
-        self._checks = 0
+        self.counted = 0
+        """Constraint checks that the clock has counted: all of them, but within a step."""
         self._reported: tuple[int | None, Verdict | None] = (None, None)
         self._heard: float = math.inf
         self._observer: Observer | None = None
@@ -106,7 +141,7 @@ class Host:
             self.protocol = type(self.protocol)(problem, order)
             self._equip(part.parameters)
             self._begun = False
-        self.clock = self.bytes = self.largest = self._checks = self._step_began = 0
+        self.clock = self.bytes = self.largest = self.counted = self._step_began = 0
         self.sent = {}
         self._reported = (None, None)
         self._heard = math.inf
@@ -126,10 +161,13 @@ class Host:
         What the robot says at once does not carry the clocks of those that follow.
         """
         try:
-            message = self._decode(envelope.content)
+            message = None if self.under_way is None else self.under_way.get(envelope.content)
+            if message is None:
+                message = self._decode(envelope.content)
         except (msgspec.MsgspecError, RecursionError, UnicodeDecodeError) as error:
             raise BadMessageError(f"{envelope.sender} sent {self.name} an invalid message: {error}") from error
-        self.clock = max(self.clock, envelope.clock)
+        if envelope.clock > self.clock:  # noqa: PLR1730 - faster
+            self.clock = envelope.clock
         self.protocol.receive(envelope.sender, message)
         self._tick()
         if self._observer:
@@ -172,10 +210,10 @@ class Host:
         protocol = self.protocol
         self.said_at = protocol.said_at
         envelopes = self._envelopes() if self.said_at else []
-        self._step_began = self._checks
+        self._step_began = self.counted
         if self._observer:
             self._report_state(self._observer)
-            self._observer(Settled(t=self._now(), robot=self.name, clock=self.clock, checks=self._checks))
+            self._observer(Settled(t=self._now(), robot=self.name, clock=self.clock, checks=self.counted))
         return envelopes
 
     def _envelopes(self) -> list[Envelope]:
@@ -187,6 +225,8 @@ class Host:
             if message is not last:
                 last, content, kind = message, encode(message), type(message).__name__
                 self.largest = max(self.largest, len(content))
+                if self.under_way is not None and message.shareable:
+                    self.under_way.keep(content, message)
             self.sent[kind] = self.sent.get(kind, 0) + 1
             self.bytes += len(content)
             envelope = Envelope(self.name, receiver, content, clock)
@@ -210,12 +250,15 @@ class Host:
     def _tick(self) -> None:
         """Advance the clock by one for each new check, and stamp the messages of this time with it."""
         protocol = self.protocol
-        before = self.clock - self._checks
-        self._answers = len(self._stamps)
-        if len(protocol.said_at) > self._answers:
-            self._stamps += [before + checks for checks in protocol.said_at[self._answers :]]
-        self._checks = protocol.problem.checks
-        self.clock = before + self._checks
+        stamps, said_at = self._stamps, protocol.said_at
+        checks = protocol.problem.checks
+        self._answers = answered = len(stamps)
+        if len(said_at) > answered:
+            before = self.clock - self.counted
+            stamps += [before + done for done in said_at[answered:]]
+        if checks != self.counted:
+            self.clock += checks - self.counted
+            self.counted = checks
 
     def _time(self, checks: int) -> float:
         """Return the time at which this number of checks was done."""
@@ -240,6 +283,11 @@ class Host:
             observer(Decided(t=self._now(), robot=self.name, assignment=assignment, clock=self.clock))
         if state[1] is not None and state[1] is not verdict:
             observer(Concluded(t=self._now(), robot=self.name, verdict=str(state[1])))
+
+
+def may_be_shared(messages: object) -> bool:
+    """Return whether any of a protocol's `messages` may be shared by its receivers."""
+    return any(kind.shareable for kind in get_args(messages) or (messages,))
 
 
 @cache

@@ -15,6 +15,7 @@ from robochoc.communication.kill_schedule import KillSchedule
 from robochoc.communication.run_result import Progress
 from robochoc.communication.search_state import SearchState
 from robochoc.communication.session import over
+from robochoc.system.stopping import stop_requested
 
 TICK_S = 0.2
 """Seconds between two reports of progress."""
@@ -61,18 +62,18 @@ class MasterLoop(ABC):
         self._kill = kill
 
     def _search_until(self, deadline: float | None) -> None:
-        """Search until there is a verdict, the search has to be broken off, or the deadline comes.
+        """Search until there is a verdict, it has to be broken off, the deadline comes, or somebody asks to stop.
 
         Raises as `_serve`.
         """
         state = self.state
-        self._serve_until(lambda: state.ready or state.broken_off, deadline)
+        self._serve_until(lambda: state.ready or state.broken_off or stop_requested(), deadline)
         if not state.ready or state.ended:
             return
         self._order_start()
         self._kills.begin(time.monotonic())
         state.ordered = state.searching = True
-        self._serve_until(lambda: state.ended, deadline)
+        self._serve_until(lambda: state.ended or stop_requested(), deadline)
         state.searching = False
         self._kills.end(time.monotonic())
 

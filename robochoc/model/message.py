@@ -33,6 +33,8 @@ class Message(msgspec.Struct, frozen=True, tag=True, array_like=True):
     """The communicative act of the message (FIPA)."""
     backtracks: ClassVar[bool] = False
     """True if the message is a backtrack: its sender has no value left."""
+    shareable: ClassVar[bool] = False
+    """True if its receivers change nothing in it: in the simulator all of them are given the same object."""
 
     def in_words(self, words: Wording) -> str:  # noqa: ARG002 - for those that have words
         """Return what the sender says: `V1.1 = 1 from now on`. Empty: the message is shown by its fields."""

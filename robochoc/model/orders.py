@@ -16,7 +16,6 @@ from collections import defaultdict
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from enum import StrEnum
-from random import Random
 from typing import assert_never
 
 from robochoc.model.priorities import natural_key, priority_order
@@ -186,6 +185,8 @@ def _random(graph: Graph, seed: int) -> tuple[str, ...]:
 
     Uses `Random.random` alone, which Python promises never to change.
     """
+    from random import Random  # noqa: PLC0415 - once imported, it draws a new state in each forked process
+
     chance = Random(seed)  # noqa: S311 - an order, not a secret
     lots = {name: chance.random() for name in _lexicographic(graph)}
     return tuple(sorted(lots, key=lambda name: (lots[name], natural_key(name))))

@@ -5,15 +5,17 @@ They are for the runtime of arrays (docs/guides/arrays.md).
 
 from __future__ import annotations
 
+import operator
 import time
-from collections.abc import Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
-from robochoc.communication.arrays.cycle_run import CycleRun, walk
+from robochoc.communication.arrays.cycle_run import CycleRun, exact_sum, walk
 from robochoc.communication.arrays.description import Description, Held
 from robochoc.communication.arrays.forms import form_of
 from robochoc.communication.arrays.kinds import Floats, Integers
@@ -21,16 +23,19 @@ from robochoc.communication.arrays.layout import Layout
 from robochoc.model.message import encode
 from robochoc.model.outcome import Metrics, Verdict
 from robochoc.model.problem import INFINITE
-from robochoc.protocols.cycles import CycleProtocol
-from robochoc.protocols.cycles_messages import Domain, Value
+from robochoc.model.wording import counted
 from robochoc.protocols.settings import settings_of
+from robochoc.protocols.shared.cycles import CycleProtocol
+from robochoc.protocols.shared.messages.cycles import Domain, Value
 from robochoc.run.compatibility import refuse_settings
 from robochoc.run.registry import protocol_named
 from robochoc.solver.encoding import UnsupportedError
 from robochoc.verification.checker import RefutedError
 
-_TABLE = 2
-"""The axes of one table."""
+_TABLE = _PAIR = 2
+"""The axes of one table; the robots of an edge."""
+MOST_ROBOTS = 1 << 31
+"""The square of their number fits into 64 bits."""
 
 
 @dataclass(frozen=True)
@@ -50,6 +55,13 @@ class ArraySolution:
     cost: int | None
     costs: tuple[float, ...]
     metrics: Metrics
+
+    def __repr__(self) -> str:
+        found = "" if self.cost is None else f", cost {self.cost:,}"
+        sent = sum(self.metrics.messages.values())
+        return (
+            f"<{self.verdict}{found}: the best of {counted(max(len(self.costs) - 1, 0), 'cycle')}, {sent:,} messages>"
+        )
 
 
 class ArrayProblem:
@@ -88,17 +100,18 @@ class ArrayProblem:
         *,
         which: ArrayLike | None = None,
         charges: ArrayLike | None = None,
-        names: Sequence[str] | None = None,
+        names: Iterable[str] | None = None,
     ) -> None:
-        self.robots = robots
-        self.values = values
-        self.edges = np.asarray(edges, np.int64).reshape(-1, 2)
-        given = np.asarray(tables, np.float64)
+        self.robots = _index("robots", robots)
+        self.values = _index("values", values)
+        pairs = _whole("edges", edges)
+        self.edges = pairs if pairs.size else pairs.reshape(-1, _PAIR)
+        given = _numbers("tables", tables).astype(np.float64)
         self.tables = given[None] if given.ndim == _TABLE else given
-        self.charges = None if charges is None else np.asarray(charges, np.float64)
-        self.names = names
-        several = len(self.tables) > 1
-        self.which = self._numbers(which, several=several)
+        self.charges = None if charges is None else _numbers("charges", charges).astype(np.float64)
+        self.names = None if names is None else list(names)
+        self._check_shapes()
+        self.which = self._tables_of_edges(which)
         self._check()
 
     def solve(
@@ -146,13 +159,16 @@ class ArrayProblem:
         known = settings_of(kind, words)
         return form(self.layout, known if isinstance(known, type(kind.settings)) else kind.settings, seed, clocks=ncccs)
 
-    def cost(self, values: Integers) -> float:
-        """Return what `values` of all robots cost."""
+    def cost(self, values: ArrayLike) -> float:
+        """Return what `values` of all robots cost. Raise `ValueError` where a robot has none, or no such value."""
+        values = _whole("values", values)
+        if values.shape != (self.robots,) or not _within(values, self.values):
+            raise ValueError(f"each of {self.robots:,} robots has a value below {self.values:,}")
         first, second = self.edges.T
-        paid = self.tables[self.which, values[first], values[second]].sum()
+        paid = exact_sum(self.tables[self.which, values[first], values[second]])
         if self.charges is not None:
-            paid += self.charges[np.arange(self.robots), values].sum()
-        return float(paid)
+            paid += exact_sum(self.charges[np.arange(self.robots), values])
+        return paid
 
     @cached_property
     def layout(self) -> Layout:
@@ -174,7 +190,7 @@ class ArrayProblem:
             degrees=np.bincount(keys // self.robots, minlength=self.robots),
             neighbours=keys % self.robots,
             charges=None if self.charges is None else self.charges.ravel(),
-            held=[held],
+            held=[held] if len(self.edges) else [],
             value_bytes=lengths[0] if alike else np.tile(lengths, self.robots),
             domain_bytes=len(encode(Domain([(value,) for value in range(self.values)]))),
         )
@@ -205,35 +221,83 @@ class ArrayProblem:
             verdict, values if found else None, int(cost) if found else None, tuple(run.costs), run.metrics(wall_s)
         )
 
-    def _numbers(self, which: ArrayLike | None, *, several: bool) -> Integers:
+    def _tables_of_edges(self, which: ArrayLike | None) -> Integers:
+        """Return the number of the table of each edge."""
         if which is not None:
-            return np.asarray(which, np.int64)
+            return _whole("which", which)
+        several = len(self.tables) > 1
         return np.arange(len(self.tables)) if several else np.zeros(len(self.edges), np.int64)
 
-    def _check(self) -> None:
-        """Raise `ValueError` for what does not fit."""
+    def _check_shapes(self) -> None:
+        """Raise `ValueError` for numbers and shapes that do not fit, before others are compared with them."""
         shape = (self.values, self.values)
-        faults = {
-            "robots and values are numbers of 1 or more": self.robots < 1 or self.values < 1,
-            "an edge is a pair of different robots": bool((self.edges[:, 0] == self.edges[:, 1]).any()),
-            f"robots are numbers below {self.robots:,}": not _within(self.edges, self.robots),
-            f"tables have the shape {shape}, one after the other": self.tables.shape[1:] != shape,
-            "there is a table for each edge": self.which.shape != (len(self.edges),),
-            "`which` names tables by their number": not _within(self.which, len(self.tables)),
-            f"charges have the shape {(self.robots, self.values)}": self.charges is not None
-            and self.charges.shape != (self.robots, self.values),
-            "costs are whole numbers of 0 or more, or inf": not _are_costs(self.tables),
-            "charges are whole numbers of 0 or more": self.charges is not None
-            and not (_are_costs(self.charges) and np.isfinite(self.charges).all()),
-            "each robot has a name": self.names is not None and len(set(self.names)) != self.robots,
-        }
-        for rule, broken in faults.items():
-            if broken:
-                raise ValueError(f"{rule}; these arrays do not fit")
+        _refuse_first(
+            {
+                "robots and values are numbers of 1 or more": self.robots < 1 or self.values < 1,
+                f"there are {MOST_ROBOTS:,} robots at most": self.robots > MOST_ROBOTS,
+                "edges have two columns": self.edges.shape[1:] != (_PAIR,),
+                f"tables have the shape {shape}, one after the other": self.tables.shape[1:] != shape,
+            }
+        )
+
+    def _check(self) -> None:
+        """Raise `ValueError` for entries that do not fit."""
+        _refuse_first(
+            {
+                "an edge is a pair of different robots": bool((self.edges[:, 0] == self.edges[:, 1]).any()),
+                f"robots are numbers below {self.robots:,}": not _within(self.edges, self.robots),
+                "there is a table for each edge": self.which.shape != (len(self.edges),),
+                "`which` names tables by their number": not _within(self.which, len(self.tables)),
+                f"charges have the shape {(self.robots, self.values)}": self.charges is not None
+                and self.charges.shape != (self.robots, self.values),
+                "costs are whole numbers of 0 or more, or inf": not _are_costs(self.tables),
+                "charges are whole numbers of 0 or more": self.charges is not None
+                and not (_are_costs(self.charges) and np.isfinite(self.charges).all()),
+                "each robot has a name": self.names is not None and not _are_names(self.names, self.robots),
+            }
+        )
+
+
+def _refuse_first(faults: Mapping[str, bool]) -> None:
+    """Raise `ValueError` with the first rule that is broken."""
+    for rule, broken in faults.items():
+        if broken:
+            raise ValueError(f"{rule}; these arrays do not fit")
+
+
+def _index(name: str, given: int) -> int:
+    try:
+        return operator.index(given)
+    except TypeError:
+        raise ValueError(f"{name} is a whole number, not {given!r}") from None
+
+
+def _numbers(name: str, given: ArrayLike) -> NDArray[Any]:
+    """Return `given` as an array. Raise `ValueError` where it holds something else than real numbers."""
+    try:
+        found = np.asarray(given)
+    except (ValueError, TypeError):  # rows of several lengths
+        raise ValueError(f"{name} are no array of numbers") from None
+    if found.dtype.kind not in "biuf":
+        raise ValueError(f"{name} are no array of numbers: numpy takes them for {found.dtype}")
+    return found
+
+
+def _whole(name: str, given: ArrayLike) -> Integers:
+    """Return `given` as an array of integers. Raise `ValueError` where it holds something else."""
+    found = _numbers(name, given)
+    if found.dtype.kind == "b" or not (np.isfinite(found) & (np.floor(found) == found)).all():
+        raise ValueError(f"{name} are no array of whole numbers")
+    whole: Integers = found.astype(np.int64)
+    return whole
 
 
 def _within(numbers: Integers, end: int) -> bool:
     return bool(((numbers >= 0) & (numbers < end)).all())
+
+
+def _are_names(names: Sequence[object], many: int) -> bool:
+    return len(names) == many == len(set(names)) and all(isinstance(name, str) for name in names)
 
 
 def _are_costs(costs: Floats) -> bool:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import re
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
@@ -188,8 +189,12 @@ class _Builder:
     def joining(self, robot: ModelRobot, order: Sequence[str], constraints: Iterable[Constraint]) -> Robot:
         """Return a robot that joins after those in `order`, with its constraints."""
         everybody = {name: self._variables(self._model.robots[name]) for name in order if name in self._model.robots}
+        extras = Extras(
+            links=[*itertools.pairwise(everybody)],  # the order is that of the team, also where no constraint says it
+            topics={robot.name: robot.topics},
+            weights={robot.name: robot.weight},
+        )
         everybody[robot.name] = self._variables(robot)
-        extras = Extras(topics={robot.name: robot.topics}, weights={robot.name: robot.weight})
         costs = replace(self._units, constant=0)
         team = assemble("", everybody, constraints, kind=self._kind, costs=costs, extras=extras)
         return replace(team[robot.name], children=())

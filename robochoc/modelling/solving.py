@@ -71,7 +71,7 @@ class Solvable(ABC):
 
         Args:
             protocol: The name of the protocol, in any case. None, or `auto`: one that suits the problem.
-            runtime: `processes`, `simulator` or `network`.
+            runtime: `processes`, `simulator`, `network` or `arrays`.
             order: The name of a priority order, such as `dom-deg`, or the names of all robots, the highest priority
                 first. None: the one that suits a protocol that was chosen; otherwise that of the team, or `max-degree`
                 where nobody has given it one. `given`: that of the team.

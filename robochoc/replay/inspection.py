@@ -15,9 +15,9 @@ from typing import Any
 from robochoc.model.message import Message, Value
 from robochoc.model.priorities import natural_key
 from robochoc.model.problem import INFINITE
-from robochoc.protocols.nogood import NogoodStore
 from robochoc.protocols.order import PriorityOrder
 from robochoc.protocols.protocol import Protocol
+from robochoc.protocols.satisfaction.nogood import NogoodStore
 from robochoc.replay.safe_repr import safe_repr
 from robochoc.replay.value_text import NumberedValueText, ValueText, as_value, cut
 from robochoc.solver.agent_problem import AgentProblem

@@ -8,8 +8,8 @@ from typing import NamedTuple
 from robochoc.journal.events import Concluded, Sent
 from robochoc.model.message import Message
 from robochoc.model.outcome import Verdict
-from robochoc.protocols.nogood import NogoodStore
 from robochoc.protocols.protocol import Protocol
+from robochoc.protocols.satisfaction.nogood import NogoodStore
 from robochoc.replay.inspection import ALWAYS, MOST_VALUES, Inspector, safely
 from robochoc.replay.steps import RecordedStep
 from robochoc.replay.value_text import as_value

@@ -45,12 +45,17 @@ def alternatives(team: Team, options: Options, *, complete: bool = False, costs:
 def fits(team: Team, options: Options, traits: Traits) -> bool:
     """Return whether a protocol with these traits would take the team, in the search as well."""
     try:
-        refuse_unfit(team, options, traits)
-        if traits.tables:
-            check_exact(max_total(team, options))
+        refuse_team(team, options, traits)
     except UnsupportedError:
         return False
     return True
+
+
+def refuse_team(team: Team, options: Options, traits: Traits) -> None:
+    """Raise `UnsupportedError` if a protocol with these traits would not take the team, also for refusals later on."""
+    refuse_unfit(team, options, traits)
+    if traits.tables:
+        check_exact(max_total(team, options))
 
 
 def _central_solver_fits(team: Team, options: Options) -> bool:

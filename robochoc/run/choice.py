@@ -16,7 +16,7 @@ from robochoc.model.costs import UnboundedCostError, normalized
 from robochoc.model.orders import Order
 from robochoc.model.problem import Team
 from robochoc.model.wording import counted
-from robochoc.run.alternatives import fits
+from robochoc.run.alternatives import refuse_team
 from robochoc.run.compatibility import refuse_settings
 from robochoc.run.context import RunContext
 from robochoc.run.defaults import AUTO, DEFAULT_COST_PROTOCOL, DEFAULT_PROTOCOL
@@ -34,14 +34,19 @@ NARROW_CELLS = 65_536
 """No table on a narrow pseudo-tree has more entries."""
 FEW_ROBOTS = 12
 """Up to so many, `sfb` needs fewer messages than `dpop` even on trees (docs/explanation/sfb.md)."""
-MOST_IN_A_TREE = 20_000
-"""With more, a token that names all robots on its way is too long."""
+MOST_IN_A_TREE = 30_000
+"""So many take half a minute in the simulator (docs/guides/large-teams.md)."""
 MANY_ROBOTS = 300
 """With more, what SFB's messages tell of each robot adds up, and local search is all that ends with costs."""
 SPARSE = 8
 """The mean number of neighbours up to which a constraint graph is called sparse."""
+FEW_TO_BEGIN_ANEW = 25
+"""Up to so many robots `sfb` decides hard problems in the files' order, which a problem that changes keeps."""
+TIGHT = 0.7
+"""The constrainedness from which `sfb`, begun anew after each change, needs fewer messages than `dynabt`."""
 LONG_ROW = 65_536
 """The values of all robots together up to which many partial assignments of SFB go into a message."""
+SOMEBODY = "it accepts the team with these options, and what suits the team better does not"
 NOBODY = "no protocol accepts the team with these options"
 
 FAILURES = (
@@ -51,70 +56,142 @@ FAILURES = (
 """What compiling domains may end with. The run tells of it."""
 
 
-class Rule(NamedTuple):
-    """A protocol for teams of one sort: when it is taken, why, and why not where the rule does not hold."""
+class Condition(NamedTuple):
+    """What a rule asks of a team: whether it holds, and in words that it does, and that it does not."""
 
-    protocol: str
     holds: Callable[[Facts], bool]
-    why: str
+    text: str
     otherwise: str
 
+
+class Rule(NamedTuple):
+    """A protocol for teams of one sort: what is asked of them, and why it is taken."""
+
+    protocol: str
+    conditions: tuple[Condition, ...]
+    why: str
+
+    def unmet(self, facts: Facts) -> str:
+        """Return why the rule does not hold: the first condition that the team does not meet. Empty if it holds."""
+        return next((one.otherwise for one in self.conditions if not one.holds(facts)), "")
+
+
+COSTS = Condition(lambda f: f.has_costs, "costs", "there are no costs")
+NO_COSTS = Condition(lambda f: not f.has_costs, "no costs", "there are costs")
+CHANGES = Condition(lambda f: f.changes, "a problem that changes", "the problem does not change")
+PARTIAL = Condition(
+    lambda f: f.partially_known, "partially known constraints (PKC)", "no constraint is partially known (PKC)"
+)
+MANY = Condition(
+    lambda f: f.robots > MANY_ROBOTS, f"more than {MANY_ROBOTS} robots", f"there are {MANY_ROBOTS} robots or fewer"
+)
+LARGE_TABLE = Condition(
+    lambda f: f.largest_table > MAX_TUPLES,
+    f"a constraint of more than {MAX_TUPLES:,} combinations of values",
+    f"no constraint has more than {MAX_TUPLES:,} combinations of values",
+)
 
 RULES = (
     Rule(
         "disfc",
-        lambda f: f.partially_known and f.largest_domain <= MAX_FILTER_BITS,
+        (
+            PARTIAL,
+            Condition(
+                lambda f: f.largest_domain <= MAX_FILTER_BITS,
+                f"at most {MAX_FILTER_BITS:,} values in a domain",
+                f"a domain has more than {MAX_FILTER_BITS:,} values, too many for its filters",
+            ),
+        ),
         "constraints are partially known: it takes them, and tells nobody a value",
-        "no constraint is partially known, or a domain is too large for its filters",
     ),
+    Rule("abt", (PARTIAL,), "constraints are partially known, and it takes them"),
     Rule(
-        "abt",
-        lambda f: f.partially_known,
-        "constraints are partially known, and it takes them",
-        "no constraint is partially known",
+        "sfb",
+        (
+            CHANGES,
+            NO_COSTS,
+            Condition(lambda f: not f.environment, "changes that files name", "something outside changes the problem"),
+            Condition(
+                lambda f: f.robots <= FEW_TO_BEGIN_ANEW,
+                f"at most {FEW_TO_BEGIN_ANEW} robots",
+                f"there are more than {FEW_TO_BEGIN_ANEW} robots",
+            ),
+            Condition(
+                lambda f: f.constrainedness >= TIGHT,
+                f"a constrainedness of {TIGHT} or more",
+                f"the constrainedness is below {TIGHT}",
+            ),
+            Condition(
+                lambda f: f.largest_table <= MAX_TUPLES and f.values <= LONG_ROW,
+                "domains that are not large",
+                "domains are large",
+            ),
+        ),
+        "the problem changes and is hard: begun anew each time, it needs fewer messages than one that goes on",
     ),
     Rule(
         "dynabt",
-        lambda f: f.changes and not f.has_costs,
+        (CHANGES, NO_COSTS),
         "the problem changes, and it keeps what still holds",
-        "the problem does not change, or has costs",
     ),
     Rule(
         "dpop",
-        lambda f: f.has_costs and FEW_ROBOTS < f.robots <= MOST_IN_A_TREE and f.tree.cells <= NARROW_CELLS,
+        (
+            COSTS,
+            Condition(
+                lambda f: f.robots > FEW_ROBOTS,
+                f"more than {FEW_ROBOTS} robots",
+                f"there are {FEW_ROBOTS} robots or fewer",
+            ),
+            Condition(
+                lambda f: f.robots <= MOST_IN_A_TREE,
+                f"at most {MOST_IN_A_TREE:,} robots",
+                f"there are more than {MOST_IN_A_TREE:,} robots",
+            ),
+            Condition(
+                lambda f: f.tree.cells <= NARROW_CELLS,
+                f"tables of at most {NARROW_CELLS:,} entries on the pseudo-tree",
+                f"a table on the pseudo-tree would have more than {NARROW_CELLS:,} entries",
+            ),
+        ),
         "the constraint graph is nearly a tree: tables are small, and messages few",
-        f"there are no costs, or {FEW_ROBOTS} robots at most, or tables of more than {NARROW_CELLS:,} entries",
     ),
     Rule(
         "dsa",
-        lambda f: f.has_costs and f.robots > MANY_ROBOTS and not f.forbids,
+        (
+            COSTS,
+            MANY,
+            Condition(lambda f: not f.forbids, "nothing is forbidden", "some constraints forbid something"),
+        ),
         "there are too many robots for a proof, and nothing is forbidden: local search ends, with a good answer",
-        f"there are no costs, or {MANY_ROBOTS} robots at most, or constraints that forbid something",
     ),
     Rule(
         "abt",
-        lambda f: not f.has_costs and f.robots > MANY_ROBOTS and 2 * f.links <= SPARSE * f.robots,
+        (
+            NO_COSTS,
+            MANY,
+            Condition(
+                lambda f: 2 * f.links <= SPARSE * f.robots,
+                f"at most {SPARSE} neighbours each in the mean",
+                f"robots have more than {SPARSE} neighbours in the mean",
+            ),
+        ),
         "there are many robots with few neighbours: they search at the same time, with short messages",
-        f"there are costs, or {MANY_ROBOTS} robots at most, or more than {SPARSE} neighbours each in the mean",
     ),
     Rule(
         "afc-ng",
-        lambda f: not f.has_costs and (f.values > LONG_ROW or f.largest_table > MAX_TUPLES),
+        (
+            NO_COSTS,
+            Condition(
+                lambda f: f.values > LONG_ROW or f.largest_table > MAX_TUPLES,
+                f"more than {LONG_ROW:,} values in all, or {LARGE_TABLE.text}",
+                f"there are {LONG_ROW:,} values in all or fewer, and {LARGE_TABLE.otherwise}",
+            ),
+        ),
         "domains are large, and it needs no tables",
-        "there are costs, or domains are not large",
     ),
-    Rule(
-        "afb",
-        lambda f: f.largest_table > MAX_TUPLES,
-        "domains are large, and it needs no tables",
-        "domains are not large",
-    ),
-    Rule(
-        "sfb",
-        lambda f: True,  # noqa: ARG005 - it is for all that is left
-        "it needs few messages, on hard problems too",
-        "",
-    ),
+    Rule("afb", (LARGE_TABLE,), "domains are large, and it needs no tables"),
+    Rule("sfb", (), "it needs few messages, on hard problems too"),
 )
 """The rules, in their order."""
 
@@ -162,15 +239,17 @@ def _decided(team: Team, options: Options, *, environment: bool) -> Choice:
     except UnboundedCostError:  # the run refuses it
         return Choice(replace(options, protocol=DEFAULT_COST_PROTOCOL))
     facts = Facts(team, environment, lambda: _compiled_sizes(team, options))
-    rejected: dict[str, str] = {}
-    for name, why, otherwise in _candidates(facts):
-        if otherwise:
-            rejected[name] = "; ".join(filter(None, [rejected.get(name), otherwise]))
-        elif not accepts(name, team, options):
-            rejected[name] = "it does not accept the team, or the options"
-        else:
+    rejected: dict[str, list[str]] = {}
+    for rule in RULES:
+        against = rule.unmet(facts) or refusal(rule.protocol, team, options)
+        if not against:
+            rejected.pop(rule.protocol, None)
+            return _choice(facts, options, (rule.protocol, rule.why), rejected)
+        rejected.setdefault(rule.protocol, []).append(against)
+    for name in _others():
+        if accepts(name, team, options):
             rejected.pop(name, None)
-            return _choice(facts, options, (name, why), rejected)
+            return _choice(facts, options, (name, SOMEBODY), rejected)
     usual = DEFAULT_COST_PROTOCOL if facts.has_costs else DEFAULT_PROTOCOL  # its refusal names who accepts the team
     return _choice(facts, options, (usual, NOBODY), {})
 
@@ -186,31 +265,33 @@ def decided_unseen(team: Team, options: Options) -> Choice:
     return Choice(replace(options, protocol=name, chosen={"protocol": why}))
 
 
-def _candidates(facts: Facts) -> Iterator[tuple[str, str, str]]:
-    """Yield protocols, the best first: the name, why it is taken, and why it is not (empty if it may be)."""
-    for rule in RULES:
-        yield rule.protocol, rule.why, "" if rule.holds(facts) else rule.otherwise
-    others = [one for one in installed_protocols() if one.protocol]
-    for complete in (True, False):
-        for one in others:
-            if one.protocol and one.protocol.traits.complete is complete:
-                yield one.name, "it accepts the team with these options, and what suits it better does not", ""
+def _others() -> list[str]:
+    """Return the installed protocols, complete ones first."""
+    found = [(not one.protocol.traits.complete, one.name) for one in installed_protocols() if one.protocol]
+    return [name for _, name in sorted(found)]
 
 
 def accepts(name: str, team: Team, options: Options) -> bool:
     """Return whether the protocol called `name` accepts the team and the options."""
+    return not refusal(name, team, options)
+
+
+def refusal(name: str, team: Team, options: Options) -> str:
+    """Return why the protocol called `name` does not accept the team or the options; empty if it does."""
     try:
         protocol = protocol_named(name)
         refuse_settings(name, protocol, options.settings)
-    except (UnknownProtocolError, UnsupportedError):
-        return False
-    return fits(team, replace(options, protocol=name), protocol.traits)
+        refuse_team(team, replace(options, protocol=name), protocol.traits)
+    except (UnknownProtocolError, UnsupportedError) as refused:
+        return str(refused)
+    return ""
 
 
-def _choice(facts: Facts, options: Options, taken: tuple[str, str], rejected: Mapping[str, str]) -> Choice:
+def _choice(facts: Facts, options: Options, taken: tuple[str, str], rejected: Mapping[str, list[str]]) -> Choice:
     name, why = taken
     chosen = _with_suitable_order(replace(options, protocol=name, chosen={"protocol": why}), facts)
-    return Choice(chosen, tuple(_in_words(facts)), tuple(rejected.items()))
+    against = tuple((other, "; ".join(dict.fromkeys(whys))) for other, whys in rejected.items())
+    return Choice(chosen, tuple(_in_words(facts)), against)
 
 
 # Orders
@@ -219,6 +300,13 @@ ORDERS = MappingProxyType(
     {"sfb": Order.MIN_WIDTH, "afb": Order.MIN_WIDTH, "abt": Order.MAX_DEGREE, "afc-ng": Order.MAX_DEGREE}
 )
 """The orders that suit the protocols. Others build trees, or have no use for one."""
+
+ORDERS_TEXT = (
+    "order, if none is asked for: max-degree for abt, afc-ng and afb; min-width for sfb, with costs max-degree, with",
+    "--withdraw dom-deg. The files' order stays for the others, and where constraints are partially known, the problem",
+    "changes, or --withdraw maximal asks who is placed first",
+)
+"""What `_with_suitable_order` and `_with_order` do, in lines for people."""
 
 STATIC = frozenset({"sbt", "abt", "afc", "afc-ng", "afc-tree", "disfc", "syncbb", "afb", "sfb"})
 """Protocols whose robots keep the order all the time, so that a poor one costs much."""
@@ -271,8 +359,10 @@ def _compiled_sizes(team: Team, options: Options) -> Sizes | None:
 
 def _in_words(facts: Facts) -> Iterator[str]:
     """Yield what is known of the team."""
-    yield f"{counted(facts.robots, 'robot')}, {counted(facts.links, 'pair')} of neighbours"
-    yield "costs are minimised" if facts.has_costs else "any solution will do"
+    mean = 2 * facts.links / max(facts.robots, 1)
+    pairs = f"{counted(facts.links, 'pair')} of neighbours ({mean:.3g} each in the mean)"
+    yield f"{counted(facts.robots, 'robot')}, {pairs}"
+    yield "costs are minimised" if facts.has_costs else "no costs: any solution will do"
     if facts.partially_known:
         yield "constraints are partially known"
     if facts.changes:

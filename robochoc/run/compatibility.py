@@ -20,9 +20,9 @@ from typing import NamedTuple
 
 from robochoc.model.change import team_after_events
 from robochoc.model.problem import ProblemKind, Team
-from robochoc.protocols.first_fit import FirstFit
 from robochoc.protocols.protocol import Protocol
 from robochoc.protocols.requirements import unmet_requirement
+from robochoc.protocols.satisfaction.first_fit import FirstFit
 from robochoc.protocols.settings import SettingsError, settings_of
 from robochoc.protocols.traits import Traits
 from robochoc.run.options import CENTRAL, CentralSolverName, OnLoss, Options, Runtime, ScheduleName, Withdrawal
@@ -31,6 +31,8 @@ from robochoc.verification.objective import withdrawal_cost
 
 LARGEST = 2**62
 """Costs that add up to more are refused: a message holds integers of 64 bits."""
+LEAST_SEED, LARGEST_SEED = -(2**63), 2**64 - 1
+"""Journals and robots on a network are told the seed in msgpack, whose integers are no longer."""
 CENTRAL_TRAITS = Traits(partially_known=True, asymmetric=True, costs=True)
 """The problems that the central solver supports."""
 
@@ -73,6 +75,7 @@ def _is_delayed(options: Options) -> bool:
 _WITHOUT_PROCESSES = frozenset({Runtime.SIMULATOR, Runtime.ARRAYS})
 
 OPTION_RULES = (
+    OptionRule(lambda o: not LEAST_SEED <= o.seed <= LARGEST_SEED, "--seed is a number of 64 bits: less than 2^64"),
     OptionRule(
         lambda o: o.channel and o.runtime is not Runtime.SIMULATOR,
         "--channel is the simulator's",

@@ -18,8 +18,10 @@ from robochoc.protocols.protocol import Protocol
 from robochoc.run.evaluation import Answer, Search, evaluate_search
 from robochoc.run.options import Options
 from robochoc.run.withdrawal import Phase, first_phase, second_phase
+from robochoc.system.stopping import stop_requested
 
 GAVE_UP = "gave up, as its protocol has it"
+STOPPED = "somebody has asked to stop"
 FOUND_NOTHING = "has come to its end, and all that it came by breaks a hard constraint"
 
 
@@ -113,6 +115,8 @@ class Deployment(ABC):
     def _limit_reached(self, spent: Metrics) -> str:
         """Return the limit that has ended a search."""
         options = self.options
+        if stop_requested():
+            return STOPPED
         if self.left_s() != 0:
             if options.messages is not None and sum(spent.messages.values()) >= options.messages:
                 return f"so many messages have been sent (--messages {options.messages})"

@@ -3,18 +3,22 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Collection, Iterator, Mapping
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import product
+from random import Random
 
 from robochoc.model.change import team_after_events
 from robochoc.model.orders import Graph, constraint_graph
 from robochoc.model.problem import INFINITE, Constraint, ConstraintModel, ProblemKind, Relation, Team
-from robochoc.solver.encoding import MAX_TUPLES, is_soft
+from robochoc.solver.encoding import MAX_TUPLES, allows_function, is_soft
 
 _TWO = 2
 LARGE = 1_000_000
 """A table on a pseudo-tree with more entries is looked at no further."""
+DRAWS = 100
+"""So many combinations of values say how much a constraint forbids."""
 Sizes = Mapping[str, int]
 """The number of values of each robot: the combinations that its neighbours see."""
 
@@ -107,6 +111,20 @@ class Facts:
         return any(map(_forbids, self.first.constraints()))
 
     @cached_property
+    def constrainedness(self) -> float:
+        """How much of all combinations of values the constraints forbid: around 1 problems are hardest.
+
+        It is kappa of Gent, MacIntyre, Prosser, Walsh ("The constrainedness of search", AAAI 1996): the bits that the
+        constraints take away, of those that the domains have. Where a constraint has more than `DRAWS` combinations of
+        values, as many are drawn.
+        """
+        domains = {one.name: one.domain for robot in self.first.robots for one in robot.variables}
+        bits = sum(math.log2(max(1, len(domain))) for domain in domains.values())
+        chance = Random(0)  # noqa: S311 - a sample, no secret
+        taken = -sum(math.log2(_share_allowed(one, domains, chance)) for one in self.first.constraints())
+        return taken / bits if bits else 0.0
+
+    @cached_property
     def tree(self) -> TreeTables:
         """The tables of dynamic programming on the pseudo-tree that the robots would build, unless they are large."""
         return tree_tables(self.graph, self.first.order, self.sizes, LARGE)
@@ -116,6 +134,19 @@ class Facts:
         shared = (one for robot in self.first.robots for one in robot.shared)
         scopes = ({owner[name] for name in one.variables} for one in shared)
         return max((math.prod(sizes[name] + 1 for name in scope) for scope in scopes), default=1)
+
+
+def _share_allowed(constraint: Constraint, domains: Mapping[str, Collection[int]], chance: Random) -> float:
+    """Return the share of combinations of values that `constraint` allows; of none, less than can be drawn."""
+    columns = [list(domains[name]) for name in constraint.variables]
+    many = math.prod(map(len, columns))
+    if not many:
+        return 1.0
+    whole = many <= DRAWS
+    looked_at = product(*columns) if whole else (tuple(map(chance.choice, columns)) for _ in range(DRAWS))
+    allowed = allows_function(constraint, constraint.variables)
+    number = many if whole else DRAWS
+    return max(sum(map(allowed, looked_at)), 1 / 2) / number
 
 
 def _forbids(constraint: Constraint) -> bool:
@@ -135,7 +166,7 @@ class TreeTables:
 
 
 def tree_tables(graph: Graph, order: tuple[str, ...], sizes: Sizes, enough: float = math.inf) -> TreeTables:
-    """Return the tables of DPOP on the tree that `protocols/dfs.py` builds, which needs no robot for that.
+    """Return the tables of DPOP on the tree that `protocols/shared/dfs.py` builds, which needs no robot for that.
 
     Args:
         graph: The neighbours of each robot.

@@ -8,8 +8,8 @@ from dataclasses import dataclass
 from typing import cast
 
 from robochoc.protocols.dynamic import DynamicProtocol
-from robochoc.protocols.first_fit import FirstFit
 from robochoc.protocols.protocol import Protocol
+from robochoc.protocols.satisfaction.first_fit import FirstFit
 from robochoc.protocols.settings_base import Settings
 from robochoc.protocols.traits import Traits
 from robochoc.run.defaults import AUTO, DEFAULT_COST_PROTOCOL, FIRST_FIT
@@ -46,7 +46,7 @@ class InstalledProtocol:
 
     @property
     def place(self) -> str:
-        """Module and class, as the package names them: `robochoc.protocols.abt:ABT`."""
+        """Module and class, as the package names them: `robochoc.protocols.satisfaction.abt:ABT`."""
         return self.entry.value
 
     @property

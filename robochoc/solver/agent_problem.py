@@ -7,7 +7,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from types import MappingProxyType
 from typing import NamedTuple
 
 from robochoc.model.problem import ConstraintModel, Domain, Robot, Team
@@ -22,6 +21,10 @@ Links = Mapping[str, tuple[str, ...]]
 """The parents of each robot."""
 
 
+_NO_SETTINGS: Mapping[str, str] = {}
+"""A plain dictionary, as it has to travel to other processes; nobody writes to it."""
+
+
 class RunParameters(NamedTuple):
     """The parameters of a run, the same for all robots.
 
@@ -33,7 +36,7 @@ class RunParameters(NamedTuple):
     """
 
     seed: int = 0
-    settings: Mapping[str, str] = MappingProxyType({})
+    settings: Mapping[str, str] = _NO_SETTINGS
     withdrawal_cost: int | float | None = None
 
 

@@ -203,11 +203,10 @@ class LocalProblem:
         """Return the lexicographic cost of every own value: comparable also where hard constraints are violated."""
         known = self._paid(view)
         self.checks += len(known) * len(self.values)
-        columns = list(zip(self.charges, *known, strict=True))
-        costs = [sum(prices) for prices in columns]
+        costs = list(map(sum, zip(self.charges, *known, strict=True)))
         if INFINITE not in costs:
             return [(0, cost) for cost in costs]
-        return [_lexicographic_cost(prices) for prices in columns]
+        return [_lexicographic_cost(prices) for prices in zip(self.charges, *known, strict=True)]
 
     def scopes(self, robots: Iterable[str]) -> list[tuple[tuple[str, ...], Cost]]:
         """Return, for each constraint whose other robots are all in `robots`, these robots and its maximum cost.

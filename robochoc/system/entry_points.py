@@ -33,7 +33,7 @@ class EntryPoint(Protocol):
 
     @property
     def value(self) -> str:
-        """Module and attribute: `robochoc.protocols.abt:ABT`."""
+        """Module and attribute: `robochoc.protocols.satisfaction.abt:ABT`."""
 
     @property
     def dist(self) -> Distribution | None:

@@ -79,6 +79,12 @@ def load_entry_point(entry: EntryPoint, namesakes: Sequence[EntryPoint], fault: 
     except Terminated:
         raise
     except (Exception, SystemExit) as error:  # noqa: BLE001 - see above
-        return Loaded(None, f"cannot be imported: {type(error).__name__}: {error}")
+        return Loaded(None, f"cannot be imported: {type(error).__name__}: {error}{_after_an_update(entry, error)}")
     broken = fault(found)
     return Loaded(None if broken else found, broken)
+
+
+def _after_an_update(entry: EntryPoint, error: BaseException) -> str:
+    """Return what to do where a module of our own is not where it was when this was installed."""
+    ours = entry.value.startswith("robochoc.") and isinstance(error, ModuleNotFoundError)
+    return "; robochoc has changed since it was installed: say make demo, or pip install -e . again" if ours else ""

@@ -23,7 +23,7 @@ DEFAULT_SEEDS = "1..10"
 @click.option("--protocols", required=True, metavar="NAME,NAME,...", help="The protocols.")
 @click.option("--set", "settings", multiple=True, metavar="NAME=VALUE", help="Set a parameter of all. Repeatable.")
 @click.option("--order", metavar="NAME", help="Priority order of the robots, or several with commas.")
-@click.option("--runtime", default="simulator", show_default=True, metavar="NAME", help="simulator or processes.")
+@click.option("--runtime", default="simulator", show_default=True, metavar="NAME", help="simulator, arrays, processes.")
 @click.option("--channel", metavar="NAME", help="Channel model of the simulator: wlan, wpan, wman, wwan.")
 @click.option(
     "--timeout", type=click.FloatRange(0, min_open=True), default=30, show_default=True, metavar="SECONDS",

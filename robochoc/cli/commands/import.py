@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import click
 
+from robochoc.cli.options.generated import next_step
 from robochoc.cli.options.order import GIVEN, ORDER_NAME, order_for
 from robochoc.cli.options.order import NAMES as ORDERS
 from robochoc.cli.options.paths import InputPath
@@ -164,7 +165,7 @@ def _tell(entry: dict[str, Any]) -> None:
     sizes = {what: entry[what] for what in ("robots", "variables", "constraints")}
     counts = ", ".join(f"{number:,} {what if number != 1 else what[:-1]}" for what, number in sizes.items())
     folder = on_one_line(entry["team"])
-    click.echo(f"{folder}: {counts}, from {entry['format']}; next: robochoc solve {folder}")
+    click.echo(f"{folder}: {counts}, from {entry['format']}; {next_step(folder, sizes['robots'])}")
     for line in notes_told([Note(**note) for note in entry["notes"]], "--report lists them"):
         click.echo(line)
 

@@ -44,6 +44,7 @@ from robochoc.cli.reports.closed_loop import flight_told, told_of
 from robochoc.cli.reports.failures import LIMIT, Failure, failures_told, worst
 from robochoc.cli.reports.live_sniffer import Watch, check_chosen, watching
 from robochoc.cli.reports.notes import bound_told, differences_told
+from robochoc.system.stopping import stop_heard
 
 if TYPE_CHECKING:
     from robochoc.cli.reports.closed_loop import FlownMission
@@ -222,7 +223,9 @@ def solve(
         more_inputs=source_places(ros.situation),
     )
     check_products(products, wanted, options, teams=len(folders))
-    context.exit(worst([_solve_one(folder, options, products, wanted) for folder in folders]))
+    with stop_heard():
+        statuses = [_solve_one(folder, options, products, wanted) for folder in folders]
+    context.exit(worst(statuses))
 
 
 def _solve_one(folder: Path, options: Options, products: Products, wanted: Wanted) -> int:

@@ -19,6 +19,8 @@ if TYPE_CHECKING:
 MAX = 1000
 MAX_NODES = 1_000_000
 """As `generators/draws.py` has it, which is not imported at the start."""
+MAX_PROCESSES = 1000
+"""With more robots, the simulator is proposed: docs/guides/large-teams.md."""
 Options = dict[str, Any]
 Command = Callable[..., None]
 
@@ -82,7 +84,13 @@ def write(make: Callable[[], Team], output: Path | None, *, replace: bool) -> No
     folder = output or Path("instances") / team.name
     write_team(team, folder, replace=replace)
     constraints = sum(len(robot.shared) for robot in team.robots)
-    click.echo(f"{folder}: {len(team.robots)} robots, {constraints} constraints; next: robochoc solve {folder}")
+    count = len(team.robots)
+    click.echo(f"{folder}: {count} robots, {constraints} constraints; {next_step(folder, count)}")
+
+
+def next_step(folder: Path | str, robots: int) -> str:
+    """Return how to solve the team in `folder`: not in processes where that would be very many."""
+    return f"next: robochoc solve {folder}{' --runtime simulator' if robots > MAX_PROCESSES else ''}"
 
 
 OUTPUT = ("--seed", "-o", "--force", "--help")

@@ -243,7 +243,9 @@ def _take_options(arguments: dict[str, Any]) -> Options:
 def check_products(products: Products, wanted: Wanted, options: Options, *, teams: int) -> None:
     """Raise `click.UsageError` for products that would be empty, or that are for one team only."""
     if wanted.explain and wanted.as_json:
-        raise click.UsageError("--explain goes without --json: the JSON result always has the tree")
+        raise click.UsageError(
+            "--explain goes without --json: the JSON result always has what was chosen, and the tree"
+        )
     if options.count and (products or wanted.ros):
         nothing = "--ros" if wanted.ros else "--html, --journal, --serve or --sniff"
         raise click.UsageError(f"--count gives only a number: drop {nothing}")

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 from robochoc.cli.reports.progress import print_above
 from robochoc.formats import on_one_line
-from robochoc.run.choice import RULES, Choice, faster_order
+from robochoc.run.choice import ORDERS_TEXT, RULES, Choice, Rule, faster_order
 
 if TYPE_CHECKING:
     from robochoc.communication.run_result import Progress
@@ -27,9 +27,15 @@ def choice_lines(choice: Choice) -> Iterator[str]:
 
 
 def rules_text() -> str:
-    """Return how a protocol is chosen."""
-    head = "auto: no protocol of its own. Of these, the first that suits the team and accepts all options is taken"
-    return "\n".join([head, *(f"  {rule.protocol}: {rule.why}" for rule in RULES)])
+    """Return how a protocol and an order are chosen."""
+    head = "auto: no protocol of its own. It takes the first of these that suits the team and accepts all options"
+    rules = [line for rule in RULES for line in _rule_lines(rule)]
+    return "\n".join([head, *rules, *ORDERS_TEXT, "next: robochoc solve --explain says it of a team"])
+
+
+def _rule_lines(rule: Rule) -> Iterator[str]:
+    yield f"  {rule.protocol}: {'; '.join(one.text for one in rule.conditions) or 'all other teams'}"
+    yield f"      {rule.why}"
 
 
 class OrderNote:
@@ -59,4 +65,6 @@ class OrderNote:
         order = faster_order(self._team, self._options)
         if order:
             name = on_one_line(self._team.name)
-            print_above(f"{name}: in the files' order; --order {order} is usually faster, and --protocol auto chooses")
+            print_above(
+                f"{name}: --order {order} is usually faster than the files'; --protocol auto chooses one itself"
+            )

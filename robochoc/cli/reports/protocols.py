@@ -60,7 +60,7 @@ def print_protocols(found: Sequence[Row], *, long: bool = False) -> None:
         if row.broken:
             click.echo(on_one_line(f"{row.name}: {row.place} (package {row.package}) {row.broken}"))
     if not long and sys.stdout.isatty():
-        click.echo("next: robochoc protocols NAME explains one; --long shows papers, privacy and more")
+        click.echo("next: robochoc protocols NAME explains one, auto the choice; --long shows papers, privacy and more")
 
 
 def protocol_text(row: Row) -> str:

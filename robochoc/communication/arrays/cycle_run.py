@@ -1,4 +1,4 @@
-"""The common base of synchronous protocols as arrays: what `protocols/cycles.py` is for robots that are objects.
+"""The common base of synchronous protocols as arrays: what `protocols/shared/cycles.py` is for robots that are objects.
 
 One `step` is a cycle of all robots. Each method has the name of what it does for all of them in `protocols`.
 """
@@ -18,8 +18,9 @@ from robochoc.communication.arrays.layout import Group, Layout
 from robochoc.communication.arrays.tally import Tally
 from robochoc.model.outcome import Metrics, Verdict
 from robochoc.model.problem import INFINITE
-from robochoc.protocols.cycles_messages import Value
-from robochoc.protocols.cycles_settings import CycleSettings
+from robochoc.protocols.shared.messages.cycles import Value
+from robochoc.protocols.shared.settings.cycles import CycleSettings
+from robochoc.solver.exact_costs import EXACT
 
 Costs = TypeVar("Costs", Integers, Floats)
 
@@ -228,7 +229,7 @@ class _Sums:
         """Add `costs`, which `times` robots count."""
         broken = int(layout.costs.broken(costs).sum())
         self._broken[times] = self._broken.get(times, 0) + broken
-        self._paid[times] = self._paid.get(times, 0) + int(costs.sum(dtype=np.int64)) - (broken << layout.costs.bits)
+        self._paid[times] = self._paid.get(times, 0) + layout.costs.sum(costs) - (broken << layout.costs.bits)
 
     @property
     def cost(self) -> float:
@@ -244,6 +245,12 @@ def _fixed(group: Group) -> Integers:
         return group.fixed[: group.active].copy()
     kind = group.blocks[0].rows.dtype if group.blocks else np.dtype(np.int32)
     return np.zeros((group.active, group.size), kind)
+
+
+def exact_sum(costs: Floats) -> float:
+    """Return the sum of `costs`, whole numbers or `inf`: an integer where floats do not hold it exactly."""
+    total = float(costs.sum())
+    return total if total < EXACT or total == INFINITE else sum(map(int, costs.ravel().tolist()))
 
 
 def least(costs: Costs) -> Costs:

@@ -1,4 +1,4 @@
-"""DSA for all robots at once: `protocols/dsa.py`, where the algorithm is explained."""
+"""DSA for all robots at once: `protocols/local_search/dsa.py`, where the algorithm is explained."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import numpy as np
 from robochoc.communication.arrays.cycle_run import CycleRun, count, least, nth
 from robochoc.communication.arrays.kinds import Flags, Integers
 from robochoc.communication.arrays.layout import Group
-from robochoc.protocols.dsa_settings import DSASettings
+from robochoc.protocols.local_search.settings.dsa import DSASettings
 
 
 class ArrayDSA(CycleRun):

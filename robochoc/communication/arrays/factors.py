@@ -1,4 +1,4 @@
-"""Function nodes of Max-Sum as arrays: `protocols/maxsum_factor.py` for all functions of a team at once."""
+"""Function nodes of Max-Sum as arrays: `protocols/inference/maxsum_factor.py` for all functions of a team at once."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ from typing import cast
 
 import numpy as np
 
+from robochoc.communication.arrays.cycle_run import exact_sum
 from robochoc.communication.arrays.description import Held
 from robochoc.communication.arrays.jagged import columns
 from robochoc.communication.arrays.kinds import FEW, Floats, Index, Integers
@@ -51,7 +52,7 @@ class Factors:
 
     def cost(self, values: Integers) -> float:
         """Return what all functions cost, where robots have these `values`."""
-        return float(self.tables[(self.which, *(values[column] for column in self.rows.T))].sum())
+        return exact_sum(self.tables[(self.which, *(values[column] for column in self.rows.T))])
 
 
 def factors_of(layout: Layout) -> list[Factors]:

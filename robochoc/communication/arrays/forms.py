@@ -9,10 +9,10 @@ from robochoc.communication.arrays.dsa import ArrayDSA
 from robochoc.communication.arrays.maxsum import ArrayMaxSum
 from robochoc.communication.arrays.mgm import ArrayMGM
 from robochoc.communication.arrays.mgm2 import ArrayMGM2
-from robochoc.protocols.dsa import DSA
-from robochoc.protocols.maxsum import MaxSum
-from robochoc.protocols.mgm import MGM
-from robochoc.protocols.mgm2 import MGM2
+from robochoc.protocols.inference.maxsum import MaxSum
+from robochoc.protocols.local_search.dsa import DSA
+from robochoc.protocols.local_search.mgm import MGM
+from robochoc.protocols.local_search.mgm2 import MGM2
 from robochoc.protocols.protocol import Protocol
 from robochoc.solver.encoding import UnsupportedError
 
@@ -25,5 +25,8 @@ def form_of(protocol: type[Protocol]) -> type[CycleRun]:
     """Return the form of `protocol` as arrays. Raises `UnsupportedError` where there is none."""
     form = _FORMS.get(protocol)
     if form is None:
-        raise UnsupportedError(f"{protocol.__name__} has no form as arrays; say --runtime simulator")
+        able = ", ".join(kind.__name__.lower() for kind in _FORMS)
+        raise UnsupportedError(
+            f"{protocol.__name__} has no form as arrays; these have: {able}; the simulator takes all"
+        )
     return form

@@ -18,6 +18,10 @@ from robochoc.communication.arrays.kinds import Flags, Floats, Index, Integers
 from robochoc.solver.encoding import TooLargeError
 from robochoc.solver.exact_costs import check_exact
 
+_SIGNED_BITS = 63
+_LOW_BITS = 31
+_LOW = (1 << _LOW_BITS) - 1
+
 
 @dataclass(frozen=True)
 class Costs:
@@ -50,6 +54,13 @@ class Costs:
         """Return `costs`, in which `inf` stands for a broken constraint."""
         broken = np.isinf(costs)
         return (np.where(broken, 0, costs).astype(np.int64) + (broken.astype(np.int64) << self.bits)).astype(self.kind)
+
+    def sum(self, costs: Integers) -> int:
+        """Return the sum of `costs`; where none is broken, it need not fit into 64 bits."""
+        if len(costs) << self.bits < 1 << _SIGNED_BITS:
+            return int(costs.sum(dtype=np.int64))
+        low = int((costs & _LOW).sum(dtype=np.int64))
+        return low + (int((costs >> _LOW_BITS).sum(dtype=np.int64)) << _LOW_BITS)
 
     def broken(self, costs: Integers) -> Integers:
         """Return the numbers of broken constraints, of sums or of differences."""

@@ -1,4 +1,4 @@
-"""Max-Sum for all robots at once: `protocols/maxsum.py`, where the algorithm is explained.
+"""Max-Sum for all robots at once: `protocols/inference/maxsum.py`, where the algorithm is explained.
 
 Sums are added up in the order in which the objects do, so that they are rounded alike.
 """
@@ -9,7 +9,7 @@ from typing import cast
 
 import numpy as np
 
-from robochoc.communication.arrays.cycle_run import CycleRun, least
+from robochoc.communication.arrays.cycle_run import CycleRun, exact_sum, least
 from robochoc.communication.arrays.factors import Ports, factors_of, ports_of
 from robochoc.communication.arrays.kinds import Floats, Integers
 from robochoc.communication.arrays.layout import Group, Layout
@@ -17,10 +17,10 @@ from robochoc.communication.arrays.tally import list_bytes
 from robochoc.model.message import encode
 from robochoc.model.outcome import Verdict
 from robochoc.model.problem import INFINITE
-from robochoc.protocols.cycles_messages import Domain
-from robochoc.protocols.cycles_settings import CycleSettings
-from robochoc.protocols.maxsum_messages import Q, R
-from robochoc.protocols.maxsum_settings import MaxSumSettings
+from robochoc.protocols.inference.messages.maxsum import Q, R
+from robochoc.protocols.inference.settings.maxsum import MaxSumSettings
+from robochoc.protocols.shared.messages.cycles import Domain
+from robochoc.protocols.shared.settings.cycles import CycleSettings
 
 _REST = len(encode(R([]))) - 1
 """Bytes of a message but for its list of rows."""
@@ -69,7 +69,7 @@ class ArrayMaxSum(CycleRun):
         total = sum(factors.cost(self.values) for factors in self._factors)
         for group, alone in zip(self.layout.groups, self._alone, strict=True):
             if alone is not None:
-                total += float(alone[np.arange(group.many), group.values(self.values)].sum())
+                total += exact_sum(alone[np.arange(group.many), group.values(self.values)])
         self.note(total)
 
     # Equations

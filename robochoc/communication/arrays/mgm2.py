@@ -1,4 +1,4 @@
-"""MGM-2 for all robots at once: `protocols/mgm2.py`, where the algorithm is explained."""
+"""MGM-2 for all robots at once: `protocols/local_search/mgm2.py`, where the algorithm is explained."""
 
 from __future__ import annotations
 
@@ -14,9 +14,9 @@ from robochoc.communication.arrays.mgm import ArrayGainers
 from robochoc.communication.arrays.shared import Shared
 from robochoc.communication.arrays.tally import integer_bytes, list_bytes
 from robochoc.model.message import encode
-from robochoc.protocols.cycles_messages import Domain
-from robochoc.protocols.mgm2_messages import Accept, Go, Offer, Reject
-from robochoc.protocols.mgm2_settings import MGM2Settings
+from robochoc.protocols.local_search.messages.mgm2 import Accept, Go, Offer, Reject
+from robochoc.protocols.local_search.settings.mgm2 import MGM2Settings
+from robochoc.protocols.shared.messages.cycles import Domain
 
 _NO_OFFER = len(encode(Offer(None)))
 _ACCEPT = len(encode(Accept(0, 0, 0))) - 3

@@ -16,13 +16,14 @@ from robochoc.communication.session import Epoch, Session
 from robochoc.journal.events import Concluded, Decided, Observer
 from robochoc.model.outcome import Verdict
 from robochoc.model.problem import Team
-from robochoc.protocols.cycles import CycleProtocol
 from robochoc.protocols.findings import Findings, Trail
 from robochoc.protocols.protocol import Protocol
 from robochoc.protocols.settings import settings_of
+from robochoc.protocols.shared.cycles import CycleProtocol
 from robochoc.solver.agent_problem import DEFAULT_PARAMETERS, AgentProblem, RunParameters
 from robochoc.solver.compiled_team import CompiledTeam
 from robochoc.solver.encoding import UnsupportedError
+from robochoc.system.stopping import stop_requested
 
 
 class ArraysRun(Session):
@@ -73,7 +74,9 @@ class ArraysRun(Session):
             elapsed_s = time.monotonic() - began
             self._report(elapsed_s)
             if not run.over and (
-                (timeout is not None and elapsed_s > timeout) or (messages is not None and self._sent >= messages)
+                stop_requested()
+                or (timeout is not None and elapsed_s > timeout)
+                or (messages is not None and self._sent >= messages)
             ):
                 break
         else:

@@ -17,6 +17,8 @@ _DECODER = msgspec.msgpack.Decoder(FromParent)
 _ENCODER = msgspec.msgpack.Encoder()
 """Made before the fork: once for all robots."""
 _ROOM_FOR_FDS = socket.CMSG_SPACE(QUEUES_AT_ONCE * array.array("i").itemsize)
+_TRUNCATED = int(socket.MSG_CTRUNC)
+"""As a plain number: to combine an enumeration's member makes a new one."""
 
 
 class ControlPipe:
@@ -51,7 +53,7 @@ class ControlPipe:
             return []
         except ConnectionResetError:
             chunk, ancillary, flags = b"", [], 0
-        if flags & socket.MSG_CTRUNC:
+        if flags & _TRUNCATED:
             raise UnsupportedError(
                 f"{self._name} needs more open files than the system allows (raise the limit, see 'ulimit -n')"
             )

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import gc
 import os
+import select
 import signal
 import sys
 import traceback
@@ -140,6 +141,14 @@ def _flush() -> None:
     for stream in (sys.stdout, sys.stderr):
         with suppress(AttributeError, ValueError):  # there is none, or it is closed
             stream.flush()
+
+
+def ended_of(sentinels: Iterable[int], patience_s: float) -> list[int]:
+    """Return those of processes' `sentinels` whose processes have ended: wait at most `patience_s` s for one."""
+    poll = select.poll()
+    for sentinel in sentinels:
+        poll.register(sentinel, select.POLLIN)
+    return [sentinel for sentinel, _ in poll.poll(patience_s * 1000)]
 
 
 def ranges_of(descriptors: Iterable[int]) -> Iterator[range]:

@@ -2,19 +2,18 @@
 
 from __future__ import annotations
 
-import multiprocessing.connection
+import os
 import selectors
 import socket
 import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack
 from functools import partial
-from multiprocessing.context import ForkContext, ForkServerContext
-from typing import Literal, cast
+from typing import Literal
 
 from robochoc.communication.control import FromRobot, QueueFrom, QueuesTo
 from robochoc.communication.main_guard import require_main_guard
-from robochoc.communication.processes.forked_process import ChildProcess, ForkedProcess, ranges_of
+from robochoc.communication.processes.forked_process import ChildProcess, ForkedProcess, ended_of, ranges_of
 from robochoc.communication.processes.process_status import ProcessStatus
 from robochoc.communication.processes.robot_link import RobotLink
 from robochoc.communication.processes.robot_process import RobotStart, robot_process, served_robot_process
@@ -23,10 +22,6 @@ from robochoc.solver.encoding import UnsupportedError
 from robochoc.system.signals import signals_held
 
 StartMethod = Literal["fork", "forkserver"]
-_CONTEXTS: dict[StartMethod, type[ForkContext | ForkServerContext]] = {
-    "fork": ForkContext,
-    "forkserver": ForkServerContext,
-}
 STARTED_AT_ONCE = 16
 GRACE_S = 0.5
 """The time that processes have to end by themselves before they are killed, in seconds."""
@@ -43,7 +38,7 @@ class ProcessPool:
     def __init__(self, start_method: StartMethod) -> None:
         if start_method != "fork":
             require_main_guard()
-        self._context = _CONTEXTS[start_method]()
+        self._start_method = start_method
         self.robots: dict[str, RobotLink] = {}
         self._dismissed: list[RobotLink] = []
         self._inherited: list[range] = []
@@ -98,10 +93,12 @@ class ProcessPool:
 
     def _process(self, start: RobotStart, control: socket.socket) -> ChildProcess:
         """Return a process that runs the robot with its end of its control pipe."""
-        if self._context.get_start_method() == "fork":
+        if self._start_method == "fork":
             return ForkedProcess(partial(robot_process, start, control), [control.fileno()], self._inherited)
+        from multiprocessing.context import ForkServerContext  # noqa: PLC0415 - nobody else needs it
+
         name = start.part.robot.name
-        return self._context.Process(target=served_robot_process, name=name, args=(start, control), daemon=True)
+        return ForkServerContext().Process(target=served_robot_process, name=name, args=(start, control), daemon=True)
 
     def _own_descriptors(self, prepared: Sequence[RobotLink]) -> Iterator[int]:
         """Yield all ends of pipes: what robots would inherit of them hides from others that an end is gone."""
@@ -158,16 +155,19 @@ class ProcessPool:
             writers = []
             for name in receivers:
                 try:
-                    reader, writer = self._context.Pipe(duplex=False)
+                    reader, writer = os.pipe()
                 except OSError as error:
                     raise UnsupportedError(
                         f"the system does not let {sender.name} have a queue to {name}: {error.strerror}"
                         " (raise its limits, see 'ulimit -n', or use the simulator)"
                     ) from error
-                writers.append(copies.enter_context(writer))
-                with reader:
-                    self.robots[name].send(QueueFrom(sender.name), [reader.fileno()])
-            sender.send(QueuesTo(list(receivers)), [writer.fileno() for writer in writers])
+                copies.callback(os.close, writer)
+                writers.append(writer)
+                try:
+                    self.robots[name].send(QueueFrom(sender.name), [reader])
+                finally:
+                    os.close(reader)
+            sender.send(QueuesTo(list(receivers)), writers)
 
     # Ending
 
@@ -219,5 +219,4 @@ def _await(sentinels: Sequence[int]) -> None:
     deadline = time.monotonic() + GRACE_S
     alive = set(sentinels)
     while alive and time.monotonic() < deadline:
-        ended = multiprocessing.connection.wait(list(alive), max(0.0, deadline - time.monotonic()))
-        alive.difference_update(cast("list[int]", ended))
+        alive.difference_update(ended_of(alive, max(0.0, deadline - time.monotonic())))

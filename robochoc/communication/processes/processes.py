@@ -33,7 +33,7 @@ from robochoc.communication.master_loop import TICK_S, MasterLoop
 from robochoc.communication.processes.pool import STARTED_AT_ONCE, ProcessPool, StartMethod
 from robochoc.communication.processes.process_status import ProcessStatus
 from robochoc.communication.processes.robot_link import RobotLink
-from robochoc.communication.processes.robot_process import RobotStart
+from robochoc.communication.processes.robot_process import RobotStart, rehearse
 from robochoc.communication.processes.stopped import LONGEST_STEP_S, StoppedRobots
 from robochoc.communication.resources import garbage_frozen
 from robochoc.communication.run_result import Progress, RobotsLostError, RunResult
@@ -45,9 +45,12 @@ from robochoc.protocols.protocol import Protocol
 from robochoc.solver.agent_problem import DEFAULT_PARAMETERS, AgentProblem, RunParameters
 from robochoc.solver.compiled_team import CompiledTeam
 from robochoc.solver.encoding import TooLargeError, UnsupportedError
+from robochoc.system.stopping import stop_requested
 
 CHECK_S = 0.001
 """The time between two checks of which processes are there, for each robot: so they take a small part of it."""
+CROWD = 100
+"""The robots from which a rehearsal in the parent saves more than it takes."""
 REPORTS_S = 5.0
 """The longest wait of the parent for reports after the end of an epoch, in seconds."""
 BUSY_REPORTS_S = 60.0
@@ -115,7 +118,7 @@ class ProcessesRun(Session, MasterLoop):
             self._search_until(deadline)
             if self.state.ordered:
                 self._lossless = self.state.counters.quiescent and not self.state.broken_off
-            return self._finish(began, late=over(deadline))
+            return self._finish(began, late=over(deadline) or stop_requested())
         except RobotsLostError as lost:
             for name, why in lost.robots.items():
                 self._observe(Lost(t=self._now(), robot=name, why=why))
@@ -162,6 +165,8 @@ class ProcessesRun(Session, MasterLoop):
         self._pool.make_room(robots)
         self.check_s = min(max(TICK_S, robots * CHECK_S), LONGEST_STEP_S)
         message_decoder(self._protocol.messages)  # before the fork: once for all robots
+        if robots >= CROWD:
+            rehearse(self._protocol, unstarted.values())
         with garbage_frozen():
             parts = iter(unstarted.values())
             while (some := list(islice(parts, STARTED_AT_ONCE))) and not over(deadline):

@@ -6,7 +6,6 @@ messages that wait when it wakes up are one packet.
 
 from __future__ import annotations
 
-import selectors
 from collections.abc import Sequence
 from dataclasses import replace
 from typing import assert_never
@@ -28,9 +27,17 @@ from robochoc.communication.control import (
 from robochoc.communication.host import Host
 from robochoc.communication.processes.control_pipe import ControlPipe
 from robochoc.communication.processes.queues import LARGEST_BODY, QueueReader, QueueWriter
+from robochoc.communication.processes.watch import Watch
 from robochoc.communication.resources import own_memory
 from robochoc.communication.robot_loop import IDLE_S, RobotLoop
 from robochoc.model.message import Envelope
+
+MOST_IDLE_S = 0.032
+"""The longest that a robot waits for a message before it reports its counters.
+
+It begins with `IDLE_S`, and doubles with each report of a search: where many robots share few cores, each of them
+waits for its turn, and what it reports meanwhile is soon out of date.
+"""
 
 
 class QueueRobot(RobotLoop):
@@ -59,23 +66,26 @@ class QueueRobot(RobotLoop):
         self._link = link
         self._readers: dict[str, QueueReader] = {}
         self._writers: dict[str, QueueWriter] = {}
+        self._link_is_full = False
         self._running = True
-        self._selector = selectors.DefaultSelector()
-        self._selector.register(link, selectors.EVENT_READ, self._read_orders)
+        self._patience_s = IDLE_S
+        self._watch = Watch()
+        self._watch.add(link.fileno(), self._read_orders)
         for sentinel in parent:
-            self._selector.register(sentinel, selectors.EVENT_READ, self._end)
+            self._watch.add(sentinel, self._end)
         self.confirm(host)
 
     def run(self) -> None:
         """Wait and act until the parent hangs up or is gone."""
         while self._running:
-            ready = self._selector.select(IDLE_S if self.is_restless else None)
-            if not ready:
+            actions = self._watch.wait(self._patience_s if self.is_restless else None)
+            if not actions:
                 self.report_idle()
+                self._patience_s = min(2 * self._patience_s, MOST_IDLE_S)
                 continue
             packet: list[Envelope] = []
-            for key, _ in ready:
-                key.data(packet)
+            for act in actions:
+                act(packet)
             self.take_in(packet)
 
     # Messages
@@ -98,12 +108,12 @@ class QueueRobot(RobotLoop):
     def _flush(self, writer: QueueWriter) -> None:
         if writer.flush() or writer.fd is None:
             return
-        if writer.fd not in self._selector.get_map():
-            self._selector.register(writer.fd, selectors.EVENT_WRITE, lambda _packet: self._flush_later(writer))
+        if writer.fd not in self._watch:
+            self._watch.add(writer.fd, lambda _packet: self._flush_later(writer), write=True)
 
     def _flush_later(self, writer: QueueWriter) -> None:
         if writer.flush() and writer.fd is not None:
-            self._selector.unregister(writer.fd)
+            self._watch.remove(writer.fd)
 
     def _read(self, sender: str, reader: QueueReader, packet: list[Envelope]) -> None:
         if self._readers.get(sender) is not reader:
@@ -119,12 +129,14 @@ class QueueRobot(RobotLoop):
     # The parent
 
     def _say(self, message: FromRobot) -> None:
-        if not self._link.send(message):
-            self._selector.modify(self._link, selectors.EVENT_READ | selectors.EVENT_WRITE, self._read_orders)
+        if not self._link.send(message) and not self._link_is_full:
+            self._link_is_full = True
+            self._watch.watch_writing(self._link.fileno(), wanted=True)
 
     def _read_orders(self, _packet: list[Envelope]) -> None:
-        if self._link.flush():
-            self._selector.modify(self._link, selectors.EVENT_READ, self._read_orders)
+        if self._link_is_full and self._link.flush():
+            self._link_is_full = False
+            self._watch.watch_writing(self._link.fileno(), wanted=False)
         for order in self._link.orders():
             self._obey(order)
         if self._link.ended:
@@ -155,7 +167,9 @@ class QueueRobot(RobotLoop):
     def _report_end(self) -> None:
         if self._host is not None:
             protocol = self._host.protocol
-            metrics = replace(self._host.metrics(), memory=own_memory() if self._measured else 0)
+            metrics = self._host.metrics()
+            if self._measured:
+                metrics = replace(metrics, memory=own_memory())
             self._say(Report(self.epoch, protocol.assignment, metrics, protocol.findings))
 
     def _change(self, order: Change) -> None:
@@ -167,6 +181,7 @@ class QueueRobot(RobotLoop):
             if name in self._writers:
                 self._close_writer(self._writers.pop(name))
         self.epoch = order.epoch
+        self._patience_s = IDLE_S
         self._reset()
         if self._host is not None:
             self._host.change(part, invalidated)
@@ -176,14 +191,14 @@ class QueueRobot(RobotLoop):
 
     def _open_reader(self, sender: str, reader: QueueReader) -> None:
         self._readers[sender] = reader
-        self._selector.register(reader.fd, selectors.EVENT_READ, lambda packet: self._read(sender, reader, packet))
+        self._watch.add(reader.fd, lambda packet: self._read(sender, reader, packet))
 
     def _close_reader(self, reader: QueueReader) -> None:
         self._readers = {name: other for name, other in self._readers.items() if other is not reader}
-        self._selector.unregister(reader.fd)
+        self._watch.remove(reader.fd)
         reader.close()
 
     def _close_writer(self, writer: QueueWriter) -> None:
-        if writer.fd is not None and writer.fd in self._selector.get_map():
-            self._selector.unregister(writer.fd)
+        if writer.fd is not None and writer.fd in self._watch:
+            self._watch.remove(writer.fd)
         writer.close()

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import errno
-import multiprocessing.connection
 import socket
 import time
 from collections.abc import Sequence
@@ -11,7 +10,7 @@ from collections.abc import Sequence
 import msgspec
 
 from robochoc.communication.control import FromParent, FromRobot
-from robochoc.communication.processes.forked_process import ChildProcess
+from robochoc.communication.processes.forked_process import ChildProcess, ended_of
 from robochoc.communication.processes.process_status import ProcessStatus, describe_end, is_computing, process_status
 from robochoc.communication.processes.queues import QueueReader
 from robochoc.communication.run_result import RobotsLostError
@@ -66,7 +65,7 @@ class RobotLink:
                     raise
                 if time.monotonic() > deadline:
                     raise RobotsLostError({self.name: "it does not answer"}) from error
-                multiprocessing.connection.wait([self.process.sentinel], 0.001)
+                ended_of([self.process.sentinel], 0.001)
                 continue
             frame, fds = frame[sent:], ()
 

@@ -6,13 +6,15 @@ It ends when the parent says so, and at once when the parent is gone, however th
 from __future__ import annotations
 
 import ctypes
-import multiprocessing
 import os
 import signal
 import socket
 import sys
+import time
 import traceback
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
+from contextlib import suppress
+from itertools import islice
 from typing import NamedTuple
 
 from robochoc.communication.control import Failed
@@ -21,6 +23,7 @@ from robochoc.communication.processes.control_pipe import ControlPipe
 from robochoc.communication.processes.queue_robot import QueueRobot
 from robochoc.protocols.protocol import Protocol
 from robochoc.solver.agent_problem import AgentProblem
+from robochoc.solver.compiled import MIN_TABLE_VALUES
 from robochoc.solver.encoding import TooLargeError, UnsupportedError
 from robochoc.system.signals import leave_ctrl_c_to_the_parent
 
@@ -28,6 +31,10 @@ LOWEST_NICE = 19
 MEASURED = 128
 """Of a larger team not every robot measures its memory, but so many, evenly over the order: the system takes a
 millisecond for it."""
+REHEARSED = 32
+"""The most robots that are rehearsed. Python 3.11 rewrites a function from its 8th call on, and more now and then."""
+REHEARSAL_S = 0.05
+"""When the rehearsal is broken off, in seconds."""
 _PR_SET_PDEATHSIG = 1
 _PR_SET_NAME = 15
 _prctl = ctypes.CDLL(None).prctl if sys.platform == "linux" else None
@@ -48,6 +55,23 @@ class RobotStart(NamedTuple):
     protocol: type[Protocol]
     epoch: int
     observed: bool
+
+
+def rehearse(protocol: type[Protocol], parts: Iterable[AgentProblem]) -> None:
+    """Build a few robots in the parent, and forget them, before all are forked.
+
+    Python rewrites what it runs for the first times, to run it faster. What was rewritten before the fork is not
+    copied for each robot. Others' protocols are left alone: whatever is wrong with them is to happen in a robot. So are
+    large domains: they take numpy, which can start threads, and long.
+    """
+    if not protocol.__module__.startswith("robochoc."):
+        return
+    until = time.monotonic() + REHEARSAL_S
+    with suppress(UnsupportedError):  # a robot will say so
+        for part in islice((part for part in parts if len(part.domain.values) < MIN_TABLE_VALUES), REHEARSED):
+            Host.of(protocol, part)
+            if time.monotonic() > until:
+                break
 
 
 def robot_process(start: RobotStart, control: socket.socket, parent: Sequence[int] = ()) -> None:
@@ -81,6 +105,8 @@ def robot_process(start: RobotStart, control: socket.socket, parent: Sequence[in
 
 def served_robot_process(start: RobotStart, control: socket.socket) -> None:
     """Run one robot in a process that a fork server has started: its parent is that server, not ours."""
+    import multiprocessing  # noqa: PLC0415 - it is there where a fork server has started this, and nobody else needs it
+
     parent = multiprocessing.parent_process()
     robot_process(start, control, () if parent is None else (parent.sentinel,))
 

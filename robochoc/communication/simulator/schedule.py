@@ -11,10 +11,13 @@ import random
 from abc import ABC, abstractmethod
 from collections import deque
 from collections.abc import Sequence
-from itertools import count
+from typing import Final
 
 from robochoc.model.message import Envelope
 from robochoc.system.compiling import mypyc_attr
+
+NEVER: Final = -1
+"""No time of a turn."""
 
 
 @mypyc_attr(allow_interpreted_subclasses=True)
@@ -77,62 +80,97 @@ class Concurrent(Schedule):
         self._chance = random.Random(seed)  # noqa: S311 - a schedule is no secret
         self._longest = longest
         self._one_by_one = one_by_one
-        self._count = count()
-        self._busy_until: dict[str, int] = {}
-        self._inboxes: dict[str, list[tuple[int, int, Envelope]]] = {}
-        self._last_arrival: dict[tuple[str, str], int] = {}
-        self._agenda: list[tuple[int, float, str]] = []
-        self._turns: dict[str, int] = {}
+        self._said = 0
+        self._readers: dict[str, _Reader] = {}
+        self._times: list[int] = []
+        """When robots have turns, as a heap: each time once."""
+        self._turns: dict[int, list[tuple[float, str]]] = {}
+        """The robots that have a turn at a time, as a heap by lot: many small heaps are faster than a large one."""
 
     def put(self, envelope: Envelope, checks: int = 0) -> None:  # noqa: ARG002 - they are in its clock
         """Draw the delay; never earlier than the message before it in the same channel."""
-        edge = (envelope.sender, envelope.receiver)
-        delay = self._chance.randint(0, self._longest) if self._longest else 0
-        arrival = max(envelope.clock + delay, self._last_arrival.get(edge, 0))
-        self._last_arrival[edge] = arrival
-        inbox = self._inboxes.setdefault(envelope.receiver, [])
-        first = not inbox or arrival < inbox[0][0]
-        if arrival > envelope.clock:
+        sender, receiver, _, said = envelope
+        reader = self._readers.get(receiver)
+        if reader is None:
+            reader = self._readers[receiver] = _Reader(receiver)
+        arrival = said + self._chance.randint(0, self._longest) if self._longest else said
+        before = reader.last_arrival.get(sender, 0)
+        if before > arrival:  # noqa: PLR1730 - faster
+            arrival = before
+        reader.last_arrival[sender] = arrival
+        if arrival > said:
             envelope = envelope._replace(clock=arrival)
-        heapq.heappush(inbox, (arrival, next(self._count), envelope))
+        inbox = reader.inbox
+        first = not inbox or arrival < inbox[0][0]
+        self._said += 1
+        heapq.heappush(inbox, (arrival, self._said, envelope))
         if first:
-            self._note(envelope.receiver)
+            self._note(reader, arrival)
 
     def get(self) -> Sequence[Envelope]:
         """Return all messages in the inbox of the robot that reads its inbox next, or the first of them."""
-        while self._agenda:
-            due, _, robot = heapq.heappop(self._agenda)
-            if self._turns.get(robot) != due:  # it has had its turn, or has been given another
+        while self._times:
+            due = self._times[0]
+            turns = self._turns[due]
+            reader = self._readers[heapq.heappop(turns)[1]]
+            if not turns:
+                heapq.heappop(self._times)
+                del self._turns[due]
+            if reader.due != due:  # it has had its turn, or has been given another
                 continue
-            del self._turns[robot]
-            inbox = self._inboxes[robot]
+            reader.due = NEVER
+            inbox = reader.inbox
             self.now = due
-            packet = []
-            while inbox and inbox[0][0] <= due:
+            packet = [heapq.heappop(inbox)[2]]
+            while inbox and inbox[0][0] <= due and not self._one_by_one:
                 packet.append(heapq.heappop(inbox)[2])
-                if self._one_by_one:
-                    break
             return packet
         return ()
 
     def clear(self) -> None:
         """Drop all messages under way. No robot is busy afterwards."""
-        for state in (self._busy_until, self._inboxes, self._last_arrival, self._agenda, self._turns):
-            state.clear()
+        self._readers.clear()
+        self._times.clear()
+        self._turns.clear()
         self.now = 0
 
     def done(self, robot: str, clock: int, checks: int) -> None:  # noqa: ARG002 - they are in the clock
         """Note that the robot is free from `clock` on."""
-        self._busy_until[robot] = clock
-        if self._inboxes.get(robot):
-            self._note(robot)
+        reader = self._readers.get(robot)
+        if reader is None:
+            reader = self._readers[robot] = _Reader(robot)
+        reader.busy_until = clock
+        if reader.inbox:
+            self._note(reader, reader.inbox[0][0])
 
-    def _note(self, robot: str) -> None:
-        """Give `robot` its turn at the time when something has arrived and it is not busy; a robot has one at most."""
-        due = max(self._inboxes[robot][0][0], self._busy_until.get(robot, 0))
-        if self._turns.get(robot) != due:
-            self._turns[robot] = due
-            heapq.heappush(self._agenda, (due, self._chance.random(), robot))
+    def _note(self, reader: _Reader, arrival: int) -> None:
+        """Give a robot its turn when its first message has arrived and it is not busy; it has one turn at most."""
+        due, free = arrival, reader.busy_until
+        if free > due:  # noqa: PLR1730 - faster
+            due = free
+        if reader.due == due:
+            return
+        reader.due = due
+        turn = (self._chance.random(), reader.name)
+        turns = self._turns.get(due)
+        if turns is None:
+            self._turns[due] = [turn]
+            heapq.heappush(self._times, due)
+        else:
+            heapq.heappush(turns, turn)
+
+
+class _Reader:
+    """A robot as `Concurrent` sees it: what is under way to it, until when it is busy, and when it has its turn."""
+
+    __slots__ = ("busy_until", "due", "inbox", "last_arrival", "name")
+
+    def __init__(self, name: str) -> None:
+        self.name = name
+        self.inbox: list[tuple[int, int, Envelope]] = []
+        self.last_arrival: dict[str, int] = {}
+        self.busy_until = 0
+        self.due = NEVER
 
 
 @mypyc_attr(allow_interpreted_subclasses=True)

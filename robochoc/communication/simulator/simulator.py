@@ -10,7 +10,7 @@ import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
-from robochoc.communication.host import Host, order_of
+from robochoc.communication.host import Host, UnderWay, may_be_shared, order_of
 from robochoc.communication.resources import garbage_frozen
 from robochoc.communication.run_result import Progress, RunResult
 from robochoc.communication.session import Epoch, Session, over
@@ -25,10 +25,13 @@ from robochoc.solver.agent_problem import DEFAULT_PARAMETERS, AgentProblem, RunP
 from robochoc.solver.compiled_team import CompiledTeam
 from robochoc.solver.team_compiler import OutOfTimeError
 from robochoc.system.compiling import answer_signals, mypyc_attr
-from robochoc.system.garbage import collection_paused
+from robochoc.system.garbage import collection_paused, collection_seldom
+from robochoc.system.stopping import stop_requested
 
 PROGRESS_EVERY = 256
 """Packets between two reports of progress."""
+PROGRESS_S = 0.25
+"""Seconds after which there is one in any case: some packets are much work."""
 
 
 @dataclass(frozen=True)
@@ -89,6 +92,7 @@ class Simulation(Session):
         self._verdict: Verdict | None = None
         self._witness: str | None = None
         self._order: PriorityOrder | None = None
+        self._under_way = UnderWay() if may_be_shared(protocol.messages) else None
         with collection_paused():
             parts = Epoch(self.compiled, parameters=parameters).parts(protocol)
             self._hosts = {name: self._host(part) for name, part in parts.items()}
@@ -102,7 +106,7 @@ class Simulation(Session):
         """See `Session.search`; a limit on messages is looked at after each packet."""
         began = time.monotonic()
         if self._verdict is None:
-            with garbage_frozen():  # robots' problems are none, and they are most of what there is
+            with garbage_frozen(), collection_seldom():  # robots' problems are none, and they are most of what there is
                 self._play(began, timeout, messages)
         simulated_s, cycles = self._schedule.elapsed_s, self._schedule.cycles
         self._schedule.clear()
@@ -145,6 +149,7 @@ class Simulation(Session):
     def _host(self, part: AgentProblem) -> Host:
         self._check_time(part.robot.name)
         host = Host.of(self._protocol, part, self._order_of(part))
+        host.under_way = self._under_way
         if self._observer:
             host.observe(self._observer, lambda: self._time(host.checks), self._time)
         return host
@@ -161,7 +166,9 @@ class Simulation(Session):
         for host in self._hosts.values():
             self._checks = host.checks
             self._send(host, host.start(lossless=lossless))
-        packets = 0
+        packets, told_s = 0, 0.0
+        schedule, hosts = self._schedule, self._hosts
+        most_ncccs, most_cycles = self._limits.ncccs, self._limits.cycles
         while self._verdict is None:
             answer_signals()
             elapsed_s = time.monotonic() - began
@@ -169,29 +176,39 @@ class Simulation(Session):
                 return
             if messages is not None and self._sent >= messages:
                 return
-            if self._limits.ncccs is not None and self._ncccs >= self._limits.ncccs:
+            if most_ncccs is not None and self._ncccs >= most_ncccs:
                 return
-            if self._limits.cycles is not None and self._schedule.next_cycle > self._limits.cycles:
+            if most_cycles is not None and schedule.next_cycle > most_cycles:
                 return
-            if self._progress and packets % PROGRESS_EVERY == 0:
-                self._progress(Progress(self._sent, elapsed_s))
-            packet = self._schedule.get()
+            if packets % PROGRESS_EVERY == 0 or elapsed_s - told_s >= PROGRESS_S:
+                told_s = elapsed_s
+                if self._is_to_stop(elapsed_s):
+                    return
+            packet = schedule.get()
             if not packet:
                 self._verdict, self._lossless = Verdict.SOLUTION, True
                 return
-            host = self._hosts[packet[0].receiver]
-            self._checks = host.checks
+            host = hosts[packet[0].receiver]
+            self._checks = host.counted
             self._send(host, host.handle(packet))
             packets += 1
 
+    def _is_to_stop(self, elapsed_s: float) -> bool:
+        """Report the progress; return whether somebody has asked to stop."""
+        if self._progress:
+            self._progress(Progress(self._sent, elapsed_s))
+        return stop_requested()
+
     def _send(self, host: Host, envelopes: Sequence[Envelope]) -> None:
         """Send what `host` has said in its step on its way."""
-        schedule, before = self._schedule, self._checks
-        self._sent += len(envelopes)
-        for envelope, checks in zip(envelopes, host.said_at, strict=True):
-            schedule.put(envelope, checks - before)
-        schedule.done(host.name, host.clock, host.checks - before)
-        self._ncccs = max(self._ncccs, host.clock)
+        schedule, before, clock = self._schedule, self._checks, host.clock
+        if envelopes:
+            self._sent += len(envelopes)
+            for envelope, checks in zip(envelopes, host.said_at, strict=True):
+                schedule.put(envelope, checks - before)
+        schedule.done(host.name, clock, host.counted - before)
+        if clock > self._ncccs:  # noqa: PLR1730 - faster
+            self._ncccs = clock
         self._note_verdict(host)
 
     def _time(self, checks: int) -> float:

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import click
 
+from robochoc.cli.options.generated import next_step
 from robochoc.cli.options.paths import InputPath
 from robochoc.cli.reports.failures import invalid_input_fails
 
@@ -45,4 +46,5 @@ def queens3d(n: int, model: str, robots: str, output: Path | None, *, force: boo
     team = team_of_queens(n, model, robots)
     folder = output or Path("instances") / team.name
     write_team(team, folder, replace=force)
-    click.echo(f"{folder}: {len(team.robots)} robots; next: robochoc solve {folder}")
+    count = len(team.robots)
+    click.echo(f"{folder}: {count} robots; {next_step(folder, count)}")
