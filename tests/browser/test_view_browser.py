@@ -1,11 +1,9 @@
-"""The page in a browser, which plays it: time, epochs, camera, trails, keys; narrow, dark, with little motion."""
+"""The page in a browser, which plays it: time, epochs, camera, trails, keys."""
 
 from __future__ import annotations
 
 import io
 from collections.abc import Iterator
-from contextlib import contextmanager
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -14,27 +12,10 @@ import numpy.typing as npt
 import pytest
 from PIL import Image
 
-from robochoc.flight.log import FlightLog
-from robochoc.flight.mission import mission_of
 from robochoc.view.page import scene_page
-from robochoc.view.scene import Scene, scene_of
-from tests.support.browser_pages import watched_page
-from tests.support.flights import LEG_S, epochs_of_three, five, straight
-from tests.support.live_scenes import served_scene
+from tests.support.flights import LEG_S
+from tests.support.scene_pages import END_S, HOSTILE, Page, now, opened, place, pressed, scene
 from tests.support.sniffer_pages import CONTRAST, NAMELESS, until
-
-HOSTILE = "</script><img src=x onerror=document.title='broken'>"
-END_S = 3 * LEG_S
-
-Page = Any
-"""Playwright's, which is not everywhere."""
-
-
-def scene(**how: Any) -> Scene:  # noqa: ANN401 - `straight`'s
-    outcome = epochs_of_three(HOSTILE)
-    mission = mission_of(outcome, five())
-    flown: FlightLog = straight(mission, **how)
-    return scene_of(outcome, mission, flown)
 
 
 @pytest.fixture(scope="module")
@@ -42,18 +23,6 @@ def file(tmp_path_factory: pytest.TempPathFactory) -> Path:
     html = tmp_path_factory.mktemp("flown") / "page.html"
     html.write_bytes(scene_page(scene(falls={1: 3.0}, obstacles=((2.0, 1.0, 5.0),))))
     return html
-
-
-@contextmanager
-def opened(browser: Any, url: str, **options: Any) -> Iterator[Page]:  # noqa: ANN401 - Playwright's
-    """The page, once it is drawn. No script may complain, and nothing may be asked for anything."""
-    with watched_page(browser, **{"viewport": {"width": 700, "height": 560}, **options}) as (page, complaints, asked):
-        page.goto(url)
-        until(lambda: page.evaluate("Boolean(globalThis.Playback)"), "it does not begin")
-        yield page
-        assert page.locator("#trouble").is_hidden()
-    assert not [one for one in complaints if "GL Driver Message" not in one]  # it is slow to photograph
-    assert not [one for one in asked if not one.startswith((url, "data:", "blob:"))]
 
 
 @pytest.fixture(scope="module")
@@ -74,23 +43,6 @@ def player(one: Page) -> Iterator[Page]:
     drawn_again(one)  # where things are on the screen is known then
     yield one
     one.evaluate("Playback.player.pause()")  # what moves is painted again and again
-
-
-def now(page: Page) -> float:
-    time: float = page.evaluate("Playback.player.time")
-    return time
-
-
-def place(page: Page, drone: int) -> list[float]:
-    """Where a drone is, as it is drawn: x, y and z in cells."""
-    at: list[float] = page.evaluate(f"Playback.drones[{drone}].position.toArray()")
-    return at
-
-
-def pressed(page: Page) -> str | None:
-    """The camera's button that is pressed."""
-    names: list[str] = page.eval_on_selector_all(".joined [aria-pressed=true]", "all => all.map((one) => one.id)")
-    return names[0] if names else None
 
 
 def drawn_again(page: Page) -> None:
@@ -314,98 +266,6 @@ def test_hostile_names_stay_text(player: Page) -> None:
 def test_all_can_be_named_and_read(player: Page) -> None:
     assert player.evaluate(NAMELESS) == []
     assert player.evaluate(CONTRAST) == []
-
-
-@pytest.fixture(scope="module")
-def small(browser: Any, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Page]:  # noqa: ANN401 - Playwright's
-    """A telephone at night, of one who wants little motion; the last two epochs begin at the same time."""
-    whole = scene()
-    playback = whole.playback
-    assert playback
-    first, second, third = playback.chapters
-    playback = replace(playback, chapters=(first, second, replace(third, begins_s=second.begins_s)))
-    html = tmp_path_factory.mktemp("small") / "page.html"
-    html.write_bytes(scene_page(replace(whole, playback=playback)))
-    screen = {"width": 360, "height": 640}
-    with opened(browser, html.as_uri(), viewport=screen, color_scheme="dark", reduced_motion="reduce") as shown:
-        yield shown
-
-
-def test_with_little_motion_it_begins_at_its_end(small: Page) -> None:
-    assert now(small) == END_S
-    assert not small.evaluate("Playback.player.playing")
-    small.keyboard.press("2")
-    assert pressed(small) == "top"
-    assert small.evaluate("Playback.camera.turning") is None
-
-
-def test_epochs_that_begin_together_are_told_together(small: Page) -> None:
-    said = small.inner_text("#epoch")
-    assert "Epoch 1 (0 to 2)" in said
-    assert "Epoch 2 (0 to 2)" in said
-    boxes = [small.locator("#marks button").nth(number).bounding_box() for number in range(3)]
-    assert boxes[1]["x"] + boxes[1]["width"] <= boxes[2]["x"] + 0.5
-
-
-def test_labels_and_legend_can_be_read_on_a_narrow_page(small: Page) -> None:
-    high = """Playback.labels.names.filter((name) => name.visible).map((name) => {
-      const [at, size] = [new MeshCat.THREE.Vector3(), new MeshCat.THREE.Vector3()];
-      const lens = Playback.viewer.camera;
-      const depth = -name.getWorldPosition(at).applyMatrix4(lens.matrixWorldInverse).z;
-      const height = name.getWorldScale(size).y * name.children[0].scale.y;
-      return height * innerHeight / 2 / depth / Math.tan(lens.fov * Math.PI / 360);
-    })"""
-    until(lambda: small.evaluate(high), "no drone has a label")
-    assert min(small.evaluate(high)) > 15
-    assert small.locator("#legend li").count() >= 5
-    assert small.evaluate(
-        "document.getElementById('legend').scrollWidth <= document.getElementById('caption').clientWidth"
-    )
-
-
-def test_a_narrow_dark_page_has_room_for_all(small: Page) -> None:
-    assert small.evaluate("document.documentElement.scrollWidth") == 360
-    boxes = [small.locator(f"#{name}").bounding_box() for name in ("caption", "controls")]
-    for box in boxes:
-        assert box["x"] >= 0
-        assert box["x"] + box["width"] <= 360
-    assert boxes[1]["y"] - boxes[0]["y"] - boxes[0]["height"] > 250
-    outside = small.eval_on_selector_all(
-        "#controls button, #controls select, #controls input",
-        "all => all.filter((one) => { const box = one.getBoundingClientRect();"
-        " return box.left < 0 || box.right > innerWidth || box.bottom > innerHeight; }).map((one) => one.id)",
-    )
-    assert outside == []
-    assert small.evaluate(CONTRAST) == []
-    small.click("#keys summary")
-    keys = small.locator("#keys dl").bounding_box()
-    assert keys["x"] >= 0
-    assert keys["x"] + keys["width"] <= 360
-
-
-def test_without_a_flight_there_is_nothing_to_play(browser: Any, tmp_path: Path) -> None:  # noqa: ANN401 - Playwright's
-    bare = Scene("a team: a solution", (("flight", "none"),), scene().drones, scene().axes)
-    html = tmp_path / "page.html"
-    html.write_bytes(scene_page(bare))
-    with opened(browser, html.as_uri(), reduced_motion="reduce") as shown:
-        assert shown.locator("#play").is_hidden()
-        assert shown.locator("#time").is_hidden()
-        shown.keyboard.press("4")
-        assert pressed(shown) == "follow"
-        shown.keyboard.press(" ")
-        assert place(shown, 0) == pytest.approx(bare.drones[0].end)
-
-
-def test_the_live_page_plays_the_same(browser: Any, one: Page) -> None:  # noqa: ANN401 - Playwright's
-    with served_scene(scene()) as url, opened(browser, url, viewport=one.viewport_size) as live:
-        until(lambda: live.evaluate("Boolean(Playback.trails.mesh)"), "nothing to play has come")
-        assert live.evaluate("Playback.player.playing || Playback.player.ended"), "by itself"
-        live.evaluate("Playback.player.pause(); Playback.player.seek(4.5)")
-        assert live.inner_text("#epoch").startswith("Epoch 2 (0 to 2)")
-        assert place(live, 0) != pytest.approx(place(live, 1), abs=0.5)
-        assert pressed(live) == "overview"
-        away = "Playback.viewer.camera.position.length()"
-        assert live.evaluate(away) > 2, "as the window wants it"
 
 
 def test_its_keys_are_a_key_away(player: Page) -> None:

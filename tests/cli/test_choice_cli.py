@@ -29,9 +29,19 @@ def test_what_was_chosen_is_said_with_the_reason_and_more_on_request(four: Path)
     said = robochoc_within("solve", four, "--runtime", "simulator", "--explain").stdout
     assert "  chosen: sfb, as " in said
     assert "; order min-width, as " in said
-    assert "  the team: 16 robots, 76 pairs of neighbours; any solution will do; 64 values in all" in said
-    assert "  not dpop: there are no costs" in said
+    assert (
+        "  the team: 16 robots, 76 pairs of neighbours (9.5 each in the mean); no costs: any solution will do; " in said
+    )
+    assert "  not dpop: there are no costs\n" in said
+    assert "  not abt: no constraint is partially known (PKC); there are 300 robots or fewer\n" in said
     assert "  not sfb" not in said
+
+
+def test_who_refuses_the_options_is_told_with_the_reason(four: Path) -> None:
+    said = robochoc_within("solve", four, "--runtime", "arrays", "--explain").stdout
+    assert "  chosen: dsa, as it accepts the team with these options" in said
+    assert "  not sfb: the problem does not change; sfb has no form as arrays; add --runtime simulator" in said
+    assert "  not dsa" not in said
 
 
 def test_nothing_is_said_of_a_choice_where_all_was_asked_for(four: Path) -> None:
@@ -72,7 +82,7 @@ def test_it_is_said_once_that_another_order_is_usually_faster(capsys: pytest.Cap
     note.tell_if_late(LONG_S)
     said = capsys.readouterr().err
     assert (
-        said == "queens3d-4: in the files' order; --order max-degree is usually faster, and --protocol auto chooses\n"
+        said == "queens3d-4: --order max-degree is usually faster than the files'; --protocol auto chooses one itself\n"
     )
 
 

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import pytest
 
+from robochoc.cli.options.generated import next_step
 from robochoc.formats import read_team
 from robochoc.generators.coloring import coloring_of
 from robochoc.generators.graphs import grid, scale_free, small_world
@@ -43,6 +44,11 @@ FAMILIES: dict[str, Callable[[], Team]] = {
         3, 3, worth=100, ways=Ways(100, Distance.STRAIGHT, 2), skills=Skills(2, 1)
     ),
 }
+
+
+def test_very_many_robots_are_not_proposed_as_processes() -> None:
+    assert next_step("out", 1000) == "next: robochoc solve out"
+    assert next_step("out", 1001) == "next: robochoc solve out --runtime simulator"
 
 
 @pytest.mark.parametrize("words", FAMILIES)

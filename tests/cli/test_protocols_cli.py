@@ -14,7 +14,7 @@ from click.testing import CliRunner, Result
 from robochoc import __version__
 from robochoc.cli.group import cli
 from robochoc.cli.reports.protocols import print_protocols, rows
-from robochoc.protocols import abt
+from robochoc.protocols.satisfaction import abt
 from robochoc.run.registry import (
     UnknownProtocolError,
     installed_protocol,
@@ -25,8 +25,8 @@ from robochoc.run.registry import (
 from tests.support.program import robochoc_within
 
 WITHOUT_DOCSTRING = """
-    from robochoc.protocols.first_fit import FirstFit
-    from robochoc.protocols.first_fit_messages import Placed
+    from robochoc.protocols.satisfaction.first_fit import FirstFit
+    from robochoc.protocols.satisfaction.messages.first_fit import Placed
     from robochoc.protocols.dynamic import DynamicProtocol
     from robochoc.protocols.traits import Traits
 
@@ -170,7 +170,7 @@ def test_json_is_an_object_a_line() -> None:
     renamed = {"everywhere": traits["shared_scopes"], "beyond": traits["writes_to_non_neighbours"]}
     assert found["abt"] == {
         "name": "abt",
-        "place": "robochoc.protocols.abt:ABT",
+        "place": "robochoc.protocols.satisfaction.abt:ABT",
         "package": f"robochoc {__version__}",
         "distributed": True,
         **{key: value for key, value in traits.items() if key not in {"shared_scopes", "writes_to_non_neighbours"}},
@@ -189,7 +189,7 @@ def test_a_protocol_is_explained_by_its_docstring() -> None:
     head, _, doc = done.stdout.partition("\n\n")
     what, place = head.splitlines()
     assert what.startswith("abt: satisfaction; complete; robots act at the same time; ")
-    assert place == f"robochoc.protocols.abt:ABT, from the package robochoc {__version__}"
+    assert place == f"robochoc.protocols.satisfaction.abt:ABT, from the package robochoc {__version__}"
     assert abt.__doc__ is not None
     assert doc.splitlines() == abt.__doc__.partition(">>>")[0].strip().splitlines()
     assert "central solver" in " ".join(run("central").stdout.split())
@@ -229,7 +229,9 @@ def test_the_list_is_wrapped_to_the_terminal(
 
 
 def test_how_a_protocol_is_chosen_is_explained() -> None:
-    head, *rules = robochoc_within("protocols", "auto").stdout.splitlines()
+    head, *lines = robochoc_within("protocols", "auto").stdout.splitlines()
     assert head.startswith("auto: ")
+    rules = [line for line in lines if re.match(r"  \S", line)]
     assert {rule.split(":")[0].strip() for rule in rules} <= {*protocol_names()}
-    assert rules[-1].startswith("  sfb: ")
+    assert rules[-1] == "  sfb: all other teams"
+    assert "  dsa: costs; more than 300 robots; nothing is forbidden" in rules

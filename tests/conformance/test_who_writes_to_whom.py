@@ -13,8 +13,8 @@ from robochoc.communication.simulator.schedule import RandomChannels
 from robochoc.communication.simulator.simulator import Simulation
 from robochoc.journal.events import AnyEvent, Sent
 from robochoc.model.problem import Team
-from robochoc.protocols.first_fit import FirstFit
 from robochoc.protocols.protocol import Protocol
+from robochoc.protocols.satisfaction.first_fit import FirstFit
 from robochoc.run.registry import protocol_named, protocol_names
 from robochoc.solver.agent_problem import DEFAULT_PARAMETERS, RunParameters
 from robochoc.verification.objective import withdrawal_cost

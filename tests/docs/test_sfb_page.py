@@ -13,9 +13,9 @@ from robochoc.communication.simulator.simulator import Simulation
 from robochoc.generators.families import FAMILIES
 from robochoc.journal.events import Sent
 from robochoc.model.problem import Team
+from robochoc.protocols.optimization.sfb import SFB
+from robochoc.protocols.optimization.sfb_bounds import VALUES
 from robochoc.protocols.order import PriorityOrder
-from robochoc.protocols.sfb import SFB
-from robochoc.protocols.sfb_bounds import VALUES
 from tests.support.program import ROOT
 
 PAGE = ROOT / "docs" / "explanation" / "sfb.md"

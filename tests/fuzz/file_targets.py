@@ -22,8 +22,8 @@ from robochoc.journal.blocks import BEGINNING, PREAMBLE, BlockReader, JournalDam
 from robochoc.journal.journal import Header, JournalError, JournalRecorder, lines_of, read_journal
 from robochoc.model.outcome import EpochOutcome, Metrics, Outcome, PseudoTreeNode, Verdict
 from robochoc.model.problem import Team
-from robochoc.protocols.abt import ABT
-from robochoc.protocols.dpop import DPOP
+from robochoc.protocols.inference.dpop import DPOP
+from robochoc.protocols.satisfaction.abt import ABT
 from robochoc.ros.source import SourceError
 from tests.fuzz.harness import Target, assert_clear
 from tests.fuzz.mutations import (

@@ -16,7 +16,7 @@ REPORT = json.dumps(
     {
         "files": {
             "/somewhere/robochoc/api.py": summary(3, 3, 0, 0),
-            "robochoc/protocols/abt.py": summary(10, 10, 1999, 2000),
+            "robochoc/protocols/satisfaction/abt.py": summary(10, 10, 1999, 2000),
             "robochoc/protocols/heuristics/any.py": summary(5, 10, 0, 0),
         }
     }

@@ -56,7 +56,7 @@ def test_each_mutant_is_the_file_with_one_change() -> None:
     assert all(mutant.diff.count("\n+") == 1 for mutant in mutants)
 
 
-@pytest.mark.parametrize("path", ["robochoc/protocols/sfb.py", "robochoc/communication/host.py"])
+@pytest.mark.parametrize("path", ["robochoc/protocols/optimization/sfb.py", "robochoc/communication/host.py"])
 def test_mutants_of_the_code_are_programs(path: str) -> None:
     mutants = mutants_of(path, (ROOT / path).read_text())
     assert len({mutant.text for mutant in mutants}) == len(mutants) > 100
@@ -65,7 +65,7 @@ def test_mutants_of_the_code_are_programs(path: str) -> None:
 
 
 def test_a_mutant_meets_the_tests_of_its_file_then_those_of_all_who_use_it() -> None:
-    bounding = [tests for tests, _ in commands_for("robochoc/protocols/bounding.py")]
+    bounding = [tests for tests, _ in commands_for("robochoc/protocols/optimization/bounding.py")]
     assert bounding[0] == ("tests/protocols/test_bounding.py",)
     assert {"tests/protocols/test_adopt.py", "tests/protocols/test_bnb_adopt.py"} <= set(bounding[1])
     assert bounding[2] == ("tests/conformance", "-k", "adopt or bnb-adopt")

@@ -29,7 +29,7 @@ from tests.mutation.mutants import Mutant, mutants_of
 
 ROOT = Path(__file__).parents[2]
 FILES = (
-    "robochoc/protocols/*.py",
+    "robochoc/protocols/**/*.py",
     "robochoc/communication/quiescence.py",
     "robochoc/communication/host.py",
     "robochoc/communication/search_state.py",
@@ -139,7 +139,7 @@ def commands_for(path: str) -> Iterator[tuple[tuple[str, ...], int]]:
         yield SHARED[room], CPU_S
         yield ("tests/conformance", "-k", "abt or syncbb"), CPU_S
         return
-    users = _users(f"robochoc.protocols.{stem}")
+    users = _users(_module(Path(path)))
     others = [file for file in sorted(ROOT.glob("tests/protocols/test_*.py")) if users & _imported(file)]
     yield (SENTENCES, *(str(file.relative_to(ROOT)) for file in others if file not in own)), CPU_S
     points = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]["entry-points"]["robochoc.protocols"]
@@ -149,7 +149,8 @@ def commands_for(path: str) -> Iterator[tuple[tuple[str, ...], int]]:
 
 def _users(module: str) -> set[str]:
     """Return the modules of protocols that import `module`, and it, and those that import them."""
-    imports = {f"robochoc.protocols.{file.stem}": _imported(file) for file in ROOT.glob("robochoc/protocols/*.py")}
+    files = ROOT.glob("robochoc/protocols/**/*.py")
+    imports = {_module(file.relative_to(ROOT)): _imported(file) for file in files}
     users = {module}
     while more := {user for user, imported in imports.items() if imported & users} - users:
         users |= more
@@ -157,7 +158,11 @@ def _users(module: str) -> set[str]:
 
 
 def _imported(file: Path) -> set[str]:
-    return set(re.findall(r"^\s*from (robochoc\.protocols\.\w+) import", file.read_text(), re.MULTILINE))
+    return set(re.findall(r"^\s*from (robochoc\.protocols\.[\w.]+) import", file.read_text(), re.MULTILINE))
+
+
+def _module(path: Path) -> str:
+    return ".".join(path.with_suffix("").parts)
 
 
 def _say(text: str) -> None:

@@ -7,8 +7,8 @@ from collections.abc import Callable
 import pytest
 
 from robochoc.model.problem import Team
-from robochoc.protocols.abt import ABT
 from robochoc.protocols.protocol import Protocol
+from robochoc.protocols.satisfaction.abt import ABT
 from tests.support import traitors
 from tests.support.in_memory_network import InMemoryNetwork
 from tests.support.one_traitor import CHAIN

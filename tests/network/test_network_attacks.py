@@ -27,8 +27,8 @@ from robochoc.communication.network.router import Router
 from robochoc.communication.network.transport import CannotConnectError, Transport
 from robochoc.model.message import encode
 from robochoc.model.outcome import Verdict
-from robochoc.protocols.abt_messages import Ok
 from robochoc.protocols.protocol import Protocol
+from robochoc.protocols.satisfaction.messages.abt import Ok
 from robochoc.solver.compiled_team import CompiledRobot
 from tests.support.limits import HANG_S
 from tests.support.network_runs import NetworkRun, frame, put

@@ -34,7 +34,7 @@ from robochoc.communication.network.inbox import FrameArrived, Item, PresenceCha
 from robochoc.communication.network.robot import Ending, NetworkRobot
 from robochoc.communication.network.robot_settings import RobotSettings
 from robochoc.communication.network.transport import Transport
-from robochoc.protocols.abt import ABT
+from robochoc.protocols.satisfaction.abt import ABT
 from robochoc.solver.compiled_team import CompiledRobot
 from tests.support.in_memory_network import RUN, ScriptedTransport
 from tests.support.lone_robot import LEAVE, UNPROVEN, chain_of_three, ok, played, task

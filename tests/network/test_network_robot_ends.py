@@ -33,9 +33,9 @@ from robochoc.communication.network.robot import Ending, NetworkRobot
 from robochoc.communication.network.shared import PredicateRecord, SharedRecord
 from robochoc.communication.network.transport import Transport
 from robochoc.model.problem import INFINITE, ConstraintModel
-from robochoc.protocols.abt import ABT
-from robochoc.protocols.awc import AWC
 from robochoc.protocols.protocol import Protocol
+from robochoc.protocols.satisfaction.abt import ABT
+from robochoc.protocols.satisfaction.awc import AWC
 from robochoc.solver.compiled_team import CompiledRobot
 from tests.support.in_memory_network import RUN, ScriptedTransport
 from tests.support.lone_robot import LEAVE, UNPROVEN, chain_of_three, ok, played, task

@@ -9,7 +9,7 @@ import pytest
 from robochoc.authority.admission import InMemoryAuthority
 from robochoc.model.outcome import Verdict
 from robochoc.model.problem import INFINITE
-from robochoc.protocols.abt import ABT
+from robochoc.protocols.satisfaction.abt import ABT
 from robochoc.run.registry import protocol_named, protocol_names
 from robochoc.solver.agent_problem import RunParameters
 from tests.support.brute_force import least_cost, solutions

@@ -26,7 +26,7 @@ from robochoc.communication.run_result import RobotsLostError
 from robochoc.model.message import encode
 from robochoc.model.outcome import Verdict
 from robochoc.model.problem import ProblemKind
-from robochoc.protocols.abt_messages import Ok
+from robochoc.protocols.satisfaction.messages.abt import Ok
 from tests.support.limits import HANG_S
 from tests.support.network_runs import NetworkRun, frame
 from tests.support.paused_abt import CHAIN, TRIANGLE, PausedABT

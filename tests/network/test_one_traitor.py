@@ -16,12 +16,12 @@ from robochoc.communication.processes.processes import ProcessesRun
 from robochoc.communication.run_result import RobotsLostError
 from robochoc.formats.result import read_result, result_json
 from robochoc.model.outcome import ALL_ROBOTS, CheckCounts, Outcome, Verdict
-from robochoc.protocols.abt import ABT
-from robochoc.protocols.afc import AFC
-from robochoc.protocols.awc import AWC
-from robochoc.protocols.first_fit import FirstFit
+from robochoc.protocols.optimization.sfb import SFB
 from robochoc.protocols.protocol import Protocol
-from robochoc.protocols.sfb import SFB
+from robochoc.protocols.satisfaction.abt import ABT
+from robochoc.protocols.satisfaction.afc import AFC
+from robochoc.protocols.satisfaction.awc import AWC
+from robochoc.protocols.satisfaction.first_fit import FirstFit
 from robochoc.protocols.traits import Traits
 from robochoc.run.networked.machines import claimed
 from robochoc.run.registry import protocol_named, protocol_names

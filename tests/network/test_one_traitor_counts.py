@@ -11,9 +11,9 @@ from robochoc.communication.control import Counters, Ready
 from robochoc.communication.network.audited_state import AuditedSearchState
 from robochoc.communication.network.control_messages import DetailedReport, Exchanged
 from robochoc.model.outcome import Metrics, PseudoTreeNode
-from robochoc.protocols.abt import ABT
 from robochoc.protocols.findings import NOTHING, Findings, Incumbent, Trail
-from robochoc.protocols.sfb import SFB
+from robochoc.protocols.optimization.sfb import SFB
+from robochoc.protocols.satisfaction.abt import ABT
 from robochoc.protocols.traits import Traits
 from tests.support import traitors
 from tests.support.in_memory_network import InMemoryNetwork

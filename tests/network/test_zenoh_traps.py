@@ -25,7 +25,7 @@ from robochoc.communication.network.settings import LEASE_MS
 from robochoc.communication.network.transport import Transport
 from robochoc.communication.network.zenoh_config import RX_BYTES, config
 from robochoc.generators.random_csp import random_csp
-from robochoc.protocols.abt import ABT
+from robochoc.protocols.satisfaction.abt import ABT
 from tests.support.leftovers import shared_by_tests
 from tests.support.limits import HANG_S
 from tests.support.ports import free_endpoint

@@ -6,8 +6,8 @@ import itertools
 from collections.abc import Iterable, Sequence
 
 from robochoc.model.problem import Constraint, Relation, Semantics, Team
-from robochoc.protocols.dpop import DPOP
-from robochoc.protocols.dpop_messages import Dimensions, Domain, Need
+from robochoc.protocols.inference.dpop import DPOP
+from robochoc.protocols.inference.messages.dpop import Dimensions, Domain, Need
 from tests.support.agents import replies
 from tests.support.cost_problems import with_costs
 from tests.support.problems import team_of

@@ -13,8 +13,8 @@ from robochoc.communication.simulator.simulator import Simulation
 from robochoc.model.message import Message
 from robochoc.model.outcome import Verdict
 from robochoc.model.problem import INFINITE, Assignment, Team
-from robochoc.protocols.cycles import CycleProtocol
 from robochoc.protocols.order import PriorityOrder
+from robochoc.protocols.shared.cycles import CycleProtocol
 from robochoc.solver.agent_problem import RunParameters, agent_problems
 from robochoc.solver.compiled import LexicographicCost, LocalProblem
 

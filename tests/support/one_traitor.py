@@ -5,7 +5,7 @@ from __future__ import annotations
 from robochoc.communication.network.audited_state import AuditedSearchState
 from robochoc.communication.network.plausibility import Declarations
 from robochoc.model.problem import Constraint
-from robochoc.protocols.afc import AFC
+from robochoc.protocols.satisfaction.afc import AFC
 from robochoc.protocols.traits import Traits
 from tests.support.problems import PREDICATES, team_of
 

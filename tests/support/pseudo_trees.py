@@ -8,9 +8,9 @@ from typing import TypeVar
 
 from robochoc.model.message import Message
 from robochoc.model.problem import Constraint, Relation, Semantics, Team
-from robochoc.protocols.bounding_messages import Context
-from robochoc.protocols.dfs import TreeProtocol
+from robochoc.protocols.optimization.messages.bounding import Context
 from robochoc.protocols.order import PriorityOrder
+from robochoc.protocols.shared.dfs import TreeProtocol
 from robochoc.solver.agent_problem import agent_problems
 from robochoc.solver.compiled import LocalProblem
 from tests.support.cost_problems import with_costs

@@ -6,10 +6,10 @@ from collections.abc import Sequence
 
 from robochoc.model.message import Message
 from robochoc.model.problem import Team
+from robochoc.protocols.optimization.messages.sfb import CPAs
+from robochoc.protocols.optimization.settings.sfb import SFBSettings
+from robochoc.protocols.optimization.sfb import SFB
 from robochoc.protocols.order import PriorityOrder
-from robochoc.protocols.sfb import SFB
-from robochoc.protocols.sfb_messages import CPAs
-from robochoc.protocols.sfb_settings import SFBSettings
 from robochoc.solver.agent_problem import agent_problems
 from robochoc.solver.compiled import LocalProblem
 from tests.support.agents import replies

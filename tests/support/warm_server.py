@@ -27,7 +27,13 @@ _NETWORK = 0x40000000
 
 _PACKAGES = ("robochoc.authority", "robochoc.communication.network", "robochoc.run.networked")
 _COMMANDS = tuple(f"robochoc.cli.commands.{name}" for name in ("directory", "master", "robot", "sniff", "sniff_master"))
-_MODULES = (*_COMMANDS, "robochoc.cli.group", "robochoc.protocols.abt", "robochoc.sniffer.remote", "zenoh.ext")
+_MODULES = (
+    *_COMMANDS,
+    "robochoc.cli.group",
+    "robochoc.protocols.satisfaction.abt",
+    "robochoc.sniffer.remote",
+    "zenoh.ext",
+)
 
 
 def main(control: socket.socket) -> None:

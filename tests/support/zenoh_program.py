@@ -11,7 +11,7 @@ import sys
 from robochoc.communication.network.local import LocalNetwork
 from robochoc.communication.processes.processes import ProcessesRun
 from robochoc.generators.random_csp import random_csp
-from robochoc.protocols.abt import ABT
+from robochoc.protocols.satisfaction.abt import ABT
 
 
 def say(what: str) -> None:

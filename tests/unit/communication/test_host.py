@@ -4,14 +4,15 @@ from __future__ import annotations
 
 import pytest
 
-from robochoc.communication.host import BadMessageError, Host
+from robochoc.communication.host import BadMessageError, Host, UnderWay
 from robochoc.journal.events import AnyEvent, Concluded, Decided, Received, Sent, Settled
 from robochoc.model.message import Envelope, Message, encode
 from robochoc.model.problem import Constraint, Relation, Semantics, Team
-from robochoc.protocols.abt import ABT
-from robochoc.protocols.abt_messages import AddLink, Nogood, Ok
-from robochoc.protocols.first_fit_messages import Placed
 from robochoc.protocols.order import PriorityOrder
+from robochoc.protocols.satisfaction.abt import ABT
+from robochoc.protocols.satisfaction.messages.abt import AddLink, Ok
+from robochoc.protocols.satisfaction.messages.first_fit import Placed
+from robochoc.protocols.satisfaction.messages.nogood import Nogood
 from robochoc.solver.agent_problem import agent_problems
 from robochoc.solver.compiled import LocalProblem
 from tests.support.problems import team_of
@@ -127,3 +128,14 @@ def test_a_verdict_is_an_event_once() -> None:
         Concluded(t=0.0, robot="RA", verdict="no-solution")
     ]
     assert any(isinstance(event, Sent) and event.content == {"value": (2,)} for event in events)
+
+
+def test_of_large_messages_only_the_last_ones_are_kept_to_be_shared() -> None:
+    under_way, message = UnderWay(), Ok((1,))
+    contents = [bytes([number]) * 1_000_000 for number in range(8)]
+    for content in contents:
+        under_way.keep(content, message)
+    assert [content[0] for content in contents if under_way.get(content) is message] == [4, 5, 6, 7]
+    under_way.keep(b"0" * 9_000_000, message)
+    assert under_way.get(b"0" * 9_000_000) is message
+    assert under_way.get(contents[-1]) is None

@@ -16,7 +16,7 @@ from robochoc.journal.journal import Header, JournalRecorder, lines_of, metrics_
 from robochoc.model.message import Envelope
 from robochoc.model.outcome import Verdict
 from robochoc.model.problem import Constraint, Relation, Semantics, Team
-from robochoc.protocols.dsa import DSA
+from robochoc.protocols.local_search.dsa import DSA
 from robochoc.run import Options, Runtime, ScheduleName, Withdrawal, solve
 from robochoc.solver.agent_problem import RunParameters
 from tests.support import golden

@@ -30,7 +30,7 @@ def test_rows_have_the_same_keys_and_plain_values(journal: Path) -> None:
     sent = [row for row in rows if row["event"] == "Sent"]
     received = [row for row in rows if row["event"] == "Received"]
     assert len(sent) == len(received) == 40
-    assert sum(row["bytes"] for row in sent) == 687
+    assert sum(row["bytes"] for row in sent) == 678
     assert {(row["robot"], row["other"]) for row in sent} == {(row["other"], row["robot"]) for row in received}
     assert all(isinstance(json.loads(row["content"]), dict) for row in sent)
 

@@ -141,6 +141,14 @@ def test_a_wrong_sum_is_refuted(monkeypatch: pytest.MonkeyPatch) -> None:
         problem.solve()
 
 
+def test_a_solution_is_shown_in_a_line() -> None:
+    problem = ArrayProblem(2, 2, PAIR, SAME)
+    assert repr(problem.solve("dsa", cycles=3)) == "<solution, cost 0: the best of 3 cycles, 6 messages>"
+    assert repr(ArrayProblem(2, 1, PAIR, [[np.inf]]).solve("dsa", cycles=1)).startswith(
+        "<unknown: the best of 1 cycle, "
+    )
+
+
 @pytest.mark.parametrize(
     ("changed", "said"),
     [
@@ -156,12 +164,60 @@ def test_a_wrong_sum_is_refuted(monkeypatch: pytest.MonkeyPatch) -> None:
         ({"tables": np.full((2, 2), np.nan)}, "whole numbers of 0 or more, or inf"),
         ({"charges": np.full((2, 2), np.inf)}, "charges are whole numbers"),
         ({"names": ["A", "A"]}, "each robot has a name"),
+        ({"names": ["A", "A", "B"]}, "each robot has a name"),
+        ({"names": [1, 2]}, "each robot has a name"),
+        ({"robots": 2.0}, "robots is a whole number, not 2.0"),
+        ({"robots": 10**12}, "2,147,483,648 robots at most"),
+        ({"edges": [0, 1]}, "edges have two columns"),
+        ({"edges": [(0, 1, 0), (1, 0, 1)]}, "edges have two columns"),
+        ({"edges": [(0, 0.7)]}, "edges are no array of whole numbers"),
+        ({"edges": [(0, np.nan)]}, "edges are no array of whole numbers"),
+        ({"edges": [[False, True]]}, "edges are no array of whole numbers"),
+        ({"which": [0.5]}, "which are no array of whole numbers"),
+        ({"tables": 1}, r"tables have the shape \(2, 2\)"),
+        ({"tables": SAME * 1j}, "tables are no array of numbers"),
+        ({"tables": [[1], [1, 2]]}, "tables are no array of numbers"),
+        ({"tables": [[0, 10**30], [0, 0]]}, "tables are no array of numbers"),
     ],
 )
 def test_arrays_that_do_not_fit_are_refused(changed: dict[str, Any], said: str) -> None:
     given = {"robots": 2, "values": 2, "edges": PAIR, "tables": SAME, **changed}
     with pytest.raises(ValueError, match=said):
         ArrayProblem(**given)
+
+
+@pytest.mark.parametrize("values", [[0], [0, 2], [-1, 0], [0, 0.5]])
+def test_the_cost_is_that_of_values_that_there_are(values: list[float]) -> None:
+    with pytest.raises(ValueError, match=r"value below 2|values are no array of whole numbers"):
+        ArrayProblem(2, 2, PAIR, SAME).cost(values)
+
+
+@pytest.mark.parametrize("protocol", PROTOCOLS)
+@pytest.mark.parametrize("cost", [2**45, 2**50])
+def test_costs_of_all_robots_are_exact_above_what_floats_and_64_bits_hold(protocol: str, cost: int) -> None:
+    """A chain of 5,000 robots: some 2^57 and 2^62; each edge is counted twice."""
+    chain = [(robot, robot + 1) for robot in range(4999)]
+    problem = ArrayProblem(5000, 2, chain, cost + SAME, charges=np.tile([cost, cost + 1], (5000, 1)))
+    run = problem.run(protocol, cycles=2)
+    found = [one.values[run.layout.places].tolist() for one in walk(run)]
+    costs = [
+        (4999 + 5000) * cost + sum(values) + sum(one == other for one, other in itertools.pairwise(values))
+        for values in found
+    ]
+    assert run.costs == costs
+    assert [problem.cost(values) for values in found] == costs
+
+
+@pytest.mark.parametrize("protocol", PROTOCOLS)
+def test_there_may_be_no_edges_and_no_tables(protocol: str) -> None:
+    found = ArrayProblem(3, 2, [], np.empty((0, 2, 2)), charges=[[1, 0], [0, 1], [3, 2]]).solve(protocol)
+    assert found.values is not None
+    assert (found.values.tolist(), found.cost) == ([1, 0, 1], 2)
+
+
+def test_names_may_be_an_array() -> None:
+    names = np.array(["A", "B"])
+    assert ArrayProblem(2, 2, PAIR, SAME, names=names).names == ["A", "B"]
 
 
 def test_protocols_and_settings_are_looked_up() -> None:

@@ -14,7 +14,7 @@ import pytest
 
 import robochoc
 from robochoc.formats import InvalidInputError, read_team
-from robochoc.model.problem import Robot, Team
+from robochoc.model.problem import AddAgent, Robot, Team
 from tests.support.program import ROOT
 
 Kind = Enum("Kind", ["FIRST", "SECOND"])
@@ -185,3 +185,15 @@ def test_what_pickle_does_not_take_it_says() -> None:
     with pytest.raises((pickle.PicklingError, AttributeError), match="lambda"):
         pickle.dumps(model)
     assert copy.deepcopy(model).solve("abt", runtime="simulator")["a.x"] == 2
+
+
+def test_a_robot_joins_below_robots_that_no_constraint_orders() -> None:
+    """Its constraint of three goes with the lowest of those that are there, by the order and not by their names."""
+    model = robochoc.Model()
+    high, low = (model.robot(name, priority=rank).variable("x", range(3)) for name, rank in (("z", 1), ("a", 0)))
+    event = model.after_solution()
+    added = event.robot("m").variable("x", range(3))
+    event.add(high + low + added <= 3)
+    (change,) = model.team.scenario[0].changes
+    assert isinstance(change, AddAgent)
+    assert [(parent.name, len(parent.constraints)) for parent in change.robot.parents] == [("z", 0), ("a", 1)]

@@ -28,9 +28,9 @@ from robochoc.journal.events import (
 )
 from robochoc.journal.journal import Header, Journal, JournalRecorder, read_journal
 from robochoc.model.message import Message, Value
-from robochoc.protocols.abt import ABT
-from robochoc.protocols.abt_messages import Nogood
-from robochoc.protocols.dynabt import DynABT
+from robochoc.protocols.satisfaction.abt import ABT
+from robochoc.protocols.satisfaction.dynabt import DynABT
+from robochoc.protocols.satisfaction.messages.nogood import Nogood
 from robochoc.replay import CannotReplayError, ReplayOptions, ReplayResult, replay
 from robochoc.run import Options, Runtime, Withdrawal
 from robochoc.run.options import ScheduleName

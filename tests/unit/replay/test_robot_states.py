@@ -15,8 +15,8 @@ import pytest
 from robochoc.generators.queens3d import queens3d
 from robochoc.journal.events import Concluded, Sent, Settled, actor
 from robochoc.model.problem import Constraint, Team
-from robochoc.protocols.abt import ABT
 from robochoc.protocols.findings import Incumbent
+from robochoc.protocols.satisfaction.abt import ABT
 from robochoc.replay import CannotReplayError, ReplayOptions, RobotState, states_of
 from robochoc.replay.inspection import MOST_VALUES
 from robochoc.replay.reasons import MOST_BACKTRACKS, MOST_REASONS

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Callable, Mapping
 from dataclasses import replace
-from math import prod
+from math import log2, prod
 from random import Random
 
 import pytest
@@ -13,6 +13,7 @@ import pytest
 from robochoc.generators.coloring import coloring
 from robochoc.generators.graphs import grid, tree
 from robochoc.generators.random_csp import random_csp, random_on
+from robochoc.generators.scenario import random_scenario
 from robochoc.model.orders import Order
 from robochoc.model.outcome import PseudoTreeNode, Verdict
 from robochoc.model.problem import INFINITE, AddAgent, Change, ProblemKind, Team
@@ -163,7 +164,9 @@ PART = pkc_part("AB", (0, 0))
         (random_on(grid(20, 20), 4, 0.1, max_cost=9), {}, "sfb", Order.MAX_DEGREE),
         (coloring(400, 3, 3, conflicts="hard"), {}, "abt", Order.MAX_DEGREE),
         (pkc_pair(PART, PART), {}, "disfc", None),
-        (random_changing_team(Random("one"), 2), {}, "dynabt", None),
+        (random_scenario(random_csp(12, 5, 0.5, 0.2), 2, 0.1), {}, "dynabt", None),
+        (random_scenario(random_csp(12, 5, 0.5, 0.5), 2, 0.1), {}, "sfb", None),
+        (random_scenario(random_csp(30, 5, 0.2, 0.5), 2, 0.1), {}, "dynabt", None),
         (team_of({"A": range(3000), "B": range(3000)}, []), {}, "sfb", Order.MIN_WIDTH),
         (random_on(tree(300), 300, 0.00001), {}, "afc-ng", Order.MAX_DEGREE),
     ],
@@ -208,6 +211,21 @@ def test_of_robots_that_keep_their_constraints_the_kind_is_known() -> None:
         options = decided_unseen(team, Options(runtime=Runtime.NETWORK)).options
         assert (options.protocol, options.order) == (name, None)
         assert options.chosen["protocol"]
+
+
+def test_how_much_is_forbidden_is_what_counting_says() -> None:
+    """Kappa of random problems: half the density, times the robots less one, times the bits of a constraint."""
+    for tightness in (0.2, 0.4, 0.6):
+        found = Facts(random_csp(12, 5, 0.5, tightness)).constrainedness
+        assert found == pytest.approx(33 * log2(1 / (1 - tightness)) / (12 * log2(5)))
+    assert Facts(random_csp(2, 40, 1, 0.5)).constrainedness == pytest.approx(1 / (2 * log2(40)), rel=0.3)  # by drawing
+    assert Facts(team_of({"A": (1,), "B": (1,)}, [])).constrainedness == 0
+    assert Facts(random_csp(2, 5, 1, 1)).constrainedness > 1
+
+
+def test_what_something_outside_changes_is_left_to_who_keeps_what_holds() -> None:
+    team = random_csp(12, 5, 0.5, 0.5)
+    assert decided(team, Options(), environment=True).options.protocol == "dynabt"
 
 
 @count("many", 10, 200)

@@ -10,6 +10,9 @@ import pytest
 
 from robochoc.communication.kill_schedule import Kill
 from robochoc.communication.simulator.channel import CHANNELS
+from robochoc.journal.entries import Header
+from robochoc.journal.journal import JournalRecorder
+from robochoc.journal.reader import read_journal
 from robochoc.model.problem import Constraint, ConstraintModel, ProblemKind, Relation, Semantics, Team
 from robochoc.run import alternatives, solve
 from robochoc.run.compatibility import refuse_options
@@ -142,3 +145,17 @@ def test_no_rule_refuses_the_defaults() -> None:
     for runtime in Runtime:
         refuse_options(Options(runtime=runtime), environment=runtime not in {Runtime.NETWORK, Runtime.ARRAYS})
     refuse_options(Options(protocol="central", count=True))
+
+
+@pytest.mark.parametrize("seed", [2**64, -(2**63) - 1])
+def test_a_seed_has_64_bits_as_journals_and_networks_tell_it(seed: int) -> None:
+    with pytest.raises(UnsupportedError, match="--seed is a number of 64 bits"):
+        refuse_options(Options(seed=seed))
+
+
+@pytest.mark.parametrize("seed", [2**64 - 1, -(2**63)])
+def test_the_largest_seeds_can_be_recorded(seed: int) -> None:
+    refuse_options(Options(seed=seed))
+    recorder = JournalRecorder(Header(team="team", protocol="abt", runtime="simulator", seed=seed))
+    recorder.flush()
+    assert read_journal(recorder.content()).header.seed == seed

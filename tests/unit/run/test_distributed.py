@@ -11,9 +11,9 @@ from robochoc.communication.run_result import RobotsLostError, RunResult
 from robochoc.model.cost_units import Cost
 from robochoc.model.outcome import Metrics, Outcome, Verdict
 from robochoc.model.problem import ProblemKind
-from robochoc.protocols.abt import ABT
-from robochoc.protocols.dsa import DSA
-from robochoc.protocols.sfb import SFB
+from robochoc.protocols.local_search.dsa import DSA
+from robochoc.protocols.optimization.sfb import SFB
+from robochoc.protocols.satisfaction.abt import ABT
 from robochoc.run import Options, Withdrawal
 from robochoc.run.distributed import Deployment, solve_distributed
 from robochoc.run.evaluation import CheckedAssignment, Search

@@ -31,7 +31,7 @@ from robochoc.model.problem import (
     Team,
     Variable,
 )
-from robochoc.protocols.dynabt import DynABT
+from robochoc.protocols.satisfaction.dynabt import DynABT
 from robochoc.run import Options, Runtime, solve
 from robochoc.run.scenario import FinishedEpoch, ScenarioRun
 from robochoc.solver.compiled_team import CompiledTeam

@@ -15,7 +15,7 @@ import pytest
 from robochoc.generators.queens3d import queens3d
 from robochoc.journal.events import Sent, Settled
 from robochoc.journal.journal import Journal, JournalRecorder, lines_of
-from robochoc.protocols.sfb import SFB
+from robochoc.protocols.optimization.sfb import SFB
 from robochoc.replay.channels import MessageDecoder
 from robochoc.run.options import Options, Runtime, Withdrawal
 from robochoc.run.registry import protocol_named, protocol_names

@@ -17,9 +17,9 @@ from hypothesis import strategies as st
 from robochoc.generators.queens3d import queens3d
 from robochoc.model.message import Message
 from robochoc.model.wording import Wording, listed
-from robochoc.protocols.dfs_messages import Token
-from robochoc.protocols.first_fit import FirstFit
 from robochoc.protocols.protocol import Protocol
+from robochoc.protocols.satisfaction.first_fit import FirstFit
+from robochoc.protocols.shared.messages.dfs import Token
 from robochoc.run import Options, Runtime, Withdrawal
 from robochoc.run.registry import protocol_named, protocol_names
 from robochoc.sniffer.page_data import PageData
@@ -35,7 +35,7 @@ OURS = [name for name in protocol_names() if protocol_named(name).__module__.sta
 PROTOCOLS: list[type[Protocol]] = [*map(protocol_named, OURS), FirstFit]
 TYPES: list[type[Message]] = sorted(
     {kind for protocol in PROTOCOLS for kind in get_args(protocol.messages) or (protocol.messages,)},
-    key=lambda kind: (kind.__name__, kind.__module__.removesuffix("_messages")),
+    key=lambda kind: (kind.__name__, kind.__module__),
 )
 
 REAL = {
@@ -83,8 +83,8 @@ REAL = {
         "Robot1.3 says: nobody below Robot1.2 has a value left that goes with its own: take another one"
     ),
     ("adopt", "Wave"): "RX03 says: RX00, which has 3 neighbours, wants to be the root",
-    ("adopt", "Token"): "RX02 says: you are my child in the tree, which holds RX00, RX02 and RX01 already",
-    ("adopt", "Back"): "RX01 says: all below me are in the tree, which holds RX00, RX02 and RX01 by now",
+    ("adopt", "Token"): "RX02 says: you are my child in the tree, where not all know of RX00, RX02 and RX01 yet",
+    ("adopt", "Back"): "RX01 says: all below me are in the tree, where not all know of RX00, RX02 and RX01 yet",
     ("adopt", "Value"): "RX03 says: X03 = 3 from now on (change 30)",
     ("adopt", "Cost"): "RX03 says: as long as X02 = -3 and X00 = 5, my subtree costs between 0 and 10",
     ("adopt", "Threshold"): ("RX02 says: as long as X00 = -3, your subtree may cost 11 before you try other values"),
@@ -322,9 +322,9 @@ def test_the_rarer_things_that_are_said(kind: str, content: dict[str, Any], word
 
 def test_long_contents_are_cut() -> None:
     names = [f"R{place}" for place in range(20)]
-    told = sentence("Token", {"visited": names}, TWO, Token)
-    assert told.endswith("holds R0, R1, R2, R3, R4, R5, R6, R7 and 12 more already")
-    assert len(sentence("Token", {"visited": ["x" * 500] * 9}, TWO, Token)) == 1000
+    told = sentence("Token", {"visited": dict.fromkeys(names, 1)}, TWO, Token)
+    assert told.endswith("not all know of R0, R1, R2, R3, R4, R5, R6, R7 and 12 more yet")
+    assert len(sentence("Token", {"visited": {f"{place}" * 500: 1 for place in range(9)}}, TWO, Token)) == 1000
 
 
 def test_a_users_own_type_is_told_by_its_fields() -> None:

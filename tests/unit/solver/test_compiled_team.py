@@ -18,7 +18,7 @@ from robochoc.journal.journal import Header, JournalRecorder, read_journal
 from robochoc.model.orders import with_dom_deg_order, with_priorities
 from robochoc.model.problem import AddConstraint, Child, Constraint, Parent, Robot, ScenarioEvent, Team
 from robochoc.model.team_edits import keep_interfaces, without_robots
-from robochoc.protocols.abt import ABT
+from robochoc.protocols.satisfaction.abt import ABT
 from robochoc.protocols.traits import Traits
 from robochoc.replay.rebuild import Rebuilder, ReplayOptions
 from robochoc.replay.steps import RecordedRun
@@ -84,6 +84,10 @@ def test_a_robot_cannot_get_another_ones_domain() -> None:
 def test_compiled_robots_travel_to_other_processes() -> None:
     own = CompiledRobot(turned_interface()["A"])
     assert pickle.loads(pickle.dumps(own)) == own  # noqa: S301 - it is our own
+
+
+def test_the_parameters_of_a_run_travel_to_other_processes() -> None:
+    assert pickle.loads(pickle.dumps(DEFAULT_PARAMETERS)) == DEFAULT_PARAMETERS  # noqa: S301 - it is our own
 
 
 def test_a_robot_with_other_links_is_compiled_again_only_if_it_shows_something_else() -> None:

@@ -7,7 +7,7 @@ import pickle
 from robochoc.communication.control import sealed, unsealed
 from robochoc.communication.host import Host
 from robochoc.generators.coloring import coloring
-from robochoc.protocols.abt import ABT
+from robochoc.protocols.satisfaction.abt import ABT
 from robochoc.solver.agent_problem import AgentProblem, RunParameters, agent_problems
 from robochoc.solver.compiled import LocalProblem
 from robochoc.solver.explanation import Invalidated

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import signal
+from importlib.metadata import EntryPoint
 
 import pytest
 
@@ -29,6 +30,15 @@ def test_sigterm_ends_the_program_while_a_protocol_is_imported() -> None:
     with pytest.raises(Terminated, match="143"):
         load_entry_point(Struck(), [], lambda _: "")
     assert load_entry_point(Leaving(), [], lambda _: "").broken == "cannot be imported: SystemExit: 3"
+
+
+def test_who_has_updated_an_editable_install_is_told_to_install_again() -> None:
+    moved = EntryPoint("abt", "robochoc.protocols.moved_since:ABT", "robochoc.protocols")
+    said = load_entry_point(moved, [], lambda _: "").broken
+    assert said.startswith("cannot be imported: ModuleNotFoundError")
+    assert said.endswith("; robochoc has changed since it was installed: say make demo, or pip install -e . again")
+    other = EntryPoint("own", "no_such_module:Own", "robochoc.protocols")
+    assert "changed since" not in load_entry_point(other, [], lambda _: "").broken
 
 
 def test_sigterm_ends_the_program_while_a_sink_is_imported(monkeypatch: pytest.MonkeyPatch) -> None:

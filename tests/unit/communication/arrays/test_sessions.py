@@ -19,7 +19,7 @@ from robochoc.generators.families import FAMILIES
 from robochoc.journal.events import AnyEvent, Decided
 from robochoc.model.outcome import Verdict
 from robochoc.model.problem import Constraint, Relation, Semantics, Team
-from robochoc.protocols.dsa import DSA
+from robochoc.protocols.local_search.dsa import DSA
 from robochoc.run import Options, Runtime, ScheduleName, solve
 from robochoc.run.registry import installed_protocols
 from robochoc.solver.encoding import UnsupportedError

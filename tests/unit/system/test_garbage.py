@@ -1,0 +1,63 @@
+"""The garbage collector is put off, and left as it was found."""
+
+import gc
+from collections.abc import Iterator
+
+import pytest
+
+from robochoc.system.garbage import SELDOM, collection_paused, collection_seldom
+
+
+class Looped:
+    """An object that refers to itself: only the collector finds it."""
+
+    def __init__(self) -> None:
+        self.itself = self
+
+
+@pytest.fixture(autouse=True)
+def as_found() -> Iterator[None]:
+    """Leave the collector as it was."""
+    thresholds, enabled = gc.get_threshold(), gc.isenabled()
+    yield
+    gc.set_threshold(*thresholds)
+    (gc.enable if enabled else gc.disable)()
+
+
+def test_what_was_made_meanwhile_is_not_young_afterwards() -> None:
+    gc.enable()
+    with collection_paused():
+        made = [Looped() for _ in range(1000)]
+        assert not gc.isenabled()
+    assert gc.isenabled()
+    young = {id(one) for one in gc.get_objects(generation=0)}
+    assert not young & {id(one) for one in made}
+    assert not gc.get_freeze_count()
+
+
+def test_frozen_objects_stay_frozen() -> None:
+    gc.enable()
+    gc.freeze()
+    try:
+        with collection_paused():
+            pass
+        assert gc.get_freeze_count()
+    finally:
+        gc.unfreeze()
+
+
+def test_where_it_is_off_it_stays_off() -> None:
+    gc.disable()
+    with collection_paused(), collection_paused():
+        pass
+    assert not gc.isenabled()
+
+
+@pytest.mark.parametrize(
+    ("before", "meanwhile"), [(700, SELDOM), (SELDOM + 1, SELDOM + 1), (0, 0)], ids=["usual", "rarer", "never"]
+)
+def test_looks_are_seldom_and_then_as_before(before: int, meanwhile: int) -> None:
+    gc.set_threshold(before, 10, 10)
+    with collection_seldom():
+        assert gc.get_threshold() == (meanwhile, 10, 10)
+    assert gc.get_threshold() == (before, 10, 10)
