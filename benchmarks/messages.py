@@ -19,9 +19,15 @@ from measure import ROOT, RUNS, say
 from report import Row, Section
 
 PURE = "pure:"
-HARD = "random_csp(20, 10, 0.25, 0.6, 1, connected=True)"
-COSTLY = "random_csp(8, 4, 0.4, 0.0, 2, connected=True, max_cost=10)"
-LARGE = "random_csp(100, 5, 0.04, 0.0, 1, connected=True, max_cost=10)"
+Problem = Mapping[str, int | float]
+"""The arguments of `random_csp` for the problems that are measured."""
+HARD: Problem = {"agents": 20, "domain": 10, "density": 0.25, "tightness": 0.6, "seed": 1, "connected": True}
+COSTLY: Problem = {
+    "agents": 8, "domain": 4, "density": 0.4, "tightness": 0.0, "seed": 2, "connected": True, "max_cost": 10
+}  # fmt: skip
+LARGE: Problem = {
+    "agents": 100, "domain": 5, "density": 0.04, "tightness": 0.0, "seed": 1, "connected": True, "max_cost": 10
+}  # fmt: skip
 PROBLEMS = {
     "abt": HARD,
     "afc-ng": HARD,
@@ -43,7 +49,7 @@ from robochoc.run.registry import protocol_named
 from robochoc.solver.compiled_team import CompiledTeam
 from robochoc.solver.agent_problem import RunParameters
 protocol = protocol_named(sys.argv[1])
-team = CompiledTeam(eval(sys.argv[2]))
+team = CompiledTeam(random_csp(**json.loads(sys.argv[2])))
 settings = {"cycles": "20"} if hasattr(protocol.settings, "cycles") else {}
 least, began = float("inf"), time.process_time()
 while time.process_time() - began < 0.5:
@@ -65,18 +71,18 @@ class Cost(NamedTuple):
     bytes: int
 
 
-def cost(protocol: str, tree: str, problem: str) -> Cost:
+def cost(protocol: str, tree: str, problem: Problem) -> Cost:
     """Return the cheapest of the searches of half a second, in a process of its own with the code in `tree`."""
     pure = {"ROBOCHOC_PURE": "1"} if tree.startswith(PURE) else {}
     environment = {**os.environ, "PYTHONPATH": str(Path(tree.removeprefix(PURE)).resolve()), **pure}
-    command = [sys.executable, "-c", PROGRAM, protocol, problem]
+    command = [sys.executable, "-c", PROGRAM, protocol, json.dumps(problem)]
     done = subprocess.run(
         command, cwd=tree.removeprefix(PURE), env=environment, stdout=subprocess.PIPE, text=True, check=True
     )
     return Cost(*json.loads(done.stdout))
 
 
-def costs(protocols: Mapping[str, str], trees: Sequence[str], runs: int) -> dict[str, list[Cost]]:
+def costs(protocols: Mapping[str, Problem], trees: Sequence[str], runs: int) -> dict[str, list[Cost]]:
     """Return the least cost of each protocol with each tree, of `runs` that are taken in turns."""
     found: dict[str, list[Cost]] = {}
     for protocol, problem in protocols.items():
@@ -90,10 +96,15 @@ def measured() -> Section:
     """A row for each protocol."""
     notes = (
         "Schedule concurrent, no delays, one process; the search alone, up to 50,000 messages, the least of "
-        f"{RUNS} times half a second. ABT, AFC-ng and SFB: `{HARD}`. ADOPT, BnB-ADOPT and DPOP: `{COSTLY}`. DSA, MGM, "
-        f"Max-Sum, 20 cycles: `{LARGE}`. `python benchmarks/messages.py --tree . --tree OTHER` compares two checkouts."
+        f"{RUNS} times half a second. ABT, AFC-ng and SFB: `{_call(HARD)}`. ADOPT, BnB-ADOPT and DPOP: "
+        f"`{_call(COSTLY)}`. DSA, MGM, Max-Sum, 20 cycles: `{_call(LARGE)}`. "
+        "`python benchmarks/messages.py --tree . --tree OTHER` compares two checkouts."
     )
     return Section("messages", "What a message costs", notes, (_table(costs(PROBLEMS, [str(ROOT)], RUNS), ["us CPU"]),))
+
+
+def _call(problem: Problem) -> str:
+    return f"random_csp({', '.join(f'{name}={value}' for name, value in problem.items())})"
 
 
 def _table(found: Mapping[str, Sequence[Cost]], heads: Sequence[str]) -> list[Row]:
@@ -115,7 +126,7 @@ def main() -> None:
     parser.add_argument("protocols", nargs="*", metavar="PROTOCOL", help=", ".join(PROBLEMS))
     parser.add_argument("--tree", action="append", metavar="DIR", help="a checkout; repeatable (default: this one)")
     parser.add_argument("--runs", type=int, default=RUNS)
-    parser.add_argument("--problem", help="a call of random_csp, for protocols that are not in the list")
+    parser.add_argument("--problem", type=json.loads, metavar="JSON", help=f"for all protocols: {json.dumps(HARD)}")
     options = parser.parse_args()
     trees: list[str] = options.tree or [str(ROOT)]
     chosen = {name: options.problem or PROBLEMS.get(name, HARD) for name in options.protocols or PROBLEMS}

@@ -13,6 +13,7 @@ import time
 from collections.abc import Callable
 from pathlib import Path
 
+import app_pages
 import command_time
 import crowd
 import flagship
@@ -47,6 +48,7 @@ LONG: dict[str, Callable[[], Section]] = {
     "peers_costs": peers.measured_costs,
     "network": network.measured,
     "sniffer": sniffer.measured,
+    "app": app_pages.measured,
 }
 """Parts that take longer than all others together, measured only when they are named."""
 ALL = {**PARTS, **LONG}

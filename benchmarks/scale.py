@@ -33,7 +33,7 @@ SOLVED: dict[str, tuple[tuple[str, tuple[str, ...]], ...]] = {
     "random, degree 4": LOCAL,
     "tree": (("dpop", ("--protocol", "dpop")),),
     "ring": (("dsa", LOCAL[0][1]), ("dpop", ("--protocol", "dpop"))),
-    "tree, hard": (("abt", ("--protocol", "abt")),),
+    "tree, hard": (("abt", ("--protocol", "abt")), ("afc-ng", ("--protocol", "afc-ng"))),
 }
 LIMIT_S = 900
 

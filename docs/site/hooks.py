@@ -10,7 +10,7 @@ from __future__ import annotations
 import inspect
 import os
 import re
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, get_args
 
@@ -104,7 +104,11 @@ def page_of(path: str) -> str:
 def protocol_pages() -> dict[str, str]:
     """Return the text of the protocols' pages and of their list, by the pages' names."""
     protocols = {offer.name: offer.protocol for offer in installed_protocols() if offer.protocol}
-    pages = {f"reference/protocols/{name}.md": protocol_page(name, kind) for name, kind in protocols.items()}
+    first: dict[type[Struct], str] = {}  # a page, and an anchor, for each message, though several protocols send it
+    for name, kind in protocols.items():
+        for item in structs(kind):
+            first.setdefault(item, name)
+    pages = {f"reference/protocols/{name}.md": protocol_page(name, kind, first) for name, kind in protocols.items()}
     rows = [
         f"| [`{name}`]({name}.md) | {title(kind)} | {purpose(kind)} | {kind.traits.use_when} |"
         for name, kind in protocols.items()
@@ -121,8 +125,11 @@ def protocol_pages() -> dict[str, str]:
     return {**pages, PROTOCOLS: "\n".join(listing)}
 
 
-def protocol_page(name: str, kind: type[Protocol]) -> str:
-    """Return the page of one protocol: its traits, its docstring, its settings and its messages."""
+def protocol_page(name: str, kind: type[Protocol], first: Mapping[type[Struct], str]) -> str:
+    """Return the page of one protocol: its traits, its docstring, its settings and its messages.
+
+    What stands on the page of another protocol `first` is not shown again: there is a link.
+    """
     traits = kind.traits
     facts = {
         "name": f"`--protocol {name}`",
@@ -135,7 +142,7 @@ def protocol_page(name: str, kind: type[Protocol]) -> str:
         "paper": traits.paper,
     }
     table = "\n".join(f"| {key} | {value} |" for key, value in facts.items())
-    listed = [struct_block(item) for item in structs(kind)]
+    listed = [struct_block(item) if first[item] == name else struct_link(item, first[item]) for item in structs(kind)]
     whole = "{members: false, show_root_heading: false, show_root_toc_entry: false}"
     parts = [
         f"# {title(kind)}\n\n| | |\n| --- | --- |\n{table}\n",
@@ -150,6 +157,11 @@ def struct_block(item: type[Struct]) -> str:
     fields = ", ".join(item.__struct_fields__)
     options = f"{{heading_level: 3, members: [{fields}], show_if_no_docstring: true, show_root_full_path: false}}"
     return f"::: {item.__module__}.{item.__qualname__}\n    options: {options}\n"
+
+
+def struct_link(item: type[Struct], page: str) -> str:
+    """Return the entry of a message, or settings, that stand on the page of another protocol."""
+    return f"### {item.__name__}\n\n[As `{page}` has it]({page}.md#{item.__module__}.{item.__qualname__}).\n"
 
 
 def title(kind: type[Protocol]) -> str:
