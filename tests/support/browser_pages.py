@@ -66,3 +66,13 @@ def watched_page(browser: Any, viewport: dict[str, int] | None = None, **media: 
         yield seen
     finally:
         page.close()
+
+
+def connected(page: Page, url: str) -> None:
+    """Open a page of the application, and wait until what is clicked there reaches it in order.
+
+    What happens before the connection stands is tried again every 10 ms, each event by itself: of two clicks the later
+    one may then come first. A person is not that fast.
+    """
+    page.goto(url)
+    page.wait_for_function("window.did_handshake")

@@ -14,7 +14,7 @@ from robochoc.app.runs.runs import Runs
 from robochoc.app.sketch.sketch import Decision, Kind, Sketch
 from robochoc.app.store import Store
 from tests.support.app_server import AppServer, app_server
-from tests.support.browser_pages import WatchedPage, watched_page
+from tests.support.browser_pages import WatchedPage, connected, watched_page
 from tests.support.limits import wait_until
 from tests.support.slot_sketches import slots
 
@@ -23,7 +23,7 @@ HEADLINE = ".headline"
 
 
 def _opened(tab: WatchedPage, application: AppServer, team: str) -> None:
-    tab.page.goto(f"{application.url}team/{team}/decide")
+    connected(tab.page, f"{application.url}team/{team}/decide")
     tab.page.wait_for_selector(GO)
 
 
@@ -121,7 +121,7 @@ def test_a_server_that_is_killed_leaves_no_process(browser: Any, tmp_path: Path)
         wait_until(lambda: not any(map(_is_there, children)), lambda: f"{children} are there still")
         tab.page.goto("about:blank")
         with app_server(tmp_path) as again:
-            tab.page.goto(f"{again.url}team/{team}/decide")
+            connected(tab.page, f"{again.url}team/{team}/decide")
             _told(tab, "The application ended during this run")
             tab.page.goto("about:blank")
     assert Runs(_Team(sketch, teams.path(team))).latest is not None

@@ -19,7 +19,7 @@ from robochoc.app.runs.runs import Runs, end_all
 from robochoc.app.sketch.sketch import Kind, Sketch
 from robochoc.app.store import Store
 from tests.support.app_server import AppServer
-from tests.support.browser_pages import WatchedPage, watched_page
+from tests.support.browser_pages import WatchedPage, connected, watched_page
 from tests.support.kept_runs import cube, kept_run
 from tests.support.limits import wait_until
 
@@ -54,7 +54,10 @@ def _decided(teams: Store, sketch: Sketch) -> tuple[_Team, Run]:
 @contextmanager
 def _opened(browser: Any, url: str, width: int = 1280, **media: str) -> Iterator[WatchedPage]:  # noqa: ANN401 - Playwright's
     with watched_page(browser, {"width": width, "height": 800}, **media) as tab:
-        tab.page.goto(url)
+        if url.startswith("file:"):
+            tab.page.goto(url)
+        else:
+            connected(tab.page, url)
         yield tab
         assert [one for one in tab.complaints if not any(quiet in one for quiet in QUIET)] == []
 
@@ -202,7 +205,7 @@ def test_the_state_is_opened_from_the_gallery(
             tab.page.click("[aria-label='All of it: Save']")
         assert saved.value.suggested_filename == state.name
         saved.value.save_as(state)
-        tab.page.goto(application.url)
+        connected(tab.page, application.url)
         tab.page.set_input_files("input[type=file]", state)
         tab.page.wait_for_url("**/model")
         tab.page.click("text=Fly")

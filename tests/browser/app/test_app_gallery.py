@@ -16,7 +16,7 @@ from robochoc.app.sketch.sketch import Sketch
 from robochoc.app.store import Store
 from robochoc.system.temporary_files import temporary_folder
 from tests.support.app_server import AppServer
-from tests.support.browser_pages import WatchedPage, watched_page
+from tests.support.browser_pages import WatchedPage, connected, watched_page
 from tests.support.limits import wait_until
 
 _TEAM = re.compile(r"/team/([0-9a-f]{12})/model$")
@@ -36,7 +36,7 @@ def _sent(tab: WatchedPage, file: Path) -> None:
 
 def test_an_example_becomes_a_team_of_the_users_own(browser: Any, application: AppServer, teams: Store) -> None:  # noqa: ANN401 - Playwright's
     with watched_page(browser) as tab:
-        tab.page.goto(application.url)
+        connected(tab.page, application.url)
         tab.page.click(f"text={title_of('charging')}")
         assert teams.load(_made(tab)).now == examples()["charging"]
         assert tab.complaints == []
@@ -52,7 +52,7 @@ def test_a_team_that_was_saved_comes_back_from_its_archive(
     archive = tmp_path / "patrol.zip"
     archive.write_bytes(files.zipped(sketch))
     with watched_page(browser) as tab:
-        tab.page.goto(application.url)
+        connected(tab.page, application.url)
         with tab.page.expect_file_chooser() as asked:
             tab.page.click("text=From a file")
         asked.value.set_files(str(archive))
@@ -71,7 +71,7 @@ def test_files_of_another_tool_are_opened_as_what_they_are(
         "constraints: {c: {type: intention, function: 1 if x == y else 0}}\nagents: [a, b]\n"
     )
     with watched_page(browser) as tab:
-        tab.page.goto(application.url)
+        connected(tab.page, application.url)
         _sent(tab, file)
         name = _made(tab)
         tab.page.wait_for_selector("text=This team was not drawn here")
@@ -101,7 +101,7 @@ def test_what_cannot_be_read_is_told_in_one_line(
     file = tmp_path / name
     file.write_bytes(content)
     with watched_page(browser) as tab:
-        tab.page.goto(application.url)
+        connected(tab.page, application.url)
         _sent(tab, file)
         tab.page.wait_for_function(f"document.querySelector('.error').textContent.includes({says!r})")
         assert str(tmp_path) not in tab.page.inner_text(".error")
@@ -118,7 +118,7 @@ def test_an_archive_that_leads_out_of_its_folder_writes_nothing_there(
         for depth in (1, 2, 3):
             made.writestr(f"{'../' * depth}{name}", "<instance/>")
     with watched_page(browser) as tab:
-        tab.page.goto(application.url)
+        connected(tab.page, application.url)
         _sent(tab, archive)
         tab.page.wait_for_function("document.querySelector('.error').textContent.length > 0")
     folder = temporary_folder()  # the archive is unpacked in a folder two levels below it
@@ -129,7 +129,7 @@ def test_an_archive_that_leads_out_of_its_folder_writes_nothing_there(
 def test_a_team_is_removed_when_that_is_confirmed(browser: Any, application: AppServer, teams: Store) -> None:  # noqa: ANN401 - Playwright's
     team = teams.add(Sketch("unwanted"))
     with watched_page(browser) as tab:
-        tab.page.goto(application.url)
+        connected(tab.page, application.url)
         tab.page.click("[aria-label='Remove unwanted']")
         tab.page.click("text=Keep it")
         tab.page.click("[aria-label='Remove unwanted']")

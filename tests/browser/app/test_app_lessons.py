@@ -9,7 +9,7 @@ import pytest
 
 from robochoc.app.lessons.lesson import COUNT, lesson
 from tests.support.app_server import AppServer, app_server
-from tests.support.browser_pages import watched_page
+from tests.support.browser_pages import connected, watched_page
 
 _MOST_TABS = 30
 
@@ -37,7 +37,7 @@ def test_lesson_one_is_played_to_its_end_by_keyboard(browser: Any, tmp_path: Pat
     taught = lesson(1)
     with app_server(tmp_path / "teams") as server, watched_page(browser) as tab:
         page = tab.page
-        page.goto(server.url)
+        connected(page, server.url)
         page.wait_for_selector("h1")
         _tab_to(page, "Learn how robots decide")
         page.keyboard.press("Enter")
@@ -66,7 +66,7 @@ def test_lesson_one_is_played_to_its_end_by_keyboard(browser: Any, tmp_path: Pat
         _has_focus(page, "What you have seen")
         _is_told(page, "What you have seen")
         page.wait_for_selector(f"text={taught.end}")
-        page.goto(f"{server.url}lessons")
+        connected(page, f"{server.url}lessons")
         page.wait_for_selector("a:has-text('Done')")
         assert page.locator("a:has-text('Done')").count() == 1
         assert tab.complaints == []
@@ -81,7 +81,7 @@ def test_no_lesson_needs_scrolling_to_the_side_on_a_narrow_screen(
 ) -> None:
     with watched_page(browser, {"width": 360, "height": 740}, color_scheme=scheme) as tab:
         for number in range(1, COUNT + 1):
-            tab.page.goto(f"{application.url}lessons/{number}")
+            connected(tab.page, f"{application.url}lessons/{number}")
             tab.page.wait_for_selector(".choices")
             assert tab.page.evaluate("document.documentElement.scrollWidth") <= 360
         assert tab.complaints == []
@@ -90,5 +90,5 @@ def test_no_lesson_needs_scrolling_to_the_side_on_a_narrow_screen(
 def test_a_lesson_that_there_is_not_is_told(browser: Any, application: AppServer) -> None:  # noqa: ANN401 - Playwright's
     with watched_page(browser) as tab:
         for number in ("0", "11", "one", "<b>", "99999999999999999999", "٣"):
-            tab.page.goto(f"{application.url}lessons/{number}")
+            connected(tab.page, f"{application.url}lessons/{number}")
             tab.page.wait_for_selector("text=There is no such lesson.")

@@ -13,7 +13,7 @@ from robochoc.app.sketch.history import History
 from robochoc.app.sketch.sketch import Sketch
 from robochoc.app.store import Store
 from tests.support.app_server import AppServer, app_server
-from tests.support.browser_pages import watched_page
+from tests.support.browser_pages import connected, watched_page
 from tests.support.limits import HANG_S, wait_until
 
 NAME = "[aria-label='Name of the team']"
@@ -28,7 +28,7 @@ def test_a_team_is_renamed_undone_and_seen_in_both_tabs(browser: Any, applicatio
     team = teams.add(Sketch("first"))
     with watched_page(browser) as one, watched_page(browser) as other:
         for tab in (one, other):
-            tab.page.goto(f"{application.url}team/{team}/model")
+            connected(tab.page, f"{application.url}team/{team}/model")
             tab.page.wait_for_selector(NAME)
         one.page.fill(NAME, "second")
         _saved(teams, team, "second")
@@ -54,7 +54,7 @@ def test_what_can_be_no_name_is_told_where_it_was_typed(
 ) -> None:
     team = teams.add(Sketch("first"))
     with watched_page(browser) as tab:
-        tab.page.goto(f"{application.url}team/{team}/model")
+        connected(tab.page, f"{application.url}team/{team}/model")
         tab.page.fill(NAME, name or " ")
         tab.page.wait_for_selector("text=cannot be a name")
         assert tab.complaints == []
@@ -64,7 +64,7 @@ def test_what_can_be_no_name_is_told_where_it_was_typed(
 def test_a_team_that_there_is_not_is_told(browser: Any, application: AppServer) -> None:  # noqa: ANN401 - Playwright's
     with watched_page(browser) as tab:
         for path in ("team/0123456789ab/model", "team/%2e%2e/model", "team/<b>/fly"):
-            tab.page.goto(f"{application.url}{path}")
+            connected(tab.page, f"{application.url}{path}")
             tab.page.wait_for_selector("text=There is no such team.")
 
 
@@ -74,7 +74,7 @@ def test_whatever_ends_the_server_an_edit_is_kept(browser: Any, tmp_path: Path, 
     team = teams.add(Sketch("first"))
     server = AppServer(teams.folder)
     with watched_page(browser) as tab:
-        tab.page.goto(f"{server.url}team/{team}/model")
+        connected(tab.page, f"{server.url}team/{team}/model")
         tab.page.fill(NAME, "kept")
         if by == signal.SIGKILL:
             _saved(teams, team, "kept")
@@ -91,10 +91,10 @@ def test_a_damaged_team_does_not_keep_the_others_from_the_gallery(browser: Any, 
     broken = teams.add(Sketch("broken"))
     (teams.path(broken) / "history.json").write_bytes(b"{")
     with app_server(teams.folder) as server, watched_page(browser) as tab:
-        tab.page.goto(server.url)
+        connected(tab.page, server.url)
         tab.page.wait_for_selector("text=whole")
         tab.page.wait_for_selector("text=damaged")
-        tab.page.goto(f"{server.url}team/{broken}/model")
+        connected(tab.page, f"{server.url}team/{broken}/model")
         tab.page.wait_for_selector("text=damaged")
 
 
@@ -105,7 +105,7 @@ def test_a_narrow_screen_needs_no_scrolling_to_the_side(
     scheme: str,
 ) -> None:
     with watched_page(browser, {"width": 360, "height": 740}, color_scheme=scheme) as tab:
-        tab.page.goto(application.url)
+        connected(tab.page, application.url)
         tab.page.wait_for_selector("h1")
         assert tab.page.evaluate("document.documentElement.scrollWidth") <= 360
 

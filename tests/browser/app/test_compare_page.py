@@ -7,7 +7,7 @@ from typing import Any
 from robochoc.app.sketch.sketch import Area, Cell, Decision, Kind, Sketch, SketchRobot, SketchRule
 from robochoc.app.store import Store
 from tests.support.app_server import AppServer
-from tests.support.browser_pages import watched_page
+from tests.support.browser_pages import connected, watched_page
 
 ROBOTS = tuple(SketchRobot(name, Cell(place, 0)) for place, name in enumerate("ABCD"))
 SLOT = Decision("slot", Kind.SLOT, (1, 2, 3, 4))
@@ -17,7 +17,7 @@ REPORT_MS = 90_000
 
 
 def _asked(page: Any, application: AppServer, team: str) -> None:  # noqa: ANN401 - Playwright's
-    page.goto(f"{application.url}team/{team}/compare")
+    connected(page, f"{application.url}team/{team}/compare")
     page.wait_for_selector("text=Runs of each")
 
 

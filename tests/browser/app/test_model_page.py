@@ -11,7 +11,7 @@ import pytest
 from robochoc.app.sketch.sketch import Area, Cell, Decision, Kind, Sketch, SketchRobot, SketchRule
 from robochoc.app.store import Store
 from tests.support.app_server import AppServer
-from tests.support.browser_pages import WatchedPage, watched_page
+from tests.support.browser_pages import WatchedPage, connected, watched_page
 from tests.support.limits import wait_until
 
 HOSTILE = """<img src=x onerror="alert(1)">'"`${1}{{1}}\\"""
@@ -25,7 +25,7 @@ def drones(count: int, columns: int = 8) -> tuple[SketchRobot, ...]:
 
 
 def opened(tab: WatchedPage, application: AppServer, team: str) -> Any:  # noqa: ANN401 - Playwright's
-    tab.page.goto(f"{application.url}team/{team}/model")
+    connected(tab.page, f"{application.url}team/{team}/model")
     tab.page.wait_for_selector(".board svg")
     return tab.page
 

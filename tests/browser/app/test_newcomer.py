@@ -8,7 +8,7 @@ from typing import Any
 from robochoc.app.sketch.sketch import Cell, SketchRobot
 from robochoc.app.store import Store
 from tests.support.app_server import AppServer
-from tests.support.browser_pages import watched_page
+from tests.support.browser_pages import connected, watched_page
 from tests.support.limits import HANG_S, wait_until
 
 MOST_CLICKS = 60
@@ -67,7 +67,7 @@ def test_from_the_gallery_to_a_report(
 ) -> None:
     with watched_page(browser, {"width": 1280, "height": 900}) as tab:
         page, newcomer = tab.page, Newcomer(tab.page)
-        page.goto(application.url)
+        connected(page, application.url)
         newcomer.click("text=A new team")
         page.wait_for_selector(".board svg")
         team = page.url.split("/")[-2]

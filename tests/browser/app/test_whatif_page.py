@@ -9,7 +9,7 @@ import pytest
 from robochoc.app.sketch.sketch import Area, Cell, Decision, Kind, Sketch, SketchRobot, SketchRule
 from robochoc.app.store import Store
 from tests.support.app_server import AppServer
-from tests.support.browser_pages import watched_page
+from tests.support.browser_pages import connected, watched_page
 from tests.support.limits import wait_until
 
 ROBOTS = tuple(
@@ -31,7 +31,7 @@ def test_one_fails_and_the_team_decides_again(browser: Any, application: AppServ
     team = teams.add(TEAM)
     with watched_page(browser) as tab:
         page = tab.page
-        page.goto(f"{application.url}team/{team}/whatif")
+        connected(page, f"{application.url}team/{team}/whatif")
         page.click("[data-robot=East]")
         page.click("text=It fails")
         page.wait_for_selector("li:has-text('East fails.')")
@@ -59,7 +59,7 @@ def test_by_keyboard_alone_with_costs_and_two_changes_of_which_one_is_taken_back
     team = teams.add(Sketch("team", Area(5, 4), ROBOTS, (LEVEL,), (DIFFERENT, LITTLE)))
     with watched_page(browser, {"width": 360, "height": 740}) as tab:
         page = tab.page
-        page.goto(f"{application.url}team/{team}/whatif")
+        connected(page, f"{application.url}team/{team}/whatif")
         for words in ("It fails", "A robot joins here"):
             page.focus(f"button:has-text('{words}')")
             page.keyboard.press("Enter")
@@ -84,7 +84,7 @@ def test_a_team_without_decisions_is_told_what_it_lacks(
 ) -> None:
     team = teams.add(sketch)
     with watched_page(browser) as tab:
-        tab.page.goto(f"{application.url}team/{team}/whatif")
+        connected(tab.page, f"{application.url}team/{team}/whatif")
         tab.page.wait_for_selector("text=nothing to decide yet")
         assert tab.complaints == []
 
@@ -92,7 +92,7 @@ def test_a_team_without_decisions_is_told_what_it_lacks(
 def test_what_cannot_happen_is_told_at_once(browser: Any, application: AppServer, teams: Store) -> None:  # noqa: ANN401 - Playwright's
     team = teams.add(Sketch("team", Area(5, 4), ROBOTS[:1], (LEVEL,)))
     with watched_page(browser) as tab:
-        tab.page.goto(f"{application.url}team/{team}/whatif")
+        connected(tab.page, f"{application.url}team/{team}/whatif")
         tab.page.click("text=It fails")
         tab.page.wait_for_selector("[role=alert]:has-text('Then nobody is left')")
         tab.page.fill("input[aria-label=Column]", "99")
