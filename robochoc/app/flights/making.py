@@ -25,7 +25,7 @@ from weakref import WeakValueDictionary
 from robochoc.app.runs.options import JOURNAL, RESULT
 from robochoc.app.runs.run import Run
 from robochoc.app.sketch.building import model_of
-from robochoc.app.sketch.sketch import Kind, Sketch
+from robochoc.app.sketch.sketch import Kind
 from robochoc.formats import InvalidInputError
 from robochoc.modelling.places import ModelError
 from robochoc.system.files import write_atomically
@@ -54,12 +54,15 @@ class CannotMakeError(Exception):
     """A command has failed; the text is what it said."""
 
 
-def flies(sketch: Sketch) -> bool:
+def flies(run: Run) -> bool:
     """Return whether there is anything to fly: decisions that say where a robot is to be.
 
     A sketch without decisions is the picture of a team that was not drawn here: it flies as its files have it.
     """
-    return not sketch.decisions or any(decision.kind in {Kind.LEVEL, Kind.PLACE} for decision in sketch.decisions)
+    if run.record.flies is not None:
+        return run.record.flies
+    decisions = run.sketch.decisions
+    return not decisions or any(decision.kind in {Kind.LEVEL, Kind.PLACE} for decision in decisions)
 
 
 def can_record() -> bool:
@@ -88,7 +91,7 @@ class Making:
     @property
     def has_flight(self) -> bool:
         """Whether there is a flight to be shown, once it is made."""
-        return self.has_answer and flies(self.run.sketch) and Stage.FLIGHT not in self.troubles
+        return self.has_answer and flies(self.run) and Stage.FLIGHT not in self.troubles
 
     @property
     def has_conversation(self) -> bool:
@@ -151,7 +154,7 @@ class Making:
 
     async def _make(self) -> None:
         try:
-            if self.flight is None and self.has_answer and flies(self.run.sketch):
+            if self.flight is None and self.has_answer and flies(self.run):
                 await self._part(Stage.FLIGHT, self._make_flight)
             if self.conversation is None and self.run.artefact(JOURNAL):
                 await self._part(Stage.CONVERSATION, self._make_conversation)

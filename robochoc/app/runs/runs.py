@@ -7,6 +7,7 @@ import shutil
 import time
 from collections.abc import Callable
 from contextlib import suppress
+from functools import partial
 from pathlib import Path
 from threading import Lock
 from typing import Protocol
@@ -16,6 +17,7 @@ import msgspec
 
 from robochoc.app.listeners import Listeners
 from robochoc.app.runs.options import RunOptions
+from robochoc.app.runs.prepared import TeamFiles, from_files, from_sketch
 from robochoc.app.runs.run import RECORD, SKETCH, Record, Run, State, run_of
 from robochoc.app.runs.watching import Watched
 from robochoc.app.sketch.building import model_of
@@ -71,6 +73,7 @@ class Runs:
         *,
         sketch: Sketch | None = None,
         model: Callable[[Sketch], Model] = model_of,
+        files: TeamFiles | None = None,
         purpose: str = "decide",
     ) -> Run:
         """Let the team decide. The run has begun when this returns; all work is done in a thread and a process.
@@ -79,11 +82,13 @@ class Runs:
             options: How.
             sketch: The team. None: as it stands.
             model: Makes a model of the sketch.
+            files: What decides instead, of a team that was not drawn here; the sketch is its picture then.
             purpose: What for: a word for `latest_for`.
         """
         chosen = self._project.sketch if sketch is None else sketch
         folder = self._new_folder()
-        run = Run(folder, Record(options, purpose=purpose, started=time.time()), chosen)
+        flies = files.flies if files else None
+        run = Run(folder, Record(options, purpose=purpose, started=time.time(), flies=flies), chosen)
         run.record.arguments = options.arguments(run.team.name, ranked=chosen.is_ranked)
         with suppress(RuntimeError):  # there is no loop: listeners are called by the thread that watches
             run.told_by(asyncio.get_running_loop().call_soon_threadsafe)
@@ -91,7 +96,8 @@ class Runs:
         run.save()
         self._runs.append(run)
         self._forget_old()
-        watched = Watched(run, model)
+        prepare = partial(from_files, files=files) if files else partial(from_sketch, model=model)
+        watched = Watched(run, prepare)
         run.watched_by = watched
         with _LOCK:
             _WATCHED.append(watched)

@@ -10,16 +10,13 @@ import threading
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
-from functools import partial
 from pathlib import Path
 
-from robochoc.app.runs.labels import labels_of, value_of
 from robochoc.app.runs.live import LiveReader
 from robochoc.app.runs.options import JOURNAL, RESULT
+from robochoc.app.runs.prepared import Prepared
 from robochoc.app.runs.run import ERRORS, Run, State
-from robochoc.app.sketch.sketch import Sketch, Value
 from robochoc.formats import InvalidInputError
-from robochoc.modelling.model import Model
 from robochoc.modelling.places import ModelError
 from robochoc.run.options import Options, Withdrawal
 from robochoc.run.recording import objective_to_record
@@ -35,10 +32,10 @@ _MAX_ERRORS = 8_000
 
 
 class Watched:
-    """Starts the process of a run, and watches it. `model` makes a model of the run's sketch."""
+    """Starts the process of a run, and watches it. `prepare` writes the files of the run's team."""
 
-    def __init__(self, run: Run, model: Callable[[Sketch], Model]) -> None:
-        self._run, self._model = run, model
+    def __init__(self, run: Run, prepare: Callable[[Run], Prepared]) -> None:
+        self._run, self._prepare = run, prepare
         self._process: subprocess.Popen[bytes] | None = None
         self._stop_at: float | None = None
         self._said: set[int] = set()
@@ -78,13 +75,11 @@ class Watched:
     def _work(self) -> None:
         run = self._run
         try:
-            model = self._model(run.sketch)
-            model.save(run.team)
+            ready = self._prepare(run)
             withdraw = Withdrawal.MINIMUM if run.record.options.withdraw else None
-            objective = objective_to_record(model.team, Options(withdraw=withdraw))
-            run.record.labels = labels_of(model)
-            label = partial(_label, model)
-            reader = LiveReader(run.folder / JOURNAL, run.live, label, objective() if objective else None)
+            objective = objective_to_record(ready.team, Options(withdraw=withdraw))
+            run.record.labels = ready.labels
+            reader = LiveReader(run.folder / JOURNAL, run.live, ready.label, objective() if objective else None)
         except (ModelError, InvalidInputError, OSError, ValueError, TypeError, KeyError) as mistake:
             self._over(State.FAILED, str(mistake))
             return
@@ -152,10 +147,6 @@ class Watched:
         if signum not in self._said:
             self._said.add(signum)
             process.send_signal(signum)
-
-
-def _label(model: Model, name: str, code: int) -> Value:
-    return value_of(model, name, code) if name in model.variables else code
 
 
 @contextmanager

@@ -93,7 +93,7 @@ class _Page:
         if sketch != self._project.sketch:
             ui.label(say("fly.old")).classes("note")
         making = making_of(run)
-        if not flies(sketch):
+        if not flies(run):
             _note("fly.no-places", "fly.no-places-remedy", "fly.to-model", f"/team/{self._project.id}/model")
         elif not making.has_answer:
             ui.label(say("fly.no-answer")).classes("note")

@@ -36,7 +36,7 @@ def build_tell(making: Making, stage: Stage | None) -> None:
 
 def _recording(making: Making) -> None:
     with _card("tell.recording", "tell.recording-hint"):
-        if not making.has_answer or not flies(making.run.sketch):
+        if not making.has_answer or not flies(making.run):
             ui.label(say("tell.recording-nothing")).classes("soft")
         elif not can_record():
             ui.label(say("tell.recording-missing")).classes("soft")

@@ -10,15 +10,20 @@ from typing import Any
 import pytest
 
 from robochoc.app.flights.making import Making, Stage, flies, making_of
-from robochoc.app.runs.options import JOURNAL
+from robochoc.app.runs.options import JOURNAL, RunOptions
+from robochoc.app.runs.run import Record, Run
 from robochoc.app.sketch.sketch import Kind, Sketch
 from tests.support.kept_runs import cube, kept_run
 
 
-def test_only_who_decides_heights_or_places_flies() -> None:
-    assert flies(cube())
-    assert not flies(cube(kind=Kind.SLOT))
-    assert flies(Sketch())  # of files that were not drawn here
+def test_only_who_decides_heights_or_places_flies(tmp_path: Path) -> None:
+    sketches = cube(), cube(kind=Kind.SLOT), Sketch()
+    drawn, slots, foreign = (Run(tmp_path, Record(RunOptions()), sketch) for sketch in sketches)
+    assert flies(drawn)
+    assert not flies(slots)
+    assert flies(foreign)  # a state of earlier does not say
+    foreign.record.flies = False
+    assert not flies(foreign)
 
 
 def test_all_pages_share_what_is_made_of_a_run(tmp_path: Path) -> None:

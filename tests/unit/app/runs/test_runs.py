@@ -16,10 +16,14 @@ import msgspec
 import pytest
 
 from robochoc.app.runs.options import RunOptions
+from robochoc.app.runs.prepared import TeamFiles
 from robochoc.app.runs.run import RECORD, Record, Run, State
 from robochoc.app.runs.runs import Runs, end_all
 from robochoc.app.sketch.sketch import Cell, Decision, Kind, Sketch, SketchRobot, SketchRule
+from robochoc.formats import read_team, write_team
+from robochoc.model.problem import RemoveAgent
 from tests.support.slot_sketches import slots
+from tests.support.small_teams import triangle
 
 WAIT_S = 60
 
@@ -81,6 +85,20 @@ class TestRun:
         assert run.result is not None
         assert run.result.value(above, "slot") == 1
         assert "--order given" in run.command
+
+    def test_that_files_decide_as_they_are_and_then_as_what_happens_leaves_them(self, tmp_path: Path) -> None:
+        folder, team = tmp_path / "triangle", tmp_path / "kept"
+        write_team(triangle(3), folder)
+        team.mkdir()
+        runs = Runs(Team(Sketch("triangle"), team))
+        run = ended(runs.start(files=TeamFiles(folder, flies=False)))
+        assert run.result is not None
+        assert (run.result.verdict, run.record.flies) == ("solution", False)
+        assert read_team(run.team) == read_team(folder)
+        last = triangle(3).order[-1]
+        again = ended(runs.start(files=TeamFiles(folder, then=(RemoveAgent(last),))))
+        assert again.result is not None
+        assert [len(epoch["robots"]) for epoch in again.result.epochs] == [4, 3]
 
     def test_that_one_that_is_stopped_tells_its_best_so_far(self, tmp_path: Path) -> None:
         runs = Runs(Team(slots(14, 14), tmp_path))

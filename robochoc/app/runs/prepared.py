@@ -1,0 +1,81 @@
+"""What a run decides, made ready for its process: the team's files in the run's folder, and the words for values."""
+
+from __future__ import annotations
+
+import shutil
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+from functools import partial
+from pathlib import Path
+
+from robochoc.app.runs.labels import labels_of, value_of
+from robochoc.app.runs.run import Run
+from robochoc.app.sketch.sketch import Sketch, Value
+from robochoc.formats import read_team, write_team
+from robochoc.model.problem import AddAgent, Change, Domain, ScenarioEvent, Team
+from robochoc.modelling.model import Model
+
+
+@dataclass(frozen=True)
+class Prepared:
+    """A team that is ready to decide.
+
+    Attributes:
+        team: The team.
+        label: Returns the user's value that a code of a variable stands for.
+        labels: The user's values that files say otherwise, by what files say.
+    """
+
+    team: Team
+    label: Callable[[str, int], Value]
+    labels: dict[str, str]
+
+
+@dataclass(frozen=True)
+class TeamFiles:
+    """The files of a team that was not drawn here.
+
+    Attributes:
+        folder: Where they are.
+        flies: Whether its decisions say where robots are to be.
+        then: What happens to the team once it has decided all that its files ask for.
+    """
+
+    folder: Path
+    flies: bool = True
+    then: tuple[Change, ...] = ()
+
+
+def from_sketch(run: Run, model: Callable[[Sketch], Model]) -> Prepared:
+    """Write the files of a run's sketch, of which `model` makes a model. Raises what that raises, or `OSError`."""
+    made = model(run.sketch)
+    made.save(run.team)
+    return Prepared(made.team, partial(_drawn_label, made), labels_of(made))
+
+
+def from_files(run: Run, files: TeamFiles) -> Prepared:
+    """Write the files of a run's team, as they are or with what happens to it. Raises `InvalidInputError`, `OSError`.
+
+    Values are told as files say them.
+    """
+    team = read_team(files.folder)
+    if files.then:
+        team = replace(team, scenario=(*team.scenario, ScenarioEvent(files.then)))
+        write_team(team, run.team)
+    else:
+        shutil.copytree(files.folder, run.team)
+    return Prepared(team, partial(_label, domains_of(team)), {})
+
+
+def domains_of(team: Team) -> dict[str, Domain]:
+    """Return the domains of all variables, those of robots that join included."""
+    joining = (change.robot for event in team.scenario for change in event.changes if isinstance(change, AddAgent))
+    return {one.name: one.domain for robot in (*team.robots, *joining) for one in robot.variables}
+
+
+def _label(domains: Mapping[str, Domain], name: str, code: int) -> Value:
+    return domains[name].label(code) if name in domains else code
+
+
+def _drawn_label(model: Model, name: str, code: int) -> Value:
+    return value_of(model, name, code) if name in model.variables else code
