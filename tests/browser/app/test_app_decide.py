@@ -11,6 +11,7 @@ import msgspec
 import pytest
 
 from robochoc.app.runs.runs import Runs
+from robochoc.app.sketch.examples import example
 from robochoc.app.sketch.sketch import Decision, Kind, Sketch
 from robochoc.app.store import Store
 from tests.support.app_server import AppServer, app_server
@@ -42,7 +43,7 @@ def test_a_team_decides_and_another_tab_sees_it(browser: Any, application: AppSe
             _told(tab, "All 5 decide. It costs 15: proven the best.")
             assert tab.page.locator(".answer tbody tr").count() == 5
             assert sorted(tab.page.locator(".team-picture .value").all_text_contents()) == [*"12345"]
-        one.page.wait_for_selector("text=costs 15")
+        one.page.wait_for_selector(".costs >> text=Together: 15")
         assert "robochoc solve Berths --json" in one.page.inner_text(".command pre")
         one.page.click("text=How they decide")
         one.page.wait_for_selector("text=auto chooses sfb")
@@ -69,6 +70,7 @@ def test_rules_that_are_in_the_way_are_clicked_away(browser: Any, application: A
         _told(tab, "There is no solution")
         tab.page.click("text=Which rules are in each other")
         tab.page.wait_for_selector("text=This rule alone cannot hold")
+        tab.page.wait_for_selector(".found .trouble >> text=there are 2 values: somebody has to step aside")
         assert tab.page.evaluate("document.documentElement.scrollWidth") <= 360
         tab.page.click("button:has-text('Let it cost')")
         _told(tab, "All 3 decide. It costs 14: proven the best.")
@@ -79,6 +81,20 @@ def test_rules_that_are_in_the_way_are_clicked_away(browser: Any, application: A
         tab.page.click("text=Who would have to step aside")
         _told(tab, "2 of 3 decide.")
         assert tab.page.locator(".team-picture .aside").count() == 1
+        tab.page.wait_for_selector(".costs >> text=Together: 3")
+        assert tab.complaints == []
+
+
+def test_places_are_shown_on_the_map(browser: Any, application: AppServer, teams: Store) -> None:  # noqa: ANN401 - Playwright's
+    team = teams.add(example("coverage"))
+    with watched_page(browser, {"width": 360, "height": 740}, color_scheme="dark") as tab:
+        _opened(tab, application, team)
+        assert tab.page.locator(".team-picture .home").count() == 0
+        tab.page.click(GO)
+        _told(tab, "All 5 decide.")
+        tab.page.wait_for_selector(".team-picture .way", state="attached")
+        assert sorted(tab.page.locator(".team-picture .value").all_text_contents())[0] == "Base"
+        assert tab.page.evaluate("document.documentElement.scrollWidth") <= 360
         assert tab.complaints == []
 
 

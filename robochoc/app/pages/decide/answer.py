@@ -37,9 +37,11 @@ def _who(sketch: Sketch, result: RunResult) -> str:
 
 
 def _cost(sketch: Sketch, result: RunResult, state: State) -> str:
-    if result.verdict == "optimal":
-        return "" if result.cost is None or result.withdrawn else say("decide.proven", cost=result.cost)
     best = say("decide.best", cost=result.cost) if result.cost is not None and costly(sketch) else ""
+    if result.verdict == "optimal":
+        if result.withdrawn:
+            return best
+        return "" if result.cost is None else say("decide.proven", cost=result.cost)
     if result.verdict == "solution":
         return best
     bound = "" if result.bound is None else say("decide.bound", bound=result.bound)

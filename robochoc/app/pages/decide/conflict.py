@@ -9,14 +9,24 @@ import msgspec
 from nicegui import run, ui
 
 from robochoc.app.conflicts.found import Conflict, ConflictSearch, Finder
+from robochoc.app.conflicts.rules import with_only
+from robochoc.app.pages.model.parts import TroubleLines
 from robochoc.app.pages.shell import told, while_shown
 from robochoc.app.projects import Project
+from robochoc.app.sketch.checks import troubles
 from robochoc.app.sketch.edits import EditError, with_rule, with_rule_switched
 from robochoc.app.sketch.sketch import MAX_COST, Sketch, SketchRule
+from robochoc.app.sketch.troubles import About, Trouble
 from robochoc.app.sketch.words import sentence
 from robochoc.app.texts import say
 
 _USUAL_COST = 10
+_MOST_HINTS = 3
+
+
+def hints_about_rules(sketch: Sketch) -> list[Trouble]:
+    """Return which rules can be seen to be impossible, each with what to do."""
+    return [one for one in troubles(sketch) if one.about is About.RULE and not one.is_error]
 
 
 class Doors:
@@ -31,11 +41,19 @@ class Doors:
         with ui.element("section").classes("panel doors"):
             with ui.element("h2"):
                 ui.label(say("decide.doors"))
+            self._known = TroubleLines()
             with ui.element("div").classes("two"):
                 self._door("decide.door-aside", partial(decide, withdraw=True))
                 self._door("decide.door-conflict", self._look)
             self._found = ui.element("div").classes("found").props("aria-live=polite")
         while_shown(self._end)
+        ui.timer(0, self._look_at_once, once=True)
+
+    async def _look_at_once(self) -> None:
+        """Tell what can be seen without a search: the same that the page "Model" tells at these rules."""
+        hints = await run.io_bound(hints_about_rules, self._sketch)
+        if hints is not None and not self._found.is_deleted:
+            self._known.show(hints[:_MOST_HINTS])
 
     def _door(self, key: str, does: Callable[[], object]) -> None:
         with ui.element("button").classes("card door").props("type=button").on("click", does):
@@ -53,21 +71,22 @@ class Doors:
         self._tell(say("decide.searching"))
         conflict = await run.io_bound(self._search.found)
         if conflict is not None and not self._found.is_deleted:
-            self._show(conflict)
+            hints = await run.io_bound(hints_about_rules, with_only(self._sketch, conflict.rules or ()))
+            self._show(conflict, hints or [])
 
     def _tell(self, text: str) -> None:
         self._found.clear()
         with self._found:
             ui.label(text)
 
-    def _show(self, conflict: Conflict) -> None:
+    def _show(self, conflict: Conflict, hints: list[Trouble]) -> None:
         if conflict.rules:
             one = len(conflict.rules) == 1
             self._tell(say("decide.conflict-one") if one else say("decide.conflict", count=len(conflict.rules)))
             with self._found:
                 with ui.element("ul").classes("rules"):
                     for name in conflict.rules:
-                        self._rule(name)
+                        self._rule(name, [hint for hint in hints if hint.element == name])
                 ui.label(say("decide.by-cpmpy" if conflict.finder is Finder.CPMPY else "decide.by-own")).classes("soft")
         elif conflict.why:
             self._tell(say("decide.conflict-failed", why=conflict.why))
@@ -76,13 +95,13 @@ class Doors:
         else:
             self._tell(say("decide.conflict-none" if conflict.rules is None else "decide.conflict-empty"))
 
-    def _rule(self, name: str) -> None:
+    def _rule(self, name: str, hints: list[Trouble]) -> None:
         rule = self._sketch.rule(name)
         if rule is None:
             return
         words = sentence(self._sketch, rule)
         with ui.element("li"):
-            ui.label(words).classes("words")
+            ui.label(f"{rule.id}: {words}").classes("words")
             with ui.element("div").classes("acts"):
                 off = ui.button(say("decide.off"), on_click=partial(self._switch_off, rule))
                 off.props("flat dense no-caps").props["aria-label"] = say("decide.off-one", rule=words)
@@ -91,6 +110,8 @@ class Doors:
                 soften = ui.button(say("decide.soften"), on_click=lambda: self._soften(rule, cost.value))
                 soften.props("flat dense no-caps")
                 soften.props["aria-label"] = say("decide.soften-one", cost=_USUAL_COST, rule=words)
+            if hints:
+                TroubleLines().show(hints)
 
     def _switch_off(self, rule: SketchRule) -> None:
         self._change(lambda sketch: with_rule_switched(sketch, rule.id, on=False))

@@ -6,22 +6,20 @@ from collections.abc import Callable
 from functools import cache, partial
 from importlib.resources import files
 
-from nicegui import run as background
 from nicegui import ui
 
 from robochoc.app.pages.decide.answer import headline, table_html, took
 from robochoc.app.pages.decide.conflict import Doors
+from robochoc.app.pages.decide.costs import show_costs
+from robochoc.app.pages.decide.ground import decides_places, targets_of
 from robochoc.app.pages.decide.how import How
 from robochoc.app.pages.decide.picture import falling_svg, team_svg, values_of
 from robochoc.app.pages.shell import while_shown
 from robochoc.app.projects import Project
-from robochoc.app.runs.paid import paid
-from robochoc.app.runs.result import RunResult
 from robochoc.app.runs.run import Run, State
 from robochoc.app.runs.runs import runs_of
 from robochoc.app.sketch.checks import troubles
 from robochoc.app.sketch.sketch import Kind, Sketch, Value
-from robochoc.app.sketch.words import sentence
 from robochoc.app.texts import say
 
 _FLYING = frozenset({Kind.LEVEL, Kind.PLACE})
@@ -55,6 +53,7 @@ class _Page:
         with ui.element("div").classes("decide-body"):
             with ui.element("section").classes("panel team-picture"):
                 self._picture = ui.html("", sanitize=False)
+                self._legend = ui.label(say("decide.legend")).classes("soft small")
                 self._falling = ui.html("", sanitize=False).classes("cost-line")
             self._answer = ui.element("section").classes("panel answer")
         self._below = ui.element("div").classes("decide-below")
@@ -135,6 +134,7 @@ class _Page:
         self._status.set_text(say("decide.running") if running else "")
 
     def _show_live(self, shown: Run | None, sketch: Sketch) -> None:
+        self._legend.set_visibility(decides_places(sketch))
         if shown is None:
             self._picture.set_content(team_svg(sketch, {}))
             return
@@ -148,7 +148,8 @@ class _Page:
         unsettled = frozenset(robot.name for robot in sketch.robots if result is None and not live.settled(robot.name))
         aside = frozenset(result.withdrawn if result else ())
         spoken = dict(live.recent) if running else {}
-        picture = team_svg(sketch, values_of(sketch, values), unsettled=unsettled, aside=aside, spoken=spoken)
+        says, targets = values_of(sketch, values), targets_of(sketch, values)
+        picture = team_svg(sketch, says, unsettled=unsettled, aside=aside, spoken=spoken, targets=targets)
         self._picture.set_content(picture)
         self._falling.set_content(falling_svg([*live.costs]))
         facts = [say("decide.live", messages=f"{live.messages:,}", seconds=f"{shown.seconds:.0f}")] if running else []
@@ -184,24 +185,8 @@ class _Page:
                 Doors(self._project, sketch, self._decide)
             if shown.result.assignment:
                 costs = ui.element("div")
-                ui.timer(0, partial(self._show_costs, costs, sketch, shown.result), once=True)
+                ui.timer(0, partial(show_costs, costs, sketch, shown.result), once=True)
             _command(shown)
-
-    async def _show_costs(self, where: ui.element, sketch: Sketch, result: RunResult) -> None:
-        costs = await background.io_bound(paid, sketch, result.assignment)
-        if not costs or where.is_deleted:
-            return
-        with where, ui.element("section").classes("panel"):
-            with ui.element("h2"):
-                ui.label(say("decide.costs"))
-            with ui.element("ul").classes("rules"):
-                for name, cost in sorted(costs.items(), key=lambda one: -one[1]):
-                    rule = sketch.rule(name)
-                    if rule is not None:
-                        with ui.element("li"):
-                            ui.label(sentence(sketch, rule)).classes("words")
-                            says = say("decide.rule-paid", cost=f"{cost:g}") if cost else say("decide.rule-kept")
-                            ui.label(says).classes("cost-paid" if cost else "soft")
 
 
 def _command(shown: Run) -> None:

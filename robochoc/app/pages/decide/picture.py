@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from html import escape
 
+from robochoc.app.pages.decide.ground import Target, brief, decides_places, goers_svg, homes, map_svg, view_box
 from robochoc.app.sketch.sketch import Cell, Decision, Kind, Sketch, Value
 from robochoc.app.texts import say
 
@@ -46,8 +47,9 @@ def team_svg(
     unsettled: frozenset[str] = frozenset(),
     aside: frozenset[str] = frozenset(),
     spoken: Mapping[tuple[str, str], int] = {},
+    targets: Mapping[str, Target] = {},
 ) -> str:
-    """Return the picture. All that users have named is escaped in it.
+    """Return the picture: a map where places are decided. All that users have named is escaped in it.
 
     Args:
         sketch: The team.
@@ -55,17 +57,26 @@ def team_svg(
         unsettled: Whose values may still change: they are grey.
         aside: Who steps aside.
         spoken: How many messages went from whom to whom in the last second.
+        targets: Which cells robots have chosen.
     """
+    if decides_places(sketch):
+        named = len(sketch.robots) <= MOST_NAMED
+        goers = goers_svg(sketch, targets, says, unsettled, aside, named=named)
+        return _svg(view_box(sketch), [*map_svg(sketch), *_messages(homes(sketch), spoken), *goers], len(sketch.robots))
     where = _places(sketch)
     left = min((x for x, _ in where.values()), default=0) - UNIT
     right = max((x for x, _ in where.values()), default=0) + UNIT
     top = min((y for _, y in where.values()), default=0) - UNIT * 0.7
     bottom = max((y for _, y in where.values()), default=0) + UNIT * 0.9
     parts = [*_messages(where, spoken), *_robots(where, says, unsettled, aside)]
-    label = say("decide.picture", count=len(where))
+    return _svg(f"{left:.0f} {top:.0f} {right - left:.0f} {bottom - top:.0f}", parts, len(where))
+
+
+def _svg(view: str, parts: list[str], robots: int) -> str:
+    label = escape(say("decide.picture", count=robots))
     return (
-        f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="{left:.0f} {top:.0f} {right - left:.0f} {bottom - top:.0f}" '
-        f'role="img" aria-label="{escape(label)}">{"".join(parts)}</svg>'
+        f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="{view}" role="img" aria-label="{label}">'
+        f"{''.join(parts)}</svg>"
     )
 
 
@@ -102,7 +113,7 @@ def _robots(
     named = len(where) <= MOST_NAMED
     for robot, (x, y) in where.items():
         kind = "aside" if robot in aside else "unsettled" if robot in unsettled or robot not in says else "settled"
-        says_now = _brief(says.get(robot, "?" if robot not in aside else "-"))
+        says_now = brief(says.get(robot, "?" if robot not in aside else "-"), _BRIEF)
         few = len(says_now) <= _FEW_LETTERS
         width = 2 * _HALF if few else max(2 * _HALF, 6.4 * len(says_now) + 16)
         size = 15 if few else 11
@@ -110,16 +121,12 @@ def _robots(
         yield f'height="{2 * _HALF}" rx="{_HALF}"/>'
         yield f'<text class="value" x="{x:.0f}" y="{y + size * 0.36:.1f}" font-size="{size}">{escape(says_now)}</text>'
         if named:
-            yield f'<text class="who" x="{x:.0f}" y="{y + 33:.0f}">{escape(_brief(robot))}</text>'
+            yield f'<text class="who" x="{x:.0f}" y="{y + 33:.0f}">{escape(brief(robot, _BRIEF))}</text>'
         yield f"<title>{escape(robot)}: {escape(says.get(robot, '?'))}</title></g>"
 
 
-def _brief(text: str) -> str:
-    return text if len(text) <= _BRIEF else f"{text[: _BRIEF - 1]}…"
-
-
 def falling_svg(costs: list[tuple[float, float]]) -> str:
-    """Return how the cost has fallen, as a small line; empty without at least two points."""
+    """Return how the cost has fallen, as a small line with its caption; empty without at least two points."""
     if len(costs) < 2:  # noqa: PLR2004 - a line
         return ""
     first, last = costs[0][0], costs[-1][0]
@@ -130,8 +137,8 @@ def falling_svg(costs: list[tuple[float, float]]) -> str:
     for time_s, cost in costs:
         x, y = (time_s - first) / across * width, height - (cost - low) / along * height
         path += f"H{x:.1f}V{y:.1f}" if path else f"M{x:.1f} {y:.1f}"
+    said = escape(say("decide.falling", first=f"{costs[0][1]:g}", last=f"{low:g}", seconds=f"{last - first:.1f}"))
     return (
-        f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="-3 -3 {width + 6} {height + 6}" role="img" '
-        f'aria-label="{escape(say("decide.falling", first=f"{costs[0][1]:g}", last=f"{low:g}"))}">'
-        f'<path class="falling" d="{path}"/></svg>'
+        f'<figure><svg xmlns="http://www.w3.org/2000/svg" viewBox="-3 -3 {width + 6} {height + 6}" role="img" '
+        f'aria-label="{said}"><path class="falling" d="{path}"/></svg><figcaption>{said}</figcaption></figure>'
     )

@@ -11,6 +11,8 @@ import msgspec
 import pytest
 
 from robochoc.app.pages.decide.answer import headline, table_html
+from robochoc.app.pages.decide.conflict import hints_about_rules
+from robochoc.app.pages.decide.ground import UNIT, Target, shown_part, targets_of
 from robochoc.app.pages.decide.picture import falling_svg, team_svg, values_of
 from robochoc.app.runs.fitting import fitting
 from robochoc.app.runs.options import RunOptions
@@ -18,7 +20,7 @@ from robochoc.app.runs.paid import paid
 from robochoc.app.runs.result import RunResult, decoded
 from robochoc.app.runs.run import Record, Run, State
 from robochoc.app.sketch.building import model_of
-from robochoc.app.sketch.sketch import Cell, Decision, Kind, Sketch, SketchRobot, Value
+from robochoc.app.sketch.sketch import Area, Cell, Decision, Kind, Sketch, SketchRobot, Value
 from tests.support.rule_teams import random_rules
 from tests.support.slot_sketches import slots
 
@@ -48,7 +50,10 @@ def _run(result: RunResult | None, state: State = State.ENDED, message: str = ""
         (_run(RunResult("no-solution")), "There is no solution: the rules cannot all hold."),
         (
             _run(RunResult("optimal", assignment={"a": 1}, withdrawn=("Drone1",), cost=1)),
-            "2 of 3 decide. These step aside, and it is proven that it cannot be fewer, by their weights: Drone1.",
+            (
+                "2 of 3 decide. These step aside, and it is proven that it cannot be fewer, by their weights: Drone1. "
+                "It costs 1."
+            ),
         ),
         (_run(None, State.FAILED, "no such thing"), "It could not be decided: no such thing"),
         (_run(None, State.FAILED, "lost"), "The application ended during this run, and the run with it. Decide again."),
@@ -93,9 +98,56 @@ def test_that_the_picture_shows_who_speaks_and_what_is_not_settled() -> None:
     assert team_svg(sketch, {"Drone1": "2"}).count('class="settled"') == 1
 
 
-def test_that_a_falling_cost_is_a_line() -> None:
+def _places() -> Sketch:
+    """Two robots that choose cells of a map with a wall, and a level besides."""
+    area = Area(4, 3, frozenset({Cell(1, 1)}))
+    robots = (SketchRobot("Ada", Cell(0, 0)), SketchRobot("Ben", Cell(3, 0)))
+    decisions = (Decision("spot", Kind.PLACE), Decision("level", Kind.LEVEL, (1, 2)))
+    return Sketch(area=area, robots=robots, decisions=decisions)
+
+
+def test_that_places_are_drawn_on_the_map_with_an_arrow_from_home() -> None:
+    sketch = _places()
+    assignment: dict[str, Value] = {"Ada.spot": 11, "Ada.level": 2, "Ben.spot": 3, "Ben.level": 1}
+    targets = targets_of(sketch, assignment)
+    assert targets == {"Ada": Target(Cell(3, 2), "2"), "Ben": Target(Cell(3, 0), "1")}
+    made = team_svg(sketch, values_of(sketch, assignment), targets=targets)
+    assert made.count('class="home"') == made.count('class="way"') == 1  # Ben stays where he is
+    assert f'class="wall" d="M{UNIT} {-2 * UNIT}h' in made
+    written = [one.text for one in ET.fromstring(made).iter() if one.get("class") == "value"]  # noqa: S314 - our own
+    assert written == ["Ada · 2", "Ben · 1"]
+    assert "(4, 3) · 2" in made  # it is read aloud
+
+
+def test_that_who_has_no_place_is_drawn_at_home() -> None:
+    sketch = _places()
+    made = team_svg(sketch, {}, aside=frozenset({"Ada"}), targets={"Ada": Target(Cell(3, 2))})
+    assert 'class="home"' not in made
+    assert (made.count('class="aside"'), made.count('class="unsettled"')) == (1, 1)
+
+
+def test_that_of_a_large_map_the_part_is_drawn_that_matters() -> None:
+    robots = (SketchRobot("Ada", Cell(30, 30)),)
+    sketch = Sketch(area=Area(60, 60), robots=robots, decisions=(Decision("spot", Kind.PLACE, (31 * 60 + 33,)),))
+    assert shown_part(sketch) == (Cell(29, 29), Cell(34, 32))
+
+
+def test_that_a_falling_cost_is_a_line_with_a_caption() -> None:
     assert falling_svg([(0.0, 5.0)]) == ""
-    assert "from 9 to 4" in falling_svg([(0.0, 9.0), (1.0, 6.0), (2.0, 4.0)])
+    made = falling_svg([(0.0, 9.0), (1.0, 6.0), (2.0, 4.0)])
+    assert "fell from 9 to 4 in 2.0 s" in ET.fromstring(made)[1].text  # type: ignore[operator] # noqa: S314 - our own
+
+
+def test_that_a_rule_that_nobody_can_keep_is_explained() -> None:
+    sketch = slots(3, 2)
+    assert [(one.element, one.key) for one in hints_about_rules(sketch)] == [("R1", "trouble.never-crowded")]
+    assert hints_about_rules(slots(3, 3)) == []
+
+
+def test_that_what_rules_cost_adds_up_after_somebody_stepped_aside() -> None:
+    sketch = slots(4, 3)
+    values: dict[str, Value] = {"Drone1.slot": 2, "Drone2.slot": 1, "Drone4.slot": 3}
+    assert paid(sketch, values) == {"R2": 6}
 
 
 def test_that_what_rules_cost_is_the_cost_of_the_answer() -> None:

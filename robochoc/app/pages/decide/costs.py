@@ -1,0 +1,51 @@
+"""What the rules cost in an answer: a bar for each, and what they come to together."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from nicegui import run, ui
+
+from robochoc.app.runs.paid import paid
+from robochoc.app.runs.result import RunResult
+from robochoc.app.sketch.sketch import Sketch
+from robochoc.app.sketch.words import sentence
+from robochoc.app.texts import say
+
+MOST_BARS = 40
+"""Rules that have a bar of their own; what others cost stands in one line."""
+
+
+async def show_costs(where: ui.element, sketch: Sketch, result: RunResult) -> None:
+    """Fill `where` with what rules cost, if there are costs. It is found beside the event loop."""
+    costs = await run.io_bound(paid, sketch, result.assignment)
+    if not costs or where.is_deleted:
+        return
+    with where, ui.element("section").classes("panel costs"):
+        with ui.element("h2"):
+            ui.label(say("decide.costs"))
+        if result.withdrawn:
+            ui.label(say("decide.costs-aside")).classes("soft")
+        _bars(sketch, costs)
+
+
+def _bars(sketch: Sketch, costs: Mapping[str, float]) -> None:
+    dearest_first = sorted(costs.items(), key=lambda one: -one[1])
+    most = max(costs.values()) or 1
+    with ui.element("ul").classes("rules"):
+        for name, cost in dearest_first[:MOST_BARS]:
+            rule = sketch.rule(name)
+            _bar(f"{name}: {sentence(sketch, rule)}" if rule else name, cost, most)
+        if rest := dearest_first[MOST_BARS:]:
+            _bar(say("decide.other-rules", count=len(rest)), sum(cost for _, cost in rest), most)
+    with ui.element("p").classes("together"):
+        ui.label(say("decide.together", cost=f"{sum(costs.values()):,g}"))
+
+
+def _bar(words: str, cost: float, most: float) -> None:
+    with ui.element("li"):
+        ui.label(words).classes("words")
+        with ui.element("div").classes("track").props("aria-hidden=true"):
+            ui.element("div").classes("fill").style(f"width: {min(100.0, 100 * cost / most):.1f}%")
+        says = say("decide.rule-paid", cost=f"{cost:,g}") if cost else say("decide.rule-kept")
+        ui.label(says).classes("cost-paid" if cost else "soft")
