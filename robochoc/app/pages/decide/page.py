@@ -16,6 +16,7 @@ from robochoc.app.pages.decide.how import How
 from robochoc.app.pages.decide.picture import falling_svg, team_svg, values_of
 from robochoc.app.pages.shell import while_shown
 from robochoc.app.projects import Project
+from robochoc.app.runs.result import RunResult
 from robochoc.app.runs.run import Run, State
 from robochoc.app.runs.runs import runs_of
 from robochoc.app.sketch.checks import troubles
@@ -40,6 +41,7 @@ class _Page:
         self._run: Run | None = None
         self._end_following: Callable[[], None] | None = None
         self._answered: tuple[object, ...] = ()
+        self._told_below: tuple[object, ...] = ()
         with ui.element("h1"):
             ui.label(say("decide.title"))
         with ui.element("section").classes("decide-top"):
@@ -117,6 +119,13 @@ class _Page:
         if now != self._answered:
             self._answered = now
             self._show_answer(shown, sketch, changed=changed)
+        result = shown and shown.result
+        if (shown, result) != self._told_below:  # not when the state changes: somebody may have clicked there already
+            self._told_below = shown, result
+            self._below.clear()
+            if shown is not None and result is not None:
+                with self._below:
+                    self._show_below(shown, result, sketch)
 
     def _sketch(self) -> Sketch:
         try:
@@ -159,7 +168,6 @@ class _Page:
 
     def _show_answer(self, shown: Run | None, sketch: Sketch, *, changed: bool) -> None:
         self._answer.clear()
-        self._below.clear()
         with self._answer:
             if shown is None:
                 ui.label(say("decide.nothing")).classes("soft")
@@ -180,13 +188,14 @@ class _Page:
                 ui.label(say("decide.changed")).classes("changed")
             if shown.result.assignment:
                 ui.html(table_html(sketch, shown.result), sanitize=False).classes("values")
-        with self._below:
-            if shown.result.verdict == "no-solution":
-                Doors(self._project, sketch, self._decide)
-            if shown.result.assignment:
-                costs = ui.element("div")
-                ui.timer(0, partial(show_costs, costs, sketch, shown.result), once=True)
-            _command(shown)
+
+    def _show_below(self, shown: Run, result: RunResult, sketch: Sketch) -> None:
+        if result.verdict == "no-solution":
+            Doors(self._project, sketch, self._decide)
+        if result.assignment:
+            costs = ui.element("div")
+            ui.timer(0, partial(show_costs, costs, sketch, result), once=True)
+        _command(shown)
 
 
 def _command(shown: Run) -> None:
