@@ -119,7 +119,7 @@ class _Page:
         if now != self._answered:
             self._answered = now
             self._show_answer(shown, sketch, changed=changed)
-        result = shown and shown.result
+        result = shown.result if shown else None
         if (shown, result) != self._told_below:  # not when the state changes: somebody may have clicked there already
             self._told_below = shown, result
             self._below.clear()
