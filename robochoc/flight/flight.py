@@ -68,6 +68,7 @@ class Flight:
         homes: Where they stand in the beginning, in metres: (N, 3).
         conditions: Distance, wind, failures and obstacles.
         progress: Called with what is being done, in words, at every simulated moment that is logged.
+        rises: Whether drones leave the ground, and land, straight up and down where they can.
 
     Raises:
         ValueError: There are no drones, or too many (`quadrotor/bounds.py`); the conditions name others; or homes are
@@ -80,7 +81,10 @@ class Flight:
         homes: Array,
         conditions: FlightConditions,
         progress: Callable[[str], None] | None = None,
+        *,
+        rises: bool = False,
     ) -> None:
+        self._rises = rises
         homes = np.array(homes, dtype=np.float64).reshape(-1, 3)
         check_homes(names, homes)
         conditions.check(names)
@@ -98,13 +102,16 @@ class Flight:
         self._obstacles = np.array(conditions.obstacles, dtype=np.float64).reshape(-1, 3) - self._origin
         self._known = np.zeros(len(self._obstacles), dtype=np.bool_)
         self._seen_s = [0.0] * len(self._obstacles)
+        self._blocks = np.empty((0, 3))
         self._asked: dict[int, Goal] = {}
         self._legs: list[LegTimes] = []
         self._wall_s = 0.0
         self._simulation = QuadrotorSimulation(self.names, self._homes, self._ground, conditions)
         self._hovers = False
 
-    def fly(self, title: str, goals: Mapping[int, Goal], *, stop_on_report: bool = False) -> tuple[Report, ...]:
+    def fly(
+        self, title: str, goals: Mapping[int, Goal], *, stop_on_report: bool = False, blocks: Sequence[Point] = ()
+    ) -> tuple[Report, ...]:
         """Fly one leg, from where all drones are, and return what they report.
 
         Args:
@@ -112,6 +119,7 @@ class Flight:
             goals: Goals by the drones' numbers. A drone without one stays where it is.
             stop_on_report: Whether all drones stop and hover as soon as one has something to report. The goals are then
                 not reached. Without it, nothing is returned.
+            blocks: Points that routes avoid, but for those that are too near to where somebody starts or ends.
 
         Raises:
             ValueError: Two goals are nearer to each other than the distance, a drone has too far to fly, or obstacles
@@ -119,6 +127,7 @@ class Flight:
         """
         began = time.perf_counter()
         with np.errstate(all="ignore"):  # the simulation looks for numbers that are none
+            self._blocks = np.array(blocks, dtype=np.float64).reshape(-1, 3) - self._origin
             leg_goals = self._leg_goals(goals)
             if not self._legs:
                 self._stay()
@@ -210,7 +219,7 @@ class Flight:
         keep = max(CLEARANCE_M, leg_goals.planned(starts))
         ends = np.array([goal.at for goal in leg_goals.goals.values()]).reshape(-1, 3)
         known = self._known | (nearest_distances(self._obstacles, ends) >= keep)
-        hazards = self._hazards(known, keep)
+        hazards = self._hazards(known, keep, np.vstack((starts, leg_goals.places)))
         for drone, what in leg_goals.give_way(hazards, preferred, self._ground):
             simulation.log_event(drone, what)
         routes = self._routes(leg_goals, hazards, starts, delays)
@@ -219,11 +228,16 @@ class Flight:
         unknown = {int(number): self._obstacles[number] for number in np.flatnonzero(~known)}
         return trajectory, encounters(trajectory, unknown, keep)
 
-    def _hazards(self, known: Mask, keep: float) -> Hazards:
-        """Return what routes avoid: fallen drones by the distance, known obstacles by `keep`."""
+    def _hazards(self, known: Mask, keep: float, ends: Array) -> Hazards:
+        """Return what routes avoid: fallen drones by the distance, known obstacles and blocks by `keep`.
+
+        Blocks nearer than that to one of `ends` (K, 3) are not avoided: nobody gives way to them.
+        """
         fallen = self._simulation.places[self._simulation.failed & ~self._simulation.falling]
-        points = np.vstack((fallen, self._obstacles[known]))
-        radii = np.concatenate((np.full(len(fallen), self._distance), np.full(int(known.sum()), keep)))
+        blocks = self._blocks[nearest_distances(self._blocks, ends) >= keep]
+        points = np.vstack((fallen, self._obstacles[known], blocks))
+        kept = int(known.sum()) + len(blocks)
+        radii = np.concatenate((np.full(len(fallen), self._distance), np.full(kept, keep)))
         return Hazards(points, radii)
 
     def _routes(self, leg_goals: LegGoals, hazards: Hazards, starts: Array, delays: Array) -> RoutePlan:
@@ -241,6 +255,7 @@ class Flight:
                 delays=delays[who],
                 limits=LIMITS,
                 ground=self._ground,
+                rises=self._rises,
             )
         except (TooCloseError, NoRouteError) as refused:
             raise ValueError(self._refusal(refused, who)) from refused
@@ -328,9 +343,9 @@ def fly(
         for leg, places in zip(mission.legs, goals, strict=True):
             check_near([names[number] for number in leg.goals], places)
         conditions = replace(conditions, distance=_distance([homes, *goals]))
-    flight = Flight(names, homes, conditions, progress)
-    for leg in mission.legs:
-        flight.fly(leg.opened_by, leg.goals)
+    flight = Flight(names, homes, conditions, progress, rises=mission.rises)
+    for number, leg in enumerate(mission.legs):
+        flight.fly(leg.opened_by, leg.goals, blocks=[block.at for block in mission.blocks if block.leg <= number])
     return flight.flown()
 
 

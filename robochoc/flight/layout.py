@@ -6,11 +6,13 @@ Lengths are in cells. A drone is a little narrower than a cell. An axis maps cel
 from __future__ import annotations
 
 import math
+from collections import Counter
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from itertools import count, product
 
 from robochoc.flight.crafts import Cell, Craft, row_and_column
+from robochoc.flight.ground_map import GroundMap
 
 Point = tuple[float, float, float]
 
@@ -126,11 +128,18 @@ class Layout:
             yield x, y, self.ground
 
 
-def layout_of(crafts: Sequence[Craft], others: Iterable[Craft] = ()) -> Layout:
-    """Return the layout for `crafts`. Its axes also hold `others`: where crafts may be at another time."""
+def layout_of(crafts: Sequence[Craft], others: Iterable[Craft] = (), ground: GroundMap | None = None) -> Layout:
+    """Return the layout for `crafts`. Its axes also hold `others`: where crafts may be at another time.
+
+    With a map of the `ground`, they hold all of it, and robots of one craft have their homes where they stand on it.
+    """
     others = [*others]
     cells = _cells(crafts)
-    axes = _axes(crafts, others, [*cells, *(other.cell for other in others if other.cell)])
+    held = [*cells, *(other.cell for other in others if other.cell)]
+    if ground is not None:
+        cells = _standing(crafts, cells, ground)
+        held += [*cells, (1, 1), (ground.columns, ground.rows)]
+    axes = _axes(crafts, others, held, max(ground.columns, ground.rows) if ground else 0)
     rows, columns, levels = axes
     beside = _lines(rows.low, rows.cells, columns.high + _GAP, 1)
     homes: list[Point] = []
@@ -152,8 +161,19 @@ def _cells(crafts: Sequence[Craft]) -> list[Cell]:
     return [craft.cell or next(grid) for craft in crafts]
 
 
-def _axes(crafts: Sequence[Craft], others: Sequence[Craft], cells: Sequence[Cell]) -> tuple[Axis, Axis, Axis]:
-    most = max(_LEVELS[-1], 3 * math.ceil(math.sqrt(len(crafts))))
+def _standing(crafts: Sequence[Craft], cells: Sequence[Cell], ground: GroundMap) -> list[Cell]:
+    """Return where crafts stand on the map; where their robot has several, or is not on it, their own cells."""
+    count = Counter(craft.robot for craft in crafts)
+    return [
+        ground.starts[craft.robot] if count[craft.robot] == 1 and craft.robot in ground.starts else cell
+        for craft, cell in zip(crafts, cells, strict=True)
+    ]
+
+
+def _axes(
+    crafts: Sequence[Craft], others: Sequence[Craft], cells: Sequence[Cell], side_of_map: int
+) -> tuple[Axis, Axis, Axis]:
+    most = max(_LEVELS[-1], 3 * math.ceil(math.sqrt(len(crafts))), side_of_map)
     names = _axis_names(crafts)
     rows = Axis.over(names[0], (x for x, _ in cells), most=most, scaled=most)
     columns = Axis.over(names[1], (y for _, y in cells), most=most, scaled=most)

@@ -11,6 +11,7 @@ from collections.abc import Container, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 from robochoc.flight.crafts import Craft, craft_of_variable, crafts_of, possible_crafts, row_and_column
+from robochoc.flight.ground_map import GroundMap
 from robochoc.flight.layout import Axis, Layout, Point, layout_of
 from robochoc.model.outcome import EpochOutcome, Outcome, Verdict
 from robochoc.model.priorities import natural_key
@@ -25,6 +26,8 @@ _DENSE_M = 0.025
 _FLOWN_M = 1_000.0
 _FAR_BELOW = 40
 """Levels below all decided ones that are not shown."""
+_BLOCK_HIGH = 0.6
+"""The height of a blocked cell's point above the ground, in cells: a drone at the lowest level has to go over it."""
 
 
 @dataclass(frozen=True)
@@ -58,14 +61,28 @@ class Leg:
 
 
 @dataclass(frozen=True)
+class Block:
+    """A blocked cell of the map: routes keep their distance from the point `at`, from a leg on."""
+
+    at: Point
+    leg: int = 0
+
+
+@dataclass(frozen=True)
 class Mission:
-    """All legs of a run, and the drones that fly them. `axes` are the sides of the box around all places."""
+    """All legs of a run, and the drones that fly them. `axes` are the sides of the box around all places.
+
+    With a map of the ground, drones rise from where they stand before they fly elsewhere (`rises`), and there are
+    `blocks` to be avoided.
+    """
 
     team: str
     drones: tuple[Drone, ...]
     legs: tuple[Leg, ...]
     axes: tuple[Axis, Axis, Axis]
     scale: float
+    rises: bool = False
+    blocks: tuple[Block, ...] = ()
 
     @property
     def ground(self) -> float:
@@ -83,6 +100,7 @@ class MissionBuilder:
         others: Crafts at other times; the box holds them, too.
         leaving: How many drones will leave; None: any may.
         scale: Metres a unit; by default `UNIT_M`, or less where the box would be vast.
+        ground: A map of the ground. Robots whose files name no waypoint then stay where they stand.
     """
 
     def __init__(
@@ -94,13 +112,15 @@ class MissionBuilder:
         others: Iterable[Craft] = (),
         leaving: int | None = None,
         scale: float | None = None,
+        ground: GroundMap | None = None,
     ) -> None:
+        self._ground = ground
         self._robots = {robot.name: robot for robot in robots}
         self._names = [*names]
         crafts = sorted(self._crafts(first), key=lambda craft: (natural_key(craft.name), craft.name))
         self._places = {(craft.robot, craft.name): number for number, craft in enumerate(crafts)}
         self._crafts_in_order = crafts
-        self.layout: Layout = layout_of(crafts, others)
+        self.layout: Layout = layout_of(crafts, others, ground)
         self.scale = _scale(self.layout.axes) if scale is None else scale
         self._edge = self.layout.edge(len(crafts) if leaving is None else leaving)
         self._aside: dict[int, Point] = {}
@@ -129,19 +149,28 @@ class MissionBuilder:
 
     def mission(self, team: str, legs: Iterable[Leg]) -> Mission:
         """Return the mission with these legs."""
-        return Mission(team, self.drones, tuple(legs), self.layout.axes, self.scale)
+        blocks = tuple(self._blocks())
+        return Mission(team, self.drones, tuple(legs), self.layout.axes, self.scale, self._ground is not None, blocks)
+
+    def _blocks(self) -> Iterator[Block]:
+        rows, columns, _ = self.layout.axes
+        for cell in self._ground.blocked if self._ground else ():
+            spot = rows.at(cell.x), columns.at(cell.y), self.layout.ground + _BLOCK_HIGH
+            yield Block(self._metres(spot), cell.epoch)
 
     def _crafts(self, values: Assignment, here: Container[str] | None = None) -> Iterator[Craft]:
         """Yield the crafts of all robots, or of those that are `here`."""
         for name, robot in self._robots.items():
             if here is None or name in here:
-                yield from crafts_of(robot, values)
+                for craft in crafts_of(robot, values):
+                    stays = self._ground is not None and craft.topic is None
+                    yield replace(craft, level=None) if stays else craft
         for name in self._names:
             if here is None or name in here:
                 yield craft_of_variable(name, values) if name in values else Craft(name, row_and_column(name))
 
     def _drone(self, craft: Craft, home: Point) -> Drone:
-        group = craft.cell[0] if craft.cell else round(home[0])
+        group = craft.cell[0] if craft.cell and not self._ground else round(home[0])
         return Drone(craft.name, craft.robot, craft.topic, self._metres(home), group)
 
     def _spot(self, number: int) -> Point:
@@ -154,13 +183,16 @@ class MissionBuilder:
         return x, y, z
 
 
-def mission_of(outcome: Outcome, team: Team | None = None, scale: float | None = None) -> Mission:
+def mission_of(
+    outcome: Outcome, team: Team | None = None, scale: float | None = None, ground: GroundMap | None = None
+) -> Mission:
     """Return what `outcome` asks of the drones.
 
     Args:
         outcome: What was decided.
         team: The team as its files have it, before its scenario. Without it, only names are known.
         scale: Metres a unit; by default `UNIT_M`, or less where the box would be vast.
+        ground: A map of the ground, if there is one.
     """
     epochs = outcome.epochs or (
         EpochOutcome(outcome.verdict, team.order if team else (), assignment=outcome.assignment),
@@ -176,7 +208,9 @@ def mission_of(outcome: Outcome, team: Team | None = None, scale: float | None =
     else:
         robots, names = [], [*first, *outcome.withdrawn]
         others = [craft_of_variable(name, values) for values in decided for name in values]
-    builder = MissionBuilder(robots, first, names=names, others=others, leaving=_leaving(epochs, outcome), scale=scale)
+    builder = MissionBuilder(
+        robots, first, names=names, others=others, leaving=_leaving(epochs, outcome), scale=scale, ground=ground
+    )
     legs = [builder.leg(epoch) for epoch in epochs[:-1]]
     return builder.mission(outcome.team, [*legs, builder.leg(epochs[-1], outcome.withdrawn)])
 

@@ -15,7 +15,7 @@ from robochoc.flight.layout import Axis, Point
 from robochoc.view.keyframes import Keys, Samples, angle, attitude_keys, position_keys
 from robochoc.view.label import label
 from robochoc.view.meshcat_commands import MeshcatCommands, Track
-from robochoc.view.palette import GREY, RED, Colour, colours
+from robochoc.view.palette import GREY, RED, STONE, Colour, colours
 from robochoc.view.playback import DroneState, Playback
 from robochoc.view.quadrotor import HUB, Shape, box, disc, joined_shapes, quadrotor
 from robochoc.view.scene import DrawnDrone, Scene
@@ -53,6 +53,9 @@ _IN_THE_WAY = 0.9
 """The size of an obstacle, in cells."""
 _OPACITIES = {"body": 0.35, "edges": 0.9}
 """Opacities of an obstacle's parts."""
+_BLOCK = 0.94
+"""The width of a blocked cell's block, in cells: one is told from the next."""
+_BLOCK_OPACITY = 0.85
 
 
 def commands(scene: Scene) -> list[bytes]:
@@ -61,7 +64,7 @@ def commands(scene: Scene) -> list[bytes]:
         return _drawn(scene, [drone.end for drone in scene.drones]).commands
     meshcat = _drawn(scene, [drone.home for drone in scene.drones])
     _draw_obstacles(meshcat, [place for _, place in scene.playback.obstacles])
-    _animate(meshcat, scene.drones, scene.playback)
+    _animate(meshcat, scene, scene.playback)
     return meshcat.commands
 
 
@@ -98,6 +101,8 @@ def _drawn(scene: Scene, points: Sequence[Point]) -> MeshcatCommands:
     _aim(meshcat, extent, radius)
     _draw_ground(meshcat, scene, extent)
     _draw_box(meshcat, scene.axes)
+    for since_s, shape in _blocks(scene).items():
+        meshcat.mesh(f"blocks/{since_s:g} s", shape, STONE, _BLOCK_OPACITY)
     _label_axes(meshcat, scene.axes, _TEXT * radius)
     _draw_drones(meshcat, scene.drones, points, radius)
     return meshcat
@@ -229,10 +234,20 @@ def _draw_obstacles(meshcat: MeshcatCommands, obstacles: Sequence[Point]) -> Non
         meshcat.segments(f"obstacles/{number}/edges", _lattice(sides), RED, _OPACITIES["edges"])
 
 
-def _animate(meshcat: MeshcatCommands, drones: Sequence[DrawnDrone], playback: Playback) -> None:
-    paint = row_colours(drones)
+def _blocks(scene: Scene) -> dict[float, Shape]:
+    """Return the blocks of blocked cells, those that appear at the same time as one shape, by that time."""
+    found: dict[float, list[Shape]] = {}
+    for block in scene.blocks:
+        x, y, top = block.top
+        shape = box((x, y, (top + scene.ground) / 2), (_BLOCK, _BLOCK, top - scene.ground))
+        found.setdefault(block.since_s, []).append(shape)
+    return {since_s: joined_shapes(shapes) for since_s, shapes in found.items()}
+
+
+def _animate(meshcat: MeshcatCommands, scene: Scene, playback: Playback) -> None:
+    paint = row_colours(scene.drones)
     tracks: list[Track] = []
-    for number, (drone, colour) in enumerate(zip(drones, paint, strict=True)):
+    for number, (drone, colour) in enumerate(zip(scene.drones, paint, strict=True)):
         path = path_of(number, drone.name)
         tracks += _moves(path, playback, number)
         if playback.states[number]:
@@ -243,6 +258,9 @@ def _animate(meshcat: MeshcatCommands, drones: Sequence[DrawnDrone], playback: P
                 _appearing(f"obstacles/{number}/{part}/<object>", seen_s, opacity)
                 for part, opacity in _OPACITIES.items()
             ]
+    tracks += [
+        _appearing(f"blocks/{since_s:g} s/<object>", since_s, _BLOCK_OPACITY) for since_s in _blocks(scene) if since_s > 0
+    ]
     if tracks:
         meshcat.animate(tracks, FPS)
 

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from html import escape
 
 from robochoc.system.plain_text import printable
-from robochoc.view.palette import GREY, RED, Colour, colours, web
+from robochoc.view.palette import GREY, RED, STONE, Colour, colours, web
 from robochoc.view.playback import DroneState
 from robochoc.view.scene import Scene
 
@@ -47,6 +47,8 @@ def _states(scene: Scene) -> Iterator[str]:
         yield _named(RED, "fallen")
     if scene.playback and scene.playback.obstacles:
         yield _entry(f"{web(RED)}59", "obstacle", "edged")
+    if scene.blocks:
+        yield _named(STONE, "blocked cell")
 
 
 def _named(colour: Colour, text: str) -> str:

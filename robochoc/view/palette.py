@@ -11,6 +11,8 @@ GREY: Colour = (0.62, 0.64, 0.67)
 """Of withdrawn drones."""
 RED: Colour = (0.86, 0.16, 0.18)
 """Of obstacles, and of fallen drones."""
+STONE: Colour = (0.40, 0.44, 0.50)
+"""Of blocked cells."""
 
 _RAMP = np.array(
     [

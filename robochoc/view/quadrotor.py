@@ -50,9 +50,9 @@ def disc(centre: tuple[float, float, float], radius: float, colour: tuple[float,
     return Shape(vertices, faces, np.tile(colour, (sides + 1, 1)))
 
 
-def box(centre: tuple[float, float, float], size: float) -> Shape:
-    """Return a cube, for an obstacle."""
-    corners = np.array([*product((-0.5, 0.5), repeat=3)]) * size + np.array(centre)
+def box(centre: tuple[float, float, float], size: float | tuple[float, float, float]) -> Shape:
+    """Return a box, for an obstacle: a cube, or as wide, deep and high as `size` says."""
+    corners = np.array([*product((-0.5, 0.5), repeat=3)]) * np.array(size) + np.array(centre)
     sides = [(0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3)]
     faces = np.array([face for a, b, c, d in sides for face in ((a, b, c), (a, c, d))])
     return _painted(corners, faces, 1)

@@ -41,6 +41,14 @@ class DrawnDrone:
 
 
 @dataclass(frozen=True)
+class DrawnBlock:
+    """A blocked cell, from second `since_s` on: a block on the ground whose top has its middle at `top`."""
+
+    top: Point
+    since_s: float = 0.0
+
+
+@dataclass(frozen=True)
 class Scene:
     """One run, to be drawn. `facts` is the caption: pairs of a label and a text.
 
@@ -52,6 +60,7 @@ class Scene:
     drones: tuple[DrawnDrone, ...]
     axes: tuple[Axis, Axis, Axis]
     playback: Playback | None = None
+    blocks: tuple[DrawnBlock, ...] = ()
 
     @property
     def ground(self) -> float:
@@ -84,7 +93,8 @@ def scene_of(
     title = f"{outcome.team}: {_headline(outcome, mission, drones, weighted=weighted)}"
     flight = _flight_facts(flown, why_not, is_to_scale=flown_mission is mission)
     playback = playback_of(flown_mission, flown) if flown else None
-    return Scene(title, (*_facts(outcome, mission), *flight), drones, mission.axes, playback)
+    blocks = tuple(_blocks(flown_mission, flown))
+    return Scene(title, (*_facts(outcome, mission), *flight), drones, mission.axes, playback, blocks)
 
 
 def _headline(outcome: Outcome, mission: Mission, drones: Sequence[DrawnDrone], *, weighted: bool | None) -> str:
@@ -109,6 +119,15 @@ def _drones(mission: Mission) -> Iterator[DrawnDrone]:
             yield DrawnDrone(drone.name, drone.group, home, landing=end)
         else:
             yield DrawnDrone(drone.name, drone.group, home, place=end)
+
+
+def _blocks(mission: Mission, flown: FlightLog | None) -> Iterator[DrawnBlock]:
+    """Yield each block. Those of a later leg appear when it begins; of a leg that is not flown, never."""
+    for block in mission.blocks:
+        if flown is None or not block.leg:
+            yield DrawnBlock(_cell(mission, block.at))
+        elif block.leg < len(flown.legs):
+            yield DrawnBlock(_cell(mission, block.at), flown.legs[block.leg].begins_s)
 
 
 def _cell(mission: Mission, metres: Point) -> Point:

@@ -1,5 +1,6 @@
 """Makes what is to be looked at of a run, by robochoc's own commands, each in a process of its own.
 
+map.json             the map of the ground, on which the flight begins
 flight.html          the scene of the flight, which is simulated
 flight.json          how it went
 conversation.html    all messages, as the sniffer shows them
@@ -22,6 +23,9 @@ from importlib.util import find_spec
 from pathlib import Path
 from weakref import WeakValueDictionary
 
+import msgspec
+
+from robochoc.app.flights.ground import MAP, ground_of
 from robochoc.app.runs.options import JOURNAL, RESULT
 from robochoc.app.runs.run import Run
 from robochoc.app.sketch.building import model_of
@@ -148,7 +152,8 @@ class Making:
             if file is None:
                 await self._team_is_there()
                 fresh = f"{RECORDING}.new"
-                await self._ran("fly", RESULT, "--team", self.run.team.name, "--json", "--ros", f"mcap:{fresh}")
+                given = [RESULT, "--team", self.run.team.name, *await asyncio.to_thread(self._map)]
+                await self._ran("fly", *given, "--json", "--ros", f"mcap:{fresh}")
                 file = (self.run.folder / fresh).replace(self.run.folder / RECORDING)
             return file
 
@@ -174,17 +179,25 @@ class Making:
 
     async def _make_flight(self) -> None:
         await self._team_is_there()
-        team = self.run.team.name
+        given = [RESULT, "--team", self.run.team.name, *await asyncio.to_thread(self._map)]
         try:
-            told = await self._ran("fly", RESULT, "--team", team, "--json", "--html", FLIGHT)
+            told = await self._ran("fly", *given, "--json", "--html", FLIGHT)
         except CannotMakeError:  # too near to each other to be flown, say: where they end can be seen all the same
-            await self._ran("animate", RESULT, "--team", team, "--html", FLIGHT)
+            await self._ran("animate", *given, "--html", FLIGHT)
         else:
             await asyncio.to_thread(write_atomically, self.run.folder / FLOWN, told)
 
     async def _make_conversation(self) -> None:
         cut = ["--to", str(MOST_MESSAGES - 1)] if self.is_cut else []
         await self._ran("journal", "export", JOURNAL, "--format", "html", "-o", CONVERSATION, *cut)
+
+    def _map(self) -> list[str]:
+        """Write the map of the ground; return the options that name it. Without a map there are none."""
+        ground = ground_of(self.run)
+        if ground is None:
+            return []
+        write_atomically(self.run.folder / MAP, msgspec.json.encode(ground))
+        return ["--map", MAP]
 
     async def _team_is_there(self) -> None:
         """Write the team's files, if they are not there: a state from elsewhere comes without."""

@@ -16,7 +16,7 @@ import msgspec
 
 from robochoc.app.flights.names import file_name
 from robochoc.app.runs.options import JOURNAL, RESULT
-from robochoc.app.runs.run import RECORD, SKETCH, Record, Run
+from robochoc.app.runs.run import CHANGE, RECORD, SKETCH, Record, Run
 from robochoc.app.sketch.checks import troubles
 from robochoc.app.sketch.files import zipped
 from robochoc.app.sketch.opening import DAMAGED
@@ -24,7 +24,7 @@ from robochoc.app.sketch.sketch import Sketch
 
 MAX_BYTES = 256 << 20
 """Bytes of a run, unpacked."""
-_FILES = (RECORD, SKETCH, RESULT, JOURNAL)
+_FILES = (RECORD, SKETCH, RESULT, JOURNAL, CHANGE)
 _PLACE = "run/1"
 _FIRST = "00001"
 

@@ -7,6 +7,7 @@ run.journal    what was said, while it is said
 result.json    the answer
 errors.txt     what the command had to say besides
 scene.html     the flight, if it was asked for
+change.json    what has happened meanwhile, and the team after it, if something has
 """
 
 from __future__ import annotations
@@ -30,6 +31,7 @@ from robochoc.formats.names import is_name
 
 RECORD = "run.json"
 SKETCH = "sketch.json"
+CHANGE = "change.json"
 ERRORS = "errors.txt"
 MAX_RESULT = 64 << 20
 """A larger result is none of ours."""

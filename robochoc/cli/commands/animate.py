@@ -6,6 +6,7 @@ from pathlib import Path
 
 import click
 
+from robochoc.cli.options.ground import ground_map, map_option
 from robochoc.cli.options.pages import html_option, serve_option
 from robochoc.cli.options.paths import InputPath, refuse_same_places
 from robochoc.cli.options.saved import saved_outcome, saved_team, team_option
@@ -17,9 +18,12 @@ from robochoc.cli.reports.failures import invalid_input_fails
 @html_option("-o", "--output")
 @serve_option
 @team_option
+@map_option
 @click.option("--port", type=click.IntRange(0, 65535), default=0, metavar="N", help="Port of --serve; 0: any free one.")
 @invalid_input_fails
-def animate(saved: Path, html: Path | None, folder: Path | None, port: int, *, serve: bool) -> None:
+def animate(
+    saved: Path, html: Path | None, folder: Path | None, ground: Path | None, port: int, *, serve: bool
+) -> None:
     """Write or show the 3D scene of a saved result: what 'robochoc solve' wrote with --json or --journal.
 
     It is the page of 'robochoc solve --html'. 'robochoc fly' simulates the flight as well.
@@ -34,7 +38,10 @@ def animate(saved: Path, html: Path | None, folder: Path | None, port: int, *, s
         raise click.UsageError("say where to write the page (--html FILE), or show it live (--serve)")
     if port and not serve:
         raise click.UsageError("--port is for --serve")
-    refuse_same_places({"--html": html}, {"the result": saved}, teams=[folder] if folder else [])
+    refuse_same_places({"--html": html}, {"the result": saved, "--map": ground}, teams=[folder] if folder else [])
     outcome = saved_outcome(saved)
     team = saved_team(outcome, saved, folder)
-    show_scene(scene_for(outcome, team), html, serve=serve, port=port)
+    from robochoc.flight.mission import mission_of
+
+    mission = mission_of(outcome, team, ground=ground_map(ground))
+    show_scene(scene_for(outcome, team, mission=mission), html, serve=serve, port=port)

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from robochoc.cli.options.ground import ground_map, map_option
 from robochoc.cli.options.pages import html_option, serve_option
 from robochoc.cli.options.paths import InputPath, refuse_same_places
 from robochoc.cli.options.ros import (
@@ -26,7 +27,7 @@ if TYPE_CHECKING:
 
 
 _SECTIONS: Sections = {
-    COMMON: ("--html", "--serve", "--json", "--team", "--help"),
+    COMMON: ("--html", "--serve", "--json", "--team", "--map", "--help"),
     "Simulated flight": ("--fail", "--distance", "--wind", "--gusts", "--seed"),
     "ROS (docs/guides/ros.md)": ("--ros", "--frame", "--scale"),
 }
@@ -35,6 +36,7 @@ _SECTIONS: Sections = {
 @click.command(cls=SectionedCommand, sections=_SECTIONS)
 @click.argument("saved", type=InputPath(), metavar="RESULT.json|JOURNAL")
 @team_option
+@map_option
 @ros_options
 @flight_options
 @click.option("--seed", type=click.IntRange(0), default=0, show_default=True, metavar="N", help="Seed of --gusts.")
@@ -57,7 +59,7 @@ def fly(saved: Path, folder: Path | None, html: Path | None, *, serve: bool, as_
 
     refuse_same_places(
         {"--html": html},
-        {"the result": saved},
+        {"the result": saved, "--map": given["ground"]},
         teams=[folder] if folder else [],
         more_outputs=sink_places(given["sinks"]),
     )
@@ -67,7 +69,7 @@ def fly(saved: Path, folder: Path | None, html: Path | None, *, serve: bool, as_
         raise click.UsageError("--ros publishes on the topics that robots' files name: give their folder with --team")
     from robochoc.flight.mission import mission_of
 
-    mission = mission_of(outcome, team, given["scale"])
+    mission = mission_of(outcome, team, given["scale"], ground_map(given["ground"]))
     flown, published = _flown(saved, mission, given)
     click.echo(flight_json(mission, flown) if as_json else flight_report(mission, flown))
     if not as_json:

@@ -36,11 +36,15 @@ _RADII = (1.0, math.sqrt(2), 2.0, 3.0)
 
 @dataclass(frozen=True)
 class Space:
-    """The space for paths: at least `distance` from points at rest, not below `ground`. `sky` is above all points."""
+    """The space for paths: at least `distance` from points at rest, not below `ground`. `sky` is above all points.
+
+    With `rises`, drones leave the ground, and land, straight up and down where they can.
+    """
 
     distance: float
     ground: float
     sky: float
+    rises: bool = False
 
     @property
     def least(self) -> float:
@@ -61,8 +65,8 @@ class Space:
         return not self.near(path[:-1], path[1:], points).any()
 
     def slides(self, starts: Array, goals: Array) -> Flags:
-        """Return which straight lines (K,) lead along the ground, where drones do not fly."""
-        low = np.maximum(starts[:, 2], goals[:, 2]) < self.off
+        """Return which straight lines (K,) lead along the ground, where drones do not fly; or aslant from it or to it."""
+        low = (np.minimum if self.rises else np.maximum)(starts[:, 2], goals[:, 2]) < self.off
         flags: Flags = low & (starts[:, :2] != goals[:, :2]).any(axis=1)
         return flags
 
@@ -76,7 +80,7 @@ class Space:
         lowest, highest = self._reach(goal, points)
         floor = min(self.ground + self.distance, max(start[2], goal[2]))
         if self.slides(start[None], goal[None])[0]:
-            floor = self.ground + self.distance
+            floor = max([self.ground + self.distance, *((start[2], goal[2]) if self.rises else ())])
         low, high = max(least, lowest, floor), min(most, highest, self.sky)
         heights = _outside(self._walls(start[:2], goal[:2], points), low, high, (start[2], goal[2]))
         lower, upper = sorted((float(start[2]), float(goal[2])))

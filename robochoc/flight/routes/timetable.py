@@ -52,6 +52,7 @@ def plan_routes(
     delays: Array | None = None,
     limits: MotionLimits | None = None,
     ground: float = 0.0,
+    rises: bool = False,
 ) -> RoutePlan:
     """Return how N drones fly from `starts` to `goals`, never nearer to each other than `distance`.
 
@@ -65,6 +66,7 @@ def plan_routes(
         delays: (N,): a drone does not begin before that second.
         limits: Speed and acceleration of all drones.
         ground: No drone flies lower, except for starts and goals.
+        rises: Drones leave the ground, and land, straight up and down where they can.
 
     Raises:
         TooCloseError: Two starts, or two goals, or one of them and a standing point, are nearer than `distance`.
@@ -80,7 +82,7 @@ def plan_routes(
     check_spacing(starts, standing, distance, "start")
     check_spacing(goals, standing, distance, "goal")
     heights = np.concatenate((starts[:, 2], goals[:, 2], standing[:, 2], [ground]))
-    space = Space(distance, ground, float(heights.max()) + 2 * distance)
+    space = Space(distance, ground, float(heights.max()) + 2 * distance, rises)
     table = _Timetable(starts, space, limits or MotionLimits(), delays)
     for move in moves_between(starts, goals, standing, space, delays):
         table.add(move)

@@ -16,7 +16,7 @@ from robochoc.app.listeners import Listeners
 from robochoc.app.pages.whatif.outcome import Outcome, Part, outcome, part_of, parts_of_epochs
 from robochoc.app.projects import Project
 from robochoc.app.runs.options import RunOptions
-from robochoc.app.runs.run import Run, State
+from robochoc.app.runs.run import CHANGE, Run, State
 from robochoc.app.runs.runs import runs_of
 from robochoc.app.sketch.building import model_of
 from robochoc.app.sketch.changes import AnyChange, changed, told
@@ -35,7 +35,6 @@ PURPOSE = "whatif"
 BESIDE = "whatif-anew"
 """What the run beside it is for: the changed team alone, which decides anew."""
 _STORY = "whatif.json"
-_CHANGE = "change.json"
 MOST_CHANGES = 50
 
 
@@ -202,14 +201,14 @@ class Story:
         if run is None or run.state is State.RUNNING:
             return
         with suppress(OSError, msgspec.DecodeError, ValueError, RecursionError):
-            self.kept = msgspec.json.decode((run.folder / _CHANGE).read_bytes(), type=Kept)
+            self.kept = msgspec.json.decode((run.folder / CHANGE).read_bytes(), type=Kept)
             self.run, self.beside = run, runs.find(self.kept.beside) if self.kept.beside else None
             self._later(self._conclude)
 
     def _keep(self) -> None:
         if self.run and self.kept:
             with suppress(OSError):
-                (self.run.folder / _CHANGE).write_bytes(msgspec.json.encode(self.kept))
+                (self.run.folder / CHANGE).write_bytes(msgspec.json.encode(self.kept))
 
     def _possible(self) -> tuple[AnyChange, ...]:
         """Return the changes that can happen to the team as it is now."""
