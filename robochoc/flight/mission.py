@@ -203,8 +203,9 @@ def mission_of(
         first = {**values, **first}
     if team is not None:
         robots, names = all_robots(team), []
-        others = [craft for values in decided for robot in robots for craft in crafts_of(robot, values)]
-        others += _lowest(robots, others)
+        sent = robots if ground is None else [robot for robot in robots if robot.topics]
+        others = [craft for values in decided for robot in sent for craft in crafts_of(robot, values)]
+        others += _lowest(sent, others)
     else:
         robots, names = [], [*first, *outcome.withdrawn]
         others = [craft_of_variable(name, values) for values in decided for name in values]

@@ -259,7 +259,9 @@ def _animate(meshcat: MeshcatCommands, scene: Scene, playback: Playback) -> None
                 for part, opacity in _OPACITIES.items()
             ]
     tracks += [
-        _appearing(f"blocks/{since_s:g} s/<object>", since_s, _BLOCK_OPACITY) for since_s in _blocks(scene) if since_s > 0
+        _appearing(f"blocks/{since_s:g} s/<object>", since_s, _BLOCK_OPACITY)
+        for since_s in _blocks(scene)
+        if since_s > 0
     ]
     if tracks:
         meshcat.animate(tracks, FPS)

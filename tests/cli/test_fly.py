@@ -293,3 +293,21 @@ def test_too_many_drones_are_told_soon(tmp_path: Path) -> None:
     result = ran("fly", saved(tmp_path, {f"V{number}": 1 for number in range(1001)}))
     assert result.exit_code == 1
     assert "1,001 drones are more than can be flown at a time (1,000)" in result.stderr
+
+
+def test_a_map_says_where_it_begins(tmp_path: Path) -> None:
+    ground = tmp_path / "map.json"
+    ground.write_text(json.dumps({"columns": 4, "rows": 4, "starts": {"A": [3, 4]}, "blocked": [{"x": 4, "y": 4}]}))
+    result = saved(tmp_path, planar(2))
+    page = tmp_path / "flight.html"
+    told = flown(result, "--map", ground, "--html", page)
+    assert told["as_planned"]
+    assert b"blocked cell" in page.read_bytes()
+    assert ran("animate", result, "--map", ground, "--html", page).exit_code == 0
+    assert b"blocked cell" in page.read_bytes()
+    ground.write_text('{"columns": 4, "rows": 4, "starts": {"A": [5, 4]}}')
+    for command in ("fly", "animate"):
+        refused = ran(command, result, "--map", ground, "--html", page)
+        assert refused.exit_code == 1
+        assert "A is at (5, 4), beside the map of 4 x 4 cells" in refused.stderr
+    assert ran("fly", result, "--map", ground, "--html", ground).exit_code == 2
