@@ -22,6 +22,7 @@ from dataclasses import replace
 import numpy as np
 import numpy.typing as npt
 
+from robochoc.flight.layout import Point
 from robochoc.flight.log import SAMPLE_RATE_HZ, FlightLog, LegTimes
 from robochoc.flight.mission import Goal, Mission
 from robochoc.flight.quadrotor.airframe import Array

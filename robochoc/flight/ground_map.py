@@ -47,6 +47,8 @@ def read_ground_map(content: bytes) -> GroundMap:
     Raises:
         ValueError: It is not a map, or something lies beside it.
     """
+    if len(content) > MAX_BYTES:
+        raise ValueError(f"it has more than {MAX_BYTES:,} bytes")
     try:
         found = msgspec.json.decode(content, type=GroundMap)
     except (msgspec.DecodeError, RecursionError) as error:

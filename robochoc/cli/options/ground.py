@@ -32,8 +32,6 @@ def ground_map(file: Path | None) -> GroundMap | None:
     try:
         with file.open("rb") as stream:
             content = stream.read(MAX_BYTES + 1)
-        if len(content) > MAX_BYTES:
-            raise ValueError(f"it has more than {MAX_BYTES:,} bytes")
         return read_ground_map(content)
     except OSError as error:
         raise Failure(INVALID, on_one_line(f"{file}: {error.strerror or error}")) from error

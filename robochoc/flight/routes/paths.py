@@ -65,7 +65,7 @@ class Space:
         return not self.near(path[:-1], path[1:], points).any()
 
     def slides(self, starts: Array, goals: Array) -> Flags:
-        """Return which straight lines (K,) lead along the ground, where drones do not fly; or aslant from it or to it."""
+        """Return which straight lines (K,) lead along the ground; or, with `rises`, aslant from it or to it."""
         low = (np.minimum if self.rises else np.maximum)(starts[:, 2], goals[:, 2]) < self.off
         flags: Flags = low & (starts[:, :2] != goals[:, :2]).any(axis=1)
         return flags
