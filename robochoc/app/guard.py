@@ -4,7 +4,10 @@ from __future__ import annotations
 
 import hmac
 from collections.abc import Awaitable, Callable, MutableMapping
+from contextlib import suppress
 from typing import Any
+
+from starlette.requests import ClientDisconnect
 
 Scope = MutableMapping[str, Any]
 Receive = Callable[[], Awaitable[MutableMapping[str, Any]]]
@@ -19,6 +22,18 @@ _HEADERS = (
     (b"cross-origin-resource-policy", b"same-origin"),
     (b"cross-origin-opener-policy", b"same-origin"),
 )
+MOST_BYTES = (64 << 20) + (1 << 16)
+"""Bytes that are taken of one request: the largest file that is opened, and what a form adds to it."""
+_METHODS = frozenset({"GET", "HEAD", "POST"})
+"""POST: files that are opened, and sockets of browsers that have no better one."""
+_MOST_DIGITS = 12
+_POLICY = (
+    "default-src 'self'; "
+    "script-src 'self' 'unsafe-inline' 'unsafe-eval'; "  # NiceGUI makes its pages of both
+    "style-src 'self' 'unsafe-inline'; img-src 'self' data: blob:; font-src 'self' data:; "
+    "connect-src 'self' ws://{host}; object-src 'none'; base-uri 'none'; form-action 'none'; frame-ancestors 'self'"
+)
+"""What a page may do that has no policy of its own: nothing is loaded from elsewhere, and nothing is sent there."""
 
 
 class Guard:
@@ -39,12 +54,26 @@ class Guard:
         if scope["type"] == "lifespan":
             await self.app(scope, receive, send)
         elif (status := self._refused(scope)) is None:
-            await self.app(scope, receive, self._with_headers(send))
+            await self._serve(scope, receive, send)
         elif scope["type"] == "websocket":
             await send({"type": "websocket.close", "code": 1008})
         else:
-            await send({"type": "http.response.start", "status": status, "headers": [(b"content-type", b"text/plain")]})
-            await send({"type": "http.response.body", "body": str(status).encode()})
+            await _answer(send, status)
+
+    async def _serve(self, scope: Scope, receive: Receive, send: Send) -> None:
+        taken = _Taken(receive)
+        begun = False
+
+        async def sending(message: MutableMapping[str, Any]) -> None:
+            nonlocal begun
+            if begun or not taken.too_much:  # else it says that it has failed, and we say why
+                begun = True
+                await send(message)
+
+        with suppress(ClientDisconnect):  # it has gone before all of its file was here, or sends too much
+            await self.app(scope, taken, self._with_headers(scope, sending))
+        if taken.too_much and not begun:
+            await _answer(send, 413)
 
     def _refused(self, scope: Scope) -> int | None:
         """Return the HTTP status of a request that is refused; None: it is served."""
@@ -56,14 +85,45 @@ class Guard:
         origin = headers.get(b"origin")
         if origin is not None and origin != b"http://" + host:
             return 403
+        if scope.get("method", "GET") not in _METHODS:
+            return 405
+        length = headers.get(b"content-length", b"0")
+        if not length.isdigit() or len(length) > _MOST_DIGITS or int(length) > MOST_BYTES:
+            return 413
         return None
 
-    def _with_headers(self, send: Send) -> Send:
+    def _with_headers(self, scope: Scope, send: Send) -> Send:
+        policy = _POLICY.format(host=dict(scope["headers"])[b"host"].decode()).encode()
+        ours = (*_HEADERS, (b"content-security-policy", policy))
+
         async def sending(message: MutableMapping[str, Any]) -> None:
             if message["type"] == "http.response.start":
                 known = {name.lower() for name, _ in message.get("headers", ())}
-                more = [one for one in _HEADERS if one[0] not in known]
+                more = [one for one in ours if one[0] not in known]
                 message = {**message, "headers": [*message.get("headers", ()), *more]}
             await send(message)
 
         return sending
+
+
+class _Taken:
+    """Receives a request; of one that is too long, whatever it says of its length, as if its sender had gone."""
+
+    def __init__(self, receive: Receive) -> None:
+        self.too_much = False
+        self._receive, self._left = receive, MOST_BYTES
+
+    async def __call__(self) -> MutableMapping[str, Any]:
+        message = await self._receive()
+        if message["type"] == "http.request":
+            self._left -= len(message.get("body", b""))
+            if self._left < 0:
+                self.too_much = True
+                return {"type": "http.disconnect"}
+        return message
+
+
+async def _answer(send: Send, status: int) -> None:
+    headers = [(b"content-type", b"text/plain"), (b"connection", b"close")]
+    await send({"type": "http.response.start", "status": status, "headers": headers})
+    await send({"type": "http.response.body", "body": str(status).encode()})

@@ -17,6 +17,7 @@ import msgspec
 from robochoc.app.flights.names import file_name
 from robochoc.app.runs.options import JOURNAL, RESULT
 from robochoc.app.runs.run import CHANGE, RECORD, SKETCH, Record, Run
+from robochoc.app.sketch.archives import bounded_archive
 from robochoc.app.sketch.checks import troubles
 from robochoc.app.sketch.files import zipped
 from robochoc.app.sketch.opening import DAMAGED
@@ -75,7 +76,7 @@ def unpack_run(file: Path, folder: Path) -> bool:
         OSError: if it cannot be written.
     """
     try:
-        with zipfile.ZipFile(file) as archive:
+        with bounded_archive(file) as archive:
             found = _found(archive)
     except DAMAGED:
         return False

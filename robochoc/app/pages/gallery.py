@@ -66,7 +66,8 @@ def _own_card(projects: Projects, name: str) -> None:
     says = say("app.damaged") if sketch is None else counted(len(sketch.robots))
     with _card(title, says, partial(open_team, name), sketch=sketch):
         button = ui.button(icon="close", on_click=partial(_ask_to_remove, projects, name, title)).classes("remove")
-        button.props(f'flat round dense size=sm aria-label="{say("gallery.remove", name=title)}"')
+        button.props("flat round dense size=sm")
+        button.props["aria-label"] = say("gallery.remove", name=title)  # `props` would parse what the name has in it
 
 
 def _ask_to_remove(projects: Projects, name: str, title: str) -> None:

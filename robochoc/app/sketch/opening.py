@@ -10,6 +10,7 @@ import zlib
 from dataclasses import dataclass, replace
 from pathlib import Path, PurePosixPath
 
+from robochoc.app.sketch.archives import bounded_archive
 from robochoc.app.sketch.files import MAX_SKETCH, sketch_in
 from robochoc.app.sketch.sketch import Sketch
 from robochoc.formats import Diagnostic, InvalidInputError, read_team, write_team
@@ -141,7 +142,7 @@ def _unpack(path: Path, folder: Path) -> None:
     """Write the files of a team that are in an archive into a folder, within bounds. No path leads out of it."""
     taken: set[str] = set()
     left = MAX_BYTES
-    with zipfile.ZipFile(path) as archive:
+    with bounded_archive(path) as archive:
         for member in archive.infolist():
             match = _PARTS.fullmatch(member.filename)
             if match is None or member.is_dir() or ".." in PurePosixPath(member.filename).parts:

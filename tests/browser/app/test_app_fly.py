@@ -128,6 +128,13 @@ def test_a_report_opens_by_itself_without_a_network(
             tab.page.click("[aria-label='Report: Save']")
         assert saved.value.suggested_filename == "Duo.html"
         saved.value.save_as(report)
+        served = tab.page.evaluate("document.querySelector('[aria-label=\"Report: Save\"]').href")
+    with watched_page(browser) as tab:  # a tab of its own is apart from the application, from which it comes
+        tab.page.goto(served)
+        tab.page.wait_for_selector(f"text={HOSTILE}")
+        assert tab.page.evaluate("self.origin") == "null"
+        plays = "Boolean(globalThis.Playback)"  # `wait_for_function` evaluates text, which the report does not allow
+        wait_until(lambda: tab.page.frames[1].evaluate(plays), "the scene in it has not begun")
     with _opened(browser, report.as_uri()) as tab:
         tab.page.wait_for_selector(f"text={HOSTILE}")
         frames = tab.page.frames[1:]

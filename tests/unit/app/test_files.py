@@ -13,7 +13,8 @@ import pytest
 from hypothesis import HealthCheck, given
 from hypothesis import strategies as st
 
-from robochoc.app.sketch import files, opening
+from robochoc.app.flights.state import unpack_run
+from robochoc.app.sketch import archives, files, opening
 from robochoc.app.sketch.building import decided, model_of
 from robochoc.app.sketch.examples import KEYS, example
 from robochoc.app.sketch.files import save, xml_sources, zipped
@@ -188,6 +189,17 @@ def test_mistakes_in_an_archive_are_told_by_the_names_in_it(tmp_path: Path) -> N
 
 def test_an_archive_of_two_teams_is_refused(tmp_path: Path) -> None:
     assert "twice" in refused(archive(tmp_path / "a.zip", ("one/A.xml", b""), ("two/A.xml", b"")))
+
+
+def test_an_archive_that_lists_a_million_files_is_refused_before_the_list_is_read(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(archives.Bounded, "most", 5_000)
+    assert "lists too many files" in refused(archive(tmp_path / "a.zip", *((f"{n}.txt", b"") for n in range(100))))
+    assert not unpack_run(tmp_path / "a.zip", tmp_path)
+    archive(tmp_path / "b.zip", ("A.txt", b"0" * 10_000))
+    with archives.bounded_archive(tmp_path / "b.zip") as found:
+        assert len(found.read("A.txt")) == 10_000
 
 
 @pytest.mark.parametrize(

@@ -7,11 +7,16 @@ from collections.abc import MutableMapping
 from typing import Any
 
 import pytest
+from starlette.requests import Request
+from starlette.responses import PlainTextResponse
 
-from robochoc.app.guard import Guard
+from robochoc.app import guard
+from robochoc.app.guard import Guard, Served
 
 SECRET = "secret"  # noqa: S105 - of a test
 HERE = b"127.0.0.1:8000"
+SAME = {"host": HERE, "origin": b"http://" + HERE}
+_PIECE = 1 << 20
 
 
 async def _inside(scope: MutableMapping[str, Any], _receive: object, send: Any) -> None:  # noqa: ANN401 - ASGI's
@@ -22,39 +27,52 @@ async def _inside(scope: MutableMapping[str, Any], _receive: object, send: Any) 
         await send({"type": "http.response.body", "body": b"inside"})
 
 
-def _asked(path: str, *, kind: str = "http", **headers: bytes) -> list[dict[str, Any]]:
-    """What is answered to a request."""
+def _asked(
+    path: str,
+    headers: dict[str, bytes],
+    *,
+    kind: str = "http",
+    method: str = "GET",
+    served: Served = _inside,
+    sends: int = 0,
+) -> list[dict[str, Any]]:
+    """What is answered to a request that sends so many bytes, in pieces without an end."""
+    left = sends
     answers: list[dict[str, Any]] = []
 
     async def send(message: MutableMapping[str, Any]) -> None:
         answers.append(dict(message))
 
     async def receive() -> MutableMapping[str, Any]:
-        return {"type": f"{kind}.request"}
+        nonlocal left
+        piece = min(left, _PIECE)
+        left -= piece
+        return {"type": f"{kind}.request", "body": bytes(piece), "more_body": left > 0}
 
-    scope = {"type": kind, "path": path, "headers": [(name.encode(), value) for name, value in headers.items()]}
-    asyncio.run(Guard(_inside, SECRET, 8000)(scope, receive, send))
+    named = [(name.encode(), value) for name, value in headers.items()]
+    scope = {"type": kind, "path": path, "headers": named} | ({"method": method} if kind == "http" else {})
+    asyncio.run(Guard(served, SECRET, 8000)(scope, receive, send))
     return answers
 
 
 def test_a_browser_of_this_machine_with_the_path_is_served() -> None:
-    first, body = _asked("/secret/", host=HERE, origin=b"http://" + HERE)
+    first, body = _asked("/secret/", SAME)
     assert (first["status"], body["body"]) == (200, b"inside")
 
 
 @pytest.mark.parametrize("host", [b"evil.example:8000", b"127.0.0.1", b"127.0.0.1:8001", b"", b"secret"])
 def test_another_name_of_this_machine_is_not_found(host: bytes) -> None:
-    assert _asked("/secret/", host=host)[0]["status"] == 404
+    assert _asked("/secret/", {"host": host})[0]["status"] == 404
 
 
 @pytest.mark.parametrize("path", ["/", "", "/secre/", "/secrets/", "/x/secret/", "//secret/", "/SECRET/", "/sécret/"])
 def test_without_the_secret_path_nothing_is_found(path: str) -> None:
-    assert _asked(path, host=HERE)[0]["status"] == 404
+    assert _asked(path, {"host": HERE})[0]["status"] == 404
 
 
 @pytest.mark.parametrize("origin", [b"https://evil.example", b"null", b"http://127.0.0.1:8001", b"https://" + HERE])
 def test_a_page_of_another_site_is_refused(origin: bytes) -> None:
-    assert _asked("/secret/", host=HERE, origin=origin)[0]["status"] == 403
+    assert _asked("/secret/", {"host": HERE, "origin": origin})[0]["status"] == 403
 
 
 @pytest.mark.parametrize(
@@ -66,15 +84,52 @@ def test_a_page_of_another_site_is_refused(origin: bytes) -> None:
     ],
 )
 def test_its_sockets_are_refused_as_well(path: str, headers: dict[str, bytes]) -> None:
-    assert _asked(path, kind="websocket", **headers) == [{"type": "websocket.close", "code": 1008}]
+    assert _asked(path, headers, kind="websocket") == [{"type": "websocket.close", "code": 1008}]
 
 
 def test_a_socket_of_its_own_page_is_accepted() -> None:
-    assert _asked("/secret/ws", kind="websocket", host=HERE, origin=b"http://" + HERE) == [{"type": "websocket.accept"}]
+    assert _asked("/secret/ws", SAME, kind="websocket") == [{"type": "websocket.accept"}]
 
 
 def test_answers_may_not_be_kept_nor_framed_elsewhere() -> None:
-    headers = dict(_asked("/secret/", host=HERE)[0]["headers"])
+    headers = dict(_asked("/secret/", {"host": HERE})[0]["headers"])
     assert headers[b"cache-control"] == b"no-store"
     assert headers[b"x-frame-options"] == b"SAMEORIGIN"
     assert headers[b"referrer-policy"] == b"no-referrer"
+
+
+@pytest.mark.parametrize("method", ["PUT", "DELETE", "OPTIONS", "TRACE", "PROPFIND", "get", ""])
+def test_other_methods_are_refused(method: str) -> None:
+    assert _asked("/secret/", {"host": HERE}, method=method)[0]["status"] == 405
+
+
+@pytest.mark.parametrize("length", [b"%d" % (guard.MOST_BYTES + 1), b"9" * 5_000, b"-1", b"1e3", b"0x10"])
+def test_what_is_too_long_is_refused_before_it_is_read(length: bytes) -> None:
+    told = _asked("/secret/", {"host": HERE, "content-length": length}, method="POST")
+    assert (told[0]["status"], len(told)) == (413, 2)
+
+
+async def _reads(scope: MutableMapping[str, Any], receive: Any, send: Any) -> None:  # noqa: ANN401 - ASGI's
+    body = await Request(scope, receive).body()
+    await PlainTextResponse(str(len(body)))(scope, receive, send)
+
+
+@pytest.mark.parametrize(("sends", "status"), [(3 * _PIECE, 200), (3 * _PIECE + 1, 413)])
+def test_what_does_not_say_how_long_it_is_is_counted(monkeypatch: pytest.MonkeyPatch, sends: int, status: int) -> None:
+    monkeypatch.setattr(guard, "MOST_BYTES", 3 * _PIECE)
+    told = _asked("/secret/", {"host": HERE}, method="POST", served=_reads, sends=sends)
+    assert told[0]["status"] == status
+    assert [one["type"] for one in told] == ["http.response.start", "http.response.body"]
+
+
+def test_a_page_loads_nothing_from_elsewhere_unless_it_says_what() -> None:
+    policy = dict(_asked("/secret/", {"host": HERE})[0]["headers"])[b"content-security-policy"].decode()
+    assert f"connect-src 'self' ws://{HERE.decode()};" in policy
+    assert "http:" not in policy
+    assert "*" not in policy
+
+    async def own(scope: MutableMapping[str, Any], receive: Any, send: Any) -> None:  # noqa: ANN401 - ASGI's
+        await PlainTextResponse("", headers={"Content-Security-Policy": "sandbox"})(scope, receive, send)
+
+    headers = _asked("/secret/", {"host": HERE}, served=own)[0]["headers"]
+    assert [value for name, value in headers if name == b"content-security-policy"] == [b"sandbox"]

@@ -9,6 +9,7 @@ from nicegui import run, ui
 
 from robochoc.app.pages.compare.lines import show_lines
 from robochoc.app.pages.compare.served import REPORT
+from robochoc.app.pages.numbers import whole
 from robochoc.app.pages.shell import while_shown
 from robochoc.app.projects import Project
 from robochoc.app.sketch.sketch import Sketch
@@ -150,8 +151,8 @@ class ComparePage:
         return Question(
             tuple(name for name, box in self._boxes.items() if box.value),
             family=self._kind.value == _FAMILY,
-            runs=_within(self._runs.value, MOST_RUNS),
-            timeout=_within(self._timeout.value, MOST_SECONDS),
+            runs=whole(self._runs.value, 1, MOST_RUNS, otherwise=1),
+            timeout=whole(self._timeout.value, 1, MOST_SECONDS, otherwise=1),
         )
 
     def _show_study(self) -> None:
@@ -252,10 +253,6 @@ def _message(text: str, *, bad: bool = False) -> None:
 
 def _number(key: str, value: int, most: int) -> ui.number:
     return ui.number(label=say(key), value=value, min=1, max=most, precision=0).props("dense outlined").classes("count")
-
-
-def _within(value: float | None, most: int) -> int:
-    return min(max(int(value or 1), 1), most)
 
 
 def _heading(tag: str, key: str) -> None:

@@ -25,4 +25,5 @@ def install_reports(projects: Projects) -> None:
             file = None
         if file is None:
             return Response(status_code=404)
-        return FileResponse(file, media_type="text/html", headers={"Content-Security-Policy": "frame-ancestors 'self'"})
+        policy = "sandbox allow-popups; frame-ancestors 'self'"
+        return FileResponse(file, media_type="text/html", headers={"Content-Security-Policy": policy})

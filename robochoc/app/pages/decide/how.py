@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+from math import inf
+
 from nicegui import run, ui
 
+from robochoc.app.pages.numbers import whole
 from robochoc.app.projects import Project
 from robochoc.app.runs.fitting import Fitting, fitting
 from robochoc.app.runs.options import MAX_SEED, RunOptions
@@ -34,12 +37,12 @@ class How:
 
     def options(self, *, withdraw: bool = False, scene: bool = False) -> RunOptions:
         """Return what is set. What cannot be is left to the usual."""
-        limit, seed = self._limit.value, self._seed.value
+        limit = self._limit.value
         return RunOptions(
             protocol=str(self._protocol.value or AUTO)[:MAX_LABEL],
             runtime=str(Runtime(self._runtime.value or Runtime.SIMULATOR)),
-            seed=int(min(max(seed or 0, 0), MAX_SEED)),
-            timeout=float(limit) if limit and limit > 0 else None,
+            seed=whole(self._seed.value, 0, MAX_SEED, otherwise=0),
+            timeout=float(limit) if limit and 0 < limit < inf else None,
             withdraw=withdraw,
             scene=scene,
         )

@@ -29,6 +29,8 @@ STATE = "state.zip"
 MOST_IN_REPORT = 24 << 20
 """Bytes of a page that a report contains: with a larger one it could hardly be sent to anybody."""
 _HEADERS = {"Content-Security-Policy": "frame-ancestors 'self'"}
+_APART = {"Content-Security-Policy": "sandbox allow-scripts allow-popups allow-downloads; frame-ancestors 'self'"}
+"""Of a document that nothing here has to reach into: for the browser it is of another origin than the application."""
 
 
 def address(team: str, run: Run, file: str) -> str:
@@ -72,7 +74,7 @@ def _made(run: Run, file: str) -> Response:
     match file:
         case "report.html":
             content = report(sketch, run, Pages(_content(run, FLIGHT), _content(run, CONVERSATION)), __version__)
-            return Response(content, media_type="text/html", headers=_HEADERS)
+            return Response(content, media_type="text/html", headers=_APART)
         case "team.zip":
             return _saved(team_archive(run), "application/zip", file_name(sketch.name, ".zip"))
         case "state.zip":

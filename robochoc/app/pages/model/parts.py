@@ -99,7 +99,7 @@ def number_field(key: str, least: int, most: int, changed: Callable[[int], str |
     """Add a field for an integer. `changed` makes the edit, and returns what is wrong with it."""
 
     def check(value: float | None) -> str | None:
-        if value is None or value != int(value) or not least <= value <= most:
+        if value is None or not least <= value <= most or value != int(value):  # NaN is in no bounds
             return say("model.number", least=least, most=most)
         return changed(int(value))
 

@@ -10,6 +10,7 @@ from nicegui import run, ui
 
 from robochoc.app.pages.model.board import Board, Clicked, Told
 from robochoc.app.pages.model.picture import LinksDrawn, links_of, robots_of
+from robochoc.app.pages.numbers import whole
 from robochoc.app.pages.shell import told, while_shown
 from robochoc.app.pages.whatif.answer import Answer
 from robochoc.app.pages.whatif.story import story_of
@@ -17,7 +18,7 @@ from robochoc.app.projects import Project
 from robochoc.app.sketch.changes import FULL, LEAST_BATTERY, AnyChange, Battery, Blocked, Fails, Joins
 from robochoc.app.sketch.checks import troubles
 from robochoc.app.sketch.edits import EditError
-from robochoc.app.sketch.sketch import Cell, Sketch
+from robochoc.app.sketch.sketch import MAX_SIDE, Cell, Sketch
 from robochoc.app.texts import say
 
 _LOOK_S = 0.25
@@ -72,9 +73,7 @@ class WhatIfPage:
                 self._slider = ui.slider(min=0, max=FULL, step=5, value=50).classes("grow")
                 self._slider.props(f'label aria-label="{say("whatif.battery")}"')
                 _button = _act("whatif.battery-set", "battery_3_bar", self._battery_set, percent=50)
-            self._slider.on_value_change(
-                lambda event: _button.set_text(say("whatif.battery-set", percent=int(event.value)))
-            )
+            self._slider.on_value_change(lambda _: _button.set_text(say("whatif.battery-set", percent=self._percent())))
             ui.label(say("whatif.battery-hint", least=LEAST_BATTERY)).classes("soft small")
             with ui.element("div").classes("whatif-row"):
                 self._column, self._row = (
@@ -114,10 +113,14 @@ class WhatIfPage:
         return str(self._robots.value or "")
 
     def _chosen_cell(self) -> Cell:
-        return Cell(int(self._column.value or 0) - 1, int(self._row.value or 0) - 1)
+        column, row = (whole(field.value, 0, MAX_SIDE + 1, otherwise=0) for field in (self._column, self._row))
+        return Cell(column - 1, row - 1)
+
+    def _percent(self) -> int:
+        return whole(self._slider.value, 0, FULL, otherwise=FULL)
 
     def _battery_set(self) -> None:
-        self._happen(lambda: Battery(self._chosen(), min(max(int(self._slider.value), 0), FULL)))
+        self._happen(lambda: Battery(self._chosen(), self._percent()))
 
     def _happen(self, change: Callable[[], AnyChange]) -> None:
         self._wrong.set_text("")
