@@ -13,7 +13,7 @@ from pathlib import Path
 
 from nicegui import app, ui
 
-from robochoc.app.sketch.edits import EditError
+from robochoc.app.log import FAULTS, TOLD, words
 from robochoc.app.texts import say
 from robochoc.system.plain_text import on_one_line
 
@@ -22,8 +22,6 @@ MOST_BYTES = 1 << 20
 """A longer file of errors is begun anew; the one before it is kept."""
 MOST_CHARACTERS = 10_000
 """Of one error."""
-TOLD = logging.getLogger("robochoc.app")
-"""Says in the terminal what users must know, even when no page is open."""
 _OF_SERVERS = ("nicegui", "socketio", "socketio.server", "engineio", "engineio.server", "asyncio", "uvicorn")
 _OF_SERVERS_ALSO = ("uvicorn.error", "uvicorn.access", "uvicorn.asgi")
 
@@ -37,18 +35,10 @@ def keep_faults(folder: Path) -> None:
         logger = logging.getLogger(name)
         logger.handlers[:] = [] if name in _OF_SERVERS_ALSO or "." in name else [kept, terminal]
         logger.propagate = "." in name
+    FAULTS.handlers[:] = [kept, terminal]
     TOLD.handlers[:] = [terminal]
-    TOLD.propagate = False
+    FAULTS.propagate = TOLD.propagate = False
     app.on_exception(tell)
-
-
-def words(error: Exception) -> str:
-    """Return what somebody in front of the page is told."""
-    if isinstance(error, EditError):
-        return say(error.key, **error.named)
-    if isinstance(error, OSError):
-        return say("app.disk", why=error.strerror or type(error).__name__)
-    return say("app.fault")
 
 
 def tell(error: Exception) -> None:

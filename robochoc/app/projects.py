@@ -3,12 +3,16 @@
 from __future__ import annotations
 
 import asyncio
-import logging
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from functools import partial
 from pathlib import Path
 from threading import Lock
+from typing import Any
 
+from robochoc.app.jobs.job import Job, end_jobs_in
 from robochoc.app.listeners import Listeners
+from robochoc.app.log import TOLD
+from robochoc.app.parts import HasParts
 from robochoc.app.sketch.edits import EditError
 from robochoc.app.sketch.history import History
 from robochoc.app.sketch.shape import is_sound
@@ -16,17 +20,18 @@ from robochoc.app.sketch.sketch import Sketch
 from robochoc.app.store import Store
 from robochoc.app.texts import say
 
-_LOG = logging.getLogger("robochoc.app")
 SAVE_S = 0.5
 """An edit is on disk after so long."""
 AGAIN_S = 5.0
 """What could not be saved is tried again after so long."""
+_JOIN_S = 0.1
 
 
-class Project:
+class Project(HasParts):
     """A team that somebody edits. It is saved by itself, and tells whoever listens that it has changed."""
 
     def __init__(self, store: Store, name: str) -> None:
+        super().__init__()
         self.id = name
         self._store = store
         self._history = store.load(name)
@@ -150,15 +155,34 @@ class Projects:
         return self.open(self.store.add(sketch))
 
     def remove(self, name: str) -> None:
-        """Remove a team, and all that was decided by it. Raises `KeyError` for what is no id."""
+        """Remove a team, and all that was decided by it. All that it does at present is ended.
+
+        Raises:
+            KeyError: for what is no id.
+            OSError: if that cannot be. Nothing has changed then, but that nothing runs any more.
+        """
+        folder = self.store.path(name)
+        ended = end_jobs_in(folder)
+        self.store.put_away(name)
         project = self._open.pop(name, None)
         if project is not None:
             project.forget()
+        Job(f"removal of {name}", partial(self._swept, name, ended)).start()
+
+    def sweep(self) -> None:
+        """Remove, in a thread, what is left of teams whose removal was broken off."""
+        Job("removal", lambda _: self.store.sweep()).start()
+
+    def _swept(self, name: str, ended: Sequence[Job[Any]], job: Job[None]) -> None:
+        """Remove the files once nobody writes them any more; a thread that was at work may have written some anew."""
+        for one in ended:
+            while not one.join(_JOIN_S):
+                job.check()
         self.store.remove(name)
 
     def save(self) -> None:
         """Keep all that is open on disk. What cannot be kept is told in the terminal."""
-        for project in self._open.values():
+        for project in [*self._open.values()]:
             project.save()
             if project.unsaved:
-                _LOG.error("%s", say("app.lost", name=project.sketch.name, why=project.unsaved))
+                TOLD.error("%s", say("app.lost", name=project.sketch.name, why=project.unsaved))

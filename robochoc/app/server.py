@@ -3,12 +3,16 @@
 from __future__ import annotations
 
 import asyncio
+import os
+import signal
 import threading
+import time
 import webbrowser
 from collections.abc import Callable
 from contextlib import AbstractContextManager, nullcontext
 from pathlib import Path
 from socket import socket
+from types import FrameType
 
 import uvicorn
 from fastapi import FastAPI
@@ -16,6 +20,7 @@ from nicegui import ui
 
 from robochoc.app.faults import keep_faults
 from robochoc.app.guard import Guard
+from robochoc.app.jobs.job import end_all
 from robochoc.app.pages import routes
 from robochoc.app.projects import Projects
 from robochoc.app.store import Store
@@ -25,6 +30,11 @@ from robochoc.view.redirect import RedirectFile
 
 _RECONNECT_S = 30.0
 """A browser that was away for so long finds its page as it was. After it, the page is made again: nothing is lost."""
+_LONGEST_END_S = 2.5
+"""Told to end, the server has ended after so long."""
+_LONGEST_SAVE_S = 1.0
+_SIGNALLED = 128
+"""The exit status of a program that a signal has ended, less that signal's number: as shells say it."""
 _ICON = Path(__file__).with_name("icon.svg")
 
 
@@ -48,7 +58,9 @@ def serve_app(
         secret = secret_path()
         url = url_of(here, f"{secret}/")
         outside = FastAPI(openapi_url=None)
-        routes.install(Projects(store))
+        projects = Projects(store)
+        projects.sweep()
+        routes.install(projects)
         ui.run_with(
             outside,
             mount_path=f"/{secret}",
@@ -68,24 +80,44 @@ def serve_app(
             ws_max_size=1 << 24,
             timeout_graceful_shutdown=1,
         )
-        asyncio.run(_serve(config, here, url, ready, open_browser=open_browser))
+        asyncio.run(_serve(_Server(config, projects), here, url, ready, open_browser=open_browser))
 
 
 class _Server(uvicorn.Server):
-    """Calls `ready` once browsers can ask."""
+    """Calls `ready` once browsers can ask. Told to end, it ends in time, whatever else is at work."""
 
-    def __init__(self, config: uvicorn.Config, ready: Callable[[], None]) -> None:
+    ready: Callable[[], None]
+    redirect: RedirectFile | None = None
+
+    def __init__(self, config: uvicorn.Config, projects: Projects) -> None:
         super().__init__(config)
-        self._ready = ready
+        self._projects = projects
 
     async def startup(self, sockets: list[socket] | None = None) -> None:
         """Start, and say so."""
         await super().startup(sockets)
-        self._ready()
+        self.ready()
+
+    def handle_exit(self, sig: int, frame: FrameType | None) -> None:
+        """Begin to end."""
+        super().handle_exit(sig, frame)
+        status = 0 if sig == signal.SIGINT else _SIGNALLED + sig
+        threading.Thread(target=self._end_in_time, args=(status,), daemon=True).start()
+
+    def _end_in_time(self, status: int) -> None:
+        """End this process if it has not ended by then: somebody computes, and cannot be interrupted."""
+        time.sleep(_LONGEST_END_S)
+        end_all(0)
+        saving = threading.Thread(target=self._projects.save, daemon=True)
+        saving.start()
+        saving.join(_LONGEST_SAVE_S)  # a disk may not answer at all
+        if self.redirect:
+            self.redirect.close()
+        os._exit(status)
 
 
 async def _serve(
-    config: uvicorn.Config, here: socket, url: str, ready: Callable[[str], None] | None, *, open_browser: bool
+    server: _Server, here: socket, url: str, ready: Callable[[str], None] | None, *, open_browser: bool
 ) -> None:
     shown: AbstractContextManager[RedirectFile | None] = RedirectFile(url) if open_browser else nullcontext()
     with shown as redirect:
@@ -96,4 +128,5 @@ async def _serve(
             if redirect is not None:  # in a thread: a browser for the terminal returns when it is closed
                 threading.Thread(target=webbrowser.open, args=(redirect.url,), daemon=True).start()
 
-        await _Server(config, begin).serve(sockets=[here])
+        server.ready, server.redirect = begin, redirect
+        await server.serve(sockets=[here])

@@ -2,6 +2,7 @@
 
 FOLDER/ID/history.json    the sketch, and what can be undone
 FOLDER/ID/runs/           what was decided and flown
+FOLDER/.removed-...       a team that is being removed
 FOLDER/.lock              held by the one application that has the folder open
 """
 
@@ -27,6 +28,7 @@ from robochoc.app.sketch.sketch import MAX_ROBOTS, MAX_SIDE, Area, Cell, Sketch,
 _HISTORY = "history.json"
 _TEAM = "team"
 _LOCK = ".lock"
+_REMOVED = ".removed-"
 _ID_BYTES = 6
 MAX_BYTES = 64 << 20
 """A larger file is none of ours. What would be larger is kept with fewer steps that can be undone."""
@@ -76,7 +78,8 @@ class Store:
         """Return the teams, the one that was changed last first."""
         found: list[tuple[int, str]] = []
         for file in self.folder.glob(f"*/{_HISTORY}"):
-            with suppress(OSError):  # it is being removed
+            with suppress(OSError, KeyError):  # it is being removed, or its folder is none of ours
+                self.path(file.parent.name)
                 found.append((file.stat().st_mtime_ns, file.parent.name))
         return [name for _, name in sorted(found, reverse=True)]
 
@@ -156,8 +159,24 @@ class Store:
             raise
 
     def remove(self, name: str) -> None:
-        """Remove a team, and all that was decided by it."""
-        shutil.rmtree(self.path(name), ignore_errors=True)
+        """Remove a team, and all that was decided by it. Raises `KeyError` for what is no id."""
+        self.put_away(name)
+        self.sweep()
+
+    def put_away(self, name: str) -> None:
+        """Remove a team at once: its files, which may be many, are gone after `sweep`.
+
+        Raises:
+            KeyError: for what is no id.
+            OSError: if that cannot be.
+        """
+        with suppress(FileNotFoundError):
+            self.path(name).rename(self.folder / f"{_REMOVED}{name}-{secrets.token_hex(_ID_BYTES)}")
+
+    def sweep(self) -> None:
+        """Remove what is left of teams that were removed. What cannot be removed is left for the next time."""
+        for left in self.folder.glob(f"{_REMOVED}*"):
+            shutil.rmtree(left, ignore_errors=True)
 
     def path(self, name: str) -> Path:
         """Return a team's folder. Raises `KeyError` for what is no id."""

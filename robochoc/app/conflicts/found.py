@@ -2,21 +2,23 @@
 
 from __future__ import annotations
 
-import os
-import signal
-import subprocess
-import sys
-import threading
-from contextlib import suppress
+import asyncio
+from collections.abc import Callable
 from enum import StrEnum
+from pathlib import Path
 
 import msgspec
 
+from robochoc.app.jobs.job import EndedError, Job, LateError
+from robochoc.app.jobs.process import Command
+from robochoc.app.log import words
 from robochoc.app.sketch.sketch import Sketch
 
 PATIENCE_S = 30.0
 """The search is given so long."""
 _GRACE_S = 5.0
+"""Its process needs so long to begin, and to tell."""
+_PROCESS = "robochoc.app.conflicts.process"
 
 
 class Finder(StrEnum):
@@ -44,48 +46,51 @@ class Conflict(msgspec.Struct, frozen=True):
 
 
 class ConflictSearch:
-    """A search. `found` waits for it, `stop` ends it from another thread."""
+    """A search, which begins at once. `found` has what it finds; `end` ends it.
 
-    def __init__(self, sketch: Sketch, seconds: float = PATIENCE_S) -> None:
+    Args:
+        sketch: The team.
+        seconds: The search is given so long.
+        folder: The team's folder: the search ends when that is removed.
+    """
+
+    def __init__(self, sketch: Sketch, seconds: float = PATIENCE_S, *, folder: Path | None = None) -> None:
         self._sketch, self._seconds = sketch, seconds
-        self._lock = threading.Lock()
-        self._process: subprocess.Popen[bytes] | None = None
-        self._stopped = threading.Event()
+        self._job = Job("conflict search", self._search, folder=folder).start()
 
-    def found(self) -> Conflict:
-        """Search; return what was found."""
-        with self._lock:
-            if self._stopped.is_set():
-                return Conflict(None, late=True)
-            self._process = subprocess.Popen(  # noqa: S603 - our own module
-                [sys.executable, "-P", "-m", "robochoc.app.conflicts.process", str(os.getpid()), str(self._seconds)],
-                stdin=subprocess.PIPE,
-                stdout=subprocess.PIPE,
-                stderr=subprocess.PIPE,
-                process_group=0,
-            )
-        with self._process as process:
-            try:
-                said, errors = process.communicate(msgspec.json.encode(self._sketch), self._seconds + _GRACE_S)
-            except subprocess.TimeoutExpired:
-                self._kill()
-                return Conflict(None, late=True)
-            finally:
-                self._kill()
-        if self._stopped.is_set():
-            return Conflict(None, late=True)
-        if process.returncode or not said:
-            lines = errors.decode(errors="replace").strip().splitlines()
-            return Conflict(None, why=lines[-1] if lines else f"exit status {process.returncode}")
-        return msgspec.json.decode(said, type=Conflict)
+    @property
+    def pid(self) -> int | None:
+        """Its process, while there is one."""
+        return self._job.pid
 
-    def stop(self) -> None:
+    def result(self) -> Conflict | None:
+        """Wait for what it finds. None: it was ended."""
+        return _told(self._job.future.result)
+
+    async def found(self) -> Conflict | None:
+        """Wait for what it finds. None: it was ended."""
+        await asyncio.wait([asyncio.wrap_future(self._job.future)])
+        return self.result()
+
+    def end(self) -> None:
         """End it."""
-        with self._lock:
-            self._stopped.set()
-        self._kill()
+        self._job.end()
 
-    def _kill(self) -> None:
-        if self._process is not None:
-            with suppress(ProcessLookupError, PermissionError):
-                os.killpg(self._process.pid, signal.SIGKILL)
+    def _search(self, job: Job[Conflict]) -> Conflict:
+        command = Command((str(self._seconds),), module=_PROCESS, given=msgspec.json.encode(self._sketch))
+        try:
+            finished = job.run(command, within_s=self._seconds + _GRACE_S)
+        except LateError:
+            return Conflict(None, late=True)
+        if finished.status or not finished.out:
+            return Conflict(None, why=(finished.why.splitlines() or [""])[-1])
+        return msgspec.json.decode(finished.out, type=Conflict)
+
+
+def _told(result: Callable[[], Conflict]) -> Conflict | None:
+    try:
+        return result()
+    except EndedError:
+        return None
+    except Exception as fault:  # noqa: BLE001 - the file of errors has it already
+        return Conflict(None, why=words(fault))

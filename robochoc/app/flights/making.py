@@ -12,20 +12,20 @@ They stay in the run's folder. Whoever wants them says so, and the work ends whe
 from __future__ import annotations
 
 import asyncio
-import os
-import signal
-import sys
 import time
 from collections.abc import Callable
-from contextlib import suppress
 from enum import StrEnum
+from functools import partial
 from importlib.util import find_spec
 from pathlib import Path
-from weakref import WeakValueDictionary
 
 import msgspec
 
 from robochoc.app.flights.ground import MAP, ground_of
+from robochoc.app.jobs.job import Call, Job, call_here
+from robochoc.app.jobs.process import Command
+from robochoc.app.listeners import Listeners
+from robochoc.app.log import words
 from robochoc.app.runs.options import JOURNAL, RESULT
 from robochoc.app.runs.run import Run
 from robochoc.app.sketch.building import model_of
@@ -83,8 +83,10 @@ class Making:
         self.troubles: dict[Stage, str] = {}
         """What could not be made, and why."""
         self._began = time.monotonic()
-        self._wanted: list[Callable[[], None]] = []
-        self._task: asyncio.Task[None] | None = None
+        self._wanted = Listeners()
+        self._job: Job[None] | None = None
+        self._before: Job[None] | None = None
+        self._call: Call = call_here()
         self._recording = asyncio.Lock()
 
     @property
@@ -124,25 +126,27 @@ class Making:
 
     def wanted(self, told: Callable[[], None]) -> Callable[[], None]:
         """Begin, if that has not been done; call `told` at every stage. Return what says that it is not wanted."""
-        self._wanted.append(told)
-        if self._task is None and self.stage is not Stage.DONE:
-            self.troubles.clear()
-            self._began = time.monotonic()
-            self._task = asyncio.get_running_loop().create_task(self._make())
+        leave = self._wanted.add(told)
+        if self.stage is Stage.WAITING:
+            self._begin()
 
         def release() -> None:
-            if told in self._wanted:
-                self._wanted.remove(told)
+            leave()
             if not self._wanted:
                 self.cancel()
 
         return release
 
+    def again(self) -> None:
+        """Try again to make what could not be made."""
+        if self.stage is Stage.DONE and self.troubles:
+            self._begin()
+
     def cancel(self) -> None:
         """End the work. What is there already stays."""
-        if self._task is not None:
-            self._task.cancel()
-            self._task = None
+        if self._job is not None:
+            self._job.end()
+            self._before, self._job = self._job, None
             self._become(Stage.WAITING)
 
     async def recording(self) -> Path:
@@ -150,46 +154,64 @@ class Making:
         async with self._recording:
             file = self.run.artefact(RECORDING)
             if file is None:
-                await self._team_is_there()
-                fresh = f"{RECORDING}.new"
-                given = [RESULT, "--team", self.run.team.name, *await asyncio.to_thread(self._map)]
-                await self._ran("fly", *given, "--json", "--ros", f"mcap:{fresh}")
-                file = (self.run.folder / fresh).replace(self.run.folder / RECORDING)
+                job = Job(f"recording {self.run.folder}", self._record, folder=self.run.folder).start()
+                await asyncio.wait([asyncio.wrap_future(job.future)])
+                try:
+                    file = job.future.result()
+                except CannotMakeError:
+                    raise
+                except Exception as fault:  # noqa: BLE001 - it was ended, or the file of errors has it
+                    raise CannotMakeError(words(fault)) from None
             return file
 
-    async def _make(self) -> None:
-        try:
-            if self.flight is None and self.has_answer and flies(self.run):
-                await self._part(Stage.FLIGHT, self._make_flight)
-            if self.conversation is None and self.run.artefact(JOURNAL):
-                await self._part(Stage.CONVERSATION, self._make_conversation)
-        except (OSError, ValueError) as damaged:
-            self.troubles[self.stage] = str(damaged)
-        self._task = None
-        self._become(Stage.DONE)
+    def _begin(self) -> None:
+        self.troubles.clear()
+        self._began = time.monotonic()
+        self._call = call_here()
+        self.stage = Stage.FLIGHT if self._wants_flight else Stage.CONVERSATION
+        before, self._before = self._before, None
+        self._job = job = Job(f"flight {self.run.folder}", partial(self._make, before), folder=self.run.folder)
+        job.over = partial(self._broken_off, job)
+        job.start()
 
-    async def _part(self, stage: Stage, make: Callable[[], object]) -> None:
-        self._become(stage)
-        work = make()
-        assert asyncio.iscoroutine(work)  # noqa: S101 - both are
+    @property
+    def _wants_flight(self) -> bool:
+        return self.flight is None and self.has_answer and flies(self.run)
+
+    def _make(self, before: Job[None] | None, job: Job[None]) -> None:
+        if before:  # two shall not write the same files
+            before.join()
+        if self._wants_flight:
+            self._part(job, Stage.FLIGHT, self._make_flight)
+        if self.conversation is None and self.run.artefact(JOURNAL):
+            self._part(job, Stage.CONVERSATION, self._make_conversation)
+        self._advance(job, Stage.DONE)
+
+    def _part(self, job: Job[None], stage: Stage, make: Callable[[Job[None]], None]) -> None:
+        self._advance(job, stage)
         try:
-            await work
+            make(job)
         except CannotMakeError as why:
             self.troubles[stage] = str(why)
 
-    async def _make_flight(self) -> None:
-        await self._team_is_there()
-        given = [RESULT, "--team", self.run.team.name, *await asyncio.to_thread(self._map)]
-        try:
-            told = await self._ran("fly", *given, "--json", "--html", FLIGHT)
-        except CannotMakeError:  # too near to each other to be flown, say: where they end can be seen all the same
-            await self._ran("animate", *given, "--html", FLIGHT)
-        else:
-            await asyncio.to_thread(write_atomically, self.run.folder / FLOWN, told)
+    def _broken_off(self, job: Job[None], why: str) -> None:
+        if self._job is job and why:
+            self.troubles[self.stage] = why
+        self._advance(job, Stage.DONE if why else Stage.WAITING)
 
-    async def _make_conversation(self) -> None:
+    def _make_flight(self, job: Job[None]) -> None:
+        self._team_is_there()
+        given = [RESULT, "--team", self.run.team.name, *self._map()]
+        try:
+            told = self._ran(job, "fly", *given, "--json", "--html", FLIGHT)
+        except CannotMakeError:  # too near to each other to be flown, say: where they end can be seen all the same
+            self._ran(job, "animate", *given, "--html", FLIGHT)
+        else:
+            write_atomically(self.run.folder / FLOWN, told)
+
+    def _make_conversation(self, job: Job[None]) -> None:
         cut = ["--to", str(MOST_MESSAGES - 1)] if self.is_cut else []
-        await self._ran("journal", "export", JOURNAL, "--format", "html", "-o", CONVERSATION, *cut)
+        self._ran(job, "journal", "export", JOURNAL, "--format", "html", "-o", CONVERSATION, *cut)
 
     def _map(self) -> list[str]:
         """Write the map of the ground; return the options that name it. Without a map there are none."""
@@ -199,48 +221,42 @@ class Making:
         write_atomically(self.run.folder / MAP, msgspec.json.encode(ground))
         return ["--map", MAP]
 
-    async def _team_is_there(self) -> None:
+    def _record(self, job: Job[Path]) -> Path:
+        self._team_is_there()
+        fresh = f"{RECORDING}.new"
+        given = [RESULT, "--team", self.run.team.name, *self._map()]
+        self._ran(job, "fly", *given, "--json", "--ros", f"mcap:{fresh}")
+        return (self.run.folder / fresh).replace(self.run.folder / RECORDING)
+
+    def _team_is_there(self) -> None:
         """Write the team's files, if they are not there: a state from elsewhere comes without."""
         run = self.run
         if run.team.is_dir():
             return
         try:
-            await asyncio.to_thread(lambda: model_of(run.sketch).save(run.team))
-        except (ModelError, InvalidInputError, OSError, ValueError, TypeError) as mistake:
+            model_of(run.sketch).save(run.team)
+        except (ModelError, InvalidInputError, ValueError, TypeError) as mistake:
             raise CannotMakeError(str(mistake)) from None
 
-    async def _ran(self, *arguments: str) -> bytes:
-        """Run a command of robochoc in the run's folder; return what it wrote. It ends with this process."""
-        process = await asyncio.create_subprocess_exec(
-            sys.executable, "-P", "-m", "robochoc.app.runs.child", str(os.getpid()), *arguments,
-            cwd=self.run.folder,
-            stdin=asyncio.subprocess.DEVNULL,
-            stdout=asyncio.subprocess.PIPE,
-            stderr=asyncio.subprocess.PIPE,
-            process_group=0,
-        )  # fmt: skip
-        try:
-            out, errors = await process.communicate()
-        finally:
-            with suppress(ProcessLookupError, PermissionError):
-                os.killpg(process.pid, signal.SIGKILL)
-        if process.returncode not in {0, _NOT_AS_PLANNED}:
-            said = errors.decode(errors="replace").strip()[-_MAX_MESSAGE:]
-            raise CannotMakeError(said or f"exit status {process.returncode}")
-        return out
+    def _ran(self, job: Job[None] | Job[Path], *arguments: str) -> bytes:
+        """Run a command of robochoc in the run's folder; return what it wrote."""
+        finished = job.run(Command(arguments, self.run.folder))
+        if finished.status not in {0, _NOT_AS_PLANNED}:
+            raise CannotMakeError(finished.why[-_MAX_MESSAGE:])
+        return finished.out
+
+    def _advance(self, job: Job[None], stage: Stage) -> None:
+        """Note the stage that a job has reached, unless nobody wants that job any more."""
+        if self._job is job:
+            if stage in {Stage.DONE, Stage.WAITING}:
+                self._job = None
+            self._become(stage)
 
     def _become(self, stage: Stage) -> None:
         self.stage = stage
-        for told in [*self._wanted]:
-            told()
-
-
-_MAKING: WeakValueDictionary[Path, Making] = WeakValueDictionary()
+        self._call(self._wanted)
 
 
 def making_of(run: Run) -> Making:
     """Return what is made of a run, the same object for all pages that show it."""
-    making = _MAKING.get(run.folder)
-    if making is None or making.run is not run:
-        making = _MAKING[run.folder] = Making(run)
-    return making
+    return run.part(Making)

@@ -11,7 +11,6 @@ from nicegui import ui
 from robochoc.app.pages.opening import build_opening
 from robochoc.app.pages.pictures import thumbnail
 from robochoc.app.projects import Projects
-from robochoc.app.runs.runs import runs_of
 from robochoc.app.sketch.examples import examples, title_of
 from robochoc.app.sketch.sketch import Sketch
 from robochoc.app.texts import say
@@ -73,10 +72,8 @@ def _own_card(projects: Projects, name: str) -> None:
 def _ask_to_remove(projects: Projects, name: str, title: str) -> None:
     def remove() -> None:
         dialog.close()
-        with suppress(KeyError, ValueError):  # it is gone already, or damaged: nothing runs
-            for run in runs_of(projects.open(name)).all():
-                run.stop()
-        projects.remove(name)
+        with suppress(KeyError):  # it is gone already
+            projects.remove(name)
         _own.refresh()
 
     with ui.dialog(value=True) as dialog, ui.card():

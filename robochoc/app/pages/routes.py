@@ -8,8 +8,9 @@ from pathlib import Path
 
 from nicegui import app, ui
 
-from robochoc.app.faults import words
+from robochoc.app.jobs.job import end_all
 from robochoc.app.lessons.progress import Progress
+from robochoc.app.log import words
 from robochoc.app.pages.compare.page import build_compare
 from robochoc.app.pages.compare.served import install_reports
 from robochoc.app.pages.decide.page import build_decide
@@ -22,7 +23,6 @@ from robochoc.app.pages.model.page import build_model
 from robochoc.app.pages.shell import AREAS, shell
 from robochoc.app.pages.whatif.page import build_whatif
 from robochoc.app.projects import Project, Projects
-from robochoc.app.runs.runs import end_all
 from robochoc.app.sketch.picture import picture
 from robochoc.app.texts import say
 

@@ -36,6 +36,7 @@ class Live:
         since: When each robot has changed them last, on the monotonic clock.
         costs: The costs of the answers so far: seconds since the start, and the cost. They fall.
         recent: The messages of the last second: how many went from whom to whom.
+        is_cut: Whether the last messages were not read, since the run had ended and there were too many.
     """
 
     messages: int = 0
@@ -43,6 +44,7 @@ class Live:
     since: dict[str, float] = field(default_factory=dict)
     costs: list[tuple[float, float]] = field(default_factory=list)
     recent: Counter[tuple[str, str]] = field(default_factory=Counter)
+    is_cut: bool = False
 
     def settled(self, robot: str) -> bool:
         """Return whether a robot has kept its values for a while."""

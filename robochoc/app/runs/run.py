@@ -22,7 +22,9 @@ from typing import Protocol
 
 import msgspec
 
+from robochoc.app.jobs.job import Call
 from robochoc.app.listeners import Listeners
+from robochoc.app.parts import HasParts
 from robochoc.app.runs.live import Live
 from robochoc.app.runs.options import RESULT, RunOptions, command_line
 from robochoc.app.runs.result import RunResult, decoded
@@ -78,11 +80,15 @@ class Watching(Protocol):
     def stop(self) -> None:
         """Ask it to stop."""
 
+    def end(self) -> None:
+        """End it now."""
 
-class Run:
+
+class Run(HasParts):
     """A run. `Runs` starts them; pages listen to them."""
 
     def __init__(self, folder: Path, record: Record, sketch: Sketch | None = None) -> None:
+        super().__init__()
         self.id = folder.name
         self.folder = folder
         self.record = record
@@ -92,7 +98,7 @@ class Run:
         """The answer, as soon as there is one; of a run that was stopped, the best so far."""
         self._sketch = sketch
         self._listeners = Listeners()
-        self._call: Callable[[Callable[[], None]], object] = lambda does: does()
+        self._call: Call = lambda does: does()
         self.watched_by: Watching | None = None
 
     @property
@@ -150,20 +156,18 @@ class Run:
         """Call `callback` whenever there is news, in the event loop in which it was started; return what ends that."""
         return self._listeners.add(callback)
 
-    def told_by(self, call: Callable[[Callable[[], None]], object]) -> None:
+    def told_by(self, call: Call) -> None:
         """Have listeners called by `call`: from a thread into an event loop, say."""
         self._call = call
 
     def tell(self) -> None:
         """Call all listeners."""
-        with suppress(RuntimeError):  # the loop is closed: nobody listens any more
-            self._call(self._told)
-
-    def _told(self) -> None:
-        self._listeners()
+        self._call(self._listeners)
 
     def become(self, state: State, message: str = "") -> None:
-        """Note that it is over, and how."""
+        """Note that it is over, and how. What was noted first stays."""
+        if self.state is not State.RUNNING:
+            return
         self.record.message = " ".join(message.split())[:_MAX_MESSAGE]
         self.record.ended = time.time()
         self.record.state = state

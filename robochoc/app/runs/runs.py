@@ -2,25 +2,24 @@
 
 from __future__ import annotations
 
-import asyncio
 import shutil
 import time
 from collections.abc import Callable
-from contextlib import suppress
 from functools import partial
 from pathlib import Path
-from threading import Lock
 from typing import Protocol
-from weakref import WeakKeyDictionary
 
 import msgspec
 
+from robochoc.app.jobs.job import call_here, end_jobs_in
 from robochoc.app.listeners import Listeners
+from robochoc.app.projects import Project
 from robochoc.app.runs.options import RunOptions
 from robochoc.app.runs.prepared import TeamFiles, from_files, from_sketch
 from robochoc.app.runs.run import RECORD, SKETCH, Record, Run, State, run_of
-from robochoc.app.runs.watching import Watched
+from robochoc.app.runs.watching import watched
 from robochoc.app.sketch.building import model_of
+from robochoc.app.sketch.edits import EditError
 from robochoc.app.sketch.sketch import Sketch
 from robochoc.modelling.model import Model
 
@@ -83,25 +82,25 @@ class Runs:
             sketch: The team. None: as it stands.
             model: Makes a model of the sketch.
             files: What decides instead, of a team that was not drawn here; the sketch is its picture then.
-            purpose: What for: a word for `latest_for`.
+            purpose: What for: a word for `latest_for`. There is one run at a time for each purpose: one before that
+                still runs is ended.
+
+        Raises:
+            EditError: if the team was removed.
         """
         chosen = self._project.sketch if sketch is None else sketch
         folder = self._new_folder()
         flies = files.flies if files else None
         run = Run(folder, Record(options, purpose=purpose, started=time.time(), flies=flies), chosen)
         run.record.arguments = options.arguments(run.team.name, ranked=chosen.is_ranked)
-        with suppress(RuntimeError):  # there is no loop: listeners are called by the thread that watches
-            run.told_by(asyncio.get_running_loop().call_soon_threadsafe)
+        run.told_by(call_here())
         (folder / SKETCH).write_bytes(msgspec.json.encode(chosen))
         run.save()
+        self._end_before(purpose)
         self._runs.append(run)
         self._forget_old()
         prepare = partial(from_files, files=files) if files else partial(from_sketch, model=model)
-        watched = Watched(run, prepare)
-        run.watched_by = watched
-        with _LOCK:
-            _WATCHED.append(watched)
-        watched.start(_ended)
+        run.watched_by = watched(run, prepare).start()
         self._listeners()
         return run
 
@@ -110,7 +109,10 @@ class Runs:
         return self._listeners.add(callback)
 
     def _new_folder(self) -> Path:
-        self._folder.mkdir(mode=0o700, exist_ok=True)  # the team's folder is gone if the team was removed
+        try:
+            self._folder.mkdir(mode=0o700, exist_ok=True)
+        except FileNotFoundError:
+            raise EditError("app.removed") from None
         taken = [int(one.name) for one in self._folder.iterdir() if one.name.isdecimal()]
         number = max(taken, default=0) + 1
         while True:
@@ -121,36 +123,19 @@ class Runs:
             else:
                 return self._folder / f"{number:05}"
 
+    def _end_before(self, purpose: str) -> None:
+        for run in self._runs:
+            if run.record.purpose == purpose and run.watched_by:
+                run.watched_by.end()
+
     def _forget_old(self) -> None:
         over = [run for run in self._runs if run.state is not State.RUNNING]
         for run in over[: max(0, len(self._runs) - MOST_KEPT)]:
             self._runs.remove(run)
+            end_jobs_in(run.folder)
             shutil.rmtree(run.folder, ignore_errors=True)
 
 
-_LOCK = Lock()
-_WATCHED: list[Watched] = []
-_RUNS: WeakKeyDictionary[Team, Runs] = WeakKeyDictionary()
-
-
-def runs_of(project: Team) -> Runs:
+def runs_of(project: Project) -> Runs:
     """Return the runs of a team, the same object for all pages that show it."""
-    if project not in _RUNS:
-        _RUNS[project] = Runs(project)
-    return _RUNS[project]
-
-
-def end_all() -> None:
-    """End all that runs: the server does."""
-    with _LOCK:
-        running = [*_WATCHED]
-    for one in running:
-        one.kill()
-    for one in running:
-        one.join()
-
-
-def _ended(watched: Watched) -> None:
-    with _LOCK:
-        if watched in _WATCHED:
-            _WATCHED.remove(watched)
+    return project.part(Runs)

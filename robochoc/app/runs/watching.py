@@ -1,17 +1,14 @@
-"""A run's process, from its start to its end, in a thread that watches it."""
+"""A run's process, from its start to its end, in a job that watches it."""
 
 from __future__ import annotations
 
-import os
 import signal
-import subprocess
-import sys
-import threading
 import time
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager, suppress
-from pathlib import Path
+from collections.abc import Callable
+from functools import partial
 
+from robochoc.app.jobs.job import Job
+from robochoc.app.jobs.process import Command, Finished
 from robochoc.app.runs.live import LiveReader
 from robochoc.app.runs.options import JOURNAL, RESULT
 from robochoc.app.runs.prepared import Prepared
@@ -22,156 +19,89 @@ from robochoc.run.options import Options, Withdrawal
 from robochoc.run.recording import objective_to_record
 from robochoc.system.stopping import STOP
 
-LOOK_S = 0.2
-"""The journal is read so often."""
 PATIENCE_S = 4.0
 """A run that was asked to stop tells its best so far in this time; then it is told to end, then it is ended."""
+_STOPPING = ((0.0, STOP), (PATIENCE_S, signal.SIGTERM), (2 * PATIENCE_S, signal.SIGKILL))
 _LIMIT = 3
 """The exit status when a limit was reached."""
-_MAX_ERRORS = 8_000
+READ_ON_S = 1.0
+"""What a run has said that has ended is read for so long. The rest is left out: `Live.is_cut`."""
 
 
-class Watched:
-    """Starts the process of a run, and watches it. `prepare` writes the files of the run's team."""
-
-    def __init__(self, run: Run, prepare: Callable[[Run], Prepared]) -> None:
-        self._run, self._prepare = run, prepare
-        self._process: subprocess.Popen[bytes] | None = None
-        self._stop_at: float | None = None
-        self._said: set[int] = set()
-        self._thread: threading.Thread | None = None
-
-    @property
-    def pid(self) -> int | None:
-        """The process, the first of its group, while there is one."""
-        return self._process.pid if self._process and self._process.returncode is None else None
-
-    def start(self, ended: Callable[[Watched], None]) -> None:
-        """Begin, in a thread; `ended` is called by it in the end."""
-
-        def work() -> None:
-            try:
-                self._work()
-            finally:
-                ended(self)
-
-        self._thread = threading.Thread(target=work, name=f"run {self._run.id}", daemon=True)
-        self._thread.start()
-
-    def stop(self) -> None:
-        """Ask for the best so far; be less patient after a while."""
-        if self._stop_at is None:
-            self._stop_at = time.monotonic()
-
-    def kill(self) -> None:
-        """Have it end now."""
-        self._stop_at = time.monotonic() - 2 * PATIENCE_S
-
-    def join(self) -> None:
-        """Wait until it has ended."""
-        if self._thread:
-            self._thread.join(3 * PATIENCE_S)
-
-    def _work(self) -> None:
-        run = self._run
-        try:
-            ready = self._prepare(run)
-            withdraw = Withdrawal.MINIMUM if run.record.options.withdraw else None
-            objective = objective_to_record(ready.team, Options(withdraw=withdraw))
-            run.record.labels = ready.labels
-            reader = LiveReader(run.folder / JOURNAL, run.live, ready.label, objective() if objective else None)
-        except (ModelError, InvalidInputError, OSError, ValueError, TypeError, KeyError) as mistake:
-            self._over(State.FAILED, str(mistake))
-            return
-        if self._stop_at is not None:
-            self._over(State.STOPPED)
-            return
-        try:
-            with _files(run.folder) as (out, errors):
-                self._process = _started(run, out, errors)
-                self._watch(self._process, reader)
-        except OSError as error:
-            self._over(State.FAILED, f"{error.strerror}: {error.filename}" if error.filename else str(error))
-
-    def _watch(self, process: subprocess.Popen[bytes], reader: LiveReader) -> None:
-        try:
-            while process.poll() is None:
-                reader.advance()
-                self._run.read_result()  # a scene is still to be written then
-                self._run.tell()
-                self._be_heard(process)
-                with suppress(subprocess.TimeoutExpired):
-                    process.wait(LOOK_S)
-            while reader.advance():
-                pass
-        finally:
-            reader.close()
-            _end_group(process)
-        self._note(process.returncode)
-
-    def _note(self, status: int) -> None:
-        """Note how the process has ended."""
-        run = self._run
-        run.read_result()
-        if self._stop_at is not None and (run.result is None or run.result.verdict == "unknown"):
-            self._over(State.STOPPED)
-        elif run.result is not None:  # though its scene, say, may not have been written
-            self._over(State.ENDED, "" if status in {0, _LIMIT} else self._why(status))
-        else:
-            self._over(State.FAILED, self._why(status))
-
-    def _why(self, status: int) -> str:
-        with suppress(OSError):
-            said = (self._run.folder / ERRORS).read_bytes()[-_MAX_ERRORS:].decode(errors="replace").strip()
-            if said:
-                return said
-        return f"exit status {status}" if status >= 0 else signal.Signals(-status).name
-
-    def _over(self, state: State, message: str = "") -> None:
-        self._run.become(state, message)
-        self._run.tell()
-
-    def _be_heard(self, process: subprocess.Popen[bytes]) -> None:
-        """Say what is to be said to a process that has to stop, each once."""
-        if self._stop_at is None:
-            return
-        waited = time.monotonic() - self._stop_at
-        if waited >= 2 * PATIENCE_S:
-            _end_group(process)
-        elif waited >= PATIENCE_S:
-            self._say(process, signal.SIGTERM)
-        else:
-            self._say(process, STOP)
-
-    def _say(self, process: subprocess.Popen[bytes], signum: int) -> None:
-        if signum not in self._said:
-            self._said.add(signum)
-            process.send_signal(signum)
+def watched(run: Run, prepare: Callable[[Run], Prepared]) -> Job[None]:
+    """Return the job that carries out a run. `prepare` writes the files of the run's team."""
+    return Job(
+        f"run {run.folder}",
+        partial(_carry_out, run, prepare),
+        over=partial(_broken_off, run),
+        folder=run.folder,
+        stopping=_STOPPING,
+    )
 
 
-@contextmanager
-def _files(folder: Path) -> Iterator[tuple[int, int]]:
-    with (folder / RESULT).open("wb") as out, (folder / ERRORS).open("wb") as errors:
-        yield out.fileno(), errors.fileno()
-
-
-def _started(run: Run, out: int, errors: int) -> subprocess.Popen[bytes]:
-    """Return the run's process: the first of a group, that ends with this one."""
-    before = signal.pthread_sigmask(signal.SIG_BLOCK, {STOP})  # it holds it until it knows what it means
+def _carry_out(run: Run, prepare: Callable[[Run], Prepared], job: Job[None]) -> None:
     try:
-        return subprocess.Popen(  # noqa: S603 - our own module
-            [sys.executable, "-P", "-m", "robochoc.app.runs.child", str(os.getpid()), *run.record.arguments],
-            cwd=run.folder,
-            stdin=subprocess.DEVNULL,
-            stdout=out,
-            stderr=errors,
-            process_group=0,
-        )
+        reader = _reader(run, prepare)
+    except (ModelError, InvalidInputError, ValueError, TypeError, KeyError) as mistake:
+        _over(run, State.FAILED, str(mistake))
+        return
+    if job.stopped_at is not None:
+        _over(run, State.STOPPED)
+        return
+    try:
+        finished = job.run(_command(run), partial(_look, run, reader))
+        _read_on(run, reader, job)
     finally:
-        signal.pthread_sigmask(signal.SIG_SETMASK, before)
+        reader.close()
+    _note(run, finished, stopped=job.stopped_at is not None)
 
 
-def _end_group(process: subprocess.Popen[bytes]) -> None:
-    """End whatever is left of the process and those that it has started."""
-    with suppress(ProcessLookupError, PermissionError):
-        os.killpg(process.pid, signal.SIGKILL)
+def _reader(run: Run, prepare: Callable[[Run], Prepared]) -> LiveReader:
+    """Write the team's files; return what reads the journal."""
+    ready = prepare(run)
+    withdraw = Withdrawal.MINIMUM if run.record.options.withdraw else None
+    objective = objective_to_record(ready.team, Options(withdraw=withdraw))
+    run.record.labels = ready.labels
+    return LiveReader(run.folder / JOURNAL, run.live, ready.label, objective() if objective else None)
+
+
+def _command(run: Run) -> Command:
+    out, errors = run.folder / RESULT, run.folder / ERRORS
+    return Command((*run.record.arguments,), run.folder, out=out, errors=errors, can_be_asked=True)
+
+
+def _look(run: Run, reader: LiveReader) -> None:
+    reader.advance()
+    run.read_result()  # a scene is still to be written then
+    run.tell()
+
+
+def _read_on(run: Run, reader: LiveReader, job: Job[None]) -> None:
+    """Read what has not been read yet: all of it, or as much as there is time for."""
+    until = time.monotonic() + READ_ON_S
+    while reader.advance():
+        job.check()
+        if time.monotonic() > until:
+            run.live.is_cut = True
+            return
+
+
+def _note(run: Run, finished: Finished, *, stopped: bool) -> None:
+    """Note how the process has ended."""
+    run.read_result()
+    if stopped and (run.result is None or run.result.verdict == "unknown"):
+        _over(run, State.STOPPED)
+    elif run.result is not None:  # though its scene, say, may not have been written
+        _over(run, State.ENDED, "" if finished.status in {0, _LIMIT} else finished.why)
+    else:
+        _over(run, State.FAILED, finished.why)
+
+
+def _broken_off(run: Run, why: str) -> None:
+    run.read_result()
+    _over(run, State.FAILED if why else State.STOPPED, why)
+
+
+def _over(run: Run, state: State, message: str = "") -> None:
+    run.become(state, message)
+    run.tell()

@@ -2,20 +2,19 @@
 
 from __future__ import annotations
 
-import asyncio
-import os
 import signal
 import sqlite3
-import sys
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import closing, contextmanager, suppress
 from enum import StrEnum
+from functools import partial
 from pathlib import Path
 from statistics import median
-from weakref import WeakKeyDictionary
 
 import msgspec
 
+from robochoc.app.jobs.job import Call, Job, call_here
+from robochoc.app.jobs.process import Command, Finished
 from robochoc.app.listeners import Listeners
 from robochoc.app.projects import Project
 from robochoc.app.sketch.building import model_of
@@ -31,9 +30,7 @@ ROWS = "study.sqlite"
 REPORT = "report.html"
 _STATE = "state.json"
 _ERRORS = "errors.txt"
-_SAID = "said.txt"
-_LOOK_S = 0.4
-_PATIENCE_S = 4.0
+_STOPPING = ((0.0, signal.SIGINT), (4.0, signal.SIGKILL))
 _MAX_MESSAGE = 2_000
 _FINISHED = frozenset({Status.DONE, Status.ENDED})
 
@@ -82,9 +79,8 @@ class Study:
     def __init__(self, project: Project) -> None:
         self._folder = project.folder / "study"
         self._listeners = Listeners()
-        self._process: asyncio.subprocess.Process | None = None
-        self._task: asyncio.Task[None] | None = None
-        self._stopping = False
+        self._job: Job[None] | None = None
+        self._call: Call = call_here()
         self.facts = self._last()
 
     @property
@@ -104,90 +100,77 @@ class Study:
             return
         family = family_of(sketch) if question.family else None
         text = study_of(sketch, question, family)
-        self.facts = Facts(question, text, number_of_runs(question, family))
-        self._stopping = False
-        self._task = asyncio.get_running_loop().create_task(self._carry_out(sketch, self.facts))
+        facts = self.facts = Facts(question, text, number_of_runs(question, family))
+        self._call = call_here()
+        self._job = Job(
+            f"study {self._folder}",
+            partial(self._carry_out, sketch, facts),
+            over=partial(self._broken_off, facts),
+            folder=self._folder,
+            stopping=_STOPPING,
+        ).start()
         self._tell()
 
     def stop(self) -> None:
         """Ask it to stop. What is there is kept."""
-        self._stopping = True
-        self._signal(signal.SIGINT)
-
-    async def end(self) -> None:
-        """End it at once: the server ends."""
-        self._stopping = True
-        if self._task is not None and not self._task.done():
-            self._kill()
-            self._task.cancel()
-            with suppress(asyncio.CancelledError):
-                await self._task
+        if self._job:
+            self._job.stop()
 
     def on_change(self, callback: Callable[[], None]) -> Callable[[], None]:
         """Call `callback` when there is news; return what ends that."""
         return self._listeners.add(callback)
 
-    async def _carry_out(self, sketch: Sketch, facts: Facts) -> None:
+    def _carry_out(self, sketch: Sketch, facts: Facts, job: Job[None]) -> None:
         try:
-            await asyncio.to_thread(self._prepare, sketch, facts)
-            self._become(Stage.RUNNING)
-            status = await self._command("run", STUDY, "-o", ROWS)
-            facts.done = await asyncio.to_thread(self._rows)
-            if self._stopping:
-                self._become(Stage.STOPPED)
-            elif status:
-                self._become(Stage.FAILED, self._errors())
-            else:
-                await self._tell_what_came_of_it(facts)
-        except (ModelError, InvalidInputError, OSError, ValueError, sqlite3.Error) as error:
-            self._become(Stage.FAILED, str(error))
+            self._prepare(sketch, facts)
+            if not self._is_stopped(job, facts):
+                self._run(facts, job)
+        except (ModelError, InvalidInputError, ValueError, sqlite3.Error) as error:
+            self._become(facts, Stage.FAILED, str(error))
 
-    async def _tell_what_came_of_it(self, facts: Facts) -> None:
-        self._become(Stage.REPORTING)
-        facts.lines = await asyncio.to_thread(lines_of, self._folder / ROWS, facts.question.protocols)
+    def _run(self, facts: Facts, job: Job[None]) -> None:
+        self._become(facts, Stage.RUNNING)
+        finished = self._command(job, "run", STUDY, "-o", ROWS)
+        facts.done = self._rows()
+        if self._is_stopped(job, facts):
+            return
+        if finished.status:
+            self._become(facts, Stage.FAILED, _said(finished))
+            return
+        self._become(facts, Stage.REPORTING)
+        facts.lines = lines_of(self._folder / ROWS, facts.question.protocols)
         (self._folder / REPORT).unlink(missing_ok=True)
-        failed = await self._command("report", ROWS, "-o", REPORT)
-        self._become(Stage.STOPPED if self._stopping else Stage.DONE, self._errors() if failed else "")
+        reported = self._command(job, "report", ROWS, "-o", REPORT)
+        if not self._is_stopped(job, facts):
+            self._become(facts, Stage.DONE, _said(reported) if reported.status else "")
+
+    def _is_stopped(self, job: Job[None], facts: Facts) -> bool:
+        """Return whether somebody has stopped it; say so, then."""
+        stopped = job.stopped_at is not None
+        if stopped:
+            self._become(facts, Stage.STOPPED)
+        return stopped
+
+    def _broken_off(self, facts: Facts, why: str) -> None:
+        self._become(facts, Stage.FAILED if why else Stage.STOPPED, why)
 
     def _prepare(self, sketch: Sketch, facts: Facts) -> None:
-        self._folder.mkdir(mode=0o700, parents=True, exist_ok=True)
+        self._folder.mkdir(mode=0o700, exist_ok=True)  # not its parents: the team was removed if they are not there
         if not facts.question.family:
             model_of(sketch).save(self._folder / folder_of(sketch), replace=True)
         (self._folder / STUDY).write_text(facts.text, encoding="utf-8")
 
-    async def _command(self, *arguments: str) -> int:
-        """Carry out `robochoc experiment`; return its exit status."""
-        if self._stopping:
-            return -signal.SIGINT
-        with (self._folder / _SAID).open("wb") as said, (self._folder / _ERRORS).open("wb") as errors:
-            self._process = process = await asyncio.create_subprocess_exec(
-                *(sys.executable, "-P", "-m", "robochoc.app.runs.child", str(os.getpid()), "experiment", *arguments),
-                cwd=self._folder,
-                stdin=asyncio.subprocess.DEVNULL,
-                stdout=said,
-                stderr=errors,
-                process_group=0,
-            )
-        try:
-            return await self._watched(process)
-        finally:
-            self._kill()
-            self._process = None
+    def _command(self, job: Job[None], *arguments: str) -> Finished:
+        """Carry out `robochoc experiment`."""
+        errors = self._folder / _ERRORS
+        return job.run(Command(("experiment", *arguments), self._folder, errors=errors), self._look)
 
-    async def _watched(self, process: asyncio.subprocess.Process) -> int:
-        """Look how far it is until it ends; if it does not when it is asked to, end it."""
-        stopping_s = 0.0
-        while True:
-            with suppress(TimeoutError):
-                return await asyncio.wait_for(process.wait(), _LOOK_S)
-            done = await asyncio.to_thread(self._rows)
-            if self.facts and done != self.facts.done:
-                self.facts.done = done
-                self._tell()
-            if self._stopping:
-                stopping_s += _LOOK_S
-                if stopping_s > _PATIENCE_S:
-                    self._kill()
+    def _look(self) -> None:
+        """Look how far it is."""
+        done = self._rows()
+        if self.facts and done != self.facts.done:
+            self.facts.done = done
+            self._tell()
 
     def _rows(self) -> int:
         """Return how many of the study's runs are there."""
@@ -201,40 +184,27 @@ class Study:
         except sqlite3.Error:  # it is being made
             return self.facts.done if self.facts else 0
 
-    def _errors(self) -> str:
-        with suppress(OSError):
-            said = (self._folder / _ERRORS).read_bytes()[-_MAX_MESSAGE:].decode(errors="replace")
-            return " ".join(said.split())
-        return ""
-
-    def _signal(self, number: int) -> None:
-        if self._process is not None and self._process.returncode is None:
-            with suppress(ProcessLookupError):
-                self._process.send_signal(number)
-
-    def _kill(self) -> None:
-        """End whatever is left of the process and those that it has started."""
-        if self._process is not None:
-            with suppress(ProcessLookupError, PermissionError):
-                os.killpg(self._process.pid, signal.SIGKILL)
-
-    def _become(self, stage: Stage, message: str = "") -> None:
-        if self.facts is None:
+    def _become(self, facts: Facts, stage: Stage, message: str = "") -> None:
+        if facts.stage in ENDED:
             return
-        self.facts.stage, self.facts.message = stage, message
+        facts.message, facts.stage = message, stage
         if stage in ENDED:
             with suppress(OSError):
-                (self._folder / _STATE).write_bytes(msgspec.json.encode(self.facts))
+                (self._folder / _STATE).write_bytes(msgspec.json.encode(facts))
         self._tell()
 
     def _last(self) -> Facts | None:
         try:
             return msgspec.json.decode((self._folder / _STATE).read_bytes(), type=Facts)
-        except (OSError, msgspec.DecodeError):
+        except (OSError, msgspec.DecodeError, RecursionError):
             return None
 
     def _tell(self) -> None:
-        self._listeners()
+        self._call(self._listeners)
+
+
+def _said(finished: Finished) -> str:
+    return " ".join(finished.why.split())[-_MAX_MESSAGE:]
 
 
 def lines_of(file: Path, protocols: Sequence[str]) -> list[Line]:
@@ -260,17 +230,6 @@ def _opened(file: Path) -> Iterator[sqlite3.Connection]:
         yield rows
 
 
-_STUDIES: WeakKeyDictionary[Project, Study] = WeakKeyDictionary()
-
-
 def study_on(project: Project) -> Study:
     """Return the study of a team, the same object for all pages that show it."""
-    if project not in _STUDIES:
-        _STUDIES[project] = Study(project)
-    return _STUDIES[project]
-
-
-async def end_studies() -> None:
-    """End all that runs: the server does."""
-    for study in [*_STUDIES.values()]:
-        await study.end()
+    return project.part(Study)

@@ -13,9 +13,10 @@ from urllib.request import urlopen
 import msgspec
 import pytest
 
+from robochoc.app.jobs.job import end_all
 from robochoc.app.runs.options import RunOptions
 from robochoc.app.runs.run import Run, State
-from robochoc.app.runs.runs import Runs, end_all
+from robochoc.app.runs.runs import Runs
 from robochoc.app.sketch.sketch import Kind, Sketch
 from robochoc.app.store import Store
 from tests.support.app_server import AppServer

@@ -11,11 +11,12 @@ import pytest
 pytest.importorskip("nicegui")
 
 from robochoc.app import faults
-from robochoc.app.faults import ERRORS, TOLD, keep_faults, words
+from robochoc.app.faults import ERRORS, keep_faults
+from robochoc.app.log import FAULTS, TOLD, words
 from robochoc.app.sketch.edits import EditError
 
 _LOGGERS = ("nicegui", "socketio", "socketio.server", "engineio", "engineio.server", "asyncio", "uvicorn",
-            "uvicorn.error", "uvicorn.access", "uvicorn.asgi", TOLD.name)  # fmt: skip
+            "uvicorn.error", "uvicorn.access", "uvicorn.asgi", TOLD.name, FAULTS.name)  # fmt: skip
 
 
 @pytest.fixture

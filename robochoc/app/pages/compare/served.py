@@ -7,15 +7,14 @@ from fastapi.responses import FileResponse
 from nicegui import app
 
 from robochoc.app.projects import Projects
-from robochoc.app.studies.study import end_studies, study_on
+from robochoc.app.studies.study import study_on
 
 REPORT = "study/report.html"
 """Its address, relative to the pages of its team."""
 
 
 def install_reports(projects: Projects) -> None:
-    """Install the address of reports, and end studies with the server."""
-    app.on_shutdown(end_studies)
+    """Install the address of reports."""
 
     @app.get("/team/{name}/" + REPORT)
     async def report(name: str) -> Response:  # in the event loop, as all that opens teams: there is one of each

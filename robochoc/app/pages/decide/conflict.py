@@ -8,7 +8,7 @@ from functools import partial
 import msgspec
 from nicegui import run, ui
 
-from robochoc.app.conflicts.found import Conflict, ConflictSearch, Finder
+from robochoc.app.conflicts.found import PATIENCE_S, Conflict, ConflictSearch, Finder
 from robochoc.app.conflicts.rules import with_only
 from robochoc.app.pages.model.parts import TroubleLines
 from robochoc.app.pages.shell import told, while_shown
@@ -46,7 +46,7 @@ class Doors:
                 self._door("decide.door-aside", partial(decide, withdraw=True))
                 self._door("decide.door-conflict", self._look)
             self._found = ui.element("div").classes("found").props("aria-live=polite")
-        while_shown(self._end)
+        while_shown(self.end)
         ui.timer(0, self._look_at_once, once=True)
 
     async def _look_at_once(self) -> None:
@@ -61,15 +61,21 @@ class Doors:
                 ui.label(say(key))
             ui.label(say(f"{key}-help")).classes("soft")
 
-    def _end(self) -> None:
+    def end(self) -> None:
+        """Search no more."""
         if self._search:
-            self._search.stop()
+            self._search.end()
 
     async def _look(self) -> None:
-        self._end()
-        self._search = ConflictSearch(self._sketch)
-        self._tell(say("decide.searching"))
-        conflict = await run.io_bound(self._search.found)
+        if self._search:  # it searches already
+            return
+        self._search = search = ConflictSearch(self._sketch, folder=self._project.folder)
+        self._tell(say("decide.searching", seconds=int(PATIENCE_S)))
+        try:
+            conflict = await search.found()
+        finally:
+            self._search = None
+            search.end()
         if conflict is not None and not self._found.is_deleted:
             hints = await run.io_bound(hints_about_rules, with_only(self._sketch, conflict.rules or ()))
             self._show(conflict, hints or [])
@@ -91,7 +97,7 @@ class Doors:
         elif conflict.why:
             self._tell(say("decide.conflict-failed", why=conflict.why))
         elif conflict.late:
-            self._tell(say("decide.conflict-late"))
+            self._tell(say("decide.conflict-late", seconds=int(PATIENCE_S)))
         else:
             self._tell(say("decide.conflict-none" if conflict.rules is None else "decide.conflict-empty"))
 

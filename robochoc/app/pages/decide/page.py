@@ -42,6 +42,7 @@ class _Page:
         self._end_following: Callable[[], None] | None = None
         self._answered: tuple[object, ...] = ()
         self._told_below: tuple[object, ...] = ()
+        self._doors: Doors | None = None
         with ui.element("h1"):
             ui.label(say("decide.title"))
         with ui.element("section").classes("decide-top"):
@@ -122,7 +123,7 @@ class _Page:
         result = shown.result if shown else None
         if (shown, result) != self._told_below:  # not when the state changes: somebody may have clicked there already
             self._told_below = shown, result
-            self._below.clear()
+            self._clear_below()
             if shown is not None and result is not None:
                 with self._below:
                     self._show_below(shown, result, sketch)
@@ -191,11 +192,17 @@ class _Page:
 
     def _show_below(self, shown: Run, result: RunResult, sketch: Sketch) -> None:
         if result.verdict == "no-solution":
-            Doors(self._project, sketch, self._decide)
+            self._doors = Doors(self._project, sketch, self._decide)
         if result.assignment:
             costs = ui.element("div")
             ui.timer(0, partial(show_costs, costs, sketch, result), once=True)
         _command(shown)
+
+    def _clear_below(self) -> None:
+        if self._doors:
+            self._doors.end()
+            self._doors = None
+        self._below.clear()
 
 
 def _command(shown: Run) -> None:

@@ -59,9 +59,28 @@ def test_that_constraints_are_told_apart_by_the_longest_name() -> None:
 
 class TestSearch:
     def test_that_it_is_found_in_a_process_of_its_own(self) -> None:
-        assert ConflictSearch(slots(3, 2)).found().rules == ("R1",)
+        assert found(ConflictSearch(slots(3, 2))).rules == ("R1",)
 
-    def test_that_one_that_was_stopped_finds_nothing(self) -> None:
+    def test_that_one_that_was_ended_finds_nothing(self) -> None:
         search = ConflictSearch(slots(3, 2))
-        search.stop()
-        assert search.found() == Conflict(None, late=True)
+        search.end()
+        assert search.result() is None
+        assert search.pid is None
+        search.end()  # its process is none of its own any more
+
+    def test_that_a_limit_of_time_is_told(self) -> None:
+        assert ConflictSearch(slots(3, 2), -60).result() == Conflict(None, late=True)
+
+    def test_that_a_search_that_fails_says_why(self, monkeypatch: pytest.MonkeyPatch) -> None:
+        monkeypatch.setattr("robochoc.app.conflicts.found._PROCESS", "robochoc.no_such_module")
+        conflict = found(ConflictSearch(slots(3, 2)))
+        assert "no_such_module" in conflict.why
+        monkeypatch.setattr("robochoc.app.conflicts.found.Command", None)
+        assert found(ConflictSearch(slots(3, 2))).why == "That did not work. The team is as it was before."
+
+
+def found(search: ConflictSearch) -> Conflict:
+    """Return what a search has found; it was not ended."""
+    conflict = search.result()
+    assert conflict is not None
+    return conflict

@@ -3,17 +3,18 @@
 from __future__ import annotations
 
 import asyncio
-import signal
 from pathlib import Path
-from typing import Any
 
 import pytest
 
-from robochoc.app.flights.making import Making, Stage, flies, making_of
+from robochoc.app.flights.making import FLIGHT, Making, Stage, flies, making_of
+from robochoc.app.jobs.job import jobs_alive
+from robochoc.app.log import words
 from robochoc.app.runs.options import JOURNAL, RunOptions
 from robochoc.app.runs.run import Record, Run
 from robochoc.app.sketch.sketch import Kind, Sketch
 from tests.support.kept_runs import cube, kept_run
+from tests.support.limits import HANG_S, wait_until
 
 
 def test_only_who_decides_heights_or_places_flies(tmp_path: Path) -> None:
@@ -60,26 +61,36 @@ def test_a_run_without_its_teams_files_is_flown_and_a_damaged_journal_told(tmp_p
     assert asyncio.run(_made(Making(making.run)))[0] is Stage.CONVERSATION
 
 
-def test_the_work_ends_when_nobody_wants_it_any_more(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_work_ends_when_nobody_wants_it_any_more(tmp_path: Path) -> None:
     making = Making(kept_run(tmp_path, cube()))
-    begun: list[asyncio.subprocess.Process] = []
-    has_begun = asyncio.Event()
-    really = asyncio.create_subprocess_exec
+    one, other = making.wanted(lambda: None), making.wanted(lambda: None)
+    (job,) = jobs_alive()
+    wait_until(lambda: job.pid is not None, "it has no process")
+    one()
+    assert making.stage is Stage.FLIGHT
+    other()
+    assert making.stage is Stage.WAITING
+    assert job.join(HANG_S)
+    assert (making.stage, making.flight, making.troubles) == (Stage.WAITING, None, {})
 
-    async def begin(*arguments: str, **options: Any) -> asyncio.subprocess.Process:  # noqa: ANN401 - asyncio's
-        begun.append(await really(*arguments, **options))
-        has_begun.set()
-        return begun[0]
 
-    monkeypatch.setattr(asyncio, "create_subprocess_exec", begin)
+def test_what_failed_can_be_tried_again(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    making = Making(kept_run(tmp_path, cube()))
+    monkeypatch.setattr(Making, "_make_flight", _failing)
+    asyncio.run(_made(making))
+    assert making.troubles[Stage.FLIGHT] == words(ValueError())
+    assert not making.has_flight
+    making.wanted(lambda: None)
+    assert making.stage is Stage.DONE  # not by itself
+    monkeypatch.undo()
+    monkeypatch.setattr(Making, "_make_flight", lambda self, _: self.run.folder.joinpath(FLIGHT).write_bytes(b"scene"))
+    monkeypatch.setattr(Making, "_make_conversation", lambda *_: None)
+    making.again()
+    wait_until(lambda: making.stage is Stage.DONE, "it is not made")
+    assert making.flight
+    assert making.troubles == {}
+    assert making.has_flight
 
-    async def cancelled() -> int:
-        one, other = making.wanted(lambda: None), making.wanted(lambda: None)
-        await has_begun.wait()
-        one()
-        assert making.stage is Stage.FLIGHT
-        other()
-        return await begun[0].wait()
 
-    assert asyncio.run(cancelled()) == -signal.SIGKILL
-    assert (making.stage, making.flight) == (Stage.WAITING, None)
+def _failing(*_: object) -> None:
+    raise ValueError("unforeseen")

@@ -15,10 +15,11 @@ from pathlib import Path
 import msgspec
 import pytest
 
+from robochoc.app.jobs.job import end_all
 from robochoc.app.runs.options import RunOptions
 from robochoc.app.runs.prepared import TeamFiles
 from robochoc.app.runs.run import RECORD, Record, Run, State
-from robochoc.app.runs.runs import Runs, end_all
+from robochoc.app.runs.runs import Runs
 from robochoc.app.sketch.sketch import Cell, Decision, Kind, Sketch, SketchRobot, SketchRule
 from robochoc.formats import read_team, write_team
 from robochoc.model.problem import RemoveAgent

@@ -1,4 +1,4 @@
-"""The process of a run: `python -m robochoc.app.runs.child PARENT ARGUMENTS...` is `robochoc ARGUMENTS...`.
+"""The process of a job: `python -m robochoc.app.jobs.child PARENT MODULE ...` is `python -m MODULE ...`.
 
 It ends with the server whose process is PARENT, however that ends: the kernel tells it.
 """
@@ -14,12 +14,12 @@ from robochoc.system.orphans import signal_when_orphaned
 
 
 def main() -> None:
-    """Run the command line, as long as there is somebody to read what comes of it."""
-    parent = int(sys.argv.pop(1))
+    """Run the module, as long as there is somebody to read what comes of it."""
+    parent, module = int(sys.argv.pop(1)), sys.argv.pop(1)
     signal_when_orphaned(signal.SIGTERM)
     if os.getppid() != parent:  # it has died before the kernel knew whom to tell
         return
-    runpy.run_module("robochoc", run_name="__main__", alter_sys=True)
+    runpy.run_module(module, run_name="__main__", alter_sys=True)
 
 
 if __name__ == "__main__":
