@@ -10,7 +10,7 @@ from collections.abc import Callable
 from concurrent.futures import Future
 from contextlib import suppress
 from pathlib import Path
-from typing import Any, Generic, Protocol, Self, TypeVar
+from typing import Any, Generic, Self, TypeVar
 
 from robochoc.app.jobs.process import Command, Finished, GroupProcess
 from robochoc.app.log import noted
@@ -27,6 +27,8 @@ AT_ONCE = ((0.0, signal.SIGKILL),)
 T = TypeVar("T")
 Call = Callable[[Callable[[], None]], object]
 """Calls something, perhaps later and in another thread."""
+Over = Callable[[str], object]
+"""Is told once, in the job's thread, that it did not come to its end, and why; empty: somebody has ended it."""
 
 
 class EndedError(Exception):
@@ -49,13 +51,6 @@ def call_here() -> Call:
             loop.call_soon_threadsafe(does)
 
     return call
-
-
-class Over(Protocol):
-    """Is told how a job has ended that did not come to its end. It is called once, in the thread of the job."""
-
-    def __call__(self, why: str) -> object:
-        """`why`: a sentence about what went wrong; empty: somebody has ended the job."""
 
 
 class Job(Generic[T]):

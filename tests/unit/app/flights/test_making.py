@@ -67,9 +67,9 @@ def test_the_work_ends_when_nobody_wants_it_any_more(tmp_path: Path) -> None:
     (job,) = jobs_alive()
     wait_until(lambda: job.pid is not None, "it has no process")
     one()
-    assert making.stage is Stage.FLIGHT
+    assert making.stage == "flight"
     other()
-    assert making.stage is Stage.WAITING
+    assert making.stage == "waiting"
     assert job.join(HANG_S)
     assert (making.stage, making.flight, making.troubles) == (Stage.WAITING, None, {})
 

@@ -136,10 +136,12 @@ class TestEnd:
 
     def test_that_those_of_a_folder_are_ended_and_no_others(self, tmp_path: Path) -> None:
         release = threading.Event()
-        jobs = {
-            name: Job(name, lambda job: (release.wait(HANG_S), job.check()), folder=tmp_path / name).start()
-            for name in ("a", "a/runs/1", "ab", "b")
-        }
+
+        def works(job: Job[None]) -> None:
+            release.wait(HANG_S)
+            job.check()
+
+        jobs = {name: Job(name, works, folder=tmp_path / name).start() for name in ("a", "a/runs/1", "ab", "b")}
         assert {job.name for job in end_jobs_in(tmp_path / "a")} == {"a", "a/runs/1"}
         release.set()
         assert all(job.join(HANG_S) for job in jobs.values())
