@@ -11,7 +11,7 @@ from nicegui import ui
 from robochoc.app.pages.opening import build_opening
 from robochoc.app.pages.pictures import thumbnail
 from robochoc.app.projects import Projects
-from robochoc.app.sketch.examples import examples, title_of
+from robochoc.app.sketch.examples import examples, shows, title_of
 from robochoc.app.sketch.sketch import Sketch
 from robochoc.app.texts import say
 
@@ -31,9 +31,19 @@ def build_gallery(projects: Projects) -> None:
     _heading("gallery.examples")
     with ui.element("ul").classes("cards"):
         for key, sketch in examples().items():
-            _card(title_of(key), sketch.story, partial(_begin, projects, sketch), sketch=sketch)
+            _card(
+                title_of(key),
+                sketch.story,
+                partial(_begin, projects, sketch),
+                sketch=sketch,
+                note=_shown_by(key, sketch),
+            )
     _heading("gallery.yours")
     _own(projects)
+
+
+def _shown_by(key: str, sketch: Sketch) -> str:
+    return say("gallery.shows-flying" if sketch.flies else "gallery.shows", what=shows(key))
 
 
 def open_team(name: str) -> None:
@@ -94,7 +104,7 @@ def _heading(key: str) -> None:
 
 
 def _card(
-    title: str, says: str, does: Callable[[], object], *, sketch: Sketch | None = None, icon: str = ""
+    title: str, says: str, does: Callable[[], object], *, sketch: Sketch | None = None, icon: str = "", note: str = ""
 ) -> ui.element:
     item = ui.element("li").classes("item")
     with item, ui.element("button").classes("card").props("type=button").on("click", does):
@@ -106,4 +116,6 @@ def _card(
         with ui.element("h3"):
             ui.label(title)
         ui.label(says).classes("soft")
+        if note:
+            ui.label(note).classes("small")
     return item

@@ -10,6 +10,7 @@ from importlib.resources import files
 from nicegui import ui
 from nicegui.events import KeyEventArguments
 
+from robochoc.app.pages.theme import ThemeButton
 from robochoc.app.projects import Project
 from robochoc.app.sketch.edits import EditError, renamed
 from robochoc.app.texts import say
@@ -29,7 +30,6 @@ def shell(title: str, project: Project | None = None, area: str = "") -> Iterato
     ui.add_css(_style())
     ui.page_title(f"{title} - {say('app.title')}" if title else say("app.title"))
     ui.colors(primary="var(--accent)")
-    dark = ui.dark_mode(None)
     ui.link(say("app.skip"), "#content").classes("skip")
     with ui.element("header").classes("bar"):
         _brand()
@@ -39,7 +39,7 @@ def shell(title: str, project: Project | None = None, area: str = "") -> Iterato
         with ui.element("div").classes("tools"):
             if project is not None:
                 _undo_and_redo(project)
-            _button("contrast", "app.dark", lambda: dark.set_value(not dark.value))
+            ThemeButton()
     with ui.element("main").classes("main").props("id=content tabindex=-1"):
         if project is not None:
             _trouble(project)

@@ -11,7 +11,10 @@ from robochoc.app.texts import say
 
 
 def examples() -> dict[str, Sketch]:
-    """Return the sketches by their keys, in the order of the gallery. Each has its story; `title_of` says its title."""
+    """Return the sketches by their keys, in the order of the gallery: those that fly first.
+
+    Each has its story; `title_of` says its title, `shows` what can be learnt from it.
+    """
     return {key: example(key) for key in _MADE}
 
 
@@ -23,6 +26,11 @@ def example(key: str) -> Sketch:
 def title_of(key: str) -> str:
     """Return the title of an example."""
     return say(f"example.{key}.title")
+
+
+def shows(key: str) -> str:
+    """Return what an example shows, in a few words."""
+    return say(f"example.{key}.shows")
 
 
 class _Rules:
@@ -170,15 +178,15 @@ def _secrets() -> Sketch:
 
 
 _MADE: dict[str, Callable[[], Sketch]] = {
-    "charging": _charging,
     "cube": _cube,
     "patrol": _patrol,
-    "rescue": _rescue,
     "hangar": _hangar,
+    "coverage": _coverage,
+    "secrets": _secrets,
+    "charging": _charging,
+    "rescue": _rescue,
     "meetings": _meetings,
     "channels": _channels,
-    "coverage": _coverage,
     "convoy": _convoy,
-    "secrets": _secrets,
 }
 KEYS: Sequence[str] = tuple(_MADE)

@@ -127,6 +127,32 @@ def of_secrets(facts: Facts) -> Iterator[Trouble]:
                 yield _trouble(rule, "private-cost")
 
 
+def why_not_private(sketch: Sketch, rule: SketchRule) -> Trouble | None:
+    """Return why a rule cannot be made private as the team stands. None: it can be."""
+    entry = PALETTE.get(rule.kind)
+    if entry is None or entry.links is Links.EACH:
+        return None
+    count = len(sketch.bound(rule))
+    if entry.links is Links.GROUP and count > _PAIR:
+        return _trouble(rule, "private-many", count=count)
+    costly = next((one for one in sketch.rules if one.on and (one.cost is not None or _is_graded(one))), None)
+    return None if costly is None else _trouble(rule, "private-off", other=shortened(costly.id))
+
+
+def why_no_cost(sketch: Sketch, rule: SketchRule | None = None) -> Trouble | None:
+    """Return why a rule (None: a new one) cannot cost anything as the team stands. None: it can."""
+    for other in sketch.rules:
+        entry = PALETTE.get(other.kind)
+        if other.on and other.private and entry is not None and entry.links is not Links.EACH:
+            return _trouble(rule or other, "cost-off", other=shortened(other.id))
+    return None
+
+
+def _is_graded(rule: SketchRule) -> bool:
+    entry = PALETTE.get(rule.kind)
+    return entry is not None and entry.graded
+
+
 def of_number(facts: Facts) -> Iterator[Trouble]:
     """Yield the rule with which there are too many constraints."""
     total = 0

@@ -165,6 +165,11 @@ class Sketch(msgspec.Struct, frozen=True):
         """Whether somebody has said who is above whom."""
         return any(robot.rank for robot in self.robots)
 
+    @property
+    def flies(self) -> bool:
+        """Whether somebody decides where to be: a level, or a place."""
+        return any(decision.kind in {Kind.LEVEL, Kind.PLACE} for decision in self.decisions)
+
     def robot(self, name: str) -> SketchRobot | None:
         """Return the robot of that name, if there is one."""
         return next((robot for robot in self.robots if robot.name == name), None)

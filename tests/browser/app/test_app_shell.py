@@ -45,6 +45,33 @@ def test_a_team_is_renamed_undone_and_seen_in_both_tabs(browser: Any, applicatio
         }
 
 
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+def test_light_or_dark_is_kept_from_page_to_page(
+    browser: Any,  # noqa: ANN401 - Playwright's
+    application: AppServer,
+    teams: Store,
+    scheme: str,
+) -> None:
+    team = teams.add(Sketch("first"))
+    chosen = "light" if scheme == "dark" else "dark"
+    with (
+        watched_page(browser, color_scheme=scheme) as tab,
+        watched_page(browser, color_scheme=scheme) as other,
+    ):
+        connected(other.page, application.url)
+        connected(tab.page, application.url)
+        try:
+            tab.page.click("[aria-label='Light or dark']")
+            for page in (tab.page, other.page):
+                page.wait_for_selector(f"body.body--{chosen}")
+            connected(tab.page, f"{application.url}team/{team}/decide")
+            tab.page.wait_for_selector(f"body.body--{chosen}")
+            tab.page.wait_for_selector("[aria-label='Light or dark']")
+            assert tab.complaints + other.complaints == []
+        finally:
+            tab.page.evaluate("localStorage.clear()")
+
+
 @pytest.mark.parametrize("name", ["", "<script>alert(1)</script>", "a b", "{{7*7}}", "scenario", "ä", "1st"])
 def test_what_can_be_no_name_is_told_where_it_was_typed(
     browser: Any,  # noqa: ANN401 - Playwright's

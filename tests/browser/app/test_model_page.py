@@ -62,9 +62,7 @@ def test_five_drones_and_five_charging_slots_are_modelled_by_clicks(
         page.get_by_role("button", name="Add a decision: Slot").click()
         becomes(teams, team, lambda sketch: sketch.decisions == (Decision("slot", Kind.SLOT, (1, 2, 3, 4, 5)),))
         page.get_by_role("button", name="Select", exact=True).click()
-        page.keyboard.press("Escape")
-        page.locator("[data-robot=Drone5]").click()  # it was selected when it was added
-        page.wait_for_selector(".robot.chosen", state="detached")
+        page.wait_for_selector("[data-robot=Drone5].chosen")  # since it was added: rules are for all
         pick(page, "All different")
         page.wait_for_selector(".link.lines .seen[d^=M]", state="attached")
         page.get_by_role("button", name="Done").click()
@@ -225,7 +223,7 @@ def test_hostile_words_stay_words(browser: Any, application: AppServer, teams: S
         page.wait_for_selector(".source >> text=onerror")
         page.locator(".rule .sentence").nth(1).click()
         page.wait_for_selector(".pairs button")
-        page.locator(".pairs button").nth(1).click()
+        page.locator(".pairs td button").nth(1).click()
         becomes(
             teams,
             team,
@@ -261,6 +259,56 @@ def test_121_robots_on_a_large_map_are_drawn_and_dragged(browser: Any, applicati
         page.locator("[data-robot=Drone121]").focus()
         page.keyboard.press("ArrowUp")
         becomes(teams, team, lambda sketch: sketch.robots[120].at == Cell(10, 11))
+        assert tab.complaints == []
+
+
+def test_a_large_table_is_clicked_together_by_keys(browser: Any, application: AppServer, teams: Store) -> None:  # noqa: ANN401 - Playwright's
+    rules = (SketchRule("R1", "table", "level", ("Drone1", "Drone2"), {"rows": [[1, 1]]}),)
+    levels = Decision("level", Kind.LEVEL, tuple(range(1, 101)))
+    team = teams.add(Sketch("pairs", robots=drones(2), decisions=(levels,), rules=rules))
+    with watched_page(browser) as tab:
+        page = opened(tab, application, team)
+        page.locator(".rule .sentence").click()
+        page.focus("[data-at='0:0']")
+        for key in ("PageDown", "PageDown", "End", "Enter", "ArrowDown", "ArrowLeft", "Shift+Enter"):
+            page.keyboard.press(key)
+        square = [[one, other] for one in (33, 34) for other in (99, 100)]
+        made = becomes(teams, team, lambda sketch: len(sketch.rules[0].settings["rows"]) == 5)  # type: ignore[arg-type] # a list
+        assert sorted(made.rules[0].settings["rows"]) == [[1, 1], *square]  # type: ignore[arg-type, type-var] # a list
+        page.wait_for_selector("text=Across: 85 to 100, of 100")
+        page.keyboard.press("Home")
+        page.keyboard.press("ArrowLeft")
+        page.wait_for_function("document.activeElement.matches('.head')")
+        page.keyboard.press("Enter")
+        becomes(teams, team, lambda sketch: len(sketch.rules[0].settings["rows"]) == 103)  # type: ignore[arg-type] # a list
+        assert tab.complaints == []
+
+
+def test_the_last_robot_and_the_last_cell_stay_and_secrets_say_why_they_are_off(
+    browser: Any,  # noqa: ANN401 - Playwright's
+    application: AppServer,
+    teams: Store,
+) -> None:
+    place = Decision("place", Kind.PLACE, (40,))
+    rules = (
+        SketchRule("R1", "prefers", "level", ("Drone1",), {"value": 1}, 3),
+        SketchRule("R2", "apart", "level", (), {"gap": 1}),
+    )
+    team = teams.add(Sketch("last", robots=drones(2), decisions=(place, LEVEL), rules=rules))
+    with watched_page(browser, {"width": 1280, "height": 900}) as tab:
+        page = opened(tab, application, team)
+        page.get_by_role("switch", name="Choose cells by clicking them").click()
+        page.wait_for_selector("text=Click the cells among which the robots choose.")
+        click_cell(page, 0, 5)
+        page.wait_for_selector("[role=alert] >> text=That is the last cell that can be chosen for place.")
+        page.locator(".rule .sentence").nth(0).click()
+        page.locator("[data-robot=Drone1]").click()
+        page.wait_for_selector("[role=alert] >> text=Drone1 is the last one that this rule names.")
+        page.get_by_role("button", name="Everybody").click()
+        becomes(teams, team, lambda sketch: sketch.rules[0].robots == ())
+        page.locator(".rule .sentence").nth(1).click()
+        page.wait_for_selector("text=Private is off: R1 costs something")
+        assert page.get_by_role("switch", name="Private").get_attribute("aria-disabled") == "true"
         assert tab.complaints == []
 
 

@@ -2,16 +2,20 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from random import Random
+from typing import TYPE_CHECKING, cast
 
+import msgspec
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
 from robochoc.app.sketch.checks import troubles
-from robochoc.app.sketch.edits import EditError, with_rule
+from robochoc.app.sketch.edits import EditError, with_rule, without_decision
+from robochoc.app.sketch.fits import why_no_cost, why_not_private
 from robochoc.app.sketch.rules import PALETTE
-from robochoc.app.sketch.sketch import MAX_VALUES, Area, Cell, Decision, Kind, Sketch, SketchRobot, SketchRule
+from robochoc.app.sketch.sketch import MAX_VALUES, Area, Cell, Decision, Kind, Sketch, SketchRobot, SketchRule, Value
 from tests.support.examples import examples
 from tests.support.sketches import random_sketch
 
@@ -19,6 +23,8 @@ pytest.importorskip("nicegui")
 
 from robochoc.app.pages.model import picture
 from robochoc.app.pages.model.clicks import with_cell_clicked, with_robot_clicked
+from robochoc.app.pages.model.desk import Desk
+from robochoc.app.pages.model.pair_table import filled
 from robochoc.app.pages.model.palette_menu import first_rule
 from robochoc.app.pages.model.values import (
     first_values,
@@ -28,9 +34,19 @@ from robochoc.app.pages.model.values import (
     written_values,
 )
 
+if TYPE_CHECKING:
+    from robochoc.app.projects import Project
+
 LEVEL, PLACE = Decision("level", Kind.LEVEL, (1, 2, 3)), Decision("place", Kind.PLACE)
 ROBOTS = tuple(SketchRobot(name, Cell(x, 0)) for x, name in enumerate(("North", "South", "East")))
 TEAM = Sketch("team", Area(4, 3), ROBOTS, (LEVEL, PLACE))
+
+
+@dataclass
+class Held:
+    """What of a project a desk asks for."""
+
+    sketch: Sketch
 
 
 @pytest.mark.parametrize(
@@ -88,10 +104,86 @@ def test_a_decision_begins_with_something_to_choose_from() -> None:
 
 
 def test_cells_are_clicked_together_and_all_of_them_are_none_by_name() -> None:
-    one_less = with_cell_clicked(TEAM, Cell(0, 0), 1, None)
+    one_less = with_cell_clicked(TEAM, Cell(0, 0), "place", None)
     assert one_less.decisions[1].values == tuple(range(1, 12))
-    assert with_cell_clicked(one_less, Cell(0, 0), 1, None) == TEAM
+    assert with_cell_clicked(one_less, Cell(0, 0), "place", None) == TEAM
     assert with_cell(TEAM, PLACE, 11) == tuple(range(11))
+
+
+def test_cells_are_those_of_the_named_place_alone() -> None:
+    without = without_decision(TEAM, "level")
+    assert with_cell_clicked(without, Cell(0, 0), "place", None).decisions[0].values == tuple(range(1, 12))
+    for name in ("level", "gone"):
+        assert with_cell_clicked(TEAM, Cell(0, 0), name, None) == TEAM
+
+
+def test_the_last_cell_and_the_last_robot_stay() -> None:
+    one = msgspec.structs.replace(TEAM, decisions=(Decision("place", Kind.PLACE, (0,)),))
+    with pytest.raises(EditError, match=r"edit\.last-cell"):
+        with_cell_clicked(one, Cell(0, 0), "place", None)
+    named = with_rule(TEAM, SketchRule("", "different", "level", ("North",)))
+    with pytest.raises(EditError, match=r"edit\.last-of-rule"):
+        with_robot_clicked(named, named.rules[0], "North")
+
+
+def test_a_robot_that_was_just_added_is_named_but_rules_are_not_for_it() -> None:
+    desk = Desk(cast("Project", Held(TEAM)))
+    desk.select_added("South")
+    assert (desk.selected, desk.meant) == (["South"], [])
+    desk.select(["South"])
+    assert desk.meant == ["South"]
+
+
+def test_a_place_whose_cells_are_clicked_is_let_go_when_it_is_gone() -> None:
+    desk = Desk(cast("Project", Held(TEAM)), cells_of="place")
+    desk.forget_gone()
+    assert desk.cells_of == "place"
+    desk.project = cast("Project", Held(without_decision(TEAM, "place")))
+    desk.forget_gone()
+    assert desk.cells_of is None
+
+
+def test_pairs_are_filled_as_a_rectangle_and_emptied_again() -> None:
+    rows: list[list[Value]] = [[1, 1], [9]]
+    more = filled(rows, (1, 2), (1, 3), on=True)
+    assert more == [[1, 1], [9], [1, 3], [2, 1], [2, 3]]
+    assert filled(more, (1, 2), (1,), on=False) == [[9], [1, 3], [2, 3]]
+
+
+@pytest.mark.parametrize(
+    ("rules", "private_off", "costs_off"),
+    [
+        ((), False, False),
+        ((SketchRule("R1", "prefers", "level", (), {"value": 1}, 3),), True, False),
+        ((SketchRule("R1", "little", "level", (), {"step": 1}),), True, False),
+        ((SketchRule("R1", "little", "level", (), {"step": 1}, on=False),), False, False),
+        ((SketchRule("R1", "apart", "level", ("North", "South"), {"gap": 1}, private=True),), False, True),
+        ((SketchRule("R1", "never", "level", (), {"value": 1}, private=True),), False, False),
+    ],
+)
+def test_secrets_and_costs_are_told_apart_before_they_meet(
+    rules: tuple[SketchRule, ...],
+    private_off: bool,  # noqa: FBT001 - a parameter
+    costs_off: bool,  # noqa: FBT001 - a parameter
+) -> None:
+    new = SketchRule("R9", "close", "level", ("North", "East"), {"gap": 1})
+    sketch = msgspec.structs.replace(TEAM, rules=(*rules, new))
+    assert (why_not_private(sketch, new) is not None) is private_off
+    assert (why_no_cost(sketch, new) is not None) is costs_off
+    private = with_rule(sketch, msgspec.structs.replace(new, private=True))
+    costs = with_rule(sketch, msgspec.structs.replace(new, cost=1))
+    for made, off in ((private, private_off), (costs, costs_off)):
+        assert any(one.key == "trouble.rule-private-cost" for one in troubles(made)) is off
+
+
+def test_a_rule_of_one_robot_may_always_be_private_and_a_group_never() -> None:
+    little = SketchRule("R1", "little", "level", (), {"step": 1})
+    group = SketchRule("R2", "at-most", "level", (), {"value": 1, "count": 1})
+    sketch = msgspec.structs.replace(TEAM, rules=(little, group))
+    assert why_not_private(sketch, little) is None
+    found = why_not_private(sketch, group)
+    assert found is not None
+    assert found.key == "trouble.rule-private-many"
 
 
 @given(st.integers(0, 2**32))

@@ -12,7 +12,7 @@ from lxml import etree
 
 from robochoc.app.sketch.building import model_of
 from robochoc.app.sketch.checks import troubles
-from robochoc.app.sketch.examples import KEYS, example, examples, title_of
+from robochoc.app.sketch.examples import KEYS, example, examples, shows, title_of
 from robochoc.app.sketch.picture import picture
 from robochoc.app.sketch.rules import PALETTE
 from robochoc.app.sketch.sketch import Area, Cell, Sketch, SketchRobot, SketchRule
@@ -25,6 +25,13 @@ def test_there_are_enough_of_them_and_each_has_words() -> None:
     assert len(found) >= 8
     assert [*found] == [*KEYS]
     assert all(sketch.name == key and sketch.story and title_of(key) for key, sketch in found.items())
+
+
+def test_those_that_fly_come_first_and_each_says_what_it_shows() -> None:
+    flying = [sketch.flies for sketch in examples().values()]
+    assert flying == sorted(flying, reverse=True)
+    assert {*flying} == {True, False}
+    assert len({shows(key) for key in KEYS}) == len(KEYS)
 
 
 @pytest.mark.parametrize("key", KEYS)

@@ -20,10 +20,9 @@ from robochoc.app.runs.result import RunResult
 from robochoc.app.runs.run import Run, State
 from robochoc.app.runs.runs import runs_of
 from robochoc.app.sketch.checks import troubles
-from robochoc.app.sketch.sketch import Kind, Sketch, Value
+from robochoc.app.sketch.sketch import Sketch, Value
 from robochoc.app.texts import say
 
-_FLYING = frozenset({Kind.LEVEL, Kind.PLACE})
 PURPOSE = "decide"
 
 
@@ -78,8 +77,7 @@ class _Page:
 
     def _decide(self, *, withdraw: bool = False) -> None:
         sketch = self._project.sketch
-        flies = any(decision.kind in _FLYING for decision in sketch.decisions)
-        self._runs.start(self._how.options(withdraw=withdraw, scene=flies), purpose=PURPOSE)
+        self._runs.start(self._how.options(withdraw=withdraw, scene=sketch.flies), purpose=PURPOSE)
 
     def _follow_latest(self) -> None:
         """Show the run that was started last, perhaps in another tab."""

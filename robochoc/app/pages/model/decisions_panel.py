@@ -8,7 +8,16 @@ import msgspec
 from nicegui import ui
 
 from robochoc.app.pages.model.desk import Desk
-from robochoc.app.pages.model.parts import Cards, TroubleLines, icon_button, name_it, panel, put
+from robochoc.app.pages.model.parts import (
+    Cards,
+    TroubleLines,
+    everybody_button,
+    icon_button,
+    name_it,
+    panel,
+    put,
+    refuse_last,
+)
 from robochoc.app.pages.model.values import first_values, free_decision_name, typed_values, written_values
 from robochoc.app.pages.shell import told
 from robochoc.app.sketch.edits import EditError, with_decision, without_decision
@@ -71,6 +80,7 @@ class _DecisionCard:
                 self._who = ui.select([], multiple=True, label=say("model.who"), with_input=True)
                 self._who.props(f'dense outlined use-chips hint="{say("model.who-hint")}"').classes("half")
                 self._who.on_value_change(lambda event: self._decided_by(tuple(event.value or ())))
+                self._everybody = everybody_button(lambda: self._change(robots=()))
                 self._values: ui.input | None = None
                 self._cells: ui.switch | None = None
                 if self._kind is Kind.PLACE:
@@ -97,10 +107,12 @@ class _DecisionCard:
         chosen = [name for name in decision.robots if name in names]
         if self._who.options != names or self._who.value != chosen:
             self._who.set_options(names, value=chosen)
+        self._everybody.set_visibility(bool(decision.robots))
         if self._values is not None and not self._values.error and not self._same(self._values.value, decision):
             self._values.set_value(written_values(decision.values))
         if self._cells is not None:
-            self._cells.set_value(self._desk.cells_of == self._place)
+            self._cells.set_value(self._desk.cells_of == decision.name)
+            self._all_cells.set_visibility(bool(decision.values))
             count, free = len(sketch.values(decision)), len(sketch.area.free)
             known = say("model.all-cells", count=free) if not decision.values else say("model.some-cells", count=count)
             self._known.set_text(known)
@@ -115,11 +127,13 @@ class _DecisionCard:
         with ui.element("div").classes("wide"):
             self._known = ui.label().classes("soft")
             self._cells = ui.switch(say("model.click-cells"), on_change=lambda event: self._click_cells(event.value))
+            self._all_cells = ui.button(say("model.take-all-cells"), on_click=lambda: self._change(values=()))
+            self._all_cells.props("flat dense no-caps")
 
     def _click_cells(self, on: bool) -> None:  # noqa: FBT001 - a switch's value
-        place = self._place if on else None
-        if (self._desk.cells_of == self._place) is not on:
-            self._desk.cells_of = place
+        decision = self._decision
+        if decision is not None and (self._desk.cells_of == decision.name) is not on:
+            self._desk.cells_of = decision.name if on else None
             self._desk.opened = None if on else self._desk.opened
             self._desk.looked()
 
@@ -140,6 +154,10 @@ class _DecisionCard:
         return self._change(values=values)
 
     def _decided_by(self, robots: tuple[str, ...]) -> None:
+        decision = self._decision
+        if not robots and decision is not None and decision.robots and not self._following:
+            refuse_last(self._who, decision.robots, say("edit.last-decider"))
+            return
         everybody = len(robots) == len(self._desk.sketch.robots)
         self._change(robots=() if everybody else robots)
 
@@ -150,7 +168,13 @@ class _DecisionCard:
         made = msgspec.structs.replace(decision, **changes)
         if made == decision:
             return None
-        return self._desk.edit(lambda sketch: with_decision(sketch, made, instead_of=decision.name))
+        clicked = self._desk.cells_of
+        if clicked == decision.name:
+            self._desk.cells_of = made.name  # its cells are clicked together on, under its new name
+        wrong = self._desk.edit(lambda sketch: with_decision(sketch, made, instead_of=decision.name))
+        if wrong is not None:
+            self._desk.cells_of = clicked
+        return wrong
 
     def _removed(self) -> None:
         decision = self._decision

@@ -9,7 +9,7 @@ from robochoc.app.listeners import Listeners
 from robochoc.app.pages.shell import told
 from robochoc.app.projects import Project
 from robochoc.app.sketch.edits import EditError
-from robochoc.app.sketch.sketch import Sketch
+from robochoc.app.sketch.sketch import Kind, Sketch
 from robochoc.app.sketch.troubles import About, Trouble
 
 Edit = Callable[[Sketch], Sketch]
@@ -30,8 +30,9 @@ class Desk:
     Attributes:
         project: The team.
         selected: The robots that are selected, in the order in which they were.
+        just_added: The robot that is selected since it was added, so that it can be named. Rules are not meant for it.
         opened: The rule whose parts are shown, to be changed. Robots that are clicked go into it, or out of it.
-        cells_of: The place of the decisions whose cells are clicked together on the map.
+        cells_of: The decision about places whose cells are clicked together on the map, by its name.
         pointed: The rule that somebody points at in the list.
         troubles: What is wrong, as far as it was looked at.
         tell: Tells what could not be done, where no field is near it.
@@ -40,8 +41,9 @@ class Desk:
 
     project: Project
     selected: list[str] = field(default_factory=list)
+    just_added: str | None = None
     opened: str | None = None
-    cells_of: int | None = None
+    cells_of: str | None = None
     pointed: str | None = None
     troubles: list[Trouble] = field(default_factory=list)
     tell: Callable[[str], None] = _quiet
@@ -79,7 +81,18 @@ class Desk:
         """Select these robots: those of them that are (still) there."""
         known = {robot.name for robot in self.sketch.robots}
         self.selected = [name for name in dict.fromkeys(names) if name in known]
+        self.just_added = None
         self.looked()
+
+    def select_added(self, name: str) -> None:
+        """Select a robot that was just added."""
+        self.select([name])
+        self.just_added = name
+
+    @property
+    def meant(self) -> list[str]:
+        """The robots that a new rule is for. Empty: all of them."""
+        return [] if self.just_added else self.selected
 
     def open(self, rule: str | None) -> None:
         """Show the parts of a rule, or of none."""
@@ -92,8 +105,11 @@ class Desk:
         self.selected = [name for name in self.selected if name in known]
         if self.opened is not None and self.sketch.rule(self.opened) is None:
             self.opened = None
-        if self.cells_of is not None and self.cells_of >= len(self.sketch.decisions):
+        decision = None if self.cells_of is None else self.sketch.decision(self.cells_of)
+        if decision is None or decision.kind is not Kind.PLACE:
             self.cells_of = None
+        if self.just_added not in self.selected:
+            self.just_added = None
 
     def troubles_at(self, about: About, element: str) -> list[Trouble]:
         """Return what is wrong with an element."""

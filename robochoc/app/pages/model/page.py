@@ -103,7 +103,7 @@ class ModelPage:
         desk = self._desk
         if self._tool == "add":
             if desk.do(lambda sketch: with_robot(sketch, cell)):
-                desk.select([desk.sketch.robots[-1].name])
+                desk.select_added(desk.sketch.robots[-1].name)
         elif self._tool == "block":
             desk.do(lambda sketch: with_cell_blocked(sketch, cell, blocked=cell not in sketch.area.blocked))
         elif desk.cells_of is not None or desk.opened is not None:

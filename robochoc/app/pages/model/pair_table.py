@@ -11,8 +11,10 @@ from nicegui.events import GenericEventArguments
 from robochoc.app.sketch.sketch import Setting, Value
 from robochoc.app.texts import say
 
-MOST = 40
-"""Values of a table that can be clicked."""
+MOST_PAIRS = 20_000
+"""Pairs of a table that is clicked together: more is a rule that another word says better."""
+_PAIR = 2
+_WORDS = ("caption", "many", "pair", "row", "column", "down", "across", "range", "back", "on")
 
 
 class PairTable(Element, component="pair_table.js"):
@@ -28,8 +30,9 @@ class PairTable(Element, component="pair_table.js"):
         self._rows: list[list[Value]] = []
         self._changed = changed
         self.classes("wide")
-        self._props |= {"labels": [], "on": [], "one": "", "other": "", "words": _words(), "large": ""}
-        self.on("toggled", self._toggled)
+        words = {name: say(f"pairs.{name}") for name in _WORDS}
+        self._props |= {"labels": [], "on": [], "count": 0, "one": "", "other": "", "words": words, "wrong": ""}
+        self.on("filled", self._filled)
 
     def show(self, values: tuple[Value, ...], labels: list[str], rows: Setting | None, bound: tuple[str, ...]) -> None:
         """Show the table as it stands."""
@@ -38,26 +41,45 @@ class PairTable(Element, component="pair_table.js"):
         number = {value: index for index, value in enumerate(values)}
         fitting = [row for row in self._rows if len(row) == len(bound) and all(value in number for value in row)]
         shown = {
-            "labels": labels[:MOST],
+            "labels": labels,
             "on": [number[row[0]] * len(values) + number[row[1]] for row in fitting],
             "count": len(values),
             "one": bound[0],
             "other": bound[1],
-            "large": say("model.table-large", most=MOST) if len(values) > MOST else "",
+            "wrong": "",
         }
         if any(self._props.get(name) != value for name, value in shown.items()):
             self._props |= shown
             self.update()
 
-    def _toggled(self, event: GenericEventArguments) -> None:
+    def _filled(self, event: GenericEventArguments) -> None:
         try:
-            one, other = msgspec.convert(event.args, tuple[int, int])
-            pair = [self._values[one], self._values[other]]
-        except (msgspec.ValidationError, IndexError):
+            top, left, bottom, right, on = msgspec.convert(event.args, tuple[int, int, int, int, bool])
+        except msgspec.ValidationError:
             return  # not from our table
-        kept = [row for row in self._rows if row != pair]
-        self._changed(kept if len(kept) < len(self._rows) else [*self._rows, pair])
+        count = len(self._values)
+        if not (0 <= top <= bottom < count and 0 <= left <= right < count):
+            return
+        if (bottom - top + 1) * (right - left + 1) > MOST_PAIRS:
+            self._refuse()
+            return
+        rows = filled(self._rows, self._values[top : bottom + 1], self._values[left : right + 1], on=on)
+        if on and len(rows) > MOST_PAIRS:
+            self._refuse()
+        else:
+            self._changed(rows)
+
+    def _refuse(self) -> None:
+        self._props["wrong"] = say("pairs.too-many", most=f"{MOST_PAIRS:,}")
+        self.update()
 
 
-def _words() -> dict[str, str]:
-    return {name: say(f"pairs.{name}") for name in ("caption", "pair")}
+def filled(
+    rows: list[list[Value]], ones: tuple[Value, ...], others: tuple[Value, ...], *, on: bool
+) -> list[list[Value]]:
+    """Return the rows of a table with every pair of one of `ones` and one of `others`, or without them."""
+    if not on:
+        some, more = {*ones}, {*others}
+        return [row for row in rows if not (len(row) == _PAIR and row[0] in some and row[1] in more)]
+    there = {tuple(row) for row in rows}
+    return rows + [[one, other] for one in ones for other in others if (one, other) not in there]

@@ -8,9 +8,11 @@ from nicegui import ui
 
 from robochoc.app.pages.model.desk import Desk
 from robochoc.app.sketch.edits import with_rule
+from robochoc.app.sketch.fits import why_no_cost
 from robochoc.app.sketch.palette import Form, Opening, PaletteRule
 from robochoc.app.sketch.rules import PALETTE
 from robochoc.app.sketch.sketch import Decision, Setting, Sketch, SketchRule
+from robochoc.app.sketch.words import listed
 from robochoc.app.texts import say
 
 FIRST_COST = 1
@@ -35,7 +37,8 @@ class PaletteMenu:
                 )
             self._about = ui.select([], label=say("model.about"), on_change=self._list)
             self._about.props("dense outlined").classes("wide")
-            self._hint = ui.label(say("model.palette-hint")).classes("soft")
+            self._hint = ui.label().classes("soft")
+            self._why = ui.label()
             self._rules = ui.element("ul").classes("palette-rules")
 
     def open(self) -> None:
@@ -53,20 +56,33 @@ class PaletteMenu:
         self._rules.clear()
         if decision is None:
             return
+        meant = self._desk.meant
+        self._hint.set_text(say("model.palette-some", robots=listed(meant)) if meant else say("model.palette-all"))
+        off = why_no_cost(self._desk.sketch)
+        self._why.set_text("" if off is None else f"{off.text} {off.remedy}")
+        self._why.set_visibility(off is not None)
         with self._rules:
             for entry in PALETTE.values():
                 if decision.kind in entry.kinds:
                     with ui.element("li"), ui.element("button").props("type=button").classes("card") as button:
                         ui.label(say(f"rule.{entry.key}.name")).classes("strong")
                         ui.label(say(f"rule.{entry.key}.help")).classes("soft small")
-                    button.on("click", partial(self._pick, entry, decision))
+                    if off is not None and costs_at_first(entry):
+                        button.props("disabled")
+                    else:
+                        button.on("click", partial(self._pick, entry, decision))
 
     def _pick(self, entry: PaletteRule, decision: Decision) -> None:
         self._dialog.close()
         before = {rule.id for rule in self._desk.sketch.rules}
-        rule = first_rule(self._desk.sketch, entry, decision, self._desk.selected)
+        rule = first_rule(self._desk.sketch, entry, decision, self._desk.meant)
         if self._desk.do(lambda sketch: with_rule(sketch, rule)):
             self._desk.open(next(rule.id for rule in self._desk.sketch.rules if rule.id not in before))
+
+
+def costs_at_first(entry: PaletteRule) -> bool:
+    """Return whether a rule of the palette costs something as it begins."""
+    return entry.graded or entry.key == _PREFERENCE
 
 
 def first_rule(sketch: Sketch, entry: PaletteRule, decision: Decision, selected: list[str]) -> SketchRule:
@@ -79,7 +95,7 @@ def first_rule(sketch: Sketch, entry: PaletteRule, decision: Decision, selected:
         chosen = (chosen or deciders)[: entry.most]
     values = sketch.values(decision)
     settings = {opening.name: _first(opening, values) for opening in entry.openings}
-    cost = FIRST_COST if entry.key == _PREFERENCE else None
+    cost = FIRST_COST if entry.key == _PREFERENCE else None  # the graded ones have their own
     return SketchRule("", entry.key, decision.name, chosen, settings, cost)
 
 

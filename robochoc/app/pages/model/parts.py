@@ -107,6 +107,17 @@ def number_field(key: str, least: int, most: int, changed: Callable[[int], str |
     return field.props("dense outlined debounce=300").classes("number")
 
 
+def everybody_button(does: Callable[[], object]) -> ui.button:
+    """Add the button that lets something be about everybody again."""
+    return ui.button(say("model.everybody"), icon="groups", on_click=does).props("flat dense no-caps")
+
+
+def refuse_last(choice: ui.select, robots: Sequence[str], why: str) -> None:
+    """Say why the last robot of a choice stays: with nobody named, everybody would be meant."""
+    choice.set_value([*robots])
+    choice.error = why
+
+
 def put(field: ValidationElement[Any], value: object) -> None:
     """Show a value in a field, unless it is there, or somebody types what is wrong so far."""
     if field.value != value and not field.error:

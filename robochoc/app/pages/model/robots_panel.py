@@ -88,10 +88,12 @@ class _SelectedCard:
         (old,), new = self._names, (value or "").strip()
         if new == old:
             return None
+        added = self._desk.just_added
         self._desk.selected = [new]  # before the edit: the robot stays selected, and its card stays
+        self._desk.just_added = None if added is None else new
         wrong = self._desk.edit(lambda sketch: with_robot_renamed(sketch, old, new))
         if wrong is not None:
-            self._desk.selected = [old]
+            self._desk.selected, self._desk.just_added = [old], added
         return wrong
 
     def _set(self, what: str, value: int) -> str | None:

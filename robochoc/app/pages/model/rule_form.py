@@ -10,11 +10,13 @@ from nicegui import ui
 
 from robochoc.app.pages.model.desk import Desk
 from robochoc.app.pages.model.pair_table import PairTable
-from robochoc.app.pages.model.parts import number_field, put
+from robochoc.app.pages.model.parts import everybody_button, number_field, put, refuse_last
 from robochoc.app.sketch import sketch as limits
 from robochoc.app.sketch.edits import with_rule
+from robochoc.app.sketch.fits import why_no_cost, why_not_private
 from robochoc.app.sketch.palette import Form, Links, Opening, PaletteRule
 from robochoc.app.sketch.sketch import Decision, SketchRule
+from robochoc.app.sketch.troubles import Trouble
 from robochoc.app.sketch.words import value_words
 from robochoc.app.texts import say
 
@@ -84,9 +86,19 @@ class RuleForm:
         key = "model.rule-robots-leader" if leads else "model.rule-robots"
         choice = ui.select([], multiple=True, label=say(key), with_input=True).classes("wide")
         choice.props(f'dense outlined use-chips hint="{say("model.rule-robots-hint")}"')
-        choice.on_value_change(lambda event: self._change(robots=tuple(event.value or ())))
+        everybody = everybody_button(lambda: self._change(robots=()))
+
+        def changed(robots: tuple[str, ...]) -> None:
+            rule = self._desk.sketch.rule(self._id)
+            if rule is not None and rule.robots and not robots and not self._following:
+                refuse_last(choice, rule.robots, say("edit.last-of-rule", robot=rule.robots[0]))
+            else:
+                self._change(robots=robots)
+
+        choice.on_value_change(lambda event: changed(tuple(event.value or ())))
 
         def follow(rule: SketchRule, decision: Decision) -> None:
+            everybody.set_visibility(bool(rule.robots))
             names = [*self._desk.sketch.deciders(decision)]
             chosen = [name for name in rule.robots if name in names]
             if choice.options != names or choice.value != chosen:
@@ -155,12 +167,16 @@ class RuleForm:
         with ui.element("div").classes("wide"):
             choice = ui.toggle({"must": say("model.must"), "cost": say("model.costs")}).props("no-caps unelevated")
             choice.classes("segments")
+            why = ui.label().classes("soft small")
         choice.on_value_change(lambda event: self._costs_or_must(must=event.value == "must"))
         with ui.element("div").classes("wide fields") as box:
             slider, field = _slider_and_field("model.cost", 1, limits.MAX_COST, lambda value: self._change(cost=value))
 
         def follow(rule: SketchRule, _: Decision) -> None:
             choice.set_value("must" if rule.cost is None else "cost")
+            off = why_no_cost(self._desk.sketch, rule) if rule.cost is None else None
+            choice.set_enabled(off is None)
+            _show_why(why, off)
             box.set_visibility(rule.cost is not None)
             if rule.cost is not None:
                 _show_number(slider, field, rule.cost, limits.MAX_COST)
@@ -176,11 +192,21 @@ class RuleForm:
         with ui.element("div").classes("wide"):
             switch = ui.switch(say("model.private"), on_change=lambda event: self._change(private=bool(event.value)))
             ui.label(say("model.private-hint")).classes("soft small")
+            why = ui.label().classes("small")
 
         def follow(rule: SketchRule, _: Decision) -> None:
             switch.set_value(rule.private)
+            off = None if rule.private else why_not_private(self._desk.sketch, rule)
+            switch.set_enabled(off is None)
+            _show_why(why, off)
 
         self._follow.append(follow)
+
+
+def _show_why(label: ui.label, off: Trouble | None) -> None:
+    """Say why something is off, and what to do. None: it is not."""
+    label.set_text("" if off is None else f"{off.text} {off.remedy}")
+    label.set_visibility(off is not None)
 
 
 def _slider_and_field(

@@ -64,8 +64,14 @@ def free_decision_name(sketch: Sketch, stem: str) -> str:
 
 
 def with_cell(sketch: Sketch, decision: Decision, number: int) -> tuple[int | str, ...]:
-    """Return the cells of a place without this one, or with it. All free cells are none by name."""
+    """Return the cells of a place without this one, or with it. All free cells are none by name.
+
+    Raises:
+        EditError: if it is the last one.
+    """
     cells = {*sketch.values(decision)} ^ {number}
+    if not cells:
+        raise EditError("edit.last-cell", decision.name, decision=decision.name)
     return () if cells == {*sketch.area.free} else tuple(sorted(cell for cell in cells if isinstance(cell, int)))
 
 

@@ -8,7 +8,6 @@ from robochoc.app.pages.whatif.outcome import Fate, Outcome, Row
 from robochoc.app.pages.whatif.story import Kept, Story
 from robochoc.app.projects import Project
 from robochoc.app.runs.run import Run, State
-from robochoc.app.sketch.sketch import Kind
 from robochoc.app.sketch.words import listed
 from robochoc.app.texts import say
 
@@ -67,7 +66,7 @@ class Answer:
                 if self._can_keep(kept):
                     keep = ui.button(say("whatif.keep"), icon="check", on_click=self._keep, color=None)
                     keep.props("no-caps unelevated").classes("go")
-                if any(one.kind in {Kind.LEVEL, Kind.PLACE} for one in kept.after.decisions):
+                if kept.after.flies:
                     ui.link(say("whatif.fly"), f"/team/{self._project.id}/fly?run={run.id}").classes("flight")
                     ui.label(say("whatif.flight-hint")).classes("soft small grow")
                 else:
