@@ -274,7 +274,7 @@ def test_a_large_table_is_clicked_together_by_keys(browser: Any, application: Ap
             page.keyboard.press(key)
         square = [[one, other] for one in (33, 34) for other in (99, 100)]
         made = becomes(teams, team, lambda sketch: len(sketch.rules[0].settings["rows"]) == 5)  # type: ignore[arg-type] # a list
-        assert sorted(made.rules[0].settings["rows"]) == [[1, 1], *square]  # type: ignore[arg-type, type-var] # a list
+        assert sorted(made.rules[0].settings["rows"]) == [[1, 1], *square]  # type: ignore[arg-type] # a list
         page.wait_for_selector("text=Across: 85 to 100, of 100")
         page.keyboard.press("Home")
         page.keyboard.press("ArrowLeft")

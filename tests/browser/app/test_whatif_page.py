@@ -75,6 +75,60 @@ def test_by_keyboard_alone_with_costs_and_two_changes_of_which_one_is_taken_back
         assert tab.complaints == []
 
 
+def test_it_happens_where_the_robot_is_by_two_clicks_or_by_keys(
+    browser: Any,  # noqa: ANN401 - Playwright's
+    application: AppServer,
+    teams: Store,
+) -> None:
+    team = teams.add(TEAM)
+    with watched_page(browser, {"width": 360, "height": 740}) as tab:
+        page = tab.page
+        connected(page, f"{application.url}team/{team}/whatif")
+        page.click("[data-robot=East]")
+        page.click("[role=menu] >> text=It fails")
+        page.wait_for_selector("li:has-text('East fails.')")
+        page.focus("[data-robot=South]")
+        page.keyboard.press("Enter")
+        page.wait_for_selector("[role=menu][aria-label=South]")
+        page.wait_for_function("document.activeElement.textContent === 'It fails'")
+        page.keyboard.press("ArrowDown")
+        page.keyboard.press("Enter")
+        page.wait_for_selector("li:has-text('South has 50 % of its battery left')")
+        page.focus("[data-robot=South]")
+        page.keyboard.press("Enter")
+        page.wait_for_selector("[role=menu]")
+        page.keyboard.press("Escape")
+        page.wait_for_selector("[role=menu]", state="detached")
+        page.wait_for_function("document.activeElement.matches('[data-robot=South]')")
+        page.focus(".board .cells")
+        page.keyboard.press("Enter")
+        page.wait_for_function("document.activeElement.textContent === 'The cell is blocked'")
+        page.keyboard.press("Enter")
+        page.wait_for_selector("li:has-text('The cell in column 1, row 4 is blocked.')")
+        assert page.evaluate("document.documentElement.scrollWidth") <= 360
+        assert tab.complaints == []
+
+
+def test_without_a_solution_there_are_ways_out(browser: Any, application: AppServer, teams: Store) -> None:  # noqa: ANN401 - Playwright's
+    team = teams.add(Sketch("team", Area(5, 4), ROBOTS, (LEVEL,), (DIFFERENT, LITTLE)))
+    with watched_page(browser) as tab:
+        page = tab.page
+        connected(page, f"{application.url}team/{team}/whatif")
+        page.focus("button:has-text('A robot joins here')")
+        page.keyboard.press("Enter")
+        page.wait_for_selector("text=Some rules of this team cost something: after a change, it decides anew.")
+        page.focus("button:has-text('Decide again')")
+        page.keyboard.press("Enter")
+        page.wait_for_selector("text=After this there is no solution.", timeout=ANSWER_MS)
+        page.click("text=Who would have to step aside?")
+        page.wait_for_selector(".whatif-aside .headline:has-text('4 of 5 decide')", timeout=ANSWER_MS)
+        page.click("text=Which rules are in each other")
+        page.click("button:has-text('Switch off')")
+        page.wait_for_selector("text=Nobody has to change anything.", timeout=ANSWER_MS)
+        wait_until(lambda: not teams.load(team).now.rules[0].on, lambda: str(teams.load(team).now.rules))
+        assert tab.complaints == []
+
+
 @pytest.mark.parametrize("sketch", [Sketch("empty"), Sketch("idle", robots=ROBOTS)])
 def test_a_team_without_decisions_is_told_what_it_lacks(
     browser: Any,  # noqa: ANN401 - Playwright's

@@ -245,6 +245,8 @@ def test_every_text_has_a_remedy() -> None:
     assert {f"trouble.{key}" for key, _, _ in (*ERRORS, *HINTS)} | {
         "trouble.never-alone",
         "trouble.rule-links",
+        "trouble.rule-private-off",  # these two are told at a switch, before the mistake can be made
+        "trouble.rule-cost-off",
     } == texts
 
 

@@ -108,6 +108,10 @@ class Doors:
         words = sentence(self._sketch, rule)
         with ui.element("li"):
             ui.label(f"{rule.id}: {words}").classes("words")
+            now = self._project.sketch.rule(name)
+            if now is None or (now.kind, now.decision) != (rule.kind, rule.decision):
+                ui.label(say("decide.not-yours")).classes("soft small")
+                return
             with ui.element("div").classes("acts"):
                 off = ui.button(say("decide.off"), on_click=partial(self._switch_off, rule))
                 off.props("flat dense no-caps").props["aria-label"] = say("decide.off-one", rule=words)

@@ -4,6 +4,7 @@
 const MARGIN = 26;
 const TALLEST = 660;
 const AROUND = 300; // pixels of the window that are not the map
+const MENU = 230; // pixels of what is offered at a robot
 const DRAG = 4; // pixels before a press becomes a drag
 const ARROWS = { ArrowUp: [0, 1], ArrowDown: [0, -1], ArrowLeft: [-1, 0], ArrowRight: [1, 0] };
 const clamp = (value, least, most) => Math.max(least, Math.min(most, value));
@@ -74,13 +75,18 @@ export default {
           <rect :x="-label.width / 2" y="-13" :width="label.width" height="24" rx="12" /><text y="4">{{ label.text }}</text>
         </g>
       </svg>
+      <div v-if="menu" ref="menu" class="acts-menu" role="menu" :aria-label="menu.says" :style="{ left: menu.left + 'px', top: menu.top + 'px' }"
+           @keydown="typedInMenu" @focusout="leftMenu">
+        <p class="soft small" aria-hidden="true">{{ menu.says }}</p>
+        <button v-for="[act, says] in menu.acts" type="button" role="menuitem" tabindex="-1" @click="happens(act)">{{ says }}</button>
+      </div>
     </div>`,
   props: {
     columns: Number, rows: Number, blocked: Array, robots: Array, links: Array, selected: Array,
-    lit: String, tool: String, words: Object, movable: Boolean,
+    lit: String, tool: String, words: Object, movable: Boolean, acts: Object,
   },
-  emits: ["robot", "cell", "moved", "removed", "rule", "cleared"],
-  data: () => ({ width: 640, tall: TALLEST, local: {}, over: null, cursor: null, drag: null, hovered: null, spot: null, next: null }),
+  emits: ["act", "robot", "cell", "moved", "removed", "rule", "cleared"],
+  data: () => ({ width: 640, tall: TALLEST, local: {}, over: null, cursor: null, drag: null, hovered: null, spot: null, next: null, menu: null }),
   mounted() {
     this.watcher = new ResizeObserver(([box]) => {
       this.width = Math.floor(box.contentRect.width);
@@ -251,7 +257,40 @@ export default {
       this.spot = { x: px, y: py };
     },
     clickCell(event) {
-      this.$emit("cell", this.cellAt(this.at(event)));
+      const here = this.at(event), cell = this.cellAt(here);
+      this.$emit("cell", cell);
+      this.offer("cell", cell, this.words.cell.replace("{column}", cell.x + 1).replace("{row}", cell.y + 1), here, event.currentTarget);
+    },
+    // What can happen to a robot or a cell is offered where it is.
+    offer(kind, target, says, { px, py }, back) {
+      const acts = this.acts?.[kind];
+      if (!acts?.length) return;
+      const svg = back.ownerSVGElement.getBoundingClientRect(), box = this.$refs.box.getBoundingClientRect();
+      const left = clamp(px + svg.left - box.left + 12, 0, Math.max(0, box.width - MENU)), top = py + svg.top - box.top + 12;
+      this.menu = { target, says, acts, back, left, top: Math.max(0, Math.min(top, box.height - 36 * (acts.length + 1))) };
+      this.$nextTick(() => this.$refs.menu?.querySelector("button")?.focus());
+    },
+    happens(act) {
+      const { target } = this.menu;
+      this.closeMenu();
+      this.$emit("act", { act, ...target });
+    },
+    closeMenu() {
+      const { back } = this.menu || {};
+      this.menu = null;
+      if (back?.isConnected) back.focus({ preventScroll: true });
+    },
+    leftMenu(event) {
+      if (!event.relatedTarget || !this.$refs.menu?.contains(event.relatedTarget)) this.menu = null;
+    },
+    typedInMenu(event) {
+      const items = [...this.$refs.menu.querySelectorAll("button")], at = items.indexOf(document.activeElement);
+      const to = { ArrowDown: (at + 1) % items.length, ArrowUp: (at + items.length - 1) % items.length, Home: 0, End: items.length - 1 }[event.key];
+      if (to !== undefined) items[to].focus();
+      else if (event.key === "Escape") this.closeMenu();
+      else return;
+      event.preventDefault();
+      event.stopPropagation();
     },
     pressed(robot, event) {
       if (event.button) return;
@@ -269,7 +308,13 @@ export default {
       this.drag = null;
       if (!drag || event.type === "pointercancel") return;
       if (drag.moved) this.move(drag.name, drag.cell);
-      else this.$emit("robot", { name: drag.name, more: event.shiftKey || event.ctrlKey || event.metaKey });
+      else this.clickRobot(drag.name, event);
+    },
+    clickRobot(name, event) {
+      this.$emit("robot", { name, more: event.shiftKey || event.ctrlKey || event.metaKey });
+      const robot = this.placed.find((one) => one.name === name);
+      const back = [...this.$refs.box.querySelectorAll(".robot")].find((one) => one.dataset.robot === name);
+      if (robot && back) this.offer("robot", { name }, name, robot, back);
     },
     move(name, cell) {
       const robot = this.placed.find((one) => one.name === name);
@@ -283,14 +328,17 @@ export default {
     },
     typedAtCell(event) {
       if (ARROWS[event.key]) this.cursor = this.step(this.cursor, ARROWS[event.key]);
-      else if (event.key === "Enter" || event.key === " ") this.$emit("cell", this.cursor);
+      else if (event.key === "Enter" || event.key === " ") {
+        this.$emit("cell", this.cursor);
+        this.offer("cell", { ...this.cursor }, this.cellWords, this.middle(this.cursor), event.currentTarget);
+      }
       else if (event.key === "Escape") this.$emit("cleared");
       else return;
       event.preventDefault();
     },
     typedAt(robot, index, event) {
       if (ARROWS[event.key] && this.movable) this.move(robot.name, this.step(robot, ARROWS[event.key]));
-      else if (event.key === "Enter" || event.key === " ") this.$emit("robot", { name: robot.name, more: event.shiftKey || event.ctrlKey });
+      else if (event.key === "Enter" || event.key === " ") this.clickRobot(robot.name, event);
       else if (event.key === "Delete" || event.key === "Backspace") {
         this.next = index;
         this.$emit("removed", robot.name);

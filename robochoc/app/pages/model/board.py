@@ -24,6 +24,15 @@ class Clicked(msgspec.Struct):
     more: bool = False
 
 
+class Act(msgspec.Struct):
+    """Something that was chosen at a robot (`name`), or at a cell."""
+
+    act: str
+    name: str = ""
+    x: int = 0
+    y: int = 0
+
+
 class Moved(msgspec.Struct):
     """A robot that was dragged to a cell."""
 
@@ -46,8 +55,16 @@ class Told:
     removed: Callable[[str], object] = _nothing
     rule: Callable[[str], object] = _nothing
     cleared: Callable[[], object] = _nothing
+    act: Callable[[Act], object] = _nothing
     types: dict[str, type] = field(
-        default_factory=lambda: {"robot": Clicked, "cell": Cell, "moved": Moved, "removed": str, "rule": str}
+        default_factory=lambda: {
+            "robot": Clicked,
+            "cell": Cell,
+            "moved": Moved,
+            "removed": str,
+            "rule": str,
+            "act": Act,
+        }
     )
 
 
@@ -66,6 +83,7 @@ class Board(Element, component="board.js"):
         self._props |= {"lit": "", "tool": SELECT, "words": _words(), "movable": movable}
         for name in told.types:
             self.on(name, lambda event, name=name: self._hear(name, event))
+        self._props["acts"] = {}
         self.on("cleared", lambda _: told.cleared())
 
     def show(
@@ -77,6 +95,10 @@ class Board(Element, component="board.js"):
         if links is not None:
             self._set("links", links)
         self.update()
+
+    def offer(self, robot: dict[str, str], cell: dict[str, str]) -> None:
+        """Offer what can happen to a robot, or to a cell, that is clicked: names of acts, and their words."""
+        self._change("acts", {"robot": [*robot.items()], "cell": [*cell.items()]})
 
     def choose(self, names: list[str]) -> None:
         """Show these robots as selected."""

@@ -109,7 +109,11 @@ def number_field(key: str, least: int, most: int, changed: Callable[[int], str |
 
 def everybody_button(does: Callable[[], object]) -> ui.button:
     """Add the button that lets something be about everybody again."""
-    return ui.button(say("model.everybody"), icon="groups", on_click=does).props("flat dense no-caps")
+    return (
+        ui.button(say("model.everybody"), icon="groups", on_click=does)
+        .props("flat dense no-caps align=left")
+        .classes("wide")
+    )
 
 
 def refuse_last(choice: ui.select, robots: Sequence[str], why: str) -> None:

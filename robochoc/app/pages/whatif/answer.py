@@ -6,6 +6,7 @@ from nicegui import ui
 
 from robochoc.app.pages.whatif.outcome import Fate, Outcome, Row
 from robochoc.app.pages.whatif.story import Kept, Story
+from robochoc.app.pages.whatif.ways_out import WaysOut
 from robochoc.app.projects import Project
 from robochoc.app.runs.run import Run, State
 from robochoc.app.sketch.words import listed
@@ -71,6 +72,8 @@ class Answer:
                     ui.label(say("whatif.flight-hint")).classes("soft small grow")
                 else:
                     ui.label(say("whatif.no-flight")).classes("soft small grow")
+            if found.after.verdict == "no-solution":
+                WaysOut(self._project, self._story, kept.after)
             with ui.element("details").classes("whatif-command"):
                 with ui.element("summary"):
                     ui.label(say("whatif.command"))

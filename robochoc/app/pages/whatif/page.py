@@ -8,17 +8,18 @@ from importlib.resources import files
 
 from nicegui import run, ui
 
-from robochoc.app.pages.model.board import Board, Clicked, Told
+from robochoc.app.pages.model.board import Act, Board, Clicked, Told
 from robochoc.app.pages.model.picture import LinksDrawn, links_of, robots_of
 from robochoc.app.pages.numbers import whole
 from robochoc.app.pages.shell import told, while_shown
 from robochoc.app.pages.whatif.answer import Answer
+from robochoc.app.pages.whatif.going_on import why_anew
 from robochoc.app.pages.whatif.story import story_of
 from robochoc.app.projects import Project
 from robochoc.app.sketch.changes import FULL, LEAST_BATTERY, AnyChange, Battery, Blocked, Fails, Joins
 from robochoc.app.sketch.checks import troubles
 from robochoc.app.sketch.edits import EditError
-from robochoc.app.sketch.sketch import MAX_SIDE, Cell, Sketch
+from robochoc.app.sketch.sketch import MAX_SIDE, Cell, Kind, Sketch
 from robochoc.app.texts import say
 
 _LOOK_S = 0.25
@@ -46,10 +47,12 @@ class WhatIfPage:
     def __init__(self, project: Project) -> None:
         self._project = project
         self._story = story_of(project)
-        self._linked: Sketch | None = None
+        self._linked: tuple[Sketch, Sketch] | None = None
         with ui.element("div").classes("whatif"):
             with ui.element("section").classes("panel map-box").props(f'aria-label="{say("whatif.map")}"'):
-                self._board = Board(Told(robot=self._robot_clicked, cell=self._cell_clicked), movable=False)
+                self._board = Board(
+                    Told(robot=self._robot_clicked, cell=self._cell_clicked, act=self._act), movable=False
+                )
             with ui.element("div").classes("whatif-side"):
                 self._build_happenings()
                 self._build_list()
@@ -89,6 +92,7 @@ class WhatIfPage:
             _heading("h2", "whatif.list")
             self._list = ui.element("ol").classes("whatif-list")
             self._none = ui.label(say("whatif.none")).classes("soft")
+            self._anew = ui.label().classes("soft small")
             with ui.element("div").classes("whatif-row"):
                 self._decide = ui.button(say("whatif.decide"), on_click=self._story.decide, color=None).props(
                     "no-caps unelevated"
@@ -108,6 +112,19 @@ class WhatIfPage:
     def _cell_clicked(self, cell: Cell) -> None:
         self._column.set_value(cell.x + 1)
         self._row.set_value(cell.y + 1)
+
+    def _act(self, chosen: Act) -> None:
+        """Let happen what was chosen at a robot or a cell of the map."""
+        name, cell = chosen.name, Cell(chosen.x, chosen.y)
+        changes: dict[str, AnyChange] = {
+            "fail": Fails(name),
+            "half": Battery(name, FULL // 2),
+            "quarter": Battery(name, FULL // 4),
+            "block": Blocked(cell),
+            "join": Joins(cell),
+        }
+        if (change := changes.get(chosen.act)) is not None:
+            self._happen(lambda: change)
 
     def _chosen(self) -> str:
         return str(self._robots.value or "")
@@ -143,6 +160,8 @@ class WhatIfPage:
         self._clear.set_enabled(bool(words))
         self._decide.set_enabled(bool(words) and not self._story.running)
         self._board.show(after, robots=robots_of(after))
+        self._board.offer(*_offered(after))
+        self._anew.set_visibility(bool(words))
         self._robot_chosen()
         self._answer.follow()
         self._linking.activate()
@@ -161,19 +180,30 @@ class WhatIfPage:
         """Draw the rules, and say what is wrong: of large teams that takes its time."""
         self._linking.deactivate()
         after = self._story.after()
-        if self._linked == after:
+        pair = self._project.sketch, after
+        if self._linked == pair:
             return
-        self._linked = after
-        found = await run.io_bound(_looked_at, after)
-        if found is not None and self._linked is after:
-            links, wrong = found
+        self._linked = pair
+        found = await run.io_bound(_looked_at, *pair)
+        if found is not None and self._linked is pair:
+            links, wrong, anew = found
+            self._anew.set_text(anew)
             self._board.show(after, robots=robots_of(after), links=links.drawn)
             self._wrong.set_text(say("whatif.wrong", text=wrong) if wrong else "")
 
 
-def _looked_at(sketch: Sketch) -> tuple[LinksDrawn, str]:
-    wrong = next((trouble.text for trouble in troubles(sketch) if trouble.is_error), "")
-    return links_of(sketch), wrong
+def _looked_at(before: Sketch, after: Sketch) -> tuple[LinksDrawn, str, str]:
+    wrong = next((trouble.text for trouble in troubles(after) if trouble.is_error), "")
+    return links_of(after), wrong, "" if wrong or before == after else why_anew(before, after)
+
+
+def _offered(sketch: Sketch) -> tuple[dict[str, str], dict[str, str]]:
+    """Return what can happen to a robot, and to a cell."""
+    robot = {"fail": say("whatif.fail")}
+    if any(decision.kind is Kind.LEVEL for decision in sketch.decisions):
+        shares = {"half": FULL // 2, "quarter": FULL // 4}
+        robot |= {act: say("whatif.battery-set", percent=percent) for act, percent in shares.items()}
+    return robot, {"block": say("whatif.block"), "join": say("whatif.join")}
 
 
 def _heading(tag: str, key: str) -> None:
@@ -190,4 +220,4 @@ def _style() -> str:
     return "\n".join((files("robochoc.app.pages") / path).read_text(encoding="utf-8") for path in _STYLES)
 
 
-_STYLES = ("model/model.css", "whatif/whatif.css")
+_STYLES = ("model/model.css", "decide/decide.css", "whatif/whatif.css")

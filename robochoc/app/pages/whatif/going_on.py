@@ -1,0 +1,54 @@
+"""Whether a team can go on from what it had decided, told before it decides again."""
+
+from __future__ import annotations
+
+from robochoc.app.pages.whatif.story import goes_on
+from robochoc.app.runs.paid import costly
+from robochoc.app.sketch.building import model_of
+from robochoc.app.sketch.differences import AnewError, changing_model
+from robochoc.app.sketch.palette import Links
+from robochoc.app.sketch.rules import PALETTE
+from robochoc.app.sketch.sketch import Sketch
+from robochoc.app.texts import say
+from robochoc.formats import InvalidInputError
+from robochoc.model.problem import Team
+from robochoc.modelling.places import ModelError
+from robochoc.run.choice import decided
+from robochoc.run.options import Options, Runtime
+from robochoc.solver.encoding import UnsupportedError
+
+MOST_CHOSEN_FOR = 60
+"""Of larger teams it is not looked at beforehand which protocol `auto` takes."""
+
+
+def why_anew(before: Sketch, after: Sketch) -> str:
+    """Return why the team will begin anew after a change, in words; empty: it can go on from before.
+
+    Args:
+        before: The team before the change.
+        after: The team after it.
+    """
+    if costly(before) or costly(after):
+        return say("whatif.before-costs")
+    if any(_has_secrets(sketch) for sketch in (before, after)):
+        return say("whatif.before-secrets")
+    try:
+        _ = model_of(after).team
+        return _by_protocol(changing_model(before, after).team)
+    except AnewError as anew:
+        return say("whatif.all-anew", why=say(anew.key, **anew.named))
+    except (ModelError, InvalidInputError, UnsupportedError):  # a mistake, which is told elsewhere
+        return ""
+
+
+def _by_protocol(team: Team) -> str:
+    if len(team.robots) > MOST_CHOSEN_FOR:
+        return ""
+    protocol = decided(team, Options(runtime=Runtime.SIMULATOR)).options.protocol
+    return "" if goes_on(protocol) else say("whatif.before-protocol", protocol=protocol)
+
+
+def _has_secrets(sketch: Sketch) -> bool:
+    """Return whether two robots have a rule of which only one of them knows."""
+    private = [rule for rule in sketch.rules if rule.on and rule.private and rule.kind in PALETTE]
+    return any(PALETTE[rule.kind].links is not Links.EACH for rule in private)
