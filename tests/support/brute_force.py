@@ -35,19 +35,25 @@ class _Tree:
 
 def solutions(team: Team) -> Iterator[dict[str, int]]:
     """All assignments that every constraint allows, one after the other."""
+    return (assignment for assignment, _ in priced_solutions(team))
+
+
+def priced_solutions(team: Team) -> Iterator[tuple[dict[str, int], float]]:
+    """All assignments that every constraint allows, one after the other, with what they cost."""
     tree, assignment = _Tree(team), dict[str, int]()
 
-    def extend(depth: int) -> Iterator[dict[str, int]]:
-        if tree.price(depth, assignment) == INFINITE:
+    def extend(depth: int, paid: float) -> Iterator[tuple[dict[str, int], float]]:
+        paid += tree.price(depth, assignment)
+        if paid == INFINITE:
             return
         if depth == len(tree.names):
-            yield dict(assignment)
+            yield dict(assignment), paid
             return
         for value in tree.domains[depth]:
             assignment[tree.names[depth]] = value
-            yield from extend(depth + 1)
+            yield from extend(depth + 1, paid)
 
-    return extend(0)
+    return extend(0, 0)
 
 
 def least_cost(team: Team) -> float:

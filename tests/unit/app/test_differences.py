@@ -19,7 +19,7 @@ from robochoc.app.sketch.sketch import Area, Cell, Decision, Kind, Sketch, Sketc
 from robochoc.app.texts import say
 from robochoc.model.change import apply_changes, describe_change
 from robochoc.model.problem import Team
-from tests.support.brute_force import solutions
+from tests.support.brute_force import priced_solutions
 from tests.support.examples import examples
 from tests.support.sketches import random_sketch, without_costs
 
@@ -31,10 +31,8 @@ def priced(team: Team) -> dict[frozenset[tuple[str, object]], float]:
     """All solutions of a team in the users' values, with what they cost."""
     words = {name: variable.domain.symbols for name, variable in team.variables.items()}
     return {
-        frozenset((name, words[name][value] if words[name] else value) for name, value in solution.items()): sum(
-            constraint.price(solution) for constraint in team.constraints()
-        )
-        for solution in solutions(team)
+        frozenset((name, words[name][value] if words[name] else value) for name, value in solution.items()): cost
+        for solution, cost in priced_solutions(team)
     }
 
 
