@@ -9,6 +9,8 @@ from typing import Any
 
 from starlette.requests import ClientDisconnect
 
+from robochoc.app.texts import say
+
 Scope = MutableMapping[str, Any]
 Receive = Callable[[], Awaitable[MutableMapping[str, Any]]]
 Send = Callable[[MutableMapping[str, Any]], Awaitable[None]]
@@ -24,6 +26,7 @@ _HEADERS = (
 )
 MOST_BYTES = (64 << 20) + (1 << 16)
 """Bytes that are taken of one request: the largest file that is opened, and what a form adds to it."""
+NOT_FOUND = 404
 _METHODS = frozenset({"GET", "HEAD", "POST"})
 """POST: files that are opened, and sockets of browsers that have no better one."""
 _MOST_DIGITS = 12
@@ -58,7 +61,7 @@ class Guard:
         elif scope["type"] == "websocket":
             await send({"type": "websocket.close", "code": 1008})
         else:
-            await _answer(send, status)
+            await _answer(send, status, say("app.nothing-here") if status == NOT_FOUND else "")
 
     async def _serve(self, scope: Scope, receive: Receive, send: Send) -> None:
         taken = _Taken(receive)
@@ -81,7 +84,7 @@ class Guard:
         host = headers.get(b"host", b"")
         given = scope["path"].split("/")[1] if "/" in scope["path"] else ""
         if host not in self._hosts or not hmac.compare_digest(given.encode(), self._secret):
-            return 404
+            return NOT_FOUND
         origin = headers.get(b"origin")
         if origin is not None and origin != b"http://" + host:
             return 403
@@ -123,7 +126,7 @@ class _Taken:
         return message
 
 
-async def _answer(send: Send, status: int) -> None:
-    headers = [(b"content-type", b"text/plain"), (b"connection", b"close")]
+async def _answer(send: Send, status: int, text: str = "") -> None:
+    headers = [(b"content-type", b"text/plain; charset=utf-8"), (b"connection", b"close")]
     await send({"type": "http.response.start", "status": status, "headers": headers})
-    await send({"type": "http.response.body", "body": str(status).encode()})
+    await send({"type": "http.response.body", "body": (text or str(status)).encode()})

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from functools import cache
@@ -122,7 +123,8 @@ def _button(icon: str, key: str, does: Callable[[], object]) -> ui.button:
 
 @cache
 def _style() -> str:
-    return (files(__package__) / "style.css").read_text(encoding="utf-8")
+    style = (files(__package__) / "style.css").read_text(encoding="utf-8")
+    return f"{style}\n#popup::after {{ content: {json.dumps(say('app.away'))}; max-width: 24rem; }}"  # no connection
 
 
 @cache

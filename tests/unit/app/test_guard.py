@@ -62,7 +62,9 @@ def test_a_browser_of_this_machine_with_the_path_is_served() -> None:
 
 @pytest.mark.parametrize("host", [b"evil.example:8000", b"127.0.0.1", b"127.0.0.1:8001", b"", b"secret"])
 def test_another_name_of_this_machine_is_not_found(host: bytes) -> None:
-    assert _asked("/secret/", {"host": host})[0]["status"] == 404
+    first, body = _asked("/secret/", {"host": host})
+    assert first["status"] == 404
+    assert b"Each start of robochoc app has an address of its own" in body["body"]
 
 
 @pytest.mark.parametrize("path", ["/", "", "/secre/", "/secrets/", "/x/secret/", "//secret/", "/SECRET/", "/sécret/"])
