@@ -39,7 +39,7 @@ def install(projects: Projects) -> None:
     """Install all pages."""
     app.on_shutdown(projects.save)
     install_kept(projects)
-    app.on_shutdown(end_all)
+    app.on_shutdown(_end_jobs)
     install_reports(projects)
 
     app.on_page_exception(_fault)
@@ -79,6 +79,10 @@ def install(projects: Projects) -> None:
     @ui.page("/{_path:path}")
     def anything_else(_path: str) -> None:
         _missing(damaged=False)
+
+
+def _end_jobs() -> None:  # without a parameter: NiceGUI would give the application to it
+    end_all()
 
 
 def _fault(error: Exception) -> None:
