@@ -7,6 +7,8 @@ try {
   const dark = matchMedia("(prefers-color-scheme: dark)");
   const still = matchMedia("(prefers-reduced-motion: reduce)");
   const narrow = matchMedia("(max-width: 40rem)");
+  // ?driven: a page around this one has the line of time. Nothing plays by itself, and there is no second line.
+  const driven = new URLSearchParams(location.search).has("driven");
   const paintSky = () => {
     viewer.set_property(["Background"], "top_color", dark.matches ? [0.05, 0.07, 0.1] : [0.8, 0.88, 0.95]);
     viewer.set_property(["Background"], "bottom_color", dark.matches ? [0.12, 0.15, 0.2] : [0.97, 0.97, 0.95]);
@@ -19,7 +21,9 @@ try {
     return { left: beside, top: 0, right: innerWidth, bottom };
   };
   for (const one of document.querySelectorAll(".playback")) one.hidden = !playback.duration;
-  element("facts").open = !narrow.matches;
+  document.documentElement.toggleAttribute("data-driven", driven);
+  if (driven) for (const id of ["line", "play", "again", "clock", "speed-label"]) element(id).hidden = true;
+  element("facts").open = !narrow.matches && !driven;
   element("controls").hidden = false;
   const object = (path) => viewer.scene_tree.find(["meshcat", ...path.split("/")]).object;
   const player = new Player(playback.duration);
@@ -75,8 +79,8 @@ try {
     }
     trails.draw(ways, viewer.scene_tree.find(["meshcat"]).object);
     setTrail(element("trail").value);
-    player.seek(still.matches ? player.duration : 0);
-    if (!still.matches) player.play(Player.LEAD);
+    player.seek(still.matches && !driven ? player.duration : 0);
+    if (!still.matches && !driven) player.play(Player.LEAD);
   };
 
   // Camera

@@ -18,6 +18,7 @@ class _Change(msgspec.Struct):
     """What is read of `change.json`: the team after what has happened; if it decided `anew`, in another run."""
 
     after: Sketch
+    happened: list[str] = []
     anew: str = ""
 
 
@@ -41,9 +42,20 @@ def ground_of(run: Run) -> GroundMap | None:
 
 def changed_to(run: Run) -> Sketch | None:
     """Return the team after what has happened to it during a run, for which it decided again; None: nothing has."""
+    change = _change(run)
+    return change.after if change else None
+
+
+def happened_in(run: Run) -> list[str]:
+    """Return what has happened to the team during a run, in sentences."""
+    change = _change(run)
+    return change.happened if change else []
+
+
+def _change(run: Run) -> _Change | None:
     with suppress(OSError, msgspec.DecodeError, RecursionError):
         change = msgspec.json.decode((run.folder / CHANGE).read_bytes(), type=_Change)
-        return None if change.anew else change.after
+        return None if change.anew else change
     return None
 
 

@@ -2,7 +2,7 @@
 
 map.json             the map of the ground, on which the flight begins
 flight.html          the scene of the flight, which is simulated
-flight.json          how it went
+flight.json          how it went, or why it could not be flown
 conversation.html    all messages, as the sniffer shows them
 flight.mcap          a recording, if somebody asks for it
 
@@ -21,6 +21,7 @@ from pathlib import Path
 
 import msgspec
 
+from robochoc.app.flights.flown import FLOWN, flown_of, refused
 from robochoc.app.flights.ground import MAP, ground_of
 from robochoc.app.jobs.job import Call, Job, call_here
 from robochoc.app.jobs.process import Command
@@ -35,7 +36,6 @@ from robochoc.modelling.places import ModelError
 from robochoc.system.files import write_atomically
 
 FLIGHT = "flight.html"
-FLOWN = "flight.json"
 CONVERSATION = "conversation.html"
 RECORDING = "flight.mcap"
 MOST_MESSAGES = 100_000
@@ -43,6 +43,8 @@ MOST_MESSAGES = 100_000
 _NOT_AS_PLANNED = 4
 """The exit status of `robochoc fly` for a flight in which somebody has not arrived: it can be looked at."""
 _MAX_MESSAGE = 600
+_REFUSAL = "it cannot be flown: "
+"""What `robochoc fly` says before the reason."""
 
 
 class Stage(StrEnum):
@@ -138,8 +140,14 @@ class Making:
         return release
 
     def again(self) -> None:
-        """Try again to make what could not be made."""
-        if self.stage is Stage.DONE and self.troubles:
+        """Try again to make what could not be made, and a flight that was refused. Raises `OSError`."""
+        if self.stage is not Stage.DONE:
+            return
+        flown = flown_of(self.run)
+        if flown and flown.refused:
+            for name in (FLIGHT, FLOWN):
+                (self.run.folder / name).unlink(missing_ok=True)
+        if self.troubles or self._wants_flight:
             self._begin()
 
     def cancel(self) -> None:
@@ -204,10 +212,10 @@ class Making:
         given = [RESULT, "--team", self.run.team.name, *self._map()]
         try:
             told = self._ran(job, "fly", *given, "--json", "--html", FLIGHT)
-        except CannotMakeError:  # too near to each other to be flown, say: where they end can be seen all the same
+        except CannotMakeError as why:  # too near to each other, say: where they end can be seen all the same
             self._ran(job, "animate", *given, "--html", FLIGHT)
-        else:
-            write_atomically(self.run.folder / FLOWN, told)
+            told = refused(str(why).rpartition(_REFUSAL)[2])
+        write_atomically(self.run.folder / FLOWN, told)
 
     def _make_conversation(self, job: Job[None]) -> None:
         cut = ["--to", str(MOST_MESSAGES - 1)] if self.is_cut else []

@@ -19,9 +19,15 @@ from typing import Any
 import msgspec
 
 from robochoc.app.flights.answer import broken
+from robochoc.app.flights.flown import flight_words, flown_of
+from robochoc.app.flights.ground import changed_to, happened_in
+from robochoc.app.flights.who import who_flies
 from robochoc.app.runs.options import RESULT
+from robochoc.app.runs.paid import paid
 from robochoc.app.runs.run import Run
 from robochoc.app.sketch.building import decided
+from robochoc.app.sketch.picture import picture
+from robochoc.app.sketch.rules import PALETTE
 from robochoc.app.sketch.sketch import Sketch, Value
 from robochoc.app.sketch.words import listed, sentence, value_words, weight_of
 from robochoc.app.texts import LANGUAGE, say
@@ -53,11 +59,12 @@ def report(sketch: Sketch, run: Run, pages: Pages, version: str) -> bytes:
         pages: What can be looked at.
         version: That of robochoc.
     """
+    after = changed_to(run) or sketch
     parts = [
+        _answer(after, run),
+        _rules(after, run),
         _frame("report.flight", pages.flight),
-        _answer(sketch, run),
-        _rules(sketch, run),
-        _team(sketch),
+        _team(after),
         _talk(run),
         _frame("report.conversation", pages.conversation),
         _again(run, version),
@@ -70,6 +77,7 @@ def report(sketch: Sketch, run: Run, pages: Pages, version: str) -> bytes:
         name=_text(sketch.name),
         when=_text(_when(run)),
         summary=_text(summary(sketch, run)),
+        story="".join(f"<p>{_text(told)}</p>" for told in _story(run)),
         parts="\n".join(filter(None, parts)),
     ).encode()
 
@@ -79,18 +87,28 @@ def summary(sketch: Sketch, run: Run) -> str:
     result = run.result
     if result is None:
         return say("report.no-answer")
-    robots = len(sketch.robots) - len(result.withdrawn)
-    words = (
-        [say(f"report.verdict.{result.verdict}", robots=robots)] if result.verdict in _VERDICTS else [result.verdict]
-    )
-    if result.withdrawn:
+    robots = len((changed_to(run) or sketch).robots) - len(result.withdrawn)
+    verdict = "fewest" if result.verdict == "optimal" and result.withdrawn else result.verdict
+    words = [say(f"report.verdict.{verdict}", robots=robots)] if verdict in _VERDICTS else [verdict]
+    if result.withdrawn and not who_flies(run):  # which tells it, too
         words.append(say("report.withdrawn", names=listed(result.withdrawn)))
     if result.cost:
         words.append(say("report.cost", cost=f"{result.cost:,}"))
     return " ".join(words)
 
 
-_VERDICTS = frozenset({"solution", "optimal", "no-solution", "unknown"})
+def _story(run: Run) -> list[str]:
+    """Return what happened to the team, who flies, and what went wrong on the way."""
+    happened = happened_in(run)
+    flown = flown_of(run)
+    return [
+        *([say("fly.happened-first", what=" ".join(happened))] if happened else []),
+        *who_flies(run),
+        *(flight_words(flown) if flown else []),
+    ]
+
+
+_VERDICTS = frozenset({"solution", "optimal", "fewest", "no-solution", "unknown"})
 
 
 def values_of(sketch: Sketch, run: Run) -> dict[tuple[str, str], Value]:
@@ -120,7 +138,9 @@ def _answer(sketch: Sketch, run: Run) -> str:
 def _rules(sketch: Sketch, run: Run) -> str:
     if not sketch.rules:
         return ""
-    found = {one.rule.id: one for one in broken(sketch, values_of(sketch, run))}
+    values = values_of(sketch, run)
+    found = {one.rule.id: one for one in broken(sketch, values)}
+    costs = _by_degrees(sketch, run)
     items = []
     for rule in sketch.rules:
         marks = [f'<span class="soft">{_text(weight_of(rule))}</span>']
@@ -128,8 +148,23 @@ def _rules(sketch: Sketch, run: Run) -> str:
             links = listed([" - ".join(robots) for robots in one.links], _MOST_LINKS)
             key = "report.broken" if one.cost is None else "report.broken-costs"
             marks.append(f'<span class="bad">{_text(say(key, links=links, cost=one.cost))}</span>')
+        if rule.id in costs:
+            marks.append(f"<span>{_text(say('report.cost', cost=f'{costs[rule.id]:,}'))}</span>")
         items.append(f"<li>{_text(sentence(sketch, rule))} {' '.join(marks)}</li>")
-    return _section("report.rules", f"<ol>{''.join(items)}</ol>")
+    count = sum(rule.on for rule in sketch.rules)
+    how = say("report.rules-broken", broken=len(found), count=count) if found else say("report.rules-kept", count=count)
+    told = f"<p>{_text(how)}</p>" if values else ""
+    return _section("report.rules", f"{told}<ol>{''.join(items)}</ol>")
+
+
+def _by_degrees(sketch: Sketch, run: Run) -> dict[str, float]:
+    """Return what rules cost that are never broken, but cost more or less: by their ids."""
+    graded = tuple(rule for rule in sketch.rules if rule.on and rule.kind in PALETTE and PALETTE[rule.kind].graded)
+    if run.result is None or not graded:
+        return {}
+    with suppress(ModelError, ValueError, TypeError, KeyError):
+        return paid(msgspec.structs.replace(sketch, rules=graded), run.result.assignment)
+    return {}
 
 
 def _team(sketch: Sketch) -> str:
@@ -147,8 +182,10 @@ def _team(sketch: Sketch) -> str:
     ]
     own = [say(f"report.{key}") for key in ("robot", "stands", "weight", "rank")]
     story = f"<p>{_text(sketch.story)}</p>" if sketch.story else ""
+    drawn = f'<figure class="map">{picture(sketch)}</figure>' if sketch.decisions else ""
     return _section(
-        "report.team", f"{story}<p>{_text(told)}</p>{_table(headings, decisions)}{_table(own, robots, fold=True)}"
+        "report.team",
+        f"{story}<p>{_text(told)}</p>{drawn}{_table(headings, decisions)}{_table(own, robots, fold=True)}",
     )
 
 

@@ -82,6 +82,9 @@ def unpack_run(file: Path, folder: Path) -> bool:
         return False
     if RECORD not in found or SKETCH not in found or not _is_sound(found):
         return False
+    record = msgspec.json.decode(found[RECORD], type=Record)
+    record.opened = True
+    found[RECORD] = msgspec.json.encode(record)
     place = folder / "runs" / _FIRST
     place.mkdir(mode=0o700, parents=True)
     for name, piece in found.items():

@@ -55,8 +55,8 @@ class State(StrEnum):
 class Record(msgspec.Struct):
     """What is kept of a run besides its files. Times are Unix times; `message`: why it failed.
 
-    `labels`: the values that files cannot say as the user does, by what files say. `flies`: whether decisions say where
-    robots are to be, of a team that was not drawn here.
+    `labels`: the values that files cannot say as the user does, by what files say. `opened`: whether it came in a file,
+    from elsewhere. `flies`: whether decisions say where robots are to be, of a team that was not drawn here.
     """
 
     options: RunOptions
@@ -67,6 +67,7 @@ class Record(msgspec.Struct):
     ended: float | None = None
     message: str = ""
     labels: dict[str, str] = {}
+    opened: bool = False
     flies: bool | None = None
 
 

@@ -362,6 +362,8 @@
   const begin = async () => {
     const source = Sniffer.source();
     Sniffer.palette.apply();
+    // ?driven: a page around this one has the line of time, so that there is no second one.
+    if (new URLSearchParams(location.search).has("driven")) document.documentElement.dataset.driven = "";
     const waiting = setTimeout(() => {
       byId("nothing").hidden = false;
       byId("nothing").textContent = "Waiting for the robots";

@@ -42,7 +42,7 @@ class _Team:
         self.folder = teams.path(self.id)
 
 
-def _decided(teams: Store, sketch: Sketch) -> tuple[_Team, Run]:
+def decided(teams: Store, sketch: Sketch) -> tuple[_Team, Run]:
     """Return a team that has decided."""
     team = _Team(teams, sketch)
     run = Runs(team).start(RunOptions(protocol="syncbb"))
@@ -53,7 +53,7 @@ def _decided(teams: Store, sketch: Sketch) -> tuple[_Team, Run]:
 
 
 @contextmanager
-def _opened(browser: Any, url: str, width: int = 1280, **media: str) -> Iterator[WatchedPage]:  # noqa: ANN401 - Playwright's
+def fly_opened(browser: Any, url: str, width: int = 1280, **media: str) -> Iterator[WatchedPage]:  # noqa: ANN401 - Playwright's
     with watched_page(browser, {"width": width, "height": 800}, **media) as tab:
         if url.startswith("file:"):
             tab.page.goto(url)
@@ -77,8 +77,8 @@ def test_from_a_finished_run_to_scene_and_conversation_in_step(
     teams: Store,
     tmp_path: Path,
 ) -> None:
-    team, run = _decided(teams, cube(3, "Trio"))
-    with _opened(browser, f"{application.url}team/{team.id}/fly", reduced_motion="reduce") as tab:
+    team, run = decided(teams, cube(3, "Trio"))
+    with fly_opened(browser, f"{application.url}team/{team.id}/fly", reduced_motion="reduce") as tab:
         page = tab.page
         page.wait_for_selector(READY)
         page.wait_for_selector("text=It costs 6.")
@@ -109,7 +109,7 @@ def test_from_a_finished_run_to_scene_and_conversation_in_step(
         assert (tmp_path / "flight.mcap").read_bytes().startswith(b"\x89MCAP0\r\n")
         assert {one.split("/")[2] for one in tab.asked if one.startswith("http")} == {f"127.0.0.1:{application.port}"}
     assert run.artefact("flight.html")
-    with _opened(browser, f"{application.url}team/{team.id}/fly?run={run.id}#t=3.5", reduced_motion="reduce") as tab:
+    with fly_opened(browser, f"{application.url}team/{team.id}/fly?run={run.id}#t=3.5", reduced_motion="reduce") as tab:
         tab.page.wait_for_selector(READY)
         assert _numbers(tab)[2] == 3.5
 
@@ -121,9 +121,9 @@ def test_a_report_opens_by_itself_without_a_network(
     tmp_path: Path,
 ) -> None:
     sketch = msgspec.structs.replace(cube(2, "Duo"), story=HOSTILE)
-    team, _ = _decided(teams, sketch)
+    team, _ = decided(teams, sketch)
     report = tmp_path / "report.html"
-    with _opened(browser, f"{application.url}team/{team.id}/fly") as tab:
+    with fly_opened(browser, f"{application.url}team/{team.id}/fly") as tab:
         tab.page.wait_for_selector(READY)
         with tab.page.expect_download() as saved:
             tab.page.click("[aria-label='Report: Save']")
@@ -136,7 +136,7 @@ def test_a_report_opens_by_itself_without_a_network(
         assert tab.page.evaluate("self.origin") == "null"
         plays = "Boolean(globalThis.Playback)"  # `wait_for_function` evaluates text, which the report does not allow
         wait_until(lambda: tab.page.frames[1].evaluate(plays), "the scene in it has not begun")
-    with _opened(browser, report.as_uri()) as tab:
+    with fly_opened(browser, report.as_uri()) as tab:
         tab.page.wait_for_selector(f"text={HOSTILE}")
         frames = tab.page.frames[1:]
         frames[0].wait_for_function("globalThis.Playback")
@@ -151,8 +151,8 @@ def test_who_decides_no_place_does_not_fly_and_is_told_why(
     application: AppServer,
     teams: Store,
 ) -> None:
-    team, _ = _decided(teams, cube(2, "Slots", Kind.SLOT))
-    with _opened(browser, f"{application.url}team/{team.id}/fly", 360, color_scheme="dark") as tab:
+    team, _ = decided(teams, cube(2, "Slots", Kind.SLOT))
+    with fly_opened(browser, f"{application.url}team/{team.id}/fly", 360, color_scheme="dark") as tab:
         tab.page.wait_for_selector("text=Nobody flies: this team decides neither heights nor places.")
         tab.page.wait_for_selector(READY)
         assert tab.page.locator(".stage-parts span").all_inner_texts() == ["They talk"]
@@ -194,7 +194,7 @@ def test_they_talk_then_fly_epoch_by_epoch(browser: Any) -> None:  # noqa: ANN40
 
 
 def test_what_has_not_decided_is_sent_to_decide(browser: Any, application: AppServer, teams: Store) -> None:  # noqa: ANN401 - Playwright's
-    with _opened(browser, f"{application.url}team/{teams.add(cube())}/fly") as tab:
+    with fly_opened(browser, f"{application.url}team/{teams.add(cube())}/fly") as tab:
         tab.page.wait_for_selector("text=Nothing has been decided yet.")
         tab.page.click("text=Go to Decide")
         tab.page.wait_for_url("**/decide")
@@ -206,9 +206,9 @@ def test_the_state_is_opened_from_the_gallery(
     teams: Store,
     tmp_path: Path,
 ) -> None:
-    team, _ = _decided(teams, cube(2, "Moved"))
+    team, _ = decided(teams, cube(2, "Moved"))
     state = tmp_path / "Moved.robochoc.zip"
-    with _opened(browser, f"{application.url}team/{team.id}/fly") as tab:
+    with fly_opened(browser, f"{application.url}team/{team.id}/fly") as tab:
         with tab.page.expect_download() as saved:
             tab.page.click("[aria-label='All of it: Save']")
         assert saved.value.suggested_filename == state.name

@@ -3,24 +3,31 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from contextlib import suppress
 from functools import cache
 from importlib.resources import files
+from pathlib import Path
 
 from nicegui import ui
 
-from robochoc.app.flights.making import CONVERSATION, FLIGHT, MOST_MESSAGES, Making, Stage, flies, making_of
+from robochoc.app.flights.flown import flight_words, flown_of
+from robochoc.app.flights.ground import happened_in
+from robochoc.app.flights.listing import run_words
+from robochoc.app.flights.making import MOST_MESSAGES, Making, Stage, flies, making_of
 from robochoc.app.flights.report import summary
+from robochoc.app.flights.who import who_flies
 from robochoc.app.pages.fly.kept import beside
 from robochoc.app.pages.fly.stage import Stage as Frames
 from robochoc.app.pages.fly.tell import build_tell
 from robochoc.app.pages.shell import while_shown
 from robochoc.app.projects import Project
 from robochoc.app.runs.run import Run, State
-from robochoc.app.runs.runs import runs_of
+from robochoc.app.runs.runs import MOST_KEPT, runs_of
 from robochoc.app.sketch.sketch import Sketch
 from robochoc.app.texts import say
 
 _TICK_S = 0.5
+_LONGEST_ID = 20
 
 
 def build_fly(project: Project) -> None:
@@ -36,7 +43,7 @@ class _Page:
         self._project = project
         self._runs = runs_of(project)
         request = ui.context.client.request
-        self._asked = request.query_params.get("run", "") if request else ""
+        self._asked = request.query_params.get("run", "")[:_LONGEST_ID] if request else ""
         self._shown: tuple[str, State] | None = None
         self._leave: Callable[[], None] = _nothing
         self._body = ui.element("div").classes("fly")
@@ -48,7 +55,8 @@ class _Page:
         self._leave()
 
     def _run(self) -> Run | None:
-        return (self._runs.find(self._asked) if self._asked else None) or self._runs.latest_for("decide")
+        asked = self._runs.find(self._asked) if self._asked else None
+        return asked or self._runs.latest_for("decide") or self._runs.latest_for("whatif")
 
     def _follow(self) -> None:
         """Show the run as it is now, where that is not what is shown."""
@@ -64,6 +72,9 @@ class _Page:
             self._build(run)
 
     def _build(self, run: Run | None) -> None:
+        if self._asked and (run is None or run.id != self._asked):
+            key = "fly.gone" if run else "fly.gone-nothing"
+            ui.label(say(key, run=self._asked, most=MOST_KEPT)).classes("note").props("role=status")
         if run is None:
             _told("fly.nothing", "fly.nothing-remedy", "fly.to-decide", f"/team/{self._project.id}/decide")
             return
@@ -88,7 +99,11 @@ class _Page:
         with ui.element("div").classes("fly-head"):
             with ui.element("div"):
                 _title()
+                if happened := happened_in(run):
+                    ui.label(say("fly.happened-first", what=" ".join(happened)))
                 ui.label(summary(sketch, run)).classes("soft")
+                for words in who_flies(run):
+                    ui.label(words).classes("soft")
             self._choice(run)
         if sketch != self._project.sketch:
             ui.label(say("fly.old")).classes("note")
@@ -106,7 +121,7 @@ class _Page:
         runs = [one for one in self._runs.all() if one.state in {State.ENDED, State.STOPPED}]
         if len(runs) < 2:  # noqa: PLR2004 - nothing to choose
             return
-        options = {one.id: say("fly.run", number=int(one.id), summary=_verdict(one)) for one in runs}
+        options = {one.id: run_words(one) for one in runs}
 
         def choose(name: str) -> None:
             ui.navigate.to(f"/team/{self._project.id}/fly?run={name}")
@@ -126,7 +141,7 @@ class _Made:
             self._says = ui.label("")
             self._cancel = ui.button(say("fly.cancel"), on_click=self._stop).props("flat no-caps dense")
             self._again = ui.button(say("fly.again"), on_click=self._begin).props("flat no-caps dense")
-        self._troubles = ui.element("div")
+        self._troubles = ui.element("div").classes("fly-troubles").props("role=status")
         self.frames = Frames(flies=making.has_flight, talks=making.has_conversation)
         self._timer = ui.timer(_TICK_S, self._tell_time)
         self._release: Callable[[], None] = _nothing
@@ -154,16 +169,33 @@ class _Made:
         self._again.set_visibility(stage is Stage.WAITING)
         self._timer.active = works
         self._tell_time()
-        flight = beside(making.run, FLIGHT) if making.flight else None
-        talk = beside(making.run, CONVERSATION) if making.conversation else None
-        self.frames.show(flight, talk)
+        flight, talk = _framed(making, making.flight), _framed(making, making.conversation)
+        self.frames.show(flight, talk, flies=making.has_flight, talks=making.has_conversation)
         self.frames.set_visibility(making.has_flight or making.has_conversation)
         self._troubles.clear()
         with self._troubles:
-            for place, why in making.troubles.items():
-                ui.label(say(f"fly.trouble.{place}", why=why)).classes("error")
+            self._tell_troubles()
             if making.is_cut and talk:
                 ui.label(say("fly.cut", most=f"{MOST_MESSAGES:,}")).classes("soft")
+
+    def _tell_troubles(self) -> None:
+        making = self._making
+        for place, why in making.troubles.items():
+            ui.label(say(f"fly.trouble.{place}", why=why)).classes("error")
+        flown = flown_of(making.run) if making.flight else None
+        words = flight_words(flown) if flown else []
+        for told in words:
+            ui.label(told).classes("error" if flown and flown.refused else "note")
+        failed = making.troubles or (flown and flown.refused)
+        if making.stage is Stage.DONE and failed:
+            ui.button(say("fly.try-again"), icon="refresh", on_click=self._try_again).props("flat no-caps dense")
+
+    def _try_again(self) -> None:
+        try:
+            self._making.again()
+        except OSError as why:
+            ui.notify(say("fly.trouble.flight", why=why), type="negative")
+        self._told()
 
     def _tell_time(self) -> None:
         stage = self._making.stage
@@ -173,6 +205,13 @@ class _Made:
             self._says.set_text(say(f"fly.making.{stage}", seconds=int(self._making.seconds)))
 
 
+def _framed(making: Making, page: Path | None) -> str | None:
+    """Return the address of a page for a frame: another one for each time that it was made."""
+    with suppress(OSError):
+        return f"{beside(making.run, page.name)}?driven&made={page.stat().st_mtime_ns}" if page else None
+    return None
+
+
 def _nothing() -> None:
     pass
 
@@ -180,10 +219,6 @@ def _nothing() -> None:
 def _title() -> None:
     with ui.element("h1"):
         ui.label(say("fly.title"))
-
-
-def _verdict(run: Run) -> str:
-    return run.result.verdict if run.result else say("report.no-answer")
 
 
 def _told(what: str, remedy: str, link: str, address: str) -> None:

@@ -43,12 +43,6 @@ export function partsOf(runs, stepCount, chapters, duration) {
 export default {
   template: `
     <div class="stage" :data-ready="ready">
-      <div class="stage-views" :data-both="flies && talks">
-        <figure v-if="flies"><figcaption>{{ words.flight }}</figcaption>
-          <iframe v-if="flight" ref="flight" :src="flight" :title="words.flight" @load="meet"></iframe><div v-else class="stage-empty"></div></figure>
-        <figure v-if="talks"><figcaption>{{ words.conversation }}</figcaption>
-          <iframe v-if="talk" ref="talk" :src="talk" :title="words.conversation" @load="meet"></iframe><div v-else class="stage-empty"></div></figure>
-      </div>
       <div v-if="parts.length" class="stage-line panel" role="group" :aria-label="words.label">
         <button type="button" class="stage-play" :aria-label="playing ? words.pause : words.play" :title="playing ? words.pause : words.play" @click="toggle">
           <svg viewBox="0 0 16 16" aria-hidden="true"><path v-if="playing" d="M3 2h3.6v12H3zM9.4 2H13v12H9.4z"/><path v-else d="M4 2.2v11.6a.6.6 0 0 0 .9.5l9.4-5.8a.6.6 0 0 0 0-1L4.9 1.7a.6.6 0 0 0-.9.5z"/></svg>
@@ -64,6 +58,12 @@ export default {
           <select v-model.number="speed"><option v-for="one in speeds" :key="one" :value="one">{{ one }}×</option></select></label>
       </div>
       <p v-else-if="flight || talk" class="soft">{{ words.waiting }}</p>
+      <div class="stage-views" :data-both="flies && talks">
+        <figure v-if="flies"><figcaption>{{ words.flight }}</figcaption>
+          <iframe v-if="flight" ref="flight" :src="flight" :title="words.flight" @load="meet"></iframe><div v-else class="stage-empty"></div></figure>
+        <figure v-if="talks"><figcaption>{{ words.conversation }}</figcaption>
+          <iframe v-if="talk" ref="talk" :src="talk" :title="words.conversation" @load="meet"></iframe><div v-else class="stage-empty"></div></figure>
+      </div>
     </div>`,
   // The pages' addresses, once they are there, and which are to come.
   props: { flight: String, talk: String, flies: Boolean, talks: Boolean, words: Object },
@@ -121,6 +121,7 @@ export default {
       if (scene && !scene.heard) this.hear(scene);
       if (page && !page.heard) {
         page.heard = true;
+        this.take(this.$refs.talk, "p");
         page.view.on((changed) => changed.has("moment") && this.fromTalk(page));
       }
       this.ready = Boolean((scene || !this.flies) && (page || !this.talks));
@@ -128,12 +129,22 @@ export default {
     },
     hear(scene) {
       scene.heard = true;
+      this.take(this.$refs.flight, " ");
       const shown = scene.player.ontime;
       scene.player.pause();
       scene.player.ontime = (time) => {
         shown(time);
         if (!this.moving) this.fromFlight(time);
       };
+    },
+    // The key that plays a page by itself plays both.
+    take(frame, key) {
+      frame.contentWindow.addEventListener("keydown", (event) => {
+        if (event.key !== key || event.ctrlKey || event.altKey || event.metaKey || event.target.closest?.("input, select, textarea, button, summary")) return;
+        event.preventDefault();
+        event.stopImmediatePropagation();
+        this.toggle();
+      }, true);
     },
     stepAt(part) {
       const share = (this.time - part.begins) / (part.ends - part.begins);

@@ -34,10 +34,15 @@ class Stage(Element, component="stage.js"):
             "epoch": _left_open("fly.line.epoch"),
         }
 
-    def show(self, flight: str | None, talk: str | None) -> None:
-        """Show pages by their addresses, which are relative to this one. None: it is not there (yet)."""
+    def show(self, flight: str | None, talk: str | None, *, flies: bool, talks: bool) -> None:
+        """Show pages by their addresses, which are relative to this one. None: it is not there (yet).
+
+        `flies` and `talks` are as they were when it was made, or as what could not be made has changed them.
+        """
         self._props["flight"] = flight
         self._props["talk"] = talk
+        self._props["flies"] = flies
+        self._props["talks"] = talks
         self.update()
 
 

@@ -5,12 +5,14 @@ from __future__ import annotations
 import asyncio
 from pathlib import Path
 
+import msgspec
 import pytest
 
+from robochoc.app.flights.flown import flown_of
 from robochoc.app.flights.making import FLIGHT, Making, Stage, flies, making_of
 from robochoc.app.jobs.job import jobs_alive
 from robochoc.app.log import words
-from robochoc.app.runs.options import JOURNAL, RunOptions
+from robochoc.app.runs.options import JOURNAL, RESULT, RunOptions
 from robochoc.app.runs.run import Record, Run
 from robochoc.app.sketch.sketch import Kind, Sketch
 from tests.support.kept_runs import cube, kept_run
@@ -94,3 +96,25 @@ def test_what_failed_can_be_tried_again(tmp_path: Path, monkeypatch: pytest.Monk
 
 def _failing(*_: object) -> None:
     raise ValueError("unforeseen")
+
+
+@pytest.mark.slow
+def test_a_flight_that_is_refused_tells_why_and_is_made_again(tmp_path: Path) -> None:
+    sketch = cube(2)
+    sketch = msgspec.structs.replace(
+        sketch, decisions=(msgspec.structs.replace(sketch.decisions[0], values=(1, 900_000)),)
+    )
+    making = Making(kept_run(tmp_path, sketch, assignment={"Drone1.level": 1, "Drone2.level": 900_000}))
+    asyncio.run(_made(making))
+    assert making.flight, making.troubles
+    flown = flown_of(making.run)
+    assert flown is not None
+    assert "m are to be kept: ask for a larger scale" in flown.refused
+    assert "cannot be flown" not in flown.refused
+    low = kept_run(tmp_path / "low", cube(2))
+    (making.run.folder / RESULT).write_bytes((low.folder / RESULT).read_bytes())
+    making.again()
+    wait_until(lambda: making.stage is Stage.DONE, "it is not made")
+    flown = flown_of(making.run)
+    assert flown is not None
+    assert (flown.refused, flown.as_planned) == ("", True)

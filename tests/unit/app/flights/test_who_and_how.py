@@ -1,0 +1,165 @@
+"""What is told of a flight: on which map, who flies and who stays and why, how it went, and what a run was."""
+
+from __future__ import annotations
+
+import os
+import time
+from datetime import UTC, datetime
+from pathlib import Path
+
+import msgspec
+import pytest
+
+from robochoc.app.flights.flown import FLOWN, flight_words, flown_of, refused
+from robochoc.app.flights.ground import changed_to, ground_of, happened_in
+from robochoc.app.flights.listing import run_words
+from robochoc.app.flights.who import who_flies
+from robochoc.app.runs.run import CHANGE, Run, State
+from robochoc.app.sketch import edits
+from robochoc.app.sketch.sketch import Area, Cell, Decision, Kind, Sketch
+from robochoc.flight.ground_map import BlockedCell
+from tests.support.kept_runs import STARTED, cube, kept_run
+
+
+def changing(run: Run, after: Sketch, **more: object) -> None:
+    content = {"after": after, "happened": ["Drone2 fails."], "beside": "00002", **more}
+    (run.folder / CHANGE).write_bytes(msgspec.json.encode(content))
+
+
+def test_the_map_has_where_robots_stand_and_what_is_blocked_since_when(tmp_path: Path) -> None:
+    before = msgspec.structs.replace(cube(), area=Area(8, 4, frozenset({Cell(7, 3), Cell(9, 9)})))
+    run = kept_run(tmp_path, before)
+    ground = ground_of(run)
+    assert ground is not None
+    assert (ground.columns, ground.rows) == (8, 4)
+    assert ground.starts == {"Drone1": (1, 1), "Drone2": (2, 1), "Drone3": (3, 1)}
+    assert ground.blocked == (BlockedCell(8, 4),)
+    after = edits.with_robot(edits.without_robot(before, "Drone2"), Cell(4, 2), "Zoe")
+    after = edits.with_cell_blocked(after, Cell(0, 3), blocked=True)
+    changing(run, after)
+    ground = ground_of(run)
+    assert ground is not None
+    assert ground.starts == {"Drone1": (1, 1), "Drone2": (2, 1), "Drone3": (3, 1), "Zoe": (5, 3)}
+    assert ground.blocked == (BlockedCell(1, 4, 1), BlockedCell(8, 4))
+    assert happened_in(run) == ["Drone2 fails."]
+
+
+def test_what_decided_anew_or_is_damaged_changes_nothing(tmp_path: Path) -> None:
+    run = kept_run(tmp_path, cube())
+    changing(run, cube(2), anew="another robot decides now")
+    assert changed_to(run) is None
+    (run.folder / CHANGE).write_bytes(b"[" * 100_000)
+    assert (changed_to(run), happened_in(run)) == (None, [])
+
+
+def test_a_team_that_was_not_drawn_has_no_map(tmp_path: Path) -> None:
+    run = kept_run(tmp_path, Sketch("Foreign"))
+    assert ground_of(run) is None
+    assert who_flies(run) == []
+
+
+def test_who_flies_is_told_and_who_stays_and_why(tmp_path: Path) -> None:
+    run = kept_run(tmp_path / "all", cube())
+    assert who_flies(run) == ["All 3 robots fly to where they decided to be."]
+    one = kept_run(tmp_path / "one", cube(1))
+    assert who_flies(one) == ["Drone1 flies to where it decided to be."]
+    given = {"Drone1.level": 1, "Drone2.level": 2}
+    aside = kept_run(tmp_path / "aside", cube(), assignment=given, withdrawn=["Drone3"])
+    assert who_flies(aside) == [
+        "2 of 3 robots fly to where they decided to be.",
+        "Stepped aside, so that the others can keep all rules: Drone3. Who steps aside lands at the edge.",
+    ]
+    sketch = edits.with_robot(cube(), Cell(5, 1), "Cook")
+    sketch = msgspec.structs.replace(
+        sketch,
+        decisions=(
+            msgspec.structs.replace(sketch.decisions[0], robots=("Drone1", "Drone2", "Drone3")),
+            Decision("dish", Kind.CHOICE, ("soup", "cake"), ("Cook",)),
+        ),
+    )
+    given = {f"Drone{number}.level": number for number in (1, 2, 3)}
+    cook = kept_run(tmp_path / "cook", sketch, assignment={**given, "Cook.dish": "soup"})
+    assert who_flies(cook)[1:] == ["Decided neither a level nor a place, and stay where they stand: Cook."]
+    changing(run, edits.without_robot(cube(), "Drone2"))
+    assert who_flies(run) == [
+        "2 of 3 robots fly to where they decided to be.",
+        "Left while the others were flying: Drone2. Who leaves lands at the edge.",
+    ]
+    nobody = kept_run(tmp_path / "nobody", cube(kind=Kind.SLOT))
+    assert who_flies(nobody) == []
+
+
+def test_how_a_flight_went_is_told(tmp_path: Path) -> None:
+    run = kept_run(tmp_path, cube())
+    file = run.folder / FLOWN
+    assert flown_of(run) is None
+    for broken in (b"", b"[" * 100_000, b'{"drones": 3}'):
+        file.write_bytes(broken)
+        assert flown_of(run) is None
+    file.write_bytes(refused("two are in one place."))
+    flown = flown_of(run)
+    assert flown is not None
+    assert flight_words(flown) == [
+        "It cannot be flown: two are in one place. The picture shows where all are to be in the end."
+    ]
+    drones = [
+        {"name": "A", "error_m": None, "at": [1, 2, 3]},
+        {"name": "B", "error_m": 0.4},
+        {"name": "C", "error_m": 0},
+    ]
+    told = {
+        "as_planned": False,
+        "drones": drones,
+        "happenings": [{"at_s": 2.04, "drone": "A", "what": "hits the ground"}] * 9,
+    }
+    file.write_bytes(msgspec.json.encode(told))
+    flown = flown_of(run)
+    assert flown is not None
+    assert flight_words(flown)[:3] == ["Fallen: A.", "Not where they should be: B.", "2.0 s, A: hits the ground."]
+    assert len(flight_words(flown)) == 8
+    near = msgspec.structs.replace(flown, drones=flown.drones[2:], happenings=())
+    assert flight_words(near) == ["Two came nearer to each other than they should."]
+    assert flight_words(msgspec.structs.replace(near, as_planned=True)) == []
+
+
+@pytest.fixture
+def _utc(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(os.environ, "TZ", "UTC")
+    time.tzset()
+
+
+@pytest.mark.usefixtures("_utc")
+def test_a_run_in_a_list_says_when_what_for_and_what_came_of_it(tmp_path: Path) -> None:
+    run = kept_run(tmp_path, cube())
+    same_day = datetime.fromtimestamp(STARTED + 60, UTC)
+    assert run_words(run, same_day) == "22:13, Decide: the best answer, proven, costs 6"
+    assert run_words(run).startswith("2023-11-14 22:13, Decide")
+    assert run.result is not None
+    for purpose, opened, words in (
+        ("whatif", False, "What if"),
+        ("whatif-anew", False, "What if, decided anew to compare"),
+        ("decide", True, "Opened from a file"),
+        ("<b>", False, "Another run"),
+    ):
+        run.record.purpose, run.record.opened = purpose, opened
+        assert run_words(run, same_day).startswith(f"22:13, {words}: ")
+    run.record.purpose = "decide"
+    for verdict, state, more, words in (
+        (
+            "solution",
+            State.ENDED,
+            {"withdrawn": ("A", "B"), "cost": 0},
+            "all rules that must hold are kept, 2 stepped aside",
+        ),
+        ("no-solution", State.ENDED, {"assignment": {}, "cost": None}, "no answer is possible"),
+        ("unknown", State.STOPPED, {"cost": 6}, "stopped, the best so far, costs 6"),
+        ("unknown", State.ENDED, {"cost": 0}, "the best so far"),
+        ("unknown", State.STOPPED, {"assignment": {}}, "no answer"),
+    ):
+        run.record.state = state
+        kept = run.result
+        run.result = msgspec.structs.replace(kept, verdict=verdict, **more)
+        assert run_words(run, same_day).endswith(f": {words}")
+        run.result = kept
+    run.result = None
+    assert run_words(run, same_day).endswith(": no answer")
