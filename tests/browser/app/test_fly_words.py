@@ -12,9 +12,9 @@ from robochoc.app.runs.run import RECORD, Record, Run, State
 from robochoc.app.sketch import edits
 from robochoc.app.sketch.sketch import Cell, Decision, Kind, Sketch, SketchRule
 from robochoc.app.store import Store
-from tests.browser.app.test_app_fly import FLIGHT, LINE, READY, TALK, decided, fly_opened
 from tests.support.app_server import AppServer
 from tests.support.browser_pages import watched_page
+from tests.support.fly_pages import FLIGHT, LINE, READY, TALK, decided, fly_opened
 from tests.support.kept_runs import STARTED, cube, kept_run
 
 SHOWN = "(id) => getComputedStyle(document.getElementById(id)).display !== 'none'"
