@@ -8,41 +8,23 @@ from __future__ import annotations
 
 import json
 from collections import Counter
-from collections.abc import Callable
 from pathlib import Path
 from random import Random
-from subprocess import CompletedProcess
 from typing import Any
 
 from robochoc.formats.folder import write_team
 from robochoc.model.problem import INFINITE, ProblemKind, Team
 from robochoc.run.registry import protocol_names
-from tests.support.complex_problems import random_complex_team
-from tests.support.cost_problems import minimum_withdrawal, random_complex_cost_team, random_cost_team
+from tests.support.cost_problems import minimum_withdrawal
 from tests.support.examples import count
-from tests.support.loose_problems import loosened, minimum_cost
-from tests.support.pkc_problems import random_pkc_team
-from tests.support.problems import random_team, with_unique_definitions
+from tests.support.loose_problems import minimum_cost
+from tests.support.problems import with_unique_definitions
 from tests.support.program import robochoc_within
+from tests.support.random_command_lines import ORDERS, TEAMS, assert_refused, some
 
-TEAMS: dict[str, Callable[[Random], Team]] = {
-    "satisfaction": random_team,
-    "costs": random_cost_team,
-    "partially known": random_pkc_team,
-    "several variables": random_complex_team,
-    "several variables and costs": random_complex_cost_team,
-    "superfluous links": lambda chance: loosened(random_team(chance), chance),
-}
-ORDERS = ("given", "lexicographic", "max-degree", "min-width", "dom-deg", "dfs", "random")
 IN_CYCLES = ("dsa", "mgm", "mgm2", "maxsum")
 SEEDS = (0, 7, 2**32, 2**63, 2**64 - 1)
 SETTINGS = ("cycles=3", "cycles=", "variant=B", "damping=0.5", "preference=inf", "memory=1", "none=1", "=3")
-
-
-def some(chance: Random, likely: float, *words: object) -> list[str]:
-    """An option, with one of the values after its name, or nothing."""
-    option, *values = words
-    return [str(option), str(chance.choice(values))] if chance.random() < likely else []
 
 
 def command_line(folder: Path, chance: Random) -> list[str]:
@@ -85,14 +67,6 @@ def test_no_command_line_ends_in_a_traceback_or_a_wrong_verdict(many: int, tmp_p
                 check_verdict(team, json.loads(done.stdout), words, what)
                 assert (done.returncode == 3) is (json.loads(done.stdout)["verdict"] == "unknown"), what
     assert {0, 2} <= {*seen}
-
-
-def assert_refused(done: CompletedProcess[str], what: str) -> None:
-    """A refusal is one line, perhaps after the command's usage, and nothing is printed as a result."""
-    assert not done.stdout, what
-    told = [line for line in done.stderr.splitlines() if line]
-    assert told, what
-    assert len(told) == 1 or told[0].startswith("Usage:"), what
 
 
 def check_verdict(team: Team, found: dict[str, Any], words: list[str], what: str) -> None:
