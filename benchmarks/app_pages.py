@@ -1,4 +1,4 @@
-"""Part `app`: how long `robochoc app` takes to its first picture, and how smoothly a team of 121 robots is modelled.
+"""Part `app`: how long `robochoc app` takes to its first picture, and how 121 robots are modelled, decide and fly.
 
 It needs the extra `app`, Playwright, and Chromium on the path.
 """
@@ -24,6 +24,9 @@ from report import Row, Section
 
 RUNS = 7
 SIDE = 11
+PATIENCE_S = 600
+DECIDE = ".go button"
+FLIGHT = "document.querySelector('.stage-views iframe').contentWindow.Playback.player"
 FRAMES = """
 () => new Promise((done) => {
   const times = [];
@@ -53,10 +56,11 @@ def measured() -> Section:
             page.wait_for_selector("svg [data-robot], svg .robot")
             rows.append((f"page of a team of {SIDE * SIDE} robots", f"{time.perf_counter() - began:.2f}"))
             rows.append(("frames a second while a robot is dragged", f"{_dragging(page):.0f}"))
+            rows += _deciding_and_flying(page, f"{url}team/{team}")
         browser.close()
     notes = (
         "Chromium without a window, its pages drawn by the processor. The picture is there when the gallery's cards "
-        "are. Median (min..max)."
+        "are. Median (min..max). A flight has begun when its scene, which is simulated first, can be played."
     )
     return Section("app", "The application", notes, (rows,))
 
@@ -113,3 +117,25 @@ def _dragging(page: Any) -> float:  # noqa: ANN401 - Playwright's
     frames.dispose()
     page.mouse.up()
     return 1000 / statistics.median(later - one for one, later in itertools.pairwise(times))
+
+
+def _deciding_and_flying(page: Any, team: str) -> list[Row]:  # noqa: ANN401 - Playwright's
+    """Let the team decide by a click, and see it fly: how long each takes, and frames a second of the flight."""
+    page.set_default_timeout(PATIENCE_S * 1000)
+    page.goto(f"{team}/decide")
+    page.wait_for_function("window.did_handshake")
+    began = time.perf_counter()
+    page.click(DECIDE)
+    page.wait_for_selector(f".headline:has-text('All {SIDE * SIDE} decide')")
+    rows: list[Row] = [(f"from the click to the answer of {SIDE * SIDE} robots", f"{time.perf_counter() - began:.2f}")]
+    began = time.perf_counter()
+    page.goto(f"{team}/fly")
+    page.wait_for_selector(".stage[data-ready=true]")
+    rows.append(("from there to their flight", f"{time.perf_counter() - began:.2f}"))
+    page.focus(".stage-line input")
+    page.click(".stage-play")
+    page.wait_for_function(f"{FLIGHT}.time > 0")
+    times: list[float] = page.evaluate(f"({FRAMES})()")
+    median = statistics.median(later - one for one, later in itertools.pairwise(times))
+    rows.append(("frames a second of their flight, beside the conversation", f"{1000 / median:.0f}"))
+    return rows
