@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import asyncio
 from collections.abc import Callable, Sequence
-from functools import partial
+from functools import cached_property, partial
 from pathlib import Path
 from threading import Lock
 from typing import Any
 
+from robochoc.app.foreign.facts import Facts
 from robochoc.app.jobs.job import Job, end_jobs_in
 from robochoc.app.listeners import Listeners
 from robochoc.app.log import TOLD
@@ -57,6 +58,11 @@ class Project(HasParts):
     def foreign(self) -> Path | None:
         """The files of a team that was not drawn here, and cannot be edited by hand. None: it was."""
         return self._store.foreign(self.id)
+
+    @cached_property
+    def facts(self) -> Facts:
+        """What is known of a team that was not drawn here. Raises `ValueError` if its files are damaged."""
+        return self._store.facts(self.id)
 
     @property
     def can_undo(self) -> bool:

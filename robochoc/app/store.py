@@ -1,6 +1,7 @@
 """Teams on disk: every one is a folder with its sketch, and is saved by itself, all of it or nothing.
 
 FOLDER/ID/history.json    the sketch, and what can be undone
+FOLDER/ID/team/           the files of a team that was not drawn here; foreign.json: what is known of it
 FOLDER/ID/runs/           what was decided and flown
 FOLDER/.removed-...       a team that is being removed
 FOLDER/.lock              held by the one application that has the folder open
@@ -14,19 +15,22 @@ import secrets
 import shutil
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
-from math import ceil, sqrt
 from pathlib import Path
 from typing import TypeVar
 
 import msgspec
 
+from robochoc.app.foreign.drawing import drawn
+from robochoc.app.foreign.facts import Facts, facts_of
 from robochoc.app.sketch.history import History
 from robochoc.app.sketch.opening import ForeignTeam
 from robochoc.app.sketch.shape import is_sound
-from robochoc.app.sketch.sketch import MAX_ROBOTS, MAX_SIDE, Area, Cell, Sketch, SketchRobot
+from robochoc.app.sketch.sketch import Sketch
+from robochoc.formats import InvalidInputError, read_team
 
 _HISTORY = "history.json"
 _TEAM = "team"
+_FACTS = "foreign.json"
 _LOCK = ".lock"
 _REMOVED = ".removed-"
 _ID_BYTES = 6
@@ -106,12 +110,35 @@ class Store:
     def add_foreign(self, team: ForeignTeam) -> str:
         """Keep a team that was not drawn here; return its id."""
         name = self.add(drawn(team))
+        facts = facts_of(team.team, files=team.changed, notes=team.notes, origin=team.path.name)
         try:
             team.save(self.path(name) / _TEAM)
+            (self.path(name) / _FACTS).write_bytes(msgspec.json.encode(facts))
         except BaseException:
             self.remove(name)
             raise
         return name
+
+    def facts(self, name: str) -> Facts:
+        """Return what is known of a team that was not drawn here.
+
+        Raises:
+            KeyError: for what is no id.
+            ValueError: if its files are damaged.
+        """
+        file = self.path(name) / _FACTS
+        try:
+            if file.stat().st_size <= MAX_BYTES:
+                return msgspec.json.decode(file.read_bytes(), type=Facts)
+        except (OSError, msgspec.DecodeError, RecursionError):  # it was kept before there were facts, say
+            pass
+        try:
+            facts = facts_of(read_team(self.path(name) / _TEAM))
+        except InvalidInputError as damaged:
+            raise ValueError(str(damaged)) from None
+        with suppress(OSError):
+            file.write_bytes(msgspec.json.encode(facts))
+        return facts
 
     def load(self, name: str) -> History:
         """Return a team. Steps that are beyond all bounds, which no edit makes, cannot be undone.
@@ -191,18 +218,3 @@ def _within_bounds(history: History) -> bytes:
         before, after = history.before, history.after
         history = History(history.now, before[(len(before) + 1) // 2 :], after[(len(after) + 1) // 2 :])
     return content
-
-
-def drawn(team: ForeignTeam) -> Sketch:
-    """Return a picture of a team that was not drawn here: its robots, side by side. Their files say all the rest."""
-    robots = team.robots[:MAX_ROBOTS]
-    columns = min(MAX_SIDE, max(8, ceil(sqrt(len(robots)))))
-    rows = max(6, ceil(len(robots) / columns))
-    return Sketch(
-        team.name,
-        Area(columns, rows),
-        tuple(
-            SketchRobot(name, Cell(number % columns, rows - 1 - number // columns))
-            for number, name in enumerate(robots)
-        ),
-    )

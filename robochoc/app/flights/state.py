@@ -38,12 +38,15 @@ def team_archive(run: Run) -> bytes:
         OSError: if a file cannot be read.
     """
     sketch = run.sketch
-    if sketch.decisions:
-        return zipped(sketch)
+    return zipped(sketch) if sketch.decisions else files_archive(run.team, sketch.name)
+
+
+def files_archive(folder: Path, name: str) -> bytes:
+    """Return the files of a team that was not drawn here as a ZIP archive. Raises `OSError` if one cannot be read."""
     content = io.BytesIO()
     with zipfile.ZipFile(content, "w", zipfile.ZIP_DEFLATED) as archive:
-        for file in sorted(run.team.rglob("*.xml")):
-            _add(archive, f"{file_name(sketch.name)}/{file.relative_to(run.team).as_posix()}", file)
+        for file in sorted(folder.rglob("*.xml")):
+            _add(archive, f"{file_name(name)}/{file.relative_to(folder).as_posix()}", file)
     return content.getvalue()
 
 

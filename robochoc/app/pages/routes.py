@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import shlex
 from collections.abc import Callable
-from pathlib import Path
 
 from nicegui import app, ui
 
@@ -16,6 +14,7 @@ from robochoc.app.pages.compare.served import install_reports
 from robochoc.app.pages.decide.page import build_decide
 from robochoc.app.pages.fly.kept import install_kept
 from robochoc.app.pages.fly.page import build_fly
+from robochoc.app.pages.foreign.model import build_foreign_model
 from robochoc.app.pages.gallery import build_gallery
 from robochoc.app.pages.lessons.lesson_page import build_lesson
 from robochoc.app.pages.lessons.list_page import build_lessons
@@ -23,7 +22,6 @@ from robochoc.app.pages.model.page import build_model
 from robochoc.app.pages.shell import AREAS, shell
 from robochoc.app.pages.whatif.page import build_whatif
 from robochoc.app.projects import Project, Projects
-from robochoc.app.sketch.picture import picture
 from robochoc.app.texts import say
 
 _BUILD: dict[str, Callable[[Project], None]] = {
@@ -33,6 +31,8 @@ _BUILD: dict[str, Callable[[Project], None]] = {
     "fly": build_fly,
     "compare": build_compare,
 }
+_BUILD_FOREIGN: dict[str, Callable[[Project], None]] = {"model": build_foreign_model}
+"""Pages of teams that were not drawn here, where they are others."""
 
 
 def install(projects: Projects) -> None:
@@ -57,12 +57,9 @@ def install(projects: Projects) -> None:
             _missing(damaged=isinstance(missing, ValueError))
             return
         chosen = area if area in AREAS else AREAS[0]
-        if (foreign := project.foreign) is not None:
-            with shell(project.sketch.name):
-                _not_drawn_here(project, foreign)
-            return
+        build = _BUILD if project.foreign is None else {**_BUILD, **_BUILD_FOREIGN}
         with shell(project.sketch.name, project, chosen):
-            _BUILD[chosen](project)
+            build[chosen](project)
 
     progress = Progress(projects.store.folder)
 
@@ -91,18 +88,6 @@ def _fault(error: Exception) -> None:
             ui.label(say("app.fault-page"))
         ui.label(words(error))
         ui.link(say("app.home"), "/")
-
-
-def _not_drawn_here(project: Project, files: Path) -> None:
-    """Show a team that was not drawn here, and the command that decides it: its files say more than a picture."""
-    with ui.element("h1"):
-        ui.label(project.sketch.name)
-    ui.label(say("app.foreign", robots=len(project.sketch.robots))).classes("prose")
-    with ui.element("span").classes("panel"):
-        ui.html(picture(project.sketch), sanitize=False)
-    ui.label(say("app.foreign-command"))
-    ui.label(shlex.join(["robochoc", "solve", str(files), "--html", "scene.html"])).classes("panel command-text")
-    ui.link(say("app.home"), "/")
 
 
 def _missing(*, damaged: bool) -> None:

@@ -8,11 +8,12 @@ from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 
+from robochoc.app.foreign.facts import domains_of
 from robochoc.app.runs.labels import labels_of, value_of
 from robochoc.app.runs.run import Run
 from robochoc.app.sketch.sketch import Sketch, Value
 from robochoc.formats import read_team, write_team
-from robochoc.model.problem import AddAgent, Change, Domain, ScenarioEvent, Team
+from robochoc.model.problem import Change, Domain, ScenarioEvent, Team
 from robochoc.modelling.model import Model
 
 
@@ -65,12 +66,6 @@ def from_files(run: Run, files: TeamFiles) -> Prepared:
     else:
         shutil.copytree(files.folder, run.team)
     return Prepared(team, partial(_label, domains_of(team)), {})
-
-
-def domains_of(team: Team) -> dict[str, Domain]:
-    """Return the domains of all variables, those of robots that join included."""
-    joining = (change.robot for event in team.scenario for change in event.changes if isinstance(change, AddAgent))
-    return {one.name: one.domain for robot in (*team.robots, *joining) for one in robot.variables}
 
 
 def _label(domains: Mapping[str, Domain], name: str, code: int) -> Value:

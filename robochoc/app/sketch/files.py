@@ -74,15 +74,17 @@ def xml_sources(sketch: Sketch) -> dict[str, str]:
     return {name: content.decode() for name, content in team_files(_checked_team(sketch)).items()}
 
 
-def sketch_in(folder: Path, xml: Mapping[str, bytes]) -> tuple[Sketch | None, bool]:
-    """Return the sketch in a folder whose XML files are `xml`, if it is still true, and whether there is one at all.
+def sketch_in(folder: Path, xml: Mapping[str, bytes]) -> Sketch | tuple[str, ...]:
+    """Return the sketch in a folder whose XML files are `xml`, if it is still true.
+
+    If not, return which of the files do not say what the sketch says; none where there is no sketch at all.
 
     Raises:
         InvalidInputError: if there is a file of that name, and it is none of ours, or what it holds has errors.
     """
     path = folder / SKETCH_FILE
     if not path.exists():
-        return None, False
+        return ()
     if not path.is_file() or path.stat().st_size > MAX_SKETCH:
         raise _damaged(path, "it is no file, or too large")
     try:
@@ -93,13 +95,24 @@ def sketch_in(folder: Path, xml: Mapping[str, bytes]) -> tuple[Sketch | None, bo
     except (msgspec.DecodeError, RecursionError, UnicodeError) as damaged:
         raise _damaged(path, str(damaged)) from None
     if found.digest != _digest({**xml, SKETCH_FILE: bytes(found.sketch)}):
-        return None, True
+        return _differing(sketch, xml) or (SKETCH_FILE,)
     if not is_sound(sketch):
         raise _damaged(path, say("edit.unsound"))
     errors = [trouble for trouble in troubles(sketch) if trouble.is_error]
     if errors:
         raise _damaged(path, errors[0].text)
-    return sketch, True
+    return sketch
+
+
+def _differing(sketch: Sketch, xml: Mapping[str, bytes]) -> tuple[str, ...]:
+    """Return which files are others than those that would be written of a sketch; none if it is no sound one."""
+    if not is_sound(sketch):
+        return ()
+    try:
+        written = team_files(_checked_team(sketch))
+    except InvalidInputError:
+        return ()
+    return tuple(sorted(name for name in {*written, *xml} if written.get(name) != xml.get(name)))
 
 
 def _digest(files: Mapping[str, bytes]) -> str:

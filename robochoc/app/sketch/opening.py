@@ -38,13 +38,13 @@ class ForeignTeam:
     Attributes:
         path: What was opened.
         team: The team.
-        changed: It was drawn here, and its files were changed by hand since.
+        changed: Files that were changed by hand since it was drawn here; none: it never was.
         notes: What has been changed when it was imported, in sentences.
     """
 
     path: Path
     team: Team
-    changed: bool = False
+    changed: tuple[str, ...] = ()
     notes: tuple[str, ...] = ()
 
     @property
@@ -102,8 +102,8 @@ def opened(path: Path, *more: Path) -> Sketch | ForeignTeam:
 
 def _folder(folder: Path) -> Sketch | ForeignTeam:
     xml = _xml_in(folder)
-    sketch, was_drawn = sketch_in(folder, xml)
-    return sketch or ForeignTeam(folder, read_team(folder), changed=was_drawn)
+    found = sketch_in(folder, xml)
+    return found if isinstance(found, Sketch) else ForeignTeam(folder, read_team(folder), changed=found)
 
 
 def _xml_in(folder: Path) -> dict[str, bytes]:

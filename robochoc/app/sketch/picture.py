@@ -5,7 +5,7 @@ It takes the colours of the page that it stands in (`--paper` and the like), and
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from html import escape
 
 from robochoc.app.sketch.fits import Facts
@@ -21,20 +21,27 @@ MAX_LINES = 150
 """Links that are drawn. With more, nobody sees them apart."""
 MAX_DRAWN = 400
 """Robots that are drawn; of larger teams, the first ones."""
+_NAMED_ELSEWHERE = "trouble.team-name"
+"""Files of others have names that no sketch can be given: they are only told."""
 _MARGIN = 14
 _FEW = 8
 """Up to so many robots have their names beside them."""
 _INK, _ACCENT, _PAPER = "var(--ink, #17202b)", "var(--accent, #1f5fbf)", "var(--paper, #ffffff)"
 
 
-def picture(sketch: Sketch) -> str:
-    """Return the picture. All that users have named is escaped in it."""
-    if next(of_bounds(sketch), None):
+def picture(sketch: Sketch, links: Iterable[tuple[str, str]] = ()) -> str:
+    """Return the picture. All that users have named is escaped in it.
+
+    Args:
+        sketch: The sketch.
+        links: Pairs of robots that are linked by more than its rules.
+    """
+    if any(one.key != _NAMED_ELSEWHERE for one in of_bounds(sketch)):
         sketch = Sketch()  # the picture of nothing
     scale = min((WIDTH - 2 * _MARGIN) / sketch.area.columns, (HEIGHT - 2 * _MARGIN) / sketch.area.rows)
     drawn = _Drawn(sketch, scale)
     label = say("picture.label", name=sketch.name, robots=listed([robot.name for robot in sketch.robots]))
-    parts = [*drawn.cells(), *drawn.links(), *drawn.robots()]
+    parts = [*drawn.cells(), *drawn.links(links), *drawn.robots()]
     return (
         f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {WIDTH} {HEIGHT}" role="img" '
         f'aria-label="{escape(_printable(label))}">{"".join(parts)}</svg>'
@@ -76,10 +83,11 @@ class _Drawn:
         if blocked:
             yield f'<path d="{blocked}" fill="{_INK}" fill-opacity="0.3"/>'
 
-    def links(self) -> Iterator[str]:
-        """Yield the lines between robots that rules link, each pair once."""
+    def links(self, more: Iterable[tuple[str, str]]) -> Iterator[str]:
+        """Yield the lines between robots that rules link, or that are linked besides, each pair once."""
         standing = {robot.name: robot.at for robot in self._sketch.robots if self._sketch.area.has(robot.at)}
         pairs: dict[tuple[str, str], None] = {}
+        pairs |= dict.fromkeys(pair for pair in more if standing.keys() >= {*pair})
         for rule in Facts(self._sketch).sound:
             entry = PALETTE[rule.kind]
             if entry.links in {Links.EACH, Links.GROUP}:

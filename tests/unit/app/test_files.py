@@ -112,7 +112,7 @@ def test_files_that_were_changed_by_hand_are_opened_as_what_they_are(folder: Pat
     file.write_text(file.read_text().replace("<presentation", '<presentation weight="9"', 1))
     found = opened(folder)
     assert isinstance(found, ForeignTeam)
-    assert (found.changed, found.name, found.robots) == (True, "kept", ("Ann", "Bob", "Cid"))
+    assert (found.changed, found.name, found.robots) == (("Ann.xml",), "kept", ("Ann", "Bob", "Cid"))
     assert found.team["Ann"].weight == 9
 
 
@@ -127,7 +127,7 @@ def test_a_team_of_others_is_opened_as_what_it_is(tmp_path: Path, name: str) -> 
     path = ROOT / "docs/examples" / name
     found = opened(path)
     assert isinstance(found, ForeignTeam)
-    assert (found.changed, found.path, found.team) == (False, path, read_team(path))
+    assert (found.changed, found.path, found.team) == ((), path, read_team(path))
     assert found.variables >= len(found.robots) > 0 < found.constraints
     found.save(tmp_path / name)
     assert read_team(tmp_path / name) == found.team

@@ -1,0 +1,198 @@
+"""What pages tell of a team that was not drawn here. It is found once, when the team is opened, and kept."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from itertools import islice
+
+import msgspec
+
+from robochoc.app.texts import say
+from robochoc.flight.crafts import row_and_column
+from robochoc.model.orders import constraint_graph
+from robochoc.model.problem import (
+    AddAgent,
+    AddConstraint,
+    AddValue,
+    Change,
+    ConstraintModel,
+    Domain,
+    ProblemKind,
+    RemoveAgent,
+    RemoveConstraint,
+    RemoveValue,
+    Robot,
+    ScenarioEvent,
+    Team,
+)
+
+MOST_VARIABLES = 20_000
+"""Decisions that are known by their robots. What others decide is told without."""
+MOST_LINKS = 400
+MOST_EVENTS = 100
+MOST_CHANGES = 12
+"""Changes of an event that are told one by one."""
+_MOST_RANGES = 8
+_LONGEST_VALUES = 160
+_LONGEST_NOTE = 400
+_MOST_NOTES = 100
+
+
+class Decides(msgspec.Struct, frozen=True):
+    """A decision: the variable's name, how many values it has, and which, in words."""
+
+    variable: str
+    size: int
+    values: str
+
+
+class RobotFacts(msgspec.Struct, frozen=True):
+    """A robot.
+
+    Attributes:
+        name: Its name.
+        decides: What it decides.
+        weight: How much its stepping aside counts.
+        joins: It is not there from the beginning.
+    """
+
+    name: str
+    decides: tuple[Decides, ...]
+    weight: int = 1
+    joins: bool = False
+
+
+class Facts(msgspec.Struct, frozen=True):
+    """What is known of a team.
+
+    Attributes:
+        robots: Its robots in their order, then those that join.
+        variables: How many decisions there are.
+        constraints: How many constraints there are, at the beginning.
+        private: How many of them are about one robot alone.
+        partial: How many of them are parts of partially known ones.
+        links: Pairs of robots that share a constraint; of many, the first ones.
+        linked: How many such pairs there are.
+        costs: Whether there are costs.
+        maximised: Whether their sum is to be as large as can be.
+        events: What happens to it, event by event, in words.
+        flies: Whether its files say where robots are to be.
+        files: Files that were changed by hand since it was drawn here; none: it never was.
+        notes: What was changed when it was imported.
+        origin: The name of the file that was opened.
+    """
+
+    robots: tuple[RobotFacts, ...]
+    variables: int
+    constraints: int
+    private: int = 0
+    partial: int = 0
+    links: tuple[tuple[str, str], ...] = ()
+    linked: int = 0
+    costs: bool = False
+    maximised: bool = False
+    events: tuple[str, ...] = ()
+    flies: bool = False
+    files: tuple[str, ...] = ()
+    notes: tuple[str, ...] = ()
+    origin: str = ""
+
+    @property
+    def there(self) -> tuple[RobotFacts, ...]:
+        """The robots that are there from the beginning."""
+        return tuple(robot for robot in self.robots if not robot.joins)
+
+    @property
+    def names(self) -> frozenset[str]:
+        """The names of all robots."""
+        return frozenset(robot.name for robot in self.robots)
+
+
+def facts_of(team: Team, *, files: Sequence[str] = (), notes: Sequence[str] = (), origin: str = "") -> Facts:
+    """Return what is known of a team. See `Facts` for the other arguments."""
+    constraints = [*team.constraints()]
+    graph = constraint_graph(team)
+    links = [(one, other) for one in team.order for other in graph[one] if one < other]
+    return Facts(
+        robots=tuple(_robots(team)),
+        variables=len(team.variables),
+        constraints=len(constraints),
+        private=sum(len(robot.private) for robot in team.robots),
+        partial=sum(one.model is ConstraintModel.PKC for one in constraints),
+        links=tuple(links[:MOST_LINKS]),
+        linked=len(links),
+        costs=team.kind is ProblemKind.DISWCSP,
+        maximised=bool(team.robots) and team.robots[0].costs.maximize,
+        events=tuple(_events(team.scenario, domains_of(team) if team.scenario else {})),
+        flies=bool(team.robots) and all(map(_has_place, team.robots)),
+        files=tuple(files),
+        notes=tuple(note[:_LONGEST_NOTE] for note in notes[:_MOST_NOTES]),
+        origin=origin,
+    )
+
+
+def all_robots(team: Team) -> list[Robot]:
+    """Return a team's robots in their order, then those that join, each once."""
+    joining = (change.robot for event in team.scenario for change in event.changes if isinstance(change, AddAgent))
+    found = {robot.name: robot for robot in team.robots}
+    for robot in joining:
+        found.setdefault(robot.name, robot)
+    return [*found.values()]
+
+
+def domains_of(team: Team) -> dict[str, Domain]:
+    """Return the domains of all variables, those of robots that join included."""
+    return {one.name: one.domain for robot in all_robots(team) for one in robot.variables}
+
+
+def _robots(team: Team) -> Iterator[RobotFacts]:
+    left = MOST_VARIABLES
+    for robot in all_robots(team):
+        own = robot.variables[:left]
+        left -= len(own)
+        decides = tuple(Decides(one.name, len(one.domain), _values(one.domain)) for one in own)
+        yield RobotFacts(robot.name, decides, robot.weight, joins=robot.name not in team)
+
+
+def _values(domain: Domain) -> str:
+    """Return the values of a decision, in short: `1..4, 7`."""
+    if domain.symbols:
+        said = ", ".join(str(domain.label(value)) for value in islice(domain, _LONGEST_VALUES))
+    else:
+        parts = domain.ranges[:_MOST_RANGES]
+        said = ", ".join(f"{part[0]}..{part[-1]}" if len(part) > 1 else str(part[0]) for part in parts)
+        said += ", …" if len(domain.ranges) > _MOST_RANGES else ""
+    return said if len(said) <= _LONGEST_VALUES else f"{said[: _LONGEST_VALUES - 1]}…"
+
+
+def _has_place(robot: Robot) -> bool:
+    """Return whether files say where a robot is to be: by a topic, or by its name, such as `Robot3.1`."""
+    said = any(coordinate is not None for topic in robot.topics for coordinate in (topic.x, topic.y, topic.z))
+    return said or row_and_column(robot.name) is not None
+
+
+def _events(scenario: Sequence[ScenarioEvent], domains: Mapping[str, Domain]) -> Iterator[str]:
+    for event in scenario[:MOST_EVENTS]:
+        when = (
+            say("foreign.when-decided") if event.after is None else say("foreign.when-sent", count=f"{event.after:,}")
+        )
+        told = [_said(change, domains) for change in event.changes[:MOST_CHANGES]]
+        if (more := len(event.changes) - len(told)) > 0:
+            told.append(say("foreign.more-changes", count=f"{more:,}"))
+        yield f"{when} {'; '.join(told)}."
+
+
+def _said(change: Change, domains: Mapping[str, Domain]) -> str:
+    match change:
+        case RemoveAgent(name):
+            return say("foreign.leaves", robot=name)
+        case AddAgent(robot):
+            return say("foreign.comes", robot=robot.name)
+        case RemoveValue(variable, value):
+            return say("foreign.loses", variable=variable, value=domains[variable].label(value))
+        case AddValue(variable, value):
+            return say("foreign.gains", variable=variable, value=domains[variable].label(value))
+        case AddConstraint(agent, parent, constraint):
+            return say("foreign.binds", one=parent, other=agent, name=constraint.name)
+        case RemoveConstraint(agent, parent, name):
+            return say("foreign.frees", one=parent, other=agent, name=name)

@@ -1,0 +1,203 @@
+"""The page "Model" of a team that was not drawn here: what its files say, to be read."""
+
+from __future__ import annotations
+
+import shlex
+from functools import cache
+from importlib.resources import files
+from pathlib import Path
+
+from nicegui import run, ui
+
+from robochoc.app.flights.names import file_name
+from robochoc.app.flights.state import files_archive
+from robochoc.app.foreign.facts import Facts, RobotFacts
+from robochoc.app.foreign.reading import Read, read
+from robochoc.app.projects import Project
+from robochoc.app.sketch.picture import MAX_LINES, picture
+from robochoc.app.sketch.words import listed
+from robochoc.app.texts import say
+from robochoc.formats import InvalidInputError
+
+_MOST_NAMED = 8
+_MOST_DECISIONS = 40
+_PYTHON = """import robochoc
+
+model = robochoc.Model.load({folder!r})
+solution = model.solve()
+print(solution)"""
+
+
+def build_foreign_model(project: Project) -> None:
+    """Fill the current container with the page."""
+    folder = project.foreign
+    assert folder is not None, "the team has files"  # noqa: S101
+    ui.add_css(style())
+    facts = project.facts
+    with ui.element("h1"):
+        ui.label(project.sketch.name)
+    with ui.element("div").classes("foreign"):
+        with ui.element("div").classes("foreign-part"):
+            _why(project, facts, folder)
+            if facts.events:
+                _events(facts)
+            with ui.element("section").classes("panel foreign-part"):
+                _elsewhere(folder)
+        with ui.element("section").classes("panel foreign-part"):
+            _heading("foreign.team")
+            ui.label(counts(facts))
+            links = facts.links if facts.linked <= MAX_LINES else ()  # of many, nobody could follow one
+            ui.html(picture(project.sketch, links), sanitize=False).classes("foreign-picture")
+        with ui.element("section").classes("panel foreign-part"):
+            _Robots(project, facts, folder)
+
+
+def counts(facts: Facts) -> str:
+    """Return how large a team is, and what it asks for, in a few sentences."""
+    told = [
+        say(
+            "foreign.counts",
+            robots=f"{len(facts.there):,}",
+            variables=f"{facts.variables:,}",
+            constraints=f"{facts.constraints:,}",
+            links=f"{facts.linked:,}",
+        )
+    ]
+    if facts.costs:
+        told.append(say("foreign.sum-most" if facts.maximised else "foreign.sum-least"))
+    else:
+        told.append(say("foreign.all-hold"))
+    if facts.private:
+        told.append(say("foreign.alone", count=f"{facts.private:,}"))
+    if facts.partial:
+        told.append(say("foreign.partial", count=f"{facts.partial:,}"))
+    return " ".join(told)
+
+
+def _why(project: Project, facts: Facts, folder: Path) -> None:
+    with ui.element("section").classes("panel foreign-part"):
+        _heading("foreign.why")
+        if facts.files:
+            ui.label(say("foreign.changed", files=listed(facts.files, _MOST_NAMED)))
+        else:
+            ui.label(say("foreign.from", origin=facts.origin) if facts.origin else say("foreign.from-files"))
+        if facts.notes:
+            ui.label(say("foreign.notes"))
+            with ui.element("ul").classes("foreign-notes"):
+                for note in facts.notes:
+                    with ui.element("li"):
+                        ui.label(note)
+        ui.label(say("foreign.can")).classes("soft")
+        with ui.element("div").classes("foreign-row"):
+            ui.link(say("foreign.to-decide"), f"/team/{project.id}/decide").classes("foreign-go")
+            name = file_name(project.sketch.name, ".zip")
+
+            async def hand_on() -> None:
+                content = await run.io_bound(files_archive, folder, project.sketch.name)
+                if content is not None:
+                    ui.download.content(content, name, "application/zip")
+
+            ui.button(say("foreign.save"), icon="download", on_click=hand_on).props("flat dense no-caps")
+
+
+def _events(facts: Facts) -> None:
+    with ui.element("section").classes("panel foreign-part"):
+        _heading("foreign.events")
+        ui.label(say("foreign.events-hint")).classes("soft")
+        with ui.element("ol").classes("foreign-notes"):
+            for event in facts.events:
+                with ui.element("li"):
+                    ui.label(event)
+
+
+class _Robots:
+    """The robots, one at a time: what it decides, its constraints in words, its file."""
+
+    def __init__(self, project: Project, facts: Facts, folder: Path) -> None:
+        self._project, self._folder = project, folder
+        self._robots = {robot.name: robot for robot in facts.robots}
+        self._chosen = ""
+        _heading("foreign.robot")
+        if not self._robots:
+            return
+        select = ui.select([*self._robots], with_input=True, label=say("foreign.choose"))
+        select.props("dense outlined").classes("foreign-choice")
+        select.on_value_change(lambda event: self._choose(event.value))
+        self._box = ui.element("div").classes("foreign-part").props("aria-live=polite")
+        ui.timer(0, lambda: select.set_value(next(iter(self._robots))), once=True)
+
+    async def _choose(self, name: object) -> None:
+        robot = self._robots.get(name) if isinstance(name, str) else None
+        if robot is None:
+            return
+        self._chosen = robot.name
+        found: Read | str | None
+        try:
+            found = await run.io_bound(read, self._folder, robot.name)
+        except (InvalidInputError, OSError) as damaged:
+            found = str(damaged)
+        if found is None or self._chosen != robot.name or self._box.is_deleted:  # the server ends; another one is asked
+            return
+        self._box.clear()
+        with self._box:
+            self._show(robot, found)
+
+    def _show(self, robot: RobotFacts, found: Read | str) -> None:
+        if robot.joins:
+            ui.label(say("foreign.joins", robot=robot.name)).classes("soft")
+        with ui.element("h3"):
+            ui.label(say("foreign.decides"))
+        with ui.element("ul").classes("foreign-notes"):
+            for one in robot.decides[:_MOST_DECISIONS]:
+                with ui.element("li"):
+                    ui.label(say("foreign.one-of", variable=one.variable, size=f"{one.size:,}", values=one.values))
+            if (more := len(robot.decides) - _MOST_DECISIONS) > 0:
+                with ui.element("li"):
+                    ui.label(say("foreign.more", count=f"{more:,}"))
+        if isinstance(found, str):
+            ui.label(found).classes("error")
+            return
+        self._constraints(found)
+        with ui.element("h3"):
+            ui.label(found.name)
+        if found.is_cut:
+            ui.label(say("foreign.cut", most=f"{len(found.text):,}")).classes("soft")
+        with ui.element("pre").classes("foreign-file").props(f'tabindex=0 role=region aria-label="{found.name}"'):
+            ui.label(found.text)
+
+    def _constraints(self, found: Read) -> None:
+        with ui.element("h3"):
+            ui.label(say("foreign.keeps"))
+        if found.neighbours:
+            ui.label(say("foreign.neighbours", names=listed(found.neighbours, _MOST_NAMED))).classes("soft")
+        if not found.count:
+            ui.label(say("foreign.keeps-none")).classes("soft")
+        with ui.element("ul").classes("foreign-notes"):
+            for text in found.sentences:
+                with ui.element("li"):
+                    ui.label(text)
+            if (more := found.count - len(found.sentences)) > 0:
+                with ui.element("li"):
+                    ui.label(say("foreign.more", count=f"{more:,}"))
+
+
+def _elsewhere(folder: Path) -> None:
+    """Show what else can be done with the files: the command, and Python."""
+    _heading("foreign.elsewhere")
+    ui.label(say("foreign.command")).classes("soft")
+    with ui.element("pre").classes("foreign-file command-text").props("tabindex=0"):
+        ui.label(shlex.join(["robochoc", "solve", str(folder)]))
+    ui.label(say("foreign.python")).classes("soft")
+    with ui.element("pre").classes("foreign-file").props("tabindex=0"):
+        ui.label(_PYTHON.format(folder=str(folder)))
+
+
+def _heading(key: str) -> None:
+    with ui.element("h2"):
+        ui.label(say(key))
+
+
+@cache
+def style() -> str:
+    """Return the style of the pages of teams that were not drawn here."""
+    return (files(__package__) / "foreign.css").read_text(encoding="utf-8")
