@@ -14,6 +14,7 @@ from robochoc.app.jobs.job import Job, end_jobs_in
 from robochoc.app.listeners import Listeners
 from robochoc.app.log import TOLD
 from robochoc.app.parts import HasParts
+from robochoc.app.runs.prepared import TeamFiles
 from robochoc.app.sketch.edits import EditError
 from robochoc.app.sketch.history import History
 from robochoc.app.sketch.shape import is_sound
@@ -58,6 +59,12 @@ class Project(HasParts):
     def foreign(self) -> Path | None:
         """The files of a team that was not drawn here, and cannot be edited by hand. None: it was."""
         return self._store.foreign(self.id)
+
+    @property
+    def files(self) -> TeamFiles | None:
+        """What decides, of a team that was not drawn here. None: its sketch does."""
+        folder = self.foreign
+        return None if folder is None else TeamFiles(folder, flies=self.facts.flies)
 
     @cached_property
     def facts(self) -> Facts:

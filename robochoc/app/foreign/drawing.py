@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from math import ceil, sqrt
 
+from robochoc.app.foreign.facts import has_place
 from robochoc.app.sketch.opening import ForeignTeam
 from robochoc.app.sketch.sketch import MAX_ROBOTS, MAX_SIDE, Area, Cell, Sketch, SketchRobot
 from robochoc.flight.crafts import crafts_of
@@ -25,6 +26,8 @@ def drawn(team: ForeignTeam) -> Sketch:
 
 def _said_cells(robots: Sequence[Robot]) -> list[Cell] | None:
     """Return where files say that robots are, whatever they decide; None: they do not, or a map is too small for it."""
+    if not all(map(has_place, robots)):
+        return None
     found = [craft.cell for robot in robots for craft in crafts_of(robot, {})[:1]]
     said = [cell for cell in found if cell is not None]
     if len(set(said)) < len(robots):

@@ -124,7 +124,7 @@ def facts_of(team: Team, *, files: Sequence[str] = (), notes: Sequence[str] = ()
         costs=team.kind is ProblemKind.DISWCSP,
         maximised=bool(team.robots) and team.robots[0].costs.maximize,
         events=tuple(_events(team.scenario, domains_of(team) if team.scenario else {})),
-        flies=bool(team.robots) and all(map(_has_place, team.robots)),
+        flies=bool(team.robots) and all(map(has_place, team.robots)),
         files=tuple(files),
         notes=tuple(note[:_LONGEST_NOTE] for note in notes[:_MOST_NOTES]),
         origin=origin,
@@ -165,7 +165,7 @@ def _values(domain: Domain) -> str:
     return said if len(said) <= _LONGEST_VALUES else f"{said[: _LONGEST_VALUES - 1]}…"
 
 
-def _has_place(robot: Robot) -> bool:
+def has_place(robot: Robot) -> bool:
     """Return whether files say where a robot is to be: by a topic, or by its name, such as `Robot3.1`."""
     said = any(coordinate is not None for topic in robot.topics for coordinate in (topic.x, topic.y, topic.z))
     return said or row_and_column(robot.name) is not None

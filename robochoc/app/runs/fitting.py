@@ -4,8 +4,11 @@ from __future__ import annotations
 
 import msgspec
 
+from robochoc.app.runs.prepared import TeamFiles
 from robochoc.app.sketch.building import model_of
 from robochoc.app.sketch.sketch import Sketch
+from robochoc.formats import read_team
+from robochoc.model.problem import Team
 from robochoc.run.choice import accepts, decided
 from robochoc.run.options import Options, Runtime
 from robochoc.run.registry import installed_protocols
@@ -29,9 +32,19 @@ class Fitting(msgspec.Struct, frozen=True):
     rejected: tuple[tuple[str, str], ...]
 
 
-def fitting(sketch: Sketch, runtime: str = Runtime.SIMULATOR) -> Fitting:
-    """Return what fits a team. Raises `ModelError`, or `UnsupportedError`, for a team that nothing can decide."""
-    team = model_of(sketch).team
+def team_of(sketch: Sketch, files: TeamFiles | None = None) -> Team:
+    """Return the team of a sketch, or that of files where there are some. Raises `ModelError`, `InvalidInputError`."""
+    return read_team(files.folder) if files else model_of(sketch).team
+
+
+def fitting(sketch: Sketch, files: TeamFiles | None = None, runtime: str = Runtime.SIMULATOR) -> Fitting:
+    """Return what fits the team of a sketch, or of files.
+
+    Raises:
+        ModelError, UnsupportedError: for a team that nothing can decide.
+        InvalidInputError: if the files are damaged.
+    """
+    team = team_of(sketch, files)
     options = Options(runtime=Runtime(runtime))
     known = [(one.name, one.protocol.traits.complete) for one in installed_protocols() if one.protocol]
     fit = [(name, complete) for name, complete in known if accepts(name, team, options)]

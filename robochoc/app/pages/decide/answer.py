@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from html import escape
 
+from robochoc.app.foreign.facts import Facts
+from robochoc.app.pages.foreign.answer import robots_of
 from robochoc.app.runs.paid import costly
 from robochoc.app.runs.result import RunResult
 from robochoc.app.runs.run import Run, State
@@ -12,8 +14,8 @@ from robochoc.app.sketch.words import listed, value_words
 from robochoc.app.texts import say
 
 
-def headline(run: Run) -> str:
-    """Return what came of a run, in a sentence or two."""
+def headline(run: Run, foreign: Facts | None = None) -> str:
+    """Return what came of a run, in a sentence or two. `foreign`: what is known of a team that was not drawn here."""
     result, sketch = run.result, run.sketch
     if run.state is State.FAILED:
         known = {"lost": "decide.lost", "broken": "decide.broken"}
@@ -24,11 +26,13 @@ def headline(run: Run) -> str:
         return say("decide.no-solution")
     if not result.assignment:
         return say("decide.nothing-yet")
-    return " ".join(filter(None, [_who(sketch, result), _cost(sketch, result, run.state)]))
+    count = robots_of(foreign, result) if foreign else len(sketch.robots)
+    costs = foreign.costs if foreign else bool(costly(sketch))
+    worth = foreign is not None and foreign.maximised
+    return " ".join(filter(None, [_who(count, result), _cost(result, run.state, costs=costs, worth=worth)]))
 
 
-def _who(sketch: Sketch, result: RunResult) -> str:
-    count = len(sketch.robots)
+def _who(count: int, result: RunResult) -> str:
     if result.withdrawn:
         aside = listed(result.withdrawn)
         fewest = "decide.aside-fewest" if result.verdict == "optimal" else "decide.aside"
@@ -36,15 +40,21 @@ def _who(sketch: Sketch, result: RunResult) -> str:
     return say("decide.one") if count == 1 else say("decide.all", count=count)
 
 
-def _cost(sketch: Sketch, result: RunResult, state: State) -> str:
-    best = say("decide.best", cost=result.cost) if result.cost is not None and costly(sketch) else ""
+def _cost(result: RunResult, state: State, *, costs: bool, worth: bool) -> str:
+    """Return what an answer costs, or is `worth`, and how good that is."""
+    best = (
+        say("foreign.worth" if worth else "decide.best", cost=result.cost) if result.cost is not None and costs else ""
+    )
     if result.verdict == "optimal":
         if result.withdrawn:
             return best
-        return "" if result.cost is None else say("decide.proven", cost=result.cost)
+        return (
+            "" if result.cost is None else say("foreign.worth-proven" if worth else "decide.proven", cost=result.cost)
+        )
     if result.verdict == "solution":
         return best
-    bound = "" if result.bound is None else say("decide.bound", bound=result.bound)
+    above = "foreign.worth-bound" if worth else "decide.bound"
+    bound = "" if result.bound is None else say(above, bound=result.bound)
     stopped = say("decide.stopped") if state is State.STOPPED else say("decide.limit")
     return " ".join(filter(None, [stopped, best, bound]))
 

@@ -12,6 +12,7 @@ from robochoc.app.runs.fitting import Fitting, fitting
 from robochoc.app.runs.options import MAX_SEED, RunOptions
 from robochoc.app.sketch.sketch import MAX_LABEL
 from robochoc.app.texts import say
+from robochoc.formats import InvalidInputError
 from robochoc.run.defaults import AUTO
 from robochoc.run.options import Runtime
 from robochoc.solver.encoding import UnsupportedError
@@ -55,8 +56,8 @@ class How:
         self._looked_at = sketch
         self._tell(say("decide.looking"))
         try:
-            found = await run.io_bound(fitting, sketch)
-        except (ValueError, UnsupportedError) as misfit:
+            found = await run.io_bound(fitting, sketch, self._project.files)
+        except (ValueError, UnsupportedError, InvalidInputError) as misfit:
             self._tell(say("decide.fits-none", why=str(misfit)))
             return
         if found is not None:  # the server is about to end

@@ -14,6 +14,9 @@ from robochoc.app.pages.decide.costs import show_costs
 from robochoc.app.pages.decide.ground import decides_places, targets_of
 from robochoc.app.pages.decide.how import How
 from robochoc.app.pages.decide.picture import falling_svg, team_svg, values_of
+from robochoc.app.pages.foreign.answer import says_of
+from robochoc.app.pages.foreign.answer import table_html as answers_html
+from robochoc.app.pages.foreign.below import show_foreign_below
 from robochoc.app.pages.shell import while_shown
 from robochoc.app.projects import Project
 from robochoc.app.runs.result import RunResult
@@ -24,6 +27,8 @@ from robochoc.app.sketch.sketch import Sketch, Value
 from robochoc.app.texts import say
 
 PURPOSE = "decide"
+MOST_LIVE = 300
+"""Of more robots, the picture is drawn when they have decided."""
 
 
 def build_decide(project: Project) -> None:
@@ -37,6 +42,8 @@ class _Page:
 
     def __init__(self, project: Project) -> None:
         self._project, self._runs = project, runs_of(project)
+        self._foreign = project.facts if project.foreign else None
+        """What is known of a team that was not drawn here."""
         self._run: Run | None = None
         self._end_following: Callable[[], None] | None = None
         self._answered: tuple[object, ...] = ()
@@ -77,7 +84,8 @@ class _Page:
 
     def _decide(self, *, withdraw: bool = False) -> None:
         sketch = self._project.sketch
-        self._runs.start(self._how.options(withdraw=withdraw, scene=sketch.flies), purpose=PURPOSE)
+        options = self._how.options(withdraw=withdraw, scene=sketch.flies)
+        self._runs.start(options, files=self._project.files, purpose=PURPOSE)
 
     def _follow_latest(self) -> None:
         """Show the run that was started last, perhaps in another tab."""
@@ -92,7 +100,8 @@ class _Page:
 
     def _follow_team(self) -> None:
         """Say what keeps the team from deciding, or that it is another than the one that has decided."""
-        errors = [trouble for trouble in troubles(self._project.sketch) if trouble.is_error]
+        looked_at = [] if self._foreign else troubles(self._project.sketch)  # files were checked when they were opened
+        errors = [trouble for trouble in looked_at if trouble.is_error]
         self._not_ready.clear()
         if errors:
             with self._not_ready:
@@ -148,6 +157,9 @@ class _Page:
             return
         live, result = shown.live, shown.result
         running = shown.state is State.RUNNING
+        if running and len(sketch.robots) > MOST_LIVE and self._picture.content:
+            self._tell_facts(shown)
+            return
         values: dict[str, Value] = {}
         for some in [*live.values.values()]:
             values |= some
@@ -156,10 +168,16 @@ class _Page:
         unsettled = frozenset(robot.name for robot in sketch.robots if result is None and not live.settled(robot.name))
         aside = frozenset(result.withdrawn if result else ())
         spoken = dict(live.recent) if running else {}
-        says, targets = values_of(sketch, values), targets_of(sketch, values)
+        says = says_of(self._foreign, values) if self._foreign else values_of(sketch, values)
+        targets = targets_of(sketch, values)
         picture = team_svg(sketch, says, unsettled=unsettled, aside=aside, spoken=spoken, targets=targets)
         self._picture.set_content(picture)
-        self._falling.set_content(falling_svg([*live.costs]))
+        falls = not (self._foreign and self._foreign.maximised)
+        self._falling.set_content(falling_svg([*live.costs]) if falls else "")
+        self._tell_facts(shown)
+
+    def _tell_facts(self, shown: Run) -> None:
+        live, running = shown.live, shown.state is State.RUNNING
         facts = [say("decide.live", messages=f"{live.messages:,}", seconds=f"{shown.seconds:.0f}")] if running else []
         if running and live.costs:
             facts.append(say("decide.best-now", cost=f"{live.costs[-1][1]:g}"))
@@ -175,7 +193,7 @@ class _Page:
                 ui.label(say("decide.running")).classes("soft")
                 return
             with ui.element("h2").classes("headline").props("aria-live=polite"):
-                ui.label(headline(shown))
+                ui.label(headline(shown, self._foreign))
             if shown.result is None:
                 return
             ui.label(took(shown)).classes("soft")
@@ -186,12 +204,15 @@ class _Page:
             if changed:
                 ui.label(say("decide.changed")).classes("changed")
             if shown.result.assignment:
-                ui.html(table_html(sketch, shown.result), sanitize=False).classes("values")
+                table = answers_html(self._foreign, shown.result) if self._foreign else table_html(sketch, shown.result)
+                ui.html(table, sanitize=False).classes("values")
 
     def _show_below(self, shown: Run, result: RunResult, sketch: Sketch) -> None:
-        if result.verdict == "no-solution":
+        if self._foreign:
+            show_foreign_below(self._project, self._foreign, result, self._decide)
+        elif result.verdict == "no-solution":
             self._doors = Doors(self._project, sketch, self._decide)
-        if result.assignment:
+        if result.assignment and not self._foreign:
             costs = ui.element("div")
             ui.timer(0, partial(show_costs, costs, sketch, result), once=True)
         _command(shown)

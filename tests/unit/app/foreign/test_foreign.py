@@ -1,0 +1,140 @@
+"""Teams that were not drawn in the application: what is told of their files, and that names in them are only text."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import msgspec
+import pytest
+
+from robochoc.app.foreign import facts
+from robochoc.app.foreign.drawing import drawn
+from robochoc.app.foreign.facts import facts_of
+from robochoc.app.foreign.reading import read
+from robochoc.app.foreign.sentences import sentence
+from robochoc.app.pages.decide.answer import headline
+from robochoc.app.pages.foreign.answer import epochs_html, says_of, table_html
+from robochoc.app.runs.options import RunOptions
+from robochoc.app.runs.result import RunResult
+from robochoc.app.runs.run import Record, Run, State
+from robochoc.app.sketch.opening import ForeignTeam, opened
+from robochoc.app.sketch.picture import picture
+from robochoc.app.sketch.sketch import Cell
+from robochoc.app.store import Store
+from robochoc.formats import read_team
+from robochoc.model.constraint import Constraint, Predicate, Relation, Semantics
+from robochoc.model.expression import Type, parse
+from tests.support.program import ROOT
+from tests.support.small_teams import pair, pkc_team, triangle
+
+RESCUE = ROOT / "docs/examples/rescue"
+QUEENS = ROOT / "instances/queens3d-4"
+
+
+def kept(path: Path, folder: Path) -> tuple[Store, str]:
+    """A store with a team that was not drawn there, and its id."""
+    store, found = Store(folder), opened(path)
+    assert isinstance(found, ForeignTeam)
+    return store, store.add_foreign(found)
+
+
+def test_what_happens_to_a_team_is_told_and_who_joins_is_known() -> None:
+    found = facts_of(read_team(RESCUE), origin="rescue")
+    assert found.events[:2] == ("When it has decided: East leaves.", "When it has decided: Spare comes.")
+    assert [robot.name for robot in found.robots if robot.joins] == ["Spare"]
+    assert len(found.there) == 7
+    assert found.flies
+
+
+def test_a_team_without_places_does_not_fly_and_parts_are_counted() -> None:
+    found = facts_of(pkc_team())
+    assert not found.flies
+    assert (found.constraints, found.partial, found.linked) == (3, 2, 2)
+
+
+def test_facts_are_kept_and_found_anew_where_they_are_damaged(tmp_path: Path) -> None:
+    store, name = kept(QUEENS, tmp_path)
+    first = store.facts(name)
+    assert first.origin == "queens3d-4"
+    (store.path(name) / "foreign.json").write_bytes(b"{")
+    assert store.facts(name) == msgspec.structs.replace(first, origin="")
+    for file in (store.path(name) / "team").iterdir():
+        file.write_text("<instance/>")
+    (store.path(name) / "foreign.json").unlink()
+    with pytest.raises(ValueError, match="Robot1"):
+        store.facts(name)
+
+
+def test_robots_are_drawn_where_their_files_say_or_else_side_by_side() -> None:
+    there = drawn(ForeignTeam(QUEENS, read_team(QUEENS)))
+    assert {robot.name: robot.at for robot in there.robots}["Robot3.2"] == Cell(2, 1)
+    assert picture(there).count("<circle") == 16
+    beside = drawn(ForeignTeam(QUEENS, triangle()))
+    assert len({robot.at for robot in beside.robots}) == 4
+
+
+def test_one_robot_is_read_with_its_file_and_its_constraints_in_words(tmp_path: Path) -> None:
+    store, name = kept(RESCUE, tmp_path)
+    folder = store.path(name) / "team"
+    spare = read(folder, "Spare")
+    assert spare.name.startswith("late")
+    assert spare.text.startswith("<?xml")
+    assert not spare.is_cut
+    assert spare.count == len(spare.sentences) > 0
+
+
+@pytest.mark.parametrize(
+    ("text", "says"),
+    [
+        ("and(ne(X,Y),ne(abs(sub(X,Y)),2))", "(a ≠ b) and (|a - b| ≠ 2)"),
+        ("le(mul(2,add(X,Y)),sqr(X))", "(2 · (a + b)) ≤ a²"),
+        ("not(in(X,set(1,2)))", "not: a is one of 1, 2"),
+        ("ge(dist(X,Y),min(X,3))", "|a - b| ≥ min(a, 3)"),
+    ],
+)
+def test_an_expression_reads_as_people_write_it(text: str, says: str) -> None:
+    says_so = Predicate("P", ("X", "Y"), parse(text, ("X", "Y"), Type.BOOLEAN))
+    constraint = Constraint("C", says_so, ("a", "b"), ("a", "b"))
+    assert sentence(constraint) == says
+
+
+def test_tables_are_told_with_their_costs_and_cut() -> None:
+    pairs = tuple((one, other) for one in (1, 2, 3) for other in (1, 2, 3))
+    soft = Relation("R", 2, Semantics.SOFT, pairs, costs=(float("inf"), *range(1, 9)), default_cost=5)
+    says = sentence(Constraint("C", soft, ("a", "b"), ("a", "b")))
+    assert says.startswith("a, b: (1, 1): forbidden; (1, 2): costs 1;")
+    assert says.endswith("3 more; all others: costs 5")
+
+
+def test_a_part_of_a_partially_known_constraint_says_so() -> None:
+    part = next(one for one in pkc_team().constraints() if one.name == "C")
+    assert "own part" in sentence(part)
+
+
+def test_the_answer_tells_every_decision_and_names_are_only_text() -> None:
+    team = pair()
+    found = facts_of(team)
+    result = RunResult("solution", assignment={"A": "<b>", "B": 2})
+    assert says_of(found, result.assignment) == {"RA": "<b>", "RB": "2"}
+    assert "<td>&lt;b&gt;</td>" in table_html(found, result)
+    epochs = ({"verdict": "<i>", "opened_by": "<script>", "robots": ["RA"], "assignment": {"A": "<u>"}}, {"robots": 3})
+    told = epochs_html(found, msgspec.structs.replace(result, epochs=epochs))
+    assert not any(tag in told for tag in ("<i>", "<script>", "<u>"))
+
+
+def test_a_table_of_very_many_decisions_is_cut(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(facts, "MOST_VARIABLES", 3)
+    found = facts_of(read_team(QUEENS))
+    assert sum(len(robot.decides) for robot in found.robots) == 3
+    assert found.variables == 16
+
+
+def test_the_headline_counts_who_is_there_at_the_end(tmp_path: Path) -> None:
+    found = facts_of(read_team(RESCUE))
+    epochs = ({"robots": ["a", "b", "c"]}, {"robots": ["a", "b"]})
+    run = Run(tmp_path, Record(RunOptions(), state=State.ENDED), drawn(ForeignTeam(RESCUE, read_team(RESCUE))))
+    run.result = RunResult("solution", assignment={"lead": 1}, cost=0, epochs=epochs)
+    assert headline(run, found) == "All 2 decide."
+    run.result = RunResult("optimal", assignment={"lead": 1}, cost=7)
+    worth = msgspec.structs.replace(found, costs=True, maximised=True)
+    assert headline(run, worth) == "All 7 decide. It is worth 7: proven the best."
