@@ -29,7 +29,8 @@ from robochoc.app.sketch.sketch import Sketch
 from robochoc.formats import InvalidInputError, read_team
 
 _HISTORY = "history.json"
-_TEAM = "team"
+FILES = "team"
+"""The folder of the files of a team that was not drawn here."""
 _FACTS = "foreign.json"
 _LOCK = ".lock"
 _REMOVED = ".removed-"
@@ -104,7 +105,7 @@ class Store:
 
     def foreign(self, name: str) -> Path | None:
         """Return the files of a team that was not drawn here; None: it was. Raises `KeyError` for what is no id."""
-        files = self.path(name) / _TEAM
+        files = self.path(name) / FILES
         return files if files.is_dir() else None
 
     def add_foreign(self, team: ForeignTeam) -> str:
@@ -112,7 +113,7 @@ class Store:
         name = self.add(drawn(team))
         facts = facts_of(team.team, files=team.changed, notes=team.notes, origin=team.path.name)
         try:
-            team.save(self.path(name) / _TEAM)
+            team.save(self.path(name) / FILES)
             (self.path(name) / _FACTS).write_bytes(msgspec.json.encode(facts))
         except BaseException:
             self.remove(name)
@@ -133,7 +134,7 @@ class Store:
         except (OSError, msgspec.DecodeError, RecursionError):  # it was kept before there were facts, say
             pass
         try:
-            facts = facts_of(read_team(self.path(name) / _TEAM))
+            facts = facts_of(read_team(self.path(name) / FILES))
         except InvalidInputError as damaged:
             raise ValueError(str(damaged)) from None
         with suppress(OSError):

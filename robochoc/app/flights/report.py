@@ -87,7 +87,11 @@ def summary(sketch: Sketch, run: Run) -> str:
     result = run.result
     if result is None:
         return say("report.no-answer")
-    robots = len((changed_to(run) or sketch).robots) - len(result.withdrawn)
+    if result.epochs and not sketch.decisions:  # of files: some come and go
+        there = len(result.epochs[-1].get("robots", ()))
+    else:
+        there = len((changed_to(run) or sketch).robots)
+    robots = there - len(result.withdrawn)
     verdict = "fewest" if result.verdict == "optimal" and result.withdrawn else result.verdict
     words = [say(f"report.verdict.{verdict}", robots=robots)] if verdict in _VERDICTS else [verdict]
     if result.withdrawn and not who_flies(run):  # which tells it, too

@@ -9,6 +9,7 @@ TEAM/run/1/...       the run: how it was started, its answer, what was said
 from __future__ import annotations
 
 import io
+import shutil
 import zipfile
 from pathlib import Path
 
@@ -21,7 +22,9 @@ from robochoc.app.sketch.archives import bounded_archive
 from robochoc.app.sketch.checks import troubles
 from robochoc.app.sketch.files import zipped
 from robochoc.app.sketch.opening import DAMAGED
+from robochoc.app.sketch.shape import is_sound
 from robochoc.app.sketch.sketch import Sketch
+from robochoc.app.store import FILES
 
 MAX_BYTES = 256 << 20
 """Bytes of a run, unpacked."""
@@ -92,6 +95,10 @@ def unpack_run(file: Path, folder: Path) -> bool:
     place.mkdir(mode=0o700, parents=True)
     for name, piece in found.items():
         (place / name).write_bytes(piece)
+    if (folder / FILES).is_dir():  # of a sketch, they are written when they are needed
+        record = msgspec.json.decode(found[RECORD], type=Record)
+        sketch = msgspec.json.decode(found[SKETCH], type=Sketch)
+        shutil.copytree(folder / FILES, Run(place, record, sketch).team)
     return True
 
 
@@ -118,4 +125,6 @@ def _is_sound(found: dict[str, bytes]) -> bool:
         sketch = msgspec.json.decode(found[SKETCH], type=Sketch)
     except (msgspec.DecodeError, RecursionError, UnicodeError):
         return False
+    if not sketch.decisions:  # the picture of a team that was not drawn here
+        return is_sound(sketch)
     return not any(trouble.is_error for trouble in troubles(sketch))

@@ -9,6 +9,7 @@ import msgspec
 
 from robochoc.app.texts import say
 from robochoc.flight.crafts import row_and_column
+from robochoc.model.change import team_after_events
 from robochoc.model.orders import constraint_graph
 from robochoc.model.problem import (
     AddAgent,
@@ -67,6 +68,7 @@ class Facts(msgspec.Struct, frozen=True):
 
     Attributes:
         robots: Its robots in their order, then those that join.
+        last: Who is there once all has happened.
         variables: How many decisions there are.
         constraints: How many constraints there are, at the beginning.
         private: How many of them are about one robot alone.
@@ -83,6 +85,7 @@ class Facts(msgspec.Struct, frozen=True):
     """
 
     robots: tuple[RobotFacts, ...]
+    last: tuple[str, ...]
     variables: int
     constraints: int
     private: int = 0
@@ -102,11 +105,6 @@ class Facts(msgspec.Struct, frozen=True):
         """The robots that are there from the beginning."""
         return tuple(robot for robot in self.robots if not robot.joins)
 
-    @property
-    def names(self) -> frozenset[str]:
-        """The names of all robots."""
-        return frozenset(robot.name for robot in self.robots)
-
 
 def facts_of(team: Team, *, files: Sequence[str] = (), notes: Sequence[str] = (), origin: str = "") -> Facts:
     """Return what is known of a team. See `Facts` for the other arguments."""
@@ -115,6 +113,7 @@ def facts_of(team: Team, *, files: Sequence[str] = (), notes: Sequence[str] = ()
     links = [(one, other) for one in team.order for other in graph[one] if one < other]
     return Facts(
         robots=tuple(_robots(team)),
+        last=team_after_events(team, len(team.scenario)).order,
         variables=len(team.variables),
         constraints=len(constraints),
         private=sum(len(robot.private) for robot in team.robots),

@@ -12,7 +12,7 @@ from nicegui.events import UploadEventArguments
 
 from robochoc.app.flights.state import unpack_run
 from robochoc.app.projects import Projects
-from robochoc.app.sketch.opening import MAX_BYTES, ForeignTeam, opened
+from robochoc.app.sketch.opening import MAX_BYTES, opened
 from robochoc.app.sketch.sketch import Sketch
 from robochoc.app.texts import say
 from robochoc.formats import InvalidInputError
@@ -49,9 +49,12 @@ def build_opening(projects: Projects, show: Callable[[str], None]) -> None:
                 with suppress(OSError):  # what a state has beside its team
                     await run.io_bound(unpack_run, file, project.folder)
                 show(project.id)
-        if isinstance(found, ForeignTeam):
-            made = await run.io_bound(projects.store.add_foreign, found)
-            if made is not None:  # the server is about to end
+            elif found is not None:  # the server is not about to end
+                made = await run.io_bound(projects.store.add_foreign, found)
+                if made is None:
+                    return
+                with suppress(OSError):
+                    await run.io_bound(unpack_run, file, projects.store.path(made))
                 show(made)
 
     with item:

@@ -15,6 +15,7 @@ from robochoc.app.pages.decide.page import build_decide
 from robochoc.app.pages.fly.kept import install_kept
 from robochoc.app.pages.fly.page import build_fly
 from robochoc.app.pages.foreign.model import build_foreign_model
+from robochoc.app.pages.foreign.whatif import build_foreign_whatif
 from robochoc.app.pages.gallery import build_gallery
 from robochoc.app.pages.lessons.lesson_page import build_lesson
 from robochoc.app.pages.lessons.list_page import build_lessons
@@ -31,7 +32,7 @@ _BUILD: dict[str, Callable[[Project], None]] = {
     "fly": build_fly,
     "compare": build_compare,
 }
-_BUILD_FOREIGN: dict[str, Callable[[Project], None]] = {"model": build_foreign_model}
+_BUILD_FOREIGN: dict[str, Callable[[Project], None]] = {"model": build_foreign_model, "whatif": build_foreign_whatif}
 """Pages of teams that were not drawn here, where they are others."""
 
 

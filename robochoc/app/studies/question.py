@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import msgspec
 
-from robochoc.app.sketch.building import model_of
+from robochoc.app.runs.fitting import team_of
+from robochoc.app.runs.prepared import TeamFiles
 from robochoc.app.sketch.sketch import MAX_LABEL, Sketch
 from robochoc.app.sketch.words import listed
 from robochoc.app.studies.families import Family, family_of
@@ -13,6 +14,7 @@ from robochoc.experiments.study import toml_of
 from robochoc.formats.names import is_name
 from robochoc.model.problem import ProblemKind
 from robochoc.run.choice import accepts, decided
+from robochoc.run.facts import Facts
 from robochoc.run.options import Options, Runtime
 from robochoc.run.registry import installed_protocols
 
@@ -30,12 +32,14 @@ class Question(msgspec.Struct, frozen=True):
         family: Whether the problems are of the family that is most like the team. Else it is the team.
         runs: Runs of each protocol, or problems of each kind.
         timeout: The limit of a run in seconds.
+        ordered: Whether the team's own order is kept: a partially known constraint says who of two asks.
     """
 
     protocols: tuple[str, ...]
     family: bool = False
     runs: int = 10
     timeout: int = 20
+    ordered: bool = False
 
 
 class Possible(msgspec.Struct, frozen=True):
@@ -46,17 +50,24 @@ class Possible(msgspec.Struct, frozen=True):
         usual: Two of them to begin with.
         costs: Whether there are costs.
         family: The family most like it, if there is one.
+        ordered: Whether its order cannot be another one.
     """
 
     protocols: tuple[tuple[str, bool], ...]
     usual: tuple[str, ...]
     costs: bool
     family: Family | None
+    ordered: bool = False
 
 
-def possible(sketch: Sketch) -> Possible:
-    """Return what can be compared. Raises `ModelError` for what is no team that can decide."""
-    team = model_of(sketch).team
+def possible(sketch: Sketch, files: TeamFiles | None = None) -> Possible:
+    """Return what can be compared on the team of a sketch, or of files.
+
+    Raises:
+        ModelError: for what is no team that can decide.
+        InvalidInputError: if the files are damaged.
+    """
+    team = team_of(sketch, files)
     options = Options(runtime=Runtime.SIMULATOR)
     known = [(one.name, one.protocol.traits.complete) for one in installed_protocols() if one.protocol]
     fit = sorted(
@@ -67,7 +78,9 @@ def possible(sketch: Sketch) -> Possible:
     names = [name for name, _ in fit]
     beside = next((name for name in (*_COMMON, *names) if name in names and name != chosen), None)
     usual = tuple(name for name in (chosen, beside) if name in names)
-    return Possible(tuple(fit), usual, team.kind is ProblemKind.DISWCSP, family_of(sketch))
+    family = None if files else family_of(sketch)
+    partial = Facts(team).partially_known
+    return Possible(tuple(fit), usual, team.kind is ProblemKind.DISWCSP, family, ordered=partial)
 
 
 def folder_of(sketch: Sketch) -> str:
@@ -95,7 +108,7 @@ def study_of(sketch: Sketch, question: Question, family: Family | None) -> str:
         problems: dict[str, object] = {"family": family.name, **family.options, "seed": seeds}
     else:
         problems = {"path": [folder_of(sketch)]}
-        runs |= {} if sketch.is_ranked else {"order": "random"}
+        runs |= {} if sketch.is_ranked or question.ordered else {"order": "random"}
         runs["seed"] = seeds
     tables = {"problems": problems, "runs": runs, "limits": {"timeout": question.timeout}}
     return toml_of({"title": title_of(sketch, question), **tables})

@@ -17,12 +17,13 @@ from robochoc.app.jobs.job import Call, Job, call_here
 from robochoc.app.jobs.process import Command, Finished
 from robochoc.app.listeners import Listeners
 from robochoc.app.projects import Project
+from robochoc.app.runs.prepared import TeamFiles
 from robochoc.app.sketch.building import model_of
 from robochoc.app.sketch.sketch import Sketch
 from robochoc.app.studies.families import family_of
 from robochoc.app.studies.question import Question, folder_of, number_of_runs, study_of
 from robochoc.experiments.task import Status
-from robochoc.formats import InvalidInputError
+from robochoc.formats import InvalidInputError, read_team, write_team
 from robochoc.modelling.places import ModelError
 
 STUDY = "study.toml"
@@ -94,8 +95,8 @@ class Study:
         file = self._folder / REPORT
         return file if self.facts and self.facts.stage is Stage.DONE and file.is_file() else None
 
-    def start(self, sketch: Sketch, question: Question) -> None:
-        """Begin. Rows of runs that are the same as before are kept: only what is new is run."""
+    def start(self, sketch: Sketch, question: Question, files: TeamFiles | None = None) -> None:
+        """Begin, on the team of a sketch or of files. Of runs that are the same as before, the rows are kept."""
         if self.running:
             return
         family = family_of(sketch) if question.family else None
@@ -104,7 +105,7 @@ class Study:
         self._call = call_here()
         self._job = Job(
             f"study {self._folder}",
-            partial(self._carry_out, sketch, facts),
+            partial(self._carry_out, sketch, files, facts),
             over=partial(self._broken_off, facts),
             folder=self._folder,
             stopping=_STOPPING,
@@ -120,9 +121,9 @@ class Study:
         """Call `callback` when there is news; return what ends that."""
         return self._listeners.add(callback)
 
-    def _carry_out(self, sketch: Sketch, facts: Facts, job: Job[None]) -> None:
+    def _carry_out(self, sketch: Sketch, files: TeamFiles | None, facts: Facts, job: Job[None]) -> None:
         try:
-            self._prepare(sketch, facts)
+            self._prepare(sketch, files, facts)
             if not self._is_stopped(job, facts):
                 self._run(facts, job)
         except (ModelError, InvalidInputError, ValueError, sqlite3.Error) as error:
@@ -154,9 +155,11 @@ class Study:
     def _broken_off(self, facts: Facts, why: str) -> None:
         self._become(facts, Stage.FAILED if why else Stage.STOPPED, why)
 
-    def _prepare(self, sketch: Sketch, facts: Facts) -> None:
+    def _prepare(self, sketch: Sketch, files: TeamFiles | None, facts: Facts) -> None:
         self._folder.mkdir(mode=0o700, exist_ok=True)  # not its parents: the team was removed if they are not there
-        if not facts.question.family:
+        if files:
+            write_team(read_team(files.folder), self._folder / folder_of(sketch), replace=True)
+        elif not facts.question.family:
             model_of(sketch).save(self._folder / folder_of(sketch), replace=True)
         (self._folder / STUDY).write_text(facts.text, encoding="utf-8")
 

@@ -12,8 +12,8 @@ from robochoc.app.pages.compare.served import REPORT
 from robochoc.app.pages.numbers import whole
 from robochoc.app.pages.shell import while_shown
 from robochoc.app.projects import Project
+from robochoc.app.runs.prepared import TeamFiles
 from robochoc.app.sketch.sketch import Sketch
-from robochoc.app.studies.families import Family
 from robochoc.app.studies.question import MOST_RUNS, MOST_SECONDS, Possible, Question, possible, study_of
 from robochoc.app.studies.study import ENDED, Facts, Stage, study_on
 from robochoc.app.texts import say
@@ -32,7 +32,7 @@ def build_compare(project: Project) -> None:
     with ui.element("div"):
         _heading("h1", "compare.title")
         ui.label(say("compare.intro")).classes("soft")
-    if not project.sketch.robots or not project.sketch.decisions:
+    if not project.foreign and (not project.sketch.robots or not project.sketch.decisions):
         with ui.element("div").classes("panel"):
             ui.label(say("compare.empty"))
             ui.link(say("compare.empty-remedy"), f"/team/{project.id}/model")
@@ -70,7 +70,7 @@ class ComparePage:
         if sketch == self._sketch:
             return
         self._sketch = sketch
-        found = await run.io_bound(_looked_at, sketch)
+        found = await run.io_bound(_looked_at, sketch, self._project.files)
         if found is None or self._sketch is not sketch:
             return
         self._asked.clear()
@@ -89,7 +89,7 @@ class ComparePage:
         names = [name for name, _ in found.protocols]
         chosen = [name for name in last.protocols if name in names] if last else []
         self._build_protocols(found, chosen if len(chosen) >= _FEWEST else [*found.usual])
-        self._build_problems(sketch, found.family, of_family=bool(last and last.family and found.family))
+        self._build_problems(sketch, found, of_family=bool(last and last.family and found.family))
         with ui.element("div").classes("compare-row"):
             self._runs = _number("compare.runs", last.runs if last else 10, MOST_RUNS)
             self._timeout = _number("compare.timeout", last.timeout if last else 20, MOST_SECONDS)
@@ -117,7 +117,9 @@ class ComparePage:
                         ui.tooltip(say(complete if is_complete else "compare.incomplete"))
                     self._boxes[name] = box
 
-    def _build_problems(self, sketch: Sketch, family: Family | None, *, of_family: bool) -> None:
+    def _build_problems(self, sketch: Sketch, found: Possible, *, of_family: bool) -> None:
+        family = found.family
+        hint = "ranked" if sketch.is_ranked else "partial" if found.ordered else "drawn"
         with ui.element("fieldset"):
             with ui.element("legend"):
                 ui.label(say("compare.problems"))
@@ -125,12 +127,13 @@ class ComparePage:
             self._kind = ui.radio(kinds, value=_FAMILY if of_family else _TEAM, on_change=self._kind_chosen)
             self._kind.props("dense inline")
             self._hints = {
-                _TEAM: say("compare.team-ranked-hint" if sketch.is_ranked else "compare.team-hint"),
+                _TEAM: say(f"compare.team-hint.{hint}"),
                 _FAMILY: say(family.key, **family.named) if family else "",
             }
             self._hint = ui.label(self._hints[self._kind.value]).classes("soft small")
             if family is None:
-                ui.label(say("compare.family-none")).classes("soft small")
+                none = "compare.family-files" if self._project.foreign else "compare.family-none"
+                ui.label(say(none)).classes("soft small")
 
     def _build_study(self) -> None:
         with ui.element("details").classes("compare-study"):
@@ -153,6 +156,7 @@ class ComparePage:
             family=self._kind.value == _FAMILY,
             runs=whole(self._runs.value, 1, MOST_RUNS, otherwise=1),
             timeout=whole(self._timeout.value, 1, MOST_SECONDS, otherwise=1),
+            ordered=self._possible is not None and self._possible.ordered,
         )
 
     def _show_study(self) -> None:
@@ -168,7 +172,7 @@ class ComparePage:
         few = len(question.protocols) < _FEWEST
         self._wrong.set_text(say("compare.few") if few else "")
         if not few and self._sketch is not None:
-            self._study.start(self._sketch, question)
+            self._study.start(self._sketch, question, self._project.files)
 
     # What came of it
 
@@ -202,6 +206,8 @@ class ComparePage:
                 _message(say("compare.stopped", done=facts.done, total=facts.total))
             case Stage.FAILED:
                 _message(say("compare.failed", message=facts.message), bad=True)
+            case Stage.DONE if not facts.lines:
+                _message(say("compare.nothing"), bad=True)
             case Stage.DONE if self._study.report is not None:
                 show_lines(facts.lines)
                 self._show_report()
@@ -239,9 +245,9 @@ class ComparePage:
         frame.props(f"src={REPORT} sandbox=allow-same-origin").props["title"] = say("compare.report")
 
 
-def _looked_at(sketch: Sketch) -> Possible | str:
+def _looked_at(sketch: Sketch, files: TeamFiles | None) -> Possible | str:
     try:
-        return possible(sketch)
+        return possible(sketch, files)
     except (ModelError, InvalidInputError, UnsupportedError, ValueError) as mistake:
         return str(mistake)
 

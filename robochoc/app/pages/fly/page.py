@@ -109,7 +109,8 @@ class _Page:
             ui.label(say("fly.old")).classes("note")
         making = making_of(run)
         if not flies(run):
-            _note("fly.no-places", "fly.no-places-remedy", "fly.to-model", f"/team/{self._project.id}/model")
+            remedy = "fly.no-places-files" if self._project.foreign else "fly.no-places-remedy"
+            _note("fly.no-places", remedy, "fly.to-model", f"/team/{self._project.id}/model")
         elif not making.has_answer:
             ui.label(say("fly.no-answer")).classes("note")
         shown = _Made(making)

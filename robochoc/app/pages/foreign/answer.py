@@ -32,7 +32,7 @@ def says_of(facts: Facts, values: Mapping[str, Value]) -> dict[str, str]:
 
 def robots_of(facts: Facts, result: RunResult) -> int:
     """Return how many robots decided at the end: some may have come or gone."""
-    return len(_robots(result.epochs[-1])) if result.epochs else len(facts.there)
+    return len(robots_in(result.epochs[-1])) if result.epochs else len(facts.there)
 
 
 def table_html(facts: Facts, result: RunResult) -> str:
@@ -47,7 +47,7 @@ def epochs_html(facts: Facts, result: RunResult) -> str:
         verdict = str(epoch.get("verdict"))
         known = say(f"foreign.verdict.{verdict}") if verdict in _VERDICTS else verdict
         title = say("foreign.epoch", opened=_cut(str(epoch.get("opened_by", ""))))
-        told = say("foreign.epoch-took", robots=len(_robots(epoch)), messages=f"{int(epoch.get('messages', 0)):,}")
+        told = say("foreign.epoch-took", robots=len(robots_in(epoch)), messages=epoch.get("messages", 0))
         assignment = epoch.get("assignment")
         table = _table(facts, assignment, frozenset()) if isinstance(assignment, dict) and assignment else ""
         head = f"<b>{escape(title)}</b> {escape(known)} <span class='soft'>{escape(told)}</span>"
@@ -87,6 +87,7 @@ def _cut(text: str) -> str:
     return text if len(text) <= _LONGEST else f"{text[: _LONGEST - 1]}…"
 
 
-def _robots(epoch: Mapping[str, Any]) -> list[object]:
+def robots_in(epoch: Mapping[str, Any]) -> list[str]:
+    """Return who was there in an epoch of a result."""
     robots = epoch.get("robots")
-    return robots if isinstance(robots, list) else []
+    return [*map(str, robots)] if isinstance(robots, list) else []
