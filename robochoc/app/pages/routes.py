@@ -54,11 +54,11 @@ def install(projects: Projects) -> None:
     def team(name: str, area: str) -> None:
         try:
             project = projects.open(name)
+            build = {**_BUILD, **_BUILD_FOREIGN} if project.files else _BUILD  # facts are read
         except (KeyError, ValueError) as missing:
             _missing(damaged=isinstance(missing, ValueError))
             return
         chosen = area if area in AREAS else AREAS[0]
-        build = _BUILD if project.foreign is None else {**_BUILD, **_BUILD_FOREIGN}
         with shell(project.sketch.name, project, chosen):
             build[chosen](project)
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import shutil
 import zipfile
 from pathlib import Path
 
@@ -10,10 +11,14 @@ import msgspec
 import pytest
 
 from robochoc.app.flights.state import MAX_BYTES, packed, unpack_run
+from robochoc.app.foreign.drawing import drawn
 from robochoc.app.runs.runs import Runs
-from robochoc.app.sketch.opening import opened
+from robochoc.app.sketch.opening import ForeignTeam, opened
 from robochoc.app.sketch.sketch import MAX_ROBOTS, Cell, Sketch, SketchRobot
+from robochoc.app.store import Store
+from robochoc.formats import read_team
 from tests.support.kept_runs import cube, kept_run
+from tests.support.program import ROOT
 
 
 class Team:
@@ -99,3 +104,22 @@ def test_a_bomb_is_not_unpacked(tmp_path: Path, monkeypatch: pytest.MonkeyPatch)
     monkeypatch.setattr("robochoc.app.flights.state.MAX_BYTES", 1 << 20)
     content = _changed(packed(kept_run(tmp_path, cube())), run_journal=bytes(1 << 22))
     assert not unpack_run(_file(tmp_path, content), tmp_path / "there")
+
+
+def test_the_run_of_a_team_of_files_comes_back_with_its_files(tmp_path: Path) -> None:
+    files = ROOT / "docs/examples/rescue"
+    found = opened(files)
+    assert isinstance(found, ForeignTeam)
+    run = kept_run(tmp_path / "here", drawn(found))
+    shutil.copytree(files, run.team)
+    file = _file(tmp_path, packed(run))
+    again = opened(file)
+    assert isinstance(again, ForeignTeam)
+    assert again.team.robots == found.team.robots
+    store = Store(tmp_path / "there")
+    name = store.add_foreign(again)
+    assert unpack_run(file, store.path(name))
+    there = Runs(Team(store.now(name), store.path(name))).latest
+    assert there is not None
+    assert there.result == run.read_result()
+    assert read_team(there.team) == read_team(files)

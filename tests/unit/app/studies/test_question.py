@@ -7,6 +7,7 @@ from pathlib import Path
 
 import pytest
 
+from robochoc.app.runs.prepared import TeamFiles
 from robochoc.app.sketch.building import model_of
 from robochoc.app.sketch.sketch import Area, Cell, Decision, Kind, Sketch, SketchRobot, SketchRule
 from robochoc.app.studies.families import family_of
@@ -14,6 +15,8 @@ from robochoc.app.studies.question import Question, number_of_runs, possible, st
 from robochoc.app.texts import say
 from robochoc.experiments.plan import plan_of
 from robochoc.experiments.study import read_study
+from robochoc.formats import write_team
+from tests.support.small_teams import pkc_team
 
 ROBOTS = tuple(SketchRobot(name, Cell(place, 0)) for place, name in enumerate("ABCD"))
 SLOT = Decision("slot", Kind.SLOT, (1, 2, 3, 4))
@@ -89,3 +92,16 @@ def test_the_words_of_families_are_filled_in() -> None:
         family = family_of(team(*rules))
         assert family is not None
         assert "{" not in say(family.key, **family.named)
+
+
+def test_a_team_of_files_is_compared_without_a_family_and_keeps_its_order_where_parts_are_known(tmp_path: Path) -> None:
+    write_team(pkc_team(), tmp_path / "pkc")
+    found = possible(Sketch("pkc"), TeamFiles(tmp_path / "pkc"))
+    assert found.family is None
+    assert found.ordered
+    assert {name for name, _ in found.protocols} >= {"abt", "disfc"}
+    runs = [
+        tomllib.loads(study_of(Sketch("pkc"), Question(("abt", "disfc"), ordered=ordered), None))["runs"]
+        for ordered in (True, False)
+    ]
+    assert ["order" in one for one in runs] == [False, True]
