@@ -6,7 +6,7 @@ Imported by the process of a search for conflicts alone: CPMpy and its solver ta
 from __future__ import annotations
 
 import itertools
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from functools import reduce
 from typing import Any
 
@@ -16,7 +16,7 @@ from robochoc.app.sketch.sketch import Sketch
 from robochoc.model.constraint import Constraint, Relation
 from robochoc.model.expression import Apply, Expression
 from robochoc.model.expression import Constant as Integer
-from robochoc.model.problem import INFINITE
+from robochoc.model.problem import INFINITE, Team
 
 MOST_ROWS = 2_000_000
 """A table that would be longer is too large."""
@@ -38,33 +38,59 @@ def minimal_by_cpmpy(sketch: Sketch, rules: Sequence[str]) -> tuple[str, ...] | 
         ImportError: if CPMpy, or its solver OR-Tools, is not installed.
         UntranslatedError: if a rule is none that CPMpy is told here.
     """
-    import cpmpy  # noqa: PLC0415 - an extra
-    from cpmpy.tools.explain import mus  # noqa: PLC0415 - the same
-
     team = model_of(with_only(sketch, rules)).team
-    variables = {
-        name: cpmpy.intvar(min(one.domain), max(one.domain), name=name) for name, one in team.variables.items()
-    }
-    hard = [cpmpy.InDomain(variables[name], [*one.domain]) for name, one in team.variables.items()]
-    domains = {name: sorted(one.domain) for name, one in team.variables.items()}
-    said = {rule: parts for rule in rules if (parts := _as_a_whole(sketch, rule, variables))}
+    problem = _Problem(team)
+    said = {rule: parts for rule in rules if (parts := _as_a_whole(sketch, rule, problem.variables))}
     whole = frozenset(said)
     for constraint in team.constraints():
         rule = rule_of(constraint.name, rules)
         if rule is None:
             raise UntranslatedError(constraint.name)
         if rule not in whole:
-            said.setdefault(rule, []).append(_said(constraint, variables, domains))
-    softs = {rule: cpmpy.all(said[rule]) for rule in rules if rule in said}
-    if len(softs) <= FEW:
-        return minimal([*softs], lambda some: cpmpy.Model(hard, *(softs[one] for one in some)).solve(solver="ortools"))
-    if cpmpy.Model(hard, *softs.values()).solve(solver="ortools"):
-        return None
-    # Each rule is one Boolean, so that it stays whole.
-    marks = {rule: cpmpy.boolvar(name=f"rule {rule}") for rule in softs}
-    hard += [mark.implies(softs[rule]) for rule, mark in marks.items()]
-    found = {str(one) for one in mus([*marks.values()], hard=hard, solver="ortools")}
-    return tuple(rule for rule, mark in marks.items() if str(mark) in found)
+            said.setdefault(rule, []).append(problem.said(constraint))
+    return problem.minimal({rule: said[rule] for rule in rules if rule in said})
+
+
+def minimal_of_team(team: Team, constraints: Mapping[str, Constraint]) -> tuple[str, ...] | None:
+    """Return constraints of a team, by their names here, that cannot hold together. As `minimal_by_cpmpy`."""
+    problem = _Problem(team)
+    return problem.minimal({name: [problem.said(one)] for name, one in constraints.items()})
+
+
+class _Problem:
+    """The variables of a team in CPMpy, with their domains."""
+
+    def __init__(self, team: Team) -> None:
+        import cpmpy  # noqa: PLC0415 - an extra
+
+        self._domains = {name: sorted(one.domain) for name, one in team.variables.items()}
+        self.variables = {
+            name: cpmpy.intvar(values[0], values[-1], name=name) for name, values in self._domains.items()
+        }
+        self._hard = [cpmpy.InDomain(self.variables[name], values) for name, values in self._domains.items()]
+
+    def said(self, constraint: Constraint) -> Any:  # noqa: ANN401 - CPMpy's
+        """Return a constraint. Raises `UntranslatedError`."""
+        return _said(constraint, self.variables, self._domains)
+
+    def minimal(self, said: Mapping[str, list[Any]]) -> tuple[str, ...] | None:
+        """Return some of these rules that cannot hold together, as few as possible; None: all can."""
+        import cpmpy  # noqa: PLC0415 - an extra
+        from cpmpy.tools.explain import mus  # noqa: PLC0415 - the same
+
+        hard = [*self._hard]
+        softs = {rule: cpmpy.all(parts) for rule, parts in said.items()}
+        if len(softs) <= FEW:
+            return minimal(
+                [*softs], lambda some: cpmpy.Model(hard, *(softs[one] for one in some)).solve(solver="ortools")
+            )
+        if cpmpy.Model(hard, *softs.values()).solve(solver="ortools"):
+            return None
+        # Each rule is one Boolean, so that it stays whole.
+        marks = {rule: cpmpy.boolvar(name=f"rule {rule}") for rule in softs}
+        hard += [mark.implies(softs[rule]) for rule, mark in marks.items()]
+        found = {str(one) for one in mus([*marks.values()], hard=hard, solver="ortools")}
+        return tuple(rule for rule, mark in marks.items() if str(mark) in found)
 
 
 def _as_a_whole(sketch: Sketch, name: str, variables: dict[str, Any]) -> list[Any]:

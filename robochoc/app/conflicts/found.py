@@ -6,6 +6,7 @@ import asyncio
 from collections.abc import Callable
 from enum import StrEnum
 from pathlib import Path
+from typing import NamedTuple
 
 import msgspec
 
@@ -37,25 +38,34 @@ class Conflict(msgspec.Struct, frozen=True):
         finder: The tool that has found it.
         late: Whether the time was over before.
         why: Why the search has failed; empty if it has not.
+        words: What the constraints of files say that cannot hold together.
     """
 
     rules: tuple[str, ...] | None
     finder: Finder = Finder.OWN
     late: bool = False
     why: str = ""
+    words: tuple[str, ...] = ()
+
+
+class FilesAsked(NamedTuple):
+    """A team of files: their folder, and how many events of its scenario have happened."""
+
+    folder: Path
+    events: int = 0
 
 
 class ConflictSearch:
     """A search, which begins at once. `found` has what it finds; `end` ends it.
 
     Args:
-        sketch: The team.
+        asked: The team.
         seconds: The search is given so long.
         folder: The team's folder: the search ends when that is removed.
     """
 
-    def __init__(self, sketch: Sketch, seconds: float = PATIENCE_S, *, folder: Path | None = None) -> None:
-        self._sketch, self._seconds = sketch, seconds
+    def __init__(self, asked: Sketch | FilesAsked, seconds: float = PATIENCE_S, *, folder: Path | None = None) -> None:
+        self._asked, self._seconds = asked, seconds
         self._job = Job("conflict search", self._search, folder=folder).start()
 
     @property
@@ -77,7 +87,12 @@ class ConflictSearch:
         self._job.end()
 
     def _search(self, job: Job[Conflict]) -> Conflict:
-        command = Command((str(self._seconds),), module=_PROCESS, given=msgspec.json.encode(self._sketch))
+        asked = self._asked
+        if isinstance(asked, FilesAsked):
+            arguments = (str(self._seconds), str(asked.folder), str(asked.events))
+            command = Command(arguments, module=_PROCESS)
+        else:
+            command = Command((str(self._seconds),), module=_PROCESS, given=msgspec.json.encode(asked))
         try:
             finished = job.run(command, within_s=self._seconds + _GRACE_S)
         except LateError:

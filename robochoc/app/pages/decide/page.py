@@ -16,7 +16,7 @@ from robochoc.app.pages.decide.how import How
 from robochoc.app.pages.decide.picture import falling_svg, team_svg, values_of
 from robochoc.app.pages.foreign.answer import says_of
 from robochoc.app.pages.foreign.answer import table_html as answers_html
-from robochoc.app.pages.foreign.below import show_foreign_below
+from robochoc.app.pages.foreign.below import ForeignDoors, show_foreign_below
 from robochoc.app.pages.shell import while_shown
 from robochoc.app.projects import Project
 from robochoc.app.runs.result import RunResult
@@ -48,7 +48,7 @@ class _Page:
         self._end_following: Callable[[], None] | None = None
         self._answered: tuple[object, ...] = ()
         self._told_below: tuple[object, ...] = ()
-        self._doors: Doors | None = None
+        self._doors: Doors | ForeignDoors | None = None
         with ui.element("h1"):
             ui.label(say("decide.title"))
         with ui.element("section").classes("decide-top"):
@@ -209,7 +209,7 @@ class _Page:
 
     def _show_below(self, shown: Run, result: RunResult, sketch: Sketch) -> None:
         if self._foreign:
-            show_foreign_below(self._project, self._foreign, result, self._decide)
+            self._doors = show_foreign_below(self._project, self._foreign, result, self._decide)
         elif result.verdict == "no-solution":
             self._doors = Doors(self._project, sketch, self._decide)
         if result.assignment and not self._foreign:

@@ -7,16 +7,22 @@ from functools import partial
 
 from nicegui import ui
 
+from robochoc.app.conflicts.found import PATIENCE_S, Conflict, ConflictSearch, FilesAsked, Finder
 from robochoc.app.foreign.facts import Facts
 from robochoc.app.pages.foreign.answer import epochs_html
 from robochoc.app.pages.foreign.model import style
+from robochoc.app.pages.shell import while_shown
 from robochoc.app.projects import Project
 from robochoc.app.runs.result import RunResult
 from robochoc.app.texts import say
 
+_MOST_CONSTRAINTS = 60
 
-def show_foreign_below(project: Project, facts: Facts, result: RunResult, decide: Callable[..., None]) -> None:
-    """Fill the current container.
+
+def show_foreign_below(
+    project: Project, facts: Facts, result: RunResult, decide: Callable[..., None]
+) -> ForeignDoors | None:
+    """Fill the current container; return the ways out, where there is no solution.
 
     Args:
         project: The team.
@@ -31,27 +37,79 @@ def show_foreign_below(project: Project, facts: Facts, result: RunResult, decide
                 ui.label(say("foreign.epochs"))
             ui.html(epochs_html(facts, result), sanitize=False).classes("foreign-table")
     if result.verdict == "no-solution":
-        _doors(project, facts, result, decide)
+        return ForeignDoors(project, facts, result, decide)
+    return None
 
 
-def _doors(project: Project, facts: Facts, result: RunResult, decide: Callable[..., None]) -> None:
-    """Show the ways out of a team without a solution; of one that cannot be gone, why."""
-    with ui.element("section").classes("panel doors"):
-        with ui.element("h2"):
-            ui.label(say("decide.doors"))
-        if result.reason:
-            ui.label(say("foreign.reason", why=result.reason))
-        with ui.element("div").classes("two"):
+class ForeignDoors:
+    """The ways out of a team without a solution; of one that cannot be gone, why. `decide`: as above."""
+
+    def __init__(self, project: Project, facts: Facts, result: RunResult, decide: Callable[..., None]) -> None:
+        self._project = project
+        self._events = max(0, len(result.epochs) - 1)
+        self._search: ConflictSearch | None = None
+        with ui.element("section").classes("panel doors"):
+            with ui.element("h2"):
+                ui.label(say("decide.doors"))
+            if result.reason:
+                ui.label(say("foreign.reason", why=result.reason))
             if facts.events or facts.partial:
                 why = "foreign.no-aside-events" if facts.events else "foreign.no-aside-partial"
                 ui.label(say(why)).classes("soft")
-            else:
-                _door("decide.door-aside", partial(decide, withdraw=True))
-        ui.link(say("foreign.to-files"), f"/team/{project.id}/model")
+            with ui.element("div").classes("two"):
+                if not (facts.events or facts.partial):
+                    _door("decide.door-aside", "decide.door-aside-help", partial(decide, withdraw=True))
+                _door("foreign.door-conflict", "foreign.door-conflict-help", self._look)
+            self._found = ui.element("div").classes("found").props("aria-live=polite")
+            ui.link(say("foreign.to-files"), f"/team/{project.id}/model")
+        while_shown(self.end)
+
+    def end(self) -> None:
+        """Search no more."""
+        if self._search:
+            self._search.end()
+
+    async def _look(self) -> None:
+        folder = self._project.foreign
+        if self._search or folder is None:  # it searches already
+            return
+        self._search = search = ConflictSearch(FilesAsked(folder, self._events), folder=self._project.folder)
+        self._tell(say("decide.searching", seconds=int(PATIENCE_S)))
+        try:
+            conflict = await search.found()
+        finally:
+            self._search = None
+            search.end()
+        if conflict is not None and not self._found.is_deleted:
+            self._show(conflict)
+
+    def _tell(self, text: str) -> None:
+        self._found.clear()
+        with self._found:
+            ui.label(text)
+
+    def _show(self, conflict: Conflict) -> None:
+        if conflict.why:
+            self._tell(say("decide.conflict-failed", why=conflict.why))
+        elif conflict.late:
+            self._tell(say("foreign.conflict-late"))
+        elif not conflict.rules:
+            self._tell(say("decide.conflict-none" if conflict.rules is None else "decide.conflict-empty"))
+        else:
+            self._tell(say("foreign.conflict", count=len(conflict.rules)))
+            with self._found:
+                with ui.element("ul").classes("foreign-notes"):
+                    for words in conflict.words[:_MOST_CONSTRAINTS]:
+                        with ui.element("li"):
+                            ui.label(words)
+                    if (more := len(conflict.words) - _MOST_CONSTRAINTS) > 0:
+                        with ui.element("li"):
+                            ui.label(say("foreign.more", count=f"{more:,}"))
+                ui.label(say("decide.by-cpmpy" if conflict.finder is Finder.CPMPY else "decide.by-own")).classes("soft")
 
 
-def _door(key: str, does: Callable[[], object]) -> None:
+def _door(title: str, hint: str, does: Callable[[], object]) -> None:
     with ui.element("button").classes("card door").props("type=button").on("click", does):
         with ui.element("h3"):
-            ui.label(say(key))
-        ui.label(say(f"{key}-help")).classes("soft")
+            ui.label(say(title))
+        ui.label(say(hint)).classes("soft")

@@ -1,0 +1,74 @@
+"""Which constraints of a team of files are in each other's way; they are told in words."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Collection, Iterator, Sequence
+from dataclasses import replace
+from pathlib import Path
+
+from robochoc.app.conflicts.by_cpmpy import UntranslatedError, minimal_of_team
+from robochoc.app.conflicts.found import Conflict, Finder
+from robochoc.app.conflicts.rules import minimal
+from robochoc.app.conflicts.time_left import OutOfTimeError, can_hold
+from robochoc.app.foreign.sentences import sentence
+from robochoc.formats import read_team
+from robochoc.model.change import team_after_events
+from robochoc.model.constraint import INFINITE, Constraint, Predicate, Relation, Semantics
+from robochoc.model.problem import Robot, Team
+
+
+def found_in_files(folder: Path, events: int, seconds: float, *, use_cpmpy: bool = True) -> Conflict:
+    """Return the conflict in the team whose files are in `folder`, after so many events of its scenario.
+
+    It is found by CPMpy where that is installed, else by our own central solver. Raises `InvalidInputError`.
+    """
+    team = team_after_events(read_team(folder), events)
+    held = [*_held(team)]
+    forbidding = [str(number) for number, (_, one) in enumerate(held) if _forbids(one)]
+    until = time.monotonic() + seconds
+
+    def told(rules: Sequence[str] | None, finder: Finder) -> Conflict:
+        owners = [held[int(rule)] for rule in rules or ()]
+        words = tuple(f"{robot.name}: {sentence(one, robot.symbol_table, robot.costs)}" for robot, one in owners)
+        return Conflict(None if rules is None else tuple(rules), finder, words=words)
+
+    if use_cpmpy:
+        try:
+            return told(minimal_of_team(team, {rule: held[int(rule)][1] for rule in forbidding}), Finder.CPMPY)
+        except (ImportError, UntranslatedError):
+            pass
+    try:
+        return told(minimal(forbidding, lambda some: can_hold(with_only(team, {*map(int, some)}), until)), Finder.OWN)
+    except OutOfTimeError:
+        return Conflict(None, Finder.OWN, late=True)
+
+
+def with_only(team: Team, kept: Collection[int]) -> Team:
+    """Return a team with these of its constraints alone, which are numbered in the order of `Team.constraints`."""
+    numbers = iter(range(sum(1 for _ in team.constraints())))
+
+    def some(constraints: Sequence[Constraint]) -> tuple[Constraint, ...]:
+        return tuple(one for one in constraints if next(numbers) in kept)
+
+    robots = []
+    for robot in team.robots:  # in the order of `Robot.constraints`
+        private = some(robot.private)
+        parents = tuple(replace(one, constraints=some(one.constraints)) for one in robot.parents)
+        children = tuple(replace(one, constraints=some(one.constraints), copies=()) for one in robot.children)
+        robots.append(replace(robot, private=private, parents=parents, children=children))
+    return replace(team, robots=tuple(robots))
+
+
+def _held(team: Team) -> Iterator[tuple[Robot, Constraint]]:
+    for robot in team.robots:
+        for constraint in robot.constraints():
+            yield robot, constraint
+
+
+def _forbids(constraint: Constraint) -> bool:
+    """Return whether a constraint can be in the way: one that only costs cannot."""
+    definition = constraint.definition
+    if isinstance(definition, Relation) and definition.semantics is Semantics.SOFT:
+        return INFINITE in (*definition.costs, definition.default_cost)
+    return isinstance(definition, Relation) or (isinstance(definition, Predicate) and constraint.cost == INFINITE)
