@@ -74,7 +74,7 @@ class _Problem:
         return _said(constraint, self.variables, self._domains)
 
     def minimal(self, said: Mapping[str, list[Any]]) -> tuple[str, ...] | None:
-        """Return some of these rules that cannot hold together, as few as possible; None: all can."""
+        """Return some of these rules that cannot hold together, but without any one they can; None: all can."""
         import cpmpy  # noqa: PLC0415 - an extra
         from cpmpy.tools.explain import mus  # noqa: PLC0415 - the same
 

@@ -124,7 +124,8 @@ class _Robots:
         select.props("dense outlined").classes("foreign-choice")
         select.on_value_change(lambda event: self._choose(event.value))
         self._box = ui.element("div").classes("foreign-part").props("aria-live=polite")
-        ui.timer(0, lambda: select.set_value(next(iter(self._robots))), once=True)
+        last = (facts.there or facts.robots)[-1].name  # its file has what it shares with those before it
+        ui.timer(0, lambda: select.set_value(last), once=True)
 
     async def _choose(self, name: object) -> None:
         robot = self._robots.get(name) if isinstance(name, str) else None
