@@ -332,3 +332,9 @@ def test_a_narrow_screen_needs_no_scrolling_to_the_side(
             page.locator(".rule .sentence").nth(number).click()
             page.wait_for_selector(".form")
             assert page.evaluate("document.documentElement.scrollWidth") <= 360
+        wanted = {"light": "rgb(255, 255, 255)", "dark": "rgb(13, 21, 32)"}[scheme]
+        page.wait_for_function(
+            """wanted => [...document.querySelectorAll('.segments .q-btn[aria-pressed=true]')]
+                .every((one) => getComputedStyle(one).color === wanted)""",
+            arg=wanted,
+        )
