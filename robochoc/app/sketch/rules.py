@@ -90,7 +90,11 @@ def _prefers(given: Applied, alone: Group) -> Operand:
 
 
 def _rather(given: Applied, alone: Group) -> Operand:
-    return abs(alone[0] - given.value("value")) * given.number("step")
+    wish, step = given.value("value"), given.number("step")
+    if given.kind is not Kind.PLACE or not isinstance(wish, int):
+        return abs(alone[0] - wish) * step
+    columns = given.sketch.area.columns  # steps on the map go across, and along
+    return (abs(alone[0] % columns - wish % columns) + abs(alone[0] // columns - wish // columns)) * step
 
 
 def _little(given: Applied, alone: Group) -> Operand:
@@ -127,7 +131,7 @@ PALETTE: dict[str, PaletteRule] = {
         PaletteRule("only", ALL_KINDS, Links.EACH, _only, (_VALUES,), fewest=1),
         PaletteRule("never", ALL_KINDS, Links.EACH, _never, (_VALUE,), fewest=1),
         PaletteRule("prefers", ALL_KINDS, Links.EACH, _prefers, (_VALUE,), fewest=1),
-        PaletteRule("rather", _HEIGHTS, Links.EACH, _rather, (_VALUE, _STEP), fewest=1, graded=True),
+        PaletteRule("rather", NUMBERED, Links.EACH, _rather, (_VALUE, _STEP), fewest=1, graded=True),
         PaletteRule("little", _HEIGHTS, Links.EACH, _little, (_STEP,), fewest=1, graded=True),
         PaletteRule("at-most", ALL_KINDS, Links.GROUP, _at_most, (_VALUE, _COUNT)),
         PaletteRule("at-least", ALL_KINDS, Links.GROUP, _at_least, (_VALUE, _COUNT)),

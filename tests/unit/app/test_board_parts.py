@@ -206,6 +206,8 @@ def test_a_rule_is_for_whom_is_selected() -> None:
     assert first_rule(TEAM, leader, LEVEL, ["East"]).robots == ()
     assert first_rule(TEAM, PALETTE["table"], LEVEL, []).robots == ("North", "South")
     assert first_rule(TEAM, PALETTE["prefers"], LEVEL, ["East"]).cost == 1
+    some = Decision("place", Kind.PLACE, (0, 6, 8))
+    assert first_rule(TEAM, PALETTE["rather"], some, ["East"]).settings == {"value": 6, "step": 1}
 
 
 def test_a_robot_that_is_clicked_goes_into_the_open_rule_and_out_of_it() -> None:

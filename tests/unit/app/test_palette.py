@@ -47,6 +47,13 @@ class Drawn:
             return float(abs(a - b))
         return math.dist((a % self.columns, a // self.columns), (b % self.columns, b // self.columns))
 
+    def steps_to_wish(self, robot: str) -> int:
+        """How many steps what a robot has decided is away from the rule's value: on the map, across and along."""
+        a, b = self.values[robot], self.settings["value"]
+        if not self.is_place:
+            return int(abs(a - b))
+        return int(abs(a % self.columns - b % self.columns) + abs(a // self.columns - b // self.columns))
+
     def pairs(self) -> list[tuple[str, str]]:
         return [*itertools.combinations(self.robots, 2)]
 
@@ -109,7 +116,7 @@ BROKEN: dict[str, Callable[[Drawn], int]] = {
 }
 """How often a rule is broken: the number of its links that do not hold."""
 CHARGED: dict[str, Callable[[Drawn], int]] = {
-    "rather": lambda d: sum(abs(d.values[robot] - d.settings["value"]) * d.settings["step"] for robot in d.robots),
+    "rather": lambda d: sum(d.steps_to_wish(robot) * d.settings["step"] for robot in d.robots),
     "little": lambda d: sum(d.values[robot] * d.settings["step"] for robot in d.robots),
 }
 """What a graded rule costs."""

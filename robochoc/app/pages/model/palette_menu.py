@@ -11,12 +11,12 @@ from robochoc.app.sketch.edits import with_rule
 from robochoc.app.sketch.fits import why_no_cost
 from robochoc.app.sketch.palette import Form, Opening, PaletteRule
 from robochoc.app.sketch.rules import PALETTE
-from robochoc.app.sketch.sketch import Decision, Setting, Sketch, SketchRule
+from robochoc.app.sketch.sketch import Decision, Kind, Setting, Sketch, SketchRule
 from robochoc.app.sketch.words import listed
 from robochoc.app.texts import say
 
 FIRST_COST = 1
-_PREFERENCE = "prefers"
+_PREFERENCE, _NEAR = "prefers", "rather"
 
 
 class PaletteMenu:
@@ -95,8 +95,24 @@ def first_rule(sketch: Sketch, entry: PaletteRule, decision: Decision, selected:
         chosen = (chosen or deciders)[: entry.most]
     values = sketch.values(decision)
     settings = {opening.name: _first(opening, values) for opening in entry.openings}
+    if entry.key == _NEAR and decision.kind is Kind.PLACE and len(chosen) == 1:
+        settings["value"] = _nearest(sketch, chosen[0], values)
     cost = FIRST_COST if entry.key == _PREFERENCE else None  # the graded ones have their own
     return SketchRule("", entry.key, decision.name, chosen, settings, cost)
+
+
+def _nearest(sketch: Sketch, robot: str, values: tuple[int | str, ...]) -> Setting:
+    """Return the place that is nearest to where a robot stands."""
+    drawn = sketch.robot(robot)
+    cells = [value for value in values if isinstance(value, int)]
+    if drawn is None or not cells:
+        return 0
+
+    def steps(number: int) -> int:
+        cell = sketch.area.cell(number)
+        return abs(cell.x - drawn.at.x) + abs(cell.y - drawn.at.y)
+
+    return min(cells, key=steps)
 
 
 def _first(opening: Opening, values: tuple[int | str, ...]) -> Setting:
