@@ -221,7 +221,7 @@ def _again(run: Run, version: str) -> str:
 
 def _types(run: Run) -> dict[str, int]:
     """Return how many messages of each type there were, if the result tells."""
-    with suppress(OSError, msgspec.MsgspecError, KeyError, TypeError):
+    with suppress(OSError, msgspec.MsgspecError, LookupError, TypeError, ValueError, OverflowError):
         whole: dict[str, Any] = msgspec.json.decode((run.folder / RESULT).read_bytes().splitlines()[0])
         return {str(kind): int(count) for kind, count in whole["metrics"]["messages_by_type"].items()}
     return {}
@@ -262,7 +262,9 @@ def _table(headings: Sequence[str], rows: Sequence[Sequence[object]], *, fold: b
 
 
 def _when(run: Run) -> str:
-    return datetime.fromtimestamp(run.record.started, UTC).strftime("%Y-%m-%d %H:%M UTC")
+    with suppress(OverflowError, ValueError, OSError):  # a stranger's file may say any number
+        return datetime.fromtimestamp(run.record.started, UTC).strftime("%Y-%m-%d %H:%M UTC")
+    return ""
 
 
 def _text(text: str) -> str:

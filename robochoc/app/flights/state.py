@@ -28,7 +28,10 @@ from robochoc.app.store import FILES
 
 MAX_BYTES = 256 << 20
 """Bytes of a run, unpacked."""
+MOST_SAID = 128 << 20
+"""Bytes of the messages of a run: of more, none are packed."""
 _FILES = (RECORD, SKETCH, RESULT, JOURNAL, CHANGE)
+_AT_ONCE = 1 << 20
 _PLACE = "run/1"
 _FIRST = "00001"
 
@@ -54,18 +57,28 @@ def files_archive(folder: Path, name: str) -> bytes:
 
 
 def packed(run: Run) -> bytes:
-    """Return a run and its team as one file. Raises as `team_archive`."""
+    """Return a run and its team as one file, without its messages if `is_too_long`. Raises as `team_archive`."""
     content = io.BytesIO(team_archive(run))
+    left_out = {JOURNAL} if is_too_long(run) else set()
     with zipfile.ZipFile(content, "a", zipfile.ZIP_DEFLATED) as archive:
         for name in _FILES:
-            if file := run.artefact(name):
+            if name not in left_out and (file := run.artefact(name)):
                 _add(archive, f"{file_name(run.sketch.name)}/{_PLACE}/{name}", file)
     return content.getvalue()
 
 
+def is_too_long(run: Run) -> bool:
+    """Return whether so much was said in a run that it is packed without."""
+    journal = run.artefact(JOURNAL)
+    return journal is not None and journal.stat().st_size > MOST_SAID
+
+
 def _add(archive: zipfile.ZipFile, name: str, file: Path) -> None:
     """Add a file; it has no time, so that the same makes the same archive."""
-    archive.writestr(zipfile.ZipInfo(name), file.read_bytes(), zipfile.ZIP_DEFLATED)
+    entry = zipfile.ZipInfo(name)
+    entry.compress_type = zipfile.ZIP_DEFLATED
+    with file.open("rb") as source, archive.open(entry, "w") as packed_file:
+        shutil.copyfileobj(source, packed_file, _AT_ONCE)  # a piece at a time: it may be long
 
 
 def unpack_run(file: Path, folder: Path) -> bool:

@@ -37,6 +37,13 @@ def team_of(sketch: Sketch, files: TeamFiles | None = None) -> Team:
     return read_team(files.folder) if files else model_of(sketch).team
 
 
+def fitting_protocols(team: Team, options: Options) -> tuple[tuple[str, bool], ...]:
+    """Return the protocols that accept a team, complete ones first, and whether each is complete."""
+    known = [(one.name, one.protocol.traits.complete) for one in installed_protocols() if one.protocol]
+    fit = [(name, complete) for name, complete in known if accepts(name, team, options)]
+    return tuple(sorted(fit, key=lambda one: (not one[1], one[0])))
+
+
 def fitting(sketch: Sketch, files: TeamFiles | None = None, runtime: str = Runtime.SIMULATOR) -> Fitting:
     """Return what fits the team of a sketch, or of files.
 
@@ -46,11 +53,9 @@ def fitting(sketch: Sketch, files: TeamFiles | None = None, runtime: str = Runti
     """
     team = team_of(sketch, files)
     options = Options(runtime=Runtime(runtime))
-    known = [(one.name, one.protocol.traits.complete) for one in installed_protocols() if one.protocol]
-    fit = [(name, complete) for name, complete in known if accepts(name, team, options)]
     choice = decided(team, options)
     return Fitting(
-        protocols=tuple(sorted(fit, key=lambda one: (not one[1], one[0]))),
+        protocols=fitting_protocols(team, options),
         chosen=choice.options.protocol,
         why=choice.options.chosen.get("protocol", ""),
         facts=choice.facts,

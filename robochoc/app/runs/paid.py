@@ -27,13 +27,14 @@ def paid(sketch: Sketch, assignment: Mapping[str, Value]) -> dict[str, float]:
         sketch: The sketch that was decided.
         assignment: The values, by `ROBOT.DECISION`.
     """
-    return {rule.id: _paid_for(sketch, rule, assignment) for rule in costly(sketch)}
+    rules = costly(sketch)
+    codes = _codes(model_of(msgspec.structs.replace(sketch, rules=())), assignment) if rules else {}
+    return {rule.id: _paid_for(sketch, rule, codes) for rule in rules}
 
 
-def _paid_for(sketch: Sketch, rule: SketchRule, assignment: Mapping[str, Value]) -> float:
-    model = model_of(msgspec.structs.replace(sketch, rules=(rule,)))
-    codes = _codes(model, assignment)
-    parts = [one for one in model.team.constraints() if all(name in codes for name in one.variables)]
+def _paid_for(sketch: Sketch, rule: SketchRule, codes: Mapping[str, int]) -> float:
+    team = model_of(msgspec.structs.replace(sketch, rules=(rule,))).team
+    parts = [one for one in team.constraints() if all(name in codes for name in one.variables)]
     return sum(one.price(codes) for one in parts)
 
 

@@ -21,3 +21,8 @@ def troubles(sketch: Sketch) -> list[Trouble]:
     if not any(trouble.is_error for trouble in found):
         found += [*chances.hopeless(facts), *chances.large(facts)]
     return sorted(found, key=lambda trouble: not trouble.is_error)
+
+
+def errors_of(sketch: Sketch) -> list[Trouble]:
+    """Return what keeps a sketch from being a team."""
+    return [trouble for trouble in troubles(sketch) if trouble.is_error]

@@ -16,7 +16,7 @@ from pathlib import Path
 import msgspec
 
 from robochoc.app.sketch.building import saved_team
-from robochoc.app.sketch.checks import troubles
+from robochoc.app.sketch.checks import errors_of
 from robochoc.app.sketch.shape import is_sound
 from robochoc.app.sketch.sketch import Sketch
 from robochoc.app.texts import say
@@ -98,7 +98,7 @@ def sketch_in(folder: Path, xml: Mapping[str, bytes]) -> Sketch | tuple[str, ...
         return _differing(sketch, xml) or (SKETCH_FILE,)
     if not is_sound(sketch):
         raise _damaged(path, say("edit.unsound"))
-    errors = [trouble for trouble in troubles(sketch) if trouble.is_error]
+    errors = errors_of(sketch)
     if errors:
         raise _damaged(path, errors[0].text)
     return sketch
@@ -125,7 +125,7 @@ def _digest(files: Mapping[str, bytes]) -> str:
 
 
 def _checked_team(sketch: Sketch) -> Team:
-    errors = [trouble for trouble in troubles(sketch) if trouble.is_error]
+    errors = errors_of(sketch)
     if errors:
         raise InvalidInputError(
             Diagnostic(encodable(trouble.element), 0, trouble.text, trouble.remedy) for trouble in errors

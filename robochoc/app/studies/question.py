@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import msgspec
 
-from robochoc.app.runs.fitting import team_of
+from robochoc.app.runs.fitting import fitting_protocols, team_of
 from robochoc.app.runs.prepared import TeamFiles
 from robochoc.app.sketch.sketch import MAX_LABEL, Sketch
 from robochoc.app.sketch.words import listed
@@ -13,10 +13,9 @@ from robochoc.app.texts import say
 from robochoc.experiments.study import toml_of
 from robochoc.formats.names import is_name
 from robochoc.model.problem import ProblemKind
-from robochoc.run.choice import accepts, decided
+from robochoc.run.choice import decided
 from robochoc.run.facts import Facts
 from robochoc.run.options import Options, Runtime
-from robochoc.run.registry import installed_protocols
 
 MOST_RUNS = 100
 MOST_SECONDS = 600
@@ -69,18 +68,14 @@ def possible(sketch: Sketch, files: TeamFiles | None = None) -> Possible:
     """
     team = team_of(sketch, files)
     options = Options(runtime=Runtime.SIMULATOR)
-    known = [(one.name, one.protocol.traits.complete) for one in installed_protocols() if one.protocol]
-    fit = sorted(
-        ((name, complete) for name, complete in known if accepts(name, team, options)),
-        key=lambda one: (not one[1], one[0]),
-    )
+    fit = fitting_protocols(team, options)
     chosen = decided(team, options).options.protocol
     names = [name for name, _ in fit]
     beside = next((name for name in (*_COMMON, *names) if name in names and name != chosen), None)
     usual = tuple(name for name in (chosen, beside) if name in names)
     family = None if files else family_of(sketch)
     partial = Facts(team).partially_known
-    return Possible(tuple(fit), usual, team.kind is ProblemKind.DISWCSP, family, ordered=partial)
+    return Possible(fit, usual, team.kind is ProblemKind.DISWCSP, family, ordered=partial)
 
 
 def folder_of(sketch: Sketch) -> str:

@@ -5,21 +5,18 @@ from __future__ import annotations
 from functools import cache
 from importlib.resources import files
 
-from nicegui import run, ui
+from nicegui import ui
 
 from robochoc.app.pages.compare.lines import show_lines
 from robochoc.app.pages.compare.served import REPORT
+from robochoc.app.pages.looking import Wrong, looked
 from robochoc.app.pages.numbers import whole
 from robochoc.app.pages.shell import while_shown
 from robochoc.app.projects import Project
-from robochoc.app.runs.prepared import TeamFiles
 from robochoc.app.sketch.sketch import Sketch
 from robochoc.app.studies.question import MOST_RUNS, MOST_SECONDS, Possible, Question, possible, study_of
 from robochoc.app.studies.study import ENDED, Facts, Stage, study_on
 from robochoc.app.texts import say
-from robochoc.formats import InvalidInputError
-from robochoc.modelling.places import ModelError
-from robochoc.solver.encoding import UnsupportedError
 
 _LOOK_S = 0.2
 _TEAM, _FAMILY = "team", "family"
@@ -70,13 +67,13 @@ class ComparePage:
         if sketch == self._sketch:
             return
         self._sketch = sketch
-        found = await run.io_bound(_looked_at, sketch, self._project.files)
+        found = await looked(possible, sketch, self._project.files)
         if found is None or self._sketch is not sketch:
             return
         self._asked.clear()
         self._boxes, self._text, self._start = {}, None, None
         with self._asked:
-            if isinstance(found, str):
+            if isinstance(found, Wrong):
                 ui.label(say("compare.failed", message=found)).classes("error")
             else:
                 self._possible = found
@@ -243,13 +240,6 @@ class ComparePage:
                 ui.label(say("compare.open"))
         frame = ui.element("iframe").classes("compare-report")
         frame.props(f"src={REPORT} sandbox=allow-same-origin").props["title"] = say("compare.report")
-
-
-def _looked_at(sketch: Sketch, files: TeamFiles | None) -> Possible | str:
-    try:
-        return possible(sketch, files)
-    except (ModelError, InvalidInputError, UnsupportedError, ValueError) as mistake:
-        return str(mistake)
 
 
 def _message(text: str, *, bad: bool = False) -> None:

@@ -4,18 +4,17 @@ from __future__ import annotations
 
 from math import inf
 
-from nicegui import run, ui
+from nicegui import ui
 
+from robochoc.app.pages.looking import Wrong, looked
 from robochoc.app.pages.numbers import whole
 from robochoc.app.projects import Project
 from robochoc.app.runs.fitting import Fitting, fitting
 from robochoc.app.runs.options import MAX_SEED, RunOptions
 from robochoc.app.sketch.sketch import MAX_LABEL
 from robochoc.app.texts import say
-from robochoc.formats import InvalidInputError
 from robochoc.run.defaults import AUTO
 from robochoc.run.options import Runtime
-from robochoc.solver.encoding import UnsupportedError
 
 _MOST_REASONS = 12
 
@@ -55,12 +54,11 @@ class How:
             return
         self._looked_at = sketch
         self._tell(say("decide.looking"))
-        try:
-            found = await run.io_bound(fitting, sketch, self._project.files)
-        except (ValueError, UnsupportedError, InvalidInputError) as misfit:
-            self._tell(say("decide.fits-none", why=str(misfit)))
-            return
-        if found is not None:  # the server is about to end
+        found = await looked(fitting, sketch, self._project.files)
+        if isinstance(found, Wrong):
+            self._looked_at = None  # unfolded anew, it is looked at again
+            self._tell(say("decide.fits-none", why=found))
+        elif found is not None:
             self._show(found)
 
     def _tell(self, text: str) -> None:

@@ -9,6 +9,7 @@ from nicegui import ui
 
 from robochoc.app.flights.making import RECORDING, CannotMakeError, Making, can_record, flies
 from robochoc.app.flights.names import file_name
+from robochoc.app.flights.state import MOST_SAID, is_too_long
 from robochoc.app.pages.fly.kept import REPORT, STATE, TEAM, beside
 from robochoc.app.pages.fly.stage import Stage
 from robochoc.app.texts import say
@@ -29,6 +30,8 @@ def build_tell(making: Making, stage: Stage | None) -> None:
             with _card("tell.team", "tell.team-hint"):
                 _link(say("tell.get"), "tell.team", beside(run, TEAM), file_name(name, ".zip"))
             with _card("tell.state", "tell.state-hint"):
+                if is_too_long(run):
+                    ui.label(say("tell.state-long", most=MOST_SAID >> 20)).classes("soft")
                 _link(say("tell.get"), "tell.state", beside(run, STATE), file_name(name, ".robochoc.zip"))
             with _card("tell.link", "tell.link-hint"):
                 _copy(run.id, stage)

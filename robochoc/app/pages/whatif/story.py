@@ -8,11 +8,12 @@ from __future__ import annotations
 import asyncio
 from collections.abc import Callable
 from contextlib import suppress
-from weakref import WeakKeyDictionary
 
 import msgspec
 
 from robochoc.app.listeners import Listeners
+from robochoc.app.log import noted
+from robochoc.app.pages.looking import Wrong, looked
 from robochoc.app.pages.whatif.outcome import Outcome, Part, outcome, part_of, parts_of_epochs
 from robochoc.app.projects import Project
 from robochoc.app.runs.options import RunOptions
@@ -134,6 +135,8 @@ class Story:
             self.run.on_change(self._followed)
         except (ModelError, InvalidInputError) as mistake:
             self.run, self.message = None, str(mistake)
+        except Exception as fault:  # noqa: BLE001 - told, and kept in the file of errors
+            self.run, self.message = None, noted(fault, "what if")
         finally:
             self.preparing = False
             self._tell()
@@ -149,7 +152,15 @@ class Story:
         return self._listeners.add(callback)
 
     def _followed(self) -> None:
-        """Follow both runs: the second one begins when the first one has ended."""
+        """Follow both runs, and say if that goes wrong."""
+        try:
+            self._follow()
+        except Exception as fault:  # noqa: BLE001 - told, and kept in the file of errors
+            self.message = noted(fault, "what if")
+        self._tell()
+
+    def _follow(self) -> None:
+        """Begin the second run when the first one has ended, and find the outcome when both have."""
         run, kept = self.run, self.kept
         if run and kept and run.state is not State.RUNNING:
             if self.beside is None and run.state is State.ENDED and run.result and self._wants_beside(run):
@@ -161,14 +172,16 @@ class Story:
                 self.beside.on_change(self._followed)
             elif self.outcome is None and self._task is None and not self.running:
                 self._later(self._conclude)
-        self._tell()
 
     def _later(self, work: Callable[[], Outcome | None]) -> None:
         """Find the outcome beside the event loop: of a large team it takes its time."""
 
         async def concluded() -> None:
-            found = await asyncio.to_thread(work)
-            self.outcome = found
+            found = await looked(work)
+            if isinstance(found, Wrong):
+                self.message = found
+            else:
+                self.outcome = found
             self.preparing = False
             self._tell()
 
@@ -235,14 +248,9 @@ class Story:
         self._listeners()
 
 
-_STORIES: WeakKeyDictionary[Project, Story] = WeakKeyDictionary()
-
-
 def story_of(project: Project) -> Story:
     """Return what has happened to a team, the same object for all pages that show it."""
-    if project not in _STORIES:
-        _STORIES[project] = Story(project)
-    return _STORIES[project]
+    return project.part(Story)
 
 
 def goes_on(protocol: str) -> bool:

@@ -6,8 +6,10 @@ from html.parser import HTMLParser
 from pathlib import Path
 
 import msgspec
+import pytest
 
 from robochoc.app.flights.report import Pages, report, summary
+from robochoc.app.runs.options import RESULT
 from robochoc.app.sketch.sketch import SketchRobot
 from tests.support.kept_runs import cube, kept_run
 
@@ -95,3 +97,12 @@ def test_without_an_answer_it_says_so(tmp_path: Path) -> None:
     run.result = None
     assert summary(sketch, run) == "There is no answer."
     assert b"Who decided what" not in report(sketch, run, Pages(), "1")
+
+
+@pytest.mark.parametrize("started", [1e300, -1e300, float("inf"), float("nan")])
+def test_a_strangers_numbers_are_no_error(tmp_path: Path, started: float) -> None:
+    run = kept_run(tmp_path, cube())
+    run.record.started = started
+    result = run.folder / RESULT
+    result.write_bytes(result.read_bytes().replace(b'"CPA":12', b'"CPA":1e400'))
+    assert b"</html>" in report(cube(), run, Pages(), "1.0")

@@ -10,7 +10,7 @@ from pathlib import Path
 import msgspec
 import pytest
 
-from robochoc.app.flights.state import MAX_BYTES, packed, unpack_run
+from robochoc.app.flights.state import MAX_BYTES, is_too_long, packed, unpack_run
 from robochoc.app.foreign.drawing import drawn
 from robochoc.app.runs.runs import Runs
 from robochoc.app.sketch.opening import ForeignTeam, opened
@@ -123,3 +123,12 @@ def test_the_run_of_a_team_of_files_comes_back_with_its_files(tmp_path: Path) ->
     assert there is not None
     assert there.result == run.read_result()
     assert read_team(there.team) == read_team(files)
+
+
+def test_too_long_a_journal_is_left_out(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    run = kept_run(tmp_path, cube())
+    monkeypatch.setattr("robochoc.app.flights.state.MOST_SAID", 12)
+    assert is_too_long(run)
+    with zipfile.ZipFile(io.BytesIO(packed(run))) as archive:
+        assert not any(name.endswith("run.journal") for name in archive.namelist())
+        assert any(name.endswith("result.json") for name in archive.namelist())

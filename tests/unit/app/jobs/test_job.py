@@ -16,7 +16,6 @@ from robochoc.app.jobs.job import EndedError, Job, LateError, call_here, end_all
 from robochoc.app.jobs.process import Command, Finished
 from robochoc.app.listeners import Listeners
 from robochoc.app.log import FAULTS
-from tests.support.leftovers import nothing_left_behind
 from tests.support.limits import HANG_S, wait_until
 
 ENDLESS = """
@@ -33,10 +32,9 @@ while True:
 
 @pytest.fixture(autouse=True)
 def nothing_stays() -> Iterator[None]:
-    """Whatever a test starts is gone afterwards, children of children as well."""
-    with nothing_left_behind():
-        yield
-        end_all(HANG_S)
+    """End what a test has started; all tests look that nothing is left."""
+    yield
+    end_all(HANG_S)
 
 
 @pytest.fixture
