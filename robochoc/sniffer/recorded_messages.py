@@ -42,15 +42,14 @@ class RunProtocols:
     def of_run(self, run: int) -> tuple[str, type[Protocol]] | None:
         """Return the name and the class of a run's protocol; None if it is not installed."""
         if run not in self._found:
-            self._found[run] = _installed(self._trace, run)
+            self._found[run] = installed_protocol(self._trace.runs[run].protocol, self._trace.header.protocol)
         return self._found[run]
 
     def message_types(self, run: int) -> Mapping[str, type[Message]]:
         """Return the message types of a run's protocol by name; none if it is not installed."""
         if run not in self._types:
             found = self.of_run(run)
-            kinds = message_types(found[1]) if found else ()
-            self._types[run] = {kind.__name__: kind for kind in kinds}
+            self._types[run] = types_by_name(found[1]) if found else {}
         return self._types[run]
 
     def type_of(self, message: int) -> type[Message] | None:
@@ -96,13 +95,22 @@ def _declared(kind: type[Message]) -> StructType:
     return cast("StructType", type_info(kind))
 
 
-def _installed(trace: Trace, run: int) -> tuple[str, type[Protocol]] | None:
-    """Return the protocol of a run; journals name it by its class, or in a run without a beginning by its name."""
-    name = trace.runs[run].protocol
-    if name == trace.header.protocol:
+def types_by_name(protocol: type[Protocol]) -> Mapping[str, type[Message]]:
+    """Return the types of all messages of a protocol, by their names in journals."""
+    return {kind.__name__: kind for kind in message_types(protocol)}
+
+
+def installed_protocol(name: str, asked: str) -> tuple[str, type[Protocol]] | None:
+    """Return the name and the class of a run's protocol; None if it is not installed.
+
+    Args:
+        name: What the run's beginning calls it: its class; in a run without a beginning, its name.
+        asked: The protocol that was asked for: what the journal's header calls it.
+    """
+    if name == asked:
         with suppress(UnknownProtocolError):
             return name, protocol_or_first_fit(name)
-    return protocol_by_class(name, [trace.header.protocol])
+    return protocol_by_class(name, [asked])
 
 
 def _with_infinity(value: Any, declared: Type) -> Any:  # noqa: ANN401 - fields are of any type

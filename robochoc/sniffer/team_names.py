@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from typing import NamedTuple
 
 from robochoc.formats import InvalidInputError
@@ -14,12 +14,39 @@ from robochoc.sniffer.recorded_messages import RunProtocols
 from robochoc.sniffer.trace import Trace
 
 
-class _RunNames(NamedTuple):
+class RunNames(NamedTuple):
+    """The names that a run's messages need; empty where the team is not known.
+
+    Attributes:
+        order: All robots, the highest priority first.
+        interfaces: By robot, the variables whose values its messages hold.
+        symbols: By symbolic variable, the names that its values stand for.
+        tree: The pseudo-tree that the order induces, where the protocol works on it.
+    """
+
     order: tuple[str, ...] = ()
-    interfaces: Mapping[str, tuple[str, ...]] = {}
-    symbols: Mapping[str, tuple[str, ...]] = {}
+    interfaces: Mapping[str, Sequence[str]] = {}
+    symbols: Mapping[str, Sequence[str]] = {}
     tree: PseudoTree | None = None
-    """The pseudo-tree that the order induces, where the protocol works on it."""
+
+    def wording(self, sender: str, receiver: str, *, on_tree: bool) -> Wording:
+        """Return the words for a message; `on_tree`: the protocol works on the order's pseudo-tree."""
+        branch = self.order
+        if on_tree:
+            known = self.tree if self.tree and sender in self.tree.parents else None
+            branch = (*reversed(known.ancestors(sender)), sender) if known else ()
+        return Wording(sender, receiver, self.order, self.interfaces, branch, self.symbols)
+
+
+def run_names(team: Team, *, on_tree: bool) -> RunNames:
+    """Return the names of the robots and variables of `team`."""
+    tree = None
+    if on_tree:
+        parents = {robot.name: [parent.name for parent in robot.parents] for robot in team.robots}
+        tree = PseudoTree.induced(team.order, parents)
+    interfaces = {robot.name: robot.interface for robot in team.robots}
+    symbols = {name: one.domain.symbols for name, one in team.variables.items() if one.domain.symbols}
+    return RunNames(tuple(team.order), interfaces, symbols, tree)
 
 
 class _Seen(Mapping[str, tuple[str, ...]]):
@@ -50,7 +77,7 @@ class TeamNames:
         self._protocols = protocols
         self._teams: list[Team | None] = []
         self._reader = TeamReader()
-        self._known: dict[int, _RunNames] = {}
+        self._known: dict[int, RunNames] = {}
 
     def variables(self, robot: str) -> list[str]:
         """Return all known variables of a robot."""
@@ -63,12 +90,9 @@ class TeamNames:
     def wording(self, run: int, sender: str, receiver: str) -> Wording:
         """Return the words for a message of a run."""
         names = self._of_run(run)
-        interfaces = names.interfaces or _Seen(self._trace.variables)
-        branch = names.order
-        if self._works_on_tree(run):
-            known = names.tree if names.tree and sender in names.tree.parents else None
-            branch = (*reversed(known.ancestors(sender)), sender) if known else ()
-        return Wording(sender, receiver, names.order, interfaces, branch, names.symbols)
+        if not names.interfaces:
+            names = names._replace(interfaces=_Seen(self._trace.variables))
+        return names.wording(sender, receiver, on_tree=self._works_on_tree(run))
 
     def labelled(self, values: Mapping[str, int]) -> Mapping[str, int | str]:
         """Return decided values, with the names of symbols as far as the last run that is known tells them."""
@@ -84,19 +108,12 @@ class TeamNames:
         found = self._protocols.of_run(run)
         return found is not None and found[1].traits.tree
 
-    def _of_run(self, number: int) -> _RunNames:
+    def _of_run(self, number: int) -> RunNames:
         if number not in self._known:
             team = self._team(number)
             if team is None:
-                return _RunNames()
-            tree = None
-            if self._works_on_tree(number):
-                tree = PseudoTree.induced(
-                    team.order, {robot.name: [parent.name for parent in robot.parents] for robot in team.robots}
-                )
-            interfaces = {robot.name: robot.interface for robot in team.robots}
-            symbols = {name: one.domain.symbols for name, one in team.variables.items() if one.domain.symbols}
-            self._known[number] = _RunNames(tuple(team.order), interfaces, symbols, tree)
+                return RunNames()
+            self._known[number] = run_names(team, on_tree=self._works_on_tree(number))
         return self._known[number]
 
     def _team(self, number: int) -> Team | None:
