@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
-from robochoc.app.sketch.sketch import Value
+from collections.abc import Callable
+
+from robochoc.app.sketch.sketch import Sketch, Value
+from robochoc.app.sketch.words import value_in_short
 from robochoc.modelling.model import Model
 
 
@@ -11,6 +14,11 @@ def value_of(model: Model, variable: str, code: int) -> Value:
     told = model.variables[variable].codes.told or {}
     value = told.get(code, code)
     return value if isinstance(value, (int, str)) else str(value)
+
+
+def label_of(model: Model, variable: str, code: int) -> Value:
+    """Return the user's value that a code of a variable stands for; the code, if the team has no such variable."""
+    return value_of(model, variable, code) if variable in model.variables else code
 
 
 def labels_of(model: Model) -> dict[str, str]:
@@ -24,3 +32,16 @@ def labels_of(model: Model) -> dict[str, str]:
             if label != value:
                 found[label] = value
     return found
+
+
+def called_in(model: Model, sketch: Sketch) -> Callable[[str, int], str]:
+    """Return what tells a code of a variable in short, as the user knows it: a cell as `(2, 3)`."""
+    decisions = {f"{robot}.{one.name}": one for one in sketch.decisions for robot in sketch.deciders(one)}
+
+    def called(variable: str, code: int) -> str:
+        if variable not in model.variables:
+            return str(code)
+        value, decision = value_of(model, variable, code), decisions.get(variable)
+        return value_in_short(sketch, decision, value) if decision else str(value)
+
+    return called

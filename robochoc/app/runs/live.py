@@ -9,11 +9,13 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import BinaryIO
 
+from robochoc.app.runs.tape import Said, in_words
 from robochoc.app.sketch.sketch import Value
 from robochoc.journal.entries import JournalError
 from robochoc.journal.events import Began, Decided, Heard, Sent
 from robochoc.journal.reader import Follower
 from robochoc.model.problem import INFINITE
+from robochoc.sniffer.spoken import Called, Spoken
 from robochoc.verification.objective import Objective
 
 RECENT_S = 1.0
@@ -22,6 +24,10 @@ SETTLED_S = 1.0
 """A value that stays for so long looks settled."""
 AT_ONCE = 5_000
 """So many entries are read in one go."""
+READ_S = 0.1
+"""Entries are read for so long at a time, then others get their turn."""
+LAST = 8
+"""So many of the last messages are kept in words."""
 MOST_COSTS = 300
 """Points of the falling cost that are kept."""
 
@@ -37,6 +43,7 @@ class Live:
         costs: The costs of the answers so far: seconds since the start, and the cost. They fall.
         recent: The messages of the last second: how many went from whom to whom.
         is_cut: Whether the last messages were not read, since the run had ended and there were too many.
+        said: The last messages in words, the last one first.
     """
 
     messages: int = 0
@@ -45,6 +52,7 @@ class Live:
     costs: list[tuple[float, float]] = field(default_factory=list)
     recent: Counter[tuple[str, str]] = field(default_factory=Counter)
     is_cut: bool = False
+    said: tuple[Said, ...] = ()
 
     def settled(self, robot: str) -> bool:
         """Return whether a robot has kept its values for a while."""
@@ -55,16 +63,22 @@ class LiveReader:
     """Follows the journal at `file`, which need not be there yet, and keeps `live` up to date. Memory is bounded.
 
     `label` says what the code of a variable's value stands for; `objective`, what assignments cost (None: nothing is
-    minimised, or the problem changes).
+    minimised, or the problem changes); `called`, what values are called in messages.
     """
 
     def __init__(
-        self, file: Path, live: Live, label: Callable[[str, int], Value], objective: Objective | None = None
+        self,
+        file: Path,
+        live: Live,
+        label: Callable[[str, int], Value],
+        objective: Objective | None = None,
+        called: Called | None = None,
     ) -> None:
         self._file = file
         self._live = live
         self._label = label
         self._objective = objective
+        self._spoken = Spoken(called)
         self._best: float = INFINITE
         self._open: BinaryIO | None = None
         self._follower: Follower | None = None
@@ -72,31 +86,46 @@ class LiveReader:
         self._bunches: deque[tuple[float, Counter[tuple[str, str]]]] = deque()
 
     def advance(self) -> bool:
-        """Read what is new, up to a limit; return whether there was something."""
+        """Read what is new, for a short while; return whether there was something."""
         if self._follower is None and self._file.is_file():
             self._open = self._file.open("rb")
             self._follower = Follower(self._open)
         if self._follower is None:
             return False
+        began, anything = time.monotonic(), False
+        while time.monotonic() - began < READ_S and self._read(self._follower):
+            anything = True
+        self._forget_old(time.monotonic())
+        return anything
+
+    def _read(self, follower: Follower) -> bool:
+        """Read a few entries; return whether there were some."""
         try:
-            entries = self._follower.read(AT_ONCE)
+            entries = follower.read(AT_ONCE)
         except JournalError:  # not even its beginning is there: the run has its own words on that
             return False
         now = time.monotonic()
         bunch: Counter[tuple[str, str]] = Counter()
+        last: deque[Sent] = deque(maxlen=LAST)
         for entry in entries:
             match entry:
                 case Sent():
                     bunch[entry.sender, entry.receiver] += 1
+                    last.append(entry)
                 case Decided():
                     self._decided(entry, now)
                 case Heard():
                     self._improved(entry.cost, now)
                 case Began():
                     self._live.values.clear()
+                    self._spoken.follow(entry)
                 case _:
-                    pass
-        self._spoken(bunch, now)
+                    self._spoken.follow(entry)
+        if bunch:
+            self._live.messages += bunch.total()
+            self._bunches.append((now, bunch))
+            said = [in_words(sent, self._spoken) for sent in reversed(last)]
+            self._live.said = (*said, *self._live.said)[:LAST]
         return bool(entries)
 
     def close(self) -> None:
@@ -107,6 +136,8 @@ class LiveReader:
             self._open = None
 
     def _decided(self, event: Decided, now: float) -> None:
+        if self._objective and event.robot not in self._objective.interfaces:
+            return
         values = {name: self._label(name, value) for name, value in event.assignment.items()}
         if self._live.values.get(event.robot) != values:
             self._live.values[event.robot] = values
@@ -124,10 +155,8 @@ class LiveReader:
         if len(costs) > MOST_COSTS:  # every other point is enough, but the last one
             del costs[1:-1:2]
 
-    def _spoken(self, bunch: Counter[tuple[str, str]], now: float) -> None:
-        self._live.messages += bunch.total()
-        if bunch:
-            self._bunches.append((now, bunch))
+    def _forget_old(self, now: float) -> None:
+        """Keep the messages of the last second, and count them."""
         while self._bunches and now - self._bunches[0][0] > RECENT_S:
             self._bunches.popleft()
         recent: Counter[tuple[str, str]] = Counter()

@@ -9,11 +9,12 @@ from functools import partial
 from pathlib import Path
 
 from robochoc.app.foreign.facts import domains_of
-from robochoc.app.runs.labels import labels_of, value_of
+from robochoc.app.runs.labels import called_in, label_of, labels_of
 from robochoc.app.runs.run import Run
+from robochoc.app.sketch.building import model_of
 from robochoc.app.sketch.sketch import Sketch, Value
 from robochoc.formats import read_team, write_team
-from robochoc.model.problem import Change, Domain, ScenarioEvent, Team
+from robochoc.model.problem import AddAgent, Change, Domain, Robot, ScenarioEvent, Team
 from robochoc.modelling.model import Model
 
 
@@ -25,11 +26,18 @@ class Prepared:
         team: The team.
         label: Returns the user's value that a code of a variable stands for.
         labels: The user's values that files say otherwise, by what files say.
+        called: Returns the user's value in short, as it stands in what robots say.
     """
 
     team: Team
     label: Callable[[str, int], Value]
     labels: dict[str, str]
+    called: Callable[[str, int], str]
+
+    @property
+    def robots(self) -> list[str]:
+        """The names of all robots, those that join included."""
+        return [robot.name for robot in _robots(self.team)]
 
 
 @dataclass(frozen=True)
@@ -51,7 +59,7 @@ def from_sketch(run: Run, model: Callable[[Sketch], Model]) -> Prepared:
     """Write the files of a run's sketch, of which `model` makes a model. Raises what that raises, or `OSError`."""
     made = model(run.sketch)
     made.save(run.team)
-    return Prepared(made.team, partial(_drawn_label, made), labels_of(made))
+    return _drawn(made, run.sketch)
 
 
 def from_files(run: Run, files: TeamFiles) -> Prepared:
@@ -65,12 +73,29 @@ def from_files(run: Run, files: TeamFiles) -> Prepared:
         write_team(team, run.team)
     else:
         shutil.copytree(files.folder, run.team)
-    return Prepared(team, partial(_label, domains_of(team)), {})
+    return _found(team)
+
+
+def from_before(run: Run) -> Prepared:
+    """Return what a run had decided, from its folder. Raises what `from_sketch` and `from_files` raise."""
+    if run.record.flies is not None:  # it was not drawn here
+        return _found(read_team(run.team))
+    return _drawn(model_of(run.sketch), run.sketch)
+
+
+def _robots(team: Team) -> tuple[Robot, ...]:
+    joining = (change.robot for event in team.scenario for change in event.changes if isinstance(change, AddAgent))
+    return (*team.robots, *joining)
+
+
+def _drawn(model: Model, sketch: Sketch) -> Prepared:
+    return Prepared(model.team, partial(label_of, model), labels_of(model), called_in(model, sketch))
+
+
+def _found(team: Team) -> Prepared:
+    domains = domains_of(team)
+    return Prepared(team, partial(_label, domains), {}, lambda name, code: str(_label(domains, name, code)))
 
 
 def _label(domains: Mapping[str, Domain], name: str, code: int) -> Value:
     return domains[name].label(code) if name in domains else code
-
-
-def _drawn_label(model: Model, name: str, code: int) -> Value:
-    return value_of(model, name, code) if name in model.variables else code

@@ -62,7 +62,8 @@ def _reader(run: Run, prepare: Callable[[Run], Prepared]) -> LiveReader:
     withdraw = Withdrawal.MINIMUM if run.record.options.withdraw else None
     objective = objective_to_record(ready.team, Options(withdraw=withdraw))
     run.record.labels = ready.labels
-    return LiveReader(run.folder / JOURNAL, run.live, ready.label, objective() if objective else None)
+    weighed = objective() if objective else None
+    return LiveReader(run.folder / JOURNAL, run.live, ready.label, weighed, ready.called)
 
 
 def _command(run: Run) -> Command:

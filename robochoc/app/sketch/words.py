@@ -57,6 +57,14 @@ def value_words(sketch: Sketch, decision: Decision, value: int | str) -> str:
     return str(value)
 
 
+def value_in_short(sketch: Sketch, decision: Decision, value: int | str) -> str:
+    """Return a value as it stands in pictures: a cell of the map as its column and row, from 1."""
+    if decision.kind is Kind.PLACE and isinstance(value, int):
+        cell = sketch.area.cell(value)
+        return f"({cell.x + 1}, {cell.y + 1})"
+    return str(value)
+
+
 def listed(names: Sequence[str], most: int = MOST_NAMED) -> str:
     """Return names as in a sentence: "A", "A and B", "A, B and C", "A, B, C and 5 others"."""
     if not names:

@@ -17,11 +17,13 @@ from robochoc.app.pages.decide.picture import falling_svg, team_svg, values_of
 from robochoc.app.pages.foreign.answer import says_of
 from robochoc.app.pages.foreign.answer import table_html as answers_html
 from robochoc.app.pages.foreign.below import ForeignDoors, show_foreign_below
+from robochoc.app.pages.decide.talk import Talk
 from robochoc.app.pages.shell import while_shown
 from robochoc.app.projects import Project
 from robochoc.app.runs.result import RunResult
 from robochoc.app.runs.run import Run, State
 from robochoc.app.runs.runs import runs_of
+from robochoc.app.runs.tape import Tape
 from robochoc.app.sketch.checks import troubles
 from robochoc.app.sketch.sketch import Sketch, Value
 from robochoc.app.texts import say
@@ -29,6 +31,8 @@ from robochoc.app.texts import say
 PURPOSE = "decide"
 MOST_LIVE = 300
 """Of more robots, the picture is drawn when they have decided."""
+SHORT_S = 3.0
+"""Of a run that took no longer, nobody has seen what was said."""
 
 
 def build_decide(project: Project) -> None:
@@ -49,6 +53,7 @@ class _Page:
         self._answered: tuple[object, ...] = ()
         self._told_below: tuple[object, ...] = ()
         self._doors: Doors | ForeignDoors | None = None
+        self._pressed: Run | None = None
         with ui.element("h1"):
             ui.label(say("decide.title"))
         with ui.element("section").classes("decide-top"):
@@ -64,6 +69,7 @@ class _Page:
                 self._picture = ui.html("", sanitize=False)
                 self._legend = ui.label(say("decide.legend")).classes("soft small")
                 self._falling = ui.html("", sanitize=False).classes("cost-line")
+                self._talk = Talk(self._draw)
             self._answer = ui.element("section").classes("panel answer")
         self._below = ui.element("div").classes("decide-below")
         while_shown(project.on_change(self._follow_team))
@@ -85,7 +91,7 @@ class _Page:
     def _decide(self, *, withdraw: bool = False) -> None:
         sketch = self._project.sketch
         options = self._how.options(withdraw=withdraw, scene=sketch.flies)
-        self._runs.start(options, files=self._project.files, purpose=PURPOSE)
+        self._pressed = self._runs.start(options, files=self._project.files, purpose=PURPOSE)
 
     def _follow_latest(self) -> None:
         """Show the run that was started last, perhaps in another tab."""
@@ -122,6 +128,7 @@ class _Page:
         running = shown is not None and shown.state is State.RUNNING
         self._show_button(running=running)
         self._show_live(shown, sketch)
+        self._show_talk(shown)
         changed = shown is not None and sketch != self._project.sketch
         now = (shown, shown and shown.state, shown and shown.result, changed)
         if now != self._answered:
@@ -150,10 +157,35 @@ class _Page:
             self._go.set_enabled(not any(self._not_ready))
         self._status.set_text(say("decide.running") if running else "")
 
+    def _show_talk(self, shown: Run | None) -> None:
+        """Show what the robots say. Who has pressed the button sees a short conversation afterwards, played slowly."""
+        if shown is not None and shown.state is State.RUNNING:
+            self._talk.tell(shown.live.said)
+            return
+        self._talk.offer(shown if shown and shown.result else None)
+        if shown is not None and shown is self._pressed:
+            self._pressed = None
+            if shown.state is State.ENDED and shown.seconds < SHORT_S:
+                self._talk.begin()
+
+    def _draw(self) -> None:
+        """Draw the picture again: the conversation that is played back is at another moment."""
+        self._show_live(self._run, self._sketch())
+
+    def _show_moment(self, sketch: Sketch, tape: Tape, number: int) -> None:
+        values = values_of(sketch, tape.values_at(number))
+        spoken = dict(tape.moments[number].links)
+        self._picture.set_content(team_svg(sketch, values, unsettled=tape.unsettled_at(number), spoken=spoken))
+
     def _show_live(self, shown: Run | None, sketch: Sketch) -> None:
         self._legend.set_visibility(decides_places(sketch))
         if shown is None:
             self._picture.set_content(team_svg(sketch, {}))
+            return
+        played = self._talk.shown
+        self._picture.classes(add="playing" if played else "", remove="" if played else "playing")
+        if played:
+            self._show_moment(sketch, *played)
             return
         live, result = shown.live, shown.result
         running = shown.state is State.RUNNING

@@ -7,6 +7,7 @@ from html import escape
 
 from robochoc.app.pages.decide.ground import Target, brief, decides_places, goers_svg, homes, map_svg, view_box
 from robochoc.app.sketch.sketch import Cell, Decision, Kind, Sketch, Value
+from robochoc.app.sketch.words import value_in_short
 from robochoc.app.texts import say
 
 UNIT = 56
@@ -29,15 +30,8 @@ def values_of(sketch: Sketch, assignment: Mapping[str, Value]) -> dict[str, str]
         for robot in sketch.deciders(decision):
             value = assignment.get(f"{robot}.{decision.name}")
             if value is not None:
-                said.setdefault(robot, []).append(_short(sketch, decision, value))
+                said.setdefault(robot, []).append(value_in_short(sketch, decision, value))
     return {robot: " · ".join(values) for robot, values in said.items()}
-
-
-def _short(sketch: Sketch, decision: Decision, value: Value) -> str:
-    if decision.kind is Kind.PLACE and isinstance(value, int):
-        cell = sketch.area.cell(value)
-        return f"({cell.x + 1}, {cell.y + 1})"
-    return str(value)
 
 
 def team_svg(
