@@ -16,6 +16,7 @@ from robochoc.journal.events import Began, Decided, Heard, Sent
 from robochoc.journal.reader import Follower
 from robochoc.model.problem import INFINITE
 from robochoc.sniffer.spoken import Called, Spoken
+from robochoc.solver.exact_costs import EXACT
 from robochoc.verification.objective import Objective
 
 RECENT_S = 1.0
@@ -147,7 +148,7 @@ class LiveReader:
                 self._improved(self._objective.cost, now)
 
     def _improved(self, cost: float, now: float) -> None:
-        if self._objective is None or cost >= self._best:
+        if self._objective is None or not 0 <= cost < self._best or cost > EXACT:
             return
         self._best = cost
         costs = self._live.costs

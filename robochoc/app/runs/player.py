@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from math import isfinite
+from math import isnan
 
 LEAST_S, MOST_S, PER_MOMENT_S = 3.0, 10.0, 0.15
 """A conversation is played in this time, however many moments it has."""
@@ -58,7 +58,7 @@ class Player:
 
     def seek(self, moment: object) -> None:
         """Pause at a moment; what is none, as browsers may say anything, changes nothing."""
-        if isinstance(moment, (int, float)) and isfinite(moment):
+        if isinstance(moment, (int, float)) and not (isinstance(moment, float) and isnan(moment)):
             self.playing = False
             self._at = float(min(max(moment, 0), self.count - 1))
 

@@ -1,0 +1,151 @@
+"""The conversation of a run that is over: its moments, how it is read, and how it is played back."""
+
+from __future__ import annotations
+
+from contextlib import suppress
+from pathlib import Path
+from random import Random
+
+import msgspec
+import pytest
+
+from robochoc.app.runs.player import LEAST_S, MOST_S, Player
+from robochoc.app.runs.tape import MOST_MOMENTS, WORDS_KEPT, Tape, recorded
+from robochoc.journal.entries import JournalEntry, JournalError
+from robochoc.journal.events import Began, Decided, Sent
+from robochoc.journal.journal import Header, JournalRecorder
+from robochoc.sniffer.growing_file import NoFileError
+
+HEADER = Header(team="t", protocol="syncbb", runtime="processes", seed=0)
+SENT = Sent(t=0, sender="A", receiver="B", type="Hello", content={"number": 0}, bytes=1, clock=0)
+ROBOTS = ["A", "B", "C"]
+
+
+def _tape(robots: list[str] = ROBOTS) -> Tape:
+    return Tape(robots, lambda _, code: code, lambda _, code: str(code))
+
+
+def _said(number: int, t: float | None = None, sender: str = "A", receiver: str = "B") -> Sent:
+    time = float(number if t is None else t)
+    content = {"number": number}
+    return msgspec.structs.replace(SENT, t=time, content=content, sender=sender, receiver=receiver)
+
+
+def _decided(robot: str, value: int, t: float = 0) -> Decided:
+    return Decided(t=t, robot=robot, assignment={f"{robot}.d": value}, clock=0)
+
+
+def _taken(*entries: JournalEntry) -> Tape:
+    tape = _tape()
+    for entry in (HEADER, Began(t=0, protocol="syncbb"), *entries):
+        tape.take(entry)
+    tape.end()
+    return tape
+
+
+def test_that_each_message_of_a_short_conversation_is_a_moment() -> None:
+    tape = _taken(_decided("A", 1), _said(1), _decided("B", 2), _said(2, sender="B", receiver="C"), _decided("B", 3))
+    assert [moment.count for moment in tape.moments] == [1, 1]
+    assert [tape.values_at(number) for number in range(2)] == [{"A.d": 1, "B.d": 2}, {"A.d": 1, "B.d": 3}]
+    assert [tape.unsettled_at(number) for number in range(2)] == [{"B"}, set()]
+    assert [tape.messages_at(number) for number in range(2)] == [1, 2]
+    assert [dict(moment.links) for moment in tape.moments] == [{("A", "B"): 1}, {("B", "C"): 1}]
+    assert [one.words for one in tape.said_at(1, 9)] == ["Hello (inform): number = 2", "Hello (inform): number = 1"]
+
+
+def test_that_strangers_are_no_part_of_it() -> None:
+    tape = _taken(_said(1, sender="X"), _said(2, receiver="X"), _decided("X", 1), _said(3))
+    assert (tape.messages, tape.values_at(0)) == (1, {})
+
+
+@pytest.mark.parametrize("count", [1, MOST_MOMENTS, 2 * MOST_MOMENTS, 2 * MOST_MOMENTS + 1, 20_011])
+def test_that_a_long_conversation_has_few_moments_and_nothing_is_lost(count: int) -> None:
+    chance, entries = Random(count), list[JournalEntry]()
+    now: dict[str, int] = {}
+    for number in range(count):
+        entries.append(_said(number))
+        if chance.random() < 0.3:
+            robot = chance.choice(ROBOTS)
+            now[f"{robot}.d"] = number
+            entries.append(_decided(robot, number))
+    tape = _taken(*entries)
+    assert len(tape.moments) <= 2 * MOST_MOMENTS
+    assert sum(moment.count for moment in tape.moments) == tape.messages == count
+    assert tape.values_at(len(tape.moments) - 1) == now
+    assert sum(sum(moment.links.values()) for moment in tape.moments) == count
+    assert all(len(moment.said) <= WORDS_KEPT for moment in tape.moments)
+    assert tape.said_at(len(tape.moments) - 1, 1)[0].words == f"Hello (inform): number = {count - 1}"
+    if count <= 2 * MOST_MOMENTS:
+        assert all(moment.count == 1 for moment in tape.moments)
+
+
+def _written(file: Path, *events: Sent | Decided | Began) -> Path:
+    recorder = JournalRecorder(HEADER)
+    for event in events:
+        recorder(event)
+    file.write_bytes(recorder.content())
+    return file
+
+
+def test_that_it_is_read_in_the_order_of_time(tmp_path: Path) -> None:
+    file = _written(tmp_path / "j", Began(t=0, protocol="syncbb"), _said(3, 3), _said(1, 1), _said(2, 2))
+    tape = recorded(file, _tape())
+    assert [moment.said[0].words[-1] for moment in tape.moments] == ["1", "2", "3"]
+    assert tape.is_whole
+
+
+def test_that_a_journal_that_broke_off_is_read_to_there(tmp_path: Path) -> None:
+    file = _written(tmp_path / "j", *(_said(number) for number in range(9_000)))
+    file.write_bytes(file.read_bytes()[:-100])
+    assert recorded(file, _tape()).messages > 0
+
+
+def test_that_nobody_reads_on_when_nobody_waits(tmp_path: Path) -> None:
+    file = _written(tmp_path / "j", *(_said(number) for number in range(9_000)))
+    tape = recorded(file, _tape(), wanted=lambda: False)
+    assert not tape.is_whole
+
+
+@pytest.mark.parametrize("content", [b"", b"nonsense", b"{}\n"])
+def test_that_what_is_no_journal_is_refused(tmp_path: Path, content: bytes) -> None:
+    (tmp_path / "j").write_bytes(content)
+    with suppress(JournalError):
+        assert recorded(tmp_path / "j", _tape()).messages == 0
+    with pytest.raises(NoFileError):
+        recorded(tmp_path, _tape())
+
+
+@pytest.mark.parametrize(("count", "seconds"), [(1, LEAST_S), (38, 5.7), (400, MOST_S)])
+def test_that_it_is_played_in_a_time_that_can_be_followed(count: int, seconds: float) -> None:
+    player = Player(count)
+    player.toggle()
+    ticks, seen = 0, []
+    while player.playing:
+        seen.append(player.moment)
+        player.advance(0.1)
+        ticks += 1
+    assert abs(ticks * 0.1 - seconds) < 0.25
+    assert seen[0] == 0
+    assert seen == sorted(seen)
+    assert player.ended
+    player.toggle()
+    assert (player.moment, player.playing) == (0, True)
+
+
+def test_that_steps_and_seeks_pause_and_stay_within() -> None:
+    player = Player(10)
+    player.toggle()
+    player.step(-3)
+    assert (player.moment, player.playing) == (0, False)
+    player.step(1)
+    assert player.moment == 1
+    for odd in (None, "3", float("nan"), [2], True):
+        player.seek(odd)
+    assert player.moment == 1
+    player.seek(10**400)
+    assert player.moment == 9
+    for odd in (None, "fast", 1e9, -1):
+        player.hurry(odd)
+    assert player.speed == 1.0
+    player.hurry(0.25)
+    assert player.speed == 0.25
