@@ -34,7 +34,7 @@ def _told(tab: WatchedPage, words: str) -> None:
 
 def test_a_team_decides_and_another_tab_sees_it(browser: Any, application: AppServer, teams: Store) -> None:  # noqa: ANN401 - Playwright's
     team = teams.add(slots(5, 5))
-    with watched_page(browser) as one, watched_page(browser) as other:
+    with watched_page(browser, reduced_motion="reduce") as one, watched_page(browser) as other:
         _opened(one, application, team)
         _opened(other, application, team)
         one.page.focus(GO)
@@ -50,6 +50,40 @@ def test_a_team_decides_and_another_tab_sees_it(browser: Any, application: AppSe
         assert one.complaints + other.complaints == []
 
 
+def test_a_short_conversation_is_played_slowly_and_in_steps(
+    browser: Any,  # noqa: ANN401 - Playwright's
+    application: AppServer,
+    teams: Store,
+) -> None:
+    team = teams.add(slots(5, 5))
+    with watched_page(browser, reduced_motion="no-preference") as tab:
+        _opened(tab, application, team)
+        tab.page.click(GO)
+        tab.page.wait_for_selector(".playing .said", state="attached")  # by itself
+        _at(tab, 38)
+        tab.page.wait_for_selector(".team-picture:not(:has(.playing)):not(:has(.unsettled))")
+        assert sorted(tab.page.locator(".team-picture .value").all_text_contents()) == [*"12345"]
+        tab.page.click("[aria-label='One step back']")
+        _at(tab, 37)
+        assert tab.page.locator(".team-picture .said").count() == 1
+        tab.page.focus(".talk .q-slider [tabindex='0']")
+        tab.page.keyboard.press("ArrowLeft")
+        _at(tab, 36)
+        tab.page.click("[aria-label='One step on']")
+        _at(tab, 37)
+        tab.page.click("[aria-label='Play']")
+        _at(tab, 38)
+        tab.page.reload()
+        tab.page.wait_for_function("window.did_handshake")
+        tab.page.click("[aria-label='Play']")
+        tab.page.wait_for_selector(".playing .said", state="attached")
+        assert tab.complaints == []
+
+
+def _at(tab: WatchedPage, message: int) -> None:
+    tab.page.wait_for_selector(f".where:text-is('{message} of 38 messages')")
+
+
 def test_a_long_search_is_watched_and_stopped(browser: Any, application: AppServer, teams: Store) -> None:  # noqa: ANN401 - Playwright's
     team = teams.add(slots(14, 14))
     with watched_page(browser) as tab:
@@ -57,6 +91,7 @@ def test_a_long_search_is_watched_and_stopped(browser: Any, application: AppServ
         tab.page.click(GO)
         tab.page.wait_for_selector(".facts:has-text('The best so far costs 105')")
         tab.page.wait_for_selector(".team-picture .said", state="attached")
+        tab.page.wait_for_selector(".said-list li:has-text('the best solution so far costs 105')")
         tab.page.click(f"{GO}:has-text('Stop')")
         _told(tab, "It was stopped; this is the best so far. It costs 105.")
         assert tab.complaints == []

@@ -32,7 +32,7 @@ PURPOSE = "decide"
 MOST_LIVE = 300
 """Of more robots, the picture is drawn when they have decided."""
 SHORT_S = 3.0
-"""Of a run that took no longer, nobody has seen what was said."""
+"""Of a search that took no longer, nobody has seen what was said."""
 
 
 def build_decide(project: Project) -> None:
@@ -165,7 +165,7 @@ class _Page:
         self._talk.offer(shown if shown and shown.result else None)
         if shown is not None and shown is self._pressed:
             self._pressed = None
-            if shown.state is State.ENDED and shown.seconds < SHORT_S:
+            if shown.state is State.ENDED and shown.result and shown.result.metrics.wall_s < SHORT_S:
                 self._talk.begin()
 
     def _draw(self) -> None:

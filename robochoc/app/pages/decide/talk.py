@@ -19,6 +19,8 @@ from robochoc.app.texts import say
 TICK_S = 0.1
 """A conversation that is played is drawn so often."""
 _LISTED = 6
+_ANSWERS_S = 20.0
+"""A browser that takes longer to answer is busy enough."""
 _CALM = "matchMedia('(prefers-reduced-motion: reduce)').matches"
 
 
@@ -87,7 +89,7 @@ class Talk:
 
     async def _begin(self) -> None:
         try:
-            calm = await ui.run_javascript(_CALM)
+            calm = await ui.run_javascript(_CALM, timeout=_ANSWERS_S)
         except TimeoutError:
             return
         if calm is False and not self._opened:
