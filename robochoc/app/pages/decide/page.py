@@ -173,9 +173,10 @@ class _Page:
         self._show_live(self._run, self._sketch())
 
     def _show_moment(self, sketch: Sketch, tape: Tape, number: int) -> None:
-        values = values_of(sketch, tape.values_at(number))
-        spoken = dict(tape.moments[number].links)
-        self._picture.set_content(team_svg(sketch, values, unsettled=tape.unsettled_at(number), spoken=spoken))
+        values, unsettled = tape.values_at(number), tape.unsettled_at(number)
+        says, targets = values_of(sketch, values), targets_of(sketch, values)
+        links = tape.moments[number].links
+        self._picture.set_content(team_svg(sketch, says, unsettled=unsettled, spoken=links, targets=targets))
 
     def _show_live(self, shown: Run | None, sketch: Sketch) -> None:
         self._legend.set_visibility(decides_places(sketch))

@@ -11,7 +11,7 @@ import pytest
 
 from robochoc.app.runs import live
 from robochoc.app.runs.live import LAST, Live, LiveReader
-from robochoc.journal.events import Began, Decided, Given, Heard, Sent
+from robochoc.journal.events import AnyEvent, Began, Decided, Given, Heard, Sent
 from robochoc.journal.journal import Header, Journal, JournalRecorder, lines_of
 from robochoc.model.costs import normalized
 from robochoc.run import Options, Runtime
@@ -82,7 +82,7 @@ def test_that_values_are_called_as_the_user_calls_them(tmp_path: Path) -> None:
 
 HEADER = Header(team="t", protocol="syncbb", runtime="simulator", seed=0)
 SENT = Sent(t=1, sender="A", receiver="B", type="Path", content={}, bytes=1, clock=0)
-HOSTILE = [
+HOSTILE: list[AnyEvent] = [
     Began(t=0, protocol="no such protocol"),
     Began(t=0, protocol="SyncBB"),
     Given(t=0, order=("A", "A"), robots={"A": "<instance/>"}),
