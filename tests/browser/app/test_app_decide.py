@@ -99,7 +99,7 @@ def test_a_long_search_is_watched_and_stopped(browser: Any, application: AppServ
 
 def test_rules_that_are_in_the_way_are_clicked_away(browser: Any, application: AppServer, teams: Store) -> None:  # noqa: ANN401 - Playwright's
     team = teams.add(slots(3, 2))
-    with watched_page(browser, {"width": 360, "height": 740}) as tab:
+    with watched_page(browser, {"width": 360, "height": 740}, reduced_motion="reduce") as tab:
         _opened(tab, application, team)
         tab.page.click(GO)
         _told(tab, "There is no solution")
