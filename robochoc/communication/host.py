@@ -14,7 +14,7 @@ from typing import Any, Self, cast, get_args
 
 import msgspec
 
-from robochoc.journal.events import Concluded, Decided, Heard, Observer, Received, Sent, Settled
+from robochoc.journal.events import Bounded, Concluded, Decided, Heard, Observer, Received, Sent, Settled
 from robochoc.model.message import Envelope, Message, encode
 from robochoc.model.outcome import Metrics, Verdict
 from robochoc.protocols.chance import Chance
@@ -96,15 +96,26 @@ class Host:
         """Constraint checks that the clock has counted: all of them, but within a step."""
         self._reported: tuple[int | None, Verdict | None] = (None, None)
         self._heard: float = math.inf
+        self._bounded: float = 0
+        self._bounds = False
         self._observer: Observer | None = None
         self._now: Callable[[], float] = lambda: 0.0
         self._then: Callable[[int], float] | None = None
 
-    def observe(self, observer: Observer, now: Callable[[], float], then: Callable[[int], float] | None = None) -> None:
+    def observe(
+        self,
+        observer: Observer,
+        now: Callable[[], float],
+        then: Callable[[int], float] | None = None,
+        *,
+        bounds: bool = False,
+    ) -> None:
         """Report each event to `observer` from now on, stamped with `now()`.
 
         Where time is counted in checks, `then(n)` is the time when the robot had done n: for what it takes in and says.
+        `bounds`: tell of lower bounds, too.
         """
+        self._bounds = bounds
         self._observer = observer
         self._now = now
         self._then = then
@@ -145,6 +156,7 @@ class Host:
         self.sent = {}
         self._reported = (None, None)
         self._heard = math.inf
+        self._bounded = 0
 
     def handle(self, packet: Sequence[Envelope]) -> list[Envelope]:
         """Take in all waiting messages, let the protocol settle, and return what it says.
@@ -275,6 +287,8 @@ class Host:
         if best is not None and best.cost < self._heard:
             self._heard = best.cost
             observer(Heard(t=self._now(), robot=self.name, cost=best.cost, values=best.values))
+        if self._bounds:
+            self._report_bound(observer)
         state = self.protocol.value, self.protocol.verdict
         value, verdict = self._reported
         self._reported = state
@@ -283,6 +297,13 @@ class Host:
             observer(Decided(t=self._now(), robot=self.name, assignment=assignment, clock=self.clock))
         if state[1] is not None and state[1] is not verdict:
             observer(Concluded(t=self._now(), robot=self.name, verdict=str(state[1])))
+
+    def _report_bound(self, observer: Observer) -> None:
+        """Tell of a lower bound that is higher than all before."""
+        bound: Any = self.protocol.findings.bound
+        if bound is not None and self._bounded < bound < math.inf:
+            self._bounded = bound
+            observer(Bounded(t=self._now(), robot=self.name, bound=bound))
 
 
 def may_be_shared(messages: object) -> bool:

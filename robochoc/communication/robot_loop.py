@@ -25,7 +25,7 @@ EVENTS_AT_ONCE = 500
 
 
 class RobotLoop(ABC):
-    """One robot in the search `epoch`; `observed` says whether its events are wanted.
+    """One robot in the search `epoch`; `observed` says whether its events are wanted, `bounds`, also lower bounds.
 
     A runtime calls `confirm` when the robot's host is there, `begin` when the master orders the start, `admit` for each
     message and `take_in` for each packet of them, `report_idle` when nothing comes, and `pause` at the end.
@@ -34,9 +34,10 @@ class RobotLoop(ABC):
     bundle_bytes: int
     """The size at which a bundle of events is closed: bytes of all its messages."""
 
-    def __init__(self, epoch: int, *, observed: bool) -> None:
+    def __init__(self, epoch: int, *, observed: bool, bounds: bool = False) -> None:
         self.epoch = epoch
         self._observed = observed
+        self._bounds = bounds
         self._host: Host | None = None
         self._events: list[AnyEvent] = []
         self._began = 0.0
@@ -67,7 +68,7 @@ class RobotLoop(ABC):
     def confirm(self, host: Host) -> None:
         """Tell the master that the robot is ready to search with `host`."""
         if self._host is not host and self._observed:
-            host.observe(self._events.append, self._now)
+            host.observe(self._events.append, self._now, bounds=self._bounds)
         self._host = host
         self._conclude(host)  # a verdict can stand in spite of a change
         self._say(Ready(self.epoch))

@@ -11,7 +11,9 @@ VERSION = 2
 """The version of the entries' meaning. It grows when one is added or changed; readers refuse unknown versions."""
 STAMPED_LATE = 1
 """In this version the `clock` of a sent message was that of the end of the step; and it came after the decision."""
-READ = (STAMPED_LATE, VERSION)
+BOUNDED = 3
+"""The version of journals that hold `Bounded` events, which are written where they are asked for."""
+READ = (STAMPED_LATE, VERSION, BOUNDED)
 """Versions that are read."""
 
 

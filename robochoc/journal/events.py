@@ -105,6 +105,18 @@ class Heard(Event, frozen=True):
     values: dict[str, tuple[int | None, ...]]
 
 
+class Bounded(Event, frozen=True):
+    """A robot knows that no assignment of the robots that `bound` is for costs less; it was less before.
+
+    Where several robots know bounds, each is for a part of the team, and their sum is for all of it
+    (`protocols/findings.py`). It is reported where it was asked for. The cost is what protocols count
+    (`Given.told_in`).
+    """
+
+    robot: str
+    bound: float | int
+
+
 class Improved(Event, frozen=True):
     """The present assignment, or an incumbent that a robot has received, is cheaper than all before.
 
@@ -170,6 +182,7 @@ AnyEvent = (
     | Received
     | Decided
     | Heard
+    | Bounded
     | Improved
     | Settled
     | Concluded
@@ -189,7 +202,7 @@ def actor(event: AnyEvent) -> str | None:
             return event.receiver
         case Heard() | Decided() | Concluded() | Settled():
             return event.robot
-        case Began() | Given() | Registered() | Improved() | Lost() | Granted() | Refused():
+        case Began() | Given() | Registered() | Bounded() | Improved() | Lost() | Granted() | Refused():
             return None
         case never:
             assert_never(never)

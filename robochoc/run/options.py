@@ -102,6 +102,8 @@ class Options:
         kill: Robots whose processes are killed, and when.
         filters: The names of the channel filters that messages on a network go through, in this order.
         chosen: Why the `protocol`, or the `order`, was chosen, where nobody asked for it.
+        bounds: Whether events tell when a robot comes to know that nothing costs less than so much (processes and
+            simulator).
     """
 
     protocol: str = AUTO
@@ -128,6 +130,7 @@ class Options:
     filters: tuple[str, ...] = ()
     kill: tuple[Kill, ...] = ()
     chosen: Mapping[str, str] = field(default_factory=dict)
+    bounds: bool = False
 
     @property
     def survives_losses(self) -> bool:

@@ -28,7 +28,7 @@ def journal_header(team: Team, options: Options) -> Header:
     """Return the header of the run's journal."""
     from msgspec import UNSET  # noqa: PLC0415 - start-up: seldom asked for
 
-    from robochoc.journal.entries import Header  # noqa: PLC0415 - as above
+    from robochoc.journal.entries import BOUNDED, VERSION, Header  # noqa: PLC0415 - as above
 
     return Header(
         team=team.name,
@@ -37,4 +37,5 @@ def journal_header(team: Team, options: Options) -> Header:
         seed=options.seed,
         order=options.order or UNSET,
         channel=options.channel.name if options.channel else UNSET,
+        version=BOUNDED if options.bounds else VERSION,
     )

@@ -100,6 +100,7 @@ def open_processes(request: SessionRequest) -> Session:
         request.protocol,
         survive=options.survives_losses,
         patience_s=options.patience,
+        bounds=options.bounds,
         **request.common,
     )
     if request.kills:
@@ -123,8 +124,15 @@ def open_simulator(request: SessionRequest) -> Session:
 
     options = request.options
     limits = EffortLimits(options.ncccs, options.cycles)
-    schedule, deadline = _schedule_of(options), request.deadline
-    return Simulation(request.team, request.protocol, schedule, limits=limits, deadline=deadline, **request.common)
+    return Simulation(
+        request.team,
+        request.protocol,
+        _schedule_of(options),
+        limits=limits,
+        deadline=request.deadline,
+        bounds=options.bounds,
+        **request.common,
+    )
 
 
 def open_arrays(request: SessionRequest) -> Session:

@@ -12,11 +12,10 @@ from typing import BinaryIO
 from robochoc.app.runs.tape import Said, in_words
 from robochoc.app.sketch.sketch import Value
 from robochoc.journal.entries import JournalError
-from robochoc.journal.events import Began, Decided, Heard, Sent
+from robochoc.journal.events import Began, Bounded, Decided, Heard, Sent
 from robochoc.journal.reader import Follower
-from robochoc.model.problem import INFINITE
+from robochoc.run.known_costs import KnownCosts
 from robochoc.sniffer.spoken import Called, Spoken
-from robochoc.solver.exact_costs import EXACT
 from robochoc.verification.objective import Objective
 
 RECENT_S = 1.0
@@ -42,6 +41,7 @@ class Live:
         values: Each robot's present values, by `ROBOT.DECISION`.
         since: When each robot has changed them last, on the monotonic clock.
         costs: The costs of the answers so far: seconds since the start, and the cost. They fall.
+        bound: Nothing costs less. None: not known.
         recent: The messages of the last second: how many went from whom to whom.
         is_cut: Whether the last messages were not read, since the run had ended and there were too many.
         said: The last messages in words, the last one first.
@@ -50,6 +50,7 @@ class Live:
     messages: int = 0
     values: dict[str, dict[str, Value]] = field(default_factory=dict)
     since: dict[str, float] = field(default_factory=dict)
+    bound: float | None = None
     costs: list[tuple[float, float]] = field(default_factory=list)
     recent: Counter[tuple[str, str]] = field(default_factory=Counter)
     is_cut: bool = False
@@ -78,9 +79,9 @@ class LiveReader:
         self._file = file
         self._live = live
         self._label = label
-        self._objective = objective
+        self._known = KnownCosts(objective) if objective else None
+        self._robots = frozenset(objective.interfaces) if objective else None
         self._spoken = Spoken(called)
-        self._best: float = INFINITE
         self._open: BinaryIO | None = None
         self._follower: Follower | None = None
         self._began = time.monotonic()
@@ -115,10 +116,11 @@ class LiveReader:
                     last.append(entry)
                 case Decided():
                     self._decided(entry, now)
-                case Heard():
-                    self._improved(entry.cost, now)
+                case Heard() | Bounded():
+                    self._weigh(entry, now)
                 case Began():
                     self._live.values.clear()
+                    self._weigh(entry, now)
                     self._spoken.follow(entry)
                 case _:
                     self._spoken.follow(entry)
@@ -137,22 +139,25 @@ class LiveReader:
             self._open = None
 
     def _decided(self, event: Decided, now: float) -> None:
-        if self._objective and event.robot not in self._objective.interfaces:
+        if self._robots is not None and event.robot not in self._robots:
             return
         values = {name: self._label(name, value) for name, value in event.assignment.items()}
         if self._live.values.get(event.robot) != values:
             self._live.values[event.robot] = values
             self._live.since[event.robot] = now
-            if self._objective:
-                self._objective.change({event.robot: event.assignment})
-                self._improved(self._objective.cost, now)
+            self._weigh(event, now)
 
-    def _improved(self, cost: float, now: float) -> None:
-        if self._objective is None or not 0 <= cost < self._best or cost > EXACT:
+    def _weigh(self, event: Decided | Heard | Bounded | Began, now: float) -> None:
+        """Take note of what is known of the cost."""
+        if self._known is None:
             return
-        self._best = cost
+        before = self._known.best
+        self._known.take(event)
+        self._live.bound = None if self._known.bound is None else float(self._known.bound)
+        if self._known.best is None or self._known.best == before:
+            return
         costs = self._live.costs
-        costs.append((now - self._began, float(self._objective.told(cost))))
+        costs.append((now - self._began, float(self._known.best)))
         if len(costs) > MOST_COSTS:  # every other point is enough, but the last one
             del costs[1:-1:2]
 

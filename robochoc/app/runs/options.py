@@ -44,6 +44,8 @@ class RunOptions(msgspec.Struct, frozen=True):
         Where the team is `ranked`, robots decide in their own order, and no protocol chooses another one.
         """
         said = ["solve", team, "--json", "--journal", JOURNAL]
+        if not self.withdraw:  # what costs there mean is another thing
+            said.append("--bounds")
         said += ["--protocol", self.protocol, "--runtime", self.runtime, "--seed", str(self.seed)]
         if ranked:
             said += ["--order", Order.GIVEN]

@@ -18,7 +18,7 @@ from robochoc.cli.options.order import ORDER_NAME, order_for
 from robochoc.cli.options.pages import html_option, serve_option
 from robochoc.cli.options.paths import refuse_same_places, teams_at
 from robochoc.cli.options.problems import Problem, reading_options
-from robochoc.cli.options.recording import journal_option, recording, shown_and_flushed
+from robochoc.cli.options.recording import bounds_option, journal_option, recording, shown_and_flushed
 from robochoc.cli.options.ros import (
     flight_options,
     ros_options,
@@ -61,7 +61,7 @@ if TYPE_CHECKING:
 _SECTIONS: Sections = {
     COMMON: (
         "--protocol", "--runtime", "--timeout", "--withdraw", "--verify", "--seed",
-        "--json", "--html", "--journal", "--sniff", "--help",
+        "--json", "--html", "--journal", "--bounds", "--sniff", "--help",
     ),
     "Search": ("--order", "--set", "--messages", "--ncccs", "--cycles", "--count", "--with"),
     "Losses of robots (processes and network)": ("--on-loss", "--spare", "--patience", "--kill"),
@@ -179,6 +179,7 @@ _SECTIONS: Sections = {
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON object per team, and nothing else.")
 @html_option()
 @journal_option
+@bounds_option
 @serve_option
 @click.option(
     "--sniff",

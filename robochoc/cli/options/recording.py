@@ -25,6 +25,12 @@ journal_option = click.option(
     help="Write all messages and decisions to a compact file, during the run ('robochoc journal', 'replay', 'sniff').",
 )
 
+bounds_option = click.option(
+    "--bounds",
+    is_flag=True,
+    help="With --journal: also when robots prove that nothing costs less (a journal of version 3).",
+)
+
 
 @contextmanager
 def recording(

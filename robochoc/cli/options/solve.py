@@ -107,7 +107,7 @@ filter_option = click.option(
 
 _SAME_NAMES = (
     "seed", "timeout", "delay", "count", "verify", "messages", "ncccs", "cycles", "spares", "patience", "filters",
-    "kill",
+    "kill", "bounds",
 )  # fmt: skip
 """Arguments of `robochoc solve` that are called as in `robochoc.run.Options`."""
 

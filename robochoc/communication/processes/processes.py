@@ -72,9 +72,10 @@ class ProcessesRun(Session, MasterLoop):
             `RobotsLostError` is raised.
         patience_s: A robot whose process is stopped (SIGSTOP) for so many seconds is lost. None: it is waited for.
         parameters: What robots are given besides the problem.
+        bounds: Whether the observer hears of lower bounds, too.
     """
 
-    def __init__(
+    def __init__(  # noqa: PLR0913 - how a session goes, by names
         self,
         team: Team | CompiledTeam,
         protocol: type[Protocol],
@@ -85,11 +86,13 @@ class ProcessesRun(Session, MasterLoop):
         survive: bool = False,
         patience_s: float | None = None,
         parameters: RunParameters = DEFAULT_PARAMETERS,
+        bounds: bool = False,
     ) -> None:
         Session.__init__(self, team)
         MasterLoop.__init__(self, progress)
         self._protocol = protocol
         self._observer = observer
+        self._bounds = bounds
         self._survive = survive
         self._stopped = StoppedRobots(patience_s)
         self._pool = ProcessPool(start_method)
@@ -176,7 +179,8 @@ class ProcessesRun(Session, MasterLoop):
     def _start(self, parts: Sequence[AgentProblem]) -> None:
         observed = self._observer is not None
         try:
-            self._pool.start([RobotStart(part, self._protocol, self.state.epoch, observed) for part in parts])
+            epoch, bounds = self.state.epoch, self._bounds
+            self._pool.start([RobotStart(part, self._protocol, epoch, observed, bounds) for part in parts])
         except OSError as error:
             raise UnsupportedError(
                 f"the system lets only {len(self._pool.robots)} of {len(parts[0].order)} robots have a process:"

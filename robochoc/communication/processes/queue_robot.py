@@ -57,10 +57,11 @@ class QueueRobot(RobotLoop):
         epoch: int,
         *,
         observed: bool,
+        bounds: bool = False,
         measured: bool = True,
         parent: Sequence[int] = (),
     ) -> None:
-        super().__init__(epoch, observed=observed)
+        super().__init__(epoch, observed=observed, bounds=bounds)
         self._name = host.name
         self._measured = measured
         self._link = link

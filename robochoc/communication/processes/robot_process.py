@@ -49,12 +49,14 @@ class RobotStart(NamedTuple):
         protocol: The protocol that it runs.
         epoch: The number of the current epoch.
         observed: Its events are wanted.
+        bounds: Among them, its lower bounds.
     """
 
     part: AgentProblem
     protocol: type[Protocol]
     epoch: int
     observed: bool
+    bounds: bool = False
 
 
 def rehearse(protocol: type[Protocol], parts: Iterable[AgentProblem]) -> None:
@@ -94,7 +96,8 @@ def robot_process(start: RobotStart, control: socket.socket, parent: Sequence[in
     try:
         host = Host.of(start.protocol, start.part)
         measured = place % -(-robots // MEASURED) == 0
-        QueueRobot(host, link, start.epoch, observed=start.observed, measured=measured, parent=parent).run()
+        observed, bounds = start.observed, start.bounds
+        QueueRobot(host, link, start.epoch, observed=observed, bounds=bounds, measured=measured, parent=parent).run()
     except UnsupportedError as refusal:
         link.send(Failed(str(refusal), unsupported=True, elsewhere=isinstance(refusal, TooLargeError)))
     except Exception as error:  # noqa: BLE001 - whatever it was, the parent has to know

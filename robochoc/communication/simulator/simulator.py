@@ -63,12 +63,13 @@ class Simulation(Session):
         parameters: What robots are given besides the problem.
         limits: On what the searches take. They are looked at after each packet.
         deadline: When the time of the run is over, on the monotonic clock.
+        bounds: Whether the observer hears of lower bounds, too.
 
     Raises:
         OutOfTimeError: when the deadline comes before all robots are set up; `change` as well.
     """
 
-    def __init__(
+    def __init__(  # noqa: PLR0913 - how a session goes, by names
         self,
         team: Team | CompiledTeam,
         protocol: type[Protocol],
@@ -79,6 +80,7 @@ class Simulation(Session):
         parameters: RunParameters = DEFAULT_PARAMETERS,
         limits: EffortLimits = NO_LIMITS,
         deadline: float | None = None,
+        bounds: bool = False,
     ) -> None:
         super().__init__(team)
         self._protocol = protocol
@@ -87,6 +89,7 @@ class Simulation(Session):
         self._progress = progress
         self._limits = limits
         self._deadline = deadline
+        self._bounds = bounds
         self._lossless = True
         self._checks = self._ncccs = self._sent = 0
         self._verdict: Verdict | None = None
@@ -151,7 +154,7 @@ class Simulation(Session):
         host = Host.of(self._protocol, part, self._order_of(part))
         host.under_way = self._under_way
         if self._observer:
-            host.observe(self._observer, lambda: self._time(host.checks), self._time)
+            host.observe(self._observer, lambda: self._time(host.checks), self._time, bounds=self._bounds)
         return host
 
     def _order_of(self, part: AgentProblem) -> PriorityOrder:
