@@ -8,7 +8,7 @@ from typing import Any
 
 import msgspec
 
-from robochoc.journal.events import AnyEvent, Began, actor
+from robochoc.journal.events import AnyEvent, Began, Bounded, actor
 from robochoc.journal.reader import read_journal
 
 COLUMNS = (
@@ -64,6 +64,8 @@ def _row(event: AnyEvent, run: int, epoch: int) -> Row:
     )
     row.update(run=run, epoch=epoch, event=type(event).__name__, robot=robot)
     row.update(other=next((name for name in pair if name != robot), robot if pair else None))
+    if isinstance(event, Bounded):
+        row["cost"] = event.bound
     for name in ("content", "assignment"):
         if name in said:
             row[name] = msgspec.json.encode(said[name]).decode()

@@ -81,6 +81,7 @@ class LiveReader:
         self._label = label
         self._known = KnownCosts(objective) if objective else None
         self._robots = frozenset(objective.interfaces) if objective else None
+        self._minimised = objective is not None and objective.told(0) < objective.told(1)
         self._spoken = Spoken(called)
         self._open: BinaryIO | None = None
         self._follower: Follower | None = None
@@ -153,7 +154,8 @@ class LiveReader:
             return
         before = self._known.best
         self._known.take(event)
-        self._live.bound = None if self._known.bound is None else float(self._known.bound)
+        if self._minimised:
+            self._live.bound = None if self._known.bound is None else float(self._known.bound)
         if self._known.best is None or self._known.best == before:
             return
         costs = self._live.costs

@@ -214,6 +214,8 @@ class _Page:
         facts = [say("decide.live", messages=f"{live.messages:,}", seconds=f"{shown.seconds:.0f}")] if running else []
         if running and live.costs:
             facts.append(say("decide.best-now", cost=f"{live.costs[-1][1]:g}"))
+        if running and live.bound is not None:
+            facts.append(say("decide.bound", bound=f"{live.bound:g}"))
         self._facts.set_text(" · ".join(facts))
 
     def _show_answer(self, shown: Run | None, sketch: Sketch, *, changed: bool) -> None:

@@ -119,20 +119,39 @@ def _robots(
         yield f"<title>{escape(robot)}: {escape(says.get(robot, '?'))}</title></g>"
 
 
-def falling_svg(costs: list[tuple[float, float]]) -> str:
-    """Return how the cost has fallen, as a small line with its caption; empty without at least two points."""
-    if len(costs) < 2:  # noqa: PLR2004 - a line
+def falling_svg(costs: list[tuple[float, float]], bound: float | None = None, until: float = 0.0) -> str:
+    """Return how the cost has fallen, as a small line with its caption, and a band down to what it is at least.
+
+    Args:
+        costs: The costs of the best so far: seconds since the start, and the cost.
+        bound: Nothing costs less. None: not known.
+        until: The line goes on to this time, in seconds since the start.
+
+    Returns:
+        The picture; empty where there is no line and no band.
+    """
+    known = bound is not None and bool(costs) and bound <= costs[-1][1]
+    if len(costs) < 2 and not known:  # noqa: PLR2004 - a line
         return ""
-    first, last = costs[0][0], costs[-1][0]
-    low, high = costs[-1][1], max(cost for _, cost in costs)
+    first, last = costs[0][0], max(costs[-1][0], until)
+    best = costs[-1][1]
+    low, high = bound if known and bound is not None else best, max(cost for _, cost in costs)
     width, height = 240, 48
     across, along = max(last - first, 1e-9), max(high - low, 1e-9)
     path = ""
     for time_s, cost in costs:
         x, y = (time_s - first) / across * width, height - (cost - low) / along * height
         path += f"H{x:.1f}V{y:.1f}" if path else f"M{x:.1f} {y:.1f}"
-    said = escape(say("decide.falling", first=f"{costs[0][1]:g}", last=f"{low:g}", seconds=f"{last - first:.1f}"))
+    path += f"H{width}" if until else ""
+    words = []
+    if len(costs) > 1:
+        fell = f"{costs[-1][0] - first:.1f}"
+        words.append(say("decide.falling", first=f"{costs[0][1]:g}", last=f"{best:g}", seconds=fell))
+    if known and low < best:
+        words.append(say("decide.band", bound=f"{low:g}", best=f"{best:g}"))
+    said = escape(" ".join(words))
+    band = f'<path class="band" d="{path}H{width}V{height}H0Z"/>' if known else ""
     return (
         f'<figure><svg xmlns="http://www.w3.org/2000/svg" viewBox="-3 -3 {width + 6} {height + 6}" role="img" '
-        f'aria-label="{said}"><path class="falling" d="{path}"/></svg><figcaption>{said}</figcaption></figure>'
+        f'aria-label="{said}">{band}<path class="falling" d="{path}"/></svg><figcaption>{said}</figcaption></figure>'
     )

@@ -134,6 +134,12 @@ def test_that_of_a_large_map_the_part_is_drawn_that_matters() -> None:
 
 def test_that_a_falling_cost_is_a_line_with_a_caption() -> None:
     assert falling_svg([(0.0, 5.0)]) == ""
+    assert falling_svg([(0.0, 5.0)], bound=6.0) == ""  # which cannot be
+    assert falling_svg([], bound=6.0) == ""
+    banded = falling_svg([(0.0, 5.0)], bound=3.0, until=2.0)
+    assert "between 3 and 5" in banded
+    assert banded.count('class="band"') == 1
+    assert "between" not in falling_svg([(0.0, 9.0), (1.0, 6.0)], bound=6.0)
     made = falling_svg([(0.0, 9.0), (1.0, 6.0), (2.0, 4.0)])
     assert "fell from 9 to 4 in 2.0 s" in ET.fromstring(made)[1].text  # type: ignore[operator] # noqa: S314 - our own
 

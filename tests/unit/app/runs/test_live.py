@@ -11,7 +11,7 @@ import pytest
 
 from robochoc.app.runs import live
 from robochoc.app.runs.live import LAST, Live, LiveReader
-from robochoc.journal.events import AnyEvent, Began, Decided, Given, Heard, Sent
+from robochoc.journal.events import AnyEvent, Began, Bounded, Decided, Given, Heard, Sent
 from robochoc.journal.journal import Header, Journal, JournalRecorder, lines_of
 from robochoc.model.costs import normalized
 from robochoc.run import Options, Runtime
@@ -28,7 +28,7 @@ def _code(_: str, code: int) -> int:
 
 
 def _journal(protocol: str = "syncbb") -> Journal:
-    return record(TEAM, Options(protocol=protocol, runtime=Runtime.SIMULATOR, cache=False))
+    return record(TEAM, Options(protocol=protocol, runtime=Runtime.SIMULATOR, cache=False, bounds=True))
 
 
 def _reader(file: Path, facts: Live, *, weighed: bool = True) -> LiveReader:
@@ -66,7 +66,7 @@ def test_that_a_growing_journal_is_followed_line_by_line(tmp_path: Path) -> None
     assert {name: value for own in facts.values.values() for name, value in own.items()} == journal.outcome.assignment
     costs = [cost for _, cost in facts.costs]
     assert costs == sorted(costs, reverse=True)
-    assert costs[-1] == journal.outcome.cost
+    assert costs[-1] == facts.bound == journal.outcome.cost
     last = sent[-1]
     assert (facts.said[0].sender, facts.said[0].receiver, facts.said[0].kind) == (last.sender, last.receiver, last.type)
     assert len(facts.said) == LAST
@@ -95,6 +95,8 @@ HOSTILE: list[AnyEvent] = [
     Heard(t=1, robot="nobody", cost=float("-inf"), values={}),
     Heard(t=1, robot="A", cost=float("nan"), values={"A": (None,)}),
     Heard(t=1, robot="A", cost=2**63, values={}),
+    Bounded(t=1, robot="nobody", bound=5),
+    Bounded(t=1, robot="X00", bound=float("inf")),
 ]
 
 
@@ -109,6 +111,7 @@ def test_that_hostile_records_are_survived(tmp_path: Path, order: int) -> None:
     assert facts.messages == 3
     assert all(len(said.words) <= 300 and said.words.isprintable() for said in facts.said)
     assert "nobody" not in facts.values
+    assert facts.bound is None
 
 
 @pytest.mark.parametrize("content", [b"", b"no journal", b"\x89RJL\r\n\x1a\nxxxx", b'{"event":"Journal"}\n', b"{\n"])
