@@ -44,15 +44,12 @@ class RunOptions(msgspec.Struct, frozen=True):
         Where the team is `ranked`, robots decide in their own order, and no protocol chooses another one.
         """
         said = ["solve", team, "--json", "--journal", JOURNAL]
-        if not self.withdraw:  # what costs there mean is another thing
-            said.append("--bounds")
         said += ["--protocol", self.protocol, "--runtime", self.runtime, "--seed", str(self.seed)]
         if ranked:
             said += ["--order", Order.GIVEN]
         if self.timeout is not None:
             said += ["--timeout", f"{self.timeout:g}"]
-        if self.withdraw:
-            said.append("--withdraw")
+        said.append("--withdraw" if self.withdraw else "--bounds")  # with it, costs mean another thing
         if self.scene:
             said += ["--html", SCENE]
         return [*said, *self.more]
