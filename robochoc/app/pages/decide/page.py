@@ -14,10 +14,10 @@ from robochoc.app.pages.decide.costs import show_costs
 from robochoc.app.pages.decide.ground import decides_places, targets_of
 from robochoc.app.pages.decide.how import How
 from robochoc.app.pages.decide.picture import falling_svg, team_svg, values_of
+from robochoc.app.pages.decide.talk import Talk
 from robochoc.app.pages.foreign.answer import says_of
 from robochoc.app.pages.foreign.answer import table_html as answers_html
 from robochoc.app.pages.foreign.below import ForeignDoors, show_foreign_below
-from robochoc.app.pages.decide.talk import Talk
 from robochoc.app.pages.shell import while_shown
 from robochoc.app.projects import Project
 from robochoc.app.runs.result import RunResult
@@ -174,7 +174,8 @@ class _Page:
 
     def _show_moment(self, sketch: Sketch, tape: Tape, number: int) -> None:
         values, unsettled = tape.values_at(number), tape.unsettled_at(number)
-        says, targets = values_of(sketch, values), targets_of(sketch, values)
+        says = says_of(self._foreign, values) if self._foreign else values_of(sketch, values)
+        targets = targets_of(sketch, values)
         links = tape.moments[number].links
         self._picture.set_content(team_svg(sketch, says, unsettled=unsettled, spoken=links, targets=targets))
 
@@ -206,7 +207,8 @@ class _Page:
         picture = team_svg(sketch, says, unsettled=unsettled, aside=aside, spoken=spoken, targets=targets)
         self._picture.set_content(picture)
         falls = not (self._foreign and self._foreign.maximised)
-        self._falling.set_content(falling_svg([*live.costs]) if falls else "")
+        until = shown.seconds if running else 0.0
+        self._falling.set_content(falling_svg([*live.costs], live.bound, until) if falls else "")
         self._tell_facts(shown)
 
     def _tell_facts(self, shown: Run) -> None:
