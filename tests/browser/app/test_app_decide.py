@@ -97,6 +97,18 @@ def test_a_long_search_is_watched_and_stopped(browser: Any, application: AppServ
         assert tab.complaints == []
 
 
+def test_a_double_click_begins_once(browser: Any, application: AppServer, teams: Store) -> None:  # noqa: ANN401 - Playwright's
+    team = teams.add(slots(14, 14))
+    with watched_page(browser) as tab:
+        _opened(tab, application, team)
+        tab.page.dblclick(GO)
+        tab.page.wait_for_selector(".facts:has-text('The best so far costs 105')")
+        tab.page.click(f"{GO}:has-text('Stop')")
+        _told(tab, "It was stopped; this is the best so far. It costs 105.")
+        assert len(Runs(_Team(slots(14, 14), teams.path(team))).all()) == 1
+        assert tab.complaints == []
+
+
 def test_rules_that_are_in_the_way_are_clicked_away(browser: Any, application: AppServer, teams: Store) -> None:  # noqa: ANN401 - Playwright's
     team = teams.add(slots(3, 2))
     with watched_page(browser, {"width": 360, "height": 740}, reduced_motion="reduce") as tab:

@@ -94,6 +94,34 @@ def test_five_drones_and_five_charging_slots_are_modelled_by_clicks(
         assert tab.complaints == []
 
 
+OLD_ROBOTS = """async () => {
+    const board = getElement(Number(document.querySelector(".board").id.slice(1)));
+    const press = (key) => document.querySelector("[data-robot=Drone1]").dispatchEvent(
+        new KeyboardEvent("keydown", { key, bubbles: true }));
+    const old = [...board.robots];
+    press("ArrowUp");
+    board.$.props.robots = old;
+    await board.$nextTick();
+    press("ArrowRight");
+}"""
+"""A key, then an update that was under way before it, then another key."""
+
+
+def test_keys_are_not_undone_by_updates_that_were_under_way(
+    browser: Any,  # noqa: ANN401 - Playwright's
+    application: AppServer,
+    teams: Store,
+) -> None:
+    team = teams.add(Sketch("fast", robots=drones(1)))
+    with watched_page(browser, {"width": 1280, "height": 900}) as tab:
+        page = opened(tab, application, team)
+        page.evaluate(OLD_ROBOTS)
+        becomes(teams, team, lambda sketch: sketch.robots[0].at == Cell(1, 1))
+        page.evaluate(OLD_ROBOTS)
+        becomes(teams, team, lambda sketch: sketch.robots[0].at == Cell(2, 2))
+        assert tab.complaints == []
+
+
 def test_a_team_is_modelled_by_keys_alone(browser: Any, application: AppServer, teams: Store) -> None:  # noqa: ANN401 - Playwright's
     team = teams.add(Sketch("keys"))
     with watched_page(browser, {"width": 1280, "height": 900}) as tab:
@@ -297,8 +325,10 @@ def test_the_last_robot_and_the_last_cell_stay_and_secrets_say_why_they_are_off(
     team = teams.add(Sketch("last", robots=drones(2), decisions=(place, LEVEL), rules=rules))
     with watched_page(browser, {"width": 1280, "height": 900}) as tab:
         page = opened(tab, application, team)
+        page.get_by_role("button", name="Add robot").click()
         page.get_by_role("switch", name="Choose cells by clicking them").click()
         page.wait_for_selector("text=Click the cells among which the robots choose.")
+        page.wait_for_selector("button[aria-pressed=true]:has-text('Select')")  # a click adds no robot now
         click_cell(page, 0, 5)
         page.wait_for_selector("[role=alert] >> text=That is the last cell that can be chosen for place.")
         page.locator(".rule .sentence").nth(0).click()

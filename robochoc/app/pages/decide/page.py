@@ -7,6 +7,7 @@ from functools import cache, partial
 from importlib.resources import files
 
 from nicegui import ui
+from nicegui.events import GenericEventArguments
 
 from robochoc.app.pages.decide.answer import headline, table_html, took
 from robochoc.app.pages.decide.conflict import Doors
@@ -31,6 +32,8 @@ from robochoc.app.texts import say
 PURPOSE = "decide"
 MOST_LIVE = 300
 """Of more robots, the picture is drawn when they have decided."""
+_SINGLE_CLICKS = (0, 1)
+"""How many clicks there were in a row (`UIEvent.detail`); of keys, 0."""
 SHORT_S = 3.0
 """Of a search that took no longer, nobody has seen what was said."""
 
@@ -58,7 +61,8 @@ class _Page:
             ui.label(say("decide.title"))
         with ui.element("section").classes("decide-top"):
             with ui.element("div").classes("go"):
-                self._go = ui.button(say("decide.button"), on_click=self._press, color=None)
+                self._go = ui.button(say("decide.button"), color=None)
+                self._go.on("click", self._press, js_handler="(event) => emit(event.detail)")
                 self._go.props("unelevated no-caps size=lg")
                 self._status = ui.label("").classes("status").props("role=status")
                 self._facts = ui.label("").classes("soft facts")
@@ -80,7 +84,10 @@ class _Page:
 
     # What happens
 
-    def _press(self) -> None:
+    def _press(self, event: GenericEventArguments) -> None:
+        """Decide, or stop; the second click of a double click does not stop what the first one has begun."""
+        if event.args not in _SINGLE_CLICKS:
+            return
         if self._run is not None and self._run.state is State.RUNNING:
             self._run.stop()
             self._go.set_text(say("decide.stopping"))
@@ -249,6 +256,8 @@ class _Page:
             self._doors = show_foreign_below(self._project, self._foreign, result, self._decide)
         elif result.verdict == "no-solution":
             self._doors = Doors(self._project, sketch, self._decide)
+        if shown.live.is_cut:
+            ui.label(say("decide.live-cut", messages=f"{shown.live.messages:,}")).classes("soft")
         if result.assignment and not self._foreign:
             costs = ui.element("div")
             ui.timer(0, partial(show_costs, costs, sketch, result), once=True)

@@ -83,10 +83,10 @@ export default {
     </div>`,
   props: {
     columns: Number, rows: Number, blocked: Array, robots: Array, links: Array, selected: Array,
-    lit: String, tool: String, words: Object, movable: Boolean, acts: Object,
+    lit: String, tool: String, words: Object, movable: Boolean, heard: Number, acts: Object,
   },
   emits: ["act", "robot", "cell", "moved", "removed", "rule", "cleared"],
-  data: () => ({ width: 640, tall: TALLEST, local: {}, over: null, cursor: null, drag: null, hovered: null, spot: null, next: null, menu: null }),
+  data: () => ({ width: 640, tall: TALLEST, local: {}, sent: 0, over: null, cursor: null, drag: null, hovered: null, spot: null, next: null, menu: null }),
   mounted() {
     this.watcher = new ResizeObserver(([box]) => {
       this.width = Math.floor(box.contentRect.width);
@@ -99,7 +99,8 @@ export default {
   },
   watch: {
     robots() {
-      this.local = {};
+      // What is drawn may be older than what was moved since: moves that the page has not heard of yet stay.
+      this.local = Object.fromEntries(Object.entries(this.local).filter(([, cell]) => cell.sent > this.heard));
       if (this.next !== null) this.$nextTick(this.focusNext);
     },
   },
@@ -319,8 +320,9 @@ export default {
     move(name, cell) {
       const robot = this.placed.find((one) => one.name === name);
       if (robot && (robot.x !== cell.x || robot.y !== cell.y)) {
-        this.local = { ...this.local, [name]: cell };
-        this.$emit("moved", { name, ...cell });
+        const sent = ++this.sent;
+        this.local = { ...this.local, [name]: { ...cell, sent } };
+        this.$emit("moved", { name, ...cell, sent });
       }
     },
     step(cell, [dx, dy]) {

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from typing import Annotated
 
 import msgspec
 from nicegui.element import Element
@@ -15,6 +16,8 @@ from robochoc.app.texts import say
 
 SELECT = "select"
 """The tool of a board that only looks, picks and drags. With others, the cell under the pointer is shown."""
+
+MOST_MOVES = 2**53
 
 
 class Clicked(msgspec.Struct):
@@ -34,11 +37,12 @@ class Act(msgspec.Struct):
 
 
 class Moved(msgspec.Struct):
-    """A robot that was dragged to a cell."""
+    """A robot that was dragged to a cell. `sent`: how many moves of this tab there were by then."""
 
     name: str
     x: int
     y: int
+    sent: Annotated[int, msgspec.Meta(ge=0, le=MOST_MOVES)] = 0
 
 
 def _nothing(*_: object) -> None:
@@ -80,7 +84,7 @@ class Board(Element, component="board.js"):
         super().__init__()
         self._told = told
         self._props |= {"columns": 1, "rows": 1, "blocked": [], "robots": [], "links": [], "selected": []}
-        self._props |= {"lit": "", "tool": SELECT, "words": _words(), "movable": movable}
+        self._props |= {"lit": "", "tool": SELECT, "words": _words(), "movable": movable, "heard": 0}
         for name in told.types:
             self.on(name, lambda event, name=name: self._hear(name, event))
         self._props["acts"] = {}
@@ -130,6 +134,8 @@ class Board(Element, component="board.js"):
             given: object = msgspec.convert(event.args, self._told.types[name])
         except msgspec.ValidationError:
             return  # not from our board
+        if isinstance(given, Moved):  # the board keeps moves that it has not been told of so
+            self._change("heard", given.sent)
         getattr(self._told, name)(given)
 
 

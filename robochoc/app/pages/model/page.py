@@ -45,6 +45,7 @@ class ModelPage:
         self._tool = SELECT
         self._looked_at: Sketch | None = None
         self._looking = False
+        self._clicked: str | None = None
         with ui.element("div").classes("model"):
             with ui.element("section").classes("stage").props(f'aria-label="{say("board.map")}"'):
                 self._build_stage()
@@ -86,6 +87,9 @@ class ModelPage:
     def _use(self, tool: str) -> None:
         self._tool = tool
         self._board.use(tool)
+        if tool != SELECT and self._desk.cells_of is not None:
+            self._desk.cells_of = None
+            self._desk.looked()
         self._guide()
 
     def _robot(self, clicked: Clicked) -> None:
@@ -140,9 +144,17 @@ class ModelPage:
         self._robots.follow()
         self._decisions.follow()
         self._rules.follow()
+        self._clicking_cells()
         self._board.choose(self._shown_as_chosen())
         self._light()
         self._guide()
+
+    def _clicking_cells(self) -> None:
+        """Put the tool away once when cells, or what a rule binds, begin to be clicked together on the map."""
+        clicked = self._desk.cells_of or self._desk.opened
+        if clicked is not None and clicked != self._clicked:
+            self._tools.set_value(SELECT)
+        self._clicked = clicked
 
     def _shown_as_chosen(self) -> list[str]:
         rule = None if self._desk.opened is None else self._desk.sketch.rule(self._desk.opened)
