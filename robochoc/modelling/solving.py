@@ -62,6 +62,7 @@ class Solvable(ABC):
         patience: float | None = None,
         kill: Sequence[Kill] = (),
         filters: Sequence[str] = (),
+        bounds: bool = False,
         **unknown: Never,
     ) -> Solution:
         """Let the robots solve the problem together.
@@ -98,6 +99,7 @@ class Solvable(ABC):
             patience: A robot whose process is stopped for so many seconds is lost. None: it is waited for.
             kill: Robots whose processes are killed, and when.
             filters: The names of the channel filters that messages on a network go through, in this order.
+            bounds: Whether events tell the observer what is proven to be the least cost (processes and simulator).
             **unknown: There are no other options.
 
         Returns:
@@ -146,6 +148,7 @@ class Solvable(ABC):
             settings={name: str(value) for name, value in settings.items()},
             filters=tuple(filters),
             kill=tuple(one._replace(robot=called.get(one.robot, one.robot)) for one in kill),
+            bounds=bounds,
         )
         changes = environment is not None
         options = decided(team, options, environment=changes, ordered=self._is_ordered).options

@@ -122,6 +122,7 @@ OPTION_RULES = (
     _for_robots("--kill", lambda o: o.kill),
     _for_robots("--channel", lambda o: o.channel),
     _for_robots("--filter", lambda o: o.filters),
+    _for_robots("--bounds", lambda o: o.bounds),
     _for_robots("--order", lambda o: o.order is not None),
     _for_robots("--set", lambda o: o.settings),
     OptionRule(
@@ -148,6 +149,11 @@ OPTION_RULES = (
         lambda o: o.filters and o.runtime is not Runtime.NETWORK,
         "--filter is for messages that cross a network",
         "add --runtime network",
+    ),
+    OptionRule(
+        lambda o: o.bounds and o.runtime in {Runtime.NETWORK, Runtime.ARRAYS},
+        "--bounds is of robots in processes or the simulator",
+        "drop it",
     ),
     OptionRule(
         lambda o: o.spares and o.runtime is Runtime.NETWORK,

@@ -61,14 +61,14 @@ if TYPE_CHECKING:
 _SECTIONS: Sections = {
     COMMON: (
         "--protocol", "--runtime", "--timeout", "--withdraw", "--verify", "--seed",
-        "--json", "--html", "--journal", "--bounds", "--sniff", "--help",
+        "--json", "--html", "--journal", "--sniff", "--help",
     ),
     "Search": ("--order", "--set", "--messages", "--ncccs", "--cycles", "--count", "--with"),
     "Losses of robots (processes and network)": ("--on-loss", "--spare", "--patience", "--kill"),
     "Messages on their way": ("--schedule", "--delay", "--channel", "--filter"),
     "Robots with several variables": ("--local-solutions", "--local-timeout", "--ace", "--no-cache"),
     "Files of other tools (docs/guides/import.md)": ("--infinity", "--owner"),
-    "Output": ("--explain", "--serve", "--open"),
+    "Output": ("--explain", "--bounds", "--serve", "--open"),
     "ROS (docs/guides/ros.md)": ("--ros", "--frame", "--scale", "--situation", "--report-timeout", "--battery"),
     "Simulated flight (--situation flight)": ("--fail", "--distance", "--wind", "--gusts", "--obstacle"),
 }  # fmt: skip

@@ -20,7 +20,7 @@ def html_option(*short: str) -> Callable[[Command], Command]:
         "html",
         type=OutputFile(),
         metavar="FILE",
-        help="Write the 3D scene: one HTML file, to be opened in a browser without a server.",
+        help="Write the 3D scene: one HTML file, for a browser.",
     )
 
 

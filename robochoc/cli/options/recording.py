@@ -28,7 +28,7 @@ journal_option = click.option(
 bounds_option = click.option(
     "--bounds",
     is_flag=True,
-    help="With --journal: also when robots prove that nothing costs less (a journal of version 3).",
+    help="With --journal: also when a least cost is proven.",
 )
 
 

@@ -249,6 +249,8 @@ def check_products(products: Products, wanted: Wanted, options: Options, *, team
     if options.count and (products or wanted.ros):
         nothing = "--ros" if wanted.ros else "--html, --journal, --serve or --sniff"
         raise click.UsageError(f"--count gives only a number: drop {nothing}")
+    if options.bounds and not products.journal:
+        raise click.UsageError("--bounds is of the journal: add --journal FILE")
     if options.runtime == "arrays" and (products.journal or products.watching):
         raise click.UsageError("--journal and --sniff show messages, and --runtime arrays sends none: drop it")
     if products.serve and products.watching:

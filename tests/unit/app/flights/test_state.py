@@ -132,12 +132,3 @@ def test_too_long_a_journal_is_left_out(tmp_path: Path, monkeypatch: pytest.Monk
     with zipfile.ZipFile(io.BytesIO(packed(run))) as archive:
         assert not any(name.endswith("run.journal") for name in archive.namelist())
         assert any(name.endswith("result.json") for name in archive.namelist())
-
-
-def test_too_long_a_journal_is_left_out(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    run = kept_run(tmp_path, cube())
-    monkeypatch.setattr("robochoc.app.flights.state.MOST_SAID", 12)
-    assert is_too_long(run)
-    with zipfile.ZipFile(io.BytesIO(packed(run))) as archive:
-        assert not any(name.endswith("run.journal") for name in archive.namelist())
-        assert any(name.endswith("result.json") for name in archive.namelist())

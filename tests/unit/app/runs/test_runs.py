@@ -175,36 +175,6 @@ class TestRun:
         assert run.state is State.ENDED
         assert run.live.is_cut
 
-    def test_that_a_new_one_takes_the_place_of_one_that_still_runs(self, tmp_path: Path) -> None:
-        runs = Runs(Team(slots(14, 14), tmp_path))
-        first = runs.start(RunOptions(protocol="syncbb"))
-        other = runs.start(RunOptions(protocol="syncbb"), purpose="compare")
-        second = runs.start(sketch=slots(2, 2))
-        assert ended(first).state is State.STOPPED
-        assert ended(second).state is State.ENDED
-        assert other.state is State.RUNNING
-
-    def test_that_a_fault_nobody_foresaw_ends_it(
-        self, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
-    ) -> None:
-        def fails(_: object) -> None:
-            raise ZeroDivisionError("unforeseen")
-
-        monkeypatch.setattr("robochoc.app.runs.live.LiveReader.advance", fails)
-        run = ended(Runs(Team(slots(3, 3), tmp_path)).start())
-        assert run.state is State.FAILED
-        assert run.message == "That did not work. The team is as it was before."
-        assert "ZeroDivisionError" in caplog.text
-
-    def test_that_a_journal_without_end_does_not_keep_it_running(
-        self, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-    ) -> None:
-        monkeypatch.setattr("robochoc.app.runs.live.LiveReader.advance", lambda _: True)
-        monkeypatch.setattr("robochoc.app.runs.watching.READ_ON_S", 0)
-        run = ended(Runs(Team(slots(3, 3), tmp_path)).start())
-        assert run.state is State.ENDED
-        assert run.live.is_cut
-
 
 class TestAfterTheServersDeath:
     def test_that_broken_runs_are_told_as_such(self, tmp_path: Path) -> None:
