@@ -18,20 +18,18 @@ from robochoc.app.runs.runs import Runs, runs_of
 from robochoc.app.sketch.edits import EditError
 from robochoc.app.sketch.sketch import Sketch
 from robochoc.app.store import Store
-from robochoc.app.studies.question import Question
+from robochoc.app.studies.question import MOST_SECONDS, Question
 from robochoc.app.studies.study import study_on
 from tests.support.kept_runs import cube, kept_run
-from tests.support.leftovers import nothing_left_behind
 from tests.support.limits import HANG_S, wait_until
 from tests.support.slot_sketches import slots
 
 
 @pytest.fixture(autouse=True)
 def nothing_stays() -> Iterator[None]:
-    """No thread and no process is left."""
-    with nothing_left_behind():
-        yield
-        end_all(HANG_S)
+    """End what a test has started; all tests look that nothing is left."""
+    yield
+    end_all(HANG_S)
 
 
 @pytest.fixture
@@ -50,7 +48,7 @@ def test_all_that_it_does_is_ended(projects: Projects) -> None:
     kept = kept_run(project.folder, cube())
     run = runs_of(project).start(RunOptions(protocol="syncbb", runtime="processes"))
     its = runs_of(other).start(RunOptions(protocol="syncbb"))
-    study_on(project).start(project.sketch, Question(("syncbb", "afb"), timeout=600))
+    study_on(project).start(project.sketch, Question(("syncbb", "afb"), timeout=MOST_SECONDS))
     search = ConflictSearch(project.sketch, folder=project.folder)
     Making(kept).wanted(lambda: None)
     assert len(jobs_alive()) == 5
