@@ -1,16 +1,13 @@
-"""Compares a team's answer with its rules: each robot's values, the rules that are broken, and their costs."""
+"""Compares a team's answer with its rules: which of them are broken, by whom, and at what cost."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from dataclasses import dataclass
 
-from robochoc.app.sketch.palette import Applied
+from robochoc.app.runs.paid import Decided, broken_links
 from robochoc.app.sketch.rules import PALETTE
-from robochoc.app.sketch.sketch import Sketch, SketchRule, Value
-
-Decided = Mapping[tuple[str, str], Value]
-"""Values by robot and decision, as `sketch.building.decided` returns them."""
+from robochoc.app.sketch.sketch import Sketch, SketchRule
 
 
 @dataclass(frozen=True)
@@ -25,15 +22,5 @@ class Broken:
 def broken(sketch: Sketch, values: Decided) -> Iterator[Broken]:
     """Yield the rules that an answer breaks. Robots without a value (they stepped aside) break none."""
     for rule in sketch.rules:
-        if not rule.on or rule.kind not in PALETTE:
-            continue
-        entry, given = PALETTE[rule.kind], Applied(sketch, rule)
-        links = tuple(
-            robots
-            for robots in entry.groups(sketch, rule)
-            if all((robot, rule.decision) in values for robot in robots)
-            and not entry.holds(given, [values[robot, rule.decision] for robot in robots])
-        )
-        if links:
-            count = sum(map(len, links)) if rule.private else len(links)  # of a private one, each robot counts its own
-            yield Broken(rule, links, None if rule.cost is None else rule.cost * count)
+        if rule.on and rule.kind in PALETTE and (links := broken_links(sketch, rule, values)):
+            yield Broken(rule, links, None if rule.cost is None else rule.cost * len(links))

@@ -23,15 +23,13 @@ from robochoc.app.flights.flown import flight_words, flown_of
 from robochoc.app.flights.ground import changed_to, happened_in
 from robochoc.app.flights.who import who_flies
 from robochoc.app.runs.options import RESULT
-from robochoc.app.runs.paid import paid
+from robochoc.app.runs.paid import Decided, costly, price, values_in
 from robochoc.app.runs.run import Run
-from robochoc.app.sketch.building import decided
 from robochoc.app.sketch.picture import picture
 from robochoc.app.sketch.rules import PALETTE
 from robochoc.app.sketch.sketch import Sketch, Value
 from robochoc.app.sketch.words import listed, sentence, value_words, weight_of
 from robochoc.app.texts import LANGUAGE, say
-from robochoc.modelling.places import ModelError
 from robochoc.system.plain_text import printable
 
 _MOST_VALUES = 12
@@ -117,9 +115,7 @@ _VERDICTS = frozenset({"solution", "optimal", "fewest", "no-solution", "unknown"
 
 def values_of(sketch: Sketch, run: Run) -> dict[tuple[str, str], Value]:
     """Return what robots have decided, by robot and decision."""
-    with suppress(ModelError, ValueError, TypeError, KeyError):
-        return decided(sketch, run.result.assignment if run.result else {})
-    return {}
+    return values_in(sketch, run.result.assignment) if run.result else {}
 
 
 def _answer(sketch: Sketch, run: Run) -> str:
@@ -144,7 +140,7 @@ def _rules(sketch: Sketch, run: Run) -> str:
         return ""
     values = values_of(sketch, run)
     found = {one.rule.id: one for one in broken(sketch, values)}
-    costs = _by_degrees(sketch, run)
+    costs = _by_degrees(sketch, values)
     items = []
     for rule in sketch.rules:
         marks = [f'<span class="soft">{_text(weight_of(rule))}</span>']
@@ -161,14 +157,10 @@ def _rules(sketch: Sketch, run: Run) -> str:
     return _section("report.rules", f"{told}<ol>{''.join(items)}</ol>")
 
 
-def _by_degrees(sketch: Sketch, run: Run) -> dict[str, float]:
+def _by_degrees(sketch: Sketch, values: Decided) -> dict[str, int]:
     """Return what rules cost that are never broken, but cost more or less: by their ids."""
-    graded = tuple(rule for rule in sketch.rules if rule.on and rule.kind in PALETTE and PALETTE[rule.kind].graded)
-    if run.result is None or not graded:
-        return {}
-    with suppress(ModelError, ValueError, TypeError, KeyError):
-        return paid(msgspec.structs.replace(sketch, rules=graded), run.result.assignment)
-    return {}
+    graded = (rule for rule in costly(sketch) if values and PALETTE[rule.kind].graded)
+    return {rule.id: price(sketch, rule, values) for rule in graded}
 
 
 def _team(sketch: Sketch) -> str:

@@ -29,9 +29,9 @@ async def show_costs(where: ui.element, sketch: Sketch, result: RunResult) -> No
         _bars(sketch, costs)
 
 
-def _bars(sketch: Sketch, costs: Mapping[str, float]) -> None:
+def _bars(sketch: Sketch, costs: Mapping[str, int]) -> None:
     dearest_first = sorted(costs.items(), key=lambda one: -one[1])
-    most = max(costs.values()) or 1
+    most = max(1, *costs.values())
     with ui.element("ul").classes("rules"):
         for name, cost in dearest_first[:MOST_BARS]:
             rule = sketch.rule(name)
@@ -42,7 +42,7 @@ def _bars(sketch: Sketch, costs: Mapping[str, float]) -> None:
         ui.label(say("decide.together", cost=f"{sum(costs.values()):,g}"))
 
 
-def _bar(words: str, cost: float, most: float) -> None:
+def _bar(words: str, cost: int, most: int) -> None:
     with ui.element("li"):
         ui.label(words).classes("words")
         with ui.element("div").classes("track").props("aria-hidden=true"):

@@ -33,11 +33,11 @@ def test_what_had_to_hold_has_no_cost() -> None:
     ]
 
 
-def test_each_link_costs_and_of_a_private_rule_each_half() -> None:
+def test_each_link_costs_also_of_a_private_rule() -> None:
     rule = SketchRule("", "different", "level", cost=5)
     assert [one.cost for one in broken(_pair(rule), ALL_ONE)] == [15]
     private = SketchRule("", "different", "level", cost=5, private=True)
-    assert [one.cost for one in broken(_pair(private), ALL_ONE)] == [30]
+    assert [one.cost for one in broken(_pair(private), ALL_ONE)] == [15]
 
 
 def test_who_stepped_aside_and_what_is_switched_off_break_nothing() -> None:

@@ -15,13 +15,16 @@ from robochoc.app.pages.decide.conflict import hints_about_rules
 from robochoc.app.pages.decide.ground import UNIT, Target, shown_part, targets_of
 from robochoc.app.pages.decide.picture import falling_svg, team_svg, values_of
 from robochoc.app.runs.fitting import fitting
+from robochoc.app.runs.labels import value_of
 from robochoc.app.runs.options import RunOptions
 from robochoc.app.runs.paid import paid
 from robochoc.app.runs.result import RunResult, decoded
 from robochoc.app.runs.run import Record, Run, State
 from robochoc.app.sketch.building import model_of
 from robochoc.app.sketch.sketch import Area, Cell, Decision, Kind, Sketch, SketchRobot, Value
+from robochoc.verification.checker import assignment_cost
 from tests.support.rule_teams import random_rules
+from tests.support.sketches import random_sketch
 from tests.support.slot_sketches import slots
 
 HOSTILE = "<img src=x onerror=alert(1)>\"'&{x}"
@@ -183,3 +186,16 @@ def test_that_only_protocols_that_fit_are_offered() -> None:
 @pytest.mark.parametrize("content", [b"", b"{", b'{"verdict":"optimal"}', b"nonsense\n", b"[]\n", b"\xff\n"])
 def test_that_half_a_result_is_none(content: bytes) -> None:
     assert decoded(content) is None
+
+
+@pytest.mark.parametrize("seed", range(40))
+def test_that_rules_cost_in_any_answer_what_the_checker_says(seed: int) -> None:
+    random = Random(seed)
+    drawn = random_sketch(random)
+    rules = tuple(msgspec.structs.replace(rule, cost=rule.cost or 7, private=False) for rule in drawn.rules)
+    sketch = msgspec.structs.replace(drawn, rules=rules)
+    model = model_of(sketch)
+    for _ in range(10):
+        codes = {name: random.choice([*one.domain]) for name, one in model.team.variables.items() if one.domain}
+        values = {name: value_of(model, name, code) for name, code in codes.items()}
+        assert sum(paid(sketch, values).values()) == assignment_cost(model.team, codes)
