@@ -96,7 +96,7 @@ class Host:
         """Constraint checks that the clock has counted: all of them, but within a step."""
         self._reported: tuple[int | None, Verdict | None] = (None, None)
         self._heard: float = math.inf
-        self._bounded: float = 0
+        self._bounded: int | float = 0
         self._bounds = False
         self._observer: Observer | None = None
         self._now: Callable[[], float] = lambda: 0.0

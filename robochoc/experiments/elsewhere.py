@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import tempfile
 import threading
 from collections.abc import Mapping
 from pathlib import Path
@@ -11,7 +10,7 @@ import msgspec
 
 from robochoc.experiments.execute import Bench
 from robochoc.experiments.task import Task
-from robochoc.system.temporary_files import temporary_folder
+from robochoc.system.temporary_files import PrivateFolder
 
 _KEPT = threading.local()
 
@@ -36,7 +35,7 @@ def run_one(content: bytes, files: Mapping[str, bytes]) -> bytes:
     task = msgspec.json.decode(content, type=Task)
     if not files:
         return msgspec.json.encode(_bench().run(task))
-    with tempfile.TemporaryDirectory(prefix="robochoc-", dir=temporary_folder()) as folder:
+    with PrivateFolder() as folder:
         name = Path(task.problem.path).name
         single = len(files) == 1 and name in files
         place = Path(folder) if single else Path(folder) / name

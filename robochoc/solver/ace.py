@@ -9,17 +9,14 @@ from __future__ import annotations
 
 import os
 import select
-import shutil
 import signal
 import socket
 import subprocess
 import sys
-import tempfile
 import time
 from array import array
 from collections.abc import Sequence
 from contextlib import suppress
-from pathlib import Path
 from types import TracebackType
 from typing import Self
 
@@ -52,7 +49,7 @@ from robochoc.solver.failures import SolverLostError, SolverMissingError, Solver
 from robochoc.solver.propagation import propagate
 from robochoc.solver.query import Query, SolvedBy, SolverAnswer
 from robochoc.system.signals import signals_held
-from robochoc.system.temporary_files import temporary_folder
+from robochoc.system.temporary_files import PrivateFolder
 
 CHUNK = 1 << 20
 LAST_WORDS_S = 1.0
@@ -73,7 +70,7 @@ class AceProcess:
         self._steps_left = STEPS_BEFORE_ACE
         self._enumerated: SolverAnswer | None = None
         self._process: subprocess.Popen[bytes] | None = None
-        self._folder: Path | None = None
+        self._folder: PrivateFolder | None = None
         self._socket: socket.socket | None = None
         self._lifeline = -1
         self._buffer = bytearray()
@@ -185,7 +182,7 @@ class AceProcess:
         question, output = self._question, b""
         if question is not None and question.costs and self._folder is not None:
             with suppress(OSError):
-                output = (self._folder / BEST).read_bytes()
+                output = (self._folder.path / BEST).read_bytes()
         self.close()
         if question is None or b"</values>" not in output:
             return SolverTimeoutError()
@@ -221,7 +218,7 @@ class AceProcess:
             os.close(self._lifeline)
             self._lifeline = -1
         if self._folder is not None:
-            shutil.rmtree(self._folder, ignore_errors=True)
+            self._folder.close()
             self._folder = None
         self._buffer.clear()
         self._tasks = 0
@@ -250,15 +247,15 @@ class AceProcess:
     # The process
 
     def _start(self) -> None:
-        self._folder = Path(tempfile.mkdtemp(prefix="robochoc-", dir=temporary_folder()))
+        self._folder = PrivateFolder()
         ours, theirs = socket.socketpair()
         # The process reads from this pipe, whose other end only this process has: it ends with this process.
         watched, self._lifeline = os.pipe()
         try:
-            with (self._folder / "stderr").open("wb") as stderr, signals_held():
+            with (self._folder.path / "stderr").open("wb") as stderr, signals_held():
                 self._process = subprocess.Popen(  # noqa: S603 - our own module
                     [sys.executable, "-P", "-m", "robochoc.solver.ace_process"]
-                    + [str(theirs.fileno()), str(watched), str(self._folder)]
+                    + [str(theirs.fileno()), str(watched), str(self._folder.path)]
                     + ["--warm"] * self._java,
                     stdin=subprocess.DEVNULL,
                     stdout=subprocess.DEVNULL,
@@ -327,7 +324,7 @@ class AceProcess:
         if self._process is not None and self._folder is not None:
             with suppress(subprocess.TimeoutExpired):
                 status = self._process.wait(1)
-            lines = (self._folder / "stderr").read_text(errors="replace").split("\n")
+            lines = (self._folder.path / "stderr").read_text(errors="replace").split("\n")
             output = next((line.strip() for line in reversed(lines) if line.strip()), "")
         self.close()
         fate = "was lost" if status is None else f"ended with status {status}"

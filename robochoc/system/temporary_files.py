@@ -1,4 +1,4 @@
-"""The folder for temporary files, found without a trace.
+"""The folder for temporary files, found without a trace, and what is put there and removed again.
 
 Python's `tempfile`, when it is first used, tries folders out with a named file. A process that is killed in that moment
 leaves the file. So the folder is found here, and given to `tempfile` each time.
@@ -7,7 +7,11 @@ leaves the file. So the folder is found here, and given to `tempfile` each time.
 from __future__ import annotations
 
 import os
+import secrets
+import shutil
 import tempfile
+import threading
+import weakref
 from pathlib import Path
 from typing import IO
 
@@ -38,3 +42,42 @@ def unnamed_file(*, buffered: bool = True) -> IO[bytes]:
         OSError: if no folder for temporary files can be written to.
     """
     return tempfile.TemporaryFile(buffering=-1 if buffered else 0, dir=temporary_folder())
+
+
+class PrivateFolder:
+    """A new folder that only this user can read. It is removed by `close`, at the latest when this process ends.
+
+    Ctrl-C and SIGTERM may interrupt any line of the main thread; `tempfile.TemporaryDirectory` leaves a folder behind
+    that they meet between its making and its noting, or half removed. Here its removal is noted first, and done in a
+    thread, which they do not interrupt. A process that was forked does not remove it.
+
+    Raises:
+        OSError: if there is no place for it.
+    """
+
+    def __init__(self) -> None:
+        self.path = temporary_folder() / f"robochoc-{secrets.token_hex(16)}"
+        self._remove = weakref.finalize(self, _remove, self.path, os.getpid())
+        self.path.mkdir(mode=0o700)
+
+    def __enter__(self) -> Path:
+        return self.path
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """Remove the folder with all that is in it. Does nothing the second time."""
+        if self._remove.alive:
+            remover = threading.Thread(target=self._remove)
+            try:
+                remover.start()
+            except RuntimeError:  # no further thread can be had
+                self._remove()
+            else:
+                remover.join()
+
+
+def _remove(folder: Path, owner: int) -> None:
+    if os.getpid() == owner:
+        shutil.rmtree(folder, ignore_errors=True)

@@ -7,13 +7,10 @@ of a file with mode 0600, in a folder with mode 0700, and the file holds the add
 from __future__ import annotations
 
 import os
-import shutil
-import tempfile
 from html import escape
-from pathlib import Path
 from typing import Self
 
-from robochoc.system.temporary_files import temporary_folder
+from robochoc.system.temporary_files import PrivateFolder
 
 _PAGE = """\
 <!DOCTYPE html>
@@ -28,9 +25,9 @@ class RedirectFile:
     """A file that leads a browser to `url`, until it is closed. Raises `OSError` if it cannot be written."""
 
     def __init__(self, url: str) -> None:
-        self._folder = Path(tempfile.mkdtemp(prefix="robochoc-", dir=temporary_folder()))
+        self._folder = PrivateFolder()
         try:
-            file = self._folder / "page.html"
+            file = self._folder.path / "page.html"
             with os.fdopen(os.open(file, os.O_CREAT | os.O_EXCL | os.O_WRONLY, 0o600), "w", encoding="utf-8") as page:
                 page.write(_PAGE.format(url=escape(url)))
         except BaseException:
@@ -47,4 +44,4 @@ class RedirectFile:
 
     def close(self) -> None:
         """Remove the file. Does nothing the second time."""
-        shutil.rmtree(self._folder, ignore_errors=True)
+        self._folder.close()

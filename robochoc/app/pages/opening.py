@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import tempfile
 from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
@@ -17,7 +16,7 @@ from robochoc.app.sketch.sketch import Sketch
 from robochoc.app.texts import say
 from robochoc.formats import InvalidInputError
 from robochoc.system.plain_text import on_one_line
-from robochoc.system.temporary_files import temporary_folder
+from robochoc.system.temporary_files import PrivateFolder
 
 _LONGEST_NAME = 100
 
@@ -36,7 +35,7 @@ def build_opening(projects: Projects, show: Callable[[str], None]) -> None:
     async def take(event: UploadEventArguments) -> None:
         wrong.set_text("")
         upload.reset()
-        with tempfile.TemporaryDirectory(prefix="robochoc-", dir=temporary_folder()) as folder:
+        with PrivateFolder() as folder:
             file = Path(folder) / (Path(event.file.name or "").name[-_LONGEST_NAME:] or "team")
             await event.file.save(file)
             try:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import re
 import stat
-import tempfile
 import zipfile
 import zlib
 from dataclasses import dataclass, replace
@@ -19,7 +18,7 @@ from robochoc.formats.dialects.dialect import ImportOptions
 from robochoc.formats.dialects.registry import beginning_of, read_foreign, recognise, unknown_format
 from robochoc.formats.folder import SKETCH_FILE
 from robochoc.model.problem import Team
-from robochoc.system.temporary_files import temporary_folder
+from robochoc.system.temporary_files import PrivateFolder
 
 MAX_FILES = 2_000
 """Files of a team that are opened. What has more, commands decide without pictures."""
@@ -122,7 +121,7 @@ def _xml_in(folder: Path) -> dict[str, bytes]:
 
 
 def _archive(path: Path) -> Sketch | ForeignTeam:
-    with tempfile.TemporaryDirectory(prefix="robochoc-", dir=temporary_folder()) as place:
+    with PrivateFolder() as place:
         folder = Path(place) / (path.stem or "team")
         folder.mkdir()
         try:

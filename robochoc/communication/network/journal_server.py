@@ -25,8 +25,10 @@ PIECE_BYTES = 60_000
 """The largest piece of the journal: with its framing it fits into one batch of zenoh."""
 ANSWERED_AT_MOST = 200
 """The largest number of answers to one follower in a second. It repeats questions without an answer."""
-PRESENT_S = 2.0
-"""Seconds after its last request for which a follower is waited for at the end of the run."""
+PRESENT_S = 5.0
+"""Seconds after its last request for which a follower is waited for at the end of the run.
+
+It must be more than what a follower takes to ask again when a request or answer was lost (`sniffer/remote.py`: 2 s)."""
 LARGEST = 2**53
 """Bytes: no journal is as long."""
 _LARGEST_QUESTION = 200
