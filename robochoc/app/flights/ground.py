@@ -8,18 +8,28 @@ from contextlib import suppress
 import msgspec
 
 from robochoc.app.runs.run import CHANGE, Run
+from robochoc.app.sketch.shape import is_sound
 from robochoc.app.sketch.sketch import Sketch
 from robochoc.flight.ground_map import BlockedCell, GroundMap
 
 MAP = "map.json"
 
 
-class _Change(msgspec.Struct):
+_MOST_TOLD = 100_000
+"""Characters of all that is told of a change: fifty sentences have far fewer."""
+
+
+class Change(msgspec.Struct):
     """What is read of `change.json`: the team after what has happened; if it decided `anew`, in another run."""
 
     after: Sketch
     happened: list[str] = []
     anew: str = ""
+
+    @property
+    def is_sound(self) -> bool:
+        """Whether it can be shown at all, wherever its file is from."""
+        return is_sound(self.after) and len(self.anew) + sum(map(len, self.happened)) <= _MOST_TOLD
 
 
 def ground_of(run: Run) -> GroundMap | None:
@@ -52,9 +62,9 @@ def happened_in(run: Run) -> list[str]:
     return change.happened if change else []
 
 
-def _change(run: Run) -> _Change | None:
+def _change(run: Run) -> Change | None:
     with suppress(OSError, msgspec.DecodeError, RecursionError):
-        change = msgspec.json.decode((run.folder / CHANGE).read_bytes(), type=_Change)
+        change = msgspec.json.decode((run.folder / CHANGE).read_bytes(), type=Change)
         return None if change.anew else change
     return None
 

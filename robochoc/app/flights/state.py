@@ -15,12 +15,14 @@ from pathlib import Path
 
 import msgspec
 
+from robochoc.app.flights.ground import Change
 from robochoc.app.flights.names import file_name
 from robochoc.app.runs.options import JOURNAL, RESULT
-from robochoc.app.runs.run import CHANGE, RECORD, SKETCH, Record, Run
+from robochoc.app.runs.run import CHANGE, MAX_RESULT, RECORD, SKETCH, Record, Run
+from robochoc.app.sketch import opening
 from robochoc.app.sketch.archives import bounded_archive
-from robochoc.app.sketch.checks import troubles
-from robochoc.app.sketch.files import zipped
+from robochoc.app.sketch.checks import errors_of
+from robochoc.app.sketch.files import MAX_SKETCH, zipped
 from robochoc.app.sketch.opening import DAMAGED
 from robochoc.app.sketch.shape import is_sound
 from robochoc.app.sketch.sketch import Sketch
@@ -28,8 +30,10 @@ from robochoc.app.store import FILES
 
 MAX_BYTES = 256 << 20
 """Bytes of a run, unpacked."""
-MOST_SAID = 128 << 20
-"""Bytes of the messages of a run: of more, none are packed."""
+MOST_SAID = opening.MAX_BYTES * 3 // 4
+"""Bytes of the messages of a run: of more, none are packed, so that the file can be opened again."""
+MOST_AT_ONCE = {RECORD: MAX_SKETCH, SKETCH: MAX_SKETCH, CHANGE: MAX_SKETCH, RESULT: MAX_RESULT}
+"""Bytes of a file of the run that is read at once. A larger one is none of ours."""
 _FILES = (RECORD, SKETCH, RESULT, JOURNAL, CHANGE)
 _AT_ONCE = 1 << 20
 _PLACE = "run/1"
@@ -116,7 +120,7 @@ def unpack_run(file: Path, folder: Path) -> bool:
 
 
 def _found(archive: zipfile.ZipFile) -> dict[str, bytes]:
-    """Return the files of the run. Names are compared, never used as paths."""
+    """Return the files of the run; none, if one is too large. Names are compared, never used as paths."""
     found: dict[str, bytes] = {}
     left = MAX_BYTES
     for entry in archive.infolist():
@@ -124,11 +128,12 @@ def _found(archive: zipfile.ZipFile) -> dict[str, bytes]:
         name = inside.removeprefix(f"{_PLACE}/")
         if name == inside or name not in _FILES or name in found:
             continue
+        most = min(left, MOST_AT_ONCE.get(name, left))
         with archive.open(entry) as stream:  # what an entry says of its own size need not be true
-            found[name] = stream.read(left + 1)
-        left -= len(found[name])
-        if left < 0:
+            found[name] = stream.read(most + 1)
+        if len(found[name]) > most:
             return {}
+        left -= len(found[name])
     return found
 
 
@@ -136,8 +141,9 @@ def _is_sound(found: dict[str, bytes]) -> bool:
     try:
         msgspec.json.decode(found[RECORD], type=Record)
         sketch = msgspec.json.decode(found[SKETCH], type=Sketch)
+        change = msgspec.json.decode(found[CHANGE], type=Change) if CHANGE in found else None
     except (msgspec.DecodeError, RecursionError, UnicodeError):
         return False
-    if not sketch.decisions:  # the picture of a team that was not drawn here
-        return is_sound(sketch)
-    return not any(trouble.is_error for trouble in troubles(sketch))
+    if not is_sound(sketch) or (change is not None and not change.is_sound):
+        return False
+    return not (sketch.decisions and errors_of(sketch))  # without any: the picture of a team that was not drawn here

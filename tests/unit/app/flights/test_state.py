@@ -6,15 +6,20 @@ import io
 import shutil
 import zipfile
 from pathlib import Path
+from random import Random
 
 import msgspec
 import pytest
 
-from robochoc.app.flights.state import MAX_BYTES, is_too_long, packed, unpack_run
+from robochoc.app.flights import state
+from robochoc.app.flights.state import MAX_BYTES, MOST_SAID, is_too_long, packed, unpack_run
 from robochoc.app.foreign.drawing import drawn
+from robochoc.app.runs.options import JOURNAL
+from robochoc.app.runs.run import CHANGE
 from robochoc.app.runs.runs import Runs
+from robochoc.app.sketch import opening
 from robochoc.app.sketch.opening import ForeignTeam, opened
-from robochoc.app.sketch.sketch import MAX_ROBOTS, Cell, Sketch, SketchRobot
+from robochoc.app.sketch.sketch import MAX_ROBOTS, Area, Cell, Sketch, SketchRobot
 from robochoc.app.store import Store
 from robochoc.formats import read_team
 from tests.support.kept_runs import cube, kept_run
@@ -132,3 +137,48 @@ def test_too_long_a_journal_is_left_out(tmp_path: Path, monkeypatch: pytest.Monk
     with zipfile.ZipFile(io.BytesIO(packed(run))) as archive:
         assert not any(name.endswith("run.journal") for name in archive.namelist())
         assert any(name.endswith("result.json") for name in archive.namelist())
+
+
+def test_the_messages_that_are_packed_can_be_opened_again(tmp_path: Path) -> None:
+    run = kept_run(tmp_path / "here", cube())
+    (run.folder / JOURNAL).write_bytes(Random(0).randbytes(1 << 20))  # nothing makes this any smaller
+    others = len(packed(run)) - (1 << 20)
+    assert MOST_SAID + others <= opening.MAX_BYTES
+    with (run.folder / JOURNAL).open("r+b") as journal:
+        journal.truncate(MOST_SAID)
+    assert not is_too_long(run)
+    with (run.folder / JOURNAL).open("r+b") as journal:
+        journal.truncate(MOST_SAID + 1)
+    assert is_too_long(run)
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        b"{",
+        b'{"after": 3}',
+        b"[" * 100_000,
+        msgspec.json.encode({"after": Sketch("n" * 100_000), "happened": []}),
+        msgspec.json.encode({"after": Sketch(area=Area(10**6, 10**6)), "happened": []}),
+        msgspec.json.encode({"after": cube(), "happened": ["told" * 10] * 10_000}),
+    ],
+    ids=["no JSON", "no sketch", "deep", "name", "map", "told"],
+)
+def test_a_run_with_an_unsound_change_is_left_out(tmp_path: Path, change: bytes) -> None:
+    run = kept_run(tmp_path / "here", cube())
+    (run.folder / CHANGE).write_bytes(msgspec.json.encode({"after": cube(2), "happened": ["Drone3 fails."]}))
+    content = packed(run)
+    assert unpack_run(_file(tmp_path, content), tmp_path / "there")
+    assert not unpack_run(_file(tmp_path, _changed(content, change_json=change)), tmp_path / "elsewhere")
+    assert not (tmp_path / "elsewhere").exists()
+
+
+@pytest.mark.parametrize("name", ["run.json", "sketch.json", "change.json", "result.json"])
+def test_too_large_a_file_of_a_run_is_not_read_to_its_end(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, name: str
+) -> None:
+    run = kept_run(tmp_path / "here", cube())
+    (run.folder / CHANGE).write_bytes(msgspec.json.encode({"after": cube(2)}))
+    content = packed(run)
+    monkeypatch.setitem(state.MOST_AT_ONCE, name, 10)
+    assert not unpack_run(_file(tmp_path, content), tmp_path / "there")
