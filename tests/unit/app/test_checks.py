@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from robochoc.app.sketch.building import model_of
-from robochoc.app.sketch.checks import troubles
+from robochoc.app.sketch.checks import errors_of, troubles
 from robochoc.app.sketch.rules import PALETTE
 from robochoc.app.sketch.sketch import Area, Cell, Decision, Kind, Setting, Sketch, SketchRobot, SketchRule
 from robochoc.app.sketch.troubles import Trouble, shortened
@@ -226,6 +226,19 @@ def test_what_has_no_error_is_a_team(seed: int) -> None:
 def test_what_is_sound_has_no_error(seed: int) -> None:
     sketch = without_costs(random_sketch(Random(seed)))
     assert [trouble for trouble in troubles(sketch) if trouble.is_error] == []
+
+
+@given(st.integers(0, 10**9))
+@examples(60)
+def test_errors_are_found_without_the_hints_that_take_long(seed: int) -> None:
+    random = Random(seed)
+    sketch = random_sketch(random)
+    for _ in range(seed % 3):
+        sketch = spoiled(random, sketch)
+    errors = [trouble for trouble in troubles(sketch) if trouble.is_error]
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("robochoc.app.sketch.checks.chances", None)
+        assert errors_of(sketch) == errors
 
 
 @given(st.integers(0, 10**9))

@@ -25,7 +25,7 @@ from robochoc.app.runs.result import RunResult
 from robochoc.app.runs.run import Run, State
 from robochoc.app.runs.runs import runs_of
 from robochoc.app.runs.tape import Tape
-from robochoc.app.sketch.checks import troubles
+from robochoc.app.sketch.checks import errors_of
 from robochoc.app.sketch.sketch import Sketch, Value
 from robochoc.app.texts import say
 
@@ -113,8 +113,7 @@ class _Page:
 
     def _follow_team(self) -> None:
         """Say what keeps the team from deciding, or that it is another than the one that has decided."""
-        looked_at = [] if self._foreign else troubles(self._project.sketch)  # files were checked when they were opened
-        errors = [trouble for trouble in looked_at if trouble.is_error]
+        errors = [] if self._foreign else errors_of(self._project.sketch)  # files were checked when they were opened
         self._not_ready.clear()
         if errors:
             with self._not_ready:

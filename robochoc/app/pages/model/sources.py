@@ -8,7 +8,7 @@ from nicegui import run, ui
 
 from robochoc.app.pages.model.desk import Desk
 from robochoc.app.pages.model.parts import panel
-from robochoc.app.sketch.checks import troubles
+from robochoc.app.sketch.checks import errors_of
 from robochoc.app.sketch.files import xml_sources, zipped
 from robochoc.app.sketch.python_source import python_source
 from robochoc.app.sketch.sketch import Sketch
@@ -124,7 +124,7 @@ class Sources:
 
 def written_of(sketch: Sketch) -> Written:
     """Return the sources of a sketch."""
-    if any(trouble.is_error for trouble in troubles(sketch)):
+    if errors_of(sketch):
         return Written({}, "", say("model.source-wrong"))
     try:
         return Written(xml_sources(sketch), python_source(sketch), "")

@@ -17,7 +17,7 @@ from robochoc.app.pages.whatif.going_on import why_anew
 from robochoc.app.pages.whatif.story import story_of
 from robochoc.app.projects import Project
 from robochoc.app.sketch.changes import FULL, LEAST_BATTERY, AnyChange, Battery, Blocked, Fails, Joins
-from robochoc.app.sketch.checks import troubles
+from robochoc.app.sketch.checks import errors_of
 from robochoc.app.sketch.edits import EditError
 from robochoc.app.sketch.sketch import MAX_SIDE, Cell, Kind, Sketch
 from robochoc.app.texts import say
@@ -193,7 +193,7 @@ class WhatIfPage:
 
 
 def _looked_at(before: Sketch, after: Sketch) -> tuple[LinksDrawn, str, str]:
-    wrong = next((trouble.text for trouble in troubles(after) if trouble.is_error), "")
+    wrong = next((error.text for error in errors_of(after)), "")
     return links_of(after), wrong, "" if wrong or before == after else why_anew(before, after)
 
 
