@@ -135,6 +135,8 @@ def test_a_console_block_is_a_step_for_each_command() -> None:
     ("said", "printed", "agree"),
     [
         ("in 0.3 s", "in 12 s\n", True),
+        ("9 s in 0.3 s (30.0 times as fast as real time)", "9 s in 9.9 s (1.1 times slower than real time)", True),
+        ("3 times as fast as the others", "4 times as fast as the others", False),
         ("a\n...\nz", "a\nb\nc\nz", True),
         ("3 messages", "4 messages", False),
         ("a", "a\nb", False),

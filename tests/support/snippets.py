@@ -2,7 +2,8 @@
 
 A fenced block of the language `sh` or `console` has commands, one of `python` code; a `text` block that follows is what
 they print. In `console` blocks commands begin with `$ ` and their output stands between them. A block with a title is a
-file of that name. In an output `...` stands for any text; seconds, sizes of files and the width of columns may differ.
+file of that name. In an output `...` stands for any text; seconds, sizes of files and the width of columns may differ,
+and so may whether something is faster or slower than real time.
 A command ends with status 0, or with what `# exit status N` behind it says.
 
 A comment before a block says more of it, `<!-- snippet: WORDS -->`, of these words:
@@ -38,7 +39,8 @@ _FENCE = re.compile(
     re.MULTILINE | re.DOTALL,
 )
 _STATUS = re.compile(r"\s+# exit status (\d)$")
-_VARIES = re.compile(r"\b\d[\d,]*(\.\d+)?(?= (?:seconds|s|ms|MB|MiB|times as fast)\b)")
+_VARIES = re.compile(r"\b\d[\d,]*(\.\d+)?(?= (?:seconds|s|ms|MB|MiB)\b)")
+_SPEED = re.compile(r"\b\d[\d,]*(\.\d+)? times (?:as fast as|slower than)(?= real time\b)")
 _SERVES = re.compile(r"--sniff\b|--serve\b|--watch\b|robochoc sniff (?!.*--no-page)")
 _ALONE = {"network", "master", "robot", "directory"}
 """What leaves threads behind is run in a process of its own."""
@@ -127,7 +129,7 @@ def agrees(said: str, printed: str) -> bool:
 
 def _plain(text: str) -> str:
     lines = [" ".join(line.split()) for line in text.strip().splitlines()]
-    return _VARIES.sub("N", "\n".join(lines))
+    return _SPEED.sub("N times as fast as", _VARIES.sub("N", "\n".join(lines)))
 
 
 # Running
