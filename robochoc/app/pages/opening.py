@@ -6,8 +6,11 @@ from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
 
-from nicegui import run, ui
+from fastapi import HTTPException, Request
+from nicegui import app, run, ui
 from nicegui.events import UploadEventArguments
+from starlette.datastructures import UploadFile
+from starlette.routing import Route
 
 from robochoc.app.flights.state import unpack_run
 from robochoc.app.projects import Projects
@@ -63,5 +66,20 @@ def build_opening(projects: Projects, show: Callable[[str], None]) -> None:
             auto_upload=True,
             max_file_size=MAX_BYTES,
         ).classes("hidden")
+    _take_files_alone(str(upload.props["url"]))
     # In the browser: it opens the dialog for a click alone.
     card.on("click", js_handler=f"() => getElement({upload.id}).$el.querySelector('input[type=file]').click()")
+
+
+def _take_files_alone(url: str) -> None:
+    """Refuse forms without a file that are sent to the address of an upload: NiceGUI has no answer to text."""
+    route = next(route for route in app.routes if isinstance(route, Route) and route.path == url)
+    app.remove_route(url)
+
+    @app.post(url)
+    async def taken(request: Request) -> dict[str, str]:
+        async with request.form() as form:  # it is read once: NiceGUI gets the same
+            if not form or not all(isinstance(value, UploadFile) for value in form.values()):
+                raise HTTPException(400, say("gallery.no-file"))
+            answer: dict[str, str] = await route.endpoint(request)
+            return answer

@@ -10,10 +10,12 @@ from typing import Any
 
 import pytest
 
+from robochoc.app.faults import ERRORS
 from robochoc.app.sketch import files
 from robochoc.app.sketch.examples import examples, title_of
 from robochoc.app.sketch.sketch import Sketch
 from robochoc.app.store import Store
+from robochoc.app.texts import say
 from robochoc.system.temporary_files import temporary_folder
 from tests.support.app_server import AppServer
 from tests.support.browser_pages import WatchedPage, connected, watched_page
@@ -139,3 +141,23 @@ def test_a_team_is_removed_when_that_is_confirmed(browser: Any, application: App
         tab.page.click("text=Remove it")
         tab.page.wait_for_selector("[aria-label='Remove unwanted']", state="detached")
     wait_until(lambda: team not in teams.ids(), "it is there still")
+
+
+@pytest.mark.parametrize("form", [{"file": "text"}, {}], ids=["text", "nothing"])
+def test_text_in_place_of_a_file_is_refused_with_a_sentence(
+    browser: Any,  # noqa: ANN401 - Playwright's
+    application: AppServer,
+    teams: Store,
+    tmp_path: Path,
+    form: dict[str, Any],
+) -> None:
+    wrong = tmp_path / "wrong.txt"
+    wrong.write_text("no team")
+    with watched_page(browser) as tab:
+        connected(tab.page, application.url)
+        with tab.page.expect_response("**/upload/*") as sent:
+            _sent(tab, wrong)
+        assert sent.value.ok
+        answer = tab.page.request.post(sent.value.url, multipart=form)
+        assert (answer.status, answer.json()) == (400, {"detail": say("gallery.no-file")})
+    assert not (teams.folder / ERRORS).exists() or "upload_route" not in (teams.folder / ERRORS).read_text()
