@@ -10,7 +10,9 @@ from robochoc.verification.objective import Objective
 
 
 class KnownCosts:
-    """Follows the events of a run. Costs are in the user's numbers.
+    """Follows the events of runs. Costs are in the user's numbers.
+
+    `Began` opens a run, of which nothing is known yet. Those that do not minimise are passed over.
 
     Each robot's bound is for a part of the team that no other robot's bound is for, and costs are 0 or more inside: so
     the sum of those that are known is a bound for the whole team at any time.
@@ -25,12 +27,17 @@ class KnownCosts:
         self._objective = objective
         self._least: float = INFINITE
         self._bounds: dict[str, float] = {}
+        self._minimises = False
         self.best: Cost | None = None
         self.bound: Cost | None = None
 
     def take(self, event: AnyEvent) -> None:
         """Take in an event. What cannot be is passed over: journals may come from anywhere."""
         match event:
+            case Began():
+                self._begin(event)
+            case _ if not self._minimises:
+                pass
             case Decided() if event.robot in self._objective.interfaces:
                 self._objective.change({event.robot: event.assignment})
                 self._improve(self._objective.cost)
@@ -39,11 +46,15 @@ class KnownCosts:
             case Bounded() if event.robot in self._objective.interfaces and 0 <= event.bound <= EXACT:
                 self._bounds[event.robot] = max(event.bound, self._bounds.get(event.robot, 0))
                 self.bound = self._objective.told(sum(self._bounds.values()))
-            case Began():
-                self._bounds.clear()
-                self.bound = None
             case _:
                 pass
+
+    def _begin(self, began: Began) -> None:
+        self._minimises = began.minimises is True
+        self._objective.clear()
+        self._least = INFINITE
+        self._bounds.clear()
+        self.best = self.bound = None
 
     def _improve(self, cost: float) -> None:
         if 0 <= cost < self._least and cost <= EXACT:

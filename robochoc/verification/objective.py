@@ -70,6 +70,10 @@ class Objective:
                 self._sum += sign * paid
         self._paid[number] = cost
 
+    def clear(self) -> None:
+        """Take back the values of all robots."""
+        self.change({robot: {} for robot in self._weights})
+
     def shown(self, values: Mapping[str, Value]) -> dict[str, dict[str, int]] | None:
         """Return what `values`, as neighbours see them, say of each robot's variables; None if they cannot be those."""
         if any(len(self.interfaces.get(robot, (*value, ""))) != len(value) for robot, value in values.items()):

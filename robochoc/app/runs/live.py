@@ -14,6 +14,7 @@ from robochoc.app.sketch.sketch import Value
 from robochoc.journal.entries import JournalError
 from robochoc.journal.events import Began, Bounded, Decided, Heard, Sent
 from robochoc.journal.reader import Follower
+from robochoc.model.cost_units import Cost
 from robochoc.run.known_costs import KnownCosts
 from robochoc.sniffer.spoken import Called, Spoken
 from robochoc.verification.objective import Objective
@@ -40,7 +41,7 @@ class Live:
         messages: How many were sent so far.
         values: Each robot's present values, by `ROBOT.DECISION`.
         since: When each robot has changed them last, on the monotonic clock.
-        costs: The costs of the answers so far: seconds since the start, and the cost. They fall.
+        costs: The costs of the answers of the present run so far: seconds since the start, and the cost. They fall.
         bound: Nothing costs less. None: not known.
         recent: The messages of the last second: how many went from whom to whom.
         is_cut: Whether the last messages were not read, since the run had ended and there were too many.
@@ -50,8 +51,8 @@ class Live:
     messages: int = 0
     values: dict[str, dict[str, Value]] = field(default_factory=dict)
     since: dict[str, float] = field(default_factory=dict)
-    bound: float | None = None
-    costs: list[tuple[float, float]] = field(default_factory=list)
+    bound: Cost | None = None
+    costs: list[tuple[float, Cost]] = field(default_factory=list)
     recent: Counter[tuple[str, str]] = field(default_factory=Counter)
     is_cut: bool = False
     said: tuple[Said, ...] = ()
@@ -121,6 +122,7 @@ class LiveReader:
                     self._weigh(entry, now)
                 case Began():
                     self._live.values.clear()
+                    self._live.costs.clear()
                     self._weigh(entry, now)
                     self._spoken.follow(entry)
                 case _:
@@ -155,11 +157,11 @@ class LiveReader:
         before = self._known.best
         self._known.take(event)
         if self._minimised:
-            self._live.bound = None if self._known.bound is None else float(self._known.bound)
+            self._live.bound = self._known.bound
         if self._known.best is None or self._known.best == before:
             return
         costs = self._live.costs
-        costs.append((now - self._began, float(self._known.best)))
+        costs.append((now - self._began, self._known.best))
         if len(costs) > MOST_COSTS:  # every other point is enough, but the last one
             del costs[1:-1:2]
 

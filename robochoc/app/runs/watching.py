@@ -15,7 +15,7 @@ from robochoc.app.runs.prepared import Prepared
 from robochoc.app.runs.run import ERRORS, Run, State
 from robochoc.formats import InvalidInputError
 from robochoc.modelling.places import ModelError
-from robochoc.run.options import Options, Withdrawal
+from robochoc.run.options import Options
 from robochoc.run.recording import objective_to_record
 from robochoc.system.stopping import STOP
 
@@ -59,8 +59,8 @@ def _carry_out(run: Run, prepare: Callable[[Run], Prepared], job: Job[None]) -> 
 def _reader(run: Run, prepare: Callable[[Run], Prepared]) -> LiveReader:
     """Write the team's files; return what reads the journal."""
     ready = prepare(run)
-    withdraw = Withdrawal.MINIMUM if run.record.options.withdraw else None
-    objective = objective_to_record(ready.team, Options(withdraw=withdraw))
+    # where robots may step aside, what is minimised has a price for that, which is no cost of the user's
+    objective = None if run.record.options.withdraw else objective_to_record(ready.team, Options())
     run.record.labels = ready.labels
     weighed = objective() if objective else None
     return LiveReader(run.folder / JOURNAL, run.live, ready.label, weighed, ready.called)

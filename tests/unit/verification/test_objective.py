@@ -31,6 +31,16 @@ def test_a_constraint_without_variables_costs_what_it_costs_from_the_start() -> 
     assert objective.cost == 4 + 1
 
 
+def test_what_was_decided_is_taken_back() -> None:
+    objective = Objective(pair(), 10)
+    before = objective.cost
+    objective.change({"RA": {"A": 1}, "RB": {"B": 2}})
+    objective.clear()
+    assert objective.cost == before
+    objective.change({"RB": {"B": 2}})
+    assert objective.cost == 4 + 10
+
+
 def test_values_of_another_length_than_the_interface_are_not_of_these_robots() -> None:
     objective = Objective(pair(), 10)
     assert objective.shown({"RA": (1,), "RB": (None,)}) == {"RA": {"A": 1}, "RB": {}}

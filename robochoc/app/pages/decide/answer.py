@@ -12,6 +12,9 @@ from robochoc.app.runs.run import Run, State
 from robochoc.app.sketch.sketch import Sketch
 from robochoc.app.sketch.words import listed, value_words
 from robochoc.app.texts import say
+from robochoc.model.cost_units import cost_shown
+
+_WHOLE = frozenset({"solution", "optimal"})
 
 
 def headline(run: Run, foreign: Facts | None = None) -> str:
@@ -29,7 +32,10 @@ def headline(run: Run, foreign: Facts | None = None) -> str:
     count = robots_of(foreign, result) if foreign else len(sketch.robots)
     costs = foreign.costs if foreign else bool(costly(sketch))
     worth = foreign is not None and foreign.maximised
-    return " ".join(filter(None, [_who(count, result), _cost(result, run.state, costs=costs, worth=worth)]))
+    words = [_who(count, result), _so_far(result, run.state)]
+    words.append(_cost(result, worth=worth) if costs else "")
+    words.append(_bound(run, result, foreign, worth=worth) if costs or run.record.options.withdraw else "")
+    return " ".join(filter(None, words))
 
 
 def _who(count: int, result: RunResult) -> str:
@@ -40,23 +46,34 @@ def _who(count: int, result: RunResult) -> str:
     return say("decide.one") if count == 1 else say("decide.all", count=count)
 
 
-def _cost(result: RunResult, state: State, *, costs: bool, worth: bool) -> str:
-    """Return what an answer costs, or is `worth`, and how good that is."""
-    best = (
-        say("foreign.worth" if worth else "decide.best", cost=result.cost) if result.cost is not None and costs else ""
-    )
-    if result.verdict == "optimal":
-        if result.withdrawn:
-            return best
-        return (
-            "" if result.cost is None else say("foreign.worth-proven" if worth else "decide.proven", cost=result.cost)
-        )
-    if result.verdict == "solution":
-        return best
-    above = "foreign.worth-bound" if worth else "decide.bound"
-    bound = "" if result.bound is None else say(above, bound=result.bound)
-    stopped = say("decide.stopped") if state is State.STOPPED else say("decide.limit")
-    return " ".join(filter(None, [stopped, best, bound]))
+def _so_far(result: RunResult, state: State) -> str:
+    if result.verdict in _WHOLE:
+        return ""
+    return say("decide.stopped") if state is State.STOPPED else say("decide.limit")
+
+
+def _cost(result: RunResult, *, worth: bool) -> str:
+    """Return what an answer costs, or is `worth`."""
+    if result.cost is None:
+        return ""
+    if result.verdict == "optimal" and not result.withdrawn:
+        key = "foreign.worth-proven" if worth else "decide.proven"
+    else:
+        key = "foreign.worth" if worth else "decide.best"
+    return say(key, cost=cost_shown(result.cost))
+
+
+def _bound(run: Run, result: RunResult, foreign: Facts | None, *, worth: bool) -> str:
+    """Return what any answer costs at least; where robots may step aside, how many of them have to."""
+    if result.verdict in _WHOLE or result.bound is None:
+        return ""
+    if not run.record.options.withdraw:
+        return say("foreign.worth-bound" if worth else "decide.bound", bound=cost_shown(result.bound))
+    if result.bound <= 0:
+        return ""
+    robots = foreign.robots if foreign else run.sketch.robots
+    weighted = any(robot.weight != 1 for robot in robots)
+    return say("decide.aside-bound-weight" if weighted else "decide.aside-bound", bound=cost_shown(result.bound))
 
 
 def took(run: Run) -> str:

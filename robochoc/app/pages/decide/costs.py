@@ -11,6 +11,7 @@ from robochoc.app.runs.result import RunResult
 from robochoc.app.sketch.sketch import Sketch
 from robochoc.app.sketch.words import sentence
 from robochoc.app.texts import say
+from robochoc.model.cost_units import cost_shown
 
 MOST_BARS = 40
 """Rules that have a bar of their own; what others cost stands in one line."""
@@ -39,7 +40,7 @@ def _bars(sketch: Sketch, costs: Mapping[str, int]) -> None:
         if rest := dearest_first[MOST_BARS:]:
             _bar(say("decide.other-rules", count=len(rest)), sum(cost for _, cost in rest), most)
     with ui.element("p").classes("together"):
-        ui.label(say("decide.together", cost=f"{sum(costs.values()):,g}"))
+        ui.label(say("decide.together", cost=cost_shown(sum(costs.values()))))
 
 
 def _bar(words: str, cost: int, most: int) -> None:
@@ -47,5 +48,5 @@ def _bar(words: str, cost: int, most: int) -> None:
         ui.label(words).classes("words")
         with ui.element("div").classes("track").props("aria-hidden=true"):
             ui.element("div").classes("fill").style(f"width: {min(100.0, 100 * cost / most):.1f}%")
-        says = say("decide.rule-paid", cost=f"{cost:,g}") if cost else say("decide.rule-kept")
+        says = say("decide.rule-paid", cost=cost_shown(cost)) if cost else say("decide.rule-kept")
         ui.label(says).classes("cost-paid" if cost else "soft")

@@ -28,6 +28,7 @@ from robochoc.app.runs.tape import Tape
 from robochoc.app.sketch.checks import errors_of
 from robochoc.app.sketch.sketch import Sketch, Value
 from robochoc.app.texts import say
+from robochoc.model.cost_units import cost_shown
 
 PURPOSE = "decide"
 MOST_LIVE = 300
@@ -221,9 +222,9 @@ class _Page:
         live, running = shown.live, shown.state is State.RUNNING
         facts = [say("decide.live", messages=f"{live.messages:,}", seconds=f"{shown.seconds:.0f}")] if running else []
         if running and live.costs:
-            facts.append(say("decide.best-now", cost=f"{live.costs[-1][1]:g}"))
+            facts.append(say("decide.best-now", cost=cost_shown(live.costs[-1][1])))
         if running and live.bound is not None:
-            facts.append(say("decide.bound", bound=f"{live.bound:g}"))
+            facts.append(say("decide.bound", bound=cost_shown(live.bound)))
         self._facts.set_text(" · ".join(facts))
 
     def _show_answer(self, shown: Run | None, sketch: Sketch, *, changed: bool) -> None:

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from html import escape
 
 from robochoc.app.pages.decide.ground import Target, brief, decides_places, goers_svg, homes, map_svg, view_box
 from robochoc.app.sketch.sketch import Cell, Sketch, Value
 from robochoc.app.sketch.words import value_in_short
 from robochoc.app.texts import say
+from robochoc.model.cost_units import Cost, cost_shown
 
 UNIT = 56
 """The size of a cell."""
@@ -119,7 +120,7 @@ def _robots(
         yield f"<title>{escape(robot)}: {escape(says.get(robot, '?'))}</title></g>"
 
 
-def falling_svg(costs: list[tuple[float, float]], bound: float | None = None, until: float = 0.0) -> str:
+def falling_svg(costs: Sequence[tuple[float, Cost]], bound: Cost | None = None, until: float = 0.0) -> str:
     """Return how the cost has fallen, as a small line with its caption, and a band down to what it is at least.
 
     Args:
@@ -137,18 +138,18 @@ def falling_svg(costs: list[tuple[float, float]], bound: float | None = None, un
     best = costs[-1][1]
     low, high = bound if known and bound is not None else best, max(cost for _, cost in costs)
     width, height = 240, 48
-    across, along = max(last - first, 1e-9), max(high - low, 1e-9)
+    across, along = max(last - first, 1e-9), max(float(high - low), 1e-9)
     path = ""
     for time_s, cost in costs:
-        x, y = (time_s - first) / across * width, height - (cost - low) / along * height
+        x, y = (time_s - first) / across * width, height - float(cost - low) / along * height
         path += f"H{x:.1f}V{y:.1f}" if path else f"M{x:.1f} {y:.1f}"
     path += f"H{width}" if until else ""
     words = []
     if len(costs) > 1:
         fell = f"{costs[-1][0] - first:.1f}"
-        words.append(say("decide.falling", first=f"{costs[0][1]:g}", last=f"{best:g}", seconds=fell))
+        words.append(say("decide.falling", first=cost_shown(costs[0][1]), last=cost_shown(best), seconds=fell))
     if known and low < best:
-        words.append(say("decide.band", bound=f"{low:g}", best=f"{best:g}"))
+        words.append(say("decide.band", bound=cost_shown(low), best=cost_shown(best)))
     said = escape(" ".join(words))
     band = f'<path class="band" d="{path}H{width}V{height}H0Z"/>' if known else ""
     return (

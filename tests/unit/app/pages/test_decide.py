@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from decimal import Decimal
 from pathlib import Path
 from random import Random
 from typing import cast
@@ -21,6 +22,7 @@ from robochoc.app.runs.paid import paid
 from robochoc.app.runs.result import RunResult, decoded
 from robochoc.app.runs.run import Record, Run, State
 from robochoc.app.sketch.building import model_of
+from robochoc.app.sketch.edits import with_importance
 from robochoc.app.sketch.sketch import Area, Cell, Decision, Kind, Sketch, SketchRobot, Value
 from robochoc.verification.checker import assignment_cost
 from tests.support.rule_teams import random_rules
@@ -30,8 +32,17 @@ from tests.support.slot_sketches import slots
 HOSTILE = "<img src=x onerror=alert(1)>\"'&{x}"
 
 
-def _run(result: RunResult | None, state: State = State.ENDED, message: str = "", robots: int = 3) -> Run:
-    run = Run(Path("00001"), Record(RunOptions(), state=state, message=message), slots(robots, 3))
+def _run(
+    result: RunResult | None,
+    state: State = State.ENDED,
+    message: str = "",
+    robots: int = 3,
+    *,
+    withdraw: bool = False,
+    costs: bool = True,
+) -> Run:
+    record = Record(RunOptions(withdraw=withdraw), state=state, message=message)
+    run = Run(Path("00001"), record, slots(robots, 3, little=costs))
     run.result = result
     return run
 
@@ -45,6 +56,30 @@ def _run(result: RunResult | None, state: State = State.ENDED, message: str = ""
         (
             _run(RunResult("unknown", assignment={"a": 1}, cost=9, bound=4), State.STOPPED),
             "All 3 decide. It was stopped; this is the best so far. It costs 9. Nothing costs less than 4.",
+        ),
+        (
+            _run(RunResult("unknown", assignment={"a": 1}, cost=1_234_567, bound=1_234_566), State.STOPPED),
+            (
+                "All 3 decide. It was stopped; this is the best so far. It costs 1,234,567. "
+                "Nothing costs less than 1,234,566."
+            ),
+        ),
+        (_run(RunResult("solution", assignment={"a": 1}, cost=0), costs=False), "All 3 decide."),
+        (_run(RunResult("optimal", assignment={"a": 1}, cost=0), costs=False), "All 3 decide."),
+        (
+            _run(RunResult("unknown", assignment={"a": 1}, withdrawn=("Drone1",), cost=5, bound=1), withdraw=True),
+            (
+                "2 of 3 decide. These step aside: Drone1. A limit was reached; this is the best so far. It costs 5. "
+                "At least 1 must step aside."
+            ),
+        ),
+        (
+            _run(
+                RunResult("unknown", assignment={"a": 1}, withdrawn=("Drone1",), cost=0, bound=0),
+                withdraw=True,
+                costs=False,
+            ),
+            "2 of 3 decide. These step aside: Drone1. A limit was reached; this is the best so far.",
         ),
         (
             _run(RunResult("unknown", assignment={"a": 1}, cost=9)),
@@ -68,6 +103,13 @@ def _run(result: RunResult | None, state: State = State.ENDED, message: str = ""
 )
 def test_that_the_answer_is_told_in_words(run: Run, words: str) -> None:
     assert headline(run) == words
+
+
+def test_that_robots_that_step_aside_are_weighed() -> None:
+    result = RunResult("unknown", assignment={"a": 1}, withdrawn=("Drone1",), cost=5, bound=3)
+    run = Run(Path("00001"), Record(RunOptions(withdraw=True)), with_importance(slots(3, 3), "Drone1", weight=3))
+    run.result = result
+    assert headline(run).endswith("The weights of those who step aside are at least 3 together.")
 
 
 def test_that_hostile_names_are_text() -> None:
@@ -136,15 +178,21 @@ def test_that_of_a_large_map_the_part_is_drawn_that_matters() -> None:
 
 
 def test_that_a_falling_cost_is_a_line_with_a_caption() -> None:
-    assert falling_svg([(0.0, 5.0)]) == ""
-    assert falling_svg([(0.0, 5.0)], bound=6.0) == ""  # which cannot be
-    assert falling_svg([], bound=6.0) == ""
-    banded = falling_svg([(0.0, 5.0)], bound=3.0, until=2.0)
+    assert falling_svg([(0.0, 5)]) == ""
+    assert falling_svg([(0.0, 5)], bound=6) == ""  # which cannot be
+    assert falling_svg([], bound=6) == ""
+    banded = falling_svg([(0.0, 5)], bound=3, until=2.0)
     assert "between 3 and 5" in banded
     assert banded.count('class="band"') == 1
-    assert "between" not in falling_svg([(0.0, 9.0), (1.0, 6.0)], bound=6.0)
-    made = falling_svg([(0.0, 9.0), (1.0, 6.0), (2.0, 4.0)])
+    assert "between" not in falling_svg([(0.0, 9), (1.0, 6)], bound=6)
+    made = falling_svg([(0.0, 9), (1.0, 6), (2.0, 4)])
     assert "fell from 9 to 4 in 2.0 s" in ET.fromstring(made)[1].text  # type: ignore[operator] # noqa: S314 - our own
+
+
+def test_that_costs_are_told_with_all_their_digits() -> None:
+    made = falling_svg([(0.0, 2_345_678), (1.0, Decimal("1234567.125"))], bound=1_234_567)
+    assert "fell from 2,345,678 to 1,234,567.125 in 1.0 s" in made
+    assert "between 1,234,567 and 1,234,567.125" in made
 
 
 def test_that_a_rule_that_nobody_can_keep_is_explained() -> None:

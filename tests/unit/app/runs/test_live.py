@@ -162,3 +162,50 @@ def test_that_costs_are_those_of_the_objective(tmp_path: Path) -> None:
             seen.append(weighed.cost)
     assert facts.costs
     assert facts.costs[-1][1] == weighed.told(min(seen))
+
+
+def _written(file: Path, *events: AnyEvent) -> Path:
+    recorder = JournalRecorder(HEADER)
+    for event in events:
+        recorder(event)
+    file.write_bytes(recorder.content())
+    return file
+
+
+def test_that_costs_of_a_run_before_do_not_count(tmp_path: Path) -> None:
+    facts = Live()
+    began = Began(t=0, protocol="SyncBB", minimises=True)
+    dear, cheap = Heard(t=1, robot="X00", cost=7, values={}), Heard(t=1, robot="X00", cost=2, values={})
+    bound = Bounded(t=1, robot=TEAM.order[0], bound=1)
+    _catch_up(_written(tmp_path / "j", began, cheap, bound, began, dear), facts)
+    assert [cost for _, cost in facts.costs] == [7]
+    assert facts.bound is None
+
+
+def test_that_what_was_decided_in_a_run_before_is_no_answer_of_this_one(tmp_path: Path) -> None:
+    facts = Live()
+    began = Began(t=0, protocol="SyncBB", minimises=True)
+    decided = [event for event in _journal("dsa").events if isinstance(event, Decided)]
+    first = {event.robot: event for event in reversed(decided)}
+    _catch_up(_written(tmp_path / "j", began, *first.values()), facts)
+    assert facts.costs  # together they are one
+    last = TEAM.order[-1]
+    most = [event for robot, event in first.items() if robot != last]
+    _catch_up(_written(tmp_path / "j", began, *first.values(), began, *most), facts)
+    assert facts.costs == []
+
+
+def test_that_only_runs_that_minimise_are_weighed(tmp_path: Path) -> None:
+    facts = Live()
+    heard = Heard(t=1, robot="X00", cost=7, values={})
+    _catch_up(_written(tmp_path / "j", Began(t=0, protocol="ABT"), heard), facts)
+    assert facts.costs == []
+
+
+def test_that_costs_and_the_bound_are_exact(tmp_path: Path) -> None:
+    facts = Live()
+    began = Began(t=0, protocol="SyncBB", minimises=True)
+    least, most = 9_007_199_254_740_001, 9_007_199_254_740_991
+    events = began, Heard(t=1, robot="X00", cost=most, values={}), Bounded(t=1, robot=TEAM.order[0], bound=least)
+    _catch_up(_written(tmp_path / "j", *events), facts)
+    assert [repr(facts.costs[-1][1]), repr(facts.bound)] == [str(most), str(least)]

@@ -113,6 +113,13 @@ class TestRun:
         assert run.result.cost == sum(range(1, 15))
         assert len(run.result.assignment) == 14
 
+    def test_that_what_stepping_aside_is_charged_is_no_cost(self, tmp_path: Path) -> None:
+        run = ended(Runs(Team(slots(4, 3), tmp_path)).start(RunOptions(protocol="syncbb", withdraw=True)))
+        assert run.result is not None
+        assert (run.result.cost, len(run.result.withdrawn)) == (6, 1)
+        assert run.live.messages > 0
+        assert (run.live.costs, run.live.bound) == ([], None)
+
     def test_that_what_cannot_be_fails_with_one_clear_message(self, tmp_path: Path) -> None:
         runs = Runs(Team(slots(3, 3), tmp_path))
         run = ended(runs.start(RunOptions(protocol="abt")))
