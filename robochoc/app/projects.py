@@ -64,7 +64,7 @@ class Project(HasParts):
     def files(self) -> TeamFiles | None:
         """What decides, of a team that was not drawn here. None: its sketch does."""
         folder = self.foreign
-        return None if folder is None else TeamFiles(folder, flies=self.facts.flies)
+        return None if folder is None else TeamFiles(folder, flies=self.facts.flies, maximised=self.facts.maximised)
 
     @cached_property
     def facts(self) -> Facts:

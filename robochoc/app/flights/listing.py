@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from datetime import datetime
 
-from robochoc.app.runs.run import Run, State
+from robochoc.app.runs.run import Checked, Run, State
 from robochoc.app.texts import say
 
 _PURPOSES = {"decide": "decide", "whatif": "whatif", "whatif-anew": "anew"}
@@ -42,5 +42,7 @@ def _verdict(run: Run) -> str:
     if result.withdrawn:
         words.append(say("fly.verdict.aside", count=len(result.withdrawn)))
     if result.cost:
-        words.append(say("fly.verdict.cost", cost=f"{result.cost:,}"))
+        words.append(say("fly.verdict.worth" if run.record.maximised else "fly.verdict.cost", cost=f"{result.cost:,}"))
+    if run.record.checked in {Checked.BROKEN, Checked.COST}:
+        words.append(say("fly.verdict.wrong"))
     return ", ".join(words)

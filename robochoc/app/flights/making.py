@@ -21,6 +21,7 @@ from pathlib import Path
 
 import msgspec
 
+from robochoc.app.flights.captions import captioned
 from robochoc.app.flights.flown import FLOWN, flown_of, refused
 from robochoc.app.flights.ground import MAP, ground_of
 from robochoc.app.jobs.job import Call, Job, call_here
@@ -38,6 +39,8 @@ from robochoc.system.files import write_atomically
 FLIGHT = "flight.html"
 CONVERSATION = "conversation.html"
 RECORDING = "flight.mcap"
+CAPTIONED = "told.json"
+"""The result, with what has happened in words."""
 MOST_MESSAGES = 100_000
 """Messages of a conversation that are shown: a page with more would open slowly."""
 _NOT_AS_PLANNED = 4
@@ -93,8 +96,8 @@ class Making:
 
     @property
     def has_answer(self) -> bool:
-        """Whether the team has decided something that can be flown."""
-        return self.run.result is not None and bool(self.run.result.assignment)
+        """Whether the team has decided something that can be flown: in the end, or before something happened."""
+        return self.run.result is not None and self.run.result.has_decided
 
     @property
     def has_flight(self) -> bool:
@@ -209,7 +212,7 @@ class Making:
 
     def _make_flight(self, job: Job[None]) -> None:
         self._team_is_there()
-        given = [RESULT, "--team", self.run.team.name, *self._map()]
+        given = [self._result(), "--team", self.run.team.name, *self._map()]
         try:
             told = self._ran(job, "fly", *given, "--json", "--html", FLIGHT)
         except CannotMakeError as why:  # too near to each other, say: where they end can be seen all the same
@@ -228,6 +231,14 @@ class Making:
             return []
         write_atomically(self.run.folder / MAP, msgspec.json.encode(ground))
         return ["--map", MAP]
+
+    def _result(self) -> str:
+        """Return the file of the run's result: with what has happened in words, if something has."""
+        told = captioned(self.run)
+        if told is None:
+            return RESULT
+        write_atomically(self.run.folder / CAPTIONED, told)
+        return CAPTIONED
 
     def _record(self, job: Job[Path]) -> Path:
         self._team_is_there()

@@ -19,11 +19,14 @@ from typing import Any
 import msgspec
 
 from robochoc.app.flights.answer import broken
+from robochoc.app.flights.checking import claimed
 from robochoc.app.flights.flown import flight_words, flown_of
 from robochoc.app.flights.ground import changed_to, happened_in
+from robochoc.app.flights.making import flies
 from robochoc.app.flights.who import who_flies
 from robochoc.app.runs.options import RESULT
 from robochoc.app.runs.paid import Decided, costly, price, values_in
+from robochoc.app.runs.result import robots_in
 from robochoc.app.runs.run import Run
 from robochoc.app.sketch.picture import picture
 from robochoc.app.sketch.rules import PALETTE
@@ -86,17 +89,19 @@ def summary(sketch: Sketch, run: Run) -> str:
     if result is None:
         return say("report.no-answer")
     if result.epochs and not sketch.decisions:  # of files: some come and go
-        there = len(result.epochs[-1].get("robots", ()))
+        there = len(robots_in(result.epochs[-1]))
     else:
         there = len((changed_to(run) or sketch).robots)
     robots = there - len(result.withdrawn)
     verdict = "fewest" if result.verdict == "optimal" and result.withdrawn else result.verdict
+    worth = run.record.maximised
+    verdict = "most" if worth and verdict == "optimal" else verdict
     words = [say(f"report.verdict.{verdict}", robots=robots)] if verdict in _VERDICTS else [verdict]
     if result.withdrawn and not who_flies(run):  # which tells it, too
         words.append(say("report.withdrawn", names=listed(result.withdrawn)))
     if result.cost:
-        words.append(say("report.cost", cost=f"{result.cost:,}"))
-    return " ".join(words)
+        words.append(say("report.worth" if worth else "report.cost", cost=f"{result.cost:,}"))
+    return claimed(run, " ".join(words))
 
 
 def _story(run: Run) -> list[str]:
@@ -106,11 +111,12 @@ def _story(run: Run) -> list[str]:
     return [
         *([say("fly.happened-first", what=" ".join(happened))] if happened else []),
         *who_flies(run),
+        *([say("fly.unsolved")] if run.result and run.result.ends_unsolved and flies(run) else []),
         *(flight_words(flown) if flown else []),
     ]
 
 
-_VERDICTS = frozenset({"solution", "optimal", "fewest", "no-solution", "unknown"})
+_VERDICTS = frozenset({"solution", "optimal", "most", "fewest", "no-solution", "unknown"})
 
 
 def values_of(sketch: Sketch, run: Run) -> dict[tuple[str, str], Value]:
@@ -207,8 +213,9 @@ def _talk(run: Run) -> str:
 def _again(run: Run, version: str) -> str:
     seed = run.result.seed if run.result else run.record.options.seed
     facts = [(say("report.seed"), str(seed)), (say("report.version"), f"robochoc {version}")]
-    steps = _text(say("report.again-how"))
-    return _section("report.again", f"<p>{steps}</p><pre><code>{_text(run.command)}</code></pre>{_facts(facts)}")
+    command = run.command
+    steps = f"<p>{_text(say('report.again-how'))}</p><pre><code>{_text(command)}</code></pre>" if command else ""
+    return _section("report.again", f"{steps}{_facts(facts)}")
 
 
 def _types(run: Run) -> dict[str, int]:

@@ -15,6 +15,7 @@ from pathlib import Path
 
 import msgspec
 
+from robochoc.app.flights.checking import check
 from robochoc.app.flights.ground import Change
 from robochoc.app.flights.names import file_name
 from robochoc.app.runs.options import JOURNAL, RESULT
@@ -106,16 +107,18 @@ def unpack_run(file: Path, folder: Path) -> bool:
     if RECORD not in found or SKETCH not in found or not _is_sound(found):
         return False
     record = msgspec.json.decode(found[RECORD], type=Record)
-    record.opened = True
+    sketch = msgspec.json.decode(found[SKETCH], type=Sketch)
+    record.opened, record.checked = True, None
     found[RECORD] = msgspec.json.encode(record)
     place = folder / "runs" / _FIRST
     place.mkdir(mode=0o700, parents=True)
     for name, piece in found.items():
         (place / name).write_bytes(piece)
+    run = Run(place, record, sketch)
     if (folder / FILES).is_dir():  # of a sketch, they are written when they are needed
-        record = msgspec.json.decode(found[RECORD], type=Record)
-        sketch = msgspec.json.decode(found[SKETCH], type=Sketch)
-        shutil.copytree(folder / FILES, Run(place, record, sketch).team)
+        shutil.copytree(folder / FILES, run.team)
+    check(run)
+    run.save()
     return True
 
 

@@ -122,12 +122,17 @@ def facts_of(team: Team, *, files: Sequence[str] = (), notes: Sequence[str] = ()
         linked=len(links),
         costs=team.kind is ProblemKind.DISWCSP,
         maximised=bool(team.robots) and team.robots[0].costs.maximize,
-        events=tuple(_events(team.scenario, domains_of(team) if team.scenario else {})),
+        events=events_in_words(team),
         flies=bool(team.robots) and all(map(has_place, team.robots)),
         files=tuple(files),
         notes=tuple(note[:_LONGEST_NOTE] for note in notes[:_MOST_NOTES]),
         origin=origin,
     )
+
+
+def events_in_words(team: Team) -> tuple[str, ...]:
+    """Return what happens to a team, a sentence for each event; of very many, the first ones."""
+    return tuple(_events(team.scenario, domains_of(team) if team.scenario else {}))
 
 
 def all_robots(team: Team) -> list[Robot]:

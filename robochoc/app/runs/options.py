@@ -10,11 +10,14 @@ import msgspec
 from robochoc.model.orders import Order
 from robochoc.run.defaults import AUTO
 from robochoc.run.options import Runtime
+from robochoc.run.registry import protocol_names
 
 RESULT = "result.json"
 JOURNAL = "run.journal"
 SCENE = "scene.html"
 MAX_SEED = 2**31 - 1
+MAX_TIMEOUT_S = 1e9
+"""A longer limit is none that anybody meant."""
 
 
 class RunOptions(msgspec.Struct, frozen=True):
@@ -53,6 +56,17 @@ class RunOptions(msgspec.Struct, frozen=True):
         if self.scene:
             said += ["--html", SCENE]
         return [*said, *self.more]
+
+    @property
+    def are_known(self) -> bool:
+        """Whether the application could have set them itself: those of a stranger's file may say anything."""
+        return (
+            self.protocol in {AUTO, *protocol_names()}
+            and self.runtime in {Runtime.SIMULATOR, Runtime.PROCESSES}
+            and 0 <= self.seed <= MAX_SEED
+            and (self.timeout is None or 0 < self.timeout <= MAX_TIMEOUT_S)
+            and not self.more
+        )
 
 
 def command_line(arguments: Sequence[str]) -> str:

@@ -47,11 +47,13 @@ class TeamFiles:
     Attributes:
         folder: Where they are.
         flies: Whether its decisions say where robots are to be.
+        maximised: Whether the sum of its costs is a worth, and to be as large as can be.
         then: What happens to the team once it has decided all that its files ask for.
     """
 
     folder: Path
     flies: bool = True
+    maximised: bool = False
     then: tuple[Change, ...] = ()
 
 

@@ -60,9 +60,30 @@ class RunResult(msgspec.Struct, frozen=True):
         """How many messages were sent."""
         return self.metrics.messages
 
+    @property
+    def has_decided(self) -> bool:
+        """Whether there is an answer in the end, or was one in an epoch before."""
+        return bool(self.assignment) or self.ends_unsolved
+
+    @property
+    def ends_unsolved(self) -> bool:
+        """Whether there was an answer before something happened, but is none any more."""
+        return not self.assignment and any(map(_has_answer, self.epochs))
+
     def value(self, robot: str, decision: str) -> Value | None:
         """Return what a robot has decided."""
         return self.assignment.get(f"{robot}.{decision}")
+
+
+def _has_answer(epoch: Mapping[str, Any]) -> bool:
+    assignment = epoch.get("assignment")
+    return isinstance(assignment, dict) and bool(assignment) and epoch.get("verdict") != "no-solution"
+
+
+def robots_in(epoch: Mapping[str, Any]) -> list[str]:
+    """Return who was there in an epoch of a result; nobody, if it does not say so."""
+    robots = epoch.get("robots")
+    return [*map(str, robots)] if isinstance(robots, list) else []
 
 
 def decoded(content: bytes, labels: Mapping[str, str] = MappingProxyType({})) -> RunResult | None:

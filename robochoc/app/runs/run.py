@@ -52,11 +52,23 @@ class State(StrEnum):
     """It could not be; `Run.message` says why."""
 
 
+class Checked(StrEnum):
+    """What a check has found of an answer that came in a file."""
+
+    KEPT = "kept"
+    """Each constraint that must hold does, and the cost is right."""
+    BROKEN = "broken"
+    """Some constraint that must hold does not, or a value is none."""
+    COST = "cost"
+    """All hold, but the cost is another."""
+
+
 class Record(msgspec.Struct):
     """What is kept of a run besides its files. Times are Unix times; `message`: why it failed.
 
     `labels`: the values that files cannot say as the user does, by what files say. `opened`: whether it came in a file,
-    from elsewhere. `flies`: whether decisions say where robots are to be, of a team that was not drawn here.
+    from elsewhere; `checked`: what came of checking its answer then (None: it could not be). `flies`: whether decisions
+    say where robots are to be, of a team that was not drawn here; `maximised`: whether its costs are a worth.
     """
 
     options: RunOptions
@@ -68,7 +80,9 @@ class Record(msgspec.Struct):
     message: str = ""
     labels: dict[str, str] = {}
     opened: bool = False
+    checked: Checked | None = None
     flies: bool | None = None
+    maximised: bool = False
 
 
 class Watching(Protocol):
@@ -114,8 +128,19 @@ class Run(HasParts):
 
     @property
     def command(self) -> str:
-        """The command line that does the same, in the run's folder."""
-        return command_line(self.record.arguments)
+        """The command line that does the same, in the run's folder. Empty: there is none.
+
+        A stranger's file may hold any command. Of a run that came in one, it is made from its options, if they are any
+        that can be set here.
+        """
+        record = self.record
+        if not record.opened:
+            return command_line(record.arguments)
+        try:
+            ranked = self.sketch.is_ranked
+        except (OSError, ValueError):  # its files are damaged
+            return ""
+        return command_line(record.options.arguments(self.team.name, ranked=ranked)) if record.options.are_known else ""
 
     @property
     def seconds(self) -> float:

@@ -90,8 +90,10 @@ class Runs:
         """
         chosen = self._project.sketch if sketch is None else sketch
         folder = self._new_folder()
-        flies = files.flies if files else None
-        run = Run(folder, Record(options, purpose=purpose, started=time.time(), flies=flies), chosen)
+        record = Record(options, purpose=purpose, started=time.time())
+        if files:
+            record.flies, record.maximised = files.flies, files.maximised
+        run = Run(folder, record, chosen)
         run.record.arguments = options.arguments(run.team.name, ranked=chosen.is_ranked)
         run.told_by(call_here())
         (folder / SKETCH).write_bytes(msgspec.json.encode(chosen))

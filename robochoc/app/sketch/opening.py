@@ -133,7 +133,7 @@ def _archive(path: Path) -> Sketch | ForeignTeam:
         try:
             found = _folder(folder)
         except InvalidInputError as invalid:
-            raise InvalidInputError(_without(place, invalid)) from None
+            raise InvalidInputError(_without(str(place), invalid)) from None
     return found if isinstance(found, Sketch) else ForeignTeam(path, found.team, found.changed)
 
 

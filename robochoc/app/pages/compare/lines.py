@@ -10,13 +10,13 @@ from robochoc.app.studies.study import Line
 from robochoc.app.texts import say
 
 
-def show_lines(lines: Sequence[Line]) -> None:
-    """Show the medians of each protocol."""
+def show_lines(lines: Sequence[Line], *, worth: bool = False) -> None:
+    """Show the medians of each protocol. `worth`: what answers cost is what they are worth."""
     if not lines:
         return
     costs = any(line.cost for line in lines)
     most = max(1.0, *(line.messages for line in lines))
-    heads = ["protocol", "messages", "ncccs", "bytes", *(["cost"] if costs else []), "finished"]
+    heads = ["protocol", "messages", "ncccs", "bytes", *([("worth" if worth else "cost")] if costs else []), "finished"]
     with ui.element("div").classes("panel compare-lines"), ui.element("table"):
         with ui.element("caption"):
             ui.label(say("compare.medians"))

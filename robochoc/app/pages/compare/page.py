@@ -43,6 +43,7 @@ class ComparePage:
     def __init__(self, project: Project) -> None:
         self._project = project
         self._study = study_on(project)
+        self._worth = project.foreign is not None and project.facts.maximised
         self._sketch: Sketch | None = None
         self._possible: Possible | None = None
         self._boxes: dict[str, ui.checkbox] = {}
@@ -206,10 +207,10 @@ class ComparePage:
             case Stage.DONE if not facts.lines:
                 _message(say("compare.nothing"), bad=True)
             case Stage.DONE if self._study.report is not None:
-                show_lines(facts.lines)
+                show_lines(facts.lines, worth=self._worth)
                 self._show_report()
             case Stage.DONE:
-                show_lines(facts.lines)
+                show_lines(facts.lines, worth=self._worth)
                 _message(say("compare.no-pictures", message=facts.message))
 
     def _show_progress(self, facts: Facts) -> None:

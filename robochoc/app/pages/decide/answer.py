@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from html import escape
 
+from robochoc.app.flights.checking import claimed
 from robochoc.app.foreign.facts import Facts
 from robochoc.app.pages.foreign.answer import robots_of
 from robochoc.app.runs.paid import costly
@@ -18,7 +19,14 @@ _WHOLE = frozenset({"solution", "optimal"})
 
 
 def headline(run: Run, foreign: Facts | None = None) -> str:
-    """Return what came of a run, in a sentence or two. `foreign`: what is known of a team that was not drawn here."""
+    """Return what came of a run, in a sentence or two. `foreign`: what is known of a team that was not drawn here.
+
+    Of one that came in a file, it says that the file says so, and what a check has found.
+    """
+    return claimed(run, _headline(run, foreign))
+
+
+def _headline(run: Run, foreign: Facts | None) -> str:
     result, sketch = run.result, run.sketch
     if run.state is State.FAILED:
         known = {"lost": "decide.lost", "broken": "decide.broken"}

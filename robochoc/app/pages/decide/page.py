@@ -222,7 +222,8 @@ class _Page:
         live, running = shown.live, shown.state is State.RUNNING
         facts = [say("decide.live", messages=f"{live.messages:,}", seconds=f"{shown.seconds:.0f}")] if running else []
         if running and live.costs:
-            facts.append(say("decide.best-now", cost=cost_shown(live.costs[-1][1])))
+            now = "foreign.worth-now" if shown.record.maximised else "decide.best-now"
+            facts.append(say(now, cost=cost_shown(live.costs[-1][1])))
         if running and live.bound is not None:
             facts.append(say("decide.bound", bound=cost_shown(live.bound)))
         self._facts.set_text(" · ".join(facts))
@@ -271,14 +272,18 @@ class _Page:
 
 
 def _command(shown: Run) -> None:
+    command = shown.command
+    if not command:
+        return
+    where = say("report.again-how") if shown.record.opened else say("decide.command-where", folder=str(shown.folder))
     with ui.element("section").classes("panel command"):
         with ui.element("h2"):
             ui.label(say("decide.command"))
-        ui.label(say("decide.command-where", folder=str(shown.folder))).classes("soft")
+        ui.label(where).classes("soft")
         with ui.element("div").classes("line"):
             with ui.element("pre").props("tabindex=0"):
-                ui.label(shown.command)
-            copy = ui.button(icon="content_copy", on_click=lambda: _copy(shown.command)).props("flat round dense")
+                ui.label(command)
+            copy = ui.button(icon="content_copy", on_click=lambda: _copy(command)).props("flat round dense")
             copy.props["aria-label"] = say("decide.copy")
 
 

@@ -113,6 +113,8 @@ class _Page:
             _note("fly.no-places", remedy, "fly.to-model", f"/team/{self._project.id}/model")
         elif not making.has_answer:
             ui.label(say("fly.no-answer")).classes("note")
+        elif run.result and run.result.ends_unsolved:
+            ui.label(say("fly.unsolved")).classes("note")
         shown = _Made(making)
         build_tell(making, shown.frames)
         self._leave = shown.leave

@@ -4,10 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from html import escape
-from typing import Any
 
 from robochoc.app.foreign.facts import Facts
-from robochoc.app.runs.result import RunResult
+from robochoc.app.runs.result import RunResult, robots_in
 from robochoc.app.sketch.sketch import Value
 from robochoc.app.texts import say
 
@@ -43,10 +42,11 @@ def table_html(facts: Facts, result: RunResult) -> str:
 def epochs_html(facts: Facts, result: RunResult) -> str:
     """Return what happened while the team decided: what came of it each time. All names are escaped in it."""
     parts = []
-    for epoch in result.epochs[:MOST_EPOCHS]:
+    for number, epoch in enumerate(result.epochs[:MOST_EPOCHS]):
         verdict = str(epoch.get("verdict"))
         known = say(f"foreign.verdict.{verdict}") if verdict in _VERDICTS else verdict
-        title = say("foreign.epoch", opened=_cut(str(epoch.get("opened_by", ""))))
+        happened = facts.events[number - 1] if 0 < number <= len(facts.events) else ""
+        title = happened or say("foreign.epoch", opened=_cut(str(epoch.get("opened_by", ""))))
         told = say("foreign.epoch-took", robots=len(robots_in(epoch)), messages=epoch.get("messages", 0))
         assignment = epoch.get("assignment")
         table = _table(facts, assignment, frozenset()) if isinstance(assignment, dict) and assignment else ""
@@ -85,9 +85,3 @@ def _row(name: str, *cells: str) -> str:
 
 def _cut(text: str) -> str:
     return text if len(text) <= _LONGEST else f"{text[: _LONGEST - 1]}…"
-
-
-def robots_in(epoch: Mapping[str, Any]) -> list[str]:
-    """Return who was there in an epoch of a result."""
-    robots = epoch.get("robots")
-    return [*map(str, robots)] if isinstance(robots, list) else []

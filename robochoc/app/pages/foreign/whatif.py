@@ -3,18 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 from html import escape
 from typing import Any
 
 from nicegui import ui
 
+from robochoc.app.flights.checking import claimed
 from robochoc.app.foreign.facts import Facts
-from robochoc.app.pages.foreign.answer import MOST_ROWS, robots_in
+from robochoc.app.pages.foreign.answer import MOST_ROWS
 from robochoc.app.pages.foreign.model import style
 from robochoc.app.pages.shell import while_shown
 from robochoc.app.projects import Project
 from robochoc.app.runs.options import RunOptions
-from robochoc.app.runs.prepared import TeamFiles
+from robochoc.app.runs.result import robots_in
 from robochoc.app.runs.run import Run, State
 from robochoc.app.runs.runs import runs_of
 from robochoc.app.sketch.words import listed
@@ -69,7 +71,7 @@ class _Page:
             return
         self._wrong.set_text("")
         then = tuple(RemoveAgent(name) for name in failing)
-        self._runs.start(RunOptions(), files=TeamFiles(files.folder, files.flies, then), purpose=PURPOSE)
+        self._runs.start(RunOptions(), files=replace(files, then=then), purpose=PURPOSE)
 
     def _end(self) -> None:
         if self._end_following:
@@ -108,7 +110,7 @@ class _Page:
 
     def _told(self, run: Run, before: Mapping[str, Any], after: Mapping[str, Any]) -> None:
         with ui.element("h2"):
-            ui.label(_headline(self._facts, before, after))
+            ui.label(claimed(run, _headline(self._facts, before, after)))
         gone = [name for name in robots_in(before) if name not in robots_in(after)]
         ui.label(say("foreign.failed", names=listed(gone)))
         protocol = run.result.protocol if run.result else ""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from nicegui import ui
 
+from robochoc.app.flights.checking import claimed
 from robochoc.app.pages.whatif.outcome import Fate, Outcome, Row
 from robochoc.app.pages.whatif.story import Kept, Story
 from robochoc.app.pages.whatif.ways_out import WaysOut
@@ -54,7 +55,7 @@ class Answer:
     def _told(self, found: Outcome, kept: Kept, run: Run) -> None:
         with ui.element("div").classes("panel whatif-part"):
             with ui.element("h2"):
-                ui.label(_headline(found))
+                ui.label(claimed(run, _headline(found)))
             ui.label(" ".join(kept.happened)).classes("soft")
             if kept.anew:
                 ui.label(say("whatif.all-anew", why=kept.anew)).classes("soft")
@@ -74,11 +75,12 @@ class Answer:
                     ui.label(say("whatif.no-flight")).classes("soft small grow")
             if found.after.verdict == "no-solution":
                 WaysOut(self._project, self._story, kept.after)
-            with ui.element("details").classes("whatif-command"):
-                with ui.element("summary"):
-                    ui.label(say("whatif.command"))
-                with ui.element("pre"):
-                    ui.label(run.command)
+            if command := run.command:
+                with ui.element("details").classes("whatif-command"):
+                    with ui.element("summary"):
+                        ui.label(say("whatif.command"))
+                    with ui.element("pre"):
+                        ui.label(command)
 
     def _can_keep(self, kept: Kept) -> bool:
         return bool(self._story.changes) and self._story.after() == kept.after

@@ -9,7 +9,7 @@ import msgspec
 import pytest
 
 from robochoc.app.flights.report import Pages, report, summary
-from robochoc.app.runs.options import RESULT
+from robochoc.app.runs.options import RESULT, RunOptions
 from robochoc.app.sketch import edits
 from robochoc.app.sketch.sketch import Cell, Decision, Kind, Sketch, SketchRobot, SketchRule
 from tests.support.kept_runs import cube, kept_run
@@ -110,6 +110,29 @@ def test_without_an_answer_it_says_so(tmp_path: Path) -> None:
     run.result = None
     assert summary(sketch, run) == "There is no answer."
     assert b"Who decided what" not in report(sketch, run, Pages(), "1")
+
+
+def test_that_what_is_as_large_as_can_be_is_a_worth(tmp_path: Path) -> None:
+    run = kept_run(tmp_path, cube())
+    run.record.maximised = True
+    assert summary(cube(), run) == ("All 3 decide together, and no other answer is worth more: proven. It is worth 6.")
+
+
+@pytest.mark.parametrize("robots", [5, None, "all", [{}]])
+def test_that_an_epoch_of_a_stranger_may_say_anything_of_its_robots(tmp_path: Path, robots: object) -> None:
+    sketch = Sketch("Files", robots=(SketchRobot("Ada", Cell(0, 0)),))
+    run = kept_run(tmp_path, sketch, epochs=[{"robots": robots}])
+    assert summary(sketch, run)
+
+
+def test_that_the_command_of_a_stranger_is_not_told(tmp_path: Path) -> None:
+    run = kept_run(tmp_path, cube())
+    run.record.opened, run.record.arguments = True, ["x; rm -rf ~"]
+    told = _Read(report(run.sketch, run, Pages(), "1"))
+    assert "robochoc solve Cube --json" in told.words
+    assert "rm -rf" not in told.words
+    run.record.options = RunOptions(more=("--html", "/home/me/.profile"))
+    assert "solve" not in _Read(report(run.sketch, run, Pages(), "1")).words
 
 
 @pytest.mark.parametrize("started", [1e300, -1e300, float("inf"), float("nan")])

@@ -15,7 +15,7 @@ from robochoc.app.flights import state
 from robochoc.app.flights.state import MAX_BYTES, MOST_SAID, is_too_long, packed, unpack_run
 from robochoc.app.foreign.drawing import drawn
 from robochoc.app.runs.options import JOURNAL
-from robochoc.app.runs.run import CHANGE
+from robochoc.app.runs.run import CHANGE, Checked
 from robochoc.app.runs.runs import Runs
 from robochoc.app.sketch import opening
 from robochoc.app.sketch.opening import ForeignTeam, opened
@@ -58,7 +58,7 @@ def test_what_is_packed_is_the_same_elsewhere(tmp_path: Path) -> None:
     again = Runs(Team(Sketch(), tmp_path / "there")).latest
     assert again is not None
     assert (again.sketch, again.result, again.state) == (run.sketch, run.result, run.state)
-    assert again.record == msgspec.structs.replace(run.record, opened=True)
+    assert again.record == msgspec.structs.replace(run.record, opened=True, checked=Checked.KEPT)
     assert (again.folder / "run.journal").read_bytes() == b"what was said"
 
 

@@ -10,15 +10,22 @@ from pathlib import Path
 import msgspec
 import pytest
 
+from robochoc.app.flights.captions import captioned
 from robochoc.app.flights.flown import FLOWN, flight_words, flown_of, refused
 from robochoc.app.flights.ground import changed_to, ground_of, happened_in
 from robochoc.app.flights.listing import run_words
+from robochoc.app.flights.making import Making
+from robochoc.app.flights.report import Pages, report
 from robochoc.app.flights.who import who_flies
-from robochoc.app.runs.run import CHANGE, Run, State
+from robochoc.app.runs.options import RESULT
+from robochoc.app.runs.run import CHANGE, Checked, Run, State
 from robochoc.app.sketch import edits
 from robochoc.app.sketch.sketch import Area, Cell, Decision, Kind, Sketch
 from robochoc.flight.ground_map import BlockedCell
+from robochoc.formats import write_team
+from robochoc.model.problem import RemoveAgent, ScenarioEvent
 from tests.support.kept_runs import STARTED, cube, kept_run
+from tests.support.small_teams import pair
 
 
 def changing(run: Run, after: Sketch, **more: object) -> None:
@@ -138,12 +145,16 @@ def test_a_run_in_a_list_says_when_what_for_and_what_came_of_it(tmp_path: Path) 
     for purpose, opened, words in (
         ("whatif", False, "What if"),
         ("whatif-anew", False, "What if, decided anew to compare"),
-        ("decide", True, "Opened from a file"),
+        ("decide", True, "Opened from a file, which says"),
         ("<b>", False, "Another run"),
     ):
         run.record.purpose, run.record.opened = purpose, opened
         assert run_words(run, same_day).startswith(f"22:13, {words}: ")
-    run.record.purpose = "decide"
+    run.record.purpose, run.record.checked = "decide", Checked.COST
+    assert run_words(run, same_day).endswith("costs 6, but a check here has found that wrong")
+    run.record.checked, run.record.maximised = None, True
+    assert run_words(run, same_day).endswith(": the best answer, proven, is worth 6")
+    run.record.maximised = False
     for verdict, state, more, words in (
         (
             "solution",
@@ -163,3 +174,51 @@ def test_a_run_in_a_list_says_when_what_for_and_what_came_of_it(tmp_path: Path) 
         run.result = kept
     run.result = None
     assert run_words(run, same_day).endswith(": no answer")
+
+
+def _epochs(*opened: str, last: dict[str, int]) -> list[dict[str, object]]:
+    assignments = {"the start": {"Drone1.level": 1}, **dict.fromkeys(opened, last)}
+    return [{"verdict": "solution", "opened_by": one, "assignment": own} for one, own in assignments.items()]
+
+
+def test_what_has_happened_is_said_in_words_in_the_scene(tmp_path: Path) -> None:
+    run = kept_run(tmp_path, cube(), epochs=_epochs("Drone1.level without 3", last={"Drone1.level": 2}))
+    assert captioned(run) is None
+    changing(run, cube(2), happened=["Drone2 fails.", "The cell is blocked."])
+    told = captioned(run)
+    assert told is not None
+    assert told.endswith(b"}\n")
+    before, after = (msgspec.json.decode(one) for one in ((run.folder / RESULT).read_bytes(), told))
+    assert [one["opened_by"] for one in after["epochs"]] == ["the start", "Drone2 fails. The cell is blocked"]
+    before["epochs"][1]["opened_by"] = after["epochs"][1]["opened_by"]
+    assert before == after
+    for broken in (b"", b"[]\n", b"{}\n", b'{"epochs":[]}\n', b'{"epochs":[{},3]}\n', b'{"epochs":7}\n'):
+        (run.folder / RESULT).write_bytes(broken)
+        assert captioned(run) is None
+
+
+def test_what_happens_to_a_team_of_files_is_said_in_words_too(tmp_path: Path) -> None:
+    team = pair(ScenarioEvent((RemoveAgent("RA"),)))
+    run = kept_run(tmp_path, Sketch("pair"), epochs=_epochs("-A", last={}))
+    write_team(team, run.team)
+    told = captioned(run)
+    assert told is not None
+    assert msgspec.json.decode(told)["epochs"][1]["opened_by"] == "When it has decided: RA leaves"
+
+
+@pytest.mark.parametrize(("verdict", "flown"), [("solution", True), ("no-solution", False)])
+def test_the_last_answer_is_flown_if_there_is_none_in_the_end(tmp_path: Path, verdict: str, *, flown: bool) -> None:
+    first = {"verdict": verdict, "assignment": {"Drone1.level": 1}}
+    last = {"verdict": "no-solution", "assignment": {}}
+    run = kept_run(tmp_path, cube(), verdict="no-solution", assignment={}, cost=None, epochs=[first, last])
+    making = Making(run)
+    assert making.has_answer is making.has_flight is flown
+    page = report(run.sketch, run, Pages(), "1")
+    assert (b"The flight shows the last answer that there was" in page) is flown
+
+
+@pytest.mark.parametrize("epoch", [{}, {"assignment": 5}, {"assignment": None}, {"assignment": []}])
+def test_an_epoch_of_a_stranger_may_say_anything(tmp_path: Path, epoch: dict[str, object]) -> None:
+    run = kept_run(tmp_path, cube(), assignment={}, epochs=[epoch])
+    assert run.result is not None
+    assert not run.result.has_decided
