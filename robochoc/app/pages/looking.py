@@ -8,6 +8,7 @@ from typing import TypeVar
 from nicegui import run
 
 from robochoc.app.log import noted
+from robochoc.app.sketch.troubles import NotReadyError
 from robochoc.formats import InvalidInputError
 from robochoc.modelling.places import ModelError
 from robochoc.solver.encoding import UnsupportedError
@@ -25,7 +26,7 @@ async def looked(look: Callable[..., T], *given: object) -> T | Wrong | None:
     """Return what `look` finds, in a thread. None: the application ends."""
     try:
         return await run.io_bound(look, *given)
-    except (ModelError, InvalidInputError, UnsupportedError) as mistake:
+    except (NotReadyError, ModelError, InvalidInputError, UnsupportedError) as mistake:
         return Wrong(mistake)
     except Exception as fault:  # noqa: BLE001 - told, and kept in the file of errors
         return Wrong(noted(fault, getattr(look, "__name__", "look")))

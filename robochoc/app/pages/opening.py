@@ -22,6 +22,8 @@ from robochoc.system.plain_text import on_one_line
 from robochoc.system.temporary_files import PrivateFolder
 
 _LONGEST_NAME = 100
+_MOST_TOLD = 3
+"""Mistakes of a file that are told: where many files are wrong, the first ones say what is to be done."""
 
 
 def build_opening(projects: Projects, show: Callable[[str], None]) -> None:
@@ -33,7 +35,7 @@ def build_opening(projects: Projects, show: Callable[[str], None]) -> None:
         with ui.element("h3"):
             ui.label(say("gallery.file"))
         ui.label(say("gallery.file-hint")).classes("soft")
-        wrong = ui.label().classes("error").props("role=alert")
+        wrong = ui.label().classes("error mistakes").props("role=alert")
 
     async def take(event: UploadEventArguments) -> None:
         wrong.set_text("")
@@ -44,7 +46,7 @@ def build_opening(projects: Projects, show: Callable[[str], None]) -> None:
             try:
                 found = await run.io_bound(opened, file)
             except (InvalidInputError, OSError) as error:
-                wrong.set_text(on_one_line(str(error).replace(f"{folder}/", "")))
+                wrong.set_text(_told(str(error).replace(f"{folder}/", "")))
                 return
             if isinstance(found, Sketch):
                 project = projects.add(found)
@@ -83,3 +85,11 @@ def _take_files_alone(url: str) -> None:
                 raise HTTPException(400, say("gallery.no-file"))
             answer: dict[str, str] = await route.endpoint(request)
             return answer
+
+
+def _told(mistakes: str) -> str:
+    """Return the first mistakes, each in its line, and how many others there are."""
+    lines = mistakes.splitlines() or [say("app.fault")]
+    more = len(lines) - _MOST_TOLD
+    told = [on_one_line(line) for line in lines[:_MOST_TOLD]]
+    return "\n".join([*told, say("gallery.more-mistakes", count=f"{more:,}")] if more > 0 else told)

@@ -6,7 +6,9 @@ import msgspec
 
 from robochoc.app.runs.prepared import TeamFiles
 from robochoc.app.sketch.building import model_of
+from robochoc.app.sketch.checks import errors_of
 from robochoc.app.sketch.sketch import Sketch
+from robochoc.app.sketch.troubles import NotReadyError
 from robochoc.formats import read_team
 from robochoc.model.problem import Team
 from robochoc.run.choice import accepts, decided
@@ -33,8 +35,17 @@ class Fitting(msgspec.Struct, frozen=True):
 
 
 def team_of(sketch: Sketch, files: TeamFiles | None = None) -> Team:
-    """Return the team of a sketch, or that of files where there are some. Raises `ModelError`, `InvalidInputError`."""
-    return read_team(files.folder) if files else model_of(sketch).team
+    """Return the team of a sketch, or that of files where there are some.
+
+    Raises:
+        NotReadyError: for a sketch that is no team yet.
+        InvalidInputError: if the files are damaged.
+    """
+    if files:
+        return read_team(files.folder)
+    for trouble in errors_of(sketch):
+        raise NotReadyError(trouble)
+    return model_of(sketch).team
 
 
 def fitting_protocols(team: Team, options: Options) -> tuple[tuple[str, bool], ...]:
@@ -48,7 +59,8 @@ def fitting(sketch: Sketch, files: TeamFiles | None = None, runtime: str = Runti
     """Return what fits the team of a sketch, or of files.
 
     Raises:
-        ModelError, UnsupportedError: for a team that nothing can decide.
+        NotReadyError: for a sketch that is no team yet.
+        UnsupportedError: for a team that nothing can decide.
         InvalidInputError: if the files are damaged.
     """
     team = team_of(sketch, files)

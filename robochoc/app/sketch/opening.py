@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import re
 import stat
 import zipfile
@@ -173,4 +174,8 @@ def _two_teams(path: Path, name: str) -> InvalidInputError:
 
 def _without(place: str, invalid: InvalidInputError) -> list[Diagnostic]:
     """Return mistakes with paths in the archive, and not in the folder where it was looked at."""
-    return [replace(one, file=one.file.removeprefix(place).lstrip("/\\")) for one in invalid.diagnostics]
+    inside = f"{place}{os.sep}"
+    return [
+        replace(one, file=one.file.removeprefix(inside), message=one.message.replace(inside, ""))
+        for one in invalid.diagnostics
+    ]

@@ -66,6 +66,13 @@ class Trouble(msgspec.Struct, frozen=True):
         return self.severity is Severity.ERROR
 
 
+class NotReadyError(ValueError):
+    """A sketch is no team yet: something has to be mended first. The message says what, and how."""
+
+    def __init__(self, trouble: Trouble) -> None:
+        super().__init__(f"{trouble.text} {trouble.remedy}")
+
+
 def shortened(name: object) -> str:
     """Return something that a user, or a file, has named, as it may stand in a sentence."""
     most = 60

@@ -63,7 +63,7 @@ def possible(sketch: Sketch, files: TeamFiles | None = None) -> Possible:
     """Return what can be compared on the team of a sketch, or of files.
 
     Raises:
-        ModelError: for what is no team that can decide.
+        NotReadyError: for a sketch that is no team yet.
         InvalidInputError: if the files are damaged.
     """
     team = team_of(sketch, files)

@@ -11,7 +11,7 @@ from urllib.request import urlopen
 import msgspec
 import pytest
 
-from robochoc.app.sketch.sketch import Kind
+from robochoc.app.sketch.sketch import Kind, SketchRule
 from robochoc.app.store import Store
 from tests.support.app_server import AppServer
 from tests.support.browser_pages import WatchedPage, connected, watched_page
@@ -119,6 +119,37 @@ def test_who_decides_no_place_does_not_fly_and_is_told_why(
         assert tab.page.evaluate("document.documentElement.scrollWidth") <= 360
         tab.page.click("text=Go to Model")
         tab.page.wait_for_url("**/model")
+
+
+def test_where_nobody_says_a_word_no_page_is_waited_for(browser: Any, application: AppServer, teams: Store) -> None:  # noqa: ANN401 - Playwright's
+    never = SketchRule("R1", "never", "level", settings={"value": 1})
+    team, _ = decided(teams, msgspec.structs.replace(cube(1, "Alone", Kind.SLOT), rules=(never,)))
+    with fly_opened(browser, f"{application.url}team/{team.id}/fly") as tab:
+        tab.page.wait_for_selector(READY)
+        assert tab.page.locator("text=The pages are being read.").count() == 0
+
+
+def test_a_flight_that_is_looked_at_stays_where_it_is_as_the_conversation_comes(
+    browser: Any,  # noqa: ANN401 - Playwright's
+    application: AppServer,
+    teams: Store,
+) -> None:
+    team, _ = decided(teams, cube(2, "Duo"))
+    with watched_page(browser) as tab:
+
+        def once_the_flight_is_looked_at(route: Any) -> None:  # noqa: ANN401 - Playwright's
+            tab.page.wait_for_selector("output:has-text('0.3 s of flight')")
+            route.continue_()
+
+        tab.page.route("**/conversation.html*", once_the_flight_is_looked_at)
+        connected(tab.page, f"{application.url}team/{team.id}/fly")
+        tab.page.wait_for_selector(LINE)
+        tab.page.focus(LINE)
+        for _ in range(3):
+            tab.page.keyboard.press("ArrowRight")
+        tab.page.wait_for_selector(READY)
+        assert tab.page.locator(".stage-parts span").all_inner_texts() == ["They talk", "They fly"]
+        assert tab.page.locator("output").inner_text() == "0.3 s of flight"
 
 
 PARTS: list[tuple[list[tuple[int | None, int]], int, list[float], float, list[tuple[str, int, int, int]]]] = [

@@ -161,3 +161,23 @@ def test_text_in_place_of_a_file_is_refused_with_a_sentence(
         answer = tab.page.request.post(sent.value.url, multipart=form)
         assert (answer.status, answer.json()) == (400, {"detail": say("gallery.no-file")})
     assert not (teams.folder / ERRORS).exists() or "upload_route" not in (teams.folder / ERRORS).read_text()
+
+
+def test_the_first_mistakes_of_a_file_are_told_each_in_its_line(
+    browser: Any,  # noqa: ANN401 - Playwright's
+    application: AppServer,
+    tmp_path: Path,
+) -> None:
+    archive = tmp_path / "trio.zip"
+    with zipfile.ZipFile(archive, "w") as made:
+        for number in range(5):
+            made.writestr(f"R{number}.xml", "<instance")
+    with watched_page(browser) as tab:
+        connected(tab.page, application.url)
+        _sent(tab, archive)
+        tab.page.wait_for_selector("[role=alert]:has-text('trio/R0.xml')")
+        told = tab.page.locator(".mistakes").inner_text().splitlines()
+        assert [line.partition(":")[0] for line in told] == [
+            *(f"trio/R{number}.xml" for number in range(3)),
+            "And 2 more.",
+        ]

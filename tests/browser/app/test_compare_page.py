@@ -57,3 +57,14 @@ def test_a_study_is_stopped(browser: Any, application: AppServer, teams: Store) 
         tab.page.wait_for_selector("text=It was stopped", timeout=REPORT_MS)
         tab.page.wait_for_selector("button:has-text('Compare again'):not([disabled])")
         assert tab.complaints == []
+
+
+def test_what_has_to_be_mended_first_is_told(browser: Any, application: AppServer, teams: Store) -> None:  # noqa: ANN401 - Playwright's
+    nowhere = SketchRule("R1", "prefers", "slot", settings={})
+    team = teams.add(Sketch("team", Area(4, 1), ROBOTS, (SLOT,), (nowhere,)))
+    with watched_page(browser) as tab:
+        connected(tab.page, f"{application.url}team/{team}/compare")
+        tab.page.wait_for_selector(".error:has-text('Nothing can be compared here yet: Something does not fit in R1')")
+        tab.page.click("text=Go to Model")
+        tab.page.wait_for_url("**/model")
+        assert tab.complaints == []

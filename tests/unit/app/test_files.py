@@ -185,6 +185,10 @@ def test_an_archive_that_is_much_larger_than_it_looks_is_refused(
 def test_mistakes_in_an_archive_are_told_by_the_names_in_it(tmp_path: Path) -> None:
     told = refused(archive(tmp_path / "a.zip", ("Ann.xml", b"<instance")))
     assert told.startswith("a/Ann.xml:")
+    kept = xml_sources(TEAM).items()
+    path = archive(tmp_path / "b.zip", *((name, text.encode()) for name, text in kept if name != "Ann.xml"))
+    with pytest.raises(InvalidInputError, match=r"there is no b/Ann\.xml"):
+        opened(path)
 
 
 def test_an_archive_of_two_teams_is_refused(tmp_path: Path) -> None:

@@ -75,7 +75,8 @@ class ComparePage:
         self._boxes, self._text, self._start = {}, None, None
         with self._asked:
             if isinstance(found, Wrong):
-                ui.label(say("compare.failed", message=found)).classes("error")
+                ui.label(say("compare.not-yet", why=found)).classes("error")
+                ui.link(say("compare.to-model"), f"/team/{self._project.id}/model")
             else:
                 self._possible = found
                 self._build_question(sketch, found)

@@ -57,7 +57,7 @@ export default {
         <label class="stage-speed">{{ words.speed }}
           <select v-model.number="speed"><option v-for="one in speeds" :key="one" :value="one">{{ one }}×</option></select></label>
       </div>
-      <p v-else-if="flight || talk" class="soft">{{ words.waiting }}</p>
+      <p v-else-if="(flight || talk) && !ready" class="soft">{{ words.waiting }}</p>
       <div class="stage-views" :data-both="flies && talks">
         <figure v-if="flies"><figcaption>{{ words.flight }}</figcaption>
           <iframe v-if="flight" ref="flight" :src="flight" :title="words.flight" @load="meet"></iframe><div v-else class="stage-empty"></div></figure>
@@ -114,6 +114,7 @@ export default {
     meet() {
       const [scene, page] = [this.scene(), this.sniffer()];
       if (scene === this.known?.scene && page === this.known?.page) return;
+      const flown = this.flown();
       this.known = { scene, page };
       const playback = scene ? JSON.parse(this.$refs.flight.contentDocument.getElementById("playback").textContent) : {};
       this.steps = page ? page.model.stepCount : 0;
@@ -125,7 +126,18 @@ export default {
         page.view.on((changed) => changed.has("moment") && this.fromTalk(page));
       }
       this.ready = Boolean((scene || !this.flies) && (page || !this.talks));
-      this.go(Math.min(this.asked, this.duration));
+      this.go(this.again(flown) ?? Math.min(this.asked, this.duration));
+    },
+    // The moment of the flight that somebody has gone to.
+    flown() {
+      const { part, time } = this;
+      const began = Math.min(this.asked, this.duration);
+      return part?.kind === "fly" && time !== began ? part.from + time - part.begins : undefined;
+    },
+    // Where that moment stands on the line, which has become another one as the conversation came.
+    again(flown) {
+      const part = flown !== undefined && this.parts.findLast((one) => one.kind === "fly" && one.from <= flown);
+      return part ? part.begins + flown - part.from : undefined;
     },
     hear(scene) {
       scene.heard = true;

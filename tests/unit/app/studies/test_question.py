@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 import tomllib
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
 
+from robochoc.app.runs.fitting import fitting
 from robochoc.app.runs.prepared import TeamFiles
 from robochoc.app.sketch.building import model_of
 from robochoc.app.sketch.sketch import Area, Cell, Decision, Kind, Sketch, SketchRobot, SketchRule
+from robochoc.app.sketch.troubles import NotReadyError
 from robochoc.app.studies.families import family_of
 from robochoc.app.studies.question import Question, number_of_runs, possible, study_of
 from robochoc.app.texts import say
@@ -39,6 +42,12 @@ def test_only_protocols_that_fit_are_offered() -> None:
         assert len(set(found.usual)) == 2
         assert {*found.usual} <= {*dict(found.protocols)}
     assert (plain.costs, costly.costs) == (False, True)
+
+
+@pytest.mark.parametrize("look", [possible, fitting])
+def test_a_team_that_is_not_ready_is_told_what_to_mend(look: Callable[[Sketch], object]) -> None:
+    with pytest.raises(NotReadyError, match=r"R1: .*value of slot\. Choose one"):
+        look(team(SketchRule("R1", "prefers", "slot", settings={})))
 
 
 def test_all_different_is_a_colouring() -> None:
