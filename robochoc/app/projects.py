@@ -26,7 +26,6 @@ SAVE_S = 0.5
 """An edit is on disk after so long."""
 AGAIN_S = 5.0
 """What could not be saved is tried again after so long."""
-_JOIN_S = 0.1
 
 
 class Project(HasParts):
@@ -188,9 +187,7 @@ class Projects:
 
     def _swept(self, name: str, ended: Sequence[Job[Any]], job: Job[None]) -> None:
         """Remove the files once nobody writes them any more; a thread that was at work may have written some anew."""
-        for one in ended:
-            while not one.join(_JOIN_S):
-                job.check()
+        job.wait_for(ended)
         self.store.remove(name)
 
     def save(self) -> None:

@@ -6,7 +6,7 @@ import asyncio
 import signal
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from concurrent.futures import Future
 from contextlib import suppress
 from pathlib import Path
@@ -19,6 +19,8 @@ LOOK_S = 0.2
 """Whoever watches a process is asked so often to look how far it is."""
 _PAUSES_S = (0.001, 0.05)
 """The first and the longest pause between two looks whether a process has ended."""
+_JOIN_S = 0.1
+"""A job that waits for others looks so often whether it was ended itself."""
 END_S = 1.5
 """Jobs that are ended together have so long to say how they ended. Their processes are killed at once."""
 AT_ONCE = ((0.0, signal.SIGKILL),)
@@ -137,6 +139,12 @@ class Job(Generic[T]):
         if self._thread.ident is not None:
             self._thread.join(within_s)
         return not self.is_alive
+
+    def wait_for(self, others: Iterable[Job[Any]]) -> None:
+        """Wait, in this job, until others have ended. Raises `EndedError` if somebody ends it meanwhile."""
+        for other in others:
+            while not other.join(_JOIN_S):
+                self.check()
 
     def check(self) -> None:
         """Raise `EndedError` if somebody has ended it."""

@@ -4,14 +4,15 @@ from __future__ import annotations
 
 import shutil
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from contextlib import suppress
 from functools import partial
 from pathlib import Path
-from typing import Protocol
+from typing import Any, Protocol
 
 import msgspec
 
-from robochoc.app.jobs.job import call_here, end_jobs_in
+from robochoc.app.jobs.job import Job, call_here, end_jobs_in, jobs_alive
 from robochoc.app.listeners import Listeners
 from robochoc.app.projects import Project
 from robochoc.app.runs.options import RunOptions
@@ -48,6 +49,7 @@ class Runs:
         self._folder = project.folder / "runs"
         self._listeners = Listeners()
         self._runs = [run_of(one.parent) for one in sorted(self._folder.glob(f"*/{RECORD}"))]
+        self._sweep()
 
     @property
     def latest(self) -> Run | None:
@@ -87,16 +89,14 @@ class Runs:
 
         Raises:
             EditError: if the team was removed.
+            OSError: if the disk is full, say. Nothing has changed then.
         """
         chosen = self._project.sketch if sketch is None else sketch
-        folder = self._new_folder()
         record = Record(options, purpose=purpose, started=time.time())
         if files:
             record.flies, record.maximised = files.flies, files.maximised
-        run = Run(folder, record, chosen)
-        run.record.arguments = options.arguments(run.team.name, ranked=chosen.is_ranked)
+        run = self._made(record, chosen)
         run.told_by(call_here())
-        (folder / SKETCH).write_bytes(msgspec.json.encode(chosen))
         run.save()
         self._end_before(purpose)
         self._runs.append(run)
@@ -109,6 +109,18 @@ class Runs:
     def on_start(self, callback: Callable[[], None]) -> Callable[[], None]:
         """Call `callback` when a run is started; return what ends that."""
         return self._listeners.add(callback)
+
+    def _made(self, record: Record, sketch: Sketch) -> Run:
+        """Return a run in a folder of its own."""
+        folder = self._new_folder()
+        try:
+            run = Run(folder, record, sketch)
+            run.record.arguments = record.options.arguments(run.team.name, ranked=sketch.is_ranked)
+            (folder / SKETCH).write_bytes(msgspec.json.encode(sketch))
+        except BaseException:
+            shutil.rmtree(folder, ignore_errors=True)
+            raise
+        return run
 
     def _new_folder(self) -> Path:
         try:
@@ -134,8 +146,31 @@ class Runs:
         over = [run for run in self._runs if run.state is not State.RUNNING]
         for run in over[: max(0, len(self._runs) - MOST_KEPT)]:
             self._runs.remove(run)
-            end_jobs_in(run.folder)
-            shutil.rmtree(run.folder, ignore_errors=True)
+            with suppress(OSError):  # without its record it is no run any more, should this process die now
+                (run.folder / RECORD).unlink()
+            self._remove(run.folder, end_jobs_in(run.folder))
+
+    def _sweep(self) -> None:
+        """Remove what is no run: the disk was full when it began, or its removal was broken off.
+
+        Nobody writes there. The folder of all teams is this application's alone (`Store.held`), and of this one no run
+        has begun yet; what it still does with the files of earlier runs, it does in jobs.
+        """
+        if not self._folder.is_dir():
+            return
+        used = {job.folder for job in jobs_alive()}
+        for folder in self._folder.iterdir():
+            if folder.name.isdecimal() and folder not in used and not (folder / RECORD).exists():
+                self._remove(folder)
+
+    def _remove(self, folder: Path, ended: Sequence[Job[Any]] = ()) -> None:
+        """Remove a folder, in a thread, once the jobs that were about it have `ended`: they may write until then."""
+
+        def remove(job: Job[None]) -> None:
+            job.wait_for(ended)
+            shutil.rmtree(folder, ignore_errors=True)
+
+        Job(f"removal of {folder}", remove, folder=folder).start()
 
 
 def runs_of(project: Project) -> Runs:

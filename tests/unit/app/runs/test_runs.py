@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import os
 import signal
 import subprocess
@@ -15,7 +16,7 @@ from pathlib import Path
 import msgspec
 import pytest
 
-from robochoc.app.jobs.job import end_all
+from robochoc.app.jobs.job import Job, end_all
 from robochoc.app.runs.options import RunOptions
 from robochoc.app.runs.prepared import TeamFiles
 from robochoc.app.runs.run import RECORD, Record, Run, State
@@ -23,6 +24,8 @@ from robochoc.app.runs.runs import Runs
 from robochoc.app.sketch.sketch import Cell, Decision, Kind, Sketch, SketchRobot, SketchRule
 from robochoc.formats import read_team, write_team
 from robochoc.model.problem import RemoveAgent
+from tests.support.kept_runs import kept_run
+from tests.support.limits import HANG_S, wait_until
 from tests.support.slot_sketches import slots
 from tests.support.small_teams import triangle
 
@@ -181,6 +184,66 @@ class TestRun:
         run = ended(Runs(Team(slots(3, 3), tmp_path)).start())
         assert run.state is State.ENDED
         assert run.live.is_cut
+
+
+class TestWhatIsRemoved:
+    def test_that_an_old_run_goes_once_nobody_writes_to_it_any_more(
+        self, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        monkeypatch.setattr("robochoc.app.runs.runs.MOST_KEPT", 1)
+        old = kept_run(tmp_path, slots(2, 2)).folder
+        was_there: list[bool] = []
+
+        def write(job: Job[None]) -> None:
+            wait_until(lambda: job.is_ended and not (old / RECORD).exists(), "the old run is kept")
+            was_there.append(old.is_dir())
+            old.mkdir(exist_ok=True)
+            (old / "late").write_bytes(b"of a thread that computes")
+
+        writing = Job("writes", write, folder=old).start()
+        runs = Runs(Team(slots(2, 2), tmp_path))
+        run = ended(runs.start())
+        assert writing.join(HANG_S)
+        _are_left(tmp_path, run.id)
+        assert was_there == [True]
+        assert runs.all() == [run]
+
+    def test_that_a_full_disk_leaves_nothing(self, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+        def full(*_: object) -> int:
+            raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+        runs = Runs(Team(slots(2, 2), tmp_path))
+        with monkeypatch.context() as patch, pytest.raises(OSError, match="No space left"):
+            patch.setattr(Path, "write_bytes", full)
+            runs.start()
+        assert [*(tmp_path / "runs").iterdir()] == []
+        assert runs.all() == []
+        assert ended(runs.start()).state is State.ENDED
+
+    def test_that_what_is_no_run_goes_when_a_team_is_opened_again(self, tmp_path: Path) -> None:
+        kept = kept_run(tmp_path, slots(2, 2)).folder
+        for name in ("00002", "00003", "of somebody"):
+            (kept.parent / name / "team").mkdir(parents=True)
+            (kept.parent / name / "sketch.json").write_bytes(b"{")
+        may_end = threading.Event()
+        job = Job("writes", lambda _: may_end.wait(HANG_S), folder=kept.parent / "00003").start()
+        try:
+            assert [run.folder for run in Runs(Team(slots(2, 2), tmp_path)).all()] == [kept]
+            _are_left(tmp_path, "00001", "00003", "of somebody")
+        finally:
+            may_end.set()
+            assert job.join(HANG_S)
+        Runs(Team(slots(2, 2), tmp_path))
+        _are_left(tmp_path, "00001", "of somebody")
+
+
+def _are_left(folder: Path, *names: str) -> None:
+    """Wait until there are these runs, and no other files beside them."""
+
+    def found() -> list[str]:
+        return sorted(one.name for one in (folder / "runs").iterdir())
+
+    wait_until(lambda: found() == [*names], lambda: f"there are {found()}")
 
 
 class TestAfterTheServersDeath:
