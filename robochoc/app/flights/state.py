@@ -39,6 +39,8 @@ _FILES = (RECORD, SKETCH, RESULT, JOURNAL, CHANGE)
 _AT_ONCE = 1 << 20
 _PLACE = "run/1"
 _FIRST = "00001"
+_FRESH = "new"
+"""The folder of a run that is being written."""
 
 
 def team_archive(run: Run) -> bytes:
@@ -110,16 +112,25 @@ def unpack_run(file: Path, folder: Path) -> bool:
     sketch = msgspec.json.decode(found[SKETCH], type=Sketch)
     record.opened, record.checked = True, None
     found[RECORD] = msgspec.json.encode(record)
-    place = folder / "runs" / _FIRST
-    place.mkdir(mode=0o700, parents=True)
-    for name, piece in found.items():
-        (place / name).write_bytes(piece)
-    run = Run(place, record, sketch)
+    run = Run(_written(found, folder / "runs"), record, sketch)
     if (folder / FILES).is_dir():  # of a sketch, they are written when they are needed
         shutil.copytree(folder / FILES, run.team)
     check(run)
     run.save()
     return True
+
+
+def _written(found: dict[str, bytes], runs: Path) -> Path:
+    """Return the folder of a run of these files: all of them, or none. Raises `OSError` if they cannot be written."""
+    fresh = runs / _FRESH
+    fresh.mkdir(mode=0o700, parents=True)
+    try:
+        for name, piece in found.items():
+            (fresh / name).write_bytes(piece)
+        return fresh.rename(runs / _FIRST)  # only now it is seen: what has no record yet is removed
+    except BaseException:
+        shutil.rmtree(fresh, ignore_errors=True)
+        raise
 
 
 def _found(archive: zipfile.ZipFile) -> dict[str, bytes]:

@@ -48,7 +48,7 @@ class Runs:
         self._project = project
         self._folder = project.folder / "runs"
         self._listeners = Listeners()
-        self._runs = [run_of(one.parent) for one in sorted(self._folder.glob(f"*/{RECORD}"))]
+        self._runs = [run_of(one.parent) for one in sorted(self._folder.glob(f"[0-9]*/{RECORD}"))]
         self._sweep()
 
     @property

@@ -213,9 +213,10 @@ class TestWhatIsRemoved:
             raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
 
         runs = Runs(Team(slots(2, 2), tmp_path))
-        with monkeypatch.context() as patch, pytest.raises(OSError, match="No space left"):
+        with monkeypatch.context() as patch:
             patch.setattr(Path, "write_bytes", full)
-            runs.start()
+            with pytest.raises(OSError, match="No space left"):
+                runs.start()
         assert [*(tmp_path / "runs").iterdir()] == []
         assert runs.all() == []
         assert ended(runs.start()).state is State.ENDED
