@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import hmac
 from collections.abc import Awaitable, Callable, MutableMapping
-from contextlib import suppress
 from typing import Any
 
 from starlette.requests import ClientDisconnect
@@ -30,6 +29,8 @@ NOT_FOUND = 404
 _METHODS = frozenset({"GET", "HEAD", "POST"})
 """POST: files that are opened, and sockets of browsers that have no better one."""
 _MOST_DIGITS = 12
+_NO_ANSWER = "No response returned."
+"""Starlette's error for a page that was left before it was made: nobody waits for it any more, and nothing is wrong."""
 _POLICY = (
     "default-src 'self'; "
     "script-src 'self' 'unsafe-inline' 'unsafe-eval'; "  # NiceGUI makes its pages of both
@@ -73,8 +74,13 @@ class Guard:
                 begun = True
                 await send(message)
 
-        with suppress(ClientDisconnect):  # it has gone before all of its file was here, or sends too much
+        try:
             await self.app(scope, taken, self._with_headers(scope, sending))
+        except ClientDisconnect:  # it has gone before all of its file was here, or sends too much
+            pass
+        except RuntimeError as error:
+            if begun or not taken.gone or str(error) != _NO_ANSWER:
+                raise
         if taken.too_much and not begun:
             await _answer(send, 413)
 
@@ -114,6 +120,8 @@ class _Taken:
 
     def __init__(self, receive: Receive) -> None:
         self.too_much = False
+        self.gone = False
+        """Whether its sender has gone."""
         self._receive, self._left = receive, MOST_BYTES
 
     async def __call__(self) -> MutableMapping[str, Any]:
@@ -123,6 +131,7 @@ class _Taken:
             if self._left < 0:
                 self.too_much = True
                 return {"type": "http.disconnect"}
+        self.gone |= message["type"] == "http.disconnect"
         return message
 
 

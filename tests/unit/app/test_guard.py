@@ -124,6 +124,33 @@ def test_what_does_not_say_how_long_it_is_is_counted(monkeypatch: pytest.MonkeyP
     assert [one["type"] for one in told] == ["http.response.start", "http.response.body"]
 
 
+@pytest.mark.parametrize(("left", "why"), [(True, "another"), (False, "No response returned.")])
+def test_what_goes_wrong_is_no_less_wrong_for_a_page_that_was_left(*, left: bool, why: str) -> None:
+    with pytest.raises(RuntimeError, match=why):
+        _failing(left=left, why=why)
+
+
+def test_a_page_that_was_left_before_it_was_made_is_no_fault() -> None:
+    _failing(left=True, why="No response returned.")
+
+
+def _failing(*, left: bool, why: str) -> None:
+    """Serve a request with an application that fails, once it has heard whether its sender has gone."""
+
+    async def fails(_scope: object, receive: Any, _send: object) -> None:  # noqa: ANN401 - ASGI's
+        await receive()
+        raise RuntimeError(why)
+
+    async def receive() -> MutableMapping[str, Any]:
+        return {"type": "http.disconnect"} if left else {"type": "http.request", "body": b"", "more_body": False}
+
+    async def send(_message: object) -> None:
+        """Nobody listens."""
+
+    scope = {"type": "http", "path": "/secret/", "headers": [(b"host", HERE)], "method": "GET"}
+    asyncio.run(Guard(fails, SECRET, 8000)(scope, receive, send))
+
+
 def test_a_page_loads_nothing_from_elsewhere_unless_it_says_what() -> None:
     policy = dict(_asked("/secret/", {"host": HERE})[0]["headers"])[b"content-security-policy"].decode()
     assert f"connect-src 'self' ws://{HERE.decode()};" in policy
