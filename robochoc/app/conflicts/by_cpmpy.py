@@ -11,9 +11,10 @@ from functools import reduce
 from typing import Any
 
 from robochoc.app.conflicts.rules import minimal, rule_of, with_only
+from robochoc.app.conflicts.undefined import can_be_undefined, limits_of
 from robochoc.app.sketch.building import model_of
 from robochoc.app.sketch.sketch import Sketch
-from robochoc.model.constraint import Constraint, Relation
+from robochoc.model.constraint import Constraint, Function, Relation
 from robochoc.model.expression import Apply, Expression
 from robochoc.model.expression import Constant as Integer
 from robochoc.model.problem import INFINITE, Team
@@ -63,7 +64,10 @@ class _Problem:
     def __init__(self, team: Team) -> None:
         import cpmpy  # noqa: PLC0415 - an extra
 
+        if any(len(one.domain) > MOST_ROWS for one in team.variables.values()):
+            raise UntranslatedError("a domain is too large")
         self._domains = {name: sorted(one.domain) for name, one in team.variables.items()}
+        self._limits = limits_of(team)
         self.variables = {
             name: cpmpy.intvar(values[0], values[-1], name=name) for name, values in self._domains.items()
         }
@@ -71,6 +75,8 @@ class _Problem:
 
     def said(self, constraint: Constraint) -> Any:  # noqa: ANN401 - CPMpy's
         """Return a constraint. Raises `UntranslatedError`."""
+        if can_be_undefined(constraint, self._limits):  # what is undefined forbids, here, but not in CPMpy
+            return _table(constraint, self.variables, self._domains)
         return _said(constraint, self.variables, self._domains)
 
     def minimal(self, said: Mapping[str, list[Any]]) -> tuple[str, ...] | None:
@@ -103,19 +109,27 @@ def _as_a_whole(sketch: Sketch, name: str, variables: dict[str, Any]) -> list[An
     return [cpmpy.AllDifferent([variables[f"{robot}.{rule.decision}"] for robot in sketch.bound(rule)])]
 
 
+def _table(constraint: Constraint, variables: dict[str, Any], domains: dict[str, list[int]]) -> Any:  # noqa: ANN401 - CPMpy's
+    """Return a constraint as all that it allows, tried out."""
+    import cpmpy  # noqa: PLC0415 - an extra
+
+    rows = []
+    for number, row in enumerate(itertools.product(*(domains[name] for name in constraint.variables))):
+        if number >= MOST_ROWS:
+            raise UntranslatedError(constraint.name)
+        if constraint.price(dict(zip(constraint.variables, row, strict=True))) < INFINITE:
+            rows.append(row)
+    return cpmpy.Table([variables[name] for name in constraint.variables], rows) if rows else cpmpy.BoolVal(False)
+
+
 def _said(constraint: Constraint, variables: dict[str, Any], domains: dict[str, list[int]]) -> Any:  # noqa: ANN401 - CPMpy's
     import cpmpy  # noqa: PLC0415 - an extra
 
     definition = constraint.definition
     if isinstance(definition, Relation):
-        scope = [variables[name] for name in constraint.variables]
-        rows = []
-        for number, row in enumerate(itertools.product(*(domains[name] for name in constraint.variables))):
-            if number >= MOST_ROWS:
-                raise UntranslatedError(constraint.name)
-            if constraint.price(dict(zip(constraint.variables, row, strict=True))) < INFINITE:
-                rows.append(row)
-        return cpmpy.Table(scope, rows) if rows else cpmpy.BoolVal(False)
+        return _table(constraint, variables, domains)
+    if isinstance(definition, Function):  # it only costs
+        return cpmpy.BoolVal(True)
     actual = [variables[one] if isinstance(one, str) else one for one in constraint.parameters]
     return _translated(definition.body, dict(zip(definition.parameters, actual, strict=True)))
 

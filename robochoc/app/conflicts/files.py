@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Collection, Iterator, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -11,10 +11,13 @@ from robochoc.app.conflicts.by_cpmpy import UntranslatedError, minimal_of_team
 from robochoc.app.conflicts.found import Conflict, Finder
 from robochoc.app.conflicts.rules import minimal
 from robochoc.app.conflicts.time_left import OutOfTimeError, can_hold
+from robochoc.app.conflicts.undefined import can_be_undefined, limits_of
 from robochoc.app.foreign.sentences import sentence
+from robochoc.app.log import noted
 from robochoc.formats import read_team
 from robochoc.model.change import team_after_events
-from robochoc.model.constraint import INFINITE, Constraint, Predicate, Relation, Semantics
+from robochoc.model.constraint import INFINITE, Constraint, Function, Relation, Semantics
+from robochoc.model.expression.bounds import Interval
 from robochoc.model.problem import Robot, Team
 
 
@@ -25,7 +28,8 @@ def found_in_files(folder: Path, events: int, seconds: float, *, use_cpmpy: bool
     """
     team = team_after_events(read_team(folder), events)
     held = [*_held(team)]
-    forbidding = [str(number) for number, (_, one) in enumerate(held) if _forbids(one)]
+    limits = limits_of(team)
+    forbidding = [str(number) for number, (_, one) in enumerate(held) if _forbids(one, limits)]
     until = time.monotonic() + seconds
 
     def told(rules: Sequence[str] | None, finder: Finder) -> Conflict:
@@ -38,6 +42,8 @@ def found_in_files(folder: Path, events: int, seconds: float, *, use_cpmpy: bool
             return told(minimal_of_team(team, {rule: held[int(rule)][1] for rule in forbidding}), Finder.CPMPY)
         except (ImportError, UntranslatedError):
             pass
+        except Exception as fault:  # noqa: BLE001 - kept; numbers that are too large for its solver, say
+            noted(fault, "a conflict by CPMpy")
     try:
         return told(minimal(forbidding, lambda some: can_hold(with_only(team, {*map(int, some)}), until)), Finder.OWN)
     except OutOfTimeError:
@@ -66,9 +72,11 @@ def _held(team: Team) -> Iterator[tuple[Robot, Constraint]]:
             yield robot, constraint
 
 
-def _forbids(constraint: Constraint) -> bool:
-    """Return whether a constraint can be in the way: one that only costs cannot."""
+def _forbids(constraint: Constraint, limits: Mapping[str, Interval]) -> bool:
+    """Return whether a constraint can be in the way: one that only costs cannot, unless it is undefined somewhere."""
     definition = constraint.definition
     if isinstance(definition, Relation) and definition.semantics is Semantics.SOFT:
         return INFINITE in (*definition.costs, definition.default_cost)
-    return isinstance(definition, Relation) or (isinstance(definition, Predicate) and constraint.cost == INFINITE)
+    if isinstance(definition, Function):
+        return can_be_undefined(constraint, limits)
+    return isinstance(definition, Relation) or constraint.cost == INFINITE

@@ -10,11 +10,51 @@ import pytest
 
 from robochoc.app.conflicts.files import found_in_files, with_only
 from robochoc.app.conflicts.found import Conflict, ConflictSearch, FilesAsked, Finder
+from robochoc.app.conflicts.process import found_in
+from robochoc.app.conflicts.undefined import can_be_undefined, limits_of
 from robochoc.formats import read_team, write_team
-from robochoc.model.problem import AddValue, ScenarioEvent, Team
+from robochoc.model.assembly import assemble
+from robochoc.model.expression import Type, parse
+from robochoc.model.problem import (
+    AddValue,
+    Constraint,
+    Domain,
+    Function,
+    Predicate,
+    ProblemKind,
+    ScenarioEvent,
+    Team,
+    Variable,
+)
+from tests.support.slot_sketches import slots
 from tests.support.small_teams import graph_team, pair, pkc_team, triangle
 
+
+def _costs(body: str, name: str = "F") -> Constraint:
+    """Return a constraint of A and B that costs what an expression says; where that is undefined, it forbids."""
+    return Constraint(name, Function(name, ("X", "Y"), parse(body, ("X", "Y"), Type.INTEGER)), ("A", "B"), ("A", "B"))
+
+
+def _must(body: str, name: str = "P") -> Constraint:
+    predicate = Predicate(name, ("X", "Y"), parse(body, ("X", "Y"), Type.BOOLEAN))
+    return Constraint(name, predicate, ("A", "B"), ("A", "B"))
+
+
+def _of_two(*constraints: Constraint, low: int = 0, high: int = 2, kind: ProblemKind = ProblemKind.DISWCSP) -> Team:
+    values = Domain("D", (range(low, high + 1),))
+    own = {"RA": [Variable("A", values)], "RB": [Variable("B", values)]}
+    return assemble("two", own, [*constraints], kind=kind)
+
+
 TEAMS = {
+    "division": _of_two(_costs("div(X,Y)"), _must("eq(Y,0)")),
+    "remainder": _of_two(_costs("mod(1,sub(X,Y))"), _must("eq(X,Y)"), _must("le(X,2)", "Q")),
+    "only at zero": _of_two(_costs("div(1,Y)"), _must("lt(X,Y)")),
+    "power": _of_two(_costs("pow(2,neg(X))"), _must("gt(X,Y)")),
+    "only costs": _of_two(_costs("add(X,Y)"), _must("ne(X,X)"), kind=ProblemKind.DISWCSP),
+    "negated": _of_two(_must("not(eq(div(X,Y),1))"), _must("eq(Y,0)", "Q")),
+    "signs": _of_two(_must("eq(div(X,2),-1)"), _must("eq(mod(X,2),-1)", "Q"), _must("gt(X,-3)", "S"), low=-4, high=3),
+    "large": _of_two(_must("eq(mul(X,461168601842738790,10,Y),7)"), _must("eq(X,Y)", "Q")),
     "triangle": triangle(2),
     "two": graph_team(["AB", "BC", "AC", "CD", "DE", "CE"]),
     "solvable": triangle(3),
@@ -63,6 +103,45 @@ def test_that_only_some_constraints_are_left() -> None:
     every = [*team.constraints()]
     assert [*with_only(team, {0, 2}).constraints()] == [every[0], every[2]]
     assert [*with_only(team, ()).constraints()] == []
+
+
+class _FailsError(Exception):
+    """A fault of a tool."""
+
+
+def test_that_our_own_solver_looks_where_cpmpy_fails(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    def fails(*_: object) -> None:
+        raise _FailsError("model invalid")
+
+    monkeypatch.setattr("robochoc.app.conflicts.files.minimal_of_team", fails)
+    monkeypatch.setattr("robochoc.app.conflicts.process.minimal_by_cpmpy", fails)
+    write_team(triangle(2), tmp_path / "triangle")
+    assert found_in_files(tmp_path / "triangle", 0, 60).finder is Finder.OWN
+    assert found_in(slots(3, 2), 60).finder is Finder.OWN
+    assert len(caplog.records) == 2
+
+
+@pytest.mark.parametrize(
+    ("body", "undefined"),
+    [
+        ("div(X,Y)", True),
+        ("div(X,add(Y,1))", False),
+        ("add(X,mod(X,2))", False),
+        ("mod(X,sub(X,Y))", True),
+        ("pow(X,2)", True),
+        ("mul(X,X,X)", False),
+        ("mul(X,461168601842738790,10,Y)", True),
+        ("sub(mul(X,461168601842738790,10,4),1)", True),
+        ("if(eq(Y,0),0,div(X,Y))", True),
+    ],
+)
+def test_which_constraints_may_be_undefined(body: str, *, undefined: bool) -> None:
+    team = _of_two(_costs(body))
+    (constraint,) = team.constraints()
+    assert can_be_undefined(constraint, limits_of(team)) is undefined
+    assert not can_be_undefined(constraint, {})
 
 
 def test_that_the_process_takes_files(tmp_path: Path) -> None:

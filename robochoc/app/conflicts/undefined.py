@@ -1,0 +1,51 @@
+"""Which constraints may be undefined for some values: a division by zero forbids these values, also where it costs."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from robochoc.model.constraint import Constraint, Relation
+from robochoc.model.expression import Apply, Expression
+from robochoc.model.expression.bounds import Interval, bounds
+from robochoc.model.expression.tree import BOUND
+from robochoc.model.problem import Team
+
+_FOLDED = frozenset({"add", "sub", "mul"})
+"""Operators that are computed from the left: each part of the way is bounded, too."""
+
+
+def limits_of(team: Team) -> dict[str, Interval]:
+    """Return the least and the greatest value of each variable that has some."""
+    domains = {name: one.domain.ranges for name, one in team.variables.items()}
+    return {name: Interval(ranges[0][0], ranges[-1][-1]) for name, ranges in domains.items() if ranges}
+
+
+def can_be_undefined(constraint: Constraint, limits: Mapping[str, Interval]) -> bool:
+    """Return whether a constraint may have no value somewhere. It is never missed, but may be told without need.
+
+    Args:
+        constraint: The constraint.
+        limits: What `limits_of` returns for its team. A constraint on a variable without values is defined.
+    """
+    definition = constraint.definition
+    if isinstance(definition, Relation) or not limits.keys() >= {*constraint.variables}:
+        return False
+    given = [limits[one] if isinstance(one, str) else Interval(one, one) for one in constraint.parameters]
+    return _can_be(definition.body, dict(zip(definition.parameters, given, strict=True)))
+
+
+def _can_be(expression: Expression, limits: Mapping[str, Interval]) -> bool:
+    if not isinstance(expression, Apply):
+        return False
+    operator, arguments = expression.operator, expression.arguments
+    if operator == "pow" or any(_can_be(one, limits) for one in arguments):
+        return True
+    if operator in {"div", "mod"}:
+        divisor = bounds(arguments[1], limits)
+        return divisor.low <= 0 <= divisor.high
+    ends = range(2, len(arguments) + 1) if operator in _FOLDED else [len(arguments)]
+    return not all(_fits(bounds(Apply(operator, arguments[:end]), limits)) for end in ends)
+
+
+def _fits(interval: Interval) -> bool:
+    return interval.low >= -BOUND and interval.high <= BOUND
