@@ -14,6 +14,7 @@ from robochoc.app.conflicts.time_left import OutOfTimeError, can_hold
 from robochoc.app.conflicts.undefined import can_be_undefined, limits_of
 from robochoc.app.foreign.sentences import sentence
 from robochoc.app.log import noted
+from robochoc.app.texts import say
 from robochoc.formats import read_team
 from robochoc.model.change import team_after_events
 from robochoc.model.constraint import INFINITE, Constraint, Function, Relation, Semantics
@@ -34,7 +35,7 @@ def found_in_files(folder: Path, events: int, seconds: float, *, use_cpmpy: bool
 
     def told(rules: Sequence[str] | None, finder: Finder) -> Conflict:
         owners = [held[int(rule)] for rule in rules or ()]
-        words = tuple(f"{robot.name}: {sentence(one, robot.symbol_table, robot.costs)}" for robot, one in owners)
+        words = tuple(f"{robot.name}: {_words(robot, one)}" for robot, one in owners)
         return Conflict(None if rules is None else tuple(rules), finder, words=words)
 
     if use_cpmpy:
@@ -70,6 +71,11 @@ def _held(team: Team) -> Iterator[tuple[Robot, Constraint]]:
     for robot in team.robots:
         for constraint in robot.constraints():
             yield robot, constraint
+
+
+def _words(robot: Robot, constraint: Constraint) -> str:
+    says = sentence(constraint, robot.symbol_table, robot.costs)
+    return say("foreign.undefined", says=says) if isinstance(constraint.definition, Function) else says
 
 
 def _forbids(constraint: Constraint, limits: Mapping[str, Interval]) -> bool:

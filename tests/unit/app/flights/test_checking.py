@@ -76,7 +76,7 @@ LEVELS = {"Drone1.level": 1, "Drone2.level": 2, "Drone3.level": 3}
             Checked.KEPT,
             None,
         ),
-        ({"cost": 5}, Checked.COST, "but the number is wrong"),
+        ({"cost": 5}, Checked.COST, "is another number"),
         ({"cost": 6.0000000000000001}, Checked.KEPT, None),
         ({"cost": -1e300}, Checked.COST, None),
         (
@@ -186,7 +186,7 @@ def test_that_a_worth_is_checked_in_the_users_numbers(tmp_path: Path, cost: floa
     write_team(team, run.team)
     check(run)
     assert (run.record.checked, run.record.maximised) == (found, True)
-    right = "and what it is worth is right" if run.record.checked is Checked.KEPT else "but the number is wrong"
+    right = "and what it is worth is right" if run.record.checked is Checked.KEPT else "is another number"
     assert right in claimed(run, "")
 
 
