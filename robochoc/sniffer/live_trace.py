@@ -178,16 +178,27 @@ def next_entries(follower: Follower, file: GrowingFile, end: int) -> list[Journa
 
 
 def events_by_time(file: GrowingFile) -> Iterator[list[AnyEvent]]:
-    """Yield the events of `file`, up to its present end, in pieces: each run's sorted by time.
+    """Yield the events of `file`, up to its present end, in pieces: each run's sorted by time. See `sorted_by_time`."""
+    return sorted_by_time(entries_of(file))
 
-    Some pieces are empty: they stand for work done. Events of equal times keep their order. A run's events are stored
-    in an unnamed temporary file until the run is over; only their times and places stay in memory.
-    """
+
+def entries_of(file: GrowingFile) -> Iterator[list[JournalEntry]]:
+    """Yield what is written in `file`, up to its present end, in pieces."""
     here = file.again()
     follower = Follower(BufferedReader(here))
+    while lines := next_entries(follower, here, file.end):
+        yield lines
+
+
+def sorted_by_time(pieces: Iterable[Iterable[JournalEntry]]) -> Iterator[list[AnyEvent]]:
+    """Yield the events in `pieces`, in other pieces: each run's sorted by time.
+
+    Some of them are empty: they stand for work done. Events of equal times keep their order. A run's events are stored
+    in an unnamed temporary file until the run is over; only their times and places stay in memory.
+    """
     aside = _Aside()
     try:
-        while lines := next_entries(follower, here, file.end):
+        for lines in pieces:
             for line in lines:
                 if isinstance(line, Header | Ended):
                     continue

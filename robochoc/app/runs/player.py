@@ -7,6 +7,8 @@ from math import isnan
 LEAST_S, MOST_S, PER_MOMENT_S = 3.0, 10.0, 0.15
 """A conversation is played in this time, however many moments it has."""
 SPEEDS = (0.25, 0.5, 1.0, 2.0)
+LARGE_S = 1.0
+"""The picture of a large team that is played is drawn so often: it takes a while, and others want a turn."""
 
 
 class Player:
@@ -66,3 +68,23 @@ class Player:
         """Set the speed, if it is one of `SPEEDS`."""
         if speed in SPEEDS and isinstance(speed, (int, float)):
             self.speed = float(speed)
+
+
+class Frames:
+    """Says when the picture of a conversation is to be drawn again."""
+
+    def __init__(self) -> None:
+        self._drawn = -LARGE_S
+
+    def is_due(self, now: float, *, large: bool, playing: bool) -> bool:
+        """Return whether to draw it.
+
+        Args:
+            now: A time in seconds.
+            large: Whether the team is large.
+            playing: Whether the conversation goes on by itself; where it stands still, what is shown stays.
+        """
+        if large and playing and now - self._drawn < LARGE_S:
+            return False
+        self._drawn = now
+        return True

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from collections import Counter, deque
-from collections.abc import Callable, Collection, Mapping
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from io import BufferedReader
 from pathlib import Path
@@ -12,16 +12,17 @@ from typing import NamedTuple
 
 from robochoc.app.sketch.sketch import Value
 from robochoc.journal.entries import JournalEntry
-from robochoc.journal.events import Began, Decided, Sent
+from robochoc.journal.events import Began, Decided, Received, Sent, Settled
 from robochoc.journal.reader import Follower
 from robochoc.sniffer.growing_file import GrowingFile, open_to_read
-from robochoc.sniffer.live_trace import events_by_time, next_entries
+from robochoc.sniffer.live_trace import entries_of, next_entries, sorted_by_time
 from robochoc.sniffer.spoken import Called, Spoken
 
 MOST_MOMENTS = 200
 """With twice as many, every two become one."""
 MOST_READ = 300_000
-"""Messages. What comes after them is not played: it would take long to read, and nobody could follow it."""
+"""Messages and what was decided. What comes after them is not played: it would take long to read and to sort, and
+nobody could follow it."""
 MOST_BYTES = 32 << 20
 """Of the journal."""
 WORDS_KEPT = 3
@@ -56,18 +57,25 @@ class Moment:
         said: The last of them, in words.
         links: How many went from whom to whom.
         values: The new values of those who have changed them since the moment before, by `ROBOT.DECISION`.
+        begins: Whether a run, or an epoch, begins in it: what was decided before is void.
     """
 
     count: int = 0
     said: tuple[Said, ...] = ()
     links: Counter[tuple[str, str]] = field(default_factory=Counter)
     values: dict[str, dict[str, Value]] = field(default_factory=dict)
+    begins: bool = False
 
     def joined(self, later: Moment) -> Moment:
         """Return this moment and the one after it as one."""
         links = Counter(dict((self.links + later.links).most_common(MOST_LINKS)))
         said = (*self.said, *later.said)[-WORDS_KEPT:]
-        return Moment(self.count + later.count, said, links, self.values | later.values)
+        values = later.values if later.begins else self.values | later.values
+        return Moment(self.count + later.count, said, links, values, begins=self.begins or later.begins)
+
+    def after(self, before: Mapping[str, Mapping[str, Value]]) -> dict[str, Mapping[str, Value]]:
+        """Return the values of all robots at its end. `before`: those at the end of the moment before."""
+        return dict(self.values) if self.begins else {**before, **self.values}
 
 
 class Tape:
@@ -93,6 +101,7 @@ class Tape:
         self._spoken = Spoken(called)
         self._last: deque[Sent] = deque(maxlen=WORDS_KEPT)
         self._size = 1
+        self._settled: dict[str, int] = {}
 
     def take(self, entry: JournalEntry) -> None:
         """Take in what has happened next."""
@@ -104,7 +113,7 @@ class Tape:
                 values = {name: self._label(name, value) for name, value in entry.assignment.items()}
                 self.moments[-1].values[entry.robot] = values
             case Began():
-                self._close()
+                self._begin()
                 self._spoken.follow(entry)
             case _:
                 self._spoken.follow(entry)
@@ -112,6 +121,19 @@ class Tape:
     def end(self) -> None:
         """Note that this was all."""
         self._close()
+        now: dict[str, Mapping[str, Value]] = {}
+        for number, moment in enumerate(self.moments):
+            before, now = now, moment.after(now)
+            robots = before.keys() | now.keys() if moment.begins else moment.values.keys()
+            self._settled |= {robot: number for robot in robots if before.get(robot) != now.get(robot)}
+
+    def _begin(self) -> None:
+        """Begin a run, or an epoch: its robots have not decided anything."""
+        self._close()
+        if self.moments[-1].count:
+            self._next()
+        self.moments[-1].values.clear()
+        self.moments[-1].begins = True
 
     def _sent(self, sent: Sent) -> None:
         if self.moments[-1].count >= self._size:
@@ -142,13 +164,14 @@ class Tape:
     def values_at(self, number: int) -> dict[str, Value]:
         """Return all values at the end of the moment of this number."""
         now: dict[str, Mapping[str, Value]] = {}
-        for moment in self.moments[: number + 1]:
+        begun = max((place for place in range(number + 1) if self.moments[place].begins), default=0)
+        for moment in self.moments[begun : number + 1]:
             now |= moment.values
         return {name: value for values in now.values() for name, value in values.items()}
 
     def unsettled_at(self, number: int) -> frozenset[str]:
-        """Return who will change their values after the moment of this number."""
-        return frozenset(robot for moment in self.moments[number + 1 :] for robot in moment.values)
+        """Return who will have other values after the moment of this number, once all is told: see `end`."""
+        return frozenset(robot for robot, last in self._settled.items() if last > number)
 
     def messages_at(self, number: int) -> int:
         """Return how many messages were sent by the end of the moment of this number."""
@@ -192,9 +215,21 @@ def _read(file: GrowingFile, tape: Tape, wanted: Callable[[], bool]) -> None:
     here = file.again()
     for header in next_entries(Follower(BufferedReader(here)), here, file.end)[:1]:
         tape.take(header)
-    for piece in events_by_time(file):
+    for piece in sorted_by_time(_first(file, tape)):
         for event in piece:
             tape.take(event)
-        if tape.messages >= MOST_READ or not wanted():
+        if not wanted():
             tape.is_whole = False
             return
+
+
+def _first(file: GrowingFile, tape: Tape) -> Iterator[Sequence[JournalEntry]]:
+    """Yield what is played of a file, up to a bound: nothing else is worth sorting."""
+    read = 0
+    for piece in entries_of(file):
+        if read >= MOST_READ:
+            tape.is_whole = False
+            return
+        played = [entry for entry in piece if not isinstance(entry, Received | Settled)]
+        read += len(played)
+        yield played

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable
 from functools import cache, partial
 from importlib.resources import files
@@ -21,6 +22,7 @@ from robochoc.app.pages.foreign.answer import table_html as answers_html
 from robochoc.app.pages.foreign.below import ForeignDoors, show_foreign_below
 from robochoc.app.pages.shell import while_shown
 from robochoc.app.projects import Project
+from robochoc.app.runs.player import Frames
 from robochoc.app.runs.result import RunResult
 from robochoc.app.runs.run import Run, State
 from robochoc.app.runs.runs import runs_of
@@ -32,7 +34,7 @@ from robochoc.model.cost_units import cost_shown
 
 PURPOSE = "decide"
 MOST_LIVE = 300
-"""Of more robots, the picture is drawn when they have decided."""
+"""Of more robots, the picture is drawn when they have decided, and now and then while they are played."""
 _SINGLE_CLICKS = (0, 1)
 """How many clicks there were in a row (`UIEvent.detail`); of keys, 0."""
 SHORT_S = 3.0
@@ -58,6 +60,7 @@ class _Page:
         self._told_below: tuple[object, ...] = ()
         self._doors: Doors | ForeignDoors | None = None
         self._pressed: Run | None = None
+        self._frames = Frames()
         with ui.element("h1"):
             ui.label(say("decide.title"))
         with ui.element("section").classes("decide-top"):
@@ -134,8 +137,8 @@ class _Page:
         shown, sketch = self._run, self._sketch()
         running = shown is not None and shown.state is State.RUNNING
         self._show_button(running=running)
+        self._show_talk(shown)  # first: what is played back may be of the run before
         self._show_live(shown, sketch)
-        self._show_talk(shown)
         changed = shown is not None and sketch != self._project.sketch
         now = (shown, shown and shown.state, shown and shown.result, changed)
         if now != self._answered:
@@ -177,7 +180,10 @@ class _Page:
 
     def _draw(self) -> None:
         """Draw the picture again: the conversation that is played back is at another moment."""
-        self._show_live(self._run, self._sketch())
+        sketch = self._sketch()
+        large = len(sketch.robots) > MOST_LIVE
+        if self._frames.is_due(time.monotonic(), large=large, playing=self._talk.playing):
+            self._show_live(self._run, sketch)
 
     def _show_moment(self, sketch: Sketch, tape: Tape, number: int) -> None:
         values, unsettled = tape.values_at(number), tape.unsettled_at(number)

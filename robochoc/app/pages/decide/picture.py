@@ -129,7 +129,7 @@ def falling_svg(costs: Sequence[tuple[float, Cost]], bound: Cost | None = None, 
         until: The line goes on to this time, in seconds since the start.
 
     Returns:
-        The picture; empty where there is no line and no band.
+        The picture; empty where there is nothing to tell.
     """
     known = bound is not None and bool(costs) and bound <= costs[-1][1]
     if len(costs) < 2 and not known:  # noqa: PLR2004 - a line
@@ -150,6 +150,8 @@ def falling_svg(costs: Sequence[tuple[float, Cost]], bound: Cost | None = None, 
         words.append(say("decide.falling", first=cost_shown(costs[0][1]), last=cost_shown(best), seconds=fell))
     if known and low < best:
         words.append(say("decide.band", bound=cost_shown(low), best=cost_shown(best)))
+    if not words:  # the first answer was the best, and is known to be
+        return ""
     said = escape(" ".join(words))
     band = f'<path class="band" d="{path}H{width}V{height}H0Z"/>' if known else ""
     return (

@@ -64,6 +64,11 @@ class Talk:
             return None
         return self._tape, self._player.moment
 
+    @property
+    def playing(self) -> bool:
+        """Whether the conversation that is played back goes on by itself."""
+        return self._player.playing
+
     def tell(self, said: Sequence[Said]) -> None:
         """Show the last messages of a run that goes on."""
         self._forget()

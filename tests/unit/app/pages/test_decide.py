@@ -181,6 +181,7 @@ def test_that_a_falling_cost_is_a_line_with_a_caption() -> None:
     assert falling_svg([(0.0, 5)]) == ""
     assert falling_svg([(0.0, 5)], bound=6) == ""  # which cannot be
     assert falling_svg([], bound=6) == ""
+    assert falling_svg([(0.0, 5)], bound=5) == ""  # the first one is the best
     banded = falling_svg([(0.0, 5)], bound=3, until=2.0)
     assert "between 3 and 5" in banded
     assert banded.count('class="band"') == 1

@@ -9,12 +9,16 @@ from random import Random
 import msgspec
 import pytest
 
-from robochoc.app.runs.player import LEAST_S, MOST_S, Player
+from robochoc.app.runs.player import LARGE_S, LEAST_S, MOST_S, Frames, Player
 from robochoc.app.runs.tape import MOST_MOMENTS, WORDS_KEPT, Tape, recorded
 from robochoc.journal.entries import JournalEntry, JournalError
 from robochoc.journal.events import Began, Decided, Sent
 from robochoc.journal.journal import Header, JournalRecorder
+from robochoc.run import Options, Runtime
+from robochoc.run.options import Withdrawal
 from robochoc.sniffer.growing_file import NoFileError
+from tests.support.recorded_journals import record
+from tests.support.small_teams import triangle
 
 HEADER = Header(team="t", protocol="syncbb", runtime="processes", seed=0)
 SENT = Sent(t=0, sender="A", receiver="B", type="Hello", content={"number": 0}, bytes=1, clock=0)
@@ -56,6 +60,42 @@ def test_that_each_message_of_a_short_conversation_is_a_moment() -> None:
 def test_that_strangers_are_no_part_of_it() -> None:
     tape = _taken(_said(1, sender="X"), _said(2, receiver="X"), _decided("X", 1), _said(3))
     assert (tape.messages, tape.values_at(0)) == (1, {})
+
+
+def test_that_what_was_decided_in_an_epoch_before_is_void() -> None:
+    again = Began(t=0, protocol="dynabt", epoch=1)
+    first = _decided("A", 1), _said(1), _decided("B", 2), _decided("C", 3), _said(2)
+    tape = _taken(*first, again, _decided("A", 1), _said(3), _decided("B", 5), _said(4))
+    assert [tape.values_at(number) for number in range(4)] == [
+        {"A.d": 1, "B.d": 2, "C.d": 3},
+        {"A.d": 1, "B.d": 2, "C.d": 3},
+        {"A.d": 1, "B.d": 5},
+        {"A.d": 1, "B.d": 5},
+    ]
+    assert tape.unsettled_at(1) == {"B", "C"}
+    assert tape.unsettled_at(2) == frozenset()
+
+
+def test_that_an_epoch_without_a_word_is_a_moment_of_its_own() -> None:
+    tape = _taken(_decided("A", 1), _said(1), Began(t=0, protocol="dynabt", epoch=1), _decided("A", 2))
+    assert [moment.count for moment in tape.moments] == [1, 0]
+    assert [tape.values_at(number) for number in range(2)] == [{"A.d": 1}, {"A.d": 2}]
+    assert tape.said_at(1, 9) == tape.said_at(0, 9)
+
+
+def test_that_who_decides_the_same_again_has_settled() -> None:
+    tape = _taken(_decided("A", 1), _said(1), _decided("A", 1), _said(2), _decided("A", 2), _decided("A", 1))
+    assert tape.unsettled_at(0) == frozenset()
+
+
+def test_that_epochs_are_told_apart_in_a_long_conversation() -> None:
+    entries = [_said(number) for number in range(3 * MOST_MOMENTS)]
+    again = Began(t=0, protocol="dynabt", epoch=1)
+    tape = _taken(_decided("A", 1), *entries, again, _decided("B", 2), *entries)
+    assert len(tape.moments) <= 2 * MOST_MOMENTS
+    assert tape.values_at(0) == {"A.d": 1}
+    assert tape.values_at(len(tape.moments) - 1) == {"B.d": 2}
+    assert tape.unsettled_at(0) == {"A", "B"}
 
 
 @pytest.mark.parametrize("count", [1, MOST_MOMENTS, 2 * MOST_MOMENTS, 2 * MOST_MOMENTS + 1, 20_011])
@@ -100,10 +140,36 @@ def test_that_a_journal_that_broke_off_is_read_to_there(tmp_path: Path) -> None:
     assert recorded(file, _tape()).messages > 0
 
 
+def test_that_no_more_is_read_and_sorted_than_is_played(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("robochoc.app.runs.tape.MOST_READ", 5_000)
+    late = (_said(number, t=number - 20_000) for number in range(10_000, 20_000))
+    file = _written(tmp_path / "j", Began(t=0, protocol="syncbb"), *(_said(number) for number in range(10_000)), *late)
+    read = recorded(file, _tape())
+    assert int(read.said_at(0, 1)[0].words.split()[-1]) < 10_000
+    assert not read.is_whole
+    assert read.messages < 10_000
+    monkeypatch.setattr("robochoc.app.runs.tape.MOST_READ", 30_000)
+    assert recorded(file, _tape()).is_whole
+
+
 def test_that_nobody_reads_on_when_nobody_waits(tmp_path: Path) -> None:
     file = _written(tmp_path / "j", *(_said(number) for number in range(9_000)))
     tape = recorded(file, _tape(), wanted=lambda: False)
     assert not tape.is_whole
+
+
+@pytest.mark.parametrize("protocol", ["abt", "awc"])
+def test_that_the_end_is_the_answer_where_robots_step_aside(protocol: str) -> None:
+    team = triangle(2)
+    options = Options(protocol=protocol, runtime=Runtime.SIMULATOR, withdraw=Withdrawal.MINIMUM, cache=False)
+    journal = record(team, options)
+    assert journal.outcome is not None
+    assert journal.outcome.withdrawn
+    tape = _tape([*team.order])
+    for event in journal.events:
+        tape.take(event)
+    tape.end()
+    assert tape.values_at(len(tape.moments) - 1) == journal.outcome.assignment
 
 
 @pytest.mark.parametrize("content", [b"", b"nonsense", b"{}\n"])
@@ -149,3 +215,14 @@ def test_that_steps_and_seeks_pause_and_stay_within() -> None:
     assert player.speed == 1.0
     player.hurry(0.25)
     assert player.speed == 0.25
+
+
+def test_that_a_large_team_is_drawn_now_and_then_while_it_is_played() -> None:
+    small, large, still = Frames(), Frames(), Frames()
+    ticks = [number * 0.1 for number in range(100)]
+    assert all(small.is_due(tick, large=False, playing=True) for tick in ticks)
+    drawn = [tick for tick in ticks if large.is_due(tick, large=True, playing=True)]
+    assert drawn[0] == 0
+    assert 9 <= len(drawn) * LARGE_S <= 10
+    assert large.is_due(ticks[-1], large=True, playing=False)
+    assert all(still.is_due(tick, large=True, playing=False) for tick in ticks)
