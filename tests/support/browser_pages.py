@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+import os
 import shutil
+import tempfile
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import pytest
 
+from robochoc.system.temporary_files import temporary_folder
 from tests.support.leftovers import shared_by_tests
 from tests.support.limits import HANG_S
 
@@ -17,17 +20,33 @@ if TYPE_CHECKING:
 
 _CHROMIUM = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
 
+CHROMIUMS_OWN = "chromium-"
+"""The beginning of the name of a browser's folder for temporary files."""
+
 
 @contextmanager
 def chromium() -> Iterator[Any]:
-    """A browser; without one, or without Playwright, the test is skipped."""
+    """A browser; without one, or without Playwright, the test is skipped.
+
+    Chromium makes temporary files whenever it likes (for files that are dropped, for its handler of crashes), and
+    removes them when it likes. They are in a folder of its own, which no test has left behind.
+    """
     playwright = pytest.importorskip("playwright.sync_api")
     if _CHROMIUM is None:
         pytest.skip("no Chromium on the path")
     with ExitStack() as stack:
         with shared_by_tests(with_children=True):
+            place = tempfile.TemporaryDirectory(
+                prefix=CHROMIUMS_OWN, dir=temporary_folder(), ignore_cleanup_errors=True
+            )
+            own = stack.enter_context(place)
             play = stack.enter_context(playwright.sync_playwright())
-            browser = play.chromium.launch(executable_path=_CHROMIUM, args=["--no-sandbox"], timeout=HANG_S * 1000)
+            browser = play.chromium.launch(
+                executable_path=_CHROMIUM,
+                args=["--no-sandbox"],
+                timeout=HANG_S * 1000,
+                env={**os.environ, "TMPDIR": own},
+            )
         yield browser
         browser.close()
 

@@ -31,6 +31,8 @@ def shell(title: str, project: Project | None = None, area: str = "") -> Iterato
     ui.add_css(_style())
     ui.page_title(f"{title} - {say('app.title')}" if title else say("app.title"))
     ui.colors(primary="var(--accent)")
+    if around := ui.context.client.content.parent_slot:
+        around.parent.props("role=none")  # NiceGUI's page is a <main> around ours, and around the bar
     ui.link(say("app.skip"), "#content").classes("skip")
     with ui.element("header").classes("bar"):
         _brand()

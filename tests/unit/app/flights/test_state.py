@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import io
 import shutil
 import zipfile
@@ -15,7 +16,7 @@ from robochoc.app.flights import state
 from robochoc.app.flights.state import MAX_BYTES, MOST_SAID, is_too_long, packed, unpack_run
 from robochoc.app.foreign.drawing import drawn
 from robochoc.app.runs.options import JOURNAL
-from robochoc.app.runs.run import CHANGE, Checked
+from robochoc.app.runs.run import CHANGE, SKETCH, Checked
 from robochoc.app.runs.runs import Runs
 from robochoc.app.sketch import opening
 from robochoc.app.sketch.opening import ForeignTeam, opened
@@ -128,6 +129,22 @@ def test_the_run_of_a_team_of_files_comes_back_with_its_files(tmp_path: Path) ->
     assert there is not None
     assert there.result == run.read_result()
     assert read_team(there.team) == read_team(files)
+
+
+def test_a_full_disk_leaves_no_part_of_a_run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    file = _file(tmp_path, packed(kept_run(tmp_path / "here", cube())))
+    (tmp_path / "there").mkdir()
+    write = Path.write_bytes
+
+    def full(path: Path, content: bytes) -> int:
+        if path.name == SKETCH:
+            raise OSError(errno.ENOSPC, "full")
+        return write(path, content)
+
+    monkeypatch.setattr(Path, "write_bytes", full)
+    with pytest.raises(OSError, match="full"):
+        unpack_run(file, tmp_path / "there")
+    assert [*(tmp_path / "there" / "runs").iterdir()] == []
 
 
 def test_too_long_a_journal_is_left_out(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

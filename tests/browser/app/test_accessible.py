@@ -1,0 +1,81 @@
+"""axe-core finds nothing serious on any page of the application: light and dark, wide and narrow."""
+
+from __future__ import annotations
+
+from importlib.util import find_spec
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from robochoc.app.pages.shell import AREAS
+from robochoc.app.store import Store
+from tests.support.app_server import AppServer
+from tests.support.browser_pages import connected, watched_page
+from tests.support.fly_pages import READY
+from tests.support.kept_runs import cube, kept_run
+
+WIDTHS = (1280, 360)
+SERIOUS = {"serious", "critical"}
+SHOWN = {
+    "": ".cards .drawn svg",
+    "model": "svg .robot",
+    "decide": ".answer tbody tr",
+    "whatif": "svg .robot",
+    "fly": READY,
+    "compare": "h1",
+    "lessons": ".cards li",
+}
+"""By its page, what is there once a page is."""
+FOUND = """
+async () => (await axe.run(document, {resultTypes: ["violations"]})).violations.flatMap(
+  ({id, impact, nodes}) => nodes.map((node) => [impact, `${id}: ${node.target} ${node.failureSummary}`]))
+"""
+
+
+@pytest.fixture(scope="module")
+def axe() -> str:
+    """axe-core."""
+    spec = find_spec("axe_playwright_python")
+    if spec is None or spec.origin is None:
+        pytest.skip("axe-playwright-python is not installed")
+    return Path(spec.origin).with_name("axe.min.js").read_text(encoding="utf-8")
+
+
+def _found(page: Any, axe: str) -> list[tuple[str, str]]:  # noqa: ANN401 - Playwright's
+    """How bad each thing is that axe finds, and what it is."""
+    page.evaluate(axe)
+    return [(impact, text) for impact, text in page.evaluate(FOUND)]
+
+
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+@pytest.mark.parametrize("area", SHOWN, ids=lambda area: area or "gallery")
+def test_nothing_serious_is_found(
+    browser: Any,  # noqa: ANN401 - Playwright's
+    application: AppServer,
+    teams: Store,
+    axe: str,
+    area: str,
+    scheme: str,
+) -> None:
+    team = teams.add(cube())
+    kept_run(teams.path(team), cube())
+    with watched_page(browser, color_scheme=scheme, reduced_motion="reduce") as tab:
+        for width in WIDTHS:
+            tab.page.set_viewport_size({"width": width, "height": 800})
+            connected(tab.page, f"{application.url}team/{team}/{area}" if area in AREAS else application.url + area)
+            tab.page.wait_for_selector(SHOWN[area])
+            assert [text for impact, text in _found(tab.page, axe) if impact in SERIOUS] == [], width
+
+
+def test_axe_finds_what_is_there(browser: Any, axe: str) -> None:  # noqa: ANN401 - Playwright's
+    with watched_page(browser) as tab:
+        tab.page.set_content("<html lang=en><p style='color: #ccc'>pale</p><img src=''><input></html>")
+        told = _found(tab.page, axe)
+    assert {"color-contrast", "image-alt", "label"} <= {
+        text.partition(":")[0] for impact, text in told if impact in SERIOUS
+    }
+
+
+def test_every_page_of_a_team_is_looked_at() -> None:
+    assert {*AREAS} <= {*SHOWN}
