@@ -12,7 +12,6 @@ from robochoc.app.pages.shell import AREAS
 from robochoc.app.store import Store
 from tests.support.app_server import AppServer
 from tests.support.browser_pages import connected, watched_page
-from tests.support.fly_pages import READY
 from tests.support.kept_runs import cube, kept_run
 
 WIDTHS = (1280, 360)
@@ -22,7 +21,7 @@ SHOWN = {
     "model": "svg .robot",
     "decide": ".answer tbody tr",
     "whatif": "svg .robot",
-    "fly": READY,
+    "fly": ".tell .cards",
     "compare": "h1",
     "lessons": ".cards li",
 }
