@@ -14,7 +14,6 @@ from robochoc.run.registry import protocol_names
 
 RESULT = "result.json"
 JOURNAL = "run.journal"
-SCENE = "scene.html"
 MAX_SEED = 2**31 - 1
 MAX_TIMEOUT_S = 1e9
 """A longer limit is none that anybody meant."""
@@ -29,7 +28,6 @@ class RunOptions(msgspec.Struct, frozen=True):
         seed: The seed of what is random.
         timeout: A limit in seconds. None: no limit.
         withdraw: Whether robots may step aside where there is no solution: as few as possible, by weight.
-        scene: Whether the 3D scene of it is written.
         more: Further arguments of `robochoc solve`.
     """
 
@@ -38,7 +36,6 @@ class RunOptions(msgspec.Struct, frozen=True):
     seed: int = 0
     timeout: float | None = None
     withdraw: bool = False
-    scene: bool = False
     more: tuple[str, ...] = ()
 
     def arguments(self, team: str, *, ranked: bool = False) -> list[str]:
@@ -53,8 +50,6 @@ class RunOptions(msgspec.Struct, frozen=True):
         if self.timeout is not None:
             said += ["--timeout", f"{self.timeout:g}"]
         said.append("--withdraw" if self.withdraw else "--bounds")  # with it, costs mean another thing
-        if self.scene:
-            said += ["--html", SCENE]
         return [*said, *self.more]
 
     @property

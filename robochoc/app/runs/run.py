@@ -6,7 +6,6 @@ run.json       how it was started, and how it ended
 run.journal    what was said, while it is said
 result.json    the answer
 errors.txt     what the command had to say besides
-scene.html     the flight, if it was asked for
 change.json    what has happened meanwhile, and the team after it, if something has
 """
 
@@ -174,7 +173,7 @@ class Run(HasParts):
         return self.watched_by.pid if self.watched_by else None
 
     def artefact(self, name: str) -> Path | None:
-        """Return a file of the run, such as `scene.html`, if it is there."""
+        """Return a file of the run, such as `run.journal`, if it is there."""
         file = self.folder / Path(name).name
         return file if file.is_file() else None
 

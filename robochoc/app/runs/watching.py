@@ -73,7 +73,7 @@ def _command(run: Run) -> Command:
 
 def _look(run: Run, reader: LiveReader) -> None:
     reader.advance()
-    run.read_result()  # a scene is still to be written then
+    run.read_result()  # the process may not have ended then
     run.tell()
 
 
@@ -92,7 +92,7 @@ def _note(run: Run, finished: Finished, *, stopped: bool) -> None:
     run.read_result()
     if stopped and (run.result is None or run.result.verdict == "unknown"):
         _over(run, State.STOPPED)
-    elif run.result is not None:  # though its scene, say, may not have been written
+    elif run.result is not None:  # though its journal, say, may not have been written
         _over(run, State.ENDED, "" if finished.status in {0, _LIMIT} else finished.why)
     else:
         _over(run, State.FAILED, finished.why)

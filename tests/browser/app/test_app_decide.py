@@ -141,6 +141,7 @@ def test_places_are_shown_on_the_map(browser: Any, application: AppServer, teams
         _told(tab, "All 5 decide.")
         tab.page.wait_for_selector(".team-picture .way", state="attached")
         assert min(tab.page.locator(".team-picture .value").all_text_contents()) == "Base"
+        assert "--html" not in tab.page.inner_text(".command pre")  # no flight is waited for: the page Fly makes it
         assert tab.page.evaluate("document.documentElement.scrollWidth") <= 360
         assert tab.complaints == []
 

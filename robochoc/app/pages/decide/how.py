@@ -35,7 +35,7 @@ class How:
                 self._limit = ui.number(say("decide.limit-s"), min=0.1, placeholder=say("decide.no-limit"))
             self._why = ui.element("div").classes("why")
 
-    def options(self, *, withdraw: bool = False, scene: bool = False) -> RunOptions:
+    def options(self, *, withdraw: bool = False) -> RunOptions:
         """Return what is set. What cannot be is left to the usual."""
         limit = self._limit.value
         return RunOptions(
@@ -44,7 +44,6 @@ class How:
             seed=whole(self._seed.value, 0, MAX_SEED, otherwise=0),
             timeout=float(limit) if limit and 0 < limit < inf else None,
             withdraw=withdraw,
-            scene=scene,
         )
 
     async def _look(self) -> None:

@@ -100,8 +100,7 @@ class _Page:
             self._decide()
 
     def _decide(self, *, withdraw: bool = False) -> None:
-        sketch = self._project.sketch
-        options = self._how.options(withdraw=withdraw, scene=sketch.flies)
+        options = self._how.options(withdraw=withdraw)
         self._pressed = self._runs.start(options, files=self._project.files, purpose=PURPOSE)
 
     def _follow_latest(self) -> None:

@@ -76,7 +76,7 @@ class TestRun:
         assert run.command.startswith("robochoc solve Berths --json --journal run.journal --protocol syncbb")
         assert run.artefact("run.journal") == run.folder / "run.journal"
         assert run.artefact("../run.journal") == run.folder / "run.journal"
-        assert run.artefact("scene.html") is None
+        assert run.artefact("nothing.html") is None
         again = Runs(Team(Sketch(), tmp_path)).latest
         assert again is not None
         assert (again.state, again.result, again.sketch) == (run.state, run.result, run.sketch)
