@@ -39,6 +39,8 @@ _SINGLE_CLICKS = (0, 1)
 """How many clicks there were in a row (`UIEvent.detail`); of keys, 0."""
 SHORT_S = 3.0
 """Of a search that took no longer, nobody has seen what was said."""
+FEW_MESSAGES = 100
+"""So many are played back however long they took: robots wait for a busy machine, too."""
 
 
 def build_decide(project: Project) -> None:
@@ -174,7 +176,7 @@ class _Page:
         self._talk.offer(shown if shown and shown.result else None)
         if shown is not None and shown is self._pressed:
             self._pressed = None
-            if shown.state is State.ENDED and shown.result and shown.result.metrics.wall_s < SHORT_S:
+            if shown.state is State.ENDED and shown.result and _is_short(shown.result):
                 self._talk.begin()
 
     def _draw(self) -> None:
@@ -300,3 +302,8 @@ def _copy(command: str) -> None:
 @cache
 def _style() -> str:
     return (files(__package__) / "decide.css").read_text(encoding="utf-8")
+
+
+def _is_short(result: RunResult) -> bool:
+    """Return whether the conversation was over before anybody could see it."""
+    return result.metrics.wall_s < SHORT_S or result.messages <= FEW_MESSAGES
