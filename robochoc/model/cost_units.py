@@ -34,7 +34,9 @@ class CostUnits:
 
 
 def cost_shown(cost: Cost | float) -> str:
-    """Return a cost for people: all its digits, never `1.5E-8`; thousands have commas between them."""
+    """Return a cost for people: all its digits, never `1.5E-8`, nor `2.0`; thousands have commas between them."""
+    if isinstance(cost, float) and cost.is_integer():
+        return f"{int(cost):,}"
     return f"{cost:,f}" if isinstance(cost, Decimal) else f"{cost:,}"
 
 

@@ -6,6 +6,7 @@ from datetime import datetime
 
 from robochoc.app.runs.run import Checked, Run, State
 from robochoc.app.texts import say
+from robochoc.model.cost_units import cost_shown
 
 _PURPOSES = {"decide": "decide", "whatif": "whatif", "whatif-anew": "anew"}
 _VERDICTS = frozenset({"solution", "optimal", "no-solution"})
@@ -42,7 +43,9 @@ def _verdict(run: Run) -> str:
     if result.withdrawn:
         words.append(say("fly.verdict.aside", count=len(result.withdrawn)))
     if result.cost:
-        words.append(say("fly.verdict.worth" if run.record.maximised else "fly.verdict.cost", cost=f"{result.cost:,}"))
+        words.append(
+            say("fly.verdict.worth" if run.record.maximised else "fly.verdict.cost", cost=cost_shown(result.cost))
+        )
     if run.record.checked in {Checked.BROKEN, Checked.COST}:
         words.append(say("fly.verdict.wrong"))
     return ", ".join(words)

@@ -33,6 +33,7 @@ from robochoc.app.sketch.rules import PALETTE
 from robochoc.app.sketch.sketch import Sketch, Value
 from robochoc.app.sketch.words import listed, sentence, value_words, weight_of
 from robochoc.app.texts import LANGUAGE, say
+from robochoc.model.cost_units import cost_shown
 from robochoc.system.plain_text import printable
 
 _MOST_VALUES = 12
@@ -100,7 +101,7 @@ def summary(sketch: Sketch, run: Run) -> str:
     if result.withdrawn and not who_flies(run):  # which tells it, too
         words.append(say("report.withdrawn", names=listed(result.withdrawn)))
     if result.cost:
-        words.append(say("report.worth" if worth else "report.cost", cost=f"{result.cost:,}"))
+        words.append(say("report.worth" if worth else "report.cost", cost=cost_shown(result.cost)))
     return claimed(run, " ".join(words))
 
 

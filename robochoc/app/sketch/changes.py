@@ -105,7 +105,7 @@ class Battery(Change, frozen=True):
             if len(values) < len(sketch.values(decision))
         ]  # fmt: skip
         if not lost:
-            return say("whatif.battery-enough", **named)
+            return say("whatif.battery-enough" if levels else "whatif.battery-stays", **named)
         return say("whatif.battery-lower", **named, level=max(lost))
 
 
@@ -116,7 +116,12 @@ class Joins(Change, frozen=True):
     name: str | None = None
 
     def after(self, sketch: Sketch) -> Sketch:
-        """Return the team with it. Where nothing is decided by all, it takes part in every decision."""
+        """Return the team with it. Where nothing is decided by all, it takes part in every decision.
+
+        Raises `EditError` if the cell is blocked, or taken.
+        """
+        if self.cell in sketch.area.blocked:
+            raise EditError("whatif.blocked-cell", "map")
         sketch = edits.with_robot(sketch, self.cell, self.name)
         name = sketch.robots[-1].name
         if any(name in sketch.deciders(decision) for decision in sketch.decisions):

@@ -60,3 +60,14 @@ def test_a_robot_joins_also_where_deciders_are_listed() -> None:
     after = changed(listed, [Joins(Cell(2, 0), "C")])
     assert after.decisions[0].robots == ("A", "B", "C")
     assert told(listed, [Joins(Cell(2, 0), "C")]) == ["C joins in column 3, row 1."]
+
+
+def test_a_robot_joins_in_no_blocked_cell() -> None:
+    with pytest.raises(EditError) as error:
+        changed(TEAM, [Blocked(Cell(2, 0)), Joins(Cell(2, 0))])
+    assert error.value.key == "whatif.blocked-cell"
+
+
+def test_a_battery_says_nothing_of_levels_where_nobody_decides_them() -> None:
+    places = Sketch("team", Area(3, 1), ROBOTS, (PLACE,))
+    assert told(places, [Battery("A", 50)]) == ["A has 50 % of its battery left: enough to stay."]

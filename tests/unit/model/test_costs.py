@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import itertools
+from decimal import Decimal
 from fractions import Fraction
 
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from robochoc.model.cost_units import cost_shown
 from robochoc.model.costs import UnboundedCostError, flat_units, normalized, normalized_robot, told_cost
 from robochoc.model.expression import Type, evaluate, parse
 from robochoc.model.expression.bounds import ANY_INTEGER, Interval, bounds
@@ -91,3 +93,10 @@ def test_no_value_lies_outside_the_bounds(text: str, a: int, b: int, c: int, d: 
 def test_bounds_of_what_is_unknown() -> None:
     expression = parse("max(0, min(mul(X,Y), 100))", ("X", "Y"), Type.INTEGER)
     assert bounds(expression, {"X": ANY_INTEGER, "Y": ANY_INTEGER}) == (0, 100)
+
+
+@pytest.mark.parametrize(
+    ("cost", "shown"), [(1234567, "1,234,567"), (Decimal("1.5E-8"), "0.000000015"), (2.0, "2"), (-2.5, "-2.5")]
+)
+def test_a_cost_is_shown_with_all_its_digits(cost: float | Decimal, shown: str) -> None:
+    assert cost_shown(cost) == shown

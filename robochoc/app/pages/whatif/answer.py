@@ -12,6 +12,7 @@ from robochoc.app.projects import Project
 from robochoc.app.runs.run import Run, State
 from robochoc.app.sketch.words import listed
 from robochoc.app.texts import say
+from robochoc.model.cost_units import cost_shown
 
 
 class Answer:
@@ -126,7 +127,7 @@ def _costs(found: Outcome) -> str:
     before, after = found.before, found.after
     if not (before.solved and after.solved) or not (before.cost or after.cost):
         return ""
-    return say("whatif.costs", before=before.cost, after=after.cost)
+    return say("whatif.costs", before=cost_shown(before.cost or 0), after=cost_shown(after.cost or 0))
 
 
 def _table(found: Outcome) -> None:

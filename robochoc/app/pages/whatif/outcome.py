@@ -104,7 +104,9 @@ def outcome(before: tuple[Sketch, Part], after: tuple[Sketch, Part], protocol: s
 
 def _of_epoch(sketch: Sketch, model: Model, epoch: Mapping[str, Any]) -> Part:
     values = decided(sketch, epoch.get("assignment", {}), model)
-    return Part(str(epoch.get("verdict")), values, epoch.get("cost"), int(epoch.get("messages", 0)))
+    cost = epoch.get("cost")
+    number = cost if isinstance(cost, int | float) else None
+    return Part(str(epoch.get("verdict")), values, number, int(epoch.get("messages", 0)))
 
 
 def _rows(before: tuple[Sketch, Part], after: tuple[Sketch, Part]) -> Iterator[Row]:
