@@ -46,7 +46,7 @@ def warm(warm_ace: None) -> Iterator[AceProcess]:
 
 def wait_for_a_best(solver: AceProcess) -> None:
     """Wait until ACE has printed a solution."""
-    file = Path(vars(solver)["_folder"]) / BEST
+    file: Path = vars(solver)["_folder"].path / BEST
     wait_until(lambda: file.exists() and b"</values>" in file.read_bytes(), "ACE has found nothing")
 
 
