@@ -1,4 +1,4 @@
-"""What has happened before each epoch of a run, in words: the scene tells it as the files of the team have it."""
+"""Captions in words for the epochs of a run: the scene would tell what has happened as the files of the team do."""
 
 from __future__ import annotations
 

@@ -35,7 +35,7 @@ _UNREADABLE = (ModelError, InvalidInputError, OSError, ValueError, TypeError, Lo
 
 
 class _Told(msgspec.Struct):
-    """What is read again of a result: the cost with all its digits."""
+    """A result's cost with all its digits, read again from its file."""
 
     cost: int | Decimal | None = None
 
