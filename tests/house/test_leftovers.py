@@ -69,6 +69,23 @@ def test_what_is_shared_is_not_left(begin: Leave, monkeypatch: pytest.MonkeyPatc
         begin(stack)
 
 
+def test_a_link_that_was_opened_anew_is_not_left_and_one_more_is(monkeypatch: pytest.MonkeyPatch) -> None:
+    """What a run that tests share does after an outage is no fault of the test in which it happens."""
+    monkeypatch.setattr(leftovers, "WITHIN_S", 0.0)
+    with ExitStack() as stack:
+        listener = stack.enter_context(socket.create_server(("127.0.0.1", 0)))
+        shared = stack.enter_context(socket.create_connection(listener.getsockname()))
+        with leftovers.nothing_left_behind():
+            anew = stack.enter_context(socket.create_connection(listener.getsockname()))
+            assert os.fstat(anew.fileno()).st_ino != os.fstat(shared.fileno()).st_ino
+            shared.close()
+        with (
+            pytest.raises(AssertionError, match=r"left behind: .*socket: tcp link with 0100007F:.*, number 2"),
+            leftovers.nothing_left_behind(),
+        ):
+            stack.enter_context(socket.create_connection(listener.getsockname()))
+
+
 def test_a_process_that_has_left_the_family_is_found(monkeypatch: pytest.MonkeyPatch) -> None:
     """Its parent has ended, so it is nobody's child; but it has the mark of the tests."""
     monkeypatch.setattr(leftovers, "WITHIN_S", 0.0)

@@ -13,6 +13,7 @@ import multiprocessing
 import os
 import tempfile
 import threading
+from collections import Counter
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
@@ -31,6 +32,8 @@ _PYTESTS_OWN = "pytest-of-"
 """A pytest that a test starts keeps the folders of its last runs."""
 _HELPERS = (b"multiprocessing.resource_tracker", b"multiprocessing.forkserver")
 """Python's own processes, which stay until the interpreter ends."""
+_LISTENS = "0A"
+"""The state of a socket in /proc/net/tcp that waits for links."""
 
 _shared_threads: WeakSet[threading.Thread] = WeakSet()
 _shared_processes: set[int] = set()
@@ -148,12 +151,47 @@ def _is_of_a_shared_program(pid: int) -> bool:
 
 
 def _descriptors(pid: str | int = "self") -> Iterator[str]:
+    """Yield the names of what is open: those of TCP links say whither, and how many of them there are."""
+    targets = list(_targets(pid))
+    links, so_far = _links(), Counter[str]()
+    for target in targets:
+        if target in links:
+            so_far[links[target]] += 1
+            yield f"{links[target]}, number {so_far[links[target]]}"
+        else:
+            yield target
+
+
+def _targets(pid: str | int) -> Iterator[str]:
     with suppress(OSError):
         for entry in Path(f"/proc/{pid}/fd").iterdir():
             with suppress(OSError):
                 target = str(entry.readlink())
                 if not target.startswith(_OWN_KINDS):
                     yield target
+
+
+def _links() -> dict[str, str]:
+    """Return the TCP links of this machine by what /proc calls their sockets.
+
+    A link that a run which tests share has opened anew (on a busy machine, after an outage) takes the place of the one
+    before, and is not left behind.
+    """
+    links = {}
+    for table in ("tcp", "tcp6"):
+        with suppress(OSError):
+            for line in Path(f"/proc/self/net/{table}").read_text().splitlines()[1:]:
+                _, local, remote, state, *rest = line.split()
+                if state != _LISTENS:
+                    links[f"socket:[{rest[5]}]"] = f"socket: {table} link with {_address(remote)}"
+                else:
+                    links[f"socket:[{rest[5]}]"] = f"socket: {table} listens at {_address(local)}"
+    return links
+
+
+def _address(hexadecimal: str) -> str:
+    host, _, port = hexadecimal.rpartition(":")
+    return f"{host}:{int(port, 16)}"
 
 
 def _files() -> frozenset[str]:
