@@ -312,6 +312,30 @@ def test_a_large_table_is_clicked_together_by_keys(browser: Any, application: Ap
         assert tab.complaints == []
 
 
+def test_a_range_becomes_what_its_start_became_before_the_server_has_answered(
+    browser: Any,  # noqa: ANN401 - Playwright's
+    application: AppServer,
+    teams: Store,
+) -> None:
+    rules = (SketchRule("R1", "table", "level", ("Drone1", "Drone2"), {"rows": [[1, 1]]}),)
+    levels = Decision("level", Kind.LEVEL, tuple(range(1, 6)))
+    team = teams.add(Sketch("pairs", robots=drones(2), decisions=(levels,), rules=rules))
+    with watched_page(browser) as tab:
+        page = opened(tab, application, team)
+        page.locator(".rule .sentence").click()
+        page.wait_for_selector("[data-at='2:2']")
+        # In one step of the page: no answer can come in between.
+        page.evaluate("""() => {
+            document.querySelector("[data-at='2:2']").click();
+            const shift = new MouseEvent("click", {bubbles: true, shiftKey: true});
+            document.querySelector("[data-at='3:3']").dispatchEvent(shift);
+        }""")
+        square = [[one, other] for one in (3, 4) for other in (3, 4)]
+        made = becomes(teams, team, lambda sketch: len(sketch.rules[0].settings["rows"]) == 5)  # type: ignore[arg-type] # a list
+        assert sorted(made.rules[0].settings["rows"]) == [[1, 1], *square]  # type: ignore[arg-type] # a list
+        assert tab.complaints == []
+
+
 def test_the_last_robot_and_the_last_cell_stay_and_secrets_say_why_they_are_off(
     browser: Any,  # noqa: ANN401 - Playwright's
     application: AppServer,

@@ -60,10 +60,10 @@ export default {
     shift(axis, by) {
       this.from[axis] = clamp(this.from[axis] + by, 0, this.count - this.part);
     },
+    // What the last button became is known here before the server has said so: somebody types faster than that.
     pressed(i, j, event) {
-      const [a, b] = event.shiftKey && this.last ? this.last : [i, j];
-      const on = event.shiftKey && this.last ? this.fits.has(a * this.count + b) : !this.fits.has(i * this.count + j);
-      this.last = [i, j];
+      const [a, b, on] = event.shiftKey && this.last ? this.last : [i, j, !this.fits.has(i * this.count + j)];
+      this.last = [i, j, on];
       this.$emit("filled", [Math.min(a, i), Math.min(b, j), Math.max(a, i), Math.max(b, j), on]);
     },
     line(i, j) {
