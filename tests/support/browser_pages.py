@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import pytest
 
 from robochoc.system.temporary_files import temporary_folder
-from tests.support.leftovers import shared_by_tests
+from tests.support.leftovers import MARK, no_process_left, shared_by_tests
 from tests.support.limits import HANG_S
 
 if TYPE_CHECKING:
@@ -29,7 +29,9 @@ def chromium() -> Iterator[Any]:
     """A browser; without one, or without Playwright, the test is skipped.
 
     Chromium makes temporary files whenever it likes (for files that are dropped, for its handler of crashes), and
-    removes them when it likes. They are in a folder of its own, which no test has left behind.
+    removes them when it likes. They are in a folder of its own, which no test has left behind. Nor has one its
+    processes, some of which leave its family (the handlers of crashes): they have a mark of their own, and must have
+    ended when it is closed.
     """
     playwright = pytest.importorskip("playwright.sync_api")
     if _CHROMIUM is None:
@@ -40,12 +42,13 @@ def chromium() -> Iterator[Any]:
                 prefix=CHROMIUMS_OWN, dir=temporary_folder(), ignore_cleanup_errors=True
             )
             own = stack.enter_context(place)
+            stack.enter_context(no_process_left(own))
             play = stack.enter_context(playwright.sync_playwright())
             browser = play.chromium.launch(
                 executable_path=_CHROMIUM,
                 args=["--no-sandbox"],
                 timeout=HANG_S * 1000,
-                env={**os.environ, "TMPDIR": own},
+                env={**os.environ, "TMPDIR": own, MARK: own},
             )
         yield browser
         browser.close()

@@ -111,10 +111,10 @@ def shared_by_tests(*, with_children: bool = False) -> Iterator[None]:
 @contextmanager
 def no_process_left(mark: str) -> Iterator[None]:
     """Whatever process was started inside has ended, also when it has left this one's family."""
-    before = set(_marked(mark))
+    before = set(marked(mark))
 
     def left() -> list[str]:
-        new = set(_marked(mark)) - before - _shared_processes
+        new = set(marked(mark)) - before - _shared_processes
         return [f"{pid}: {_command(pid)}" for pid in new if not (_is_helper(pid) or _is_of_a_shared_program(pid))]
 
     yield
@@ -200,7 +200,8 @@ def _files() -> frozenset[str]:
     return frozenset(str(path) for path in temporary.iterdir() if not path.name.startswith(_PYTESTS_OWN))
 
 
-def _marked(mark: str) -> Iterator[int]:
+def marked(mark: str) -> Iterator[int]:
+    """Yield the processes whose environment has the mark: what was started with it, and all that these have started."""
     sought = f"{MARK}={mark}".encode()
     for entry in Path("/proc").iterdir():
         if entry.name.isdigit() and int(entry.name) != os.getpid():
