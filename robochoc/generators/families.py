@@ -35,6 +35,7 @@ def random(  # noqa: PLR0913 - parameters of a family, by their names
     max_cost: int | None = None,
     places: int = 0,
     maximize: bool = False,
+    asymmetric: bool = False,
     seed: int = 0,
     graph: str = "random",
     **of_graph: Any,  # noqa: ANN401 - `GraphChoice`'s own
@@ -46,7 +47,9 @@ def random(  # noqa: PLR0913 - parameters of a family, by their names
     costs = CostUnits(maximize, places)
     on = drawn.graph("density", density)
     if on is not None:
-        return random_problems.random_on(on, domain, tightness or 0, seed, max_cost=max_cost, costs=costs)
+        return random_problems.random_on(
+            on, domain, tightness or 0, seed, max_cost=max_cost, costs=costs, asymmetric=asymmetric
+        )
     return random_problems.random_csp(
         agents or 0,
         domain,
@@ -56,6 +59,7 @@ def random(  # noqa: PLR0913 - parameters of a family, by their names
         connected=drawn.connected,
         max_cost=max_cost,
         costs=costs,
+        asymmetric=asymmetric,
     )
 
 

@@ -14,6 +14,9 @@ With `max_cost`, pairs of values that are not forbidden cost something: each a n
 likely, whatever the others cost. With a tightness of 0 nothing is forbidden. That is the usual random DCOP. Costs may
 have decimal places, and may be utilities whose sum is maximised.
 
+With `asymmetric`, each robot of a pair has costs of its own, drawn apart, and their sum is minimised: the usual random
+ADCOP (Grinshpoun, Grubshtein, Zivan, Netzer, Meisels, JAIR 47, 2013). What is forbidden, both forbid.
+
 Instead of p1, `random_on` takes a graph: scale-free, small world, grid, tree, or a given one (`generators/graphs.py`).
 
 A seed makes the same problem on every machine and with every version of Python (`generators/draws.py`).
@@ -22,13 +25,14 @@ A seed makes the same problem on every machine and with every version of Python 
 from __future__ import annotations
 
 import itertools
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from random import Random
+from types import MappingProxyType
 
 from robochoc.generators.draws import MAX_COST, MAX_NODES, MAX_VALUES, check_bounds, check_places, seeded, some
 from robochoc.generators.draws import uniform as any_of
 from robochoc.generators.graphs import Edge, Graph, uniform
-from robochoc.model.assembly import assemble
+from robochoc.model.assembly import Extras, assemble
 from robochoc.model.cost_units import PLAIN_COSTS, CostUnits
 from robochoc.model.problem import INFINITE, Constraint, Domain, ProblemKind, Relation, Semantics, Team, Variable
 
@@ -36,7 +40,7 @@ MAX_FORBIDDEN_PAIRS = 1_000_000
 """The maximum for all constraints together: robots' files stay readable. With costs: the maximum of pairs of values."""
 
 
-def random_csp(
+def random_csp(  # noqa: PLR0913 - parameters of a family, by their names
     agents: int,
     domain: int,
     density: float,
@@ -46,6 +50,7 @@ def random_csp(
     connected: bool = False,
     max_cost: int | None = None,
     costs: CostUnits = PLAIN_COSTS,
+    asymmetric: bool = False,
 ) -> Team:
     """Return the team of the problem <agents, domain, density, tightness> that `seed` stands for.
 
@@ -60,6 +65,7 @@ def random_csp(
         connected: Whether graphs are drawn until one is connected. Each connected graph is then as likely as any other.
         max_cost: The maximum cost of pairs of values that are not forbidden: the team is a DisWCSP. None: no costs.
         costs: The decimal places of costs, and whether they are utilities to be maximised.
+        asymmetric: Whether each robot of a pair has costs of its own (partially known constraints).
 
     Raises:
         ValueError: if there is no such problem, or it is too large. The text says which number to change.
@@ -74,7 +80,7 @@ def random_csp(
     check_bounds({"tightness": (tightness, 0, 1)})
     _check_sizes(edges, domain, tightness, max_cost)
     graph = uniform(agents, edges, str(float(density)), connected=connected)
-    return random_on(graph, domain, tightness, seed, max_cost=max_cost, costs=costs)
+    return random_on(graph, domain, tightness, seed, max_cost=max_cost, costs=costs, asymmetric=asymmetric)
 
 
 def random_on(
@@ -85,6 +91,7 @@ def random_on(
     *,
     max_cost: int | None = None,
     costs: CostUnits = PLAIN_COSTS,
+    asymmetric: bool = False,
 ) -> Team:
     """Return a random problem on `graph`; all else is as in `random_csp`.
 
@@ -95,18 +102,24 @@ def random_on(
     check_places(costs.places)
     if max_cost is None and costs != PLAIN_COSTS:
         raise ValueError("there are no costs, which could have decimal places or be maximised; give a maximum cost")
+    if max_cost is None and asymmetric:
+        raise ValueError("there are no costs, which could be asymmetric; give a maximum cost")
     chance = seeded(seed)
     edges = graph.draw(chance)
-    _check_sizes(len(edges), domain, tightness, max_cost)
+    _check_sizes(len(edges) * (1 + asymmetric), domain, tightness, max_cost)
     forbidden = round(tightness * domain**2)
     constraints = {}
+    parts: dict[str, list[Constraint]] = {f"Robot{number}": [] for number in range(1, graph.agents + 1)}
+    most = None if max_cost is None else max_cost * 10**costs.places
     for edge in edges:
-        relation = _forbidding(edge, some(chance, domain**2, forbidden), domain)
-        if max_cost is not None:
-            relation = _charging(chance, relation, domain, max_cost * 10**costs.places)
-        scope = tuple(f"V{number}" for number in edge)
-        constraints[edge] = Constraint(f"C{edge[0]}.{edge[1]}", relation, scope, scope)
+        drawn = _drawn(chance, edge, domain, forbidden, [most] * (1 + asymmetric))
+        if asymmetric:
+            for number, part in zip(edge, drawn, strict=True):
+                parts[f"Robot{number}"].append(part)
+        else:
+            (constraints[edge],) = drawn
     told = "" if max_cost is None else f"-{'utility' if costs.maximize else 'cost'}{max_cost}{places_told(costs)}"
+    told += "-asymmetric" * asymmetric
     return team_of_edges(
         f"random-{graph.agents}-{domain}-{graph.label}-{float(tightness)}{told}-{seed}{graph.suffix}",
         graph.agents,
@@ -114,6 +127,7 @@ def random_on(
         constraints,
         ProblemKind.DISCSP if max_cost is None else ProblemKind.DISWCSP,
         costs,
+        parts,
     )
 
 
@@ -129,11 +143,15 @@ def team_of_edges(
     constraints: Mapping[Edge, Constraint],
     kind: ProblemKind,
     costs: CostUnits = PLAIN_COSTS,
+    parts: Mapping[str, Sequence[Constraint]] = MappingProxyType({}),
 ) -> Team:
-    """Return a team in which `Robot3` owns `V3`. The lower robot of an edge holds the edge's constraint."""
+    """Return a team in which `Robot3` owns `V3`. The lower robot of an edge holds the edge's constraint.
+
+    `parts` are what robots alone know of partially known constraints, by the robot's name.
+    """
     values = Domain("D", (range(1, domain + 1),))
     variables = {f"Robot{number}": [Variable(f"V{number}", values)] for number in range(1, agents + 1)}
-    return assemble(name, variables, constraints.values(), kind=kind, costs=costs)
+    return assemble(name, variables, constraints.values(), kind=kind, costs=costs, extras=Extras(parts=parts))
 
 
 def _check_sizes(edges: int, domain: int, tightness: float, max_cost: int | None) -> None:
@@ -149,6 +167,14 @@ def _check_sizes(edges: int, domain: int, tightness: float, max_cost: int | None
     pairs = edges * domain**2
     if pairs > MAX_FORBIDDEN_PAIRS:
         raise ValueError(f"all constraints together have {pairs:,} pairs of values, more than {MAX_FORBIDDEN_PAIRS:,}")
+
+
+def _drawn(chance: Random, edge: Edge, domain: int, forbidden: int, sides: Sequence[int | None]) -> list[Constraint]:
+    """Return a constraint on `edge` for each of its `sides`: their highest costs, or None for what only forbids."""
+    relation = _forbidding(edge, some(chance, domain**2, forbidden), domain)
+    scope = tuple(f"V{number}" for number in edge)
+    relations = [relation if most is None else _charging(chance, relation, domain, most) for most in sides]
+    return [Constraint(f"C{edge[0]}.{edge[1]}", one, scope, scope) for one in relations]
 
 
 def _forbidding(edge: Edge, forbidden: list[int], domain: int) -> Relation:

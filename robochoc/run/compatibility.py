@@ -348,10 +348,11 @@ def refuse_unfit(team: Team, options: Options, traits: Traits) -> None:
 def _takers(case: Case) -> Iterator[tuple[str, Traits]]:
     """Yield all protocols that must support the constraints: the protocol, and those that take over from it."""
     options, traits = case.options, case.traits
-    if not (case.minimum_withdrawal and case.has_costs):  # then soft constraints are left to what takes over
+    taken_over = case.minimum_withdrawal and not traits.costs
+    if not (taken_over and case.has_costs):  # then soft constraints are left to what takes over
         yield options.protocol, traits
-    if case.minimum_withdrawal:
-        yield "--withdraw minimum", Traits(costs=True, n_ary=traits.n_ary or not traits.costs)
+    if taken_over:
+        yield "--withdraw minimum", Traits(costs=True)
     if options.withdraw is Withdrawal.MAXIMAL:
         yield "--withdraw maximal", FirstFit.traits
     if options.spares:

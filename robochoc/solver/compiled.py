@@ -11,7 +11,6 @@ the domain is compiled, and are not counted; nor are look-ups of nogoods and fil
 
 from __future__ import annotations
 
-import itertools
 from bisect import bisect_left, bisect_right
 from collections.abc import Container, Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING
@@ -87,17 +86,18 @@ class LocalProblem:
 
         above = [(known.constraint.model, ready(known)) for known in held_above(robot)]
         copies = [ready(known) for known in part.copies]
-        shared = [*(constraint for _, constraint in above), *copies]
+        below = [ready(known) for _, known in held_below(robot)]
+        shared = [*(constraint for _, constraint in above), *copies, *below]
         self._constraints = sorted_by_lowest_agent(shared, rank)
         self._depths = [rank[constraint.agents[-1]] if constraint.agents else -1 for constraint in self._constraints]
         met = {agent for constraint in shared for agent in constraint.agents}
         self.neighbours = tuple(sorted({*self.parents, *self.children, *met}, key=rank.__getitem__))
         self._table: ConflictTable | None = self._looked_up() if len(self.values) >= MIN_TABLE_VALUES else None
-        self._below = _by_robot(ready(known) for _, known in held_below(robot))
+        self._below = _by_robot(below)
         parts_above = [constraint for model, constraint in above if model is ConstraintModel.PKC]
         secretive = {*part.pkc_holders, *_by_robot(parts_above)}
         self.pkc_parents = tuple(parent for parent in self.parents if parent in secretive)
-        below = itertools.chain.from_iterable(self._below.values())
+        self._parts = _by_robot([*parts_above, *below])
         self._filtering = _by_robot([*copies, *below, *parts_above])
         self._made_filters: Filters | None = None
 
@@ -207,6 +207,16 @@ class LocalProblem:
         if INFINITE not in costs:
             return [(0, cost) for cost in costs]
         return [_lexicographic_cost(prices) for prices in zip(self.charges, *known, strict=True)]
+
+    def own_side(self, index: int, robot: str, value: Value) -> LexicographicCost:
+        """Return what `values[index]` pays for the own parts of constraints with `robot`, when that has `value`.
+
+        Only what is partially known (PKC) is counted, and of it the own parts: `robot` pays its own. One check for each
+        part.
+        """
+        known = [paid for part in self._parts.get(robot, ()) if (paid := part.costs_in({robot: value})) is not None]
+        self.checks += len(known)
+        return _lexicographic_cost([paid[index] for paid in known])
 
     def scopes(self, robots: Iterable[str]) -> list[tuple[tuple[str, ...], Cost]]:
         """Return, for each constraint whose other robots are all in `robots`, these robots and its maximum cost.

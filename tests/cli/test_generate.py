@@ -10,7 +10,7 @@ import pytest
 from robochoc.cli.options.generated import next_step
 from robochoc.formats import read_team
 from robochoc.generators.coloring import coloring_of
-from robochoc.generators.graphs import grid, scale_free, small_world
+from robochoc.generators.graphs import grid, scale_free, small_world, tree
 from robochoc.generators.ising import ising
 from robochoc.generators.meetings import meetings
 from robochoc.generators.random_csp import random_on
@@ -25,6 +25,9 @@ from tests.support.program import robochoc_within
 FAMILIES: dict[str, Callable[[], Team]] = {
     "random --agents 6 --domain 3 --graph scale-free --links 3 --max-cost 9 --places 2 --maximize": lambda: random_on(
         scale_free(6, 3), 3, 0, max_cost=9, costs=CostUnits(maximize=True, places=2)
+    ),
+    "random --agents 6 --domain 3 --graph tree --max-cost 9 --asymmetric --tightness 0.3": lambda: random_on(
+        tree(6), 3, 0.3, max_cost=9, asymmetric=True
     ),
     "random --agents 6 --domain 3 --graph grid --torus --tightness 0.3": lambda: random_on(
         grid(2, 3, torus=True), 3, 0.3
@@ -81,6 +84,7 @@ def test_a_family_is_written_under_its_name(words: str, tmp_path: Path) -> None:
         ("random --domain 3 --tightness 0.2 --agents 7 --graph grid --rows 2", "7 robots do not fill 2 rows"),
         ("random --domain 3 --tightness 0.2 --agents 5 --density 0.5 --places 2", "give --max-cost, too"),
         ("random --domain 3 --tightness 0.2 --agents 5 --density 0.5 --maximize", "give --max-cost, too"),
+        ("random --domain 3 --tightness 0.2 --agents 5 --density 0.5 --asymmetric", "give --max-cost, too"),
         ("random --domain 3 --tightness 2 --agents 5 --graph tree", "tightness is 2.0"),
         ("coloring --agents 5 --graph small-world --neighbours 3", "must be even"),
         ("meetings --agents 3 --meetings 2 --slots 3 --participants 4", "participants is 4"),

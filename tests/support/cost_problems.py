@@ -38,8 +38,8 @@ def random_cost_team(chance: Random, *, n_ary: bool = True) -> Team:
     constraints = [_random_constraint(chance, domains, pair, hard) for pair in pairs]
     if n_ary and chance.random() < 0.5:
         triples = [chance.sample(sorted(domains), 3) for _ in range(chance.randint(1, 2))]
-        constraints += [_soft_table(chance, domains, triple, hard) for triple in triples]
-    constraints += [_soft_table(chance, domains, (name,), hard / 2) for name in domains if chance.random() < 0.4]
+        constraints += [soft_table(chance, domains, triple, hard) for triple in triples]
+    constraints += [soft_table(chance, domains, (name,), hard / 2) for name in domains if chance.random() < 0.4]
     return with_costs(team_of(domains, constraints, "costs"))
 
 
@@ -120,12 +120,12 @@ def _random_constraint(
     scope = list(pair)
     chance.shuffle(scope)
     if chance.random() < 0.6:
-        return _soft_table(chance, domains, scope, hard)
+        return soft_table(chance, domains, scope, hard)
     cost = INFINITE if chance.random() < hard else chance.randint(1, MAX_COST)
     return Constraint("C", chance.choice(PREDICATES), tuple(scope), tuple(scope), cost=cost)
 
 
-def _soft_table(chance: Random, domains: Mapping[str, Sequence[int]], scope: Sequence[str], hard: float) -> Constraint:
+def soft_table(chance: Random, domains: Mapping[str, Sequence[int]], scope: Sequence[str], hard: float) -> Constraint:
     """Every tuple has a cost; those that are not listed have the default."""
     rows = list(itertools.product(*(domains[name] for name in scope)))
     listed = [row for row in rows if chance.random() < 0.8]

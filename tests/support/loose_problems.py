@@ -92,13 +92,13 @@ def loose_team(protocol: str, chance: Random, *, costs: bool = False) -> Team:
     """
     traits = protocol_named(protocol).traits
     if costs and chance.random() < 0.2:
-        return loosened(softened(_several(chance, n_ary=traits.n_ary), chance), chance)
+        return loosened(softened(several_variables_team(chance, n_ary=traits.n_ary), chance), chance)
     if costs:
         return loosened(random_cost_team(chance, n_ary=traits.n_ary), chance)
     if traits.partially_known and chance.random() < 0.3:
         return loosened(random_pkc_team(chance), chance)
     if chance.random() < 0.3:
-        return loosened(_several(chance, n_ary=traits.n_ary), chance)
+        return loosened(several_variables_team(chance, n_ary=traits.n_ary), chance)
     return loosened(random_team(chance, n_ary=traits.n_ary), chance)
 
 
@@ -206,7 +206,7 @@ def _link(robots: dict[str, Robot], above: str, below: str) -> None:
     robots[below] = replace(child, parents=(*child.parents, Parent(above)))
 
 
-def _several(chance: Random, *, n_ary: bool) -> Team:
+def several_variables_team(chance: Random, *, n_ary: bool) -> Team:
     """Robots of several variables, without private constraints: none needs a solver."""
     team = random_complex_team(chance)
     owner = team.owner

@@ -57,7 +57,7 @@ def random_pkc_team(chance: Random) -> Team:
     team = team_of(domains, [*held, *(replace(one, model=None) for one in private)], "pkc")
     for (parent, child), part in parts.items():
         team = with_part(team, f"R{parent}", f"R{child}", part)
-    return _one_sided(team, chance) if chance.random() < 0.2 else team
+    return one_sided(team, chance) if chance.random() < 0.2 else team
 
 
 def with_private_parts(team: Team, chance: Random) -> Team:
@@ -164,7 +164,7 @@ def _table(
     return Constraint(name, relation, tuple(scope), tuple(scope), ConstraintModel.PKC)
 
 
-def _one_sided(team: Team, chance: Random) -> Team:
+def one_sided(team: Team, chance: Random) -> Team:
     """Some part is left out, on either side, where the neighbour still shows the variable that the other looks at."""
     holder, other, name = chance.choice([*pkc_parts(team)] or [("", "", "")])
     if not holder:

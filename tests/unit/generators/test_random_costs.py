@@ -12,7 +12,7 @@ from robochoc.formats import read_team, write_team
 from robochoc.generators.coloring import coloring
 from robochoc.generators.random_csp import random_csp
 from robochoc.model.orders import constraint_graph
-from robochoc.model.problem import INFINITE, ProblemKind, Semantics, Team
+from robochoc.model.problem import INFINITE, ConstraintModel, ProblemKind, Relation, Semantics, Team
 from tests.support.binary_problems import edges_of, relation_of, shared_constraints
 from tests.support.program import robochoc_within
 
@@ -88,6 +88,33 @@ def test_impossible_problems_are_refused() -> None:
             coloring(*wrong)
     with pytest.raises(ValueError, match="degree is nan"):
         coloring(3, 3, float("nan"))
+
+
+# Asymmetric costs
+
+
+def test_each_side_has_costs_of_its_own_and_both_forbid_the_same() -> None:
+    team = random_csp(6, 4, 0.6, 0.25, 3, max_cost=100, asymmetric=True)
+    sides: dict[str, list[Relation]] = {}
+    for constraint in team.constraints():
+        assert constraint.model is ConstraintModel.PKC
+        assert isinstance(constraint.definition, Relation)
+        sides.setdefault(constraint.name, []).append(constraint.definition)
+    assert len(sides) == 9
+    for one, other in sides.values():
+        assert one.costs != other.costs
+        forbidden = [
+            {pair for pair, cost in zip(side.tuples, side.costs, strict=True) if cost == INFINITE}
+            for side in (one, other)
+        ]
+        assert forbidden[0] == forbidden[1]
+        assert len(forbidden[0]) == 4
+    assert team == random_csp(6, 4, 0.6, 0.25, 3, max_cost=100, asymmetric=True)
+
+
+def test_asymmetric_problems_have_costs() -> None:
+    with pytest.raises(ValueError, match="could be asymmetric; give a maximum cost"):
+        random_csp(6, 4, 0.6, 0.25, asymmetric=True)
 
 
 # On the command line

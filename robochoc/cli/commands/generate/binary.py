@@ -22,7 +22,7 @@ places_option = number("--places", "Decimal places of costs.", least=0, most=9, 
     sections={
         COMMON: ("--agents", "--domain", "--density", "--tightness", "--graph"),
         "Graph": GRAPH,
-        "Costs": ("--max-cost", "--places", "--maximize"),
+        "Costs": ("--max-cost", "--places", "--maximize", "--asymmetric"),
         "Output": OUTPUT,
     },
     short_help="Model B: random binary constraints, on a graph of your choice.",
@@ -44,8 +44,9 @@ places_option = number("--places", "Decimal places of costs.", least=0, most=9, 
 )
 @places_option
 @click.option("--maximize", is_flag=True, help="With --max-cost: costs are utilities, whose sum is maximised.")
+@click.option("--asymmetric", is_flag=True, help="With --max-cost: each robot of a pair has costs of its own (ADCOP).")
 @seed_option
-@team_written("random-AGENTS-DOMAIN-GRAPH-TIGHTNESS[-costMAX]-SEED[-connected]")
+@team_written("random-AGENTS-DOMAIN-GRAPH-TIGHTNESS[-costMAX][-asymmetric]-SEED[-connected]")
 def random_problem(places: int, *, maximize: bool, **problem: Any) -> Team:  # noqa: ANN401 - `random_csp`'s own
     """Uniform random problems (Model B; Prosser 1996, Gent et al. 2001), the usual benchmark of protocols.
 
@@ -58,6 +59,7 @@ def random_problem(places: int, *, maximize: bool, **problem: Any) -> Team:  # n
     robochoc generate random --agents 20 --domain 10 --density 0.2 --tightness 0.6
     robochoc generate random --agents 10 --domain 5 --density 0.4 --max-cost 100
     robochoc generate random --agents 30 --domain 3 --graph scale-free --max-cost 9 --places 2
+    robochoc generate random --agents 6 --domain 4 --density 0.5 --max-cost 100 --asymmetric
     robochoc generate random --domain 4 --graph town.graphml --tightness 0.3
     """  # noqa: D301 - \\b is how click is told to leave the lines as they are
     from robochoc.generators.random_csp import random_csp, random_on
@@ -65,8 +67,8 @@ def random_problem(places: int, *, maximize: bool, **problem: Any) -> Team:  # n
 
     if problem["tightness"] is None and problem["max_cost"] is None:
         raise click.UsageError("Missing option '--tightness' (without --max-cost).")
-    if problem["max_cost"] is None and (places or maximize):
-        raise click.UsageError("--places and --maximize are about costs: give --max-cost, too.")
+    if problem["max_cost"] is None and (places or maximize or problem["asymmetric"]):
+        raise click.UsageError("--places, --maximize and --asymmetric are about costs: give --max-cost, too.")
     problem["tightness"] = problem["tightness"] or 0
     problem["costs"] = CostUnits(maximize, places)
     graph = graph_of(problem, "density")
