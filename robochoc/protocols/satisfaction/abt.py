@@ -145,10 +145,14 @@ class ABT(Backtracking):
             if self.value is None:
                 self._backtrack()
                 continue
-            ok = Ok(self.problem.values[self.value])
-            for neighbour in (*self.lower, *self.problem.pkc_parents):
-                self.send(neighbour, ok)
+            self._tell(self.problem.values[self.value])
             return
+
+    def _tell(self, value: Value) -> None:
+        """Send the own value to all robots that it matters to."""
+        ok = Ok(value)
+        for neighbour in (*self.lower, *self.problem.pkc_parents):
+            self.send(neighbour, ok)
 
     def _backtrack(self) -> None:
         """Resolve the stored nogoods, one for each value, and send the result to its lowest-priority robot."""
@@ -159,6 +163,10 @@ class ABT(Backtracking):
         culprit = self.order.lowest(lhs)
         value = lhs.pop(culprit)
         self.send(culprit, self._nogood(lhs, value))
+        self._backtracked(culprit)
+
+    def _backtracked(self, culprit: str) -> None:
+        """Go on after a nogood to `culprit`, which is expected to change its value: forget the old one."""
         self._update(culprit, None)
 
     def _nogood(self, lhs: dict[str, Value], value: Value) -> Nogood:
