@@ -13,7 +13,7 @@ from __future__ import annotations
 
 from bisect import bisect_left, bisect_right
 from collections.abc import Container, Iterable, Mapping, Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 from robochoc.model.message import Value
 from robochoc.model.problem import INFINITE, ConstraintModel, ProblemKind
@@ -37,6 +37,19 @@ if TYPE_CHECKING:
 LexicographicCost = tuple[int, Cost]
 """The number of constraints that a value violates, and the cost of all others. Pairs compare as tuples: a violated
 constraint weighs more than any cost, and differences are never `inf - inf`."""
+
+
+class Charged(NamedTuple):
+    """What one constraint charges in a view: `costs` of each own value, given what it sees of the `others`.
+
+    `number` is the constraint's place in `LocalProblem`. Own values that it cannot tell apart have the same code.
+    """
+
+    number: int
+    others: OtherValues
+    codes: Sequence[int]
+    costs: Sequence[Cost]
+
 
 MIN_TABLE_VALUES = 64
 """The number of values from which conflicts are looked up for all of them at once, in numpy."""
@@ -217,6 +230,30 @@ class LocalProblem:
         known = [paid for part in self._parts.get(robot, ()) if (paid := part.costs_in({robot: value})) is not None]
         self.checks += len(known)
         return _lexicographic_cost([paid[index] for paid in known])
+
+    def charged(self, view: Mapping[str, Value]) -> list[Charged]:
+        """Return what each constraint whose other variables are all known charges, with the checks of `costs`.
+
+        They add up to the `costs`, but for the private `charges`.
+        """
+        found = [
+            Charged(number, others, constraint.codes, constraint.costs(others))
+            for number, constraint in enumerate(self._constraints)
+            if (others := constraint.other_values(view)) is not None
+        ]
+        self.checks += len(found) * len(self.values)
+        return found
+
+    def least_and_most(self, number: int) -> tuple[Cost, Cost]:
+        """Return the least and the most that the constraint of this `number` charges, broken ones (infinite) included.
+
+        For the own values and all that files declare for the others; with more than `MAX_BOUNDED_ROWS` combinations,
+        what the constraint itself says: 0, and the most that it lists.
+        """
+        constraint = self._constraints[number]
+        checks, least, most = constraint.least_and_most(self._part.known.domains, MAX_BOUNDED_ROWS)
+        self.checks += checks
+        return least, most
 
     def scopes(self, robots: Iterable[str]) -> list[tuple[tuple[str, ...], Cost]]:
         """Return, for each constraint whose other robots are all in `robots`, these robots and its maximum cost.

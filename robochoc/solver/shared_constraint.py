@@ -7,9 +7,17 @@ import math
 from collections.abc import Container, Iterable, Iterator, Mapping, Sequence
 
 from robochoc.model.message import Value
-from robochoc.model.problem import Constraint
+from robochoc.model.problem import INFINITE, Constraint
 from robochoc.solver.agent_problem import TeamKnowledge
-from robochoc.solver.encoding import MAX_TUPLES, Cost, UnsupportedError, allows_function, cost_function, max_cost
+from robochoc.solver.encoding import (
+    MAX_TUPLES,
+    Cost,
+    UnsupportedError,
+    allows_function,
+    cost_function,
+    is_soft,
+    max_cost,
+)
 
 Conflict = Mapping[str, Value]
 """Assignments of other robots that rule out an own value: the left side of a nogood."""
@@ -153,6 +161,18 @@ class SharedConstraint:
             if not any(least):
                 break
         return checks, least
+
+    def least_and_most(self, domains: Mapping[str, Iterable[int]], wide: int) -> tuple[int, Cost, Cost]:
+        """Return the number of checks, and the least and the most that it charges over the others' `domains`.
+
+        With more than `wide` combinations, nothing is looked at: they are 0 and what the constraint lists.
+        """
+        columns = [list(domains[name]) for name in self._names]
+        entries = math.prod(map(len, columns)) * len(self.codes)
+        if not 0 < entries <= wide:
+            return 0, 0, self.max_cost if is_soft(self._constraint) else INFINITE
+        rows = [self.costs(others) for others in itertools.product(*columns)]
+        return entries, min(map(min, rows)), max(map(max, rows))
 
     def combinations(
         self, domains: Mapping[str, Sequence[Value]], size: int

@@ -14,6 +14,7 @@ from robochoc.model.problem import Assignment, Constraint, Relation, Semantics, 
 from robochoc.protocols.findings import Trail
 from robochoc.protocols.inference.maxsum import MaxSum
 from robochoc.protocols.local_search.dsa import DSA
+from robochoc.protocols.local_search.gdba import GDBA
 from robochoc.protocols.local_search.mgm import MGM
 from robochoc.protocols.local_search.mgm2 import MGM2
 from robochoc.protocols.settings import SettingsError, settings_of
@@ -33,7 +34,8 @@ from tests.support.local_search_runs import any_schedule, assignments_by_cycle, 
 from tests.support.problems import team_of
 from tests.support.small_teams import DIFFERENT
 
-ALL = pytest.mark.parametrize("protocol", [DSA, MGM, MGM2, MaxSum])
+NAMES: dict[type[CycleProtocol], str] = {DSA: "dsa", MGM: "mgm", MGM2: "mgm2", GDBA: "gdba", MaxSum: "maxsum"}
+ALL = pytest.mark.parametrize("protocol", NAMES)
 
 
 def chain(*, names: str = "ABC", values: int = 3) -> Team:
@@ -128,7 +130,7 @@ def test_whatever_the_delays_the_course_is_the_same(protocol: type[CycleProtocol
 @ALL
 def test_the_answer_is_the_cheapest_cycle(protocol: type[CycleProtocol], teams: int) -> None:
     chance = Random(f"cheapest {protocol.__name__}")
-    name = {DSA: "dsa", MGM: "mgm", MGM2: "mgm2", MaxSum: "maxsum"}[protocol]
+    name = NAMES[protocol]
     assert protocol_named(name) is protocol
     for seed in range(teams):
         team = random_cost_team(chance)

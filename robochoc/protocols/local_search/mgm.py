@@ -35,7 +35,7 @@ Choices that the paper leaves open:
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 from robochoc.model import message as wire
 from robochoc.protocols.local_search.messages.mgm import Gain
@@ -47,7 +47,7 @@ from robochoc.solver.compiled import LexicographicCost, LocalProblem
 
 
 class Gainers(CycleProtocol):
-    """The common base of MGM and MGM-2: a cycle begins with values, and gains decide which neighbour moves.
+    """The common base of MGM, MGM-2 and GDBA: a cycle begins with values, and gains decide which neighbour moves.
 
     `target` is the value of this robot's best move, and `gain` the gain of that move.
     """
@@ -59,7 +59,10 @@ class Gainers(CycleProtocol):
 
     def best_unilateral(self, view: Mapping[str, wire.Value]) -> None:
         """Find the best move of this robot alone, which may be to stay (BestUnilateralGain)."""
-        burdens = self.problem.lexicographic_costs(view)
+        self.best_of(self.problem.lexicographic_costs(view))
+
+    def best_of(self, burdens: Sequence[LexicographicCost]) -> None:
+        """Find the best move where the own values cost `burdens`."""
         least = min(burdens)
         self.gain = gain(burdens[self.present], least)
         self.target = self.present

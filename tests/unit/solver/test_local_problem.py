@@ -223,6 +223,38 @@ def test_nothing_is_sure_to_be_charged_where_robots_may_step_aside() -> None:
     ]
 
 
+def test_what_each_constraint_charges_adds_up_and_is_between_its_least_and_most() -> None:
+    chance = Random("charged")
+    seen = 0
+    for _ in range(40):
+        team = chance.choice((random_cost_team, random_complex_cost_team))(chance)
+        view = _view(team, {name: chance.choice(sorted(v.domain)) for name, v in team.variables.items()})
+        for part in agent_problems(_any_domains(team, chance), shared_scopes=True).values():
+            one, other = LocalProblem(part), LocalProblem(part)
+            charged = one.charged(view)
+            total = [sum(prices) for prices in zip(one.charges, *(c.costs for c in charged), strict=True)]
+            assert total == other.costs(view)
+            assert one.checks == other.checks
+            for number, _, codes, costs in charged:
+                least, most = one.least_and_most(number)
+                assert all(least <= cost <= most for cost in costs)
+                assert len({*zip(codes, costs, strict=True)}) == len({*codes})
+                seen += least < most
+    assert seen > 50
+
+
+def test_the_least_and_the_most_are_those_of_the_whole_table(monkeypatch: pytest.MonkeyPatch) -> None:
+    soft = Relation("S", 2, Semantics.SOFT, ((1, 1), (2, 1)), (3, 5), 2)
+    for relation, found, unseen in ((soft, (2, 5), (0, 5)), (EQUAL, (0, INFINITE), (0, INFINITE))):
+        team = team_of(dict.fromkeys("AB", (1, 2)), [Constraint("C", relation, ("A", "B"), ("A", "B"))])
+        problem = LocalProblem(agent_problems(team, shared_scopes=True)["RA"])
+        assert problem.least_and_most(0) == found
+        assert problem.checks == 4
+        monkeypatch.setattr(compiled, "MAX_BOUNDED_ROWS", 3)
+        assert problem.least_and_most(0) == unseen
+        monkeypatch.undo()
+
+
 def _compare(part: AgentProblem, chance: Random) -> None:
     problem = LocalProblem(part)
     for index in range(len(problem.values)):

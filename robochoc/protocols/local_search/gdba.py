@@ -1,0 +1,174 @@
+"""The Generalized Distributed Breakout Algorithm (GDBA).
+
+Local search in cycles: MGM in which constraints weigh more the longer they keep robots in a local minimum. Each robot
+has modifiers of its own for the entries of its constraints' tables; a cost together with its modifier is the effective
+cost. All robots send their values, then the reduction of their effective cost by their best move; among neighbours the
+one with the largest moves. Where neither a robot nor one of its neighbours can reduce anything (a quasi-local minimum),
+the robot raises the modifiers of its violated constraints.
+
+- **When to use**: costs, a large team, time for many cycles: it leaves the local optima in which MGM ends.
+- **Guarantees**: incomplete; it stops after `cycles` cycles, without a proof of optimality. The result is the best
+  cycle (anytime); costs rise and fall. A robot with an empty domain proves that there is no solution.
+- **Parameters (`--set`)**: `modifier` (A or M; default M), `violation` (NZ, NM or MX; default NM), `scope` (E, R, C or
+  T; default T), `cycles` (default 100). They are explained below; the defaults are the variant that later papers take.
+- **References**: Okamoto, Zivan, Nahon: "Distributed breakout: beyond satisfaction", IJCAI 2016. For the algorithm that
+  it generalizes: Yokoo, Hirayama: "Distributed breakout algorithm for solving distributed constraint satisfaction
+  problems", ICMAS 1996.
+
+The paper's three choices, 24 variants together:
+
+    effective cost: additive (A), multiplicative (M)                `modifier`, `_effective`
+    violated: non-zero, non-minimum, maximum cost (NZ, NM, MX)      `violation`, `_violated`
+    what is raised: entry, row, column, table (E, R, C, T)          `scope`, `_key`
+    send value, send improvement, raise or move                     `tell_value`, `_weigh`, `_move`
+
+With A and R, or A and T, all own values are raised alike, so no decision changes: these variants are exactly MGM.
+E and C leave minima fastest, and rest nowhere; their last cycle may be far from the best one.
+
+Choices that the paper leaves open, and differences:
+
+- A row (R) is all own values against the others' current values, a column (C) the own value against all of theirs.
+- Constraints may be n-ary; then the others' current values are those of all other robots of the scope.
+- A broken hard constraint stands for a cost larger than all others: costs are pairs as in `mgm`, and a broken
+  constraint is raised by one broken constraint (A) or weighs as one more (M).
+- A robot's private costs are no constraints with others, and are never raised.
+- First values, equally good values and equal reductions are treated as in `mgm`.
+
+>>> from robochoc.communication.simulator.schedule import Concurrent
+>>> from robochoc.communication.simulator.simulator import Simulation
+>>> from robochoc.generators.queens3d import queens3d
+>>> result = Simulation(queens3d(3), GDBA, Concurrent(seed=0)).search()
+>>> result.metrics.messages
+{'Improve': 5600, 'Value': 5600}
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import ClassVar
+
+from robochoc.model import message as wire
+from robochoc.model.problem import INFINITE
+from robochoc.protocols.local_search.messages.gdba import Improve
+from robochoc.protocols.local_search.mgm import Gainers
+from robochoc.protocols.local_search.settings.gdba import GDBASettings
+from robochoc.protocols.order import PriorityOrder
+from robochoc.protocols.shared.cycles import NO_GAIN, values_in
+from robochoc.protocols.shared.messages.cycles import Value
+from robochoc.protocols.traits import ENDS_WITH_PROOF, Traits
+from robochoc.solver.compiled import Charged, LexicographicCost, LocalProblem
+from robochoc.solver.encoding import Cost
+
+Raised = tuple[int, int]
+"""How often modifiers were raised: where the constraint was broken, and where it just cost something."""
+
+Key = tuple[int | None, tuple[int, ...] | None]
+"""The entries of a table that are raised together: those of one code of own values, of what the others say, or all."""
+
+MOST = 1 << 62
+"""The largest reduction that is told: effective costs may outgrow what a message holds."""
+
+
+class GDBA(Gainers):
+    """One agent of GDBA. A cycle has two phases: all robots send their values, then their reductions.
+
+    `raised` are the modifiers: for each constraint, by its number, how often its entries were raised.
+    """
+
+    messages = Value | Improve
+    settings: ClassVar[GDBASettings] = GDBASettings()
+    traits = Traits(
+        concludes=ENDS_WITH_PROOF,
+        paper="Okamoto, Zivan, Nahon 2016",
+        complete=False,
+        costs=True,
+        shared_scopes=True,
+        writes_to_non_neighbours=False,
+        privacy="constraints among others",
+        use_when="as MGM, and many cycles: it leaves local optima",
+    )
+
+    def __init__(self, problem: LocalProblem, order: PriorityOrder) -> None:
+        super().__init__(problem, order)
+        self.raised: dict[int, dict[Key, Raised]] = {}
+        self._charged: list[Charged] = []
+        self._ranges: dict[int, tuple[Cost, Cost]] = {}
+
+    def begin(self) -> None:
+        """Take a random value."""
+        self.take(self.any_value())
+        self.tell_value(self._weigh)
+
+    def _weigh(self, messages: Mapping[str, wire.Message]) -> None:
+        """Send the reduction of the best own move, with all neighbours' values known."""
+        self._charged = self.problem.charged(values_in(messages))
+        self.best_of(self._burdens())
+        broken, cost = self.gain
+        self.gain = broken, max(-MOST, min(MOST, cost))
+        self.tell(self.problem.neighbours, Improve(*self.gain))
+        self.listen(self.problem.neighbours, self._move)
+
+    def _move(self, messages: Mapping[str, wire.Message]) -> None:
+        """Move if the own reduction is the largest; raise modifiers in a quasi-local minimum."""
+        told = [(said.broken, said.cost) for said in messages.values() if isinstance(said, Improve)]
+        if max(self.gain, *told) <= NO_GAIN:
+            self._raise_modifiers()
+        self.take(self.target if self.wins(messages) else self.present)
+        if not self.over:
+            self.tell_value(self._weigh)
+
+    def _burdens(self) -> list[LexicographicCost]:
+        """Return the effective cost of each own value."""
+        alone = [_pair(cost) for cost in self.problem.charges]
+        rows = [alone, *(self._effective(one) for one in self._charged)]
+        return [(sum(broken for broken, _ in row), sum(cost for _, cost in row)) for row in zip(*rows, strict=True)]
+
+    def _effective(self, charged: Charged) -> Sequence[LexicographicCost]:
+        """Return the effective cost of each own value by one constraint."""
+        raised = self.raised.get(charged.number)
+        if raised is None:
+            return [_pair(cost) for cost in charged.costs]
+        weighed = self._added if self.settings.modifier == "A" else self._multiplied
+        return [
+            weighed(cost, raised.get(self._key(code, charged.others), (0, 0)))
+            for code, cost in zip(charged.codes, charged.costs, strict=True)
+        ]
+
+    @staticmethod
+    def _added(cost: Cost, raised: Raised) -> LexicographicCost:
+        broken, paid = _pair(cost)
+        return broken + raised[0], paid + raised[1]
+
+    @staticmethod
+    def _multiplied(cost: Cost, raised: Raised) -> LexicographicCost:
+        broken, paid = _pair(cost)
+        times = 1 + raised[0] + raised[1]
+        return broken * times, paid * times
+
+    def _raise_modifiers(self) -> None:
+        """Raise the modifiers of the violated constraints (increase-mod)."""
+        for number, others, codes, costs in self._charged:
+            cost = costs[self.present]
+            if self._violated(number, cost):
+                raised = self.raised.setdefault(number, {})
+                key = self._key(codes[self.present], others)
+                broken, paid = raised.get(key, (0, 0))
+                raised[key] = (broken + 1, paid) if cost == INFINITE else (broken, paid + 1)
+
+    def _violated(self, number: int, cost: Cost) -> bool:
+        """Return whether a constraint that charges `cost` is violated (is-violated)."""
+        if self.settings.violation == "NZ":
+            return cost > 0
+        if number not in self._ranges:
+            self._ranges[number] = self.problem.least_and_most(number)
+        least, most = self._ranges[number]
+        return cost > least if self.settings.violation == "NM" else cost == most
+
+    def _key(self, code: int, others: tuple[int, ...]) -> Key:
+        """Return the entries that are raised with the one of an own value's `code` and what the `others` say."""
+        scope = self.settings.scope
+        return code if scope in "EC" else None, others if scope in "ER" else None
+
+
+def _pair(cost: Cost) -> LexicographicCost:
+    return (1, 0) if cost == INFINITE else (0, cost)
