@@ -109,7 +109,7 @@ def test_a_run_over_the_limit_says_the_same_in_every_runtime(withdraw: Withdrawa
         said.append(str(refused.value))
     assert said[0] == said[1]
     assert re.match(r"R[CD] needs [\d,]+ bytes for its tables, more than 100: .* induced width 3 ", said[0])
-    assert "dpop" not in said[0]
+    assert "dpop" not in re.split(r"[ ,]+", said[0])
 
 
 @pytest.mark.parametrize("memory", ["0", "-1", "much"])

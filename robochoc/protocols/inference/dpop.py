@@ -134,11 +134,11 @@ class DPOP(TreeProtocol):
         """Dispatch on the message's type."""
         match cast("Domain | Dimensions | Proceed | UTIL | VALUE", message):
             case Domain(values):
-                _keep(sender, values, self.domains, self.ancestors)
+                keep_once(sender, values, self.domains, self.ancestors)
                 self._measure()
             case Dimensions() as dimensions:
                 self._check(sender, dimensions)
-                _keep(sender, dimensions, self.dimensions, self.children)
+                keep_once(sender, dimensions, self.dimensions, self.children)
                 self._measure()
             case Proceed(separator):
                 self._proceed(separator)
@@ -163,6 +163,7 @@ class DPOP(TreeProtocol):
         checked = self.problem.scopes(self.ancestors)
         self._sizes = self._separator_sizes([scope for scope, _ in checked])
         self._dearest = self._upper_bound([charge for _, charge in checked])
+        self._plan()
         below = [self.dimensions[child] for child in self.children]
         width = max([len(self._sizes), *(one.induced_width for one in below)])
         self._need = self._needed([scope for scope, _ in checked])
@@ -171,7 +172,14 @@ class DPOP(TreeProtocol):
             self._refuse(most, width)
             self._proceed([])
         else:
-            self.send(self.parent, Dimensions(self._sizes, self._dearest, width, most))
+            self._tell(Dimensions(self._sizes, self._dearest, width, most))
+
+    def _plan(self) -> None:
+        """Decide what is to be decided before memory needs are known; here nothing."""
+
+    def _tell(self, dimensions: Dimensions) -> None:
+        """Send the parent the dimensions of the own table."""
+        self.send(self.parent or "", dimensions)
 
     def _check(self, child: str, dimensions: Dimensions) -> None:
         """Raise `ValueError` unless `dimensions` are possible."""
@@ -212,11 +220,25 @@ class DPOP(TreeProtocol):
         """Return the memory that the own tables need; an integer while it is small enough to be sent as one."""
         own = len(self.problem.values)
         inputs = [Extent(own * math.prod(len(self.domains[name]) for name in scope), 8) for scope in checked]
-        for child in self.children:
-            dimensions = self.dimensions[child]
-            inputs.append(Extent(math.prod(dimensions.separator.values()), width_of(dimensions.dearest)))
-        need = bytes_of(list(self._sizes.values()), own, width_of(self._dearest), inputs)
+        inputs += [
+            Extent(math.prod(self._child_sizes(child)), width_of(self.dimensions[child].dearest))
+            for child in self.children
+        ]
+        need = bytes_of(self._own_sizes(), own, width_of(self._dearest), inputs) + self._kept_bytes(inputs)
         return Need(need if need < EXACT else _nearest(need), self.problem.agent)
+
+    def _own_sizes(self) -> list[int]:
+        """Return the shape of the own table, its axes in any order."""
+        return list(self._sizes.values())
+
+    def _child_sizes(self, child: str) -> list[int]:
+        """Return the shape of a child's table, its axes in any order."""
+        return list(self.dimensions[child].separator.values())
+
+    def _kept_bytes(self, inputs: Sequence[Extent]) -> int:
+        """Return the bytes of what is kept longer than a join of `inputs` takes; here nothing is."""
+        del inputs
+        return 0
 
     def _proceed(self, separator: Sequence[str]) -> None:
         """Make the tables of the own constraints, after the children were allowed to do the same."""
@@ -229,6 +251,10 @@ class DPOP(TreeProtocol):
             wanted = self.dimensions[child].separator
             self._axes[child] = tuple(name for name in (self.problem.agent, *separator) if name in wanted)
             self.send(child, Proceed(list(self._axes[child])))
+        self._begin_utils()
+
+    def _begin_utils(self) -> None:
+        """Make the tables of the own constraints; a leaf computes its table at once."""
         tables = self.problem.tables({name: self.domains[name] for name in self.ancestors})
         self._joined = [self._aligned(table.charges, (*table.agents, self.problem.agent)) for table in tables]
         del tables
@@ -244,13 +270,21 @@ class DPOP(TreeProtocol):
         if child not in self.utils:
             dimensions = self.dimensions[child]
             self.utils[child] = IncomingTable(
-                [dimensions.separator[name] for name in self._axes[child]], dimensions.dearest
+                [dimensions.separator[name] for name in self._table_axes(child)], dimensions.dearest
             )
         self.utils[child].add(width, costs)
         if len(self.utils) == len(self.children) and all(table.complete for table in self.utils.values()):
-            self._joined += [self._aligned(table.costs, self._axes[name]) for name, table in self.utils.items()]
-            self.utils.clear()
-            self._compute_utils()
+            self._compute_utils_of_all()
+
+    def _table_axes(self, child: str) -> Sequence[str]:
+        """Return the robots of the axes of a child's table."""
+        return self._axes[child]
+
+    def _compute_utils_of_all(self) -> None:
+        """Join the children's tables, all of which have arrived; they are not needed any more."""
+        self._joined += [self._aligned(table.costs, self._axes[name]) for name, table in self.utils.items()]
+        self.utils.clear()
+        self._compute_utils()
 
     def _aligned(self, table: Table, axes: Sequence[str]) -> Table:
         """Return `table` with the own axis first and the other axes in the own order."""
@@ -261,14 +295,21 @@ class DPOP(TreeProtocol):
         shape = [self._sizes[name] for name in self.separator or ()]
         costs, self.choices = project(shape, self.problem.charges, self._joined, width_of(self._dearest))
         self._joined.clear()
+        self._pass_on(costs)
+
+    def _pass_on(self, costs: Codes) -> None:
+        """Send the own table to the parent; a root chooses, and a table without a finite cost ends the search."""
         if is_hopeless(costs):
             self.conclude(Verdict.NO_SOLUTION)
         elif self.parent is None:
             self.optimum = int(costs.item())
             self._choose_optimal([])
         else:
-            for width, piece in packed_costs(costs):
-                self.send(self.parent, UTIL(width, piece))
+            self._send_table(costs)
+
+    def _send_table(self, costs: Codes) -> None:
+        for width, piece in packed_costs(costs):
+            self.send(self.parent or "", UTIL(width, piece))
 
     # VALUE, from the root down
 
@@ -285,7 +326,7 @@ class DPOP(TreeProtocol):
         """Take the cheapest value, and send the children the values of their separators."""
         if self.choices is None:
             raise ValueError(f"{self.problem.agent} has a value already, or no table yet")
-        self.value = int(self.choices[tuple(assignment)])
+        self.value = self._best_value(self.choices, assignment)
         self.choices = None
         agent_view: Mapping[str, int] = dict(
             zip((self.problem.agent, *(self.separator or ())), (self.value, *assignment), strict=True)
@@ -293,8 +334,12 @@ class DPOP(TreeProtocol):
         for child in self.children:
             self.send(child, VALUE([agent_view[name] for name in self._axes[child]]))
 
+    def _best_value(self, choices: Codes, assignment: Sequence[int]) -> int:
+        """Return the place of the cheapest own value under these values of the separator."""
+        return int(choices[tuple(assignment)])
 
-def _keep(sender: str, item: T, received: dict[str, T], speakers: Sequence[str]) -> None:
+
+def keep_once(sender: str, item: T, received: dict[str, T], speakers: Sequence[str]) -> None:
     """Store the one message that each of `speakers` sends.
 
     Raises:

@@ -103,6 +103,10 @@ REAL = {
     ("dpop", "VALUE"): (
         "RX03 says: by number, the values of the robots in your separator are 2 and 1, the nearest robot first"
     ),
+    ("mb-dpop", "Place"): "RX02 says: 1 robot above me in the tree; X02 is -3, 0, 1 or 3",
+    ("mb-dpop", "Label"): (
+        "RX03 says: my table has 16 cells over RX02 (4 values) and RX00 (4 values), and no cost above 19"
+    ),
     ("afb", "CPA"): (
         "RX03 says: so far X00 = -3, X01 = -1, X02 = 1 and X03 = 3, which costs at least 22;"
         " the best solution so far costs 26; it is RX04's turn"
