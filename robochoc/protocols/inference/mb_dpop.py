@@ -82,7 +82,7 @@ class MBDPOP(DPOP):
         writes_to_non_neighbours=False,
         tables=True,
         privacy="constraints of others, but for sums",
-        use_when="costs, too wide a pseudo-tree for dpop: tables of at most k dimensions",
+        use_when="costs, where tables of dpop are too large: bounds them",
     )
     settings: ClassVar[MBDPOPSettings] = MBDPOPSettings()
 
