@@ -19,8 +19,9 @@ from robochoc.model.wording import Wording
 from robochoc.protocols.inference.mb_dpop import MBDPOP
 from robochoc.protocols.inference.messages.dpop import UTIL, VALUE, Need, Proceed
 from robochoc.protocols.inference.messages.mb_dpop import Axis, Context, Label, Place
+from robochoc.protocols.settings import equip
 from robochoc.run import Options, Runtime, Withdrawal, solve
-from robochoc.solver.encoding import UnsupportedError
+from robochoc.solver.encoding import Cost, UnsupportedError
 from tests.support.agents import replies, value
 from tests.support.brute_force import least_cost
 from tests.support.cost_problems import minimum_withdrawal
@@ -44,15 +45,11 @@ def robot_of(team: Team, name: str, above: str = "", below: str = "", k: int = 1
     """One robot below the robots of `above`, nearest first, of which the last is the root; with children `below`."""
     over, under = ([f"R{letter}" for letter in letters] for letters in (above, below))
     robot = placed(MBDPOP, team, name, over[0] if over else None, pseudo_parents=over[1:], children=under)
-    robot.settings = replace_k(robot, k)
+    equip(robot, {"k": str(k)})
     for depth, one in enumerate(reversed(over)):
         robot.receive(one, place(depth))
     robot.settle()
     return robot
-
-
-def replace_k(robot: MBDPOP, k: int) -> robochoc.protocols.inference.mb_dpop.MBDPOPSettings:
-    return type(robot.settings)(memory=robot.settings.memory, k=k)
 
 
 def label(sizes: dict[str, tuple[int, int]], cut: dict[str, int], dearest: int = 9) -> Label:
@@ -233,7 +230,7 @@ def test_what_is_no_bound_is_refused(settings: dict[str, str]) -> None:
 # Its promises
 
 
-def tables(team: Team, options: Options) -> tuple[float | None, dict[str, int], list[Sent]]:
+def tables(team: Team, options: Options) -> tuple[Cost | None, dict[str, int], list[Sent]]:
     """Solve `team`; return the cost, each robot's dimensions as it told them, and all messages."""
     events: list[AnyEvent] = []
     outcome = solve(team, options, observer=events.append)
