@@ -5,6 +5,7 @@ from __future__ import annotations
 import doctest
 import math
 from dataclasses import replace
+from decimal import Decimal
 from random import Random
 
 import pytest
@@ -21,7 +22,7 @@ from robochoc.protocols.inference.messages.dpop import UTIL, VALUE, Need, Procee
 from robochoc.protocols.inference.messages.mb_dpop import Axis, Context, Label, Place
 from robochoc.protocols.settings import equip
 from robochoc.run import Options, Runtime, Withdrawal, solve
-from robochoc.solver.encoding import Cost, UnsupportedError
+from robochoc.solver.encoding import UnsupportedError
 from tests.support.agents import replies, value
 from tests.support.brute_force import least_cost
 from tests.support.cost_problems import minimum_withdrawal
@@ -230,7 +231,7 @@ def test_what_is_no_bound_is_refused(settings: dict[str, str]) -> None:
 # Its promises
 
 
-def tables(team: Team, options: Options) -> tuple[Cost | None, dict[str, int], list[Sent]]:
+def tables(team: Team, options: Options) -> tuple[float | Decimal | None, dict[str, int], list[Sent]]:
     """Solve `team`; return the cost, each robot's dimensions as it told them, and all messages."""
     events: list[AnyEvent] = []
     outcome = solve(team, options, observer=events.append)
