@@ -4,9 +4,9 @@ Paper, Section 4.1: every robot is one variable to a protocol. Its values are th
 the interface variables that neighbours know (`solver/domain.py`); the constraints it checks are those shared with
 its parents (`solver/shared_constraint.py`), and its parts of partially known ones (PKC), also with its children.
 
-Constraint checks are counted here, and only here: one check is one evaluation of one shared constraint for one
-value of the own domain (Meisels, Kaplansky, Razgon and Zivan 2002). Private constraints are settled once, when
-the domain is compiled, and are not counted; nor are look-ups of nogoods and filters.
+Constraint checks are counted here, and only here (CompAPO adds those in tables that others send it): one check is one
+evaluation of one shared constraint for one value of the own domain (Meisels, Kaplansky, Razgon and Zivan 2002). Private
+constraints are settled once, when the domain is compiled, and are not counted; nor are look-ups of nogoods and filters.
 """
 
 from __future__ import annotations

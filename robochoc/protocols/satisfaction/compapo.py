@@ -1,0 +1,410 @@
+"""Complete Asynchronous Partial Overlay (CompAPO).
+
+Cooperative mediation: a robot in conflict first tries to repair it by its own value. If it cannot, it mediates: it asks
+the robots of its good_list, those whose constraints it knows, to keep their values, solves their common problem by
+itself, and tells each its value. If that is in conflict with robots outside, these join the good_list. So mediators
+come to know as much of the problem as is hard, and in the worst case all of it.
+
+- **When to use**: no costs, robots may learn each other's constraints, and messages are few but may be long.
+- **Guarantees**: complete; it terminates with a solution or with a proof that there is none. A mediator's search is
+  exponential in its good_list, and tables of n-ary constraints are exponential in their number of robots.
+- **Parameters**: none.
+- **References**: Mailler, Lesser: "Solving distributed constraint satisfaction problems using cooperative mediation",
+  AAMAS 2004 (APO); "Asynchronous partial overlay: a new algorithm for solving distributed constraint satisfaction
+  problems", JAIR 25 (2006). APO is not complete: Grinshpoun, Meisels: "Completeness and performance of the APO
+  algorithm", JAIR 33 (2008), which is CompAPO. Only digests of the papers were at hand.
+
+The methods, beside the papers' names:
+
+    init            `_introduce`          evaluate?         `_evaluate`, `_serve`
+    check_agent     `_check_agent_view`   evaluate!, wait!  `_evaluated`, `_abandon`
+    mediate         `_open`, `_go_on`     accept!           `_accept`
+    choose_solution `_choose_solution`    good_list         `good_list`
+
+As in CompAPO there are no partial sessions: a mediator goes on only once all robots it asked have agreed. What is ours
+is how this ends under every schedule, with no clock and no chance:
+
+- **Sessions also hold the robots around the good_list**: all that share a constraint with one of it. They keep their
+  values, too, so what the mediator knows of them is true. It is told values, not conflicts.
+- **Who waits for whom** is settled as in wait-die of databases. Priority is the paper's: the mediator with the larger
+  good_list, then the higher robot. A robot that is held by a session lets requests of higher priority wait, and refuses
+  those of lower priority (`wait!`). Who is refused releases all robots it holds, and tries again when the robot that
+  refused it says that it is free. So a mediator only waits for sessions of lower priority, and no cycle can form. The
+  session of highest priority is never refused: it is carried out.
+- **Only the highest robot of a conflict acts**, and it repairs by itself no more often than its good_list has robots.
+
+It ends: repairs are bounded, since good_lists are. After the last repair values change in sessions only. A session has
+its mediator in a conflict of its own, whose robots are all in the good_list. If no conflict with robots outside is
+left, there are fewer conflicts than before, as all around it kept their values. Otherwise its good_list grows. So there
+are finitely many sessions that change anything. A session that finds its conflict gone follows a change of value that
+the mediator had not heard of, and one that is refused follows one of higher priority: these are finitely many, too. At
+rest no robot is the highest of a conflict, so there is none. That there is no solution is what a mediator finds whose
+good_list has none.
+
+Other choices and differences:
+
+- A robot's constraints are sent when a mediator first asks for them, not at the start: on easy problems never.
+- New values are numbered, so that an old `ok?` never replaces what a mediator has said. A mediator tells the new values
+  to all neighbours of those that change, so no `ok?` follows an `accept!`.
+- The mediator's search is in `mediation.py`. It counts its constraint checks.
+
+Privacy: a mediator learns the domains' sizes, the constraints and the values of all robots in its good_list, and the
+values of those around it. In the worst case one robot learns the whole problem.
+
+>>> from robochoc.generators.queens3d import queens3d
+>>> from robochoc.run import Options, Runtime, solve
+>>> outcome = solve(queens3d(4), Options(protocol="compapo", runtime=Runtime.SIMULATOR))
+>>> outcome.verdict.value
+'no-solution'
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from typing import assert_never, cast
+
+from robochoc.model.message import Message, Value
+from robochoc.model.outcome import Verdict
+from robochoc.protocols.order import PriorityOrder
+from robochoc.protocols.protocol import Protocol
+from robochoc.protocols.satisfaction.mediation import Mediation, allows
+from robochoc.protocols.satisfaction.messages.compapo import (
+    Accept,
+    Changes,
+    Evaluate,
+    Evaluation,
+    Free,
+    Init,
+    Ok,
+    Release,
+    Table,
+    Wait,
+)
+from robochoc.protocols.traits import ENDS_WITH_PROOF, Traits
+from robochoc.solver.compiled import LocalProblem
+
+
+class CompAPO(Protocol):
+    """One agent of CompAPO.
+
+    State: `view` (agent_view), with `counts` of changes; the neighbours' `domains`; `good_list` and `tables`, the
+    constraints of the robots in it as far as they are known. `holder` is the robot whose session holds this one, with
+    `held` its priority; `requests` are sessions that wait, `refused` robots that were told to wait. Of the own session:
+    its number `session`, the robots `asked`, and `replies`. `waits_for` is the robot that has refused it.
+    """
+
+    messages = Init | Ok | Evaluate | Evaluation | Wait | Free | Accept | Release
+    traits = Traits(
+        concludes=ENDS_WITH_PROOF,
+        paper="Mailler & Lesser 2004; Grinshpoun & Meisels 2008",
+        shared_scopes=True,
+        privacy="constraints, until a mediator asks: it learns those of all robots in its good_list",
+        use_when="no costs, and robots may learn each other's constraints",
+    )
+
+    def __init__(self, problem: LocalProblem, order: PriorityOrder) -> None:
+        super().__init__(problem, order)
+        self.name = problem.agent
+        self.linked = self._ranked({robot for scope, _ in problem.scopes(problem.neighbours) for robot in scope})
+        self.view: dict[str, Value] = {}
+        self.counts: dict[str, int] = {}
+        self.count = 0
+        self.domains: dict[str, tuple[Value, ...]] = {}
+        self.good_list = {self.name, *self.linked}
+        self.tables: dict[str, tuple[Table, ...]] = {}
+        self.repairs = 0
+        self.holder: str | None = None
+        self.held: tuple[int, int] = (0, 0)
+        self.requests: dict[str, Evaluate] = {}
+        self.refused: set[str] = set()
+        self.session = 0
+        self.asked: set[str] = set()
+        self.replies: dict[str, Evaluation] = {}
+        self.waits_for: str | None = None
+        self._conflict: bool | None = None
+        """Whether this robot is the highest of a conflict; None: not known since the last change."""
+
+    def start(self) -> None:
+        """Take the first value, and tell the domain to all neighbours."""
+        if not self.problem.values:
+            self.conclude(Verdict.NO_SOLUTION)
+            return
+        self.value = 0
+        for neighbour in self.linked:
+            self.send(neighbour, Init(self.problem.values))
+
+    def receive(self, sender: str, message: Message) -> None:
+        """Dispatch on the message's type."""
+        if self.verdict is not None:
+            return
+        match cast("Init | Ok | Evaluate | Evaluation | Wait | Free | Accept | Release", message):
+            case Init(values):
+                self._introduce(sender, values)
+            case Ok(value, count):
+                self._hear(sender, value, count)
+            case Evaluate() as request:
+                self.requests[sender] = request
+            case Evaluation() as reply:
+                self._evaluated(sender, reply)
+            case Wait(session):
+                self._abandon(sender, session)
+            case Free():
+                self.waits_for = None if self.waits_for == sender else self.waits_for
+            case Accept(place, changes):
+                self._accept(sender, place, changes)
+            case Release(changes):
+                self._release(sender, changes)
+            case never:
+                assert_never(never)
+
+    def settle(self) -> None:
+        """Go on with a session, or begin one; answer requests. Nothing is done before all domains are known."""
+        if self.verdict is not None or len(self.domains) < len(self.linked):
+            return
+        if self.holder == self.name:
+            self._go_on()
+        if self.verdict is None:
+            self._serve()
+
+    # What is told
+
+    def _introduce(self, sender: str, values: tuple[Value, ...]) -> None:
+        if not values:
+            raise ValueError(f"{sender} has no values")
+        self.domains[sender] = values
+        self._hear(sender, values[0], 0)
+
+    def _hear(self, sender: str, value: Value, count: int) -> None:
+        """Store a value, unless a newer one is known."""
+        if sender in self.domains and count >= self.counts.get(sender, 0):
+            self.view[sender], self.counts[sender] = value, count
+            self._conflict = None
+
+    def _learn(self, changes: Changes) -> None:
+        """Store what a mediator says of neighbours."""
+        for robot, (place, count) in changes.items():
+            if robot not in self.domains or not 0 <= place < len(self.domains[robot]):
+                raise ValueError(f"value number {place + 1} of {robot}, which has no such value that is known here")
+            self._hear(robot, self.domains[robot][place], count)
+
+    # In a session of another robot
+
+    def _serve(self) -> None:
+        """Agree to the first of the sessions that wait, or do what there is to do oneself; then refuse and wake others.
+
+        Who asks with a lower priority than the session that holds this robot is refused.
+        """
+        if self.holder is None and self.requests:
+            first = min(self.requests, key=self._priority)
+            self.holder, self.held = first, self._priority(first)
+            self._evaluate(first, self.requests.pop(first))
+        if self.holder is None:
+            self._check_agent_view()
+        if self.holder is None:
+            for robot in self._ranked(self.refused):
+                self.send(robot, Free())
+            self.refused.clear()
+            return
+        for robot in self._ranked(self.requests):
+            if self._priority(robot) > self.held:
+                self.send(robot, Wait(self.requests.pop(robot).session))
+                self.refused.add(robot)
+
+    def _evaluate(self, mediator: str, request: Evaluate) -> None:
+        """Agree to a session: keep the value, and tell it and, if wanted, the constraints."""
+        tables = self._own_tables() if request.tables else ()
+        self.send(mediator, Evaluation(request.session, self._place(), self.count, tables))
+
+    def _accept(self, mediator: str, place: int, changes: Changes) -> None:
+        """Take the value that the mediator gives; it has told all neighbours."""
+        if mediator != self.holder or not 0 <= place < len(self.problem.values):
+            raise ValueError(f"{mediator} gives a value number {place + 1} that it cannot give")
+        if place != self.value:
+            self._change(place)
+        self._release(mediator, changes)
+
+    def _release(self, mediator: str, changes: Changes) -> None:
+        """End the session, or forget the request for one."""
+        self._learn(changes)
+        self.requests.pop(mediator, None)
+        self.refused.discard(mediator)
+        if mediator == self.holder:
+            self.holder = None
+
+    # The own search
+
+    def _check_agent_view(self) -> None:
+        """Repair a conflict by the own value, or else begin to mediate, unless told to wait."""
+        if not self._in_conflict() or self._repair():
+            return
+        if self.waits_for is None:
+            self._open()
+
+    def _in_conflict(self) -> bool:
+        """Return whether this robot is the highest of a conflict, and so the one to act."""
+        if self._conflict is None:
+            rank = self.order.rank
+            conflicts = self.problem.conflicts(self._place(), self.view)
+            self._conflict = any(all(rank[robot] > rank[self.name] for robot in seen) for seen, _ in conflicts)
+        return self._conflict
+
+    def _repair(self) -> bool:
+        """Take a value without conflicts, and tell it to all neighbours; return whether there is one."""
+        if self.repairs >= len(self.good_list):
+            return False
+        places = range(len(self.problem.values))
+        against = {place for _, some in self.problem.conflicts_of(places, self.view) for place in some}
+        place = next((place for place in places if place not in against), None)
+        if place is None:
+            return False
+        self.repairs += 1
+        self._change(place)
+        for neighbour in self.linked:
+            self.send(neighbour, Ok(self.problem.values[place], self.count))
+        return True
+
+    def _open(self) -> None:
+        """Begin a session."""
+        self.holder, self.held = self.name, (-len(self.good_list), self.order.rank[self.name])
+        self.session += 1
+        self.asked = {self.name}
+        self.replies = {self.name: Evaluation(self.session, self._place(), self.count, ())}
+        self.tables[self.name] = self._own_tables()
+        self._go_on()
+
+    def _go_on(self) -> None:
+        """Ask who has not been asked; once all have agreed, solve the problem."""
+        if len(self.replies) < len(self.asked):
+            return
+        around = {robot for table in self._known_tables() for robot in table.robots}
+        more = (self.good_list | around) - self.asked
+        for robot in self._ranked(more):
+            wanted = robot in self.good_list and robot not in self.tables
+            self.send(robot, Evaluate(self.session, len(self.good_list), wanted))
+        self.asked |= more
+        if not more:
+            self._see_replies()
+            self._choose_solution()
+
+    def _evaluated(self, sender: str, reply: Evaluation) -> None:
+        """Store a reply to the session that goes on."""
+        if self.holder != self.name or reply.session != self.session or sender not in self.asked:
+            return
+        if sender in self.good_list and sender not in self.tables:
+            if not reply.tables or not all(
+                sender in table.robots and {*table.robots} <= {*self.order.names} for table in reply.tables
+            ):
+                raise ValueError(f"{sender} tells constraints that are none of its own")
+            self.tables[sender] = reply.tables
+        self.replies[sender] = reply
+
+    def _abandon(self, sender: str, session: int) -> None:
+        """End the own session without a result: a robot is in one of higher priority, and will say when it is free."""
+        if self.holder != self.name or session != self.session:
+            return
+        self.waits_for = sender
+        self._end({}, {}, self.asked - {self.name, sender})
+
+    def _see_replies(self) -> None:
+        """Take over the neighbours' values, which stand now."""
+        for robot in self.linked:
+            reply = self.replies[robot]
+            self._learn({robot: (reply.place, reply.count)})
+
+    def _choose_solution(self) -> None:
+        """Solve the problem of the good_list, and tell everybody; whoever is outside and in conflict joins the list."""
+        places = {robot: reply.place for robot, reply in self.replies.items()}
+        found = self._solved(places) if self._in_conflict() else {}
+        if found is None:
+            self.conclude(Verdict.NO_SOLUTION)
+            return
+        changes = {
+            robot: (place, self.replies[robot].count + 1) for robot, place in found.items() if place != places[robot]
+        }
+        self._end(found, changes, self.asked - {self.name})
+
+    def _solved(self, places: Mapping[str, int]) -> dict[str, int] | None:
+        """Return values for the good_list, which grows by whoever is in conflict with them; None: there are none."""
+        tables = self._known_tables()
+        mediation = Mediation(tables, self._sizes(tables, places), places)
+        found = mediation.best()
+        self.problem.checks += mediation.checks
+        if found is not None:
+            after = {**places, **found}
+            self.good_list.update(*(table.robots for table in tables if not allows(table, after)))
+        return found
+
+    def _end(self, found: Mapping[str, int], changes: Changes, held: Iterable[str]) -> None:
+        """End the session: tell the robots that it has `held` their values, and what changes for them."""
+        met: dict[str, set[str]] = {}
+        for table in self._known_tables() if changes else ():
+            for robot in table.robots:
+                met.setdefault(robot, set()).update(table.robots)
+        for robot in self._ranked(held):
+            news = {other: change for other, change in changes.items() if other != robot and other in met[robot]}
+            self.send(robot, Accept(found[robot], news) if robot in found else Release(news))
+        if self.name in changes:
+            self._change(changes[self.name][0])
+        self._learn({robot: change for robot, change in changes.items() if robot in self.domains})
+        self.holder = None
+
+    # Constraints
+
+    def _own_tables(self) -> tuple[Table, ...]:
+        """Return the own constraints, those over the same robots in one table."""
+        if self.name not in self.tables:
+            allowed: dict[tuple[str, ...], dict[tuple[int, ...], int]] = {}
+            for lowest in self.linked:
+                for others, masks in self.problem.allowed(self.domains, lowest):
+                    known = allowed.get(others)
+                    allowed[others] = {p: mask & known[p] for p, mask in masks.items()} if known else masks
+            self.tables[self.name] = tuple([self._table(others, masks) for others, masks in allowed.items()])
+        return self.tables[self.name]
+
+    def _table(self, others: tuple[str, ...], masks: Mapping[tuple[int, ...], int]) -> Table:
+        """Return a table whose last robot is this one."""
+        own = len(self.problem.values)
+        bits = 0
+        for row, place in enumerate(sorted(masks)):
+            bits |= masks[place] << row * own
+        sizes = (*(len(self.domains[robot]) for robot in others), own)
+        return Table((*others, self.name), sizes, bits.to_bytes(-(-len(masks) * own // 8), "little"))
+
+    def _known_tables(self) -> list[Table]:
+        """Return the constraints of the good_list, each once."""
+        found: dict[frozenset[str], Table] = {}
+        for robot in self._ranked(self.good_list):
+            for table in self.tables.get(robot, ()):
+                found.setdefault(frozenset(table.robots), table)
+        return list(found.values())
+
+    def _sizes(self, tables: Iterable[Table], places: Mapping[str, int]) -> dict[str, int]:
+        """Return the sizes of the domains of the robots in the good_list.
+
+        Raises:
+            ValueError: if a table and a value do not go together, or two tables.
+        """
+        sizes: dict[str, int] = {}
+        for table in tables:
+            for robot, size in zip(table.robots, table.sizes, strict=True):
+                if sizes.setdefault(robot, size) != size or not 0 <= places[robot] < size:
+                    raise ValueError(f"what is told of the values of {robot} does not agree")
+        return {robot: sizes[robot] for robot in self._ranked(self.good_list)}
+
+    # Small things
+
+    def _change(self, place: int) -> None:
+        self.value = place
+        self.count += 1
+        self._conflict = None
+
+    def _place(self) -> int:
+        assert self.value is not None  # noqa: S101 - taken at the start, and only ever exchanged for another
+        return self.value
+
+    def _priority(self, robot: str) -> tuple[int, int]:
+        """Return the priority of a request; smaller ones come first."""
+        return -self.requests[robot].priority, self.order.rank[robot]
+
+    def _ranked(self, robots: Iterable[str]) -> list[str]:
+        return sorted(robots, key=self.order.rank.__getitem__)

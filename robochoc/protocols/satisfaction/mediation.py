@@ -1,0 +1,161 @@
+"""A mediator's local problem (CompAPO): a value for each robot of its good_list, by depth-first branch and bound.
+
+All constraints among these robots hold in the answer. Constraints with robots outside, whose values stand, are broken
+as seldom as possible. Forward checking removes values of the robots that follow; the robot with the fewest values left
+is next; values that break little come first, and of these the one that the robot has.
+
+Each look into a table, for one value, is a constraint check, and is counted.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from typing import NamedTuple
+
+from robochoc.protocols.satisfaction.messages.compapo import Table
+
+
+class _Node(NamedTuple):
+    """A partial assignment, what is left of the other robots' domains (bitmaps), and what their values would break."""
+
+    assigned: dict[str, int]
+    left: dict[str, int]
+    broken: dict[str, list[int]]
+    cost: int
+
+
+class _Seen:
+    """A table as the mediator sees it: with the values of robots outside in their places.
+
+    `inside` are the robots that the mediator decides on. `hard`: all of the table's robots are.
+    """
+
+    def __init__(self, table: Table, members: Mapping[str, int], places: Mapping[str, int]) -> None:
+        self._allowed = table.allowed
+        self._strides: dict[str, int] = {}
+        self._base = 0
+        stride = math.prod(table.sizes)
+        for robot, size in zip(table.robots, table.sizes, strict=True):
+            stride //= size
+            if robot in members:
+                self._strides[robot] = stride
+            else:
+                self._base += stride * places[robot]
+        self.inside = tuple(self._strides)
+        self.hard = len(self.inside) == len(table.robots)
+
+    def mask(self, robot: str, assigned: Mapping[str, int], left: int) -> int:
+        """Return the values of `robot`, of those in `left`, that are allowed with all other robots inside assigned."""
+        base = self._base + sum(
+            [stride * assigned[name] for name, stride in self._strides.items() if name != robot], start=0
+        )
+        stride = self._strides[robot]
+        mask = 0
+        for value in _values(left):
+            bit = base + stride * value
+            if self._allowed[bit >> 3] >> (bit & 7) & 1:
+                mask |= 1 << value
+        return mask
+
+
+class Mediation:
+    """One mediator's problem. `checks` counts its constraint checks."""
+
+    def __init__(self, tables: Sequence[Table], members: Mapping[str, int], places: Mapping[str, int]) -> None:
+        """Take the tables in which one of `members` is.
+
+        Args:
+            tables: all constraints of the members.
+            members: the robots to decide on, in the order of priority, with the sizes of their domains.
+            places: the present values of the members and of all others in tables, as places in domains.
+        """
+        self.checks = 0
+        self._members = members
+        self._places = places
+        self._seen = [_Seen(table, members, places) for table in tables]
+        self._of: dict[str, list[_Seen]] = {name: [] for name in members}
+        for seen in self._seen:
+            for name in seen.inside:
+                self._of[name].append(seen)
+        self._least = len(tables) + 1
+        """What the best assignment so far breaks."""
+
+    def best(self) -> dict[str, int] | None:
+        """Return the best assignment of the members; None if their constraints allow none."""
+        found: dict[str, int] | None = None
+        open_nodes = [iter([node] if (node := self._root()) else [])]
+        while open_nodes and self._least:
+            child = next(open_nodes[-1], None)
+            if child is None:
+                open_nodes.pop()
+            elif child.left:
+                open_nodes.append(self._children(child))
+            elif child.cost < self._least:
+                found, self._least = child.assigned, child.cost
+        return found
+
+    def _root(self) -> _Node | None:
+        """Return the empty assignment; None if a robot has no value left."""
+        node: _Node | None = _Node({}, {name: (1 << size) - 1 for name, size in self._members.items()}, {}, 0)
+        for seen in self._seen:
+            if node is not None and len(seen.inside) == 1:
+                node = self._pruned(node, seen, seen.inside[0])
+        return node
+
+    def _children(self, node: _Node) -> Iterator[_Node]:
+        """Yield `node` with a value of the next robot each, without those that cannot be better than the best."""
+        robot = min(node.left, key=lambda name: node.left[name].bit_count())
+        prices = node.broken.get(robot)
+        current = self._places[robot]
+        left = {name: values for name, values in node.left.items() if name != robot}
+        rest = sum(
+            [
+                min(broken[value] for value in _values(left[name]))
+                for name, broken in node.broken.items()
+                if name in left
+            ]
+        )
+        priced = [(prices[value] if prices else 0, value != current, value) for value in _values(node.left[robot])]
+        for price, _, value in sorted(priced):
+            cost = node.cost + price
+            if cost + rest >= self._least:
+                return
+            child: _Node | None = _Node({**node.assigned, robot: value}, {**left}, node.broken, cost)
+            for seen in self._of[robot]:
+                ahead = [name for name in seen.inside if name in left]
+                if child is not None and len(ahead) == 1:
+                    child = self._pruned(child, seen, ahead[0])
+            if child is not None:
+                yield child
+
+    def _pruned(self, node: _Node, seen: _Seen, robot: str) -> _Node | None:
+        """Return `node` after a look ahead into one table, in which only `robot` is open; None: no value is left."""
+        left = node.left[robot]
+        self.checks += left.bit_count()
+        mask = seen.mask(robot, node.assigned, left)
+        if seen.hard:
+            node.left[robot] = mask
+            return node if mask else None
+        if mask == left:
+            return node
+        prices = list(node.broken.get(robot) or [0] * self._members[robot])
+        for value in _values(left & ~mask):
+            prices[value] += 1
+        return node._replace(broken={**node.broken, robot: prices})
+
+
+def allows(table: Table, places: Mapping[str, int]) -> bool:
+    """Return whether `table` allows these values."""
+    bit = 0
+    for robot, size in zip(table.robots, table.sizes, strict=True):
+        bit = bit * size + places[robot]
+    return bool(table.allowed[bit >> 3] >> (bit & 7) & 1)
+
+
+def _values(mask: int) -> Iterator[int]:
+    """Yield the places of the bits in `mask`."""
+    while mask:
+        low = mask & -mask
+        yield low.bit_length() - 1
+        mask ^= low

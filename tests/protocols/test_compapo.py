@@ -1,0 +1,267 @@
+"""One test per rule of CompAPO (Mailler and Lesser 2004; Grinshpoun and Meisels 2008), named for it."""
+
+from __future__ import annotations
+
+import itertools
+from collections import Counter
+from dataclasses import replace
+from random import Random
+
+import pytest
+
+from robochoc.generators.random_csp import random_csp
+from robochoc.model.message import Message
+from robochoc.model.outcome import Verdict
+from robochoc.model.problem import Team
+from robochoc.protocols.order import PriorityOrder
+from robochoc.protocols.satisfaction.compapo import CompAPO
+from robochoc.protocols.satisfaction.mediation import Mediation, allows
+from robochoc.protocols.satisfaction.messages.compapo import (
+    Accept,
+    Evaluate,
+    Evaluation,
+    Free,
+    Init,
+    Ok,
+    Release,
+    Table,
+    Wait,
+)
+from robochoc.run import Options, Runtime, solve
+from robochoc.solver.agent_problem import agent_problems
+from robochoc.solver.compiled import LocalProblem
+from tests.support.agents import replies, value
+from tests.support.examples import count
+from tests.support.random_options import random_schedule
+from tests.support.small_teams import graph_team, triangle
+
+TWO = ((1,), (2,))
+UNEQUAL = bytes([0b0110])
+"""Two robots of two values each that differ."""
+
+
+def agent(team: Team, name: str) -> CompAPO:
+    """The protocol object of one robot, which knows its neighbours' domains, with nothing left to say."""
+    robot = CompAPO(LocalProblem(agent_problems(team, shared_scopes=True)[name]), PriorityOrder(team.order))
+    robot.start()
+    for neighbour in robot.linked:
+        robot.receive(neighbour, Init(tuple((one,) for one in team[neighbour].variables[0].domain)))
+    robot.outbox.clear()
+    return robot
+
+
+def table(*robots: str) -> Table:
+    return Table(robots, (2, 2), UNEQUAL)
+
+
+def mediator() -> CompAPO:
+    """RA of the triangle, in a conflict with RB and RC that no value of its own repairs, which asks them."""
+    robot = agent(triangle(), "RA")
+    said = replies(robot, ("RC", Ok((2,), 1)))
+    assert said == [("RB", Evaluate(1, 3, tables=True)), ("RC", Evaluate(1, 3, tables=True))]
+    return robot
+
+
+def test_start_tells_the_domain_to_those_with_a_constraint() -> None:
+    team = triangle()
+    robot = CompAPO(LocalProblem(agent_problems(team, shared_scopes=True)["RC"]), PriorityOrder(team.order))
+    robot.start()
+    assert robot.outbox == [(name, Init(TWO)) for name in ("RA", "RB", "RD")]
+
+
+def test_nothing_is_done_before_all_domains_are_known() -> None:
+    team = triangle()
+    robot = CompAPO(LocalProblem(agent_problems(team, shared_scopes=True)["RA"]), PriorityOrder(team.order))
+    robot.start()
+    robot.outbox.clear()
+    assert replies(robot, ("RB", Init(TWO)), ("RB", Evaluate(1, 9, tables=False))) == []
+    assert replies(robot, ("RC", Init(TWO))) == [("RB", Evaluation(1, 0, 0, ()))]
+
+
+def test_check_agent_view_repairs_a_conflict_by_the_own_value() -> None:
+    robot = agent(triangle(), "RA")
+    assert replies(robot) == [("RB", Ok((2,), 1)), ("RC", Ok((2,), 1))]
+
+
+def test_only_the_highest_robot_of_a_conflict_acts() -> None:
+    robot = agent(triangle(), "RB")
+    assert replies(robot, ("RC", Ok((2,), 1))) == []
+    assert value(robot) == (1,)
+
+
+def test_an_old_value_does_not_replace_a_new_one() -> None:
+    robot = agent(triangle(3), "RB")
+    replies(robot, ("RC", Ok((3,), 2)), ("RC", Ok((2,), 1)))
+    assert robot.view["RC"] == (3,)
+
+
+def test_a_robot_repairs_no_more_often_than_its_good_list_has_robots() -> None:
+    robot = agent(graph_team(["AB"]), "RA")
+    replies(robot)
+    assert replies(robot, ("RB", Ok((2,), 1))) == [("RB", Ok((1,), 2))]
+    assert replies(robot, ("RB", Ok((1,), 2))) == [("RB", Evaluate(1, 2, tables=True))]
+
+
+def test_mediate_asks_all_of_the_good_list() -> None:
+    assert mediator().holder == "RA"
+
+
+def test_a_session_also_holds_the_robots_around_the_good_list() -> None:
+    robot = mediator()
+    tables = (table("RA", "RC"), table("RB", "RC"), table("RD", "RC"))
+    assert replies(robot, ("RB", Evaluation(1, 0, 0, (table("RA", "RB"), table("RC", "RB"))))) == []
+    assert replies(robot, ("RC", Evaluation(1, 1, 1, tables))) == [("RD", Evaluate(1, 3, tables=False))]
+
+
+def test_a_good_list_without_a_solution_ends_the_search() -> None:
+    robot = mediator()
+    replies(robot, ("RB", Evaluation(1, 0, 0, (table("RA", "RB"), table("RC", "RB")))))
+    replies(robot, ("RC", Evaluation(1, 1, 1, (table("RA", "RC"), table("RB", "RC")))))
+    assert robot.verdict is Verdict.NO_SOLUTION
+
+
+def test_choose_solution_tells_each_its_value_and_its_neighbours_new_ones() -> None:
+    robot = agent(graph_team(["AB", "BC"]), "RA")
+    robot.repairs = 9
+    replies(robot)
+    assert replies(robot, ("RB", Evaluation(1, 0, 0, (table("RA", "RB"), table("RC", "RB"))))) == [
+        ("RC", Evaluate(1, 2, tables=False))
+    ]
+    assert replies(robot, ("RC", Evaluation(1, 1, 4, ()))) == [("RB", Accept(0, {"RA": (1, 1)})), ("RC", Release({}))]
+    assert value(robot) == (2,)
+
+
+def test_robots_outside_that_are_in_conflict_with_the_solution_join_the_good_list() -> None:
+    robot = agent(graph_team(["AB", "BC"], {"A": 1}), "RA")
+    robot.repairs = 9
+    replies(robot)
+    one = Table(("RA", "RB"), (1, 2), bytes([0b10]))
+    replies(robot, ("RB", Evaluation(1, 0, 0, (one, table("RC", "RB")))))
+    assert replies(robot, ("RC", Evaluation(1, 1, 1, ()))) == [
+        ("RB", Accept(1, {})),
+        ("RC", Release({"RB": (1, 1)})),
+    ]
+    assert robot.good_list == {"RA", "RB", "RC"}
+
+
+def test_a_session_whose_conflict_is_gone_changes_nothing() -> None:
+    robot = agent(graph_team(["AB"]), "RA")
+    robot.repairs = 9
+    replies(robot)
+    assert replies(robot, ("RB", Evaluation(1, 1, 1, (table("RA", "RB"),)))) == [("RB", Release({}))]
+    assert robot.holder is None
+
+
+def test_whoever_is_held_keeps_its_value() -> None:
+    robot = agent(graph_team(["AB"]), "RA")
+    assert replies(robot, ("RB", Evaluate(7, 2, tables=True))) == [("RB", Evaluation(7, 0, 0, (table("RB", "RA"),)))]
+    assert replies(robot) == []
+    assert replies(robot, ("RB", Release({"RB": (1, 1)}))) == []
+    assert robot.view["RB"] == (2,)
+
+
+def test_accept_takes_the_value() -> None:
+    robot = agent(triangle(), "RB")
+    replies(robot, ("RA", Evaluate(1, 3, tables=False)))
+    assert replies(robot, ("RA", Accept(1, {}))) == []
+    assert (value(robot), robot.count, robot.holder) == ((2,), 1, None)
+
+
+def test_a_request_of_lower_priority_is_refused_and_told_when_this_robot_is_free() -> None:
+    robot = agent(triangle(), "RB")
+    replies(robot, ("RC", Ok((2,), 1)), ("RA", Evaluate(1, 3, tables=False)))
+    assert replies(robot, ("RC", Evaluate(4, 3, tables=False))) == [("RC", Wait(4))]
+    assert replies(robot, ("RA", Release({}))) == [("RC", Free())]
+
+
+def test_a_request_of_higher_priority_waits_for_its_turn() -> None:
+    robot = agent(triangle(), "RB")
+    replies(robot, ("RC", Ok((2,), 1)), ("RC", Evaluate(4, 3, tables=False)))
+    assert replies(robot, ("RD", Evaluate(1, 4, tables=False)), ("RA", Evaluate(2, 3, tables=False))) == []
+    assert replies(robot, ("RC", Release({}))) == [("RD", Evaluation(1, 0, 0, ())), ("RA", Wait(2))]
+
+
+def test_a_mediator_that_is_refused_releases_all_and_asks_again_when_the_other_is_free() -> None:
+    robot = mediator()
+    assert replies(robot, ("RB", Wait(1))) == [("RC", Release({}))]
+    assert replies(robot, ("RC", Evaluation(1, 1, 1, ())), ("RC", Free())) == []
+    again = [("RB", Evaluate(2, 3, tables=True)), ("RC", Evaluate(2, 3, tables=True))]
+    assert replies(robot, ("RB", Free())) == again
+
+
+@pytest.mark.parametrize(
+    "message",
+    [
+        Evaluation(1, 0, 0, ()),
+        Evaluation(1, 0, 0, (table("RA", "RC"),)),
+        Evaluation(1, 0, 0, (table("RB", "Nobody"),)),
+        Evaluation(1, 7, 0, (table("RA", "RB"),)),
+        Evaluation(1, -1, 0, (table("RA", "RB"),)),
+        Accept(0, {}),
+        Release({"RZ": (0, 1)}),
+        Init(()),
+    ],
+)
+def test_what_cannot_be_is_refused(message: Message) -> None:
+    robot = agent(graph_team(["AB"]), "RA")
+    robot.repairs = 9
+    replies(robot)
+    with pytest.raises(ValueError, match=r"."):
+        replies(robot, ("RB", message))
+
+
+@pytest.mark.parametrize(
+    ("sizes", "allowed"), [((2, 2), b"\x00\x00"), ((2, 2), b""), ((2,), b"\x00"), ((0, 2), b""), ((2**40, 2), b"\x01")]
+)
+def test_a_table_says_what_it_holds(sizes: tuple[int, ...], allowed: bytes) -> None:
+    with pytest.raises(ValueError, match="a table"):
+        Table(("RA", "RB"), sizes, allowed)
+
+
+def random_tables(chance: Random, names: str) -> list[Table]:
+    """Tables over two or three of `names`, of two or three values each."""
+    sizes = {name: chance.choice((2, 3)) for name in names}
+    tables = []
+    for scope in (*itertools.combinations(names, 2), *itertools.combinations(names, 3)):
+        if chance.random() < 0.4:
+            own = tuple(sizes[name] for name in scope)
+            combinations = own[0] * own[1] * (own[2] if len(own) > 2 else 1)
+            bits = sum((chance.random() < 0.7) << bit for bit in range(combinations))
+            tables.append(Table(scope, own, bits.to_bytes(-(-combinations // 8), "little")))
+    return tables
+
+
+@count("problems", 60, 2000)
+def test_the_mediator_breaks_as_little_outside_as_possible(problems: int) -> None:
+    chance, solvable = Random(0), 0
+    for _ in range(problems):
+        tables = random_tables(chance, "ABCDE")
+        sizes = {name: size for table in tables for name, size in zip(table.robots, table.sizes, strict=True)}
+        members = {name: sizes[name] for name in "ABC" if name in sizes}
+        met = [table for table in tables if members.keys() & {*table.robots}]
+        places = {name: chance.randrange(size) for name, size in sizes.items()}
+        best = None
+        for chosen in itertools.product(*(range(size) for size in members.values())):
+            after = {**places, **dict(zip(members, chosen, strict=True))}
+            broken = [table for table in met if not allows(table, after)]
+            if all({*table.robots} - members.keys() for table in broken):
+                best = len(broken) if best is None else min(best, len(broken))
+        found = Mediation(met, members, places).best()
+        assert (found is None) is (best is None)
+        if found is not None:
+            solvable += 1
+            assert sum(not allows(table, {**places, **found}) for table in met) == best
+    assert solvable > problems // 2
+
+
+@count("problems", 8, 1000)
+def test_larger_problems_end_under_every_schedule(problems: int) -> None:
+    """Many sessions meet here. Each run ends at rest, far below the limit, and as ABT's does."""
+    chance, seen = Random(1), Counter[Verdict]()
+    for seed in range(problems):
+        team = random_csp(10, 4, 0.35, chance.choice((0.45, 0.6)), seed)
+        options = replace(random_schedule(chance), protocol="compapo", messages=20_000)
+        verdict = solve(team, options).verdict
+        assert verdict is solve(team, Options(protocol="abt", runtime=Runtime.SIMULATOR)).verdict
+        seen[verdict] += 1
+    assert len(seen) == 2
