@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import doctest
 import itertools
+from dataclasses import replace
 from random import Random
 
 import numpy as np
@@ -20,6 +21,7 @@ from robochoc.protocols.inference.messages.maxsum import Q, R
 from robochoc.protocols.inference.settings.maxsum import MaxSumSettings
 from robochoc.protocols.settings import SettingsError, settings_of
 from robochoc.protocols.shared.messages.cycles import Domain
+from robochoc.run import Options, Runtime, solve
 from robochoc.solver import shared_constraint
 from robochoc.solver.cost_table import CostTable
 from robochoc.solver.encoding import UnsupportedError
@@ -231,6 +233,55 @@ def test_what_is_proven_is_true(teams: int) -> None:
     assert proofs > teams // 30
 
 
+def test_split_makes_two_of_each_function_with_shares_drawn_from_q_to_1_less_q() -> None:
+    robot = robot_of(MaxSum, chain(), "RB", 0.0, 0.0, 0.5, 0.75, 0.25, 1.0)
+    robot.settings = MaxSumSettings(preference=0, split=0.25)  # type: ignore[misc]
+    started(robot)
+    (answer,) = replies(robot, ("RA", TWO))
+    first, second = robot.factors
+    assert first.charges.tolist() == [[3 * 0.5, 1 * 0.625], [4 * 0.375, 6 * 0.75]]
+    assert (first.charges + second.charges).tolist() == [[3, 1], [4, 6]]
+    assert answer == ("RA", R([[0.625, 1.5], [0.375, 1.5]]))
+
+
+def test_halves_of_equal_shares_are_made_without_a_lot() -> None:
+    robot = robot_of(MaxSum, chain(HARD), "RB")
+    robot.settings = MaxSumSettings(preference=0, split=0.5)  # type: ignore[misc]
+    started(robot)
+    robot.chance = list[float]().pop
+    assert replies(robot, ("RA", TWO)) == [("RA", R([[0, INFINITE], [0, INFINITE]]))]
+
+
+def test_what_a_half_answers_is_in_the_q_to_the_other_one() -> None:
+    robot = middle(chain(), split=0.5)
+    replies(robot, ("RA", TWO))
+    replies(robot, ("RC", R([[0, 0], [0, 0]])))
+    assert robot.edges == [[1, 0], [1, 0], [2, 0], [2, 0]]  # each half answers 1.5 and 0.5
+
+
+@count("teams", 15, 150)
+def test_split_or_not_what_is_proven_is_true_and_no_cycle_is_cheaper_than_the_optimum(teams: int) -> None:
+    chance = Random("split")
+    for seed in range(teams):
+        team = random_cost_team(chance)
+        if all(domains_of(team).values()):
+            least = least_cost(team)
+            split = chance.choice((0.1, 0.4, 0.5))
+            result = played(team, MaxSum, any_schedule(chance), seed, cycles=8, split=split)
+            if result.verdict is Verdict.NO_SOLUTION:
+                assert least == INFINITE
+            else:
+                assert all(cost_of_assignment(team, end) >= (0, least) for end in assignments_by_cycle(team, result))
+
+
+def test_where_functions_are_to_be_split_there_is_no_form_as_arrays() -> None:
+    team = random_cost_team(Random(1), n_ary=False)
+    options = Options(protocol="maxsum", runtime=Runtime.ARRAYS, settings={"split": "0.4"})
+    with pytest.raises(UnsupportedError, match="maxsum with --set split has no form as arrays"):
+        solve(team, options)
+    assert solve(team, replace(options, settings={"split": "0"})).verdict is not Verdict.UNKNOWN
+
+
 @pytest.mark.parametrize("arity", [2, 3])
 def test_tables_in_lists_and_in_numpy_say_the_same(arity: int, monkeypatch: pytest.MonkeyPatch) -> None:
     """And what brute force says."""
@@ -265,6 +316,9 @@ def test_a_table_that_is_too_large_is_refused(monkeypatch: pytest.MonkeyPatch) -
         ("damping", "1", "from 0 to below 1"),
         ("damping", "-0.5", "from 0 to below 1"),
         ("damping", "nan", "from 0 to below 1"),
+        ("split", "0.6", "from 0 .none. to 0.5 .halves."),
+        ("split", "-0.1", "from 0 .none. to 0.5"),
+        ("split", "nan", "from 0 .none. to 0.5"),
         ("preference", "-1", "a number, 0 or more"),
         ("preference", "inf", "a number, 0 or more"),
     ],

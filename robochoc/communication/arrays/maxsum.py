@@ -21,6 +21,7 @@ from robochoc.protocols.inference.messages.maxsum import Q, R
 from robochoc.protocols.inference.settings.maxsum import MaxSumSettings
 from robochoc.protocols.shared.messages.cycles import Domain
 from robochoc.protocols.shared.settings.cycles import CycleSettings
+from robochoc.solver.encoding import UnsupportedError
 
 _REST = len(encode(R([]))) - 1
 """Bytes of a message but for its list of rows."""
@@ -28,11 +29,17 @@ _FLOAT = 9
 
 
 class ArrayMaxSum(CycleRun):
-    """A run of Max-Sum."""
+    """A run of Max-Sum.
+
+    Raises:
+        UnsupportedError: when functions are to be split.
+    """
 
     def __init__(
         self, layout: Layout, settings: CycleSettings, seed: int, *, clocks: bool = True, changes: bool = False
     ) -> None:
+        if cast("MaxSumSettings", settings).split:
+            raise UnsupportedError("maxsum with --set split has no form as arrays; --runtime simulator takes it")
         super().__init__(layout, settings, seed, clocks=clocks, changes=changes)
         self._alone = [self._cost_alone(group) for group in layout.groups]
         self._factors = [] if layout.empty.size else factors_of(layout)

@@ -6,14 +6,15 @@ cost of each value by that function, given the other variables' messages. Q, fro
 each value by all other functions. A robot takes the value with the lowest sum.
 
 - **When to use**: costs, a large team, a graph with few cycles.
-- **Guarantees**: incomplete; it stops after `cycles` cycles. On a graph without cycles the result is optimal;
-  elsewhere it is an estimate that need not converge. The result is the best cycle (anytime). A robot all of whose
-  values cost `inf` proves that there is no solution.
+- **Guarantees**: incomplete; it stops after `cycles` cycles. On a graph without cycles the result is optimal (without
+  `split`); elsewhere it is an estimate that need not converge. The result is the best cycle (anytime). A robot all of
+  whose values cost `inf` proves that there is no solution.
 - **Parameters (`--set`)**: `damping` (the weight of the last Q in a new one; default 0.5), `preference` (the maximum
-  random charge of a value; default 0.01), `cycles` (default 100).
+  random charge of a value; default 0.01), `split` (each function becomes two; default 0: none does), `cycles` (default
+  100).
 - **References**: Farinelli, Rogers, Petcu, Jennings: "Decentralised coordination of low-power embedded devices using
-  the max-sum algorithm", AAMAS 2008, Section 4; for damping: Cohen, Galiki, Zivan: "Governing convergence of Max-sum
-  on DCOPs through damping and splitting", AIJ 279, 2020.
+  the max-sum algorithm", AAMAS 2008, Section 4; for damping and splitting: Cohen, Galiki, Zivan: "Governing convergence
+  of Max-sum on DCOPs through damping and splitting", AIJ 279, 2020.
 
 The methods have the names of the first paper's equations:
 
@@ -21,6 +22,7 @@ The methods have the names of the first paper's equations:
     R, from function to variable (2)   `Factor.r`
     Z, and the value (3)               `_z`, `_decide`
     preferences gamma                  `preferred`
+    split constraint factor graph      `_split`
 
 A function is held by the lowest-priority robot of its scope, the only one that knows the constraint. Messages between
 nodes of one robot are not sent. In a cycle all functions send R, then all variables send Q. All that one robot sends
@@ -29,6 +31,11 @@ the holders of their functions.
 
 Ties: if values are interchangeable, such as colours, all their costs would stay equal. So each value of each robot has
 a small random charge, its preference (the paper's gamma).
+
+With `split`, each function becomes two: of each entry one has a share, drawn from `split` to 1 - `split`, and the other
+the rest. 0.5 makes equal halves; below it they differ a little. Both are nodes of the graph, so a robot's Q to one of
+them has in it what the other one answered. That works like damping: the search settles sooner. The halves form a cycle,
+so on a tree the result is no longer sure to be optimal.
 
 Choices that the paper leaves open, and differences:
 
@@ -105,10 +112,24 @@ class MaxSum(CycleProtocol):
     def _build(self, messages: Mapping[str, wire.Message]) -> None:
         """Make the own functions from the received domains. All Q are 0 at first."""
         domains = {name: message.values for name, message in messages.items() if isinstance(message, Domain)}
-        self.factors = Factor.joined(self.problem.tables(domains))
+        self.factors = self._split(Factor.joined(self.problem.tables(domains)))
         self.edges = [[0.0] * len(self.preferred) for _ in self.factors]
         zeros = {name: [[0.0] * len(values)] * len(self._with(name)) for name, values in domains.items()}
         self._tell_r(zeros)
+
+    def _split(self, factors: list[Factor]) -> list[Factor]:
+        """Return two functions for each of `factors`, if that is asked for."""
+        least = self.settings.split
+        if not least:
+            return factors
+        import numpy as np  # noqa: PLC0415 - the tables have been made with it already
+
+        halves: list[Factor] = []
+        for factor in factors:
+            spread = 1 - 2 * least
+            drawn = [least + spread * self.chance() if spread else least for _ in range(factor.charges.size)]
+            halves += factor.split(np.reshape(drawn, factor.charges.shape))
+        return halves
 
     def _hear_q(self, messages: Mapping[str, wire.Message]) -> None:
         """Process all Q of the cycle."""

@@ -21,7 +21,7 @@ class Factor:
 
     def __init__(self, agents: Sequence[str], charges: Array) -> None:
         self.agents = agents
-        self._charges = charges
+        self.charges = charges
         small = len(agents) == 1 and charges.size <= SMALL
         self._lines: tuple[list[Row], list[Row]] | None = (charges.tolist(), charges.T.tolist()) if small else None
 
@@ -35,6 +35,13 @@ class Factor:
                 sums[table.agents] = table.charges if before is None else before + table.charges
         return [cls(agents, charges) for agents, charges in sums.items()]
 
+    def split(self, shares: Array) -> tuple[Factor, Factor]:
+        """Return two functions whose sum is this one: of each entry its share, between 0 and 1, and the rest.
+
+        What is forbidden is so in both.
+        """
+        return Factor(self.agents, self.charges * shares), Factor(self.agents, self.charges * (1 - shares))
+
     def r(self, told: Sequence[Row]) -> list[Row]:
         """Return the minimum cost of each robot's values, given the others' Q in `told`; in the order of the axes."""
         if self._lines:
@@ -47,7 +54,7 @@ class Factor:
         import numpy as np  # noqa: PLC0415 - for large tables only
 
         axes = tuple([axis for axis in range(len(told)) if axis != place])
-        total = self._charges
+        total = self.charges
         for axis in axes:
             row = np.asarray(told[axis], np.float64)
             total = total + np.expand_dims(row, tuple([other for other in range(len(told)) if other != axis]))
