@@ -18,7 +18,7 @@ from tests.support.brute_force import least_cost
 from tests.support.cost_problems import random_complex_cost_team, random_cost_team
 
 BOUNDING = ("syncbb", "afb", "adopt", "bnb-adopt", "sfb", "dpop", "mb-dpop")
-UNPROVEN = ("dsa", "gdba", "mgm", "mgm2", "maxsum")
+UNPROVEN = ("dsa", "dsa-sdp", "gdba", "mgm", "mgm2", "maxsum", "mixed-dsa")
 
 
 def _events(team: Team, options: Options) -> tuple[list[AnyEvent], Verdict]:

@@ -14,9 +14,11 @@ from robochoc.model.problem import Assignment, Constraint, Relation, Semantics, 
 from robochoc.protocols.findings import Trail
 from robochoc.protocols.inference.maxsum import MaxSum
 from robochoc.protocols.local_search.dsa import DSA
+from robochoc.protocols.local_search.dsa_sdp import DSASDP
 from robochoc.protocols.local_search.gdba import GDBA
 from robochoc.protocols.local_search.mgm import MGM
 from robochoc.protocols.local_search.mgm2 import MGM2
+from robochoc.protocols.local_search.mixed_dsa import MixedDSA
 from robochoc.protocols.settings import SettingsError, settings_of
 from robochoc.protocols.shared.cycles import CycleProtocol
 from robochoc.protocols.shared.messages.cycles import Value
@@ -34,7 +36,15 @@ from tests.support.local_search_runs import any_schedule, assignments_by_cycle, 
 from tests.support.problems import team_of
 from tests.support.small_teams import DIFFERENT
 
-NAMES: dict[type[CycleProtocol], str] = {DSA: "dsa", MGM: "mgm", MGM2: "mgm2", GDBA: "gdba", MaxSum: "maxsum"}
+NAMES: dict[type[CycleProtocol], str] = {
+    DSA: "dsa",
+    DSASDP: "dsa-sdp",
+    MixedDSA: "mixed-dsa",
+    MGM: "mgm",
+    MGM2: "mgm2",
+    GDBA: "gdba",
+    MaxSum: "maxsum",
+}
 ALL = pytest.mark.parametrize("protocol", NAMES)
 
 

@@ -70,6 +70,19 @@ def test_who_gains_moves_with_the_probability(variant: str) -> None:
     assert hears(middle(STAYS, variant=variant), 1, 2) == (1,)
 
 
+@pytest.mark.parametrize("variant", ["D", "E"])
+def test_who_gains_always_moves_by_variants_d_and_e(variant: str) -> None:
+    assert hears(middle(STAYS, variant=variant), 1, 2) == (3,)
+
+
+@pytest.mark.parametrize(("variant", "as_variant"), [("D", "B"), ("E", "C")])
+def test_variants_d_and_e_move_sideways_as_b_and_c(variant: str, as_variant: str) -> None:
+    for chance in (MOVES, STAYS):
+        for heard in ((1, 2), (2, 2)):
+            one, other = middle(chance, variant=variant, values=2), middle(chance, variant=as_variant, values=2)
+            assert hears(one, *heard) == hears(other, *heard)
+
+
 def test_the_probability_is_not_reached_by_itself() -> None:
     assert hears(middle(0.7), 1, 2) == (1,)
     assert hears(middle(0.69), 1, 2) == (3,)
@@ -149,10 +162,10 @@ def test_a_probability_is_one(probability: str) -> None:
         settings_of(DSA, {"probability": probability})
 
 
-def test_there_are_three_variants() -> None:
-    assert settings_of(DSA, {"variant": "C"}) == DSASettings(variant="C")
+def test_there_are_five_variants() -> None:
+    assert settings_of(DSA, {"variant": "E"}) == DSASettings(variant="E")
     with pytest.raises(SettingsError, match="variant"):
-        settings_of(DSA, {"variant": "D"})
+        settings_of(DSA, {"variant": "F"})
 
 
 def test_the_example_in_the_documentation() -> None:

@@ -1,15 +1,15 @@
-"""The Distributed Stochastic Algorithm (DSA), variants A, B and C.
+"""The Distributed Stochastic Algorithm (DSA), variants A to E.
 
 Local search in cycles. In each cycle a robot looks for its best value against its neighbours' values of the cycle
 before, and takes it with a probability, so that not all neighbours move at once. The gain is the cost that a move
 saves. Variant A moves only if it gains. B also moves if it gains nothing and is in conflict. C also moves if it gains
-nothing at all.
+nothing at all. D and E are B and C in which a robot that gains always moves.
 
 - **When to use**: costs, a large team: good answers fast.
 - **Guarantees**: incomplete; it stops after `cycles` cycles, without a proof of optimality. The result is the best
   cycle (anytime). A robot with an empty domain proves that there is no solution.
-- **Parameters (`--set`)**: `variant` (A, B or C; default B), `probability` (p; default 0.7), `cycles` (default 100). B
-  was the best of the three on colouring problems (Zhang and others): sideways moves leave plateaus, and it settles
+- **Parameters (`--set`)**: `variant` (A to E; default B), `probability` (p; default 0.7), `cycles` (default 100). B
+  was the best of A, B and C on colouring problems (Zhang and others): sideways moves leave plateaus, and it settles
   where there is no conflict.
 - **References**: Fitzpatrick, Meertens: "An experimental assessment of a stochastic, anytime, decentralized, soft
   colourer for sparse graphs", SAGA 2001; Zhang, Wang, Xing, Wittenburg: "Distributed stochastic search and distributed
@@ -41,7 +41,8 @@ Choices that the paper leaves open, and differences:
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from abc import abstractmethod
+from collections.abc import Mapping, Sequence
 from typing import ClassVar
 
 from robochoc.model.message import Message
@@ -49,9 +50,41 @@ from robochoc.protocols.local_search.settings.dsa import DSASettings
 from robochoc.protocols.shared.cycles import NO_GAIN, CycleProtocol, gain, values_in
 from robochoc.protocols.shared.messages.cycles import Value
 from robochoc.protocols.traits import ENDS_WITH_PROOF, Traits
+from robochoc.solver.compiled import LexicographicCost
 
 
-class DSA(CycleProtocol):
+class StochasticSearch(CycleProtocol):
+    """The common base of DSA and its kin: all robots send their values, and each moves with some probability."""
+
+    def begin(self) -> None:
+        """Take a random value."""
+        self.take(self.any_value())
+        self.tell_value(self._choose)
+
+    @abstractmethod
+    def proposal(self, burdens: Sequence[LexicographicCost]) -> tuple[list[int], float]:
+        """Return the values that this robot may move to, where its own cost `burdens`, and with what probability."""
+
+    def _choose(self, messages: Mapping[str, Message]) -> None:
+        """Move or stay, with all neighbours' values known."""
+        places, probability = self.proposal(self.problem.lexicographic_costs(values_in(messages)))
+        index = self.present
+        if places and probability and self.chance() < probability:
+            index = self.any_of(places)
+        self.take(index)
+        if not self.over:
+            self.tell_value(self._choose)
+
+    def places_of(self, burden: LexicographicCost, burdens: Sequence[LexicographicCost]) -> list[int]:
+        """Return the values other than the present one that cost as much as `burden`."""
+        return [place for place, other in enumerate(burdens) if other == burden and place != self.present]
+
+    def in_conflict(self, now: LexicographicCost) -> bool:
+        """Return whether something is violated or charges anything, where the present value costs `now`."""
+        return now != (0, self.problem.charges[self.present])
+
+
+class DSA(StochasticSearch):
     """One agent of DSA. A cycle has one phase: all robots send their values."""
 
     messages = Value
@@ -68,24 +101,13 @@ class DSA(CycleProtocol):
         use_when="costs, large team: good answers fast, no proof",
     )
 
-    def begin(self) -> None:
-        """Take a random value."""
-        self.take(self.any_value())
-        self.tell_value(self._choose)
-
-    def _choose(self, messages: Mapping[str, Message]) -> None:
-        """Move or stay, with all neighbours' values known."""
-        burdens = self.problem.lexicographic_costs(values_in(messages))
+    def proposal(self, burdens: Sequence[LexicographicCost]) -> tuple[list[int], float]:
+        """Return the best values, and the probability of the variant (Table 1)."""
         now, least = burdens[self.present], min(burdens)
-        index = self.present
-        if gain(now, least) > NO_GAIN or self._moves_sideways(now != (0, self.problem.charges[index])):
-            best = [place for place, burden in enumerate(burdens) if burden == least and place != index]
-            if best and self.chance() < self.settings.probability:
-                index = self.any_of(best)
-        self.take(index)
-        if not self.over:
-            self.tell_value(self._choose)
+        return self.places_of(least, burdens), self._probability(now, least)
 
-    def _moves_sideways(self, conflict: bool) -> bool:  # noqa: FBT001 - the variants' only question
-        """Return whether the variant allows a move that gains nothing."""
-        return self.settings.variant == "C" or (self.settings.variant == "B" and conflict)
+    def _probability(self, now: LexicographicCost, least: LexicographicCost) -> float:
+        variant, probability = self.settings.variant, self.settings.probability
+        if gain(now, least) > NO_GAIN:
+            return 1 if variant in "DE" else probability
+        return probability if variant in "CE" or (variant in "BD" and self.in_conflict(now)) else 0

@@ -8,9 +8,9 @@ from robochoc.protocols.shared.settings.cycles import CycleSettings
 
 
 class DSASettings(CycleSettings, frozen=True):
-    """`variant`: A, B or C. `probability` (p): the probability of a move. `cycles`: the number of cycles."""
+    """`variant`: A, B, C, D or E. `probability` (p): the probability of a move. `cycles`: the number of cycles."""
 
-    variant: Literal["A", "B", "C"] = "B"
+    variant: Literal["A", "B", "C", "D", "E"] = "B"
     probability: float = 0.7
 
     def __post_init__(self) -> None:

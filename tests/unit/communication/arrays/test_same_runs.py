@@ -38,7 +38,7 @@ COUNTS = ("messages", "bytes", "largest", "checks", "ncccs")
 def random_settings(protocol: str, chance: Random) -> dict[str, str]:
     settings = {"cycles": chance.choice(("1", "2", "5", "12"))}
     if protocol == "dsa":
-        settings |= {"variant": chance.choice("ABC"), "probability": chance.choice(("0.3", "0.7", "1.0"))}
+        settings |= {"variant": chance.choice("ABCDE"), "probability": chance.choice(("0.3", "0.7", "1.0"))}
     if protocol == "mgm2":
         settings |= {"threshold": chance.choice(("0.0", "0.3", "0.5", "0.9", "1.0"))}
     if protocol == "maxsum":

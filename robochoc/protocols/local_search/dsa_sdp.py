@@ -1,0 +1,99 @@
+"""DSA with slope-dependent probabilities (DSA-SDP).
+
+DSA in which the probability of a move depends on what it saves: the larger the part of its cost that a robot saves, the
+likelier it moves. Every `period`-th cycle all robots explore: those that can save nothing may also take the best of
+their other values, the likelier the less it costs more. So the search leaves local optima, and the best cycle counts.
+
+- **When to use**: as DSA, with time for many cycles.
+- **Guarantees**: incomplete; it stops after `cycles` cycles, without a proof of optimality. The result is the best
+  cycle (anytime); costs rise when robots explore. A robot with an empty domain proves that there is no solution.
+- **Parameters (`--set`)**: `pa` and `pb` (a robot that saves the part r of its cost moves with probability
+  pa + min(pb, r); defaults 0.6 and 0.15), `pc` and `pd` (in a cycle of exploration, one whose cost would rise by the
+  part r of it moves with probability max(pc, pd - r), and never where r > 1; defaults 0.4 and 0.8), `period` (the
+  paper's k; default 40), `cycles` (default 100).
+- **References**: Zivan, Okamoto, Peled: "Explorative anytime local search for distributed constraint optimization",
+  AIJ 212, 2014, Section 5.
+
+The rules:
+
+    slope-dependent probability of an improvement    `_improving`
+    slope-dependent probability of exploration       `_exploring`
+    explore every k cycles                           `_explores`
+
+Choices that the paper leaves open, and differences:
+
+- Costs are pairs as in `mgm`, broken hard constraints first. The part r is of broken constraints, where the move
+  changes their number, otherwise of the costs.
+- A robot that costs nothing has nothing to save, and does not explore either: any rise is more than all of its cost.
+- A robot explores only where its best other value saves nothing. One of several such values is chosen at random.
+- First values are random, and constraints may be n-ary, as in `dsa`.
+
+>>> from robochoc.communication.simulator.schedule import Concurrent
+>>> from robochoc.communication.simulator.simulator import Simulation
+>>> from robochoc.generators.queens3d import queens3d
+>>> result = Simulation(queens3d(3), DSASDP, Concurrent(seed=0)).search()
+>>> result.metrics.messages
+{'Value': 5600}
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import ClassVar
+
+from robochoc.protocols.local_search.dsa import StochasticSearch
+from robochoc.protocols.local_search.settings.dsa_sdp import DSASDPSettings
+from robochoc.protocols.shared.cycles import NO_GAIN, gain
+from robochoc.protocols.shared.messages.cycles import Value
+from robochoc.protocols.traits import ENDS_WITH_PROOF, Traits
+from robochoc.solver.compiled import LexicographicCost
+
+
+class DSASDP(StochasticSearch):
+    """One agent of DSA-SDP. A cycle has one phase: all robots send their values."""
+
+    messages = Value
+    settings: ClassVar[DSASDPSettings] = DSASDPSettings()
+    traits = Traits(
+        concludes=ENDS_WITH_PROOF,
+        paper="Zivan, Okamoto, Peled 2014",
+        complete=False,
+        costs=True,
+        shared_scopes=True,
+        writes_to_non_neighbours=False,
+        privacy="constraints among others",
+        use_when="as DSA, and many cycles: it explores",
+    )
+
+    def proposal(self, burdens: Sequence[LexicographicCost]) -> tuple[list[int], float]:
+        """Return the best other values, and the probability by what they save."""
+        now = burdens[self.present]
+        best = min((burden for place, burden in enumerate(burdens) if place != self.present), default=None)
+        if best is None:
+            return [], 0
+        saved = gain(now, best)
+        if saved > NO_GAIN:
+            probability = self._improving(now, saved)
+        else:
+            probability = self._exploring(now, gain(best, now)) if self._explores else 0
+        return self.places_of(best, burdens), probability
+
+    def _improving(self, now: LexicographicCost, saved: LexicographicCost) -> float:
+        """Return the probability of a move that saves something."""
+        return self.settings.pa + min(self.settings.pb, _part(saved, now))
+
+    def _exploring(self, now: LexicographicCost, lost: LexicographicCost) -> float:
+        """Return the probability of a move that saves nothing."""
+        part = _part(lost, now)
+        return 0 if part > 1 else max(self.settings.pc, self.settings.pd - part)
+
+    @property
+    def _explores(self) -> bool:
+        """Whether the next cycle is one of exploration."""
+        return (self.cycle + 1) % self.settings.period == 0
+
+
+def _part(difference: LexicographicCost, now: LexicographicCost) -> float:
+    """Return what part of `now` the `difference` is; infinite if `now` is nothing."""
+    changed, whole = (difference[0], now[0]) if difference[0] else (difference[1], now[1])
+    return changed / whole if whole else float("inf")

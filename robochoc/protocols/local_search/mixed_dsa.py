@@ -1,0 +1,77 @@
+"""DSA for hard and soft constraints (MixedDSA).
+
+DSA with a probability of its own for hard constraints. A robot compares its values by the number of hard constraints
+that they violate, then by the cost of all others. A move by which fewer are violated is made with one probability, a
+move that only saves cost with another. So the team can settle its hard constraints fast, and its costs with care.
+
+- **When to use**: hard and soft constraints together, a large team.
+- **Guarantees**: incomplete; it stops after `cycles` cycles, without a proof of optimality. The result is the best
+  cycle (anytime). A robot with an empty domain proves that there is no solution.
+- **Parameters (`--set`)**: `hard` (the probability of a move where hard constraints are violated; default 0.7), `soft`
+  (that of any other move; default 0.5), `variant` (A, B or C as in `dsa`; default B), `cycles` (default 100).
+- **References**: the variant is that of the library pyDcop (Rust, Picard, Ramparany: "Using message-passing DCOP
+  algorithms to solve energy-efficient smart environment configuration problems", IJCAI 2016, where devices have hard
+  and soft constraints). For DSA: Zhang, Wang, Xing, Wittenburg: "Distributed stochastic search and distributed
+  breakout: properties, comparison and applications to constraint optimization problems in sensor networks", AIJ 161,
+  2005.
+
+The rules, by what the best value is, compared with the present one:
+
+    fewer hard constraints violated              move with probability `hard`
+    as many, but cheaper                         `soft`
+    no better, hard constraints violated         `hard` (variants B and C)
+    no better, some other constraint charges     `soft` (variants B and C)
+    no better, nothing charges                   `soft` (variant C)
+
+A constraint is hard where it is broken by a combination of values (`inf`), and soft where it charges a cost; one
+constraint may do both. First values are random, and constraints may be n-ary, as in `dsa`.
+
+>>> from robochoc.communication.simulator.schedule import Concurrent
+>>> from robochoc.communication.simulator.simulator import Simulation
+>>> from robochoc.generators.queens3d import queens3d
+>>> result = Simulation(queens3d(3), MixedDSA, Concurrent(seed=0)).search()
+>>> result.metrics.messages
+{'Value': 5600}
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import ClassVar
+
+from robochoc.protocols.local_search.dsa import StochasticSearch
+from robochoc.protocols.local_search.settings.mixed_dsa import MixedDSASettings
+from robochoc.protocols.shared.cycles import gain
+from robochoc.protocols.shared.messages.cycles import Value
+from robochoc.protocols.traits import ENDS_WITH_PROOF, Traits
+from robochoc.solver.compiled import LexicographicCost
+
+
+class MixedDSA(StochasticSearch):
+    """One agent of MixedDSA. A cycle has one phase: all robots send their values."""
+
+    messages = Value
+    settings: ClassVar[MixedDSASettings] = MixedDSASettings()
+    traits = Traits(
+        concludes=ENDS_WITH_PROOF,
+        paper="Zhang, Wang, Xing, Wittenburg 2005; Rust, Picard, Ramparany 2016",
+        complete=False,
+        costs=True,
+        shared_scopes=True,
+        writes_to_non_neighbours=False,
+        privacy="constraints among others",
+        use_when="as DSA, hard and soft constraints together",
+    )
+
+    def proposal(self, burdens: Sequence[LexicographicCost]) -> tuple[list[int], float]:
+        """Return the best values, and the probability by what they change."""
+        now, least = burdens[self.present], min(burdens)
+        return self.places_of(least, burdens), self._probability(now, least)
+
+    def _probability(self, now: LexicographicCost, least: LexicographicCost) -> float:
+        fewer, saved = gain(now, least)
+        if fewer or saved:
+            return self.settings.hard if fewer else self.settings.soft
+        if self.settings.variant == "A" or (self.settings.variant == "B" and not self.in_conflict(now)):
+            return 0
+        return self.settings.hard if now[0] else self.settings.soft
