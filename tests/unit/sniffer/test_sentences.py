@@ -62,7 +62,6 @@ REAL = {
     ),
     ("compapo", "Init"): "Robot1.1 says: V1.1 is 1, 2 or 3",
     ("compapo", "Wait"): "Robot1.1 says: wait with your mediation: another one is going on here that comes first",
-    ("compapo", "Free"): "Robot1.1 says: you need not wait for me any more",
     ("awc", "Ok"): "Robot3.3 says: V3.3 = 1 from now on, with priority 3",
     ("awc", "Nogood"): "Robot1.1 says: V1.3 = 2 and V1.2 = 2 cannot both stand",
     ("awc", "AddLink"): "Robot1.1 says: from now on let us tell each other V1.1 and V2.3",
