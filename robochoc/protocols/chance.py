@@ -11,8 +11,11 @@ No secret may depend on it.
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
 from hashlib import blake2b
-from typing import Final
+from typing import Final, TypeVar
+
+T = TypeVar("T")
 
 MASK: Final = 0xFFFF_FFFF_FFFF_FFFF
 FIRST_FACTOR: Final = 0xBF58_476D_1CE4_E5B9
@@ -34,6 +37,11 @@ def key_and_step(seed: int, name: str) -> tuple[int, int]:
     if (step ^ step >> 1).bit_count() < _FEWEST_TRANSITIONS:
         step ^= _ALTERNATING
     return int.from_bytes(digest[:8], "little"), step
+
+
+def one_of(chance: Callable[[], float], choices: Sequence[T]) -> T:
+    """Return a random one of `choices`; with a single choice, no random number is drawn."""
+    return choices[0] if len(choices) == 1 else choices[int(chance() * len(choices))]
 
 
 class Chance:

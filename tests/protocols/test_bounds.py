@@ -14,11 +14,14 @@ from robochoc.model.problem import INFINITE, Team
 from robochoc.run import Options, Runtime, ScheduleName, solve
 from robochoc.run.known_costs import KnownCosts
 from robochoc.run.recording import journal_header, objective_to_record
+from robochoc.run.registry import protocol_named, protocol_names
 from tests.support.brute_force import least_cost
 from tests.support.cost_problems import random_complex_cost_team, random_cost_team
 
 BOUNDING = ("syncbb", "afb", "adopt", "bnb-adopt", "sfb", "dpop", "mb-dpop")
-UNPROVEN = ("dsa", "dsa-sdp", "gdba", "mgm", "mgm2", "maxsum", "mixed-dsa")
+UNPROVEN = tuple(
+    name for name in protocol_names() if protocol_named(name).traits.costs and not protocol_named(name).traits.complete
+)
 
 
 def _events(team: Team, options: Options) -> tuple[list[AnyEvent], Verdict]:

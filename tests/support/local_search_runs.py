@@ -1,4 +1,4 @@
-"""Runs of synchronous local search, cycle by cycle."""
+"""Runs of local search, cycle by cycle where it goes through cycles."""
 
 from __future__ import annotations
 
@@ -14,11 +14,11 @@ from robochoc.model.message import Message
 from robochoc.model.outcome import Verdict
 from robochoc.model.problem import INFINITE, Assignment, Team
 from robochoc.protocols.order import PriorityOrder
-from robochoc.protocols.shared.cycles import CycleProtocol
+from robochoc.protocols.protocol import Protocol
 from robochoc.solver.agent_problem import RunParameters, agent_problems
 from robochoc.solver.compiled import LexicographicCost, LocalProblem
 
-P = TypeVar("P", bound=CycleProtocol)
+P = TypeVar("P", bound=Protocol)
 
 
 def robot_of(protocol: type[P], team: Team, name: str, *chances: float) -> P:
@@ -29,7 +29,7 @@ def robot_of(protocol: type[P], team: Team, name: str, *chances: float) -> P:
     return robot
 
 
-def started(robot: CycleProtocol) -> list[tuple[str, Message]]:
+def started(robot: Protocol) -> list[tuple[str, Message]]:
     """What `robot` says first."""
     robot.start()
     said = list(robot.outbox)
@@ -43,9 +43,7 @@ def any_schedule(chance: Random) -> Schedule:
     )
 
 
-def played(
-    team: Team, protocol: type[CycleProtocol], schedule: Schedule, seed: int = 0, **settings: object
-) -> RunResult:
+def played(team: Team, protocol: type[Protocol], schedule: Schedule, seed: int = 0, **settings: object) -> RunResult:
     """A run of simple robots to its own end."""
     parameters = RunParameters(seed, {name: str(value) for name, value in settings.items()})
     result = Simulation(team, protocol, schedule, parameters=parameters).search()

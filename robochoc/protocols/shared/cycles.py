@@ -17,6 +17,7 @@ from typing import ClassVar, TypeVar
 
 from robochoc.model import message as wire
 from robochoc.model.outcome import Verdict
+from robochoc.protocols.chance import one_of
 from robochoc.protocols.findings import Findings, Trail
 from robochoc.protocols.order import PriorityOrder
 from robochoc.protocols.protocol import Protocol
@@ -111,7 +112,7 @@ class CycleProtocol(Protocol):
 
     def any_of(self, choices: Sequence[T]) -> T:
         """Return a random one of `choices`; with a single choice, no random number is drawn."""
-        return choices[0] if len(choices) == 1 else choices[int(self.chance() * len(choices))]
+        return one_of(self.chance, choices)
 
     @property
     def present(self) -> int:

@@ -142,6 +142,9 @@ REAL = {
     ("sfb", "Solution"): (
         "RX04 says: a solution costs 25, less than all before; by number, robots' values in it are 1, 2, 3, 2 and 1"
     ),
+    ("cocoa", "Inquiry"): "RX01 says: what would each of my 2 values cost you at least?; so far X00 = -3",
+    ("cocoa", "Costs"): "RX01 says: of your 4 values, number 1 would cost me least: 12 of cost",
+    ("cocoa", "SetValue"): "RX02 says: X02 = 1 for good",
     ("dsa", "Value"): "RX01 says: X01 = -3 in this cycle",
     ("mgm", "Gain"): "RX00 says: my move would save 8 of cost",
     ("mgm2", "Domain"): "RX04 says: X04 is -2, -1 or 4",

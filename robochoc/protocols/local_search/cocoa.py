@@ -1,0 +1,199 @@
+"""Cooperative Constraint Approximation (CoCoA).
+
+No cycles: each robot takes one value, once. Before that it asks all neighbours that have none what each of its values
+would cost them at least, and takes the value for which the sum is least. If too many values are equally good, it waits
+(HOLD) until a neighbour has taken a value. If nobody around can go on, it accepts more equally good values.
+
+- **When to use**: costs, few messages: a fair answer from a number of messages that does not depend on cycles.
+- **Guarantees**: incomplete, no proof of optimality. It always ends: a robot with d neighbours and v values becomes
+  active at most d + v times, so it sends at most 2 d (d + v) messages, and as many answers as it is asked for. No
+  robot changes its value. A robot with an empty domain proves that there is no solution.
+- **Parameters**: none.
+- **Reference**: van Leeuwen, Pawelczak: "CoCoA: a non-iterative approach to a local search (A)DCOP solver", AAAI 2017.
+
+Its states and steps:
+
+    IDLE      not asked to act yet                          an active robot asks its neighbours      `_activate`
+    ACTIVE    waits for its neighbours' answers             a neighbour answers                      `_answer`
+    HOLD      too many values are equally good              it chooses, or waits                     `_decide`
+    DONE      has its value                                 beta, the bound on equally good values   `bound`
+
+Choices that the paper leaves open, and differences:
+
+- Robots that have a higher priority than all their neighbours begin. So each part of the team has one that begins; it
+  may have several, which does no harm.
+- An idle robot becomes active when a neighbour has chosen, and also when one waits. Otherwise the search could stop.
+- Neighbours that are DONE are not asked, as the robot itself knows what they charge. They have told their value before
+  any answer arrives that is still under way, and that answer is not used.
+- If all neighbours are DONE, nothing more can become known: one of the best values is chosen by lot, however many
+  there are.
+- A constraint of more than two robots counts when all but one or two have values, once: unknown robots charge nothing.
+- Fewer violated hard constraints are always better, so plain DisCSPs work, too.
+
+It ends: of the robots of a part of the team, the last one to choose or to wait finds all its neighbours DONE or in
+HOLD, and goes on. So nobody is left in HOLD, nor IDLE beside a robot that is not.
+
+>>> from robochoc.communication.simulator.schedule import Concurrent
+>>> from robochoc.communication.simulator.simulator import Simulation
+>>> from robochoc.generators.queens3d import queens3d
+>>> result = Simulation(queens3d(4), CoCoA, Concurrent(seed=0)).search()
+>>> result.metrics.messages["SetValue"], sum(map(len, result.assignments.values()))  # of 16 robots
+(85, 16)
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from enum import StrEnum
+from typing import Any, ClassVar, assert_never, cast
+
+from robochoc.model import message as wire
+from robochoc.model.outcome import Verdict
+from robochoc.protocols.chance import one_of
+from robochoc.protocols.local_search.messages.cocoa import Burden, Costs, Hold, Inquiry, SetValue
+from robochoc.protocols.order import PriorityOrder
+from robochoc.protocols.protocol import Protocol
+from robochoc.protocols.traits import ENDS_WITH_PROOF, Traits
+from robochoc.solver.compiled import LocalProblem
+from robochoc.system.compiling import mypyc_attr
+
+
+class State(StrEnum):
+    """What a robot does at the moment."""
+
+    IDLE = "idle"
+    ACTIVE = "active"
+    HOLD = "hold"
+    DONE = "done"
+
+
+_AT_REST = (State.HOLD, State.DONE)
+
+
+@mypyc_attr(allow_interpreted_subclasses=True)
+class CoCoA(Protocol):
+    """One agent of CoCoA.
+
+    State: the own `state` and the neighbours' (`states`), the final values of neighbours (`view`), `answers` to the
+    last inquiry, and `bound`: the number of equally good values among which it chooses (beta).
+    """
+
+    messages: ClassVar[Any] = Inquiry | Costs | Hold | SetValue
+    traits: ClassVar[Traits] = Traits(
+        concludes=ENDS_WITH_PROOF,
+        paper="van Leeuwen & Pawelczak 2017",
+        complete=False,
+        costs=True,
+        shared_scopes=True,
+        writes_to_non_neighbours=False,
+        privacy="constraints among others",
+        use_when="costs, few messages: each robot takes one value, once",
+    )
+
+    def __init__(self, problem: LocalProblem, order: PriorityOrder) -> None:
+        super().__init__(problem, order)
+        self.state = State.IDLE
+        self.states = dict.fromkeys(problem.neighbours, State.IDLE)
+        self.view: dict[str, wire.Value] = {}
+        self.answers: dict[str, list[Burden]] = {}
+        self.bound = 1
+        self._asked: tuple[str, ...] = ()
+        self._done_before = 0
+
+    def start(self) -> None:
+        """Become active if no neighbour has a higher priority; a robot with an empty domain ends the search."""
+        rank = self.order.rank
+        if not self.problem.values:
+            self.conclude(Verdict.NO_SOLUTION)
+        elif all(rank[name] > rank[self.problem.agent] for name in self.problem.neighbours):
+            self._activate()
+            self.settle()
+
+    def receive(self, sender: str, message: wire.Message) -> None:
+        """Note a neighbour's state or answer; answer its inquiry."""
+        if self.verdict is not None:
+            return
+        if sender not in self.states:
+            raise ValueError(f"{sender} is no neighbour of {self.problem.agent}")
+        match cast("Inquiry | Costs | Hold | SetValue", message):
+            case Inquiry(values, known):
+                self.states[sender] = State.ACTIVE
+                self._answer(sender, values, known)
+            case Costs(burdens):
+                self._keep(sender, burdens)
+            case Hold():
+                self.states[sender] = State.HOLD
+            case SetValue(value):
+                self.states[sender] = State.DONE
+                self.view[sender] = value
+            case never:
+                assert_never(never)
+
+    def settle(self) -> None:
+        """Go on as far as what is known allows."""
+        while self.verdict is None and self._goes_on():
+            pass
+
+    def _goes_on(self) -> bool:
+        """Take the next step, if there is one: begin to ask, or decide."""
+        match self.state:
+            case State.ACTIVE if len(self.answers) == len(self._asked):
+                self._decide()
+            case State.IDLE if any(state in _AT_REST for state in self.states.values()):
+                self._activate()
+            case State.HOLD if len(self.view) > self._done_before:
+                self._activate()
+            case State.HOLD if all(state in _AT_REST for state in self.states.values()):
+                self.bound += 1
+                self._activate()
+            case _:
+                return False
+        return True
+
+    def _activate(self) -> None:
+        """Ask all neighbours that have no value what the own values would cost them."""
+        self.state = State.ACTIVE
+        self._done_before = len(self.view)
+        self.answers = {}
+        self._asked = tuple(name for name, state in self.states.items() if state is not State.DONE)
+        inquiry = Inquiry(list(self.problem.values), dict(self.view))
+        for name in self._asked:
+            self.send(name, inquiry)
+
+    def _answer(self, sender: str, values: list[wire.Value], known: Mapping[str, wire.Value]) -> None:
+        """Send the least cost of each of the sender's values: over all own values, or for the final one."""
+        view = {**known, **self.view}
+        view.pop(self.problem.agent, None)
+        self.send(sender, Costs([self._least(self.problem.lexicographic_costs({**view, sender: v})) for v in values]))
+
+    def _least(self, burdens: list[Burden]) -> Burden:
+        return min(burdens) if self.value is None else burdens[self.value]
+
+    def _keep(self, sender: str, burdens: list[Burden]) -> None:
+        """Store an answer; raise `ValueError` if it was not asked for, or is not about the own values."""
+        asked = self.state is State.ACTIVE and sender in self._asked and sender not in self.answers
+        if not asked or len(burdens) != len(self.problem.values):
+            raise ValueError(f"{sender} tells costs that {self.problem.agent} has not asked for")
+        self.answers[sender] = burdens
+
+    def _decide(self) -> None:
+        """Choose one of the best values, or wait if too many are equally good."""
+        totals = self.problem.lexicographic_costs(self.view)
+        waiting = [name for name in self._asked if name not in self.view]
+        for name in waiting:
+            totals = [(a + c, b + d) for (a, b), (c, d) in zip(totals, self.answers[name], strict=True)]
+        least = min(totals)
+        best = [place for place, total in enumerate(totals) if total == least]
+        if len(best) <= self.bound or not waiting:
+            self.state = State.DONE
+            self.value = one_of(self.chance, best)
+            self._tell(SetValue(self.problem.values[self.value]))
+        else:
+            self.state = State.HOLD
+            self._tell(Hold())
+
+    def _tell(self, message: wire.Message) -> None:
+        """Tell all neighbours that have no value yet."""
+        for name, state in self.states.items():
+            if state is not State.DONE:
+                self.send(name, message)
