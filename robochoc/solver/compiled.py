@@ -27,6 +27,7 @@ from robochoc.solver.shared_constraint import (
     OtherValues,
     OwnValues,
     SharedConstraint,
+    by_robot,
     sorted_by_lowest_agent,
 )
 
@@ -106,12 +107,12 @@ class LocalProblem:
         met = {agent for constraint in shared for agent in constraint.agents}
         self.neighbours = tuple(sorted({*self.parents, *self.children, *met}, key=rank.__getitem__))
         self._table: ConflictTable | None = self._looked_up() if len(self.values) >= MIN_TABLE_VALUES else None
-        self._below = _by_robot(below)
+        self._below = by_robot(below)
         parts_above = [constraint for model, constraint in above if model is ConstraintModel.PKC]
-        secretive = {*part.pkc_holders, *_by_robot(parts_above)}
+        secretive = {*part.pkc_holders, *by_robot(parts_above)}
         self.pkc_parents = tuple(parent for parent in self.parents if parent in secretive)
-        self._parts = _by_robot([*parts_above, *below])
-        self._filtering = _by_robot([*copies, *below, *parts_above])
+        self._parts = by_robot([*parts_above, *below])
+        self._filtering = by_robot([*copies, *below, *parts_above])
         self._made_filters: Filters | None = None
 
     def solution(self, index: int) -> dict[str, int]:
@@ -273,14 +274,11 @@ class LocalProblem:
         """
         depth = self._rank[robot]
         places = slice(bisect_left(self._depths, depth), bisect_right(self._depths, depth))
-        waiting = self._constraints[places]
-        if not waiting:
-            return None
-        known = [
-            (constraint, others) for constraint in waiting if (others := constraint.other_values(view)) is not None
-        ]
-        self.checks += len(known) * len(self.values)
-        return _summed(len(self.values), [constraint.costs(others) for constraint, others in known])
+        return self._added(self._constraints[places], view) if self._depths[places] else None
+
+    def added_by(self, robot: str, view: Mapping[str, Value]) -> list[Cost]:
+        """Return what `added` returns for a `robot` anywhere in the order; 0 where no constraint becomes complete."""
+        return self._added([constraint for constraint in self._constraints if robot in constraint.agents], view)
 
     def lower_bounds(self, robots: Container[str]) -> list[Cost]:
         """Return, for each own value, a lower bound on its cost in constraints whose other robots are all in `robots`.
@@ -374,6 +372,12 @@ class LocalProblem:
         wanted = [(place, part) for place, part in enumerate(value) if part is not None]
         return [index for index, own in enumerate(self.values) if all(own[place] == part for place, part in wanted)]
 
+    def _added(self, waiting: Sequence[SharedConstraint], view: Mapping[str, Value]) -> list[Cost]:
+        """Return what each own value pays for those of `waiting` whose other variables are all known."""
+        known = [(c, others) for c in waiting if (others := c.other_values(view)) is not None]
+        self.checks += len(known) * len(self.values)
+        return _summed(len(self.values), [constraint.costs(others) for constraint, others in known])
+
     def _known(self, view: Mapping[str, Value]) -> list[tuple[SharedConstraint, OtherValues]]:
         """Return each constraint whose other variables are all known, and their values. Count a check each."""
         known = [(c, others) for c in self._constraints if (others := c.other_values(view)) is not None]
@@ -428,12 +432,3 @@ def _summed(size: int, rows: Sequence[Sequence[Cost]]) -> list[Cost]:
 def _lexicographic_cost(prices: Sequence[Cost]) -> LexicographicCost:
     """Return the total of `prices`."""
     return prices.count(INFINITE), sum([price for price in prices if price < INFINITE])
-
-
-def _by_robot(constraints: Iterable[SharedConstraint]) -> dict[str, list[SharedConstraint]]:
-    """Return those that are shared with one other robot, by its name."""
-    found: dict[str, list[SharedConstraint]] = {}
-    for constraint in constraints:
-        if len(constraint.agents) == 1:
-            found.setdefault(constraint.agents[0], []).append(constraint)
-    return found

@@ -276,3 +276,12 @@ def sorted_by_lowest_agent(
     return tuple(
         sorted(constraints, key=lambda c: (max((rank[agent] for agent in c.agents), default=-1), len(c.agents)))
     )
+
+
+def by_robot(constraints: Iterable[SharedConstraint]) -> dict[str, list[SharedConstraint]]:
+    """Return those that are shared with one other robot, by its name."""
+    found: dict[str, list[SharedConstraint]] = {}
+    for constraint in constraints:
+        if len(constraint.agents) == 1:
+            found.setdefault(constraint.agents[0], []).append(constraint)
+    return found

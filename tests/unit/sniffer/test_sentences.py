@@ -95,6 +95,13 @@ REAL = {
     ("bnb-adopt", "Cost"): (
         "RX03 says: as long as X02 = 1 and X00 = 3, my subtree costs between 0 and 9; tell me my threshold again"
     ),
+    ("ncbb", "Members"): "RX03 says: in my subtree constraints are shared by RX03 with RX02 and RX04 with RX00",
+    ("ncbb", "Greedy"): "RX02 says: X02 = 1 in the first assignment",
+    ("ncbb", "Request"): "RX02 says: X02 = 3 for now; what will you cost at least?",
+    ("ncbb", "Report"): "RX02 says: with your value and those above you, I cost at least 9",
+    ("ncbb", "Search"): "RX02 says: search your subtree for less than 20",
+    ("ncbb", "Result"): "RX02 says: my subtree costs 25, with X02 = 1, X01 = -1, X03 = 3 and X04 = -2",
+    ("ncbb", "Terminate"): "RX02 says: the search is over, with X03 = 3 and X04 = -2",
     ("dpop", "Domain"): "RX00 says: X00 is -3, 0, 3 or 5",
     ("dpop", "Dimensions"): (
         "RX03 says: my table will have 16 cells over RX02 (4 values) and RX00 (4 values), and no cost above 19;"

@@ -176,6 +176,28 @@ def test_what_a_robot_adds_is_the_difference_that_it_makes(batch: int) -> None:
     assert min(seen.values()) > 10, seen
 
 
+def test_what_a_robot_adds_is_the_same_in_any_order_in_which_robots_become_known() -> None:
+    chance = Random("added by")
+    seen = Counter[str]()
+    for _ in range(40):
+        team = random_complex_cost_team(chance)
+        for part in agent_problems(_any_domains(team, chance), shared_scopes=True).values():
+            problem, again = LocalProblem(part), LocalProblem(part)
+            view: dict[str, Value] = {}
+            costs = problem.costs(view)
+            checks = 0
+            others = [name for name in part.order if name != problem.agent]
+            for name in chance.sample(others, len(others)):
+                view[name] = tuple([chance.choice(list(part.known.domains[one])) for one in part.interfaces[name]])
+                added = problem.added_by(name, view)
+                costs = [cost + more for cost, more in zip(costs, added, strict=True)]
+                seen["something" if any(added) else "nothing"] += 1
+                checks = again.checks
+                assert costs == again.costs(view)
+            assert problem.checks <= again.checks - checks or not view
+    assert min(seen.values()) > 10, seen
+
+
 @pytest.mark.parametrize("batch", range(2))
 def test_the_least_is_what_the_cheapest_values_of_the_others_cost(batch: int, monkeypatch: pytest.MonkeyPatch) -> None:
     """Constraint by constraint, whatever the others' values in other constraints."""

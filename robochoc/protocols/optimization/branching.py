@@ -1,0 +1,256 @@
+"""The common base of NCBB, PT-FB and HS-CAI: branch and bound in every subtree of a pseudo-tree by itself.
+
+While the robots above keep their values, a robot searches the subtrees of its children for a cost below a limit. No
+value of its own is agreed on: it tries its values in each subtree by increasing lower bound, and the subtrees may be
+at different values at the same time. For each value and child it knows a lower bound on the subtree's cost, and later
+the cost itself; or that no solution with the value costs less than the best one known. A value is out once its own cost
+and the bounds of all subtrees are no less than that. The cheapest value whose subtrees all have been searched wins.
+
+A child returns its subtree's best assignment with its cost. So nothing is searched again, and the root knows the best
+assignment of its tree at any time.
+"""
+
+from __future__ import annotations
+
+from abc import abstractmethod
+from collections.abc import Iterable, Mapping, Sequence
+
+import msgspec
+
+from robochoc.model.message import Value
+from robochoc.model.outcome import Verdict
+from robochoc.model.problem import INFINITE
+from robochoc.protocols.findings import Findings, Incumbent
+from robochoc.protocols.optimization.messages.branching import Number, Result, Terminate
+from robochoc.protocols.order import PriorityOrder
+from robochoc.protocols.shared.dfs import TreeProtocol
+from robochoc.solver.compiled import LocalProblem
+from robochoc.system.compiling import mypyc_attr
+
+Assignment = dict[str, Value]
+"""The values of the robots of a subtree."""
+
+
+class Branch:
+    """The search of a child's subtree, for each own value.
+
+    - `lower`: a lower bound on the subtree's cost. Once the value is `known` it is the cost itself, or infinite: no
+      solution with the value costs less than the best one known.
+    - `values`: the assignment of this cost.
+    - `index`: the own value that is searched now; None: all have been. `told` is the limit that the child has for it;
+      None: it has not begun.
+    """
+
+    def __init__(self, lower: Sequence[Number]) -> None:
+        self.lower = [*lower]
+        self.known = [False] * len(lower)
+        self.values: dict[int, Assignment] = {}
+        self.index: int | None = None
+        self.told: Number | None = None
+
+    @property
+    def left(self) -> list[int]:
+        """The values that have not been searched yet."""
+        return [index for index, known in enumerate(self.known) if not known]
+
+    def close(self, indices: Iterable[int], cost: Number = INFINITE) -> None:
+        """Note the cost of values; infinite: they are out."""
+        for index in indices:
+            self.lower[index] = cost
+            self.known[index] = True
+
+
+@mypyc_attr(allow_interpreted_subclasses=True)
+class BranchingProtocol(TreeProtocol):
+    """One agent that searches its children's subtrees.
+
+    - `branches`: for each child its search. `local`: the cost of each own value with the values above.
+    - `limit`: only less is of use above. `best` and `solution`: the cheapest assignment of the own subtree below it.
+    - `searching`: a search of the own subtree is going on. `over`: the search of the whole tree has ended.
+    - `optimum`: at the root, its tree's least cost, once it is known.
+    """
+
+    def __init__(self, problem: LocalProblem, order: PriorityOrder) -> None:
+        super().__init__(problem, order)
+        self.branches: dict[str, Branch] = {}
+        self.local: Sequence[Number] = problem.charges
+        self.limit: Number = INFINITE
+        self.best: Number = INFINITE
+        self.solution: Assignment = {}
+        self.searching = False
+        self.over = False
+        self.optimum: Number | None = None
+        self._below: dict[str, tuple[str, ...]] = {}
+
+    @abstractmethod
+    def look(self, child: str) -> None:
+        """Get a lower bound for the present value of the child's branch; `descend` when it is there."""
+
+    @abstractmethod
+    def explore(self, child: str, limit: Number) -> None:
+        """Tell `child` to search its subtree for less than `limit`, with the present value of its branch."""
+
+    def tighten(self, child: str, limit: Number) -> None:
+        """Tell `child`, which is searching, that its limit is lower now. Not everyone does."""
+
+    def floor(self, child: str) -> Sequence[Number]:  # noqa: ARG002 - for those that know one
+        """Return a lower bound on the cost of the child's subtree for each own value, before anyone is asked."""
+        return [0] * len(self.problem.values)
+
+    # The search
+
+    @property
+    def bound(self) -> Number:
+        """What a solution must be cheaper than."""
+        return min(self.limit, self.best)
+
+    def search(self, limit: Number, local: Sequence[Number]) -> None:
+        """Search the own subtree for less than `limit`; `local` is what each own value costs with the values above."""
+        self.limit, self.local = limit, local
+        self.best, self.solution = INFINITE, {}
+        self.searching = True
+        self.branches = {child: Branch(self.floor(child)) for child in self.children}
+        if not self.children:
+            self._improve(self.cheapest)
+        for child in self.children:
+            self._advance(child)
+        self._finish_if_idle()
+
+    def estimate(self, index: int) -> Number:
+        """Return a lower bound on the cost of the own subtree with the value at `index`."""
+        return sum([branch.lower[index] for branch in self.branches.values()], self.local[index])
+
+    @property
+    def cheapest(self) -> int:
+        """The place of the own value that costs the least with the values above."""
+        return min(range(len(self.local)), key=self.local.__getitem__)
+
+    def descend(self, child: str) -> None:
+        """Let `child` search, or take the next value if the present one is out: its bound has come."""
+        index = self.present(child)
+        branch = self.branches[child]
+        total = self.estimate(index)
+        if total < self.bound:
+            self.value = index
+            branch.told = self.bound - (total - branch.lower[index])
+            self.explore(child, branch.told)
+        else:
+            branch.close([index])
+            self._advance(child)
+            self._finish_if_idle()
+
+    def take_result(self, child: str, result: Result) -> None:
+        """Note what the search of a child's subtree has come to, and go on."""
+        index = self.present(child)
+        branch = self.branches[child]
+        branch.close([index], result.cost)
+        if result.cost < INFINITE:
+            self.learn(child, result)
+            branch.values[index] = result.values
+        if all(other.known[index] for other in self.branches.values()):
+            self._improve(index)
+        self._advance(child)
+        self.tell_lower_limits()
+        self._finish_if_idle()
+
+    def present(self, child: str) -> int:
+        """Return the place of the own value that is searched in the subtree of `child`.
+
+        Raises:
+            ValueError: if nothing is, so that `child` has nothing to say.
+        """
+        branch = self.branches.get(child)
+        if branch is None or branch.index is None or not self.searching:
+            raise ValueError(f"{child} was asked nothing")
+        return branch.index
+
+    def learn(self, child: str, result: Result) -> None:
+        """Note which robots are in the subtree of `child`, from its first assignment."""
+        if child not in result.values or self.problem.agent in result.values:
+            raise ValueError(f"{child} returns the values of other robots")
+        self._below.setdefault(child, tuple(result.values))
+
+    def tell_lower_limits(self) -> None:
+        """Tell the children that are searching about limits that have become lower (`tighten`)."""
+        for child, branch in self.branches.items():
+            if branch.index is not None and branch.told is not None:
+                total = self.estimate(branch.index)
+                rest = self.bound - (total - branch.lower[branch.index]) if total < self.bound else 0
+                if rest < branch.told:
+                    branch.told = rest
+                    self.tighten(child, rest)
+
+    def _advance(self, child: str) -> None:
+        """Take the value with the least lower bound in the subtree of `child`; none is left: the branch is idle."""
+        branch = self.branches[child]
+        left = branch.left
+        index = min(left, key=self.estimate, default=None)
+        branch.index = branch.told = None
+        if index is None or self.estimate(index) >= self.bound:
+            branch.close(left)
+            return
+        branch.index = index
+        self.look(child)
+
+    def _improve(self, index: int) -> None:
+        """Note the value at `index` as the best one if it is: all subtrees are known for it."""
+        cost = self.estimate(index)
+        if cost < self.bound:
+            self.best = cost
+            self.solution = {self.problem.agent: self.problem.values[index]}
+            for branch in self.branches.values():
+                self.solution.update(branch.values[index])
+
+    def _finish_if_idle(self) -> None:
+        """Return the best of all values once all branches are idle: to the parent, or the root ends the search."""
+        if not self.searching or any(branch.index is not None for branch in self.branches.values()):
+            return
+        self.searching = False
+        if self.parent is not None:
+            self.send(self.parent, Result(self.best, self.solution))
+        else:
+            self.end(self.best, self.solution)
+
+    # The end
+
+    def end(self, cost: Number, solution: Assignment) -> None:
+        """End the search of the whole tree with its optimum, as the root."""
+        if cost == INFINITE:
+            self.conclude(Verdict.NO_SOLUTION)
+            return
+        self.optimum = cost
+        self.finish(solution)
+
+    def finish(self, values: Mapping[str, Value]) -> None:
+        """Take the own final value, and tell the children theirs and those below them.
+
+        Raises:
+            ValueError: if one of them is missing, or the own one is none.
+        """
+        wanted = {self.problem.agent, *(name for names in self._below.values() for name in names)}
+        if not wanted <= values.keys() or len(self._below) < len(self.children):
+            raise ValueError(f"{self.problem.agent} and the robots below it do not get their final values")
+        # Of equal values, which neighbours cannot tell apart, the first: the last may be to withdraw.
+        self.value = self.problem.values.index(values[self.problem.agent])
+        self.over = True
+        for child in self.children:
+            self.send(child, Terminate({name: values[name] for name in self._below[child]}))
+
+    # What is known
+
+    @property
+    def incumbent(self) -> Incumbent | None:
+        """The cheapest assignment that this root knows, if it is one of all robots."""
+        if self.parent is not None or len(self.solution) < len(self.order.names):
+            return None
+        return Incumbent(self.best, self.solution)
+
+    @property
+    def findings(self) -> Findings:
+        """The place in the tree; for a root also its best assignment, and a lower bound on the cost of its tree."""
+        return msgspec.structs.replace(super().findings, best=self.incumbent, bound=self._bound_of_tree())
+
+    def _bound_of_tree(self) -> Number | None:
+        if not self.searching or self.parent is not None:
+            return self.optimum
+        return min(self.bound, *map(self.estimate, range(len(self.local))))

@@ -1,0 +1,148 @@
+"""The common base of NCBB and PT-FB: before a value is searched in a subtree, the robots there are asked for bounds.
+
+A robot asks all robots of the subtree that it shares a constraint with. Each answers with the least that an own value
+costs with the values of the asker and of robots above that. It leaves out robots *below* the asker: their last values
+are of an earlier search. So it must know which robots are above which. It learns that from the order of the first
+requests: a robot lets a subtree search only when all its linked robots there have answered.
+
+At the beginning each robot tells its parent which robots of its subtree are linked with which robots above (`Members`).
+A leaf answers its parent with the cost itself and its value, as all constraints of a leaf are with robots above.
+
+A constraint belongs to its lowest robot, which pays it: constraints may be n-ary. It is checked when the last of the
+other robots asks. Costs with the robots above that one are known from their requests.
+"""
+
+from __future__ import annotations
+
+from abc import abstractmethod
+from collections.abc import Mapping, Sequence
+
+from robochoc.model.message import Value
+from robochoc.model.problem import INFINITE
+from robochoc.protocols.optimization.branching import BranchingProtocol
+from robochoc.protocols.optimization.messages.branching import Members, Number, Report, Request, Result
+from robochoc.protocols.order import PriorityOrder
+from robochoc.solver.compiled import LocalProblem
+from robochoc.system.compiling import mypyc_attr
+
+
+class CostsAbove:
+    """The own values' costs with robots above, which ask one after the other, the highest first.
+
+    `values` are theirs. `totals`: for each of them, the cost of every own value with its value and those above it.
+    """
+
+    def __init__(self, problem: LocalProblem) -> None:
+        self._problem = problem
+        self.values: dict[str, Value] = {}
+        self.totals: dict[str, Sequence[Number]] = {}
+
+    def ask(self, name: str, value: Value) -> Sequence[Number]:
+        """Return the costs when `name` has taken `value`."""
+        self.values[name] = value
+        names = [*self.values]
+        place = names.index(name)
+        view = {above: self.values[above] for above in names[: place + 1]}
+        base = self.totals[names[place - 1]] if place else self._problem.charges
+        added = self._problem.added_by(name, view)
+        self.totals[name] = [cost + more for cost, more in zip(base, added, strict=True)]
+        return self.totals[name]
+
+
+@mypyc_attr(allow_interpreted_subclasses=True)
+class ForwardBoundingProtocol(BranchingProtocol):
+    """One agent that asks for bounds.
+
+    - `asked`: for each child, the robots of its subtree that share a constraint with this one. `members`: those, and
+      the ones that share a constraint with robots above this one.
+    - `handed`: lower bounds on what robots of the own subtree cost alone, with the values above this robot.
+    - `answers`: the same with the value that is searched, from robots that were asked.
+    """
+
+    def __init__(self, problem: LocalProblem, order: PriorityOrder) -> None:
+        super().__init__(problem, order)
+        self.asked: dict[str, list[str]] = {}
+        self.members: dict[str, list[str]] = {}
+        self.above = CostsAbove(problem)
+        self.handed: dict[str, Number] = {}
+        self.answers: dict[str, Number] = {}
+        self._linked: dict[str, list[str]] = {}
+        self._child_above: dict[str, str] = {}
+        self._waiting: dict[str, set[str]] = {}
+
+    def begin(self) -> None:
+        """Tell the parent who is linked with whom, once all children have done the same."""
+        self._linked = {name: [self.problem.agent] for name in self.ancestors}
+        self._tell_members()
+
+    @abstractmethod
+    def begin_search(self) -> None:
+        """Begin, as the root; all robots know their members."""
+
+    def take_members(self, child: str, linked: Mapping[str, Sequence[str]]) -> None:
+        """Note who is in the child's subtree."""
+        own = linked.get(self.problem.agent, ())
+        if child not in own or child in self.asked or not {*own} <= {*self.descendants}:
+            raise ValueError(f"{child} tells of links that cannot be")
+        self.asked[child] = [*own]
+        self.members[child] = [*dict.fromkeys(name for names in linked.values() for name in names)]
+        self._child_above.update(dict.fromkeys(own, child))
+        for above, names in linked.items():
+            if above != self.problem.agent:
+                self._linked.setdefault(above, []).extend(names)
+        self._tell_members()
+
+    def _tell_members(self) -> None:
+        if len(self.asked) < len(self.children):
+            return
+        if self.parent is not None:
+            self.send(self.parent, Members(self._linked))
+        else:
+            self.begin_search()
+
+    # Bounds
+
+    def floor(self, child: str) -> Sequence[Number]:
+        """Return the bounds of its robots that were handed down."""
+        return [sum(self.handed.get(name, 0) for name in self.members[child])] * len(self.problem.values)
+
+    def look(self, child: str) -> None:
+        """Ask all linked robots in the child's subtree."""
+        value = self.problem.values[self.present(child)]
+        self._waiting[child] = {*self.asked[child]}
+        for name in self.asked[child]:
+            self.send(name, Request(value))
+
+    def take_request(self, sender: str, value: Value) -> None:
+        """Answer with a lower bound, or as a leaf to the parent with the cost."""
+        if sender not in self.ancestors:
+            raise ValueError(f"{sender} is not above {self.problem.agent}")
+        costs = self.above.ask(sender, value)
+        least = min(costs)
+        if sender != self.parent or self.children:
+            self.send(sender, Report(least))
+        else:
+            value = self.problem.values[costs.index(least)]
+            self.send(sender, Result(least, {self.problem.agent: value} if least < INFINITE else {}))
+
+    def take_report(self, sender: str, bound: Number) -> None:
+        """Note a bound; when all are there, let the child search or take the next value."""
+        child = self._child_above.get(sender)
+        if child is None or sender not in self._waiting.get(child, ()):
+            raise ValueError(f"{sender} was not asked for a bound")
+        self.answers[sender] = bound
+        self._waiting[child].remove(sender)
+        if not self._waiting[child]:
+            branch = self.branches[child]
+            branch.lower[self.present(child)] = sum([self.reports.get(name, 0) for name in self.members[child]])
+            self.descend(child)
+
+    def take_result(self, child: str, result: Result) -> None:
+        """Note the cost of a subtree; a leaf's is its answer."""
+        self._waiting.pop(child, None)
+        super().take_result(child, result)
+
+    @property
+    def reports(self) -> Mapping[str, Number]:
+        """For each robot of the own subtree, its latest bound."""
+        return {**self.handed, **self.answers}

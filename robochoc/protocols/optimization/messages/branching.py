@@ -1,0 +1,84 @@
+"""What is common to the messages of NCBB, PT-FB and HS-CAI (see `branching.py` and `forward_bounding.py`)."""
+
+from __future__ import annotations
+
+import math
+
+from robochoc.model.communicative_acts import Act, Performative
+from robochoc.model.message import Message, Value
+from robochoc.model.wording import Wording, cost_text, listed
+from robochoc.protocols import acts
+
+Number = int | float
+"""Infinite where something hard is broken, or nothing is known yet; integers stay integers on the wire."""
+
+
+class Members(Message, frozen=True):
+    """For each robot above, the robots of the sender's subtree that share a constraint with it."""
+
+    linked: dict[str, list[str]]
+
+    act = Act(Performative.INFORM, "the receiver comes to know who below it is linked with whom above")
+
+    def in_words(self, _: Wording) -> str:
+        """Return what the sender says."""
+        told = [f"{listed(names)} with {robot}" for robot, names in self.linked.items()]
+        return f"in my subtree constraints are shared by {listed(told)}"
+
+
+class Request(Message, frozen=True):
+    """A request for a lower bound on the receiver's cost with this value of the sender."""
+
+    value: Value
+
+    act = Act(Performative.QUERY_REF, "the sender asks for a lower bound on the receiver's cost")
+
+    def in_words(self, words: Wording) -> str:
+        """Return what the sender says."""
+        return f"{words.own_value(self.value)} for now; what will you cost at least?"
+
+
+class Report(Message, frozen=True):
+    """A lower bound on the sender's own cost, with the values of the receiver and of robots above it."""
+
+    bound: Number
+
+    act = acts.TELL_BOUNDS
+
+    def in_words(self, _: Wording) -> str:
+        """Return what the sender says."""
+        if math.isinf(self.bound):
+            return "no value of mine is allowed with your value and those above you"
+        return f"with your value and those above you, I cost at least {cost_text(self.bound)}"
+
+
+class Result(Message, frozen=True):
+    """The cost of the sender's subtree and its `values`; infinite, and no values: nothing is below the bound."""
+
+    cost: Number
+    values: dict[str, Value]
+
+    act = acts.TELL_BOUNDS
+
+    def in_words(self, words: Wording) -> str:
+        """Return what the sender says."""
+        if math.isinf(self.cost):
+            return "my subtree has nothing that costs less than you allow"
+        return f"my subtree costs {cost_text(self.cost)}, with {words.assigned(self.values.items())}"
+
+
+class Terminate(Message, frozen=True):
+    """The end of the search: the final values of the receiver's subtree."""
+
+    values: dict[str, Value]
+
+    act = acts.TERMINATE
+
+    def in_words(self, words: Wording) -> str:
+        """Return what the sender says."""
+        return f"the search is over, with {words.assigned(self.values.items())}"
+
+
+def allowance(bound: Number) -> str:
+    """Return what a subtree may cost, in words."""
+    return "whatever it costs" if math.isinf(bound) else f"for less than {cost_text(bound)}"

@@ -1,0 +1,171 @@
+"""No-Commitment Branch and Bound (NCBB).
+
+Complete search for minimum cost on a pseudo-tree, in linear memory. First a greedy assignment gives an upper bound.
+Then each robot lets the subtrees of its children be searched, for one own value after the other. It does not commit to
+a value: different subtrees may be searched for different values at the same time, each by increasing lower bound. The
+bounds come from the robots of the subtree that it shares constraints with: it asks them before it searches for a value.
+
+- **When to use**: costs, a pseudo-tree with branches, little memory.
+- **Guarantees**: complete; it terminates with an optimum, or with a proof that there is no solution. Each robot
+  remembers a bound and an assignment for each child and own value. On a connected team, an answer is known early.
+- **Parameters**: none.
+- **Reference**: Chechetka, Sycara: "No-commitment branch and bound search for distributed constraint optimization",
+  AAMAS 2006.
+
+The messages have other names where one name has two meanings in the paper:
+
+    VALUE (first phase)    `Greedy`     VALUE (search)   `Request`     SEARCH   `Search`
+    COST (of a subtree)    `Result`     COST (a bound)   `Report`      STOP     `Terminate`
+
+The frame of the search is in `branching`, bounds are in `forward_bounding`: PT-FB has both, too.
+
+Choices that the paper leaves open, and differences:
+
+- Constraints may be n-ary: the lowest robot of the scope pays them. There may be several trees.
+- A robot tells the asker its whole bound, with the values of all robots from the asker up. In the paper it tells the
+  difference that the asker's value makes. The whole bound is as true, and higher.
+- The greedy assignment is remembered, with its cost as the bound: only cheaper ones are searched for.
+- Results hold the best assignment of the subtree. In the paper, the last search is repeated to find it.
+- A leaf answers its parent with its cost and value. It is never told to search.
+
+>>> from robochoc.communication.simulator.schedule import Concurrent
+>>> from robochoc.communication.simulator.simulator import Simulation
+>>> from robochoc.generators.queens3d import queens3d
+>>> result = Simulation(queens3d(3), NCBB, Concurrent(seed=0)).run()
+>>> result.verdict.value
+'no-solution'
+"""
+
+from __future__ import annotations
+
+from typing import assert_never, cast
+
+from robochoc.model.message import Message, Value
+from robochoc.model.problem import INFINITE
+from robochoc.protocols.findings import Incumbent
+from robochoc.protocols.optimization.branching import Assignment
+from robochoc.protocols.optimization.forward_bounding import ForwardBoundingProtocol
+from robochoc.protocols.optimization.messages.branching import Members, Number, Report, Request, Result, Terminate
+from robochoc.protocols.optimization.messages.ncbb import Greedy, Search
+from robochoc.protocols.order import PriorityOrder
+from robochoc.protocols.shared.messages.dfs import TreeMessage
+from robochoc.protocols.traits import ENDS_WITH_PROOF, Traits
+from robochoc.solver.compiled import LocalProblem
+
+
+class NCBB(ForwardBoundingProtocol):
+    """One agent of NCBB. State besides the search: `greedy_view`, and the `greedy` results of the children."""
+
+    messages = TreeMessage | Members | Greedy | Request | Report | Search | Result | Terminate
+    traits = Traits(
+        concludes=ENDS_WITH_PROOF,
+        paper="Chechetka & Sycara 2006",
+        costs=True,
+        shared_scopes=True,
+        writes_to_non_neighbours=False,
+        privacy="constraints among others",
+        use_when="costs, sparse graph, little memory, an answer early",
+    )
+
+    def __init__(self, problem: LocalProblem, order: PriorityOrder) -> None:
+        super().__init__(problem, order)
+        self.greedy_view: dict[str, Value] = {}
+        self.greedy: dict[str, Result] = {}
+        self.greedy_cost: Number = INFINITE
+        self.greedy_values: Assignment = {}
+        self._first_phase = True
+
+    def begin(self) -> None:
+        """Tell the parent who is linked with whom."""
+        super().begin()
+        self._greet()
+
+    def begin_search(self) -> None:
+        """Do nothing: the root begins with the first phase, whose results come after the members."""
+
+    def handle(self, sender: str, message: Message) -> None:
+        """Dispatch on the message's type."""
+        match cast("Members | Greedy | Request | Report | Search | Result | Terminate", message):
+            case Members(linked):
+                self.take_members(sender, linked)
+            case Greedy(value):
+                self.greedy_view[sender] = value
+                self._greet()
+            case Request(value):
+                self.take_request(sender, value)
+            case Report(bound):
+                self.take_report(sender, bound)
+            case Search(bound):
+                self._search(bound)
+            case Result() as result if self._first_phase:
+                self._take_greedy_result(sender, result)
+            case Result() as result:
+                self.take_result(sender, result)
+            case Terminate(values):
+                self.finish(values)
+            case never:
+                assert_never(never)
+
+    # The first phase
+
+    def _greet(self) -> None:
+        """Take the cheapest value once all values above are known, and tell it to all below."""
+        if len(self.greedy_view) < len(self.ancestors):
+            return
+        self.local = self.problem.costs(self.greedy_view)
+        self.value = self.cheapest
+        for name in self.descendants:
+            self.send(name, Greedy(self.problem.values[self.value]))
+        if not self.children:
+            self._add_up()
+
+    def _take_greedy_result(self, child: str, result: Result) -> None:
+        if child not in self.children or child in self.greedy:
+            raise ValueError(f"{child} has no cost to tell")
+        self.greedy[child] = result
+        if result.cost < INFINITE:
+            self.learn(child, result)
+        if len(self.greedy) == len(self.children):
+            self._add_up()
+
+    def _add_up(self) -> None:
+        """Tell the parent the cost of the first assignment, or begin the search with it as the root."""
+        self._first_phase = False
+        cost = sum([result.cost for result in self.greedy.values()], self.local[self.cheapest])
+        values: Assignment = {}
+        if cost < INFINITE:
+            values = {self.problem.agent: self.problem.values[self.cheapest]}
+            for result in self.greedy.values():
+                values.update(result.values)
+        self.greedy.clear()
+        if self.parent is not None:
+            self.send(self.parent, Result(cost, values))
+            return
+        self.greedy_cost, self.greedy_values = cost, values
+        self.search(cost, self.problem.charges)
+
+    # The search
+
+    def explore(self, child: str, limit: Number) -> None:
+        """Send a bound to `child` (SEARCH)."""
+        self.send(child, Search(limit))
+
+    def _search(self, bound: Number) -> None:
+        if self.parent not in self.above.totals or self.searching:
+            raise ValueError(f"{self.problem.agent} does not know the value of its parent, or is searching")
+        self.search(bound, self.above.totals[self.parent])
+
+    def end(self, cost: Number, solution: Assignment) -> None:
+        """End the search, as the root: with the first assignment, if nothing is cheaper."""
+        if cost < self.greedy_cost:
+            super().end(cost, solution)
+        else:
+            super().end(self.greedy_cost, self.greedy_values)
+
+    @property
+    def incumbent(self) -> Incumbent | None:
+        """The cheapest assignment that this root knows, if it is one of all robots."""
+        cheaper = super().incumbent
+        if cheaper is not None or len(self.greedy_values) < len(self.order.names):
+            return cheaper
+        return Incumbent(self.greedy_cost, self.greedy_values)
