@@ -13,6 +13,7 @@ from robochoc.model.outcome import Verdict
 from robochoc.model.problem import Assignment, Constraint, Relation, Semantics, Team
 from robochoc.protocols.findings import Trail
 from robochoc.protocols.inference.maxsum import MaxSum
+from robochoc.protocols.inference.maxsum_ad import MaxSumAD
 from robochoc.protocols.local_search.dsa import DSA
 from robochoc.protocols.local_search.dsa_sdp import DSASDP
 from robochoc.protocols.local_search.gdba import GDBA
@@ -44,6 +45,7 @@ NAMES: dict[type[CycleProtocol], str] = {
     MGM2: "mgm2",
     GDBA: "gdba",
     MaxSum: "maxsum",
+    MaxSumAD: "maxsum-ad",
 }
 ALL = pytest.mark.parametrize("protocol", NAMES)
 

@@ -55,13 +55,12 @@ Choices that the paper leaves open, and differences:
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from operator import add, sub
 from typing import ClassVar
 
 from robochoc.model import message as wire
 from robochoc.model.outcome import Verdict
 from robochoc.model.problem import INFINITE
-from robochoc.protocols.inference.maxsum_factor import Factor, Row
+from robochoc.protocols.inference.maxsum_factor import Factor, Row, cheapest, from_zero, total, without_each
 from robochoc.protocols.inference.messages.maxsum import Q, R
 from robochoc.protocols.inference.settings.maxsum import MaxSumSettings
 from robochoc.protocols.order import PriorityOrder
@@ -105,7 +104,7 @@ class MaxSum(CycleProtocol):
         """Take the value with the lowest own charge, and send the domain to the holders of the own functions."""
         preference = self.settings.preference
         self.preferred = [cost + preference * self.chance() for cost in self.problem.costs({})]
-        self.take(_cheapest(self.preferred))
+        self.take(cheapest(self.preferred))
         self.tell(self.below, Domain(list(self.problem.values)))
         self.listen(self.above, self._build)
 
@@ -157,7 +156,7 @@ class MaxSum(CycleProtocol):
         if min(z) == INFINITE:
             self.conclude(Verdict.NO_SOLUTION)
             return
-        self.take(_cheapest(z))
+        self.take(cheapest(z))
         if self.over:
             return
         self.edges = self._q(rows, z)
@@ -169,36 +168,19 @@ class MaxSum(CycleProtocol):
 
     def _z(self, rows: Sequence[Row]) -> Row:
         """Return the cost of each value: its preference and the sum of all `rows` (Z)."""
-        z = self.preferred
-        for row in rows:
-            z = list(map(add, z, row))  # not `sum`, which rounds as the version of Python has it
-        return z
+        return total(self.preferred, rows)
 
     def _q(self, rows: Sequence[Row], z: Row) -> list[Row]:
         """Return, for each of `rows`, the cost of each value without that row (Q)."""
-        if INFINITE in z:
-            fresh = [self._z([*rows[:place], *rows[place + 1 :]]) for place in range(len(rows))]
-        else:
-            fresh = [list(map(sub, z, row)) for row in rows]
+        fresh = without_each(self.preferred, rows, z)
         damping = self.settings.damping
         if self.cycle == 1 or not damping:
-            return [_from_zero(row) for row in fresh]
+            return [from_zero(row) for row in fresh]
         rest = 1 - damping
         return [
-            [damping * old + rest * new for old, new in zip(before, _from_zero(row), strict=True)]
+            [damping * old + rest * new for old, new in zip(before, from_zero(row), strict=True)]
             for before, row in zip(self.edges, fresh, strict=True)
         ]
 
     def _with(self, name: str) -> list[Factor]:
         return [factor for factor in self.factors if name in factor.agents]
-
-
-def _from_zero(row: Row) -> Row:
-    """Return `row` with a minimum of 0."""
-    least = min(row)
-    return [entry - least for entry in row]
-
-
-def _cheapest(row: Row) -> int:
-    """Return the place of the minimum, the first of several."""
-    return row.index(min(row))

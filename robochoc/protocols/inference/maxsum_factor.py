@@ -1,10 +1,12 @@
-"""Function nodes of a factor graph (Max-Sum)."""
+"""Function nodes of a factor graph, and the sums of their messages (the Max-Sum family)."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from operator import add
+from operator import add, sub
 from typing import TYPE_CHECKING, Self
+
+from robochoc.model.problem import INFINITE
 
 if TYPE_CHECKING:
     from robochoc.solver.cost_table import Array, CostTable
@@ -60,3 +62,31 @@ class Factor:
             total = total + np.expand_dims(row, tuple([other for other in range(len(told)) if other != axis]))
         least: Row = total.min(axis=axes).tolist()
         return least
+
+
+def total(first: Row, rows: Iterable[Row]) -> Row:
+    """Return the sum of `first` and all `rows`, entry by entry."""
+    for row in rows:
+        first = list(map(add, first, row))  # not `sum`, which rounds as the version of Python has it
+    return first
+
+
+def without_each(first: Row, rows: Sequence[Row], z: Row) -> list[Row]:
+    """Return, for each of `rows`, the sum `z` of `first` and all rows without that one.
+
+    Nothing is subtracted from infinity.
+    """
+    if INFINITE in z:
+        return [total(first, [*rows[:place], *rows[place + 1 :]]) for place in range(len(rows))]
+    return [list(map(sub, z, row)) for row in rows]
+
+
+def from_zero(row: Row) -> Row:
+    """Return `row` with a minimum of 0."""
+    least = min(row)
+    return [entry - least for entry in row]
+
+
+def cheapest(row: Row) -> int:
+    """Return the place of the minimum, the first of several."""
+    return row.index(min(row))
