@@ -38,6 +38,7 @@ COMMANDS = {
     "import": ("import_", "Make teams of the files of FRODO, pyDCOP, XCSP3, ..."),
     "journal": ("journal", "Summarise or export a journal."),
     "master": ("master", "Lead a team whose robots run on other machines."),
+    "privacy": ("privacy", "Measure what robots have learnt of each other in a run."),
     "protocols": ("protocols", "List the installed protocols, or explain one."),
     "replay": ("replay", "Replay a journal, and compare it with the protocol of today."),
     "robot": ("robot", "Run one robot on this machine, in the run of a master."),

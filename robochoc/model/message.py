@@ -7,12 +7,16 @@ decode.
 
 from __future__ import annotations
 
-from typing import ClassVar, NamedTuple
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, ClassVar, NamedTuple
 
 import msgspec
 
 from robochoc.model.communicative_acts import INFORM, Act
 from robochoc.model.wording import Wording
+
+if TYPE_CHECKING:
+    from robochoc.model.disclosure import Hearing, Proof
 
 Value = tuple[int | None, ...]
 """A robot's value as others see it: the values of its interface variables, in the order of its file.
@@ -25,8 +29,8 @@ the nogood holds whatever that variable's value is, and so for every value of th
 class Message(msgspec.Struct, frozen=True, tag=True, array_like=True):
     """Base of all messages of all protocols; the class's name is its type on the wire.
 
-    All that is special about a message stands in its class: its fields, its `act`, its words. The sniffer, FIPA ACL
-    and the exports ask the class.
+    All that is special about a message stands in its class: its fields, its `act`, its words, what it proves. The
+    sniffer, FIPA ACL, the exports and the measure of privacy ask the class.
     """
 
     act: ClassVar[Act] = INFORM
@@ -39,6 +43,13 @@ class Message(msgspec.Struct, frozen=True, tag=True, array_like=True):
     def in_words(self, words: Wording) -> str:  # noqa: ARG002 - for those that have words
         """Return what the sender says: `V1.1 = 1 from now on`. Empty: the message is shown by its fields."""
         return ""
+
+    def proves(self, hearing: Hearing) -> Sequence[Proof] | None:  # noqa: ARG002 - for those that have a rule
+        """Return what the message proves to its receiver about other robots (`model/disclosure.py`).
+
+        None: there is no rule. Then it is not known what the receiver has learnt.
+        """
+        return None
 
 
 class Envelope(NamedTuple):

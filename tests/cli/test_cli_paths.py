@@ -97,6 +97,7 @@ def test_text_that_is_not_utf_8_is_said_to_be_so(
         ("compile", "{file}"),
         ("export", "{file}"),
         ("fly", "{file}"),
+        ("privacy", "{file}"),
         ("replay", "{file}"),
         ("sniff", "{file}"),
         ("journal", "show", "{file}"),

@@ -205,3 +205,10 @@ def piece_in_words(costs: bytes, width: Width) -> str:
         piece += f", from {cost_text(int(finite.min()))} to {cost_text(int(finite.max()))}"
     infinite = len(cells) - len(finite)
     return f"{piece}, and {infinite:,} infinite" if infinite else piece
+
+
+def cells_of(costs: bytes, width: Width) -> list[float]:
+    """Return the costs in a piece of a table. Raises `ValueError` if the bytes are not whole cells."""
+    cells = np.frombuffer(costs, f"<u{width}")
+    top = _top(width)
+    return [math.inf if cell == top else cell for cell in cells.tolist()]

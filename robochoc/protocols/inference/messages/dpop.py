@@ -2,21 +2,35 @@
 
 from __future__ import annotations
 
+import itertools
 import math
+from collections.abc import Mapping, Sequence
 from typing import Annotated
 
 import msgspec
 
 from robochoc.model.communicative_acts import Act, Performative
+from robochoc.model.disclosure import (
+    INFINITE,
+    NOTHING,
+    EveryValuePays,
+    HasOnly,
+    Hearing,
+    Proof,
+    SomeValuePays,
+    StandsAt,
+)
 from robochoc.model.message import Message, Value
 from robochoc.model.wording import Wording, cost_text, counted, listed
 from robochoc.protocols import acts
-from robochoc.protocols.inference.dpop_tables import Width, piece_in_words
+from robochoc.protocols.inference.dpop_tables import Width, cells_of, piece_in_words
 from robochoc.solver.exact_costs import EXACT
 
 Size = Annotated[int, msgspec.Meta(ge=2)]
 Cost = Annotated[int, msgspec.Meta(ge=0, le=EXACT)]
 """2^53 stands for all that is larger, too: it ends the run."""
+MOST_CELLS = 4096
+"""For larger tables no rule says what they prove: it would take too long."""
 
 
 class Need(msgspec.Struct, frozen=True, array_like=True, order=True):
@@ -36,6 +50,10 @@ class Domain(Message, frozen=True):
     def in_words(self, words: Wording) -> str:
         """Return what the sender says."""
         return words.domain(self.values)
+
+    def proves(self, hearing: Hearing) -> Sequence[Proof]:
+        """Return what the message proves to its receiver."""
+        return [HasOnly(hearing.sender, tuple(self.values))]
 
 
 class Dimensions(Message, frozen=True):
@@ -61,6 +79,10 @@ class Dimensions(Message, frozen=True):
             f" and {self.most.robot} needs the most memory, {cost_text(self.most.bytes)} bytes"
         )
 
+    def proves(self, _: Hearing) -> Sequence[Proof]:
+        """Return what the message proves to its receiver."""
+        return NOTHING
+
 
 class Proceed(Message, frozen=True):
     """Permission to make tables, as the tree's tables fit in memory; with the axes of the receiver's table.
@@ -76,6 +98,10 @@ class Proceed(Message, frozen=True):
         """Return what the sender says."""
         axes = f", over {listed(self.separator)}" if self.separator else ""
         return f"all tables fit: make yours{axes}"
+
+    def proves(self, _: Hearing) -> Sequence[Proof]:
+        """Return what the message proves to its receiver."""
+        return NOTHING
 
 
 class UTIL(Message, frozen=True):
@@ -93,6 +119,22 @@ class UTIL(Message, frozen=True):
         """Return what the sender says."""
         return piece_in_words(self.costs, self.width)
 
+    def proves(self, hearing: Hearing) -> Sequence[Proof] | None:
+        """Return what the message proves to its receiver. There is no rule for tables in pieces, or large ones.
+
+        For each combination of values, some value of the sender costs no more than its cell says: all that is below
+        costs 0 at least. A sender whose neighbours are all above it has nobody below; then no value costs less.
+        """
+        axes = _axes(hearing, hearing.receiver, hearing.sender)
+        dimensions = hearing.last(Dimensions, hearing.sender, hearing.receiver)
+        if dimensions is None:
+            raise ValueError("a table comes before its dimensions")
+        shape = [dimensions.separator[robot] for robot in axes]
+        cells = cells_of(self.costs, self.width)
+        if len(cells) != math.prod(shape) or len(cells) > MOST_CELLS:
+            return None
+        return _table_proves(dict(zip(axes, shape, strict=True)), cells, hearing)
+
 
 class VALUE(Message, frozen=True):
     """The places of the values of the robots in the receiver's separator, in the order of its axes."""
@@ -107,3 +149,41 @@ class VALUE(Message, frozen=True):
             return "nobody above you has to do with your subtree: take your best value"
         places = listed([str(place + 1) for place in self.assignment])
         return f"by number, the values of the robots in your separator are {places}, the nearest robot first"
+
+    def proves(self, hearing: Hearing) -> Sequence[Proof]:
+        """Return what the message proves to its receiver."""
+        axes = _axes(hearing, hearing.sender, hearing.receiver)
+        known = [(robot, hearing.values(robot), place) for robot, place in zip(axes, self.assignment, strict=True)]
+        return [StandsAt(robot, values[place]) for robot, values, place in known if values is not None]
+
+
+def _axes(hearing: Hearing, parent: str, child: str) -> Sequence[str]:
+    """Return the axes of a child's table. Raises `ValueError` if its parent has not told them."""
+    told = hearing.last(Proceed, parent, child)
+    if told is None:
+        raise ValueError(f"{parent} has not told {child} to proceed")
+    return told.separator
+
+
+def _table_proves(shape: Mapping[str, int], cells: Sequence[float], hearing: Hearing) -> Sequence[Proof]:
+    """Return what a whole table proves; `shape` has its axes.
+
+    Robots whose values the receiver does not know are left out of the views: what some value of the sender costs at
+    most with one of their values, it costs at most without them.
+    """
+    sender = hearing.sender
+    near = [(robot, hearing.values(robot)) for robot in hearing.neighbours(sender) if robot not in shape]
+    single = {robot: values[0] for robot, values in near if values is not None and len(values) == 1}
+    nobody_below = shape.keys() | single.keys() >= set(hearing.neighbours(sender))
+    least: dict[tuple[tuple[str, Value], ...], float] = {}
+    whole = all(hearing.values(robot) is not None for robot in shape)
+    for places, cost in zip(itertools.product(*map(range, shape.values())), cells, strict=True):
+        known = zip(shape, places, strict=True)
+        view = tuple([(robot, values[at]) for robot, at in known if (values := hearing.values(robot)) is not None])
+        least[view] = min(cost, least.get(view, INFINITE))
+    found: list[Proof] = []
+    for view, cost in least.items():
+        found.append(SomeValuePays(sender, {**single, **dict(view)}, cost))
+        if nobody_below and whole:
+            found.append(EveryValuePays(sender, {**single, **dict(view)}, cost))
+    return found

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 from robochoc.model import message
 from robochoc.model.communicative_acts import Act, Performative
+from robochoc.model.disclosure import NOTHING, Hearing, Proof, StandsAt
 from robochoc.model.message import Message
 from robochoc.model.wording import Wording, cost_text
 from robochoc.protocols import acts
-from robochoc.protocols.optimization.messages.bounding import Context, Number, bounds_in_words
+from robochoc.protocols.optimization.messages.bounding import Context, Number, bounds_in_words, bounds_prove
 
 
 class Value(Message, frozen=True):
@@ -21,6 +24,10 @@ class Value(Message, frozen=True):
     def in_words(self, words: Wording) -> str:
         """Return what the sender says."""
         return f"{words.own_value(self.value)} from now on (change {self.counter})"
+
+    def proves(self, hearing: Hearing) -> Sequence[Proof]:
+        """Return what the message proves to its receiver."""
+        return [StandsAt(hearing.sender, self.value)]
 
 
 class Cost(Message, frozen=True):
@@ -36,6 +43,10 @@ class Cost(Message, frozen=True):
         """Return what the sender says."""
         return bounds_in_words(words, self.context, self.lb, self.ub)
 
+    def proves(self, hearing: Hearing) -> Sequence[Proof]:
+        """Return what the message proves to its receiver."""
+        return bounds_prove(self.context, self.lb, self.ub, hearing)
+
 
 class Threshold(Message, frozen=True):
     """The cost up to which the receiver keeps its value, in `context` (THRESHOLD)."""
@@ -50,3 +61,7 @@ class Threshold(Message, frozen=True):
         values = {robot: (value, 0) for robot, value in self.context.items()}
         allowed = cost_text(self.threshold)
         return f"{words.context(values)}your subtree may cost {allowed} before you try other values"
+
+    def proves(self, _: Hearing) -> Sequence[Proof]:
+        """Return what the message proves to its receiver."""
+        return NOTHING

@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 
 from robochoc.model import message
+from robochoc.model.disclosure import Hearing, Proof, StandsAt
 from robochoc.model.message import Message
 from robochoc.model.problem import INFINITE
 from robochoc.model.wording import Wording, cost_text
 from robochoc.protocols import acts
-from robochoc.protocols.optimization.messages.bounding import Context, Number, bounds_in_words
+from robochoc.protocols.optimization.messages.bounding import Context, Number, bounds_in_words, bounds_prove
 
 
 class Value(Message, frozen=True):
@@ -28,6 +30,10 @@ class Value(Message, frozen=True):
             return change
         return f"{change}; your subtree may cost {cost_text(self.threshold)} then"
 
+    def proves(self, hearing: Hearing) -> Sequence[Proof]:
+        """Return what the message proves to its receiver."""
+        return [StandsAt(hearing.sender, self.value)]
+
 
 class Cost(Message, frozen=True):
     """Bounds `lb` and `ub` on the cost of the sender's subtree in `context`, and a threshold request (ThReq)."""
@@ -43,3 +49,7 @@ class Cost(Message, frozen=True):
         """Return what the sender says."""
         asked = "; tell me my threshold again" if self.threshold_request else ""
         return f"{bounds_in_words(words, self.context, self.lb, self.ub)}{asked}"
+
+    def proves(self, hearing: Hearing) -> Sequence[Proof]:
+        """Return what the message proves to its receiver."""
+        return bounds_prove(self.context, self.lb, self.ub, hearing)

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 
 from robochoc.model import message
+from robochoc.model.disclosure import EveryValuePays, Hearing, Proof, SomeValuePays, StandsAt
 from robochoc.model.message import Message
 from robochoc.model.wording import Wording, cost_text
 from robochoc.protocols import acts
@@ -33,6 +35,10 @@ class Terminate(Message, frozen=True):
         condition = words.context(self.context).removeprefix("as long as ").removesuffix(", ")
         return f"all above you have taken their last values{': ' if condition else ''}{condition}"
 
+    def proves(self, _: Hearing) -> Sequence[Proof]:
+        """Return what the message proves to its receiver."""
+        return [StandsAt(robot, value) for robot, (value, _) in self.context.items()]
+
 
 def bounds_in_words(words: Wording, context: Context, lower: Number, upper: Number) -> str:
     """Return a robot's bounds in words: `as long as V1.1 = 2, my subtree costs at least 3`."""
@@ -45,3 +51,15 @@ def bounds_in_words(words: Wording, context: Context, lower: Number, upper: Numb
     else:
         costs = f"costs between {cost_text(lower)} and {cost_text(upper)}"
     return f"{words.context(context)}my subtree {costs}"
+
+
+def bounds_prove(context: Context, lower: Number, upper: Number, hearing: Hearing) -> Sequence[Proof]:
+    """Return what bounds on the cost of the sender's subtree prove. Costs below the sender are 0 at least.
+
+    A sender whose neighbours are all in the context has nobody below: then the lower bound is on what it pays itself.
+    """
+    view = {robot: value for robot, (value, _) in context.items()}
+    found: list[Proof] = [SomeValuePays(hearing.sender, view, upper)]
+    if view.keys() >= set(hearing.neighbours(hearing.sender)):
+        found.append(EveryValuePays(hearing.sender, view, lower))
+    return found

@@ -7,9 +7,11 @@ from collections.abc import Iterable, Sequence
 from typing import Self
 
 from robochoc.model.communicative_acts import Act, Performative
+from robochoc.model.disclosure import NOTHING, HasOnly, Hearing, Pays, Proof, StandsAt, Total
 from robochoc.model.message import Message, Value
 from robochoc.model.wording import Wording, along, cost_text, counted, incumbent_text, listed
 from robochoc.protocols.optimization.interchangeable import Run, cut_off, expanded, grouped
+from robochoc.protocols.optimization.sfb_rows import MOST_ROWS, bits_prove, costs_prove
 
 Domain = tuple[Value, ...]
 Charges = tuple[float, ...]
@@ -32,6 +34,11 @@ class Above(Message, frozen=True):
         """Return what the sender says."""
         domains = expanded(self.domains, cut_off(self.runs, len(words.order)))
         return f"above you there are {_sizes(words.order, domains)}"
+
+    def proves(self, hearing: Hearing) -> Sequence[Proof]:
+        """Return what the message proves to its receiver."""
+        domains = expanded(self.domains, cut_off(self.runs, len(hearing.order)))
+        return [HasOnly(robot, tuple(values)) for robot, values in zip(hearing.order, domains, strict=False)]
 
 
 class Below(Message, frozen=True):
@@ -67,6 +74,15 @@ class Below(Message, frozen=True):
         names = order[order.index(words.receiver) + 1 :] if words.receiver in order else []
         return f"below you there are {_sizes(names, domains)}; all together they cost at most {cost_text(self.most)}"
 
+    def proves(self, hearing: Hearing) -> Sequence[Proof]:
+        """Return what the message proves to its receiver."""
+        below = hearing.order[hearing.order.index(hearing.receiver) + 1 :]
+        found: list[Proof] = []
+        for robot, (values, charges) in zip(below, self.robots, strict=False):
+            paid = [Pays(robot, value, {}, cost, cost) for value, cost in zip(values, charges, strict=True)]
+            found += [HasOnly(robot, tuple(values)), *paid]
+        return found
+
 
 class CPAs(Message, frozen=True):
     """A number (`count`) of partial assignments of all robots above the receiver (see `sfb_bounds`).
@@ -87,6 +103,14 @@ class CPAs(Message, frozen=True):
         known = incumbent_text(self.least if self.least < self.ceiling else math.inf)
         return f"{counted(self.count, 'partial assignment')} for {words.receiver} to extend; {known}"
 
+    def proves(self, hearing: Hearing) -> Sequence[Proof] | None:
+        """Return what the message proves to its receiver: each row holds what the robots from it on have to pay."""
+        if self.count > MOST_ROWS:
+            return None
+        if hearing.minimises:
+            return [*costs_prove(self.rows, self.count, self.ceiling, hearing)]
+        return [*bits_prove(self.rows, self.count, hearing)]
+
 
 class Explored(Message, frozen=True):
     """The end of the exploration of the oldest unanswered `CPAs` from the receiver."""
@@ -96,6 +120,10 @@ class Explored(Message, frozen=True):
     def in_words(self, _: Wording) -> str:
         """Return what the sender says."""
         return "nothing is left of the oldest partial assignments that I have had from you and have not answered"
+
+    def proves(self, _: Hearing) -> Sequence[Proof]:
+        """Return what the message proves to its receiver."""
+        return NOTHING
 
 
 class Solution(Message, frozen=True):
@@ -114,6 +142,17 @@ class Solution(Message, frozen=True):
             f" by number, robots' values in it are {places}"
         )
 
+    def proves(self, hearing: Hearing) -> Sequence[Proof]:
+        """Return what the message proves to its receiver."""
+        view = _chosen(hearing.order, self.places, hearing)
+        return [*(StandsAt(*one) for one in view.items()), Total(view, self.cost)]
+
 
 def _sizes(names: Sequence[str], domains: Sequence[Domain]) -> str:
     return listed([f"{name} ({counted(len(values), 'value')})" for name, values in along(names, domains)]) or "nobody"
+
+
+def _chosen(robots: Sequence[str], places: Sequence[int], hearing: Hearing) -> dict[str, Value]:
+    """Return the values of robots whose domains the receiver knows."""
+    known = [(robot, hearing.values(robot), place) for robot, place in zip(robots, places, strict=False)]
+    return {robot: values[place] for robot, values, place in known if values is not None}

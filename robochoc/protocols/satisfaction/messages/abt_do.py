@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
+from robochoc.model.disclosure import NOTHING, Hearing, Proof, can_take
 from robochoc.model.message import Message, Value
 from robochoc.model.wording import Wording, listed
 from robochoc.protocols import acts
@@ -22,6 +25,11 @@ class Ok(Message, frozen=True):
         """Return what the sender says."""
         return f"{words.own_value(self.value)} from now on; {_not_ruled_out(self.left)}"
 
+    def proves(self, hearing: Hearing) -> Sequence[Proof]:
+        """Return what the message proves to its receiver."""
+        # Once the order has changed, the sender need not say when it takes another value.
+        return [can_take(hearing.sender, self.value)]
+
 
 class Nogood(Message, frozen=True):
     """A nogood: the receiver cannot take `value` while all assignments in `lhs` hold.
@@ -40,6 +48,11 @@ class Nogood(Message, frozen=True):
         """Return what the sender says."""
         return f"{words.nogood(self.lhs, self.value)}; without that value, {_not_ruled_out(self.left)}"
 
+    def proves(self, _: Hearing) -> Sequence[Proof]:
+        """Return what the message proves to its receiver."""
+        # It may follow from any robot's constraints.
+        return NOTHING
+
 
 class Order(Message, frozen=True):
     """A new order of all robots, highest priority first (`order`)."""
@@ -53,6 +66,10 @@ class Order(Message, frozen=True):
         """Return what the sender says."""
         return f"the order is now {listed(self.names)}"
 
+    def proves(self, _: Hearing) -> Sequence[Proof]:
+        """Return what the message proves to its receiver."""
+        return NOTHING
+
 
 class AddLink(Message, frozen=True):
     """A request to be sent the receiver's value from now on, while the receiver has higher priority."""
@@ -62,6 +79,10 @@ class AddLink(Message, frozen=True):
     def in_words(self, words: Wording) -> str:
         """Return what the sender says."""
         return f"tell me {words.variables(words.receiver)} from now on, whenever you are above me"
+
+    def proves(self, _: Hearing) -> Sequence[Proof]:
+        """Return what the message proves to its receiver."""
+        return NOTHING
 
 
 def _not_ruled_out(left: int) -> str:

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 from robochoc.model.communicative_acts import Act, Performative
+from robochoc.model.disclosure import INFINITE, NOTHING, EveryValuePays, Hearing, Proof, StandsAt, partial_assignment
 from robochoc.model.message import Message, Value
 from robochoc.model.wording import Wording
 from robochoc.protocols import acts
@@ -23,6 +26,10 @@ class CPA(Message, frozen=True):
         """Return what the sender says."""
         return f"so far {words.partial(self.assignments)}; it is {words.receiver}'s turn"
 
+    def proves(self, hearing: Hearing) -> Sequence[Proof]:
+        """Return what the message proves to its receiver."""
+        return _partial(self.assignments, self.sc, hearing)
+
 
 class FcCPA(Message, frozen=True):
     """A copy of the CPA of step `sc`, for forward checking (`FC_CPA`)."""
@@ -36,6 +43,10 @@ class FcCPA(Message, frozen=True):
         """Return what the sender says."""
         return f"so far {words.partial(self.assignments)}; look which of your values still go with it"
 
+    def proves(self, hearing: Hearing) -> Sequence[Proof]:
+        """Return what the message proves to its receiver."""
+        return _partial(self.assignments, self.sc, hearing)
+
 
 class NotOk(Message, frozen=True):
     """An inconsistent partial assignment: no solution extends `assignments`; found at step `sc` (`Not_OK`)."""
@@ -48,6 +59,11 @@ class NotOk(Message, frozen=True):
     def in_words(self, words: Wording) -> str:
         """Return what the sender says."""
         return f"no solution has {words.partial(self.assignments)}" if self.assignments else "there is no solution"
+
+    def proves(self, hearing: Hearing) -> Sequence[Proof]:
+        """Return what the message proves to its receiver."""
+        # The sender has found it by forward checking, with its own constraints alone.
+        return [EveryValuePays(hearing.sender, dict(zip(hearing.branch, self.assignments, strict=False)), INFINITE)]
 
 
 class BacktrackCPA(Message, frozen=True):
@@ -65,3 +81,14 @@ class BacktrackCPA(Message, frozen=True):
     def in_words(self, words: Wording) -> str:
         """Return what the sender says."""
         return f"no solution has {words.partial(self.assignments)}: take another value"
+
+    def proves(self, _: Hearing) -> Sequence[Proof]:
+        """Return what the message proves to its receiver."""
+        # It may follow from any robot's constraints.
+        return NOTHING
+
+
+def _partial(assignments: Assignments, sc: int, hearing: Hearing) -> Sequence[Proof]:
+    """Return what a consistent CPA of step `sc` proves."""
+    stands = [StandsAt(robot, value, (sc,)) for robot, value in zip(hearing.branch, assignments, strict=False)]
+    return [*stands, *partial_assignment(hearing.branch, assignments)]

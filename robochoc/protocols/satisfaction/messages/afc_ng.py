@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 from robochoc.model.communicative_acts import Act, Performative
+from robochoc.model.disclosure import AT_THE_END, Hearing, Proof, StandsAt, partial_assignment
 from robochoc.model.message import Message, Value
 from robochoc.model.wording import Wording
 from robochoc.protocols import acts
@@ -23,6 +26,16 @@ class CPA(Message, frozen=True):
         """Return what the sender says."""
         return f"so far {words.partial([value for value, _ in self.assignments])}"
 
+    def proves(self, hearing: Hearing) -> Sequence[Proof]:
+        """Return what the message proves to its receiver."""
+        values = [value for value, _ in self.assignments]
+        counters = tuple([counter for _, counter in self.assignments])
+        stands = [
+            StandsAt(robot, value, counters[: place + 1])
+            for place, (robot, value) in enumerate(zip(hearing.branch, values, strict=False))
+        ]
+        return [*stands, *partial_assignment(hearing.branch, values)]
+
 
 class Solved(Message, frozen=True):
     """The end of the search: a solution was found (`stp`). Its receivers only look it up."""
@@ -35,3 +48,9 @@ class Solved(Message, frozen=True):
     def in_words(self, words: Wording) -> str:
         """Return what the sender says."""
         return f"a solution is found, and the search is over: {words.assigned(self.solution.items())}"
+
+    def proves(self, hearing: Hearing) -> Sequence[Proof]:
+        """Return what the message proves to its receiver."""
+        robots = [robot for robot in hearing.order if robot in self.solution]
+        values = [self.solution[robot] for robot in robots]
+        return [*(StandsAt(*one, AT_THE_END) for one in self.solution.items()), *partial_assignment(robots, values)]

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
+from robochoc.model.disclosure import Hearing, Proof, can_take
 from robochoc.model.message import Message, Value
 from robochoc.model.wording import Wording
 from robochoc.protocols import acts
@@ -22,3 +25,7 @@ class Accept(Message, frozen=True):
         """Return what the sender says."""
         values = f", with {words.assigned(self.subtree.items())}" if self.subtree else ""
         return f"all below {words.receiver}, from me down, accept its partial assignment{values}"
+
+    def proves(self, _: Hearing) -> Sequence[Proof]:
+        """Return what the message proves to its receiver."""
+        return [can_take(robot, value) for robot, value in self.subtree.items()]

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
+from robochoc.model.disclosure import NOTHING, Hearing, Proof, StandsAt
 from robochoc.model.message import Message, Value
 from robochoc.model.wording import Wording, is_withdrawn, listed
 from robochoc.protocols import acts
@@ -18,6 +21,10 @@ class Ok(Message, frozen=True):
     def in_words(self, words: Wording) -> str:
         """Return what the sender says."""
         return f"{words.own_value(self.value)} from now on, with priority {self.priority}"
+
+    def proves(self, hearing: Hearing) -> Sequence[Proof]:
+        """Return what the message proves to its receiver."""
+        return [StandsAt(hearing.sender, self.value)]
 
 
 class Nogood(Message, frozen=True):
@@ -36,6 +43,11 @@ class Nogood(Message, frozen=True):
             return f"{facts[0]} cannot stand, whatever the others do"
         return f"{listed(facts)} cannot {'both' if len(facts) == len('ab') else 'all'} stand"
 
+    def proves(self, _: Hearing) -> Sequence[Proof]:
+        """Return what the message proves to its receiver."""
+        # It may follow from any robot's constraints.
+        return NOTHING
+
 
 class AddLink(Message, frozen=True):
     """A new link between sender and receiver because of a nogood: each sends the other its value from now on."""
@@ -47,3 +59,7 @@ class AddLink(Message, frozen=True):
         return (
             f"from now on let us tell each other {words.variables(words.sender)} and {words.variables(words.receiver)}"
         )
+
+    def proves(self, _: Hearing) -> Sequence[Proof]:
+        """Return what the message proves to its receiver."""
+        return NOTHING

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
+from robochoc.model.disclosure import NOTHING, Hearing, Proof, StandsWhere
 from robochoc.model.message import Message
 from robochoc.model.wording import Wording, counted, listed
 from robochoc.protocols import acts
@@ -22,6 +25,11 @@ class Ok(Message, frozen=True):
             f"my assignment number {self.counter} stands from now on; it leaves {words.receiver} {left} of its domain"
         )
 
+    def proves(self, hearing: Hearing) -> Sequence[Proof]:
+        """Return what the message proves to its receiver."""
+        upwards = hearing.order.index(hearing.sender) > hearing.order.index(hearing.receiver)
+        return [StandsWhere(hearing.sender, hearing.receiver, self.allowed, parts_only=upwards)]
+
 
 class Nogood(Message, frozen=True):
     """A nogood over counters: the receiver's assignment `counter` is ruled out while all in `lhs` hold (`ngd`)."""
@@ -39,6 +47,11 @@ class Nogood(Message, frozen=True):
         rest = "" if named else ", whatever the others do"
         return f"{condition}{words.receiver} cannot keep its assignment number {self.counter}{rest}"
 
+    def proves(self, _: Hearing) -> Sequence[Proof]:
+        """Return what the message proves to its receiver."""
+        # Only the senders of these counters know which values they stand for.
+        return NOTHING
+
 
 class AddLink(Message, frozen=True):
     """A request of a lower-priority robot to be sent the receiver's assignments from now on (`adl`)."""
@@ -48,3 +61,7 @@ class AddLink(Message, frozen=True):
     def in_words(self, _: Wording) -> str:
         """Return what the sender says."""
         return "tell me of each new assignment of yours from now on"
+
+    def proves(self, _: Hearing) -> Sequence[Proof]:
+        """Return what the message proves to its receiver."""
+        return NOTHING

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
+from robochoc.model.disclosure import NOTHING, Hearing, Proof, StandsAt
 from robochoc.model.message import Message, Value
 from robochoc.model.wording import Wording
 
@@ -16,3 +19,7 @@ class Placed(Message, frozen=True):
         if self.value is None:
             return "I withdraw"
         return f"I fly, with {words.own_value(self.value, 'a value')}"
+
+    def proves(self, hearing: Hearing) -> Sequence[Proof]:
+        """Return what the message proves to its receiver."""
+        return NOTHING if self.value is None else [StandsAt(hearing.sender, self.value)]

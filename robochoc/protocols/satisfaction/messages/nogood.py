@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
+from robochoc.model.disclosure import INFINITE, NOTHING, Clash, EveryValuePays, Hearing, Proof
 from robochoc.model.message import Message, Value
 from robochoc.model.wording import Wording
 from robochoc.protocols import acts
@@ -19,3 +22,13 @@ class Nogood(Message, frozen=True):
     def in_words(self, words: Wording) -> str:
         """Return what the sender says."""
         return words.nogood(self.lhs, self.value)
+
+    def proves(self, hearing: Hearing) -> Sequence[Proof]:
+        """Return what the message proves to its receiver."""
+        broken = {**self.lhs, hearing.receiver: self.value}
+        if not hearing.fixed_holders:
+            return NOTHING
+        if hearing.order.index(hearing.sender) < hearing.order.index(hearing.receiver):
+            return [Clash(broken)]  # the sender's part of a partially known constraint
+        # A nogood of any other robot may follow from constraints of those below it, and then says nothing of its own.
+        return [EveryValuePays(hearing.sender, broken, INFINITE)] if hearing.is_lowest(hearing.sender) else NOTHING

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
+from robochoc.model.disclosure import INFINITE, NOTHING, EveryValuePays, Hearing, Proof, StandsAt, partial_assignment
 from robochoc.model.message import Message, Value
 from robochoc.model.wording import Wording
 from robochoc.protocols import acts
@@ -18,6 +21,11 @@ class CPA(Message, frozen=True):
         """Return what the sender says."""
         return f"so far {words.partial(self.assignments)}; it is {words.receiver}'s turn"
 
+    def proves(self, hearing: Hearing) -> Sequence[Proof]:
+        """Return what the message proves to its receiver."""
+        stands = [StandsAt(robot, value) for robot, value in zip(hearing.branch, self.assignments, strict=False)]
+        return [*stands, *partial_assignment(hearing.branch, self.assignments)]
+
 
 class Backtrack(Message, frozen=True):
     """A request to take the next value: no robot below has a value that agrees with the receiver's."""
@@ -28,3 +36,10 @@ class Backtrack(Message, frozen=True):
     def in_words(self, words: Wording) -> str:
         """Return what the sender says."""
         return f"nobody below {words.receiver} has a value left that goes with its own: take another one"
+
+    def proves(self, hearing: Hearing) -> Sequence[Proof]:
+        """Return what the message proves to its receiver."""
+        cpa = hearing.last(CPA, hearing.receiver, hearing.sender)
+        if cpa is None or not hearing.is_lowest(hearing.sender):
+            return NOTHING
+        return [EveryValuePays(hearing.sender, dict(zip(hearing.branch, cpa.assignments, strict=False)), INFINITE)]

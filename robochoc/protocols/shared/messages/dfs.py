@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Annotated
 
 import msgspec
 
 from robochoc.model.communicative_acts import Act, Performative
+from robochoc.model.disclosure import NOTHING, Hearing, Proof
 from robochoc.model.message import Message
 from robochoc.model.wording import Wording, counted, listed
 
@@ -26,6 +28,10 @@ class Wave(Message, frozen=True):
         """Return what the sender says."""
         return f"{self.candidate}, which has {counted(self.neighbours, 'neighbour')}, wants to be the root"
 
+    def proves(self, _: Hearing) -> Sequence[Proof]:
+        """Return what the message proves to its receiver."""
+        return NOTHING
+
 
 Visited = dict[str, Annotated[int, msgspec.Meta(ge=1)]]
 """Robots in the tree, each with the number of its neighbours that have not heard so; without those that all know of."""
@@ -42,6 +48,10 @@ class Token(Message, frozen=True):
         """Return what the sender says."""
         return f"you are my child in the tree{_news(self.visited)}"
 
+    def proves(self, _: Hearing) -> Sequence[Proof]:
+        """Return what the message proves to its receiver."""
+        return NOTHING
+
 
 class Back(Message, frozen=True):
     """The token on its way back: all robots below the sender are in the tree; `visited` are in the tree."""
@@ -53,6 +63,10 @@ class Back(Message, frozen=True):
     def in_words(self, _: Wording) -> str:
         """Return what the sender says."""
         return f"all below me are in the tree{_news(self.visited)}"
+
+    def proves(self, _: Hearing) -> Sequence[Proof]:
+        """Return what the message proves to its receiver."""
+        return NOTHING
 
 
 def _news(visited: Visited) -> str:

@@ -1,0 +1,103 @@
+"""`robochoc privacy`: what robots have learnt of each other in a recorded run."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from robochoc.cli.options.local_problems import limits, local_options
+from robochoc.cli.options.paths import InputPath, OutputFile, TeamFolder, refuse_same_places
+from robochoc.cli.options.saved import saved_journal
+from robochoc.cli.reports.failures import INVALID, USAGE, Failure, failures_told, invalid_input_fails
+
+if TYPE_CHECKING:
+    from robochoc.privacy import Measure, PrivacyReport
+    from robochoc.replay import ReplayOptions
+
+MEASURES = ("linear", "entropy", "known")
+
+
+@click.command()
+@click.argument("journal", type=InputPath(), metavar="JOURNAL")
+@click.option("--run", "number", type=click.IntRange(1), metavar="N", help="Run or epoch N.  [default: the last]")
+@click.option(
+    "--measure", type=click.Choice(MEASURES), default="entropy", show_default=True, help="Measure of the table."
+)
+@click.option("--html", type=OutputFile(), metavar="FILE", help="Write a page: who has learnt how much of whom.")
+@click.option(
+    "--team",
+    "folder",
+    type=TeamFolder(),
+    metavar="DIR",
+    help="The team's folder, for a journal without the robots' problems (from several machines).",
+)
+@click.option("--json", "as_json", is_flag=True, help="Print one JSON object, with all measures of all pairs.")
+@local_options
+@invalid_input_fails
+def privacy(
+    journal: Path,
+    number: int | None,
+    measure: str,
+    html: Path | None,
+    folder: Path | None,
+    *,
+    as_json: bool,
+    **local: Any,  # noqa: ANN401 - the options of local problems
+) -> None:
+    """Measure how much robots have learnt of each other's problems in the run that JOURNAL records.
+
+    For each robot, the mean loss to all other robots: 0 where they have excluded nothing, 1 where they know all. There
+    are three kinds of secrets: the value in the answer (decision), what the robot's own values cost and which it can
+    take (domain), and the entries of constraints that it shares with third robots (constraints).
+
+    Losses are lower bounds: what the messages' rules prove, and no more. Where a message without a rule was heard, the
+    loss is not known. See docs/guides/privacy.md.
+    """
+    from robochoc.formats import read_team
+    from robochoc.privacy import Measure
+    from robochoc.replay import ReplayOptions
+    from robochoc.solver.cache import SolutionCache
+
+    refuse_same_places({"--html": html}, {"the journal": journal})
+    options = ReplayOptions(
+        team=read_team(folder) if folder else None,
+        limits=limits(local["local_solutions"], local["local_timeout"], always_ace=local["always_ace"]),
+        cache=None if local["no_cache"] else SolutionCache(),
+    )
+    report = _measured(journal, number, options)
+    if as_json:
+        from robochoc.cli.reports.privacy import privacy_json
+
+        click.echo(privacy_json(report))
+    else:
+        from robochoc.cli.reports.privacy import print_privacy
+
+        print_privacy(report, Measure(measure))
+    if html is not None:
+        _write(html, report, Measure(measure))
+
+
+def _measured(path: Path, number: int | None, options: ReplayOptions) -> PrivacyReport:
+    from robochoc.privacy import PrivacyError, privacy_of
+
+    recorded = saved_journal(path)
+    if recorded.damage is not None and not recorded.truncated:
+        raise Failure(INVALID, f"{path}: it was altered: {recorded.damage}")
+    try:
+        with failures_told(path):
+            return privacy_of(recorded, options, number)
+    except PrivacyError as why:
+        raise Failure(INVALID if why.broken else USAGE, f"{path}: {why}") from why
+
+
+def _write(html: Path, report: PrivacyReport, measure: Measure) -> None:
+    from robochoc.privacy.page import page_of
+    from robochoc.system.files import write_atomically
+
+    try:
+        write_atomically(html, page_of(report, measure).encode())
+    except OSError as error:
+        raise Failure(INVALID, f"{html}: the page cannot be written: {error.strerror}") from error
+    click.echo(f"{html}: written", err=True)

@@ -1,0 +1,140 @@
+"""Measures of privacy loss: how much an observer has excluded of what a subject's problem may be.
+
+They are valuations of possible states (Maheswaran, Pearce, Bowring, Varakantham, Tambe: "Privacy loss in distributed
+constraint reasoning: a quantitative framework for analysis and its applications", JAAMAS 13, 2006). A subject's states
+are all combinations of what its secrets may be. With S of them at first, and P that the observer still takes to be
+possible, privacy is (P - 1) / (S - 1) by LinearTS, and log P / log S by EntropyTS. The third measure is the share of
+the secrets that are not known exactly. Loss is 1 - privacy: 0 where nothing is excluded, 1 where all is known.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from enum import StrEnum
+
+
+class Kind(StrEnum):
+    """The kinds of secrets."""
+
+    DECISION = "decision"
+    DOMAIN = "domain"
+    CONSTRAINTS = "constraints"
+
+
+class Measure(StrEnum):
+    """The measures of loss."""
+
+    LINEAR = "linear"
+    ENTROPY = "entropy"
+    KNOWN = "known"
+
+
+@dataclass(frozen=True)
+class Loss:
+    """What `observer` has learnt of one kind of secrets of `subject`.
+
+    Attributes:
+        observer: The robot that has heard.
+        subject: The robot that is heard of.
+        kind: The kind of secrets.
+        secrets: How many secrets of that kind there are.
+        linear: The loss by LinearTS. None: not known, as is the loss by the others.
+        entropy: The loss by EntropyTS.
+        known: The share of the secrets that are known exactly.
+    """
+
+    observer: str
+    subject: str
+    kind: Kind
+    secrets: int
+    linear: float | None
+    entropy: float | None
+    known: float | None
+
+    def by(self, measure: Measure) -> float | None:
+        """Return the loss by `measure`. None: it is not known."""
+        match measure:
+            case Measure.LINEAR:
+                return self.linear
+            case Measure.ENTROPY:
+                return self.entropy
+            case Measure.KNOWN:
+                return self.known
+
+
+@dataclass(frozen=True)
+class PrivacyReport:
+    """The privacy loss in one run.
+
+    Attributes:
+        team: The name of the team.
+        protocol: The protocol of the run, by its class.
+        run: Which run of the journal it is, counted from 1.
+        runs: How many there are.
+        robots: All robots, the highest priority first.
+        losses: For each observer and each subject that has secrets for it. Pairs without any are left out.
+        without_rule: The types of messages that were heard, and have no rule.
+        undecided: Why decisions are not among the losses. Empty: they are.
+    """
+
+    team: str
+    protocol: str
+    run: int
+    runs: int
+    robots: tuple[str, ...]
+    losses: tuple[Loss, ...]
+    without_rule: tuple[str, ...]
+    undecided: str = ""
+
+    def system_loss(self, kind: Kind, measure: Measure) -> float | None:
+        """Return the mean loss over all pairs of robots. None: there is none, or of one it is not known."""
+        return mean([loss.by(measure) for loss in self.losses if loss.kind is kind])
+
+    def loss_of(self, subject: str, kind: Kind, measure: Measure) -> float | None:
+        """Return the mean loss of a subject to all observers."""
+        return mean([loss.by(measure) for loss in self.losses if loss.kind is kind and loss.subject == subject])
+
+    def kinds(self) -> list[Kind]:
+        """Return the kinds of secrets that there are."""
+        return [kind for kind in Kind if any(loss.kind is kind for loss in self.losses)]
+
+
+def mean(losses: Sequence[float | None]) -> float | None:
+    """Return the mean; None if there is none, or one is not known."""
+    known = [loss for loss in losses if loss is not None]
+    return math.fsum(known) / len(known) if known and len(known) == len(losses) else None
+
+
+def loss_between(
+    observer: str, subject: str, kind: Kind, numbers: Sequence[tuple[int, int]], *, known: bool
+) -> Loss | None:
+    """Return the loss; None if there is nothing to hide.
+
+    Args:
+        observer: The robot that has heard.
+        subject: The robot that is heard of.
+        kind: The kind of secrets.
+        numbers: For each secret, how many states it has, and how many are still possible.
+        known: Whether the loss is known.
+    """
+    hidden = [(states, possible) for states, possible in numbers if states > 1]
+    if not hidden:
+        return None
+    if not known:
+        return Loss(observer, subject, kind, len(hidden), None, None, None)
+    states = math.prod(before for before, _ in hidden)
+    possible = math.prod(after for _, after in hidden)
+    before = math.fsum(math.log(number) for number, _ in hidden)
+    after = math.fsum(math.log(number) for _, number in hidden)
+    exact = sum(number == 1 for _, number in hidden)
+    return Loss(
+        observer=observer,
+        subject=subject,
+        kind=kind,
+        secrets=len(hidden),
+        linear=(states - possible) / (states - 1),
+        entropy=1 - after / before,
+        known=exact / len(hidden),
+    )

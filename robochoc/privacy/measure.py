@@ -1,0 +1,207 @@
+"""From a journal to the privacy loss of a run: every message is heard by its receiver, and by nobody else."""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Iterator, Mapping, Sequence
+
+from robochoc.journal.events import Decided, Received, Sent
+from robochoc.journal.given import run_parameters_of
+from robochoc.journal.journal import Journal
+from robochoc.model.message import Message, Value
+from robochoc.model.outcome import Verdict
+from robochoc.privacy.losses import Kind, Loss, PrivacyReport, loss_between
+from robochoc.privacy.observer import Observer, Scene
+from robochoc.privacy.possible import Secret
+from robochoc.privacy.secrets import TeamSecrets, TooManySecretsError
+from robochoc.protocols.order import PseudoTree
+from robochoc.replay.rebuild import CannotReplayError, Rebuilder, RebuiltRobots, ReplayOptions
+from robochoc.replay.steps import RecordedRun, runs_of
+from robochoc.sniffer.recorded_messages import message_of, types_by_name
+from robochoc.solver.agent_problem import RunParameters
+
+Edge = tuple[str, str]
+
+
+class PrivacyError(Exception):
+    """The privacy loss of a run cannot be told: why. `broken`: the journal is damaged, or a message's rule is wrong."""
+
+    def __init__(self, why: str, *, broken: bool = False) -> None:
+        super().__init__(why)
+        self.broken = broken
+
+
+def privacy_of(journal: Journal, options: ReplayOptions | None = None, number: int | None = None) -> PrivacyReport:
+    """Return the privacy loss of a run.
+
+    Args:
+        journal: The journal, with the problem that robots were given.
+        options: What is needed besides the journal (`replay/rebuild.py`).
+        number: Which run, counted from 1. None: the last one.
+
+    Raises:
+        PrivacyError: if there is no such run, or what is needed is missing.
+    """
+    runs = list(runs_of(journal.events))
+    number = len(runs) if number is None else number
+    if not 1 <= number <= len(runs):
+        raise PrivacyError(f"there is no run {number}: the journal holds {len(runs)}")
+    rebuilder = Rebuilder(journal.header, options or ReplayOptions())
+    try:
+        robots = [rebuilder.robots_of(run) for run in runs[:number]][-1]
+        return _Measured(journal, runs, number, robots).report()
+    except CannotReplayError as why:
+        raise PrivacyError(str(why), broken=why.broken) from why
+    except TooManySecretsError as why:
+        raise PrivacyError(str(why)) from why
+
+
+class _Measured:
+    """What the robots of one run have heard, and what it comes to."""
+
+    def __init__(self, journal: Journal, runs: Sequence[RecordedRun], number: int, robots: RebuiltRobots) -> None:
+        self._journal = journal
+        self._runs = len(runs)
+        self._number = number
+        self._run = runs[number - 1]
+        self._robots = robots
+        self._types = types_by_name(robots.protocol)
+        self._team = robots.compiled.team
+        given = self._run.given
+        self._parameters = RunParameters() if given is None else run_parameters_of(given)
+        self._secrets = TeamSecrets(robots.compiled, self._parameters)
+        scene = Scene(
+            secrets=self._secrets,
+            order=self._team.order,
+            branches=self._branches(),
+            fixed_holders=not robots.protocol.traits.shared_scopes,
+            minimises=any(host.protocol.problem.has_costs for host in robots.hosts.values()),
+        )
+        self._observers = {
+            name: Observer(scene, name, host.protocol.problem.values) for name, host in robots.hosts.items()
+        }
+
+    def report(self) -> PrivacyReport:
+        """Let every message be heard, and return the losses."""
+        self._hear_all()
+        for observer in self._observers.values():
+            observer.knowledge.settle()
+        decided, undecided = self._decisions()
+        losses = [loss for one in self._observers.values() for loss in self._losses(one, decided)]
+        return PrivacyReport(
+            team=self._team.name,
+            protocol=self._robots.protocol.__name__,
+            run=self._number,
+            runs=self._runs,
+            robots=tuple(self._team.order),
+            losses=tuple(losses),
+            without_rule=tuple(sorted({kind for one in self._observers.values() for kind in one.without_rule})),
+            undecided=undecided,
+        )
+
+    def _branches(self) -> Mapping[str, Sequence[str]]:
+        """Return for each robot the robots whose values its partial assignments hold."""
+        order = self._team.order
+        if not self._robots.protocol.traits.tree:
+            return dict.fromkeys(order, order)
+        links = {robot.name: [parent.name for parent in robot.parents] for robot in self._team.robots}
+        tree = PseudoTree.induced(order, links)
+        return {name: (*reversed(tree.ancestors(name)), name) for name in order}
+
+    def _hear_all(self) -> None:
+        """Deliver each message when it was received; those that were not say what an observer does not know."""
+        under_way: dict[Edge, deque[Sent]] = {}
+        for event in self._run.events:
+            match event:
+                case Sent():
+                    under_way.setdefault((event.sender, event.receiver), deque()).append(event)
+                    if event.sender in self._observers:
+                        self._observers[event.sender].says(event.receiver, self._message(event))
+                case Received():
+                    waiting = under_way.get((event.sender, event.receiver))
+                    if waiting and event.receiver in self._observers:
+                        sent = waiting.popleft()
+                        self._deliver(self._observers[event.receiver], sent, self._message(sent))
+                case _:
+                    pass
+        for sent in [one for waiting in under_way.values() for one in waiting]:
+            if sent.receiver in self._observers:
+                self._observers[sent.receiver].misses(sent.sender, self._message(sent))
+
+    def _deliver(self, observer: Observer, sent: Sent, message: Message) -> None:
+        try:
+            observer.hears(sent.sender, message)
+        except (LookupError, ValueError) as error:
+            raise PrivacyError(
+                f"{sent.type} from {sent.sender} to {sent.receiver} says what no robot can say: {error}", broken=True
+            ) from error
+
+    def _message(self, sent: Sent) -> Message:
+        kind = self._types.get(sent.type)
+        message = None if kind is None else message_of(kind, sent.content)
+        if message is None:
+            raise PrivacyError(f"{sent.type} from {sent.sender} is no message of this protocol", broken=True)
+        return message
+
+    # What it comes to
+
+    def _losses(self, observer: Observer, decided: Mapping[str, Value]) -> Iterator[Loss]:
+        """Yield what an observer has learnt of each subject."""
+        known = not observer.without_rule
+        for subject in self._team.order:
+            if subject == observer.name:
+                continue
+            if subject in decided:
+                values = observer.possible_values(subject)
+                if known and decided[subject] not in values:
+                    raise self._wrong(observer, subject, "decision")
+                numbers = [(len(self._secrets.declared[subject]), len(values))]
+                yield from _there(loss_between(observer.name, subject, Kind.DECISION, numbers, known=known))
+            charges = self._secrets.unknown_charges(subject, observer.name)
+            entries = self._secrets.unknown_entries(subject, observer.name)
+            for kind, secrets in ((Kind.DOMAIN, charges), (Kind.CONSTRAINTS, entries)):
+                numbers = [self._numbers(observer, subject, secret) for secret in secrets]
+                yield from _there(loss_between(observer.name, subject, kind, numbers, known=known))
+
+    def _numbers(self, observer: Observer, subject: str, secret: Secret) -> tuple[int, int]:
+        """Return how many states a secret has, and how many are possible. The true one must be among them."""
+        possible = observer.knowledge[secret]
+        if not possible.contains(self._secrets.truths[secret]):
+            raise self._wrong(observer, subject, "problem")
+        return self._secrets.most + 2, possible.number
+
+    @staticmethod
+    def _wrong(observer: Observer, subject: str, what: str) -> PrivacyError:
+        return PrivacyError(
+            f"what {observer.name} has heard excludes the true {what} of {subject}:"
+            " the journal was altered, or a message's rule is wrong",
+            broken=True,
+        )
+
+    def _decisions(self) -> tuple[dict[str, Value], str]:
+        """Return the values of the robots in the answer, and why there are none."""
+        outcome = self._journal.outcome
+        if self._number < self._runs:
+            return {}, "only the last run of a journal comes to the team's decision"
+        if not self._robots.protocol.traits.complete:
+            return {}, "the protocol is incomplete, and its robots need not tell their last values"
+        if outcome is None or outcome.verdict not in {Verdict.SOLUTION, Verdict.OPTIMAL}:
+            return {}, "the run found no solution"
+        last: dict[str, Mapping[str, int]] = {}
+        for event in self._run.events:
+            if isinstance(event, Decided):
+                last[event.robot] = event.assignment
+        stands = {name: value for assignment in last.values() for name, value in assignment.items()}
+        if stands != outcome.assignment:
+            return {}, "the answer is not the robots' last values, so messages do not tell it"
+        decided: dict[str, Value] = {}
+        for robot in self._team.robots:
+            value = tuple(outcome.assignment.get(name) for name in robot.interface)
+            if value in self._secrets.declared[robot.name]:
+                decided[robot.name] = value
+        return decided, ""
+
+
+def _there(loss: Loss | None) -> Iterator[Loss]:
+    if loss is not None:
+        yield loss

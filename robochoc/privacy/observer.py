@@ -1,0 +1,208 @@
+"""A robot as an observer of the others: what it hears in a run, and what follows from it."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Mapping, Sequence
+from typing import NamedTuple, assert_never
+
+from robochoc.model.disclosure import (
+    FINITE,
+    Clash,
+    EveryValuePays,
+    HasOnly,
+    Hearing,
+    M,
+    Pays,
+    Proof,
+    SomeValuePays,
+    StandsAt,
+    StandsWhere,
+    Total,
+    View,
+)
+from robochoc.model.message import Message, Value
+from robochoc.model.problem import INFINITE
+from robochoc.model.wording import is_withdrawn
+from robochoc.privacy.possible import AtLeast, AtMost, Case, Knowledge, OneAtMost, OneCase, Terms
+from robochoc.privacy.secrets import TeamSecrets
+
+Channel = tuple[type[Message], str, str]
+
+
+class Scene(NamedTuple):
+    """What is the same for all observers of a run.
+
+    Attributes:
+        secrets: The secrets of the team.
+        order: All robots, the highest priority first.
+        branches: By robot, the robots whose values its partial assignments hold.
+        fixed_holders: As in `Hearing`.
+        minimises: As in `Hearing`.
+    """
+
+    secrets: TeamSecrets
+    order: Sequence[str]
+    branches: Mapping[str, Sequence[str]]
+    fixed_holders: bool
+    minimises: bool
+
+
+class _Stand(NamedTuple):
+    """The last that an observer has heard of a robot's value: the values, and the statement that leaves some of them.
+
+    Without a statement it is one of `values`.
+    """
+
+    stamp: tuple[int, ...]
+    values: tuple[Value, ...]
+    cases: OneCase | None = None
+
+
+class Observer:
+    """One robot, `name`, which can take `values`; `without_rule` are the types of messages that have no rule."""
+
+    def __init__(self, scene: Scene, name: str, values: Sequence[Value]) -> None:
+        self.name = name
+        self.knowledge = Knowledge(scene.secrets.most, scene.secrets.withdrawing)
+        self.knowledge.known.update(scene.secrets.known_from_the_start(name))
+        self.without_rule: set[str] = set()
+        self._scene = scene
+        self._values: dict[str, Sequence[Value]] = {name: values}
+        self._last: dict[Channel, Message] = {}
+        self._stands: dict[str, _Stand] = {}
+
+    def says(self, receiver: str, message: Message) -> None:
+        """Note a message that the observer sends."""
+        self._last[type(message), self.name, receiver] = message
+
+    def hears(self, sender: str, message: Message) -> None:
+        """Take in a message, and all that it proves."""
+        proofs = message.proves(_Heard(self._scene, sender, self.name, self._values, self._last))
+        self._last[type(message), sender, self.name] = message
+        if proofs is None:
+            self.without_rule.add(type(message).__name__)
+            return
+        for proof in proofs:
+            self._learn(proof)
+
+    def misses(self, sender: str, message: Message) -> None:
+        """Forget where a robot stands if a message that does not arrive any more says otherwise."""
+        for proof in message.proves(_Heard(self._scene, sender, self.name, self._values, self._last)) or ():
+            if isinstance(proof, StandsAt | StandsWhere):
+                self._stands.pop(proof.robot, None)
+
+    def possible_values(self, robot: str) -> list[Value]:
+        """Return the values at which `robot` may stand now, by what was heard of it, after `knowledge.settle()`."""
+        stand = self._stands.get(robot)
+        if stand is None:
+            return list(self._scene.secrets.declared[robot])
+        if stand.cases is None:
+            return list(stand.values)
+        return [stand.values[place] for place in self.knowledge.open_cases(stand.cases)]
+
+    def _learn(self, proof: Proof) -> None:
+        """Put what a message proves in terms of secrets."""
+        match proof:
+            case StandsAt(robot, value, stamp):
+                if None not in value or is_withdrawn(value):
+                    self._bound(self._scene.secrets.own_cost(robot, value, {}), 0, FINITE)
+                    self._stand(robot, _Stand(stamp, (value,)))
+            case StandsWhere():
+                self._stands_where(proof)
+            case HasOnly(robot, values):
+                self._values[robot] = values
+                for value in self._scene.secrets.declared[robot]:
+                    least, most = (0, FINITE) if value in values else (INFINITE, INFINITE)
+                    self._bound(self._scene.secrets.own_cost(robot, value, {}), least, most)
+            case _:
+                self._learn_cost(proof)
+
+    def _learn_cost(self, proof: Pays | EveryValuePays | SomeValuePays | Total | Clash) -> None:
+        """Put what a message proves of costs in terms of secrets."""
+        secrets = self._scene.secrets
+        match proof:
+            case Pays(robot, value, view, least, most):
+                for complete in secrets.completions(view):
+                    self._bound(secrets.own_cost(robot, value, complete), least, most)
+            case EveryValuePays(robot, view, least):
+                self._every_value(robot, view, least)
+            case SomeValuePays(robot, view, most):
+                sums = tuple(secrets.own_cost(robot, value, view) for value in secrets.declared[robot])
+                if most < INFINITE:
+                    self.knowledge.tell(OneAtMost(sums, most))
+            case Total(view, cost):
+                self._bound(secrets.total(view), cost, cost)
+            case Clash(view):
+                for complete in secrets.completions(view):
+                    self._bound(secrets.among(complete), INFINITE, INFINITE)
+            case never:
+                assert_never(never)
+
+    def _every_value(self, robot: str, view: View, least: float) -> None:
+        secrets = self._scene.secrets
+        for complete in secrets.completions(view):
+            for value in secrets.declared[robot]:
+                if not is_withdrawn(value):
+                    self._bound(secrets.own_cost(robot, value, complete), least, INFINITE)
+
+    def _stands_where(self, proof: StandsWhere) -> None:
+        """Leave those values of a robot that go with exactly the values that its message says."""
+        secrets = self._scene.secrets
+        others = [value for value in secrets.declared[proof.other] if not is_withdrawn(value)]
+        values = secrets.declared[proof.robot]
+        cases = OneCase(tuple(self._case(proof, value, others) for value in values))
+        self.knowledge.tell(cases)
+        self._stand(proof.robot, _Stand((), values, cases))
+
+    def _case(self, proof: StandsWhere, value: Value, others: Sequence[Value]) -> Case:
+        secrets = self._scene.secrets
+        finite: list[int] = list(secrets.own_cost(proof.robot, value, {}))
+        broken: list[Terms] = []
+        for place, theirs in enumerate(others):
+            terms = secrets.filtered(proof.robot, value, proof.other, theirs, parts_only=proof.parts_only)
+            if proof.allowed[place >> 3] >> (place & 7) & 1:
+                finite += terms
+            else:
+                broken.append(terms)
+        return Case(tuple(dict.fromkeys(finite)), tuple(broken))
+
+    def _stand(self, robot: str, stand: _Stand) -> None:
+        known = self._stands.get(robot)
+        if known is None or stand.stamp >= known.stamp:
+            self._stands[robot] = stand
+
+    def _bound(self, terms: Terms, least: float, most: float) -> None:
+        if least > 0:
+            self.knowledge.tell(AtLeast(terms, least))
+        if most < INFINITE:
+            self.knowledge.tell(AtMost(terms, most))
+
+
+class _Heard(Hearing):
+    """A message as an observer hears it."""
+
+    def __init__(
+        self,
+        scene: Scene,
+        sender: str,
+        receiver: str,
+        values: Mapping[str, Sequence[Value]],
+        last: Mapping[Channel, Message],
+    ) -> None:
+        self.sender, self.receiver = sender, receiver
+        self.order = scene.order
+        self.branch = scene.branches[sender]
+        self.fixed_holders = scene.fixed_holders
+        self.minimises = scene.minimises
+        self._neighbours = scene.secrets.neighbours
+        self._values, self._last = values, last
+
+    def neighbours(self, robot: str) -> Collection[str]:
+        return self._neighbours[robot]
+
+    def values(self, robot: str) -> Sequence[Value] | None:
+        return self._values.get(robot)
+
+    def last(self, kind: type[M], sender: str, receiver: str) -> M | None:
+        found = self._last.get((kind, sender, receiver))
+        return found if isinstance(found, kind) else None

@@ -1,0 +1,218 @@
+"""What a secret may still be, and what statements about sums of secrets rule out.
+
+A secret is a cost: an integer from 0 up to a known largest one, or `INFINITE`. What is possible is a range of finite
+costs, and whether the secret may be infinite. Statements narrow that down until nothing changes (bounds consistency):
+all of them together are used, but each looks only at the bounds of the secrets in it. So nothing true is ever ruled
+out, and not all that is false.
+"""
+
+from __future__ import annotations
+
+import math
+from collections import deque
+from collections.abc import Collection, Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import NamedTuple, assert_never
+
+from robochoc.model.problem import INFINITE
+
+Secret = int
+"""The number of a secret."""
+Terms = tuple[Secret, ...]
+
+
+class Possible(NamedTuple):
+    """The finite costs from `least` to `most` (none if `most` is smaller), and `INFINITE` if `infinite`."""
+
+    least: int
+    most: int
+    infinite: bool
+
+    @property
+    def number(self) -> int:
+        """The number of possible costs."""
+        return max(0, self.most - self.least + 1) + self.infinite
+
+    @property
+    def minimum(self) -> float:
+        """The smallest possible cost."""
+        return self.least if self.least <= self.most else INFINITE
+
+    def contains(self, cost: float) -> bool:
+        """Return whether `cost` is possible."""
+        return self.infinite if cost == INFINITE else self.least <= cost <= self.most
+
+    def at_least(self, cost: float) -> Possible:
+        """Return what is left if the secret is at least `cost`."""
+        least = self.most + 1 if cost == INFINITE else max(self.least, math.ceil(cost))
+        return Possible(least, self.most, self.infinite)
+
+    def at_most(self, cost: float) -> Possible:
+        """Return what is left if the secret is at most `cost`, which is finite."""
+        return Possible(self.least, min(self.most, math.floor(cost)), infinite=False)
+
+
+ANY = Possible(0, 2**53, infinite=False)
+"""Any finite cost: the sum of all is below 2^53 (`solver/exact_costs.py`)."""
+
+
+class AtLeast(NamedTuple):
+    """The sum of `terms` is at least `least`."""
+
+    terms: Terms
+    least: float
+
+
+class AtMost(NamedTuple):
+    """The sum of `terms` is at most `most`, which is finite."""
+
+    terms: Terms
+    most: float
+
+
+class OneAtMost(NamedTuple):
+    """At least one of these `sums` is at most `most`, which is finite."""
+
+    sums: tuple[Terms, ...]
+    most: float
+
+
+class Case(NamedTuple):
+    """A way how things may be: the secrets in `finite` are so, and in each of `broken` one is infinite."""
+
+    finite: Terms
+    broken: tuple[Terms, ...]
+
+
+class OneCase(NamedTuple):
+    """One of `cases` is true."""
+
+    cases: tuple[Case, ...]
+
+
+Statement = AtLeast | AtMost | OneAtMost | OneCase
+
+
+@dataclass
+class Knowledge:
+    """What one observer knows of all secrets.
+
+    Attributes:
+        most: The largest finite cost that a secret may have.
+        free: Secrets that may have any finite cost, of which nothing is concluded.
+        known: What is possible, of the secrets of which more than that is known.
+    """
+
+    most: int
+    free: Collection[Secret] = frozenset()
+    known: dict[Secret, Possible] = field(default_factory=dict)
+    _statements: dict[tuple[type[Statement], Statement], Statement] = field(default_factory=dict)
+
+    def __getitem__(self, secret: Secret) -> Possible:
+        if secret in self.free:
+            return ANY
+        known = self.known.get(secret)
+        return Possible(0, self.most, infinite=True) if known is None else known
+
+    def tell(self, statement: Statement) -> None:
+        """Take note of a statement; `settle` draws the conclusions."""
+        self._statements[type(statement), statement] = statement  # tuples of two types may be equal
+
+    def open_cases(self, statement: OneCase) -> list[int]:
+        """Return the places of the cases that may be true."""
+        return [place for place, case in enumerate(statement.cases) if self._may_be(case)]
+
+    def settle(self) -> None:
+        """Draw all conclusions that single statements allow, until there is nothing new."""
+        statements = list(self._statements.values())
+        naming = _naming(statements)
+        waiting = deque(range(len(statements)))
+        queued = set(waiting)
+        while waiting:
+            place = waiting.popleft()
+            queued.discard(place)
+            for secret in self._conclude(statements[place]):
+                news = [other for other in naming[secret] if other not in queued]
+                queued.update(news)
+                waiting.extend(news)
+
+    def _conclude(self, statement: Statement) -> list[Secret]:
+        """Return the secrets of which more is known now."""
+        match statement:
+            case AtLeast(terms, least):
+                return self._at_least(terms, least)
+            case AtMost(terms, most):
+                return self._at_most(terms, most)
+            case OneAtMost(sums, most):
+                left = [terms for terms in sums if self._minimum(terms) <= most]
+                return self._at_most(left[0], most) if len(left) == 1 else []
+            case OneCase(cases):
+                left_open = self.open_cases(statement)
+                return self._take(cases[left_open[0]]) if len(left_open) == 1 else []
+            case never:
+                assert_never(never)
+
+    def _at_least(self, terms: Terms, least: float) -> list[Secret]:
+        """Conclude for each term: it makes up for what all others cannot come to."""
+        changed: list[Secret] = []
+        unbounded = [secret for secret in terms if self[secret].infinite]
+        if len(unbounded) > 1:
+            return changed
+        rest = sum(self[secret].most for secret in terms if secret not in unbounded)
+        for secret in unbounded or terms:
+            others = rest if unbounded else rest - self[secret].most
+            self._narrow(secret, self[secret].at_least(least - others), changed)
+        return changed
+
+    def _at_most(self, terms: Terms, most: float) -> list[Secret]:
+        """Conclude for each term: it is no more than what all others leave at least."""
+        changed: list[Secret] = []
+        total = self._minimum(terms)
+        for secret in terms if total < INFINITE else ():
+            self._narrow(secret, self[secret].at_most(most - (total - self[secret].minimum)), changed)
+        return changed
+
+    def _take(self, case: Case) -> list[Secret]:
+        changed: list[Secret] = []
+        for secret in case.finite:
+            self._narrow(secret, self[secret]._replace(infinite=False), changed)
+        for terms in case.broken:
+            changed += self._at_least(terms, INFINITE)
+        return changed
+
+    def _may_be(self, case: Case) -> bool:
+        finite = all(self[secret].minimum < INFINITE for secret in case.finite)
+        return finite and all(any(self[secret].infinite for secret in terms) for terms in case.broken)
+
+    def _minimum(self, terms: Terms) -> float:
+        return sum(self[secret].minimum for secret in terms)
+
+    def _narrow(self, secret: Secret, possible: Possible, changed: list[Secret]) -> None:
+        if secret not in self.free and possible.number < self[secret].number:
+            self.known[secret] = possible
+            changed.append(secret)
+
+
+def _naming(statements: Sequence[Statement]) -> Mapping[Secret, list[int]]:
+    """Return for each secret the places of the statements that name it."""
+    found: dict[Secret, list[int]] = {}
+    for place, statement in enumerate(statements):
+        for secret in dict.fromkeys(_secrets(statement)):
+            found.setdefault(secret, []).append(place)
+    return found
+
+
+def _secrets(statement: Statement) -> Iterable[Secret]:
+    """Yield all secrets that are named in a statement."""
+    match statement:
+        case AtLeast(terms) | AtMost(terms):
+            yield from terms
+        case OneAtMost(sums):
+            for terms in sums:
+                yield from terms
+        case OneCase(cases):
+            for case in cases:
+                for terms in (case.finite, *case.broken):
+                    yield from terms
+        case never:
+            assert_never(never)

@@ -1,0 +1,195 @@
+"""The secrets of a team: what each robot's problem says, as far as others do not know it from the start.
+
+There are two kinds of them besides the values that robots take. What a robot's private constraints charge for each of
+its declared values (`INFINITE`: it cannot take the value), which no other robot knows. And what a shared constraint
+costs for each combination of declared values, which the robots of its scope know; of a partially known constraint each
+robot knows its own part only.
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from typing import NamedTuple
+
+from robochoc.model.disclosure import View
+from robochoc.model.message import Value
+from robochoc.model.problem import INFINITE, Constraint, ConstraintModel, Robot
+from robochoc.model.wording import is_withdrawn
+from robochoc.privacy.possible import Possible, Secret, Terms
+from robochoc.solver.agent_problem import RunParameters
+from robochoc.solver.compiled_team import CompiledTeam
+from robochoc.solver.explanation import held_above, held_below
+
+MOST_SECRETS = 200_000
+"""Robots' values and entries of constraints, in all."""
+
+
+class TooManySecretsError(ValueError):
+    """The team has too many values, or too large constraints."""
+
+
+class _Entries(NamedTuple):
+    """The entries of a shared constraint: where the values of its variables stand, and a secret for each combination.
+
+    `knowing` are the robots that know the constraint.
+    """
+
+    places: tuple[tuple[str, int], ...]
+    owners: frozenset[str]
+    knowing: frozenset[str]
+    secrets: Mapping[Value, Secret]
+
+
+class TeamSecrets:
+    """The secrets of a team, by number; `truths` has the true costs.
+
+    Attributes:
+        declared: By robot, all combinations of declared values of its interface variables, in ascending order; and that
+            it is withdrawn, if robots may withdraw.
+        charges: By robot and value.
+        entries: By robot, the secrets in its shared constraints.
+        most: The largest finite cost of them all.
+        neighbours: By robot, those that share a constraint with it.
+    """
+
+    def __init__(self, team: CompiledTeam, parameters: RunParameters) -> None:
+        self.truths: list[float] = []
+        self.declared: dict[str, tuple[Value, ...]] = {}
+        self.charges: dict[str, dict[Value, Secret]] = {}
+        self.entries: dict[str, dict[Secret, frozenset[str]]] = {}
+        """With the robots that know each from the start."""
+        self.neighbours: dict[str, set[str]] = {robot.name: set() for robot in team.team.robots}
+        self.withdrawing: set[Secret] = set()
+        """What it costs to withdraw, and values that cannot be told from that: not counted, and never narrowed."""
+        self._shared: dict[str, list[_Entries]] = {robot.name: [] for robot in team.team.robots}
+        self._team = team.team
+        self._places = {
+            name: (robot.name, place) for robot in team.team.robots for place, name in enumerate(robot.interface)
+        }
+        for robot in team.team.robots:
+            self._add_charges(robot, team, parameters)
+        for robot in team.team.robots:
+            for one in held_above(robot):
+                self._add_constraint(one.constraint, robot.name)
+            for _, part in held_below(robot):
+                self._add_constraint(part.constraint, robot.name)
+        finite = (int(cost) for number, cost in enumerate(self.truths) if self._is_counted_cost(number, cost))
+        self.most = max(finite, default=0)
+
+    def known_from_the_start(self, observer: str) -> Iterator[tuple[Secret, Possible]]:
+        """Yield the secrets that `observer` knows."""
+        for secret in self.charges[observer].values():
+            yield secret, exactly(self.truths[secret])
+        for secret, knowing in self.entries[observer].items():
+            if observer in knowing:
+                yield secret, exactly(self.truths[secret])
+
+    def unknown_charges(self, subject: str, observer: str) -> list[Secret]:
+        """Return the charges of `subject` that `observer` does not know from the start."""
+        found = self.charges[subject].values() if subject != observer else ()
+        return [secret for secret in found if secret not in self.withdrawing]
+
+    def unknown_entries(self, subject: str, observer: str) -> list[Secret]:
+        """Return the entries of constraints that `subject` knows, and `observer` does not know from the start."""
+        return [one for one, knowing in self.entries[subject].items() if subject in knowing and observer not in knowing]
+
+    def own_cost(self, robot: str, value: Value, view: View) -> Terms:
+        """Return the secrets whose sum is the own cost of `value` of `robot` in `view` (`model/disclosure.py`)."""
+        charge = self.charges[robot].get(value)
+        terms = [] if charge is None else [charge]
+        return tuple(terms + self._between({**view, robot: value}, self._shared[robot]))
+
+    def filtered(self, robot: str, value: Value, other: str, theirs: Value, *, parts_only: bool) -> Terms:
+        """Return the secrets in constraints between two robots that `robot` knows, for a value of each.
+
+        With `parts_only` only in its parts of partially known ones.
+        """
+        view = {robot: value, other: theirs}
+        own = [one for one in self._shared[robot] if robot in one.knowing]
+        return tuple(self._between(view, [one for one in own if not parts_only or one.knowing == {robot}]))
+
+    def among(self, view: View) -> Terms:
+        """Return the secrets in all constraints among the robots of `view`."""
+        shared = {id(one): one for robot in view for one in self._shared[robot]}
+        return tuple(self._between(view, list(shared.values())))
+
+    def total(self, view: View) -> Terms:
+        """Return the secrets whose sum is what the values in `view` charge, and all constraints among them cost."""
+        charged = [self.charges[robot][value] for robot, value in view.items() if value in self.charges[robot]]
+        return (*charged, *self.among(view))
+
+    def completions(self, view: View) -> Iterator[View]:
+        """Yield `view` with each combination of values for the variables that do not matter in it."""
+        every = [self._like(robot, value) for robot, value in view.items()]
+        if math.prod(map(len, every)) <= MOST_SECRETS:
+            for values in itertools.product(*every):
+                yield dict(zip(view, values, strict=True))
+
+    def _like(self, robot: str, value: Value) -> Sequence[Value]:
+        """Return the declared values of `robot` that agree with `value` where it is not None."""
+        if is_withdrawn(value) or None not in value:
+            return [value]
+        return [
+            one
+            for one in self.declared[robot]
+            if not is_withdrawn(one) and all(wanted in (None, part) for wanted, part in zip(value, one, strict=True))
+        ]
+
+    def _is_counted_cost(self, secret: Secret, cost: float) -> bool:
+        return cost < INFINITE and secret not in self.withdrawing
+
+    def _between(self, view: View, shared: Sequence[_Entries]) -> list[Secret]:
+        """Return the secrets in those of these constraints whose robots are all in `view`, none of them withdrawn."""
+        return [
+            one.secrets[tuple([view[robot][place] for robot, place in one.places])]
+            for one in shared
+            if all(owner in view and not is_withdrawn(view[owner]) for owner in one.owners)
+        ]
+
+    def _add_charges(self, robot: Robot, team: CompiledTeam, parameters: RunParameters) -> None:
+        columns = [sorted(self._team.variables[name].domain) for name in robot.interface]
+        self._make_room(math.prod(map(len, columns)), f"{robot.name} can show its neighbours")
+        domain = team[robot.name]
+        costs: dict[Value, float] = dict(zip(domain.values, domain.costs, strict=True))
+        declared: list[Value] = list(itertools.product(*columns))
+        self.charges[robot.name] = {value: self._added(costs.get(value, INFINITE)) for value in declared}
+        if parameters.withdrawal_cost is not None:
+            away: Value = (None,) * len(robot.interface)
+            if away not in declared:
+                declared.append(away)
+                self.charges[robot.name][away] = self._added(parameters.withdrawal_cost * robot.weight)
+            self.withdrawing.add(self.charges[robot.name][away])
+        self.declared[robot.name] = tuple(declared)
+        self.entries[robot.name] = {}
+
+    def _add_constraint(self, constraint: Constraint, holder: str) -> None:
+        names = constraint.variables
+        columns = [sorted(self._team.variables[name].domain) for name in names]
+        self._make_room(math.prod(map(len, columns)), f"constraint {constraint.name} of {holder} has")
+        places = tuple(self._places[name] for name in names)
+        owners = frozenset(robot for robot, _ in places)
+        knowing = frozenset([holder]) if constraint.model is ConstraintModel.PKC else owners | {holder}
+        secrets: dict[Value, Secret] = {
+            values: self._added(constraint.price(dict(zip(names, values, strict=True))))
+            for values in itertools.product(*columns)
+        }
+        added = _Entries(places, owners, knowing, secrets)
+        for owner in sorted(owners | {holder}):
+            self._shared[owner].append(added)
+            self.neighbours[owner] |= owners - {owner}
+            self.entries[owner].update(dict.fromkeys(secrets.values(), knowing))
+
+    def _added(self, cost: float) -> Secret:
+        self.truths.append(cost)
+        return len(self.truths) - 1
+
+    def _make_room(self, number: int, who: str) -> None:
+        if len(self.truths) + number > MOST_SECRETS:
+            raise TooManySecretsError(f"{who} {number:,} combinations of values; all together at most {MOST_SECRETS:,}")
+
+
+def exactly(cost: float) -> Possible:
+    """Return what is possible of a secret that is known."""
+    return Possible(0, -1, infinite=True) if cost == INFINITE else Possible(int(cost), int(cost), infinite=False)

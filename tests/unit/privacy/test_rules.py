@@ -1,0 +1,140 @@
+"""What messages prove, worked out by hand."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import msgspec
+import pytest
+
+from robochoc.journal.events import Sent
+from robochoc.journal.journal import Header, Journal, JournalRecorder, read_journal
+from robochoc.model.problem import Constraint, ConstraintModel, Relation, Semantics, Team
+from robochoc.privacy import Kind, Loss, Measure, PrivacyError, PrivacyReport, privacy_of
+from robochoc.privacy.page import page_of
+from robochoc.protocols.local_search.messages.mgm import Gain
+from robochoc.run import Options, Runtime, solve
+from tests.support.cost_problems import with_costs
+from tests.support.problems import team_of
+
+
+def soft(first: str, second: str, rows: dict[tuple[int, int], float]) -> Constraint:
+    """A constraint with these costs, 0 for all other pairs."""
+    relation = Relation(f"{first}{second}", 2, Semantics.SOFT, tuple(rows), tuple(rows.values()))
+    return Constraint("c", relation, (first, second), (first, second))
+
+
+def unary(variable: str, costs: dict[int, float]) -> Constraint:
+    """A private constraint with these costs."""
+    relation = Relation(f"u{variable}", 1, Semantics.SOFT, tuple((value,) for value in costs), tuple(costs.values()))
+    return Constraint("u", relation, (variable,), (variable,), model=None)
+
+
+def differ(first: str, second: str, model: ConstraintModel = ConstraintModel.TKC) -> Constraint:
+    relation = Relation("differ", 2, Semantics.CONFLICTS, ((1, 1), (2, 2)))
+    return Constraint("c", relation, (first, second), (first, second), model)
+
+
+def report_of(team: Team, protocol: str) -> PrivacyReport:
+    return privacy_of(journal_of(team, protocol))
+
+
+def journal_of(team: Team, protocol: str) -> Journal:
+    recorder = JournalRecorder(Header(team=team.name, protocol=protocol, runtime="simulator", seed=0))
+    options = Options(protocol=protocol, runtime=Runtime.SIMULATOR, cache=False)
+    recorder.outcome = solve(team, options, observer=recorder)
+    return read_journal(recorder.content())
+
+
+def loss(report: PrivacyReport, observer: str, subject: str, kind: Kind) -> Loss:
+    (found,) = [one for one in report.losses if (one.observer, one.subject, one.kind) == (observer, subject, kind)]
+    return found
+
+
+PAIR = team_of({"A": (1, 2), "B": (1, 2)}, [differ("A", "B")])
+CHAIN = team_of({"A": (1, 2), "B": (1, 2), "C": (1, 2)}, [differ("A", "B"), differ("B", "C")])
+
+
+def test_abt_tells_lower_neighbours_the_value_and_that_it_can_be_taken() -> None:
+    report = report_of(PAIR, "abt")
+    assert loss(report, "RB", "RA", Kind.DECISION).entropy == 1
+    assert loss(report, "RB", "RA", Kind.DOMAIN).known == 0.5  # the other value was never told
+    assert loss(report, "RA", "RB", Kind.DECISION).entropy == 0
+    assert loss(report, "RA", "RB", Kind.DOMAIN).entropy == 0
+
+
+def test_whoever_hears_nothing_excludes_nothing() -> None:
+    report = report_of(CHAIN, "abt")
+    assert all(one.entropy == 0 for one in report.losses if (one.observer, one.subject) == ("RA", "RC"))
+    assert loss(report, "RA", "RC", Kind.CONSTRAINTS).secrets == 4
+
+
+def test_the_partial_assignment_of_sbt_tells_that_pairs_are_allowed() -> None:
+    report = report_of(CHAIN, "sbt")
+    # C hears of A = 1, B = 2: one of four entries, and both decisions.
+    assert loss(report, "RC", "RA", Kind.CONSTRAINTS).known == 0.25
+    assert [loss(report, "RC", other, Kind.DECISION).linear for other in ("RA", "RB")] == [1, 1]
+
+
+def test_disfc_tells_the_value_to_whoever_knows_the_constraint() -> None:
+    report = report_of(PAIR, "disfc")
+    assert loss(report, "RB", "RA", Kind.DECISION).entropy == 1
+
+
+def test_a_table_of_dpop_bounds_what_the_sender_pays() -> None:
+    team = with_costs(team_of({"A": (1, 2), "B": (1, 2)}, [soft("A", "B", {(1, 1): 2}), unary("B", {1: 3, 2: 3})]))
+    report = report_of(team, "dpop")
+    # RA is the root, as it is higher, and hears of 3 and 3. So neither value of B costs less than 3, the largest cost;
+    # and with A = 1, where B = 1 costs 2 more, it is B = 2 that costs 3: two states are left of 5 x 5.
+    assert loss(report, "RA", "RB", Kind.DOMAIN).linear == pytest.approx((25 - 2) / 24)
+    assert loss(report, "RB", "RA", Kind.DECISION).entropy == 1
+
+
+def test_the_path_of_syncbb_tells_each_robot_s_cost_exactly() -> None:
+    team = with_costs(team_of({"A": (1, 2), "B": (1, 2)}, [soft("A", "B", {(1, 1): 9}), unary("A", {1: 4, 2: 1})]))
+    report = report_of(team, "syncbb")
+    assert loss(report, "RB", "RA", Kind.DOMAIN).known == 1  # each value was on a path, with its cost
+    assert loss(report, "RB", "RA", Kind.DECISION).known == 1
+
+
+def test_a_message_without_a_rule_makes_the_loss_not_known_and_not_0() -> None:
+    report = report_of(PAIR, "mgm")
+    assert report.without_rule == (Gain.__name__,)
+    assert {one.by(measure) for one in report.losses for measure in Measure} == {None}
+    assert report.system_loss(Kind.DOMAIN, Measure.ENTROPY) is None
+    assert "not known" in page_of(report, Measure.LINEAR)
+
+
+def test_what_parts_of_partially_known_constraints_say_is_a_secret_of_their_holders() -> None:
+    part = differ("A", "B", ConstraintModel.PKC)
+    report = report_of(team_of({"A": (1, 2), "B": (1, 2)}, [part]), "abt")
+    assert {one.subject for one in report.losses if one.kind is Kind.CONSTRAINTS} <= {"RA", "RB"}
+    assert any(one.kind is Kind.CONSTRAINTS for one in report.losses)
+
+
+def test_a_run_that_is_not_there_is_refused() -> None:
+    with pytest.raises(PrivacyError, match="no run 2: the journal holds 1"):
+        privacy_of(journal_of(PAIR, "abt"), number=2)
+
+
+def test_without_a_solution_nobody_decides() -> None:
+    team = team_of({"A": (1,), "B": (1,)}, [differ("A", "B")])
+    assert report_of(team, "abt").undecided == "the run found no solution"
+
+
+def test_an_altered_message_is_found_where_it_excludes_the_truth() -> None:
+    journal = journal_of(CHAIN, "abt")
+    events = [
+        msgspec.structs.replace(one, content={"value": [2]}) if isinstance(one, Sent) and one.sender == "RA" else one
+        for one in journal.events
+    ]
+    altered = replace(journal, events=tuple(events))
+    with pytest.raises(PrivacyError, match="excludes the true decision"):
+        privacy_of(altered)
+
+
+def test_the_page_has_a_cell_for_each_pair_and_needs_nothing_else() -> None:
+    page = page_of(report_of(CHAIN, "sbt"), Measure.ENTROPY)
+    assert page.count("<svg") == 3
+    assert "RC of RA: 1.000" in page
+    assert "<script" not in page
