@@ -1,0 +1,63 @@
+"""How much protocols reveal: mean system losses (EntropyTS) on random meetings, for the tables in docs/guides/privacy.md.
+
+    python benchmarks/privacy.py [PROBLEMS]
+
+First all meetings have to take place (a DisCSP), so that protocols for satisfaction and for costs solve the same
+problems; then what meetings are worth is maximised.
+"""
+
+from __future__ import annotations
+
+import sys
+from statistics import mean
+
+from robochoc.generators.meetings import meetings
+from robochoc.journal.journal import Header, JournalRecorder, read_journal
+from robochoc.model.outcome import Verdict
+from robochoc.privacy import Kind, Measure, PrivacyReport, privacy_of
+from robochoc.run import Options, Runtime, solve
+
+PROBLEMS = 20
+SATISFYING = ("abt", "disfc", "afc", "afc-ng", "dpop", "syncbb", "sfb")
+MINIMISING = ("dpop", "syncbb", "sfb", "adopt")
+MAX_VALUE = 10
+
+
+def reports(protocol: str, problems: int, max_value: int | None) -> list[PrivacyReport]:
+    """Return the privacy loss in each run that finds a solution."""
+    found = []
+    seed = 0
+    while len(found) < problems:
+        team = meetings(6, 6, 2, 4, seed, max_value=max_value, model="eav")
+        recorder = JournalRecorder(Header(team=team.name, protocol=protocol, runtime="simulator", seed=seed))
+        options = Options(protocol=protocol, runtime=Runtime.SIMULATOR, seed=seed, cache=False)
+        recorder.outcome = solve(team, options, observer=recorder)
+        seed += 1
+        if recorder.outcome.verdict in {Verdict.SOLUTION, Verdict.OPTIMAL}:
+            found.append(privacy_of(read_journal(recorder.content())))
+    return found
+
+
+def row(protocol: str, problems: int, max_value: int | None) -> str:
+    """Return a protocol's row of the table."""
+    measured = reports(protocol, problems, max_value)
+    cells = []
+    for kind in Kind:
+        losses = [loss for one in measured if (loss := one.system_loss(kind, Measure.ENTROPY)) is not None]
+        cells.append(f"{mean(losses):.3f}" if len(losses) == len(measured) else "not known")
+    return f"| `{protocol}` | {' | '.join(cells)} |"
+
+
+def main() -> None:
+    """Print the tables."""
+    problems = int(sys.argv[1]) if sys.argv[1:] else PROBLEMS
+    for protocols, max_value in ((SATISFYING, None), (MINIMISING, MAX_VALUE)):
+        print(f"| protocol | {' | '.join(Kind)} |")
+        print(f"| --- |{' --- |' * len(Kind)}")
+        for protocol in protocols:
+            print(row(protocol, problems, max_value), flush=True)
+        print()
+
+
+if __name__ == "__main__":
+    main()
