@@ -1,4 +1,4 @@
-"""How much protocols reveal: mean system losses (EntropyTS) on random meetings, for the tables in docs/guides/privacy.md.
+"""How much protocols reveal: mean system losses on random meetings, for the tables in docs/guides/privacy.md.
 
     python benchmarks/privacy.py [PROBLEMS]
 
