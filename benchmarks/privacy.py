@@ -25,7 +25,7 @@ MAX_VALUE = 10
 
 def reports(protocol: str, problems: int, max_value: int | None) -> list[PrivacyReport]:
     """Return the privacy loss in each run that finds a solution."""
-    found = []
+    found: list[PrivacyReport] = []
     seed = 0
     while len(found) < problems:
         team = meetings(6, 6, 2, 4, seed, max_value=max_value, model="eav")

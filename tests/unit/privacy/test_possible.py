@@ -36,14 +36,13 @@ def random_statement(chance: Random, costs: tuple[float, ...]) -> Statement:
         return tuple(chance.sample(range(len(costs)), chance.randint(0, len(costs))))
 
     while True:
-        statement: Statement = chance.choice(
-            [
-                AtLeast(terms(), chance.choice([1, 2, 3, INFINITE])),
-                AtMost(terms(), chance.randint(0, 4)),
-                OneAtMost((terms(), terms()), chance.randint(0, 3)),
-                OneCase((Case(terms(), (terms(),)), Case(terms(), ()))),
-            ]
-        )
+        drawn: list[Statement] = [
+            AtLeast(terms(), chance.choice([1, 2, 3, INFINITE])),
+            AtMost(terms(), chance.randint(0, 4)),
+            OneAtMost((terms(), terms()), chance.randint(0, 3)),
+            OneCase((Case(terms(), (terms(),)), Case(terms(), ()))),
+        ]
+        statement = chance.choice(drawn)
         if true_of(statement, costs):
             return statement
 
