@@ -120,15 +120,15 @@ class UTIL(Message, frozen=True):
         return piece_in_words(self.costs, self.width)
 
     def proves(self, hearing: Hearing) -> Sequence[Proof] | None:
-        """Return what the message proves to its receiver. There is no rule for tables in pieces, or large ones.
+        """Return what the message proves to its receiver. There is no rule for tables in pieces, large ones, or MB-DPOP's.
 
         For each combination of values, some value of the sender costs no more than its cell says: all that is below
         costs 0 at least. A sender whose neighbours are all above it has nobody below; then no value costs less.
         """
         axes = _axes(hearing, hearing.receiver, hearing.sender)
         dimensions = hearing.last(Dimensions, hearing.sender, hearing.receiver)
-        if dimensions is None:
-            raise ValueError("a table comes before its dimensions")
+        if axes is None or dimensions is None:
+            return None
         shape = [dimensions.separator[robot] for robot in axes]
         cells = cells_of(self.costs, self.width)
         if len(cells) != math.prod(shape) or len(cells) > MOST_CELLS:
@@ -150,19 +150,19 @@ class VALUE(Message, frozen=True):
         places = listed([str(place + 1) for place in self.assignment])
         return f"by number, the values of the robots in your separator are {places}, the nearest robot first"
 
-    def proves(self, hearing: Hearing) -> Sequence[Proof]:
+    def proves(self, hearing: Hearing) -> Sequence[Proof] | None:
         """Return what the message proves to its receiver."""
         axes = _axes(hearing, hearing.sender, hearing.receiver)
+        if axes is None:
+            return None
         known = [(robot, hearing.values(robot), place) for robot, place in zip(axes, self.assignment, strict=True)]
         return [StandsAt(robot, values[place]) for robot, values, place in known if values is not None]
 
 
-def _axes(hearing: Hearing, parent: str, child: str) -> Sequence[str]:
-    """Return the axes of a child's table. Raises `ValueError` if its parent has not told them."""
+def _axes(hearing: Hearing, parent: str, child: str) -> Sequence[str] | None:
+    """Return the axes of a child's table. None: they were told otherwise than by DPOP's messages."""
     told = hearing.last(Proceed, parent, child)
-    if told is None:
-        raise ValueError(f"{parent} has not told {child} to proceed")
-    return told.separator
+    return None if told is None else told.separator
 
 
 def _table_proves(shape: Mapping[str, int], cells: Sequence[float], hearing: Hearing) -> Sequence[Proof]:
