@@ -120,7 +120,7 @@ class UTIL(Message, frozen=True):
         return piece_in_words(self.costs, self.width)
 
     def proves(self, hearing: Hearing) -> Sequence[Proof] | None:
-        """Return what the message proves to its receiver. There is no rule for tables in pieces, large ones, or MB-DPOP's.
+        """Return what the message proves to its receiver. There is no rule for large tables, or MB-DPOP's.
 
         For each combination of values, some value of the sender costs no more than its cell says: all that is below
         costs 0 at least. A sender whose neighbours are all above it has nobody below; then no value costs less.
