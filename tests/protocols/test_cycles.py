@@ -17,6 +17,8 @@ from robochoc.protocols.inference.maxsum_ad import MaxSumAD
 from robochoc.protocols.local_search.dsa import DSA
 from robochoc.protocols.local_search.dsa_sdp import DSASDP
 from robochoc.protocols.local_search.gdba import GDBA
+from robochoc.protocols.local_search.kopt import KOpt
+from robochoc.protocols.local_search.lamdls import LAMDLS
 from robochoc.protocols.local_search.mgm import MGM
 from robochoc.protocols.local_search.mgm2 import MGM2
 from robochoc.protocols.local_search.mixed_dsa import MixedDSA
@@ -41,6 +43,8 @@ NAMES: dict[type[CycleProtocol], str] = {
     DSA: "dsa",
     DSASDP: "dsa-sdp",
     MixedDSA: "mixed-dsa",
+    LAMDLS: "lamdls",
+    KOpt: "kopt",
     MGM: "mgm",
     MGM2: "mgm2",
     GDBA: "gdba",
