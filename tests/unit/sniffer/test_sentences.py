@@ -102,6 +102,8 @@ REAL = {
     ("ncbb", "Search"): "RX02 says: search your subtree for less than 20",
     ("ncbb", "Result"): "RX02 says: my subtree costs 25, with X02 = 1, X01 = -1, X03 = 3 and X04 = -2",
     ("ncbb", "Terminate"): "RX02 says: the search is over, with X03 = 3 and X04 = -2",
+    ("pt-fb", "CPA"): "RX02 says: search your subtree for less than 8; at least 5 of it is paid by RX04",
+    ("pt-fb", "Reduce"): "RX02 says: search no further",
     ("dpop", "Domain"): "RX00 says: X00 is -3, 0, 3 or 5",
     ("dpop", "Dimensions"): (
         "RX03 says: my table will have 16 cells over RX02 (4 values) and RX00 (4 values), and no cost above 19;"
