@@ -106,6 +106,9 @@ RULES = (
     ),
     Rule("abt", (PARTIAL,), "constraints are partially known, and it takes them"),
     Rule(
+        "syncabb", (PARTIAL, COSTS), "both sides of partially known constraints have costs, and it proves the best sum"
+    ),
+    Rule(
         "sfb",
         (
             CHANGES,

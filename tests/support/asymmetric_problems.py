@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from random import Random
 
@@ -21,22 +21,18 @@ SEVERAL, LOOSE, ONE_SIDED = 0.2, 0.4, 0.2
 """How often teams are of robots with several variables, have what nobody needs, or lack a part."""
 
 
-def random_asymmetric_team(chance: Random, *, n_ary: bool = True) -> Team:
+def random_asymmetric_team(chance: Random, *, simple: bool = False) -> Team:
     """Return a team of 2 to 8 robots, some in unconnected parts; most constraints of two robots are PKCs with costs.
 
     Parts are soft tables, hard ones, and predicates with or without a cost. Beside them there are TKC constraints, also
-    for the same pair, and n-ary ones.
+    for the same pair, and n-ary ones. `simple`: robots have one variable each.
     """
-    several = chance.random() < SEVERAL
-    plain = (
-        softened(several_variables_team(chance, n_ary=n_ary), chance)
-        if several
-        else random_cost_team(chance, n_ary=n_ary)
-    )
+    several = not simple and chance.random() < SEVERAL
+    plain = softened(several_variables_team(chance, n_ary=True), chance) if several else random_cost_team(chance)
     team = with_asymmetric_costs(plain, chance)
     if chance.random() < ONE_SIDED:
         team = one_sided(team, chance)
-    return loosened(team, chance) if chance.random() < LOOSE else team
+    return loosened(team, chance) if not simple and chance.random() < LOOSE else team
 
 
 def with_asymmetric_costs(team: Team, chance: Random) -> Team:
@@ -63,12 +59,15 @@ def with_asymmetric_costs(team: Team, chance: Random) -> Team:
     return team
 
 
-def check_asymmetric(protocol: str, chance: Random, options: Options | None = None) -> Outcome:
+def check_asymmetric(
+    protocol: str, chance: Random, options: Options | None = None, settings: Mapping[str, str] | None = None
+) -> Outcome:
     """Solve a random team by the complete `protocol`; the cost must be brute force's."""
     team = random_asymmetric_team(chance)
     how = random_options(team, protocol, chance)
     if options is not None:
         how = replace(options, protocol=protocol, order=how.order)
+    how = replace(how, settings=dict(settings or {}))
     cost = minimum_cost(team)
     outcome = solve(team, how)
     if cost == INFINITE:

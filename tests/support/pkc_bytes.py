@@ -7,6 +7,7 @@ from collections import defaultdict
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, replace
 from random import Random
+from types import MappingProxyType
 
 import msgspec
 import pytest
@@ -18,6 +19,7 @@ from robochoc.journal.events import AnyEvent, Decided
 from robochoc.model.message import Envelope, encode
 from robochoc.model.problem import Constraint, ConstraintModel, Domain, Relation, Robot, Semantics, Team
 from robochoc.protocols.protocol import Protocol
+from robochoc.solver.agent_problem import RunParameters
 from robochoc.solver.compiled_team import CompiledTeam
 from robochoc.solver.shared_constraint import OtherValues, SharedConstraint
 from tests.support.pkc_problems import allowed, as_predicate, as_table, pkc_parts, rows, with_constraints
@@ -54,6 +56,7 @@ def run(
     team: Team | CompiledTeam,
     protocol: type[Protocol],
     seed: int,
+    settings: Mapping[str, str] = MappingProxyType({}),
 ) -> Run:
     """One run in the simulator; the same seed draws the same channels as long as the same is said."""
     tapped = _Tapped(seed)
@@ -64,7 +67,8 @@ def run(
             for name, value in event.assignment.items():
                 taken[name].add(value)
 
-    result = Simulation(team, protocol, tapped, observer=note).run(60)
+    parameters = RunParameters(settings=dict(settings))
+    result = Simulation(team, protocol, tapped, observer=note, parameters=parameters).run(60)
     return Run(result, tuple(tapped.envelopes), taken)
 
 

@@ -123,12 +123,18 @@ class SyncBB(Protocol):
             cost = self.problem.cost(index, self._view)
             if self.paid + cost < self.best.bound:
                 self.value = index
-                path = [*self.path, (self.problem.values[index], cost)]
-                if self.rank + 1 < len(self.order.names):
-                    self.send(self.order.names[self.rank + 1], Path(path, self.best))
+                if self._pass_on(cost):
                     return
-                self.best = BestPath(self.paid + cost, tuple(value for value, _ in path))
         self._backtrack()
+
+    def _pass_on(self, cost: Cost) -> bool:
+        """Send the path on with the own value, which costs so much. Return False if it is complete: the best one."""
+        path = [*self.path, (self.problem.values[self.value or 0], cost)]
+        if self.rank + 1 < len(self.order.names):
+            self.send(self.order.names[self.rank + 1], Path(path, self.best))
+            return True
+        self.best = BestPath(self.paid + cost, tuple(value for value, _ in path))
+        return False
 
     def _backtrack(self) -> None:
         """Send the path back to the robot before; the first robot ends the search."""

@@ -1,0 +1,1 @@
+"""What these protocols send: the messages of `syncabb.py` are in `messages/syncabb.py`."""

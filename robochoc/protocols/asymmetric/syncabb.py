@@ -1,0 +1,173 @@
+"""Synchronous Asymmetric Branch and Bound (SyncABB), with one phase or two.
+
+Branch and bound for asymmetric costs: each robot of a constraint pays its own part, and nobody else knows it. The
+values of the robots so far (the CPA) go from robot to robot in priority order, as in SyncBB. Its holder knows only its
+own side. So the CPA also goes back, and the robots before add what their own sides charge for the new value. Only the
+sum travels. Once it reaches the bound, the holder takes its next value.
+
+With one phase (`phases=1`) each new value is priced at once. With two, the CPA first becomes complete with the sides of
+lower robots alone, then goes back once, and each robot adds its sides towards all lower robots.
+
+- **When to use**: asymmetric costs, few robots, little said of the own costs.
+- **Guarantees**: complete; it terminates with an optimum, or with a proof that there is no solution. Space is linear.
+- **Parameters (`--set`)**: `phases` (1 or 2, default 1).
+- **Reference**: Grinshpoun, Grubshtein, Zivan, Netzer, Meisels: "Asymmetric distributed constraint optimization
+  problems", JAIR 47, 2013 (SyncABB-1ph and SyncABB-2ph).
+
+The methods:
+
+    extend the CPA    `_extend` (of SyncBB)      the first phase, or a step of one phase   `_pass_on`
+    CPA on its way back                          `_add_side`, `_add_all_sides`
+    it has come back, with its cost              `_hand_on`
+
+What others learn: robots after it learn its values, and the cost of the CPA in sum. A robot before learns the cost of
+the CPA without its own side. No entry of a part that no CPA asked for changes any message.
+
+Choices that the paper leaves open, and differences:
+
+- With one phase, a CPA goes back only to robots that share a partially known constraint with its holder, and its cost
+  then returns to the holder. In the paper it visits all robots before, and the first one sends it on.
+- Totally known constraints are paid by their lowest robot, when it takes a value; they may be n-ary.
+- Every message that goes down carries the best path; so no bound is broadcast.
+- A robot with an empty domain reports it at once.
+
+>>> from robochoc.communication.simulator.schedule import Concurrent
+>>> from robochoc.communication.simulator.simulator import Simulation
+>>> from robochoc.generators.random_csp import random_csp
+>>> team = random_csp(5, 3, 0.6, 0, max_cost=9, asymmetric=True)
+>>> result = Simulation(team, SyncABB, Concurrent(seed=0)).run()
+>>> result.verdict.value, result.assignments["Robot1"]
+('solution', {'V1': 1})
+"""
+
+from __future__ import annotations
+
+from typing import ClassVar, assert_never, cast
+
+from robochoc.model.message import Message, Value
+from robochoc.model.problem import INFINITE
+from robochoc.protocols.asymmetric.messages.syncabb import CPA, CPABack, FullBack, Priced, TooCostly
+from robochoc.protocols.asymmetric.settings.syncabb import SyncABBSettings
+from robochoc.protocols.optimization.messages.syncbb import Backtrack, BestPath, Cost, Terminate
+from robochoc.protocols.optimization.syncbb import SyncBB
+from robochoc.protocols.order import PriorityOrder
+from robochoc.protocols.traits import ENDS_WITH_PROOF, Traits
+from robochoc.solver.compiled import LocalProblem
+
+TWO_PHASES = 2
+
+
+class SyncABB(SyncBB):
+    """One agent of SyncABB. State: as in SyncBB; `values` are those of the robots before, with the cost `paid`."""
+
+    messages = CPA | CPABack | FullBack | Priced | TooCostly | Backtrack | Terminate
+    settings: ClassVar[SyncABBSettings] = SyncABBSettings()
+    traits = Traits(
+        concludes=ENDS_WITH_PROOF,
+        paper="Grinshpoun, Grubshtein, Zivan, Netzer & Meisels 2013",
+        synchronous=True,
+        costs=True,
+        partially_known=True,
+        asymmetric=True,
+        privacy="parts of PKC but in sums, constraints of lower robots",
+        use_when="asymmetric costs, few robots",
+    )
+
+    def __init__(self, problem: LocalProblem, order: PriorityOrder) -> None:
+        super().__init__(problem, order)
+        self.values: list[Value] = []
+
+    def receive(self, sender: str, message: Message) -> None:
+        """Dispatch on the message's type."""
+        if self.verdict is not None:
+            return
+        match cast("CPA | CPABack | FullBack | Priced | TooCostly | Backtrack | Terminate", message):
+            case CPA(values, paid, best):
+                self.values, self.paid, self.best = values, paid, best
+                self._view = dict(zip(self.order.names, values, strict=False))
+                self._extend(0)
+            case CPABack() as back:
+                self._add_side(back)
+            case FullBack() as back:
+                self._add_all_sides(back)
+            case Priced(paid):
+                if not self._hand_on(paid):
+                    self._extend(self._next)
+            case TooCostly():
+                self._extend(self._next)
+            case Backtrack() | Terminate():
+                super().receive(sender, message)
+            case never:
+                assert_never(never)
+
+    # The holder
+
+    def _pass_on(self, cost: Cost) -> bool:
+        """Send the CPA back for its cost, if robots before have a side in it; otherwise hand it on."""
+        paid = self.paid + cost
+        if self.settings.phases == TWO_PHASES:
+            if not self.rank or self.rank + 1 < len(self.order.names):
+                return self._hand_on(paid)
+            self.send(self.order.names[self.rank - 1], FullBack(self._all_values, paid, self.best.bound))
+            return True
+        if not self.problem.pkc_parents:
+            return self._hand_on(paid)
+        *others, lowest = self.problem.pkc_parents
+        self.send(lowest, CPABack(self.problem.agent, self._all_values[-1], paid, self.best.bound, others))
+        return True
+
+    def _hand_on(self, paid: Cost) -> bool:
+        """Send the CPA to the next robot. Return False if it is complete: it is the best one."""
+        if self.rank + 1 < len(self.order.names):
+            self.send(self.order.names[self.rank + 1], CPA(self._all_values, paid, self.best))
+            return True
+        self.best = BestPath(paid, tuple(self._all_values))
+        return False
+
+    @property
+    def _all_values(self) -> list[Value]:
+        """The CPA with the own value."""
+        assert self.value is not None  # noqa: S101 - for mypy: the holder has one
+        return [*self.values, self.problem.values[self.value]]
+
+    @property
+    def _next(self) -> int:
+        """The place of the next own value."""
+        return 0 if self.value is None else self.value + 1
+
+    # The robots before
+
+    def _add_side(self, back: CPABack) -> None:
+        """Add the own side of constraints with the CPA's holder, and send the CPA further back, or to its holder."""
+        above = self.order.names[: self.rank]
+        if back.robot not in self.problem.children or not {*back.left} <= {*above}:
+            raise ValueError(f"a CPA of {back.robot} came back that cannot be")
+        paid = back.paid + self._side(back.robot, back.value)
+        if paid >= back.bound:
+            self.send(back.robot, TooCostly())
+        elif back.left:
+            *others, lowest = back.left
+            self.send(lowest, CPABack(back.robot, back.value, paid, back.bound, others))
+        else:
+            self.send(back.robot, Priced(paid))
+
+    def _add_all_sides(self, back: FullBack) -> None:
+        """Add the own side of constraints with all robots after this one, and send the complete CPA further back."""
+        names = self.order.names
+        if len(back.values) != len(names):
+            raise ValueError(f"a complete CPA has {len(names)} values, not {len(back.values)}")
+        values = dict(zip(names, back.values, strict=True))
+        paid = back.paid + sum(self._side(child, values[child]) for child in self.problem.children)
+        if paid >= back.bound:
+            self.send(names[-1], TooCostly())
+        elif self.rank:
+            self.send(names[self.rank - 1], FullBack(back.values, paid, back.bound))
+        else:
+            self.send(names[-1], Priced(paid))
+
+    def _side(self, robot: str, value: Value) -> Cost:
+        """Return what the own side of constraints with `robot` charges for its `value` and the own one."""
+        if self.value is None:
+            raise ValueError(f"a CPA of {robot} came back, and {self.problem.agent} has no value in it")
+        broken, cost = self.problem.own_side(self.value, robot, value)
+        return INFINITE if broken else cost

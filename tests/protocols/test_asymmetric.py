@@ -1,0 +1,120 @@
+"""Asymmetric costs (Grinshpoun et al., JAIR 47, 2013): what every protocol for them promises."""
+
+from __future__ import annotations
+
+from collections import Counter
+from dataclasses import replace
+from random import Random
+
+import pytest
+
+from robochoc.model.outcome import Verdict
+from robochoc.model.problem import INFINITE
+from robochoc.run import Options, Runtime, Withdrawal, solve
+from robochoc.run.choice import decided
+from robochoc.run.registry import protocol_named, protocol_names
+from tests.support.asymmetric_bytes import costs_changed, watched_costs
+from tests.support.asymmetric_problems import check_asymmetric, random_asymmetric_team
+from tests.support.compiled import plain_python_only
+from tests.support.examples import count
+from tests.support.limits import HANG_S
+from tests.support.loose_problems import minimum_cost
+from tests.support.pkc_bytes import nothing_hidden, run
+from tests.support.random_options import random_options
+
+ASYMMETRIC = [name for name in protocol_names() if protocol_named(name).traits.asymmetric]
+COMPLETE = [name for name in ASYMMETRIC if protocol_named(name).traits.complete]
+INCOMPLETE = [name for name in ASYMMETRIC if name not in COMPLETE]
+FORMS = [(name, {}) for name in COMPLETE] + [("syncabb", {"phases": "2"})]
+"""Complete protocols, and settings with which they search in another way."""
+SINGLE_ENTRIES = ["syncabb"]
+"""Those that look at an entry of a part only when a partial assignment has both its values."""
+
+
+@pytest.mark.parametrize(("protocol", "settings"), FORMS)
+@count("teams", 12, 2000)
+def test_the_least_sum_of_both_sides_is_found(protocol: str, settings: dict[str, str], teams: int) -> None:
+    chance = Random(f"asymmetric {protocol} {settings}")
+    seen = Counter(check_asymmetric(protocol, chance, settings=settings).verdict for _ in range(teams))
+    assert seen[Verdict.OPTIMAL] > teams // 3
+    assert seen[Verdict.NO_SOLUTION]
+
+
+@pytest.mark.parametrize(("protocol", "settings"), FORMS)
+@count("teams", 1, 20)
+def test_it_is_found_in_processes(protocol: str, settings: dict[str, str], teams: int) -> None:
+    chance = Random(f"asymmetric processes {protocol}")
+    for _ in range(teams):
+        check_asymmetric(protocol, chance, Options(timeout=HANG_S), settings=settings)
+
+
+@pytest.mark.parametrize(("protocol", "settings"), FORMS)
+@count("teams", 6, 100)
+def test_as_few_as_possible_withdraw(protocol: str, settings: dict[str, str], teams: int) -> None:
+    """The central solver finds as many; of those who stay, the cost is the least."""
+    chance = Random(f"asymmetric withdraw {protocol}")
+    withdrawn = 0
+    for _ in range(teams):
+        team = random_asymmetric_team(chance)
+        options = replace(random_options(team, protocol, chance), withdraw=Withdrawal.MINIMUM, settings=settings)
+        outcome = solve(team, options)
+        central = solve(team, Options(protocol="central", withdraw=Withdrawal.MINIMUM, timeout=HANG_S))
+        assert (len(outcome.withdrawn), outcome.cost) == (len(central.withdrawn), central.cost)
+        assert outcome.verified
+        withdrawn += bool(outcome.withdrawn)
+    assert 0 < withdrawn < teams
+
+
+@pytest.mark.parametrize("protocol", INCOMPLETE)
+@count("teams", 10, 200)
+def test_what_is_not_proven_is_no_better_than_the_least(protocol: str, teams: int) -> None:
+    chance = Random(f"asymmetric incomplete {protocol}")
+    solved = 0
+    for _ in range(teams):
+        team = random_asymmetric_team(chance)
+        cost = minimum_cost(team)
+        outcome = solve(team, replace(random_options(team, protocol, chance), settings={"cycles": "25"}))
+        assert outcome.verdict is not Verdict.OPTIMAL
+        assert cost < INFINITE or outcome.cost is None
+        if outcome.cost is not None:
+            assert outcome.cost >= cost
+            assert outcome.verified
+            solved += 1
+    assert solved > teams // 3
+
+
+@pytest.mark.parametrize("protocol", ASYMMETRIC)
+def test_it_is_chosen_by_name_and_refusals_name_it(protocol: str) -> None:
+    team = random_asymmetric_team(Random(1))
+    with pytest.raises(Exception, match=rf"which dpop does not support; these do: .*\b{protocol}\b"):
+        solve(team, Options(protocol="dpop", runtime=Runtime.SIMULATOR))
+
+
+def test_auto_takes_a_complete_one() -> None:
+    chance = Random("auto")
+    for _ in range(5):
+        assert decided(random_asymmetric_team(chance), Options(protocol="auto")).options.protocol in COMPLETE
+
+
+# What is said
+
+
+@plain_python_only
+@pytest.mark.parametrize(("protocol", "settings"), [form for form in FORMS if form[0] in SINGLE_ENTRIES])
+@count("teams", 8, 100)
+def test_entries_that_no_partial_assignment_has_change_no_byte(
+    protocol: str, settings: dict[str, str], teams: int
+) -> None:
+    chance = Random(f"bytes {protocol}")
+    changed = 0
+    for seed in range(teams):
+        team = random_asymmetric_team(chance, simple=True)
+        with pytest.MonkeyPatch.context() as patch:
+            asked = watched_costs(team, patch)
+            before = run(team, protocol_named(protocol), seed, settings)
+        nothing_hidden(protocol_named(protocol), before.envelopes)
+        elsewhere = costs_changed(team, asked, chance)
+        assert run(elsewhere, protocol_named(protocol), seed, settings).envelopes == before.envelopes
+        there = costs_changed(team, asked, chance, there=True)
+        changed += run(there, protocol_named(protocol), seed, settings).envelopes != before.envelopes
+    assert changed > teams // 2
