@@ -25,7 +25,7 @@ from tests.support.random_options import random_options
 ASYMMETRIC = [name for name in protocol_names() if protocol_named(name).traits.asymmetric]
 COMPLETE = [name for name in ASYMMETRIC if protocol_named(name).traits.complete]
 INCOMPLETE = [name for name in ASYMMETRIC if name not in COMPLETE]
-FORMS = [(name, {}) for name in COMPLETE] + [("syncabb", {"phases": "2"})]
+FORMS: list[tuple[str, dict[str, str]]] = [(name, {}) for name in COMPLETE] + [("syncabb", {"phases": "2"})]
 """Complete protocols, and settings with which they search in another way."""
 SINGLE_ENTRIES = ["syncabb"]
 """Those that look at an entry of a part only when a partial assignment has both its values."""
