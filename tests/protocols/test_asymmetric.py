@@ -14,13 +14,12 @@ from robochoc.run import Options, Runtime, Withdrawal, solve
 from robochoc.run.choice import decided
 from robochoc.run.registry import protocol_named, protocol_names
 from tests.support.asymmetric_bytes import costs_changed, watched_costs
-from tests.support.asymmetric_problems import check_asymmetric, random_asymmetric_team
+from tests.support.asymmetric_problems import check_asymmetric, random_asymmetric_team, random_pkc_options
 from tests.support.compiled import plain_python_only
 from tests.support.examples import count
 from tests.support.limits import HANG_S
 from tests.support.loose_problems import minimum_cost
 from tests.support.pkc_bytes import nothing_hidden, run
-from tests.support.random_options import random_options
 
 ASYMMETRIC = [name for name in protocol_names() if protocol_named(name).traits.asymmetric]
 COMPLETE = [name for name in ASYMMETRIC if protocol_named(name).traits.complete]
@@ -56,7 +55,7 @@ def test_as_few_as_possible_withdraw(protocol: str, settings: dict[str, str], te
     withdrawn = 0
     for _ in range(teams):
         team = random_asymmetric_team(chance)
-        options = replace(random_options(team, protocol, chance), withdraw=Withdrawal.MINIMUM, settings=settings)
+        options = replace(random_pkc_options(team, protocol, chance), withdraw=Withdrawal.MINIMUM, settings=settings)
         outcome = solve(team, options)
         central = solve(team, Options(protocol="central", withdraw=Withdrawal.MINIMUM, timeout=HANG_S))
         assert (len(outcome.withdrawn), outcome.cost) == (len(central.withdrawn), central.cost)
@@ -73,7 +72,7 @@ def test_what_is_not_proven_is_no_better_than_the_least(protocol: str, teams: in
     for _ in range(teams):
         team = random_asymmetric_team(chance)
         cost = minimum_cost(team)
-        outcome = solve(team, replace(random_options(team, protocol, chance), settings={"cycles": "25"}))
+        outcome = solve(team, replace(random_pkc_options(team, protocol, chance), settings={"cycles": "25"}))
         assert outcome.verdict is not Verdict.OPTIMAL
         assert cost < INFINITE or outcome.cost is None
         if outcome.cost is not None:

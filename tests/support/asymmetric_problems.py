@@ -7,6 +7,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from random import Random
 
+from robochoc.model.orders import Order
 from robochoc.model.outcome import Outcome, Verdict
 from robochoc.model.problem import INFINITE, Constraint, ConstraintModel, Team
 from robochoc.run import Options, solve
@@ -59,12 +60,18 @@ def with_asymmetric_costs(team: Team, chance: Random) -> Team:
     return team
 
 
+def random_pkc_options(team: Team, protocol: str, chance: Random) -> Options:
+    """Return options for a random schedule, and an order that turns no PKC link, which another seed's might."""
+    options = random_options(team, protocol, chance)
+    return replace(options, order=None) if options.order is Order.RANDOM else options
+
+
 def check_asymmetric(
     protocol: str, chance: Random, options: Options | None = None, settings: Mapping[str, str] | None = None
 ) -> Outcome:
     """Solve a random team by the complete `protocol`; the cost must be brute force's."""
     team = random_asymmetric_team(chance)
-    how = random_options(team, protocol, chance)
+    how = random_pkc_options(team, protocol, chance)
     if options is not None:
         how = replace(options, protocol=protocol, order=how.order)
     how = replace(how, settings=dict(settings or {}))
