@@ -201,9 +201,9 @@ def test_an_order_that_nobody_has_given_is_chosen_for_any_protocol() -> None:
 
 def test_where_nobody_accepts_the_team_the_refusal_names_who_may() -> None:
     team = with_costs(pkc_pair(PART, PART))
-    assert not taken(team, Options(withdraw=Withdrawal.MINIMUM))
+    assert not taken(team, Options(spares=1))
     with pytest.raises(UnsupportedError, match="PKC"):
-        solve(team, Options(withdraw=Withdrawal.MINIMUM))
+        solve(team, Options(spares=1))
 
 
 def test_of_robots_that_keep_their_constraints_the_kind_is_known() -> None:

@@ -99,7 +99,10 @@ def test_whoever_is_named_in_any_refusal_takes_the_team(withdraw: Withdrawal | N
         solve(team, options_for(other, withdraw))
 
 
-def test_where_no_protocol_does_the_judge_may() -> None:
+def test_where_no_protocol_does_the_judge_may(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Such as where no protocol is installed that takes PKC and minimises."""
+    others = [offer for offer in installed_protocols() if not offer.protocol or not offer.protocol.traits.asymmetric]
+    monkeypatch.setattr(alternatives, "installed_protocols", lambda: others)
     for kind, asked in ((ProblemKind.DISWCSP, "sfb"), (ProblemKind.DISWCSP, "abt")):
         team = replace(partly_known(3), robots=tuple(replace(one, kind=kind) for one in partly_known(3).robots))
         said = refused(team, Options(protocol=asked))
