@@ -168,6 +168,7 @@ REAL = {
     ("mgm2", "Accept"): "RX04 says: I take your offer: you take your value number 1, and we save 3 of cost in all",
     ("mgm2", "Reject"): "RX04 says: I do not take your offer",
     ("mgm2", "Go"): "RX03 says: no go: one of my neighbours is to move instead",
+    ("dba", "Improve"): "Robot1.1 says: what I violate weighs 10, and my move would make that 0 less",
     ("gdba", "Improve"): "RX00 says: as I weigh constraints by now, my move would save 8 of cost",
     ("maxsum", "R"): "RX02 says: by our function, RX01's values cost 5 and 5",
     ("maxsum", "Q"): "RX00 says: without our function, RX00's values cost 0, 1.005, 2 and 2.01",

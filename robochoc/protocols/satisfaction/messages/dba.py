@@ -1,0 +1,32 @@
+"""The message of DBA that is not common to all local search (see `dba.py`)."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+import msgspec
+
+from robochoc.model import message as wire
+from robochoc.model.communicative_acts import Act, Performative
+from robochoc.model.wording import Wording, counted
+
+Count = Annotated[int, msgspec.Meta(ge=0)]
+
+
+class Improve(wire.Message, frozen=True):
+    """By how much the sender's best move reduces the weight of what it violates (`improve`).
+
+    `weight` is the weight of what it violates now, `counter` its termination counter.
+    """
+
+    reduction: Count
+    weight: Count
+    counter: Count
+
+    act = Act(Performative.PROPOSE, "of neighbours, the one with the largest reduction is to move")
+
+    def in_words(self, _: Wording) -> str:
+        """Return what the sender says."""
+        if not self.weight:
+            return f"I violate nothing; for {counted(self.counter, 'cycle')} nobody near me has"
+        return f"what I violate weighs {self.weight:,}, and my move would make that {self.reduction:,} less"

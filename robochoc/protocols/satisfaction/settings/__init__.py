@@ -1,0 +1,1 @@
+"""Settings of these protocols, in files of the same names."""

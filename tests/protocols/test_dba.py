@@ -1,0 +1,136 @@
+"""One test per rule of DBA (Yokoo and Hirayama, ICMAS 1996), named for it."""
+
+from __future__ import annotations
+
+import doctest
+import itertools
+from random import Random
+
+import pytest
+
+import robochoc.protocols.satisfaction.dba
+from robochoc.communication.simulator.simulator import Simulation
+from robochoc.model.outcome import Verdict
+from robochoc.model.problem import INFINITE, Constraint, Relation, Semantics, Team
+from robochoc.protocols.satisfaction.dba import DBA
+from robochoc.protocols.satisfaction.messages.dba import Improve
+from robochoc.protocols.shared.messages.cycles import Value
+from robochoc.run import Options, Runtime, solve
+from robochoc.solver.agent_problem import RunParameters
+from robochoc.verification.checker import violations
+from tests.support.agents import replies, value
+from tests.support.cost_problems import random_hard_team
+from tests.support.examples import count
+from tests.support.local_search_runs import any_schedule, robot_of, started
+from tests.support.loose_problems import minimum_cost
+from tests.support.problems import team_of
+from tests.support.small_teams import DIFFERENT
+
+
+def path(*names: str, relation: Relation = DIFFERENT, values: int = 2) -> Team:
+    pairs = list(itertools.pairwise(names))
+    return team_of(dict.fromkeys(names, range(1, values + 1)), [Constraint("C", relation, p, p) for p in pairs])
+
+
+def middle(*chances: float, relation: Relation = DIFFERENT, values: int = 2) -> DBA:
+    """B between A and C, with the value 1."""
+    it = robot_of(DBA, path("A", "B", "C", relation=relation, values=values), "RB", 0.0, *chances)
+    started(it)
+    return it
+
+
+def hears(it: DBA, left: int, right: int) -> Improve:
+    (_, said), _ = replies(it, ("RA", Value((left,))), ("RC", Value((right,))))
+    assert isinstance(said, Improve)
+    return said
+
+
+def is_told(it: DBA, left: Improve, right: Improve) -> None:
+    replies(it, ("RA", left), ("RC", right))
+
+
+def test_the_largest_reduction_of_weights_is_told() -> None:
+    assert hears(middle(), 1, 1) == Improve(2, 2, 0)
+    assert hears(middle(), 1, 2) == Improve(0, 1, 0)
+    assert hears(middle(), 2, 2) == Improve(0, 0, 0)
+
+
+@pytest.mark.parametrize(
+    ("left", "right", "moves"), [(1, 1, True), (1, 2, True), (2, 1, False), (3, 0, False), (0, 3, False)]
+)
+def test_who_reduces_most_moves_and_of_equals_the_first(left: int, right: int, moves: bool) -> None:  # noqa: FBT001
+    it = middle()
+    hears(it, 1, 1)
+    is_told(it, Improve(left, 3, 0), Improve(right, 3, 0))
+    assert value(it) == ((2,) if moves else (1,))
+    assert not it.weights
+
+
+def test_what_is_violated_in_a_quasi_local_minimum_weighs_more() -> None:
+    it = middle()
+    hears(it, 1, 2)
+    is_told(it, Improve(1, 1, 0), Improve(0, 0, 0))
+    assert not it.weights
+    hears(it, 1, 2)
+    is_told(it, Improve(0, 1, 0), Improve(0, 0, 0))
+    assert list(it.weights.values()) == [2]
+    assert hears(it, 1, 2) == Improve(1, 2, 0)
+
+
+def test_of_several_best_values_one_is_drawn() -> None:
+    it = middle(0.9, values=3)
+    hears(it, 1, 1)
+    is_told(it, Improve(0, 1, 0), Improve(0, 1, 0))
+    assert value(it) == (3,)
+
+
+def test_the_counter_counts_while_nobody_near_violates_anything() -> None:
+    it = middle()
+    assert hears(it, 2, 2).counter == 0
+    is_told(it, Improve(0, 0, 0), Improve(0, 0, 5))
+    assert hears(it, 2, 2).counter == 1
+    is_told(it, Improve(0, 0, 1), Improve(0, 1, 0))
+    assert it.counter == 0
+    assert not it.over
+
+
+def test_at_the_largest_distance_it_stops() -> None:
+    it = middle()
+    hears(it, 2, 2)
+    is_told(it, Improve(0, 0, 0), Improve(0, 0, 0))
+    hears(it, 2, 2)
+    assert replies(it, ("RA", Improve(0, 0, 1)), ("RC", Improve(0, 0, 1))) == []
+    assert it.over
+    assert it.verdict is None
+
+
+def test_without_a_solution_it_gives_up_after_so_many_cycles() -> None:
+    none = Relation("N", 2, Semantics.CONFLICTS, ((1, 1), (1, 2), (2, 1), (2, 2)))
+    team = path("A", "B", relation=none)
+    outcome = solve(team, Options(protocol="dba", runtime=Runtime.SIMULATOR, settings={"cycles": "7"}))
+    assert outcome.verdict is Verdict.UNKNOWN
+    assert outcome.metrics.messages == {"Improve": 14, "Value": 14}
+
+
+@count("teams", 30, 1000)
+def test_who_stops_violates_nothing(teams: int) -> None:
+    """Most that have a solution are solved. All that are connected stop in the same cycle, and nobody is told."""
+    chance = Random("breakout")
+    solved = soluble = 0
+    for seed in range(teams):
+        team = random_hard_team(chance)
+        parameters = RunParameters(seed, {"cycles": "200"})
+        result = Simulation(team, DBA, any_schedule(chance), parameters=parameters).search()
+        possible = minimum_cost(team) < INFINITE
+        soluble += possible
+        if result.verdict is Verdict.SOLUTION:
+            solved += 1
+            found = {name: val for own in result.assignments.values() for name, val in own.items()}
+            assert not list(violations(team, found, ()))
+        elif result.verdict is Verdict.NO_SOLUTION:
+            assert not possible
+    assert solved > 0.9 * soluble > 0
+
+
+def test_the_example_in_the_documentation() -> None:
+    assert doctest.testmod(robochoc.protocols.satisfaction.dba).failed == 0
