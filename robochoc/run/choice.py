@@ -90,6 +90,24 @@ LARGE_TABLE = Condition(
     f"a constraint of more than {MAX_TUPLES:,} combinations of values",
     f"no constraint has more than {MAX_TUPLES:,} combinations of values",
 )
+NEARLY_A_TREE = (
+    COSTS,
+    Condition(
+        lambda f: f.robots > FEW_ROBOTS,
+        f"more than {FEW_ROBOTS} robots",
+        f"there are {FEW_ROBOTS} robots or fewer",
+    ),
+    Condition(
+        lambda f: f.robots <= MOST_IN_A_TREE,
+        f"at most {MOST_IN_A_TREE:,} robots",
+        f"there are more than {MOST_IN_A_TREE:,} robots",
+    ),
+    Condition(
+        lambda f: f.tree.cells <= NARROW_CELLS,
+        f"tables of at most {NARROW_CELLS:,} entries on the pseudo-tree",
+        f"a table on the pseudo-tree would have more than {NARROW_CELLS:,} entries",
+    ),
+)
 
 RULES = (
     Rule(
@@ -138,25 +156,13 @@ RULES = (
         "the problem changes, and it keeps what still holds",
     ),
     Rule(
+        "s-dpop",
+        (CHANGES, *NEARLY_A_TREE),
+        "costs change, and the constraint graph is nearly a tree: it keeps the tables that still hold",
+    ),
+    Rule(
         "dpop",
-        (
-            COSTS,
-            Condition(
-                lambda f: f.robots > FEW_ROBOTS,
-                f"more than {FEW_ROBOTS} robots",
-                f"there are {FEW_ROBOTS} robots or fewer",
-            ),
-            Condition(
-                lambda f: f.robots <= MOST_IN_A_TREE,
-                f"at most {MOST_IN_A_TREE:,} robots",
-                f"there are more than {MOST_IN_A_TREE:,} robots",
-            ),
-            Condition(
-                lambda f: f.tree.cells <= NARROW_CELLS,
-                f"tables of at most {NARROW_CELLS:,} entries on the pseudo-tree",
-                f"a table on the pseudo-tree would have more than {NARROW_CELLS:,} entries",
-            ),
-        ),
+        NEARLY_A_TREE,
         "the constraint graph is nearly a tree: tables are small, and messages few",
     ),
     Rule(

@@ -264,6 +264,14 @@ class LocalProblem:
         known = {*robots}
         return [(c.agents, c.max_cost) for c in self._constraints if known.issuperset(c.agents)]
 
+    def table_inputs(self, robots: Iterable[str]) -> tuple[object, ...]:
+        """Return what `tables` are made of for these `robots`, but for their domains: equal if the tables must be.
+
+        That is, the own values and their charges, and the constraints whose other robots are all in `robots`.
+        """
+        known = {*robots}
+        return self.values, self.charges, [c.definition for c in self._constraints if known.issuperset(c.agents)]
+
     def added(self, robot: str, view: Mapping[str, Value]) -> list[Cost] | None:
         """Return the additional cost of each own value when `robot`, the lowest in `view`, is known too.
 

@@ -117,6 +117,11 @@ class SharedConstraint:
         return None in values or self._test(values)  # type: ignore[arg-type]
 
     @property
+    def definition(self) -> object:
+        """The constraint as the files have it: equal ones charge the same."""
+        return self._constraint
+
+    @property
     def max_cost(self) -> Cost:
         """The most that it charges short of being broken."""
         return max_cost(self._constraint)

@@ -160,6 +160,10 @@ class DPOP(TreeProtocol):
         """Send the dimensions to the parent, or decide as the root, once all domains and dimensions arrived."""
         if len(self.domains) < len(self.ancestors) or len(self.dimensions) < len(self.children):
             return
+        self._report()
+
+    def _report(self) -> None:
+        """Send the dimensions of the own table to the parent; a root decides whether all proceed."""
         checked = self.problem.scopes(self.ancestors)
         self._sizes = self._separator_sizes([scope for scope, _ in checked])
         self._dearest = self._upper_bound([charge for _, charge in checked])

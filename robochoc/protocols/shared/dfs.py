@@ -52,6 +52,15 @@ class TreeProtocol(Protocol):
         """The neighbours that this robot knows to be in the tree."""
         self._early: list[tuple[str, Message]] = []
 
+    def leave_tree(self) -> None:
+        """Forget the place in the tree; `start` begins a new one, with the present neighbours and order."""
+        self.parent = None
+        self.pseudo_parents = self.children = self.pseudo_children = ()
+        self.placed = False
+        self._election = _Election(self.problem.agent, self.problem.neighbours, self.order)
+        self._met = set()
+        self._early = []
+
     @abstractmethod
     def begin(self) -> None:
         """Begin the search; the place in the tree is known."""

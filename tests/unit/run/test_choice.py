@@ -165,6 +165,8 @@ PART = pkc_part("AB", (0, 0))
         (coloring(400, 3, 3, conflicts="hard"), {}, "abt", Order.MAX_DEGREE),
         (pkc_pair(PART, PART), {}, "disfc", None),
         (random_scenario(random_csp(12, 5, 0.5, 0.2), 2, 0.1), {}, "dynabt", None),
+        (random_scenario(random_csp(20, 3, 0.15, 0, max_cost=9), 2, 0.1), {}, "s-dpop", None),
+        (random_scenario(random_csp(12, 3, 0.2, 0, max_cost=9), 2, 0.1), {}, "sfb", None),
         (random_scenario(random_csp(12, 5, 0.5, 0.5), 2, 0.1), {}, "sfb", None),
         (random_scenario(random_csp(30, 5, 0.2, 0.5), 2, 0.1), {}, "dynabt", None),
         (team_of({"A": range(3000), "B": range(3000)}, []), {}, "sfb", Order.MIN_WIDTH),

@@ -1,0 +1,382 @@
+"""Self-stabilizing DPOP (S-DPOP): DPOP that keeps what stands when the problem changes.
+
+DPOP (see `dpop.py`) whose robots keep their place in the pseudo-tree, their children's tables and their choices. After
+a change, only robots compute anew whose separator, constraint, or child's table has changed. All others send an empty
+message (`Reuse`) instead of a table.
+
+- **When to use**: costs, a pseudo-tree with a small induced width, and a problem that changes during the run.
+- **Guarantees**: complete; each epoch terminates with an optimum, or with a proof that there is no solution. What is
+  kept depends on nothing that a change has invalidated.
+- **Parameters (`--set`)**: `memory`, the bytes that the tables of a robot may take (default 1 GiB).
+- **Reference**: Petcu, Faltings: "S-DPOP: superstabilizing, fault-containing multiagent combinatorial optimization",
+  AAAI 2005.
+
+The three parts of the paper are these methods:
+
+    self-stabilizing tree   `change`, `resume`, `_renew`      UTIL propagation    `_measure`, `_reuse`, `_pass_on`
+    VALUE propagation       `_choose_optimal`
+
+An epoch on a tree that stands goes as follows. The root lets all begin (`Go`), and so everyone learns whose domains
+above it have changed. From the leaves up, each robot says whether its table can have changed: `Reuse`, or DPOP's
+`Dimensions`. Where it can, the root lets those robots proceed. A table that turns out to be the same is not sent, but
+`Reuse` once more. Down the tree, VALUE goes to children that have computed, or whose separator has other values.
+
+Choices that the paper leaves open, and differences:
+
+- The runtime propagates the changes to all robots before any robot continues.
+- A robot that has a new neighbour, or has lost its parent, begins a new tree for all that are connected with it, by the
+  first wave of an election (see `shared/dfs.py`). A lost child, or another lost neighbour, needs none. In the paper, a
+  new link needs no new tree if one end is above the other; here that is not known, and tables are reused on the new
+  tree as well.
+- A wave that comes on a tree that stood ends what was begun there. What neighbours sent before their first wave is
+  dropped; who has computed by then computes again.
+- After an epoch in which messages were lost (it was interrupted, or had no solution), all begin anew.
+- A proof of no solution stands as long as constraints come, and values go.
+
+>>> from robochoc.generators.queens3d import queens3d
+>>> from robochoc.run import Options, Runtime, solve
+>>> solve(queens3d(3), Options(protocol="s-dpop", runtime=Runtime.SIMULATOR)).verdict.value
+'no-solution'
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import assert_never, cast
+
+import numpy as np
+
+from robochoc.model.message import Message, Value
+from robochoc.protocols.dynamic import DynamicProtocol
+from robochoc.protocols.inference.dpop import DPOP, keep_once
+from robochoc.protocols.inference.dpop_tables import Codes, Extent, IncomingTable, Table, Width, project, width_of
+from robochoc.protocols.inference.messages.dpop import UTIL, VALUE, Dimensions, Domain, Proceed
+from robochoc.protocols.inference.messages.s_dpop import Go, Reuse
+from robochoc.protocols.order import PriorityOrder
+from robochoc.protocols.shared.messages.dfs import TreeMessage, Wave
+from robochoc.protocols.traits import ENDS_WITH_PROOF, Traits
+from robochoc.solver.compiled import LocalProblem
+from robochoc.solver.explanation import Invalidated
+
+
+class SDPOP(DPOP, DynamicProtocol):
+    """One agent of S-DPOP.
+
+    State besides DPOP's, kept from epoch to epoch:
+
+    - `basis`: what the own table was computed from, but for the children's tables;
+    - `sent`: the own table, if the parent has it;
+    - `told`: for each child the values that it was told last.
+    """
+
+    messages = TreeMessage | Go | Domain | Dimensions | Reuse | Proceed | UTIL | VALUE
+    traits = Traits(
+        concludes=ENDS_WITH_PROOF,
+        paper="Petcu & Faltings 2005",
+        costs=True,
+        shared_scopes=True,
+        writes_to_non_neighbours=False,
+        dynamic=True,
+        tables=True,
+        privacy="constraints of others, but for sums",
+        use_when="costs that change, small induced width: keeps tables",
+    )
+
+    def __init__(self, problem: LocalProblem, order: PriorityOrder) -> None:
+        super().__init__(problem, order)
+        self.basis: tuple[object, ...] | None = None
+        self.sent: Codes | None = None
+        self.told: dict[str, list[int]] = {}
+        self.known_values: list[Value] = []
+        """The own domain, as robots below know it."""
+        self._own_tables: list[tuple[Table, tuple[str, ...]]] = []
+        self._tabulated: tuple[object, ...] = ()
+        """What the tables of the own constraints were made of."""
+        self._has_new_values = False
+        self._stands = False
+        """Whether the tree is that of the epoch before."""
+        self._needs_tree = False
+        self._unheard: set[str] = set()
+        """Neighbours whose first wave has not come; what they sent before it belongs to a tree that is gone."""
+        self._last_parent: str | None = None
+        self._last_optimum: int | None = None
+        self._begin_epoch()
+
+    def _begin_epoch(self) -> None:
+        """Forget what an epoch, or a tree, knows by itself."""
+        self._expected: set[str] | None = None
+        """Robots above that send their domains; None: not known yet."""
+        self._new_domains: dict[str, list[Value]] = {}
+        self._reports: set[str] = set()
+        self._renewed: set[str] = set()
+        """Children whose tables may have changed."""
+        self._waiting: set[str] = set()
+        self._incoming: dict[str, IncomingTable] = {}
+        self._inputs: tuple[object, ...] = ()
+        self._fresh = self._proceeding = self._tables_changed = self._axes_changed = False
+
+    # The tree
+
+    def start(self) -> None:
+        """Begin a tree, with the neighbours that there are now."""
+        self.leave_tree()
+        self._unheard = {*self.problem.neighbours}
+        super().start()
+
+    def change(self, problem: LocalProblem, order: PriorityOrder, invalidated: Invalidated) -> None:
+        """Adopt the changed problem: the propagation phase."""
+        old, gone, around = self.problem, invalidated.agents, {*problem.neighbours}
+        if invalidated.keys:
+            self.verdict = None
+        if problem.values != old.values or problem.agent in gone:
+            self.value = None
+        self.optimum = None
+        self._needs_tree |= not around <= {*old.neighbours} or not around.isdisjoint(gone) or problem.agent in gone
+        self._needs_tree |= self.parent is not None and self.parent not in around
+        if problem.agent in gone or not gone.isdisjoint(old.neighbours):
+            self.basis = self.sent = None
+        for name in gone:
+            self._forget_child(name)
+        self.problem, self.order = problem, order
+
+    def resume(self, *, lossless: bool) -> None:
+        """Continue on the tree, if it stands; otherwise begin a new one."""
+        if self.verdict is not None:
+            return
+        self._begin_epoch()
+        if not lossless:
+            self._forget_all()
+        if not lossless or self._needs_tree or not self.placed or not self.problem.values:
+            self._renew()
+            return
+        self._stands = True
+        around = self.problem.neighbours
+        for name in self.children:
+            if name not in around:
+                self._forget_child(name)
+        self.children, self.pseudo_parents, self.pseudo_children = (
+            self._sorted(name for name in names if name in around)
+            for names in (self.children, self.pseudo_parents, self.pseudo_children)
+        )
+        self._has_new_values = self.known_values != list(self.problem.values)
+        if self._has_new_values:
+            self._send_domain()
+        if self.parent is None:
+            self._go([])
+
+    def receive(self, sender: str, message: Message) -> None:
+        """Process a message; a wave on a tree that stood ends it."""
+        if self.verdict is not None:
+            return
+        if isinstance(message, Wave):
+            if self._stands:
+                self.told = {}
+                self._renew()
+            self._unheard.discard(sender)
+        elif sender in self._unheard:
+            return
+        super().receive(sender, message)
+
+    def _renew(self) -> None:
+        """Begin a new tree. What was begun in this epoch is computed again."""
+        if self._fresh:
+            self.basis = self.sent = None
+        self._stands = self._needs_tree = False
+        self._begin_epoch()
+        self.start()
+
+    def begin(self) -> None:
+        """Keep the tables of those who are still children, and send the own domain to the neighbours below."""
+        if self.parent != self._last_parent:
+            self.basis = self.sent = None
+        self._last_parent = self.parent
+        for name in [*self.utils, *self.dimensions]:
+            if name not in self.children:
+                self._forget_child(name)
+        self._expected = {*self.ancestors}
+        self._send_domain()
+        self._measure()
+
+    def _send_domain(self) -> None:
+        self.known_values = list(self.problem.values)
+        for name in self.descendants:
+            self.send(name, Domain(self.known_values))
+
+    def _forget_child(self, name: str) -> None:
+        self.utils.pop(name, None)
+        self.dimensions.pop(name, None)
+        self._axes.pop(name, None)
+        self.told.pop(name, None)
+
+    def _forget_all(self) -> None:
+        self.basis = self.sent = self.choices = None
+        for name in [*self.utils, *self.dimensions, *self._axes, *self.told]:
+            self._forget_child(name)
+
+    # Messages
+
+    def handle(self, sender: str, message: Message) -> None:
+        """Dispatch on the message's type."""
+        match cast("Go | Domain | Dimensions | Reuse | Proceed | UTIL | VALUE", message):
+            case Go(changed):
+                self._go(changed)
+            case Domain(values):
+                keep_once(sender, values, self._new_domains, self.ancestors)
+                self._measure()
+            case Dimensions() as dimensions:
+                self._keep_dimensions(sender, dimensions)
+            case Reuse():
+                self._reuse(sender)
+            case Proceed(separator):
+                self._proceed(separator)
+            case UTIL(width, costs):
+                self._util_message_handler(sender, width, costs)
+            case VALUE(assignment):
+                self._value_message_handler(assignment)
+            case never:
+                assert_never(never)
+
+    def _go(self, changed: Sequence[str]) -> None:
+        """Pass on that the tree stands, and whose domains have changed."""
+        if not self._stands or self._expected is not None:
+            raise ValueError(f"{self.problem.agent} has begun already")
+        self._expected = {*changed} & {*self.ancestors}
+        own = [self.problem.agent] if self._has_new_values else []
+        for child in self.children:
+            self.send(child, Go([*changed, *own]))
+        self._measure()
+
+    # How large tables will be, and whether they stand
+
+    def _keep_dimensions(self, child: str, dimensions: Dimensions) -> None:
+        """Store the dimensions of a table that may have changed."""
+        self._check(child, dimensions)
+        if child not in self.children or child in self._reports:
+            raise ValueError(f"{child} had nothing to say of this, or has said it already")
+        self.dimensions[child] = dimensions
+        self._reports.add(child)
+        self._renewed.add(child)
+        self._measure()
+
+    def _reuse(self, child: str) -> None:
+        """Process that a child's table stands: it needs not be computed, or turned out to be the same."""
+        if child not in self.utils or child not in self.children or child in self._incoming:
+            raise ValueError(f"{child} says that its table stands, and there is none")
+        if child not in self._reports:
+            self._reports.add(child)
+            self._measure()
+        elif child in self._waiting:
+            self._waiting.discard(child)
+            self._compute_if_complete()
+        else:
+            raise ValueError(f"{child} had nothing to say of this, or has said it already")
+
+    def _measure(self) -> None:
+        """Once all is known that the own table depends on, say that it stands, or how large it will be."""
+        if self._expected is None or not self._expected <= self._new_domains.keys():
+            return
+        if len(self._reports) < len(self.children) or self._inputs:
+            return
+        known = {**self.domains, **self._new_domains} if self._stands else self._new_domains
+        self.domains = {name: known[name] for name in self.ancestors}
+        self._inputs = self._own_inputs()
+        if self._renewed or self._inputs != self.basis:
+            self._fresh = True
+            self._report()
+        elif self.parent is not None:
+            self.send(self.parent, Reuse())
+        else:
+            self.optimum = self._last_optimum
+
+    def _own_inputs(self) -> tuple[object, ...]:
+        """Return what the own table is computed from, besides the children's tables."""
+        seen = {name for scope, _ in self.problem.scopes(self.ancestors) for name in scope}
+        domains = {name: self.domains[name] for name in seen}
+        return self.problem.table_inputs(self.ancestors), domains, {*self.children}
+
+    def _kept_bytes(self, inputs: Sequence[Extent]) -> int:
+        """Tables stay, also while new ones arrive; the own table stays as it was sent."""
+        tables = sum(table.cells * table.width for table in inputs)
+        return 2 * (tables + math.prod(self._own_sizes()) * width_of(self._dearest))
+
+    def _proceed(self, separator: Sequence[str]) -> None:
+        """Let those children proceed whose tables may have changed, and wait for their tables."""
+        if sorted(separator) != sorted(self._sizes) or not self._fresh or self._proceeding:
+            raise ValueError(f"{self.problem.agent}'s separator is {', '.join(self._sizes)}; {separator} is none")
+        if self._need.bytes > self.settings.memory:
+            raise ValueError(f"{self.problem.agent} has no room for its tables, and was told to proceed")
+        self._proceeding = True
+        self._axes_changed = self.separator != tuple(separator)
+        self.separator = tuple(separator)
+        self._waiting = {*self._renewed}
+        for child in self.children:
+            if child in self._renewed:
+                wanted = self.dimensions[child].separator
+                self._axes[child] = tuple(name for name in (self.problem.agent, *separator) if name in wanted)
+                self.send(child, Proceed(list(self._axes[child])))
+        if self._inputs != self._tabulated:
+            tables = self.problem.tables({name: self.domains[name] for name in self.ancestors})
+            self._own_tables = [(table.charges, (*table.agents, self.problem.agent)) for table in tables]
+            self._tabulated = self._inputs
+        self._compute_if_complete()
+
+    # UTIL, from the leaves up
+
+    def _util_message_handler(self, child: str, width: Width, costs: bytes) -> None:
+        """Store a piece of a child's new table."""
+        if child not in self._waiting:
+            raise ValueError(f"{child} was not asked for a table")
+        if child not in self._incoming:
+            dimensions = self.dimensions[child]
+            shape = [dimensions.separator[name] for name in self._axes[child]]
+            self._incoming[child] = IncomingTable(shape, dimensions.dearest)
+        table = self._incoming[child]
+        table.add(width, costs)
+        if table.complete:
+            self.utils[child] = self._incoming.pop(child)
+            self._tables_changed = True
+            self._waiting.discard(child)
+            self._compute_if_complete()
+
+    def _compute_if_complete(self) -> None:
+        """Compute once the children's tables are there; not if nothing turned out to have changed."""
+        if self._waiting:
+            return
+        if self._inputs == self.basis and not self._tables_changed and not self._axes_changed:
+            if self.parent is None:
+                self.optimum = self._last_optimum
+                self._choose_optimal([])
+            else:
+                self.send(self.parent, Reuse())
+            return
+        joined = [self._aligned(table, axes) for table, axes in self._own_tables]
+        joined += [self._aligned(table.costs, self._axes[name]) for name, table in self.utils.items()]
+        shape = [self._sizes[name] for name in self.separator or ()]
+        costs, self.choices = project(shape, self.problem.charges, joined, width_of(self._dearest))
+        self.basis = self._inputs
+        self._pass_on(costs)
+        self._last_optimum = self.optimum
+
+    def _send_table(self, costs: Codes) -> None:
+        """Send the parent the own table, unless it has the same one."""
+        same = self.sent is not None and not self._axes_changed and self.sent.dtype == costs.dtype
+        if same and np.array_equal(cast("Codes", self.sent), costs):
+            self.send(self.parent or "", Reuse())
+            return
+        self.sent = costs
+        super()._send_table(costs)
+
+    # VALUE, from the root down
+
+    def _choose_optimal(self, assignment: Sequence[int]) -> None:
+        """Take the cheapest value; tell children who have computed, or whose separator has other values."""
+        if self.choices is None:
+            raise ValueError(f"{self.problem.agent} has no table yet")
+        self.value = self._best_value(self.choices, assignment)
+        view = dict(zip((self.problem.agent, *(self.separator or ())), (self.value, *assignment), strict=True))
+        for child in self.children:
+            places = [view[name] for name in self._axes[child]]
+            if child in self._renewed or self.told.get(child) != places:
+                self.told[child] = places
+                self.send(child, VALUE(places))
