@@ -159,6 +159,12 @@ REAL = {
     ("kopt", "Values"): "RX00 says: RX00 has its value number 4",
     ("kopt", "Offers"): "RX00 says: I have heard of no move that saves anything",
     ("kopt", "Go"): "RX00 says: go: RX00",
+    ("d-gibbs", "Value"): "RX00 says: X00 = -3 in this sample; the last sample was the best so far",
+    ("d-gibbs", "Backtrack"): "RX01 says: by this sample my subtree has 1 broken constraint more and 9 of cost less",
+    ("d-gibbs", "Finish"): (
+        "RX00 says: the search is over: take your value of the best sample;"
+        " the last sample was not better than the best"
+    ),
     ("dsa", "Value"): "RX01 says: X01 = -3 in this cycle",
     ("mgm", "Gain"): "RX00 says: my move would save 8 of cost",
     ("mgm2", "Domain"): "RX04 says: X04 is -2, -1 or 4",

@@ -1,0 +1,220 @@
+"""Distributed Gibbs (D-Gibbs).
+
+Sampling on a pseudo-tree. In each cycle the robots draw new values, from the root down: a cheap value with a high
+probability, given the values that all neighbours have. Neighbours never draw at the same time. From the leaves up they
+add up by how much the sample has changed the cost. So the root knows which sample was the best, though nobody knows
+what it costs, and in the end all take their values of that sample.
+
+- **When to use**: costs, and little memory: good answers where local search is caught, as dearer values are drawn too.
+- **Guarantees**: incomplete; it stops after `cycles` cycles, without a proof of optimality. The values at the end are
+  those of the best sample of each pseudo-tree. Memory is linear in the number of neighbours. A robot with an empty
+  domain proves that there is no solution.
+- **Parameters (`--set`)**: `temperature` (default 1: as the paper), `cooling` (by what it is multiplied after each
+  cycle; default 1), `hard` (default 4), `cycles` (default 100).
+- **Reference**: Nguyen, Yeoh, Lau: "Distributed Gibbs: a memory-bounded sampling-based DCOP algorithm", AAMAS 2013.
+
+Its parts:
+
+    build the pseudo-tree       `dfs.TreeProtocol`           BACKTRACK, from the leaves up     `_tell_change`
+    VALUE, from the root down   `_sample`                    the root keeps the best           `_judge`
+
+A value is drawn with a probability proportional to exp(-cost / temperature), where the cost is that of all constraints
+of the robot with its neighbours' present values. Robots above have drawn in this cycle already, and robots below have
+not. So the samples are those of one robot drawing after the other, and the change of the cost is exactly the sum of
+what the robots pay more. In the paper, temperature is 1.
+
+Choices that the paper leaves open, and differences:
+
+- The first value is chosen at random. Robots send it to the neighbours above before the first cycle.
+- A value that breaks more hard constraints than another is never a better one for the record, whatever it costs; it is
+  drawn e^`hard` times less often for each.
+- Robots store the value of the best sample when the root says that the last sample was it: with the next VALUE.
+- The paper also keeps what the best value of each robot would have saved. Here the record is of samples only.
+- Constraints may be n-ary, as all robots of a scope are on one branch. Parts of the team that have nothing to do with
+  each other have a tree and a record each.
+
+>>> from robochoc.communication.simulator.schedule import Concurrent
+>>> from robochoc.communication.simulator.simulator import Simulation
+>>> from robochoc.generators.queens3d import queens3d
+>>> result = Simulation(queens3d(3), DGibbs, Concurrent(seed=0)).search()
+>>> result.metrics.messages["Value"], result.metrics.messages["Backtrack"], result.metrics.messages["Finish"]
+(5628, 800, 8)
+"""
+
+from __future__ import annotations
+
+import math
+from itertools import accumulate
+from typing import ClassVar, assert_never, cast
+
+import msgspec
+
+from robochoc.model import message as wire
+from robochoc.protocols.findings import Findings, Trail
+from robochoc.protocols.local_search.messages.d_gibbs import Backtrack, Finish, Value
+from robochoc.protocols.local_search.settings.d_gibbs import DGibbsSettings
+from robochoc.protocols.order import PriorityOrder
+from robochoc.protocols.shared.cycles import NO_GAIN, gain
+from robochoc.protocols.shared.dfs import TreeProtocol
+from robochoc.protocols.shared.messages.dfs import TreeMessage
+from robochoc.protocols.traits import ENDS_WITH_PROOF, Traits
+from robochoc.solver.compiled import LexicographicCost, LocalProblem
+
+COLDEST = 1e-9
+"""Below it only the cheapest values are drawn."""
+
+
+class DGibbs(TreeProtocol):
+    """One agent of D-Gibbs.
+
+    State: `cycle`, the own value in it, the `view` of the neighbours' values, `best` (the own value of the best
+    sample), and the sums of changes: `change` in this cycle, and (at the root) `total` and `record` since the start.
+    """
+
+    messages = TreeMessage | Value | Backtrack | Finish
+    settings: ClassVar[DGibbsSettings] = DGibbsSettings()
+    traits = Traits(
+        concludes=ENDS_WITH_PROOF,
+        paper="Nguyen, Yeoh, Lau 2013",
+        complete=False,
+        costs=True,
+        shared_scopes=True,
+        writes_to_non_neighbours=False,
+        privacy="constraints among others",
+        use_when="costs, little memory: samples that leave local optima",
+    )
+
+    def __init__(self, problem: LocalProblem, order: PriorityOrder) -> None:
+        super().__init__(problem, order)
+        self.cycle = -1
+        self.view: dict[str, wire.Value] = {}
+        self.best = 0
+        self.change: LexicographicCost = NO_GAIN
+        self.total: LexicographicCost = NO_GAIN
+        self.record: LexicographicCost = NO_GAIN
+        self._kept = self._told_change = True
+        self._trail: list[tuple[int, int]] = []
+        self._told_by = dict.fromkeys(problem.neighbours, 0)
+        """Of each neighbour, how many of its values have been told."""
+        self._changes: dict[str, LexicographicCost] = {}
+        """Of each child, what this cycle has changed in its subtree."""
+
+    def begin(self) -> None:
+        """Take a random value, and tell it to the neighbours above; a robot alone takes its cheapest value."""
+        size = len(self.problem.values)
+        if not self.problem.neighbours:
+            burdens = self.problem.lexicographic_costs({})
+            self.cycle = self.settings.cycles
+            self._take(burdens.index(min(burdens)))
+            return
+        self._take(int(self.chance() * size))
+        self.best = self._present
+        self._tell(self.ancestors)
+
+    def handle(self, sender: str, message: wire.Message) -> None:
+        """Dispatch on the message's type."""
+        match cast("Value | Backtrack | Finish", message):
+            case Value(value, kept):
+                self.view[sender] = value
+                self._told_by[sender] += 1
+                self._kept = kept if sender == self.parent else self._kept
+            case Backtrack(broken, cost):
+                if sender not in self.children or sender in self._changes:
+                    raise ValueError(f"{sender} had nothing to add up, or has told it already")
+                self._changes[sender] = broken, cost
+            case Finish(kept):
+                if sender != self.parent:
+                    raise ValueError(f"{sender} is not the parent of {self.problem.agent}, and ends its search")
+                self._kept = kept
+                self._finish()
+            case never:
+                assert_never(never)
+
+    def decide(self) -> None:
+        """Draw a value, or add up what has changed, as soon as all messages for that are there."""
+        going = True
+        while going and self.cycle <= self.settings.cycles:
+            going = False
+            if not self._told_change and len(self._changes) == len(self.children):
+                self._tell_change()
+                going = True
+            if self._may_sample():
+                self._sample()
+                going = True
+
+    def _may_sample(self) -> bool:
+        """Return whether robots above have drawn in this cycle, and all below have in the last one."""
+        if not self.problem.neighbours or self.cycle >= self.settings.cycles:
+            return False
+        below = all(self._told_by[name] == self.cycle + 1 for name in self.descendants)
+        return below and self._told_change and all(self._told_by[name] > self.cycle for name in self.ancestors)
+
+    def _sample(self) -> None:
+        """Draw the next value, given all neighbours' values, and tell it."""
+        if self._kept:
+            self.best = self._present
+        burdens = self.problem.lexicographic_costs(self.view)
+        before = burdens[self._present]
+        self._take(self._drawn(burdens))
+        self.change = gain(burdens[self._present], before)
+        self._changes.clear()
+        self._told_change = False
+        self._tell(self.problem.neighbours)
+
+    def _drawn(self, burdens: list[LexicographicCost]) -> int:
+        """Return the place of a value, drawn with the probabilities that its cost gives it."""
+        broken, cost = min(burdens)
+        temperature = max(COLDEST, self.settings.temperature * self.settings.cooling**self.cycle)
+        weights = [
+            math.exp(-max(0, paid - cost) / temperature - self.settings.hard * (more - broken))
+            for more, paid in burdens
+        ]
+        sums = list(accumulate(weights))
+        lot = self.chance() * sums[-1]
+        return next((place for place, end in enumerate(sums) if lot < end), len(sums) - 1)
+
+    def _tell_change(self) -> None:
+        """Tell the parent what this cycle has changed in the subtree; the root judges the sample."""
+        self._told_change = True
+        for broken, cost in self._changes.values():
+            self.change = self.change[0] + broken, self.change[1] + cost
+        if self.parent is None:
+            self._judge()
+        else:
+            self.send(self.parent, Backtrack(*map(int, self.change)))
+
+    def _judge(self) -> None:
+        """Decide whether the sample is the best so far; after the last one, end the search."""
+        self.total = self.total[0] + self.change[0], self.total[1] + self.change[1]
+        self._kept = self.total < self.record
+        self.record = min(self.record, self.total)
+        if self.cycle >= self.settings.cycles:
+            self._finish()
+
+    def _finish(self) -> None:
+        """Take the value of the best sample, and let all below do so."""
+        for child in self.children:
+            self.send(child, Finish(self._kept))
+        self._take(self._present if self._kept else self.best)
+
+    def _tell(self, names: tuple[str, ...]) -> None:
+        value = Value(self.problem.values[self._present], self._kept)
+        for name in names:
+            self.send(name, value)
+
+    def _take(self, index: int) -> None:
+        """Set the own value of the next cycle."""
+        self.cycle += 1
+        if index != self.value:
+            self.value = index
+            self._trail.append((self.cycle, index))
+
+    @property
+    def _present(self) -> int:
+        assert self.value is not None  # noqa: S101 - for mypy: `begin` takes one
+        return self.value
+
+    @property
+    def findings(self) -> Findings:
+        """The place in the tree, and the own value in every cycle."""
+        return msgspec.structs.replace(super().findings, trail=Trail(list(self._trail), self.cycle))

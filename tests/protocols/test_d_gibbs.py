@@ -1,0 +1,199 @@
+"""One test per rule of D-Gibbs (Nguyen, Yeoh, Lau, AAMAS 2013), named for it."""
+
+from __future__ import annotations
+
+import doctest
+from random import Random
+
+import pytest
+
+import robochoc.protocols.local_search.d_gibbs
+from robochoc.communication.simulator.schedule import RandomChannels
+from robochoc.communication.simulator.simulator import Simulation
+from robochoc.journal.events import AnyEvent, Sent
+from robochoc.model.message import Message
+from robochoc.model.outcome import Verdict
+from robochoc.model.problem import INFINITE
+from robochoc.protocols.local_search.d_gibbs import DGibbs
+from robochoc.protocols.local_search.messages.d_gibbs import Backtrack, Finish, Value
+from robochoc.protocols.local_search.settings.d_gibbs import DGibbsSettings
+from robochoc.protocols.settings import SettingsError, settings_of
+from robochoc.run.incumbent import costs_by_cycle
+from robochoc.solver.agent_problem import RunParameters
+from robochoc.solver.compiled_team import CompiledTeam
+from tests.support.agents import replies, value
+from tests.support.cost_problems import random_cost_team, random_hard_team
+from tests.support.examples import count
+from tests.support.local_search_runs import any_schedule, cost_of_assignment, domains_of, played
+from tests.support.problems import team_of
+from tests.support.pseudo_trees import priced, unplaced
+
+PRICES = {"AB": [0, 5, 5, 0], "BC": [0, 3, 3, 0]}
+"""A and B, and B and C, better have equal values."""
+
+
+def robot(name: str, *chances: float, cycles: int = 100, temperature: float = 1.0) -> DGibbs:
+    """One of A, B and C on a branch, with its first value."""
+    made = unplaced(DGibbs, priced("ABC", PRICES), f"R{name}")
+    made.parent, made.children = {"A": (None, ("RB",)), "B": ("RA", ("RC",)), "C": ("RB", ())}[name]
+    made.settings = DGibbsSettings(cycles=cycles, temperature=temperature)  # type: ignore[misc]
+    made.chance = iter([*chances, *[0.0] * 9]).__next__
+    made.placed = True
+    made.begin()
+    return made
+
+
+def said(made: DGibbs) -> list[tuple[str, Message]]:
+    told = list(made.outbox)
+    made.outbox.clear()
+    return told
+
+
+def test_the_first_value_is_drawn_and_told_to_those_above() -> None:
+    assert said(robot("B", 0.9)) == [("RA", Value((2,), True))]
+    assert said(robot("A", 0.9)) == []
+
+
+def test_the_root_draws_when_those_below_have_told_their_values() -> None:
+    made = robot("A", 0.9)
+    assert replies(made, ("RB", Value((1,), True))) == [("RB", Value((1,), True))]
+
+
+def test_others_draw_when_those_above_have_drawn_and_those_below_have_told_their_values() -> None:
+    made = robot("B")
+    said(made)
+    assert replies(made, ("RC", Value((1,), True))) == []
+    drawn = Value((1,), False)
+    assert replies(made, ("RA", Value((1,), False))) == [("RA", drawn), ("RC", drawn)]
+
+
+@pytest.mark.parametrize(("lot", "drawn"), [(0.0, 1), (0.992, 1), (0.994, 2)])
+def test_a_value_is_drawn_by_what_it_costs_with_the_neighbours_values(lot: float, drawn: int) -> None:
+    """1 costs nothing and 2 costs 5: 1 is drawn with the probability 1 / (1 + e^-5), which is 0.9933."""
+    made = robot("A", 0.0, lot)
+    replies(made, ("RB", Value((1,), True)))
+    assert value(made) == (drawn,)
+
+
+def test_where_it_is_hot_all_values_are_alike() -> None:
+    made = robot("A", 0.0, 0.51, temperature=1e9)
+    replies(made, ("RB", Value((1,), True)))
+    assert value(made) == (2,)
+
+
+def test_what_breaks_a_hard_constraint_is_drawn_seldom() -> None:
+    for lot, drawn in ((0.98, 2), (0.983, 1)):
+        made = unplaced(DGibbs, priced("AB", {"AB": [0, INFINITE, 0, 0]}), "RA")
+        made.children, made.placed = ("RB",), True
+        made.chance = iter([0.0, 1 - lot, 0.0]).__next__
+        made.begin()
+        replies(made, ("RB", Value((2,), True)))
+        assert value(made) == (drawn,)
+
+
+def test_a_leaf_tells_at_once_by_how_much_the_cost_has_changed() -> None:
+    made = robot("C", 0.9)
+    said(made)
+    assert replies(made, ("RB", Value((1,), False)))[-1] == ("RB", Backtrack(0, -3))
+
+
+def test_others_add_up_what_their_children_tell() -> None:
+    made = robot("B", 0.9)
+    replies(made, ("RC", Value((1,), True)), ("RA", Value((1,), False)))
+    assert replies(made, ("RC", Value((1,), False)), ("RC", Backtrack(0, 2))) == [("RA", Backtrack(0, -6))]
+
+
+@pytest.mark.parametrize(("change", "kept"), [(-4, True), (5, False)])
+def test_the_root_tells_with_the_next_value_whether_the_sample_was_the_best(change: int, kept: bool) -> None:  # noqa: FBT001
+    made = robot("A")
+    replies(made, ("RB", Value((1,), True)))
+    told = replies(made, ("RB", Value((1,), True)), ("RB", Backtrack(0, change)))
+    assert told == [("RB", Value((1,), kept))]
+
+
+def test_the_next_sample_waits_for_the_values_of_all_below() -> None:
+    made = robot("A")
+    replies(made, ("RB", Value((1,), True)))
+    assert replies(made, ("RB", Backtrack(0, 0))) == []
+    assert made.cycle == 1
+    assert replies(made, ("RB", Value((1,), True))) == [("RB", Value((1,), False))]
+
+
+@pytest.mark.parametrize(("kept", "best"), [(True, 2), (False, 1)])
+def test_at_the_end_all_take_their_values_of_the_best_sample(kept: bool, best: int) -> None:  # noqa: FBT001
+    made = robot("B", 0.0, 0.999, cycles=1)
+    replies(made, ("RC", Value((1,), True)), ("RA", Value((2,), True)))
+    assert value(made) == (2,)
+    replies(made, ("RC", Value((1,), True)), ("RC", Backtrack(0, 0)))
+    assert replies(made, ("RA", Finish(kept))) == [("RC", Finish(kept))]
+    assert value(made) == (best,)
+
+
+def test_what_cannot_be_is_refused() -> None:
+    made = robot("B")
+    with pytest.raises(ValueError, match="RA had nothing to add up"):
+        replies(made, ("RA", Backtrack(0, 0)))
+    with pytest.raises(ValueError, match="RC is not the parent of RB"):
+        replies(made, ("RC", Finish(True)))
+
+
+def test_a_robot_alone_takes_its_cheapest_value() -> None:
+    made = unplaced(DGibbs, priced("A", {"A": [4, 0]}), "RA")
+    made.start()
+    assert made.assignment == {"A": 2}
+
+
+def test_a_robot_with_an_empty_domain_ends_the_search() -> None:
+    made = unplaced(DGibbs, team_of({"A": ()}, []), "RA")
+    made.start()
+    assert made.verdict is Verdict.NO_SOLUTION
+
+
+@count("teams", 15, 250)
+def test_the_values_at_the_end_are_those_of_the_best_sample(teams: int) -> None:
+    """So the sums of changes are right, whatever the delays: neighbours never draw together."""
+    chance = Random("gibbs")
+    for seed in range(teams):
+        team = chance.choice((random_cost_team, random_hard_team))(chance)
+        if not all(domains_of(team).values()):
+            continue
+        result = played(team, DGibbs, any_schedule(chance), seed, cycles=15)
+        trails = {name: found.trail for name, found in result.findings.items() if found.trail}
+        assert {trail.cycle for trail in trails.values()} == {16}
+        costs = list(costs_by_cycle(CompiledTeam(team), trails))
+        last = cost_of_assignment(team, {k: v for own in result.assignments.values() for k, v in own.items()})
+        assert costs[-1] == (INFINITE if last[0] else last[1])
+        assert costs[-1] == min(costs)
+
+
+@count("teams", 8, 80)
+def test_a_cycle_takes_two_messages_for_each_link_and_one_for_each_child(teams: int) -> None:
+    chance = Random("messages")
+    for seed in range(teams):
+        team = random_cost_team(chance)
+        if not all(domains_of(team).values()):
+            continue
+        events: list[AnyEvent] = []
+        parameters = RunParameters(seed, {"cycles": "7"})
+        run = Simulation(team, DGibbs, RandomChannels(seed), observer=events.append, parameters=parameters)
+        result = run.search()
+        kinds = [event.type for event in events if isinstance(event, Sent)]
+        children = sum(found.place is not None and found.place.parent is not None for found in result.findings.values())
+        links = sum(
+            len(found.place.pseudo_parents) + (found.place.parent is not None)
+            for found in result.findings.values()
+            if found.place
+        )
+        assert kinds.count("Value") == links * (2 * 7 + 1)
+        assert (kinds.count("Backtrack"), kinds.count("Finish")) == (7 * children, children)
+
+
+@pytest.mark.parametrize("setting", ["temperature=0", "cooling=0", "cooling=1.1", "hard=-1", "temperature=inf"])
+def test_settings_that_cannot_be_are_refused(setting: str) -> None:
+    name, number = setting.split("=")
+    with pytest.raises(SettingsError, match="it must be"):
+        settings_of(DGibbs, {name: number})
+
+
+def test_the_example_in_the_documentation() -> None:
+    assert doctest.testmod(robochoc.protocols.local_search.d_gibbs).failed == 0
