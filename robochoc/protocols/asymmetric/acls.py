@@ -1,0 +1,130 @@
+"""Asymmetric Coordinated Local Search (ACLS).
+
+Local search in cycles for asymmetric costs. Each robot proposes a value that improves its own side, drawn by how much
+it improves. Its neighbours tell what their own sides cost now, and with the proposal. So the robot knows what its move
+costs both sides, and takes it with a probability if that is cheap enough.
+
+- **When to use**: asymmetric costs, many robots, a good answer without proof.
+- **Guarantees**: incomplete; it stops after `cycles` cycles, without a proof of optimality.
+- **Parameters (`--set`)**: `coordination` (c, default 0.8), `probability` (default 0.5), `cycles` (default 100).
+- **Reference**: Grinshpoun, Grubshtein, Zivan, Netzer, Meisels: "Asymmetric distributed constraint optimization
+  problems", JAIR 47, 2013 (Section on local search).
+
+What others learn: for each proposal, the sum of a neighbour's own side in two entries.
+
+Choices that the paper leaves open, and differences:
+
+- The costs now are asked for in every cycle, so they are true when neighbours have moved.
+- Of broken hard constraints and costs, the first decide: a proposal that breaks less is cheaper, one that breaks more
+  is not taken. c is for costs.
+- Totally known constraints are part of every robot's own costs; they may be n-ary.
+
+>>> from robochoc.communication.simulator.schedule import Concurrent
+>>> from robochoc.communication.simulator.simulator import Simulation
+>>> from robochoc.generators.random_csp import random_csp
+>>> team = random_csp(5, 3, 0.6, 0, max_cost=9, asymmetric=True)
+>>> result = Simulation(team, ACLS, Concurrent(seed=0)).search()
+>>> result.metrics.messages
+{'Proposal': 1200, 'Sides': 1200, 'Value': 1200}
+"""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Mapping, Sequence
+from typing import ClassVar
+
+from robochoc.model import message as wire
+from robochoc.protocols.asymmetric.messages.acls import Proposal, Sides
+from robochoc.protocols.asymmetric.settings.acls import ACLSSettings
+from robochoc.protocols.order import PriorityOrder
+from robochoc.protocols.shared.cycles import NO_GAIN, CycleProtocol, gain, values_in
+from robochoc.protocols.shared.messages.cycles import Value
+from robochoc.protocols.traits import ENDS_WITH_PROOF, Traits
+from robochoc.solver.compiled import LexicographicCost, LocalProblem
+
+
+class ACLS(CycleProtocol):
+    """One agent of ACLS. State: the `proposal` of this cycle, and `before` and `after`, what both sides would pay."""
+
+    messages = Value | Proposal | Sides
+    settings: ClassVar[ACLSSettings] = ACLSSettings()
+    traits = Traits(
+        concludes=ENDS_WITH_PROOF,
+        paper="Grinshpoun, Grubshtein, Zivan, Netzer & Meisels 2013",
+        complete=False,
+        costs=True,
+        partially_known=True,
+        asymmetric=True,
+        shared_scopes=True,
+        writes_to_non_neighbours=False,
+        privacy="parts of PKC but for entries that proposals ask for",
+        use_when="asymmetric costs, many robots",
+    )
+
+    def __init__(self, problem: LocalProblem, order: PriorityOrder) -> None:
+        super().__init__(problem, order)
+        self.proposal: int | None = None
+        self.before: LexicographicCost = NO_GAIN
+        self.after: LexicographicCost = NO_GAIN
+        self._values: dict[str, wire.Value] = {}
+
+    def begin(self) -> None:
+        """Take a random value."""
+        self.take(self.any_value())
+        self.tell_value(self._propose)
+
+    def _propose(self, messages: Mapping[str, wire.Message]) -> None:
+        """Draw a value that improves the own side, and propose it."""
+        self._values = values_in(messages)
+        costs = self.problem.lexicographic_costs(self._values)
+        self.before = costs[self.present]
+        gains = [gain(self.before, cost) for cost in costs]
+        self.proposal = self._drawn(gains)
+        if self.proposal is not None:
+            self.after = costs[self.proposal]
+        value = None if self.proposal is None else self.problem.values[self.proposal]
+        self.tell(self.problem.neighbours, Proposal(value))
+        self.listen(self.problem.neighbours, self._answer)
+
+    def _drawn(self, gains: Sequence[LexicographicCost]) -> int | None:
+        """Return the place of a value that gains something, drawn by its gain; None: there is none."""
+        better = [place for place, saved in enumerate(gains) if saved > NO_GAIN]
+        if not better:
+            return None
+        first = any(gains[place][0] for place in better)
+        sums = list(itertools.accumulate(gains[place][0 if first else 1] for place in better))
+        lot = self.chance() * sums[-1]
+        return next((place for place, total in zip(better, sums, strict=True) if lot < total), better[-1])
+
+    def _answer(self, messages: Mapping[str, wire.Message]) -> None:
+        """Tell each neighbour that proposes a value what the own side costs now, and would cost."""
+        for name, message in messages.items():
+            wanted = message.value if isinstance(message, Proposal) else None
+            sides = Sides(NO_GAIN, NO_GAIN)
+            if wanted is not None:
+                now = self.problem.own_side(self.present, name, self._values[name])
+                sides = Sides(now, self.problem.own_side(self.present, name, wanted))
+            self.send(name, sides)
+        self.listen(self.problem.neighbours, self._decide)
+
+    def _decide(self, messages: Mapping[str, wire.Message]) -> None:
+        """Take the proposal with a probability, if it is cheap enough for both sides together."""
+        index = self.present
+        if self.proposal is not None:
+            told = [message for message in messages.values() if isinstance(message, Sides)]
+            before = _sum([self.before, *(sides.now for sides in told)])
+            after = _sum([self.after, *(sides.proposed for sides in told)])
+            if self._cheap(before, after) and self.chance() < self.settings.probability:
+                index = self.proposal
+        self.take(index)
+        if not self.over:
+            self.tell_value(self._propose)
+
+    def _cheap(self, before: LexicographicCost, after: LexicographicCost) -> bool:
+        """Return whether a proposal that costs `after` is to be taken instead of `before`."""
+        return after[0] < before[0] or (after[0] == before[0] and after[1] * self.settings.coordination < before[1])
+
+
+def _sum(costs: Sequence[LexicographicCost]) -> LexicographicCost:
+    return sum(broken for broken, _ in costs), sum(cost for _, cost in costs)

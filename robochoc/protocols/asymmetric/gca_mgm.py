@@ -1,0 +1,40 @@
+"""Guaranteed Convergence Asymmetric MGM (GCA-MGM).
+
+As MCS-MGM, but a robot hands over its entry whenever a neighbour's move has cost it anything. A robot that was handed
+over an entry pays it for good, so fewer and fewer moves look better than they are, and the robots come to rest.
+
+- **When to use**: asymmetric costs, where robots have to come to rest.
+- **Guarantees**: incomplete; it converges, and stops after `cycles` cycles, without a proof of optimality. P_ij + P_ji,
+  what both sides of a pair pay together, never changes.
+- **Parameters (`--set`)**: `cycles` (default 100).
+- **Reference**: Grinshpoun, Grubshtein, Zivan, Netzer, Meisels: "Asymmetric distributed constraint optimization
+  problems", JAIR 47, 2013 (GCA-MGM).
+
+For the choices see `mcs_mgm.py`. More entries are told than there.
+
+>>> from robochoc.communication.simulator.schedule import Concurrent
+>>> from robochoc.communication.simulator.simulator import Simulation
+>>> from robochoc.generators.random_csp import random_csp
+>>> team = random_csp(5, 3, 0.6, 0, max_cost=9, asymmetric=True)
+>>> result = Simulation(team, GCAMGM, Concurrent(seed=0)).search()
+>>> result.metrics.messages
+{'Gain': 1200, 'Transfer': 1200, 'Value': 1200}
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from robochoc.protocols.asymmetric.mcs_mgm import MCSMGM
+from robochoc.protocols.shared.cycles import NO_GAIN
+from robochoc.solver.compiled import LexicographicCost
+
+
+class GCAMGM(MCSMGM):
+    """One agent of GCA-MGM."""
+
+    traits = replace(MCSMGM.traits, use_when="asymmetric costs, and robots have to come to rest")
+
+    def too_much(self, loss: LexicographicCost, gained: LexicographicCost) -> bool:  # noqa: ARG002 - any loss is
+        """Return whether a neighbour's move has cost this robot anything."""
+        return loss > NO_GAIN

@@ -1,0 +1,140 @@
+"""Minimal Constraint Sharing MGM (MCS-MGM).
+
+MGM for asymmetric costs: gains are those of the own side. A robot that has moved may have cost a neighbour more than it
+gained itself. Then the neighbour hands over the entry of its part that has become due: from now on the other robot pays
+it. So the sum of both sides of each constraint stays what it was, and the next move of that robot takes it into
+account.
+
+- **When to use**: asymmetric costs, many robots, little told of the own costs.
+- **Guarantees**: incomplete; it stops after `cycles` cycles, without a proof of optimality. P_ij + P_ji, what both
+  sides of a pair pay together, never changes.
+- **Parameters (`--set`)**: `cycles` (default 100).
+- **Reference**: Grinshpoun, Grubshtein, Zivan, Netzer, Meisels: "Asymmetric distributed constraint optimization
+  problems", JAIR 47, 2013 (MCS-MGM).
+
+What others learn: single entries of parts, those that are handed over; values, and gains.
+
+Choices that the paper leaves open, and differences:
+
+- A cycle has three phases: values, transfers (mostly of nothing), gains.
+- Nothing is handed over before somebody has moved.
+- If neighbours have the same gain, the first one in the priority order moves.
+- Gains and entries are pairs, broken hard constraints first. Totally known constraints are paid by all robots of the
+  scope, as in MGM, and never handed over.
+
+>>> from robochoc.communication.simulator.schedule import Concurrent
+>>> from robochoc.communication.simulator.simulator import Simulation
+>>> from robochoc.generators.random_csp import random_csp
+>>> team = random_csp(5, 3, 0.6, 0, max_cost=9, asymmetric=True)
+>>> result = Simulation(team, MCSMGM, Concurrent(seed=0)).search()
+>>> result.metrics.messages
+{'Gain': 1200, 'Transfer': 1200, 'Value': 1200}
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from robochoc.model import message as wire
+from robochoc.protocols.asymmetric.messages.transfers import Transfer
+from robochoc.protocols.local_search.messages.mgm import Gain
+from robochoc.protocols.local_search.mgm import Gainers
+from robochoc.protocols.order import PriorityOrder
+from robochoc.protocols.shared.cycles import NO_GAIN, gain, values_in
+from robochoc.protocols.shared.messages.cycles import Value
+from robochoc.protocols.traits import ENDS_WITH_PROOF, Traits
+from robochoc.solver.compiled import LexicographicCost, LocalProblem
+
+Entry = tuple[int, wire.Value]
+"""An entry of the own side: the place of the own value, and the other robot's value."""
+
+
+class MCSMGM(Gainers):
+    """One agent of MCS-MGM.
+
+    `changed` holds, for each neighbour, by how much entries of the own side differ from what the own part says: what
+    was handed over is added to them, or taken away. `told` are the neighbours' last gains.
+    """
+
+    messages = Value | Transfer | Gain
+    traits = Traits(
+        concludes=ENDS_WITH_PROOF,
+        paper="Grinshpoun, Grubshtein, Zivan, Netzer & Meisels 2013",
+        complete=False,
+        costs=True,
+        partially_known=True,
+        asymmetric=True,
+        shared_scopes=True,
+        writes_to_non_neighbours=False,
+        privacy="parts of PKC but for entries that are handed over",
+        use_when="asymmetric costs, many robots, little told of them",
+    )
+
+    def __init__(self, problem: LocalProblem, order: PriorityOrder) -> None:
+        super().__init__(problem, order)
+        self.changed: dict[str, dict[Entry, LexicographicCost]] = {name: {} for name in problem.neighbours}
+        self.told: dict[str, LexicographicCost] = {}
+        self._values: dict[str, wire.Value] = {}
+
+    def begin(self) -> None:
+        """Take a random value."""
+        self.take(self.any_value())
+        self.tell_value(self._transfer)
+
+    def side(self, neighbour: str, value: wire.Value) -> LexicographicCost:
+        """Return what this robot pays for its present value and `value`, after all that was handed over."""
+        plain = self.problem.own_side(self.present, neighbour, value)
+        return _sum(plain, self.changed[neighbour].get((self.present, value), NO_GAIN))
+
+    def burdens(self, view: Mapping[str, wire.Value]) -> list[LexicographicCost]:
+        """Return the cost of every own value, after all that was handed over."""
+        costs = self.problem.lexicographic_costs(view)
+        for name, value in view.items():
+            changed = self.changed[name]
+            if changed:
+                costs = [_sum(cost, changed.get((index, value), NO_GAIN)) for index, cost in enumerate(costs)]
+        return costs
+
+    def too_much(self, loss: LexicographicCost, gained: LexicographicCost) -> bool:
+        """Return whether a neighbour's move, by which it `gained`, has cost this robot so much that it hands over."""
+        return loss > max(gained, NO_GAIN)
+
+    def _transfer(self, messages: Mapping[str, wire.Message]) -> None:
+        """Hand over entries that neighbours' moves have made due, with all neighbours' values known."""
+        values = values_in(messages)
+        for name, value in values.items():
+            before = self._values.get(name, value)
+            entry = None
+            if value != before:
+                now = self.side(name, value)
+                if self.too_much(gain(now, self.side(name, before)), self.told[name]):
+                    entry = now
+                    self._add(name, value, gain(NO_GAIN, now))
+            self.send(name, Transfer(entry))
+        self._values = values
+        self.listen(self.problem.neighbours, self._weigh)
+
+    def _weigh(self, messages: Mapping[str, wire.Message]) -> None:
+        """Take what was handed over, and send the gain of the best own move."""
+        for name, message in messages.items():
+            if isinstance(message, Transfer) and message.entry is not None:
+                self._add(name, self._values[name], message.entry)
+        self.best_of(self.burdens(self._values))
+        self.tell(self.problem.neighbours, Gain(*self.gain))
+        self.listen(self.problem.neighbours, self._move)
+
+    def _move(self, messages: Mapping[str, wire.Message]) -> None:
+        """Move if the own gain is the largest, with all neighbours' gains known."""
+        self.told = {name: (told.broken, told.cost) for name, told in messages.items() if isinstance(told, Gain)}
+        self.take(self.target if self.wins(messages) else self.present)
+        if not self.over:
+            self.tell_value(self._transfer)
+
+    def _add(self, neighbour: str, value: wire.Value, cost: LexicographicCost) -> None:
+        """Add `cost` to the own side's entry for the present value and `value` of a neighbour."""
+        entry = (self.present, value)
+        self.changed[neighbour][entry] = _sum(self.changed[neighbour].get(entry, NO_GAIN), cost)
+
+
+def _sum(one: LexicographicCost, other: LexicographicCost) -> LexicographicCost:
+    return one[0] + other[0], one[1] + other[1]

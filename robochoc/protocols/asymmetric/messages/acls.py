@@ -1,0 +1,38 @@
+"""The messages of ACLS (see `acls.py`)."""
+
+from __future__ import annotations
+
+from robochoc.model import message as wire
+from robochoc.model.communicative_acts import Act, Performative
+from robochoc.model.wording import Wording
+from robochoc.protocols.local_search.messages.mgm import saving_in_words
+
+Paid = tuple[int, int | float]
+"""Broken hard constraints, and costs."""
+
+
+class Proposal(wire.Message, frozen=True):
+    """The value that the sender would like to take. None: it has none (`proposal`)."""
+
+    value: wire.Value | None
+
+    act = Act(Performative.QUERY_REF, "the sender asks what its proposal would cost the receiver")
+
+    def in_words(self, words: Wording) -> str:
+        """Return what the sender says."""
+        if self.value is None:
+            return "I propose no other value in this cycle"
+        return f"{words.own_value(self.value)} is what I propose: what would it cost you?"
+
+
+class Sides(wire.Message, frozen=True):
+    """The sender's own side towards the receiver: with its value now, and with what it proposes (`impact`)."""
+
+    now: Paid
+    proposed: Paid
+
+    act = Act(Performative.INFORM, "the answer to `Proposal`")
+
+    def in_words(self, _: Wording) -> str:
+        """Return what the sender says."""
+        return f"my side costs {saving_in_words(*self.now)} now, and {saving_in_words(*self.proposed)} as you propose"
