@@ -18,7 +18,20 @@ from robochoc.run.registry import protocol_named, protocol_names
 from tests.support.brute_force import least_cost
 from tests.support.cost_problems import random_complex_cost_team, random_cost_team
 
-BOUNDING = ("syncabb", "syncbb", "afb", "adopt", "bnb-adopt", "sfb", "dpop", "ncbb", "pt-fb", "mb-dpop", "s-dpop")
+BOUNDING = (
+    "syncabb",
+    "syncbb",
+    "afb",
+    "adopt",
+    "bnb-adopt",
+    "sfb",
+    "dpop",
+    "ncbb",
+    "pt-fb",
+    "hs-cai",
+    "mb-dpop",
+    "s-dpop",
+)
 UNPROVEN = tuple(
     name for name in protocol_names() if protocol_named(name).traits.costs and not protocol_named(name).traits.complete
 )

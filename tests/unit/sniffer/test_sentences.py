@@ -104,6 +104,11 @@ REAL = {
     ("ncbb", "Terminate"): "RX02 says: the search is over, with X03 = 3 and X04 = -2",
     ("pt-fb", "CPA"): "RX02 says: search your subtree for less than 8; at least 5 of it is paid by RX04",
     ("pt-fb", "Reduce"): "RX02 says: search no further",
+    ("hs-cai", "Domain"): "RX03 says: X03 is 0 or 3; my depth in the tree is 2",
+    ("hs-cai", "PreUtil"): "RX02 says: my subtree costs at least 25 to 31, by the values of RX00",
+    ("hs-cai", "CPA"): (
+        "RX02 says: search your subtree whatever it costs, with RX00's value number 1 and RX02's value number 1"
+    ),
     ("dpop", "Domain"): "RX00 says: X00 is -3, 0, 3 or 5",
     ("dpop", "Dimensions"): (
         "RX03 says: my table will have 16 cells over RX02 (4 values) and RX00 (4 values), and no cost above 19;"

@@ -1,0 +1,105 @@
+"""The messages of HS-CAI, besides those of all searches in branches (see `hs_cai.py`)."""
+
+from __future__ import annotations
+
+import math
+
+from robochoc.model import message
+from robochoc.model.communicative_acts import Act, Performative
+from robochoc.model.message import Message
+from robochoc.model.wording import Wording, cost_text, listed
+from robochoc.protocols import acts
+from robochoc.protocols.optimization.messages.branching import Number, allowance
+
+Axis = tuple[str, int, int]
+"""A robot, its depth in the tree, and the number of its values."""
+
+
+class Domain(Message, frozen=True):
+    """The sender's values, and its depth in the tree."""
+
+    values: list[message.Value]
+    level: int
+
+    act = acts.TELL_DOMAIN
+
+    def in_words(self, words: Wording) -> str:
+        """Return what the sender says."""
+        return f"{words.domain(self.values)}; my depth in the tree is {self.level}"
+
+
+class PreUtil(Message, frozen=True):
+    """A lower bound on the cost of the sender's subtree for all values of the robots of `axes` (PREUTIL).
+
+    `dropped`: other robots above that matter to the subtree; the bound holds whatever their values are. `dearest`: no
+    solution of the subtree costs more.
+    """
+
+    axes: list[Axis]
+    dropped: list[Axis]
+    dearest: int
+    costs: list[Number]
+
+    act = acts.TELL_BOUNDS
+
+    def in_words(self, _: Wording) -> str:
+        """Return what the sender says."""
+        names = listed(name for name, _, _ in self.axes)
+        told = f"my subtree costs {span_in_words(self.costs)}, by the values of {names or 'nobody'}"
+        return f"{told}; left out: {listed(name for name, _, _ in self.dropped)}" if self.dropped else told
+
+
+class CPA(Message, frozen=True):
+    """A request to search the receiver's subtree for less than `bound` (CPA).
+
+    `places`: of the robots above that matter to it, the places of their values in their domains.
+    """
+
+    bound: Number
+    places: dict[str, int]
+
+    act = Act(Performative.REQUEST, "the receiver is to search its subtree")
+
+    def in_words(self, _: Wording) -> str:
+        """Return what the sender says."""
+        return f"search your subtree {allowance(self.bound)}, with {places_in_words(self.places)}"
+
+
+class InferCtxt(Message, frozen=True):
+    """A request for a tighter table, with the values at these places (INFERCTXT)."""
+
+    places: dict[str, int]
+
+    act = Act(Performative.REQUEST, "the receiver is to infer a tighter lower bound")
+
+    def in_words(self, _: Wording) -> str:
+        """Return what the sender says."""
+        return f"what does your subtree cost at least with {places_in_words(self.places)}?"
+
+
+class CtxtUtil(Message, frozen=True):
+    """A lower bound as in PREUTIL, with the values that the receiver's request named (CTXTUTIL)."""
+
+    axes: list[Axis]
+    costs: list[Number]
+
+    act = acts.TELL_BOUNDS
+
+    def in_words(self, _: Wording) -> str:
+        """Return what the sender says."""
+        names = listed(name for name, _, _ in self.axes)
+        return f"with these values my subtree costs {span_in_words(self.costs)}, by the values of {names or 'nobody'}"
+
+
+def places_in_words(places: dict[str, int]) -> str:
+    """Return values, by their places."""
+    return listed([f"{name}'s value number {place + 1}" for name, place in places.items()]) or "any values"
+
+
+def span_in_words(costs: list[Number]) -> str:
+    """Return between what and what lower bounds are: `at least 3 to 9`."""
+    finite = [cost for cost in costs if not math.isinf(cost)]
+    if not finite:
+        return "infinity"
+    least, most = min(finite), max(finite)
+    return f"at least {cost_text(least)}{'' if least == most else f' to {cost_text(most)}'}"

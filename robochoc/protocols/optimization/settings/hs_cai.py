@@ -1,0 +1,20 @@
+"""The settings of HS-CAI (see `hs_cai.py`)."""
+
+from __future__ import annotations
+
+from robochoc.protocols.settings_base import Settings
+
+
+class HSCAISettings(Settings, frozen=True):
+    """How much is inferred before and during the search.
+
+    `k`: the most robots above that a table may be over. With as many as the tree's induced width, all bounds are exact.
+    `t`: a robot has its bounds inferred anew when a value above has stayed the same for more than `t` searches.
+    """
+
+    k: int = 4
+    t: int = 1
+
+    def __post_init__(self) -> None:
+        if self.k < 1 or self.t < 1:
+            raise ValueError("k and t are 1 or more")
