@@ -170,6 +170,7 @@ REAL = {
         "RX00 says: the search is over: take your value of the best sample;"
         " the last sample was not better than the best"
     ),
+    ("a-dsa", "Tick"): "RX00 says: X00 = -3 at present",
     ("dsa", "Value"): "RX01 says: X01 = -3 in this cycle",
     ("mgm", "Gain"): "RX00 says: my move would save 8 of cost",
     ("mgm2", "Domain"): "RX04 says: X04 is -2, -1 or 4",
