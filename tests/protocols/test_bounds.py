@@ -31,6 +31,7 @@ BOUNDING = (
     "hs-cai",
     "mb-dpop",
     "s-dpop",
+    "o-dpop",
 )
 UNPROVEN = tuple(
     name for name in protocol_names() if protocol_named(name).traits.costs and not protocol_named(name).traits.complete

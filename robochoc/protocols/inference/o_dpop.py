@@ -1,0 +1,216 @@
+"""Open DPOP (O-DPOP): DPOP that sends no tables, but their entries, best first and on request.
+
+DPOP (see `dpop.py`) in which a parent asks (`Ask`), and its child answers with one *good*: a combination of values of
+its separator, and the least cost of its subtree for it. Goods come in the order of their costs. So a parent knows what
+all others cost at least, and often needs only a few.
+
+- **When to use**: costs, where few combinations are good. The number of messages may be exponential in the induced
+  width, but each is short; a table is never sent as a whole.
+- **Guarantees**: complete; it terminates with an optimum, or with a proof that there is no solution.
+- **Parameters (`--set`)**: `memory`, the bytes that the tables of a robot may take (default 1 GiB).
+- **Reference**: Petcu, Faltings: "O-DPOP: an algorithm for open/distributed constraint optimization", AAAI 2006.
+
+Its rules are these methods:
+
+    ASK / GOOD propagation    `_answer`, `_take_good`     valuation-sufficient good    `_is_complete`
+    VALUE propagation         DPOP's
+
+A robot joins what its children have sent. Where a child has sent no matching good, the cost of its last good is a lower
+bound. The robot's cheapest combination is a good once all children have sent their matching goods for it. Until then it
+asks the children that lack one.
+
+Choices that the paper leaves open, and differences:
+
+- Domains and sizes are sent as in DPOP, so all combinations are known from the beginning. In the paper, an open problem
+  reveals values as they are asked for.
+- A robot asks all children that lack a good at the same time, each once.
+- A robot keeps its costs as a table, of eight bytes a cell, and so has DPOP's need for memory.
+
+>>> from robochoc.generators.queens3d import queens3d
+>>> from robochoc.run import Options, Runtime, solve
+>>> solve(queens3d(3), Options(protocol="o-dpop", runtime=Runtime.SIMULATOR)).verdict.value
+'no-solution'
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import assert_never, cast
+
+import numpy as np
+
+from robochoc.model.message import Message
+from robochoc.model.outcome import Verdict
+from robochoc.protocols.inference.dpop import DPOP, keep_once
+from robochoc.protocols.inference.dpop_tables import Array, Codes, Extent
+from robochoc.protocols.inference.messages.dpop import VALUE, Dimensions, Domain, Proceed
+from robochoc.protocols.inference.messages.o_dpop import Ask, Done, Good
+from robochoc.protocols.order import PriorityOrder
+from robochoc.protocols.shared.messages.dfs import TreeMessage
+from robochoc.protocols.traits import ENDS_WITH_PROOF, Traits
+from robochoc.solver.compiled import LocalProblem
+
+
+class ODPOP(DPOP):
+    """One agent of O-DPOP.
+
+    State besides DPOP's:
+
+    - `goods`: for each child the costs of the goods that it has sent (not a number: not sent), by its separator;
+    - `last`: for each child the cost of its last good, `inf` if it has no more;
+    - `optimum`: at the root, a lower bound on its tree's cost; in the end it is the optimum.
+    """
+
+    messages = TreeMessage | Domain | Dimensions | Proceed | Ask | Good | Done | VALUE
+    traits = Traits(
+        concludes=ENDS_WITH_PROOF,
+        paper="Petcu & Faltings 2006",
+        costs=True,
+        shared_scopes=True,
+        writes_to_non_neighbours=False,
+        tables=True,
+        privacy="constraints of others, but for sums",
+        use_when="costs, few good combinations: short messages",
+    )
+
+    def __init__(self, problem: LocalProblem, order: PriorityOrder) -> None:
+        super().__init__(problem, order)
+        self.goods: dict[str, Array] = {}
+        self.last: dict[str, float] = {}
+        self._local: Array = np.zeros(())
+        self._unsent = np.ones((), bool)
+        self._asked = False
+        self._waiting: set[str] = set()
+
+    def handle(self, sender: str, message: Message) -> None:
+        """Dispatch on the message's type."""
+        match cast("Domain | Dimensions | Proceed | Ask | Good | Done | VALUE", message):
+            case Domain(values):
+                keep_once(sender, values, self.domains, self.ancestors)
+                self._measure()
+            case Dimensions() as dimensions:
+                self._check(sender, dimensions)
+                keep_once(sender, dimensions, self.dimensions, self.children)
+                self._measure()
+            case Proceed(separator):
+                self._proceed(separator)
+            case Ask():
+                self._take_request(sender)
+            case Good(assignment, cost):
+                self._take_good(sender, assignment, cost)
+            case Done():
+                self._take_answer(sender, math.inf)
+            case VALUE(assignment):
+                self._value_message_handler(assignment)
+            case never:
+                assert_never(never)
+
+    def _kept_bytes(self, inputs: Sequence[Extent]) -> int:
+        """Costs stay as floats, and are added up for each good."""
+        cells = len(self.problem.values) * math.prod(self._own_sizes())
+        return 40 * cells + sum(10 * table.cells for table in inputs)
+
+    # Goods, from the leaves up
+
+    def _begin_utils(self) -> None:
+        """Add up the own constraints; a root asks itself."""
+        shape = [self._sizes[name] for name in self.separator or ()]
+        self._local = np.zeros((len(self.problem.values), *shape))
+        self._local += np.array(self.problem.charges, np.float64).reshape(-1, *(1 for _ in shape))
+        for table in self.problem.tables({name: self.domains[name] for name in self.ancestors}):
+            self._local += self._aligned(table.charges, (*table.agents, self.problem.agent))
+        for child in self.children:
+            sizes = self.dimensions[child].separator
+            self.goods[child] = np.full([sizes[name] for name in self._axes[child]], np.nan)
+            self.last[child] = 0
+        self._unsent = np.ones(shape, bool)
+        self.choices = cast("Codes", np.zeros(shape, np.min_scalar_type(len(self.problem.values))))
+        if self.parent is None:
+            self._asked = True
+            self._answer()
+
+    def _take_request(self, sender: str) -> None:
+        if sender != self.parent or self.separator is None or self._asked:
+            raise ValueError(f"{self.problem.agent} is not to be asked now")
+        self._asked = True
+        self._answer()
+
+    def _take_good(self, child: str, assignment: Sequence[int], cost: int) -> None:
+        """Store a child's next good. Raises `ValueError` if it is none, or does not come in order."""
+        shape = self.goods[child].shape if child in self.goods else ()
+        if len(assignment) != len(shape) or not all(
+            0 <= place < size for place, size in zip(assignment, shape, strict=True)
+        ):
+            raise ValueError(f"{assignment} are no values of {child}'s separator")
+        if child in self._waiting:
+            if cost < self.last[child] or not np.isnan(self.goods[child][tuple(assignment)]):
+                raise ValueError(f"{child}'s good costs less than its last one, or has come before")
+            self.goods[child][tuple(assignment)] = cost
+        self._take_answer(child, cost)
+
+    def _take_answer(self, child: str, cost: float) -> None:
+        """Note that all that `child` has not sent costs at least `cost`."""
+        if child not in self._waiting:
+            raise ValueError(f"{child} was not asked for a good")
+        self._waiting.discard(child)
+        self.last[child] = cost
+        self._answer()
+
+    def _answer(self) -> None:
+        """Send the next good if it is known and asked for; otherwise ask the children that lack one."""
+        if not self._asked or self._waiting:
+            return
+        costs = self._lower_bounds()
+        least = np.where(self._unsent, costs.min(axis=0), np.inf)
+        flat = int(least.argmin())
+        cell = tuple(map(int, np.unravel_index(flat, least.shape)))
+        cost = float(least[cell])
+        if cost == math.inf:
+            self._send_end()
+            return
+        if self.parent is None:
+            self.optimum = int(cost)
+        own = int(costs.reshape(len(costs), -1)[:, flat].argmin())
+        missing = [child for child in self.children if not self._is_complete(child, (own, *cell))]
+        if missing:
+            self._waiting = {*missing}
+            for child in missing:
+                self.send(child, Ask())
+            return
+        self._asked = False
+        self._unsent[cell] = False
+        cast("Codes", self.choices)[cell] = own
+        if self.parent is None:
+            self._choose_optimal([])
+        else:
+            self.send(self.parent, Good(list(cell), int(cost)))
+
+    def _send_end(self) -> None:
+        """Send that there are no more goods; if there was none, nothing is possible at all."""
+        if self._unsent.all():
+            self.conclude(Verdict.NO_SOLUTION)
+        elif self.parent is not None:
+            self._asked = False
+            self.send(self.parent, Done())
+
+    def _lower_bounds(self) -> Array:
+        """Return a lower bound on the subtree's cost for each own value and each combination of the separator's."""
+        costs = self._local
+        for child, goods in self.goods.items():
+            bounds = np.where(np.isnan(goods), self.last[child], goods)
+            costs = costs + cast("Array", self._aligned(bounds, self._axes[child]))
+        return costs
+
+    def _is_complete(self, child: str, places: Sequence[int]) -> bool:
+        """Return whether `child` has sent its good for these places of the own value and the separator's values."""
+        view = dict(zip((self.problem.agent, *(self.separator or ())), places, strict=True))
+        return not np.isnan(self.goods[child][tuple(view[name] for name in self._axes[child])])
+
+    # VALUE, from the root down
+
+    def _best_value(self, choices: Codes, assignment: Sequence[int]) -> int:
+        """Return the place of the own value in the good that was sent for `assignment`."""
+        if self._unsent[tuple(assignment)]:
+            raise ValueError(f"{self.problem.agent} has sent no good for {list(assignment)}")
+        return super()._best_value(choices, assignment)
