@@ -74,7 +74,7 @@ def test_the_last_messages_of_the_other_direction_count() -> None:
     replies(robot, ("RA", Q([[5, 0]])))
     assert value(robot) == (1,)  # by A 4 and 6, by C 0 and 7
     assert said(robot, ("RC", R([[0, 0]]))) == [R([[1, 4]])]
-    assert robot.from_above == {"RA": [[5, 0]]}
+    assert robot.functions.q == {"RA": [[5, 0]]}
 
 
 def test_a_phase_is_one_message_to_each_neighbour_on_that_side() -> None:
@@ -90,7 +90,7 @@ def test_from_the_third_phase_on_a_value_is_told_instead_of_q() -> None:
     assert robot.cycle == 2
     assert said(robot, ("RC", R([[0, 7]]))) == [R([[3, 4]])]  # 1 costs A so much
     assert said(robot, ("RA", Value((2,)))) == [Value((1,))]
-    assert robot.from_above == {"RA": [[INFINITE, 0]]}
+    assert robot.functions.q == {"RA": [[INFINITE, 0]]}
     assert robot.own == [[4, 6]]
 
 
@@ -127,11 +127,11 @@ def test_before_values_are_told_a_robot_without_a_value_has_a_proof_and_afterwar
 
 def test_what_has_the_wrong_size_is_refused() -> None:
     robot = middle()
-    with pytest.raises(ValueError, match="has not the rows"):
+    with pytest.raises(ValueError, match="has not 1 rows of 2 entries"):
         replies(robot, ("RC", R([[0, 0, 0]])))
     robot = middle()
     replies(robot, ("RC", R([[0, 0]])))
-    with pytest.raises(ValueError, match="has not the rows"):
+    with pytest.raises(ValueError, match="has not 1 rows of 2 entries"):
         replies(robot, ("RA", Q([[0, 0], [0, 0]])))
     robot = middle("ADVP")
     replies(robot, ("RC", R([[0, 0]])))

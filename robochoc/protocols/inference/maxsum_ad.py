@@ -42,13 +42,14 @@ Choices that the papers leave open, and differences:
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from typing import ClassVar
 
 from robochoc.model import message as wire
 from robochoc.model.outcome import Verdict
 from robochoc.model.problem import INFINITE
-from robochoc.protocols.inference.maxsum_factor import Factor, Row, cheapest, from_zero, total, without_each
+from robochoc.protocols.inference.maxsum_factor import Row, cheapest, from_zero, total, without_each
+from robochoc.protocols.inference.maxsum_functions import Functions, checked
 from robochoc.protocols.inference.messages.maxsum import Q, R
 from robochoc.protocols.inference.settings.maxsum_ad import MaxSumADSettings
 from robochoc.protocols.order import PriorityOrder
@@ -66,8 +67,8 @@ PERIOD = 3
 class MaxSumAD(CycleProtocol):
     """One agent of Max-Sum_AD. A cycle is a phase.
 
-    `factors` are the own functions. Kept are the last messages: `from_above` (Q, for each robot a row for each own
-    function with it), `from_below` (R), and the answers of the own functions, `own`.
+    `functions` are the own ones, with the last Q from above. `from_below` holds the last R from each robot below, `own`
+    those of the own functions.
     """
 
     messages = Domain | R | Q | Value
@@ -87,11 +88,11 @@ class MaxSumAD(CycleProtocol):
         place = order.rank[problem.agent]
         self.above = tuple(name for name in problem.neighbours if order.rank[name] < place)
         self.below = tuple(name for name in problem.neighbours if order.rank[name] > place)
-        self.factors: list[Factor] = []
+        self.functions = Functions([], {})
         self.preferred: Row = []
-        self.from_above: dict[str, list[Row]] = {}
         self.from_below: dict[str, list[Row]] = {}
         self.own: list[Row] = []
+        self._nothing: list[Row] = []
         self._domains: dict[str, list[wire.Value]] = {}
 
     def begin(self) -> None:
@@ -103,12 +104,11 @@ class MaxSumAD(CycleProtocol):
         self.listen(self.above, self._build)
 
     def _build(self, messages: Mapping[str, wire.Message]) -> None:
-        """Make the own functions from the received domains. All messages are 0 before there are any."""
+        """Make the own functions from the received domains."""
         self._domains = {name: list(told.values) for name, told in messages.items() if isinstance(told, Domain)}
-        self.factors = Factor.joined(self.problem.tables(self._domains))
-        self.own = [[0.0] * len(self.preferred) for _ in self.factors]
-        for name, values in self._domains.items():
-            self.from_above[name] = [[0.0] * len(values) for factor in self.factors if name in factor.agents]
+        self.functions = Functions(self.problem.tables(self._domains), self._domains)
+        self._nothing = [[0.0] * len(self.preferred) for _ in self.functions.factors]
+        self.own = self._nothing
         self.listen(self.below, self._up)
 
     # Phases
@@ -117,14 +117,11 @@ class MaxSumAD(CycleProtocol):
         """Hear R from below, take a value, and send R to the robots above."""
         for name, message in messages.items():
             if isinstance(message, R):
-                self.from_below[name] = self._checked(message.rows, len(self.preferred), self.from_below.get(name))
+                many = len(self.from_below.get(name, message.rows))
+                self.from_below[name] = checked(message.rows, many, len(self.preferred))
         if not self._choose():
             return
-        answers = [self._answers(place, mine)[:-1] for place, mine in enumerate(self._q()[: len(self.factors)])]
-        said: dict[str, list[Row]] = {name: [] for name in self.above}
-        for factor, rows in zip(self.factors, answers, strict=True):
-            for name, row in zip(factor.agents, rows, strict=True):
-                said[name].append(row)
+        _, said = self.functions.answers(self._q()[: len(self._nothing)])
         for name, rows in said.items():
             self.send(name, R(rows))
         if not self.over:
@@ -134,14 +131,13 @@ class MaxSumAD(CycleProtocol):
         """Hear Q or values from above, take a value, and send Q or the value to the robots below."""
         for name, message in messages.items():
             self._hear(name, message)
-        nothing = [0.0] * len(self.preferred)
-        self.own = [self._answers(place, nothing)[-1] for place in range(len(self.factors))]
+        self.own, _ = self.functions.answers(self._nothing)
         if not self._choose():
             return
         if self._tells_values:
             self.tell(self.below, Value(self.problem.values[self.present]))
         else:
-            rows = iter(self._q()[len(self.factors) :])
+            rows = iter(self._q()[len(self._nothing) :])
             for name, heard in self.from_below.items():
                 self.send(name, Q([next(rows) for _ in heard]))
         if not self.over:
@@ -157,31 +153,15 @@ class MaxSumAD(CycleProtocol):
 
     def _hear(self, name: str, message: wire.Message) -> None:
         """Keep what a robot above has told. A value rules out all others."""
-        values, before = self._domains[name], self.from_above[name]
         if isinstance(message, Value):
-            taken = values.index(message.value)
+            values = self._domains[name]
             row = [INFINITE] * len(values)
-            row[taken] = 0.0
-            self.from_above[name] = [row] * len(before)
+            row[values.index(message.value)] = 0.0
+            self.functions.hear(name, [row] * len(self.functions.q[name]))
         elif isinstance(message, Q):
-            self.from_above[name] = self._checked(message.rows, len(values), before)
-
-    def _checked(self, rows: list[Row], size: int, before: Sequence[Row] | None) -> list[Row]:
-        """Return `rows`; `ValueError` if they are not as many as `before`, or not of `size` entries."""
-        if (before is not None and len(rows) != len(before)) or any(len(row) != size for row in rows):
-            raise ValueError(f"the message has not the rows that {self.problem.agent} shares functions for")
-        return rows
+            self.functions.hear(name, message.rows)
 
     # Equations
-
-    def _answers(self, place: int, mine: Row) -> list[Row]:
-        """Return R of the own function at `place` to each of its robots, if `mine` is the own Q."""
-        factor = self.factors[place]
-        told = []
-        for name in factor.agents:
-            shared = [number for number, other in enumerate(self.factors) if name in other.agents]
-            told.append(self.from_above[name][shared.index(place)])
-        return factor.r([*told, mine])
 
     @property
     def _rows(self) -> list[Row]:

@@ -1,0 +1,183 @@
+"""Asynchronous Max-Sum.
+
+Max-Sum without cycles. Each robot takes in what has arrived, takes the value that costs least by it, and tells its
+neighbours what has changed. When nothing changes any more, all are silent: that is the end.
+
+- **When to use**: costs, a graph with few cycles, and messages that take unequally long.
+- **Guarantees**: incomplete. It ends, as a robot tells each neighbour at most `limit` messages. On a graph without
+  cycles the result is optimal, if `limit` and `tolerance` do not cut it short; elsewhere it is an estimate. The result
+  are the values at the end, or at a limit of the run. A robot all of whose values cost `inf` proves that there is no
+  solution.
+- **Parameters (`--set`)**: `damping` (the weight of the last message in a new one; default 0.5), `preference` (the
+  maximum random charge of a value; default 0.01), `tolerance` (smaller changes are not told; default 0.0001), `limit`
+  (the number of messages to each neighbour; default 200).
+- **References**: Farinelli, Rogers, Petcu, Jennings: "Decentralised coordination of low-power embedded devices using
+  the max-sum algorithm", AAMAS 2008, Section 4, which says that nodes may send at any time; for damping: Cohen, Galiki,
+  Zivan: "Governing convergence of Max-sum on DCOPs through damping and splitting", AIJ 279, 2020.
+
+Functions, R, Q, Z and preferences are those of Max-Sum (`maxsum`).
+
+Choices that the papers leave open, and differences:
+
+- What one robot tells another is damped, R and Q, but not what its own nodes tell each other.
+- A damped message is not what the robot knows. So it says that it is not `settled`, and its receiver answers in any
+  case; then the robot tells what is nearer, until the rest is at most `tolerance`. So damping does not change where a
+  graph without cycles ends.
+- All robots begin at once, with what they pay alone.
+
+>>> from robochoc.communication.simulator.schedule import Concurrent
+>>> from robochoc.communication.simulator.simulator import Simulation
+>>> from robochoc.generators.queens3d import queens3d
+>>> result = Simulation(queens3d(2), AsyncMaxSum, Concurrent(seed=0)).search()
+>>> result.verdict.value, result.metrics.messages
+('no-solution', {'Domain': 6})
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import ClassVar, assert_never, cast
+
+from robochoc.model.message import Message, Value
+from robochoc.model.outcome import Verdict
+from robochoc.model.problem import INFINITE
+from robochoc.protocols.inference.maxsum_factor import Row, cheapest, from_zero, total, without_each
+from robochoc.protocols.inference.maxsum_functions import Functions, checked
+from robochoc.protocols.inference.messages.async_maxsum import Q, R
+from robochoc.protocols.inference.settings.async_maxsum import AsyncMaxSumSettings
+from robochoc.protocols.order import PriorityOrder
+from robochoc.protocols.protocol import Protocol
+from robochoc.protocols.shared.messages.cycles import Domain
+from robochoc.protocols.traits import ENDS_WITH_PROOF, Traits
+from robochoc.solver.compiled import LocalProblem
+
+
+class AsyncMaxSum(Protocol):
+    """One agent of asynchronous Max-Sum.
+
+    `functions` are the own ones, with the last Q from above; None before all robots above have told their domains.
+    `from_below` holds the last R from each robot below, `told` the last rows told to each neighbour, `sent` how many
+    messages that were. `owed` are those who wait for an answer.
+    """
+
+    messages = Domain | R | Q
+    settings: ClassVar[AsyncMaxSumSettings] = AsyncMaxSumSettings()
+    traits = Traits(
+        concludes=ENDS_WITH_PROOF,
+        paper="Farinelli, Rogers, Petcu, Jennings 2008",
+        complete=False,
+        costs=True,
+        writes_to_non_neighbours=False,
+        privacy="constraints among others",
+        use_when="costs, graph with few cycles, messages of unequal delay; no proof",
+    )
+
+    def __init__(self, problem: LocalProblem, order: PriorityOrder) -> None:
+        super().__init__(problem, order)
+        place = order.rank[problem.agent]
+        self.above = tuple(name for name in problem.neighbours if order.rank[name] < place)
+        self.below = tuple(name for name in problem.neighbours if order.rank[name] > place)
+        self.functions: Functions | None = None
+        self.preferred: Row = []
+        self.from_below: dict[str, list[Row]] = {}
+        self.told: dict[str, list[Row]] = {}
+        self.sent: dict[str, int] = {}
+        self.owed: set[str] = set()
+        self._domains: dict[str, Sequence[Value]] = {}
+
+    def start(self) -> None:
+        """Take the cheapest value, and tell the domain to the holders of the own functions."""
+        if not self.problem.values:
+            self.conclude(Verdict.NO_SOLUTION)
+        elif not self.problem.neighbours:
+            burdens = self.problem.lexicographic_costs({})
+            self.value = burdens.index(min(burdens))
+        else:
+            preference = self.settings.preference
+            self.preferred = [cost + preference * self.chance() for cost in self.problem.costs({})]
+            self.value = cheapest(self.preferred)
+            for name in self.below:
+                self.send(name, Domain(list(self.problem.values)))
+            self.settle()
+
+    def receive(self, sender: str, message: Message) -> None:
+        """Keep what is told."""
+        if self.verdict is not None:
+            return
+        match cast("Domain | R | Q", message):
+            case Domain(values):
+                self._domains[sender] = values
+            case R(rows, settled):
+                many = len(self.from_below.get(sender, rows))
+                self.from_below[sender] = checked(rows, many, len(self.preferred))
+                self._owe(sender, settled=settled)
+            case Q(rows, settled):
+                if self.functions is None:
+                    raise ValueError("Q has come before R")
+                self.functions.hear(sender, rows)
+                self._owe(sender, settled=settled)
+            case never:
+                assert_never(never)
+
+    def settle(self) -> None:
+        """Take a value by all that has been told, and tell what has changed."""
+        if self.verdict is not None or not self.preferred or len(self._domains) < len(self.above):
+            return
+        if self.functions is None:
+            self.functions = Functions(self.problem.tables(self._domains), self._domains)
+        functions = self.functions
+        own, _ = functions.answers([[0.0] * len(self.preferred)] * len(functions.factors))
+        rows = [*own, *(row for told in self.from_below.values() for row in told)]
+        z = total(self.preferred, rows)
+        if min(z) == INFINITE:
+            self.conclude(Verdict.NO_SOLUTION)
+            return
+        self.value = cheapest(z)
+        q = [from_zero(row) for row in without_each(self.preferred, rows, z)]
+        for name, answers in functions.answers(q[: len(own)])[1].items():
+            self._tell(name, answers, R)
+        rest = iter(q[len(own) :])
+        for name, heard in self.from_below.items():
+            self._tell(name, [next(rest) for _ in heard], Q)
+
+    def _owe(self, sender: str, *, settled: bool) -> None:
+        """Note whether `sender` waits for an answer."""
+        if settled:
+            self.owed.discard(sender)
+        else:
+            self.owed.add(sender)
+
+    def _tell(self, name: str, fresh: list[Row], kind: type[R | Q]) -> None:
+        """Tell `fresh`, damped, if it has changed, or an answer is owed. There may be no rows, or too many messages."""
+        tolerance = self.settings.tolerance
+        before = self.told.get(name)
+        owed = name in self.owed
+        self.owed.discard(name)
+        sent = self.sent.get(name, 0)
+        if not fresh or sent >= self.settings.limit:
+            return
+        if before is not None and not owed and _near(before, fresh, tolerance):
+            return
+        rows = fresh if before is None else self._damped(before, fresh)
+        settled = _near(rows, fresh, tolerance)
+        self.told[name] = fresh if settled else rows
+        self.sent[name] = sent + 1
+        self.send(name, kind(self.told[name], settled))
+
+    def _damped(self, before: list[Row], fresh: list[Row]) -> list[Row]:
+        damping = self.settings.damping
+        if not damping:
+            return fresh
+        return [
+            [damping * old + (1 - damping) * new for old, new in zip(one, other, strict=True)]
+            for one, other in zip(before, fresh, strict=True)
+        ]
+
+
+def _near(before: list[Row], after: list[Row], tolerance: float) -> bool:
+    """Return whether no entry differs by more than `tolerance`."""
+    return all(
+        old == new or abs(old - new) <= tolerance
+        for one, other in zip(before, after, strict=True)
+        for old, new in zip(one, other, strict=True)
+    )

@@ -1,0 +1,170 @@
+"""Maximum spanning forests that the robots build themselves, as Boruvka's algorithm does.
+
+Each robot begins as a tree of its own. In a round, each tree finds the heaviest function that leads out of it, and all
+trees that such functions join become one; so there are at most log2(n) rounds. All robots of a tree know its root, and
+tell it to the neighbours (Fragment). What leads out is reported up the tree (Heaviest), its root chooses (Choice), and
+robots tell their neighbours in other trees whether their function was chosen (Join). Exactly one function of the new
+tree was chosen from both sides; the higher of its robots is the new root, and tells all of the tree (NewRoot).
+
+A robot goes on with a round when it has what it needs for it: messages of one robot arrive in the order in which they
+were sent, and wait until then. No two functions are equally heavy, as ties are broken by the robots' places in the
+order. (Boruvka 1926; with messages: Gallager, Humblet, Spira: "A distributed algorithm for minimum-weight spanning
+trees", ACM TOPLAS 5(1), 1983, which needs no common rounds, and fewer messages.)
+"""
+
+from __future__ import annotations
+
+from abc import abstractmethod
+from collections.abc import Callable, Iterable
+
+from robochoc.model.message import Message
+from robochoc.protocols.inference.messages.bounded_maxsum import Choice, Ends, Fragment, Heaviest, Join, NewRoot
+from robochoc.protocols.order import PriorityOrder
+from robochoc.protocols.protocol import Protocol
+from robochoc.solver.compiled import LocalProblem
+
+Heaviness = tuple[float, int, int]
+"""A weight, and what breaks ties."""
+
+
+class SpanningProtocol(Protocol):
+    """One agent that first builds a maximum spanning forest with the others.
+
+    `weights` are those of the functions with neighbours, known on both sides, when `grow` is called. `parent` (None: a
+    root) and `children` are known when `begin` is called.
+    """
+
+    def __init__(self, problem: LocalProblem, order: PriorityOrder) -> None:
+        super().__init__(problem, order)
+        self.weights: dict[str, float] = {}
+        self.parent: str | None = None
+        self.joined: list[str] = []
+        """The neighbours in the tree."""
+        self.root = problem.agent
+        self.stage: Callable[[], bool] | None = None
+        """What is to be done next: returns False if messages for it are missing."""
+        self._waiting: dict[str, list[Message]] = {name: [] for name in problem.neighbours}
+        self._outer: list[str] = []
+        self._own_choice: str | None = None
+
+    @abstractmethod
+    def begin(self) -> None:
+        """The tree is done."""
+
+    @property
+    def children(self) -> list[str]:
+        """The neighbours in the tree but for the parent."""
+        return [name for name in self.joined if name != self.parent]
+
+    def receive(self, sender: str, message: Message) -> None:
+        """Keep the message for its stage."""
+        self._waiting[sender].append(message)
+
+    def settle(self) -> None:
+        """Do all that the messages so far are enough for."""
+        while self.verdict is None and self.stage is not None and self.stage():
+            pass
+
+    def heard(self, names: Iterable[str]) -> dict[str, Message] | None:
+        """Return the next message of each of `names`; None if one is missing."""
+        wanted = list(names)
+        if not all(self._waiting[name] for name in wanted):
+            return None
+        return {name: self._waiting[name].pop(0) for name in wanted}
+
+    def grow(self) -> None:
+        """Begin the first round."""
+        self._outer = list(self.weights)
+        self._next_round()
+
+    def _next_round(self) -> None:
+        for name in self._outer:
+            self.send(name, Fragment(self.root))
+        self.stage = self._compare
+
+    def _compare(self) -> bool:
+        """Keep the functions that lead out of the tree."""
+        told = self.heard(self._outer)
+        if told is None:
+            return False
+        self._outer = [name for name, one in told.items() if isinstance(one, Fragment) and one.root != self.root]
+        self.stage = self._report
+        return True
+
+    def _report(self) -> bool:
+        """Heaviest the heaviest function that leads out of the branch; at the root, choose it."""
+        told = self.heard(self.children)
+        if told is None:
+            return False
+        found = {self._ends(name): self._heaviness(self._ends(name), self.weights[name]) for name in self._outer}
+        for report in told.values():
+            if isinstance(report, Heaviest) and report.ends is not None and report.weight is not None:
+                found[report.ends] = self._heaviness(report.ends, report.weight)
+        best = max(found, key=found.__getitem__) if found else None
+        if self.parent is None:
+            self._choose(best)
+        else:
+            self.send(self.parent, Heaviest(found[best][0] if best else None, best))
+            self.stage = self._hear_choice
+        return True
+
+    def _hear_choice(self) -> bool:
+        told = self.heard([] if self.parent is None else [self.parent])
+        if told is None:
+            return False
+        for message in told.values():
+            self._choose(message.ends if isinstance(message, Choice) else None)
+        return True
+
+    def _choose(self, ends: Ends | None) -> None:
+        """Tell the children the choice, and neighbours in other trees whether it is their function."""
+        for child in self.children:
+            self.send(child, Choice(ends))
+        if ends is None:
+            self.stage = None
+            self.begin()
+            return
+        self._own_choice = None
+        for name in self._outer:
+            if self._ends(name) == ends:
+                self._own_choice = name
+            self.send(name, Join(name == self._own_choice))
+        self.stage = self._join
+
+    def _join(self) -> bool:
+        """Add the functions that were chosen from either side to the tree."""
+        told = self.heard(self._outer)
+        if told is None:
+            return False
+        chosen = [name for name, one in told.items() if isinstance(one, Join) and one.joined]
+        new = [name for name in self._outer if name in chosen or name == self._own_choice]
+        self._outer = [name for name in self._outer if name not in new]
+        self.joined += new
+        if self._own_choice in chosen and self._ends(self._own_choice)[0] == self.problem.agent:
+            self._set_root(None, self.problem.agent)
+        else:
+            self.stage = self._hear_root
+        return True
+
+    def _hear_root(self) -> bool:
+        for name in self.joined:
+            waiting = self._waiting[name]
+            if waiting and isinstance(waiting[0], NewRoot):
+                message = waiting.pop(0)
+                assert isinstance(message, NewRoot)  # noqa: S101 - for mypy
+                self._set_root(name, message.root)
+                return True
+        return False
+
+    def _set_root(self, parent: str | None, root: str) -> None:
+        self.parent, self.root = parent, root
+        for child in self.children:
+            self.send(child, NewRoot(root))
+        self._next_round()
+
+    def _ends(self, name: str | None) -> Ends:
+        one, other = sorted((self.problem.agent, name or ""), key=self.order.rank.__getitem__)
+        return one, other
+
+    def _heaviness(self, ends: Ends, weight: float) -> Heaviness:
+        return weight, -self.order.rank[ends[0]], -self.order.rank[ends[1]]

@@ -1,0 +1,227 @@
+"""One test per rule of bounded Max-Sum (Rogers, Farinelli, Stranders, Jennings, AIJ 2011), named for it."""
+
+from __future__ import annotations
+
+import doctest
+import itertools
+from collections.abc import Mapping
+from random import Random
+from typing import NamedTuple
+
+import pytest
+
+import robochoc.protocols.inference.bounded_maxsum
+from robochoc.communication.simulator.simulator import Simulation
+from robochoc.model.orders import with_order
+from robochoc.model.outcome import Verdict
+from robochoc.model.problem import INFINITE, Constraint, Relation, Semantics, Team
+from robochoc.protocols.inference.bounded_maxsum import BoundedMaxSum
+from robochoc.protocols.inference.messages.bounded_maxsum import Assign, Branch, Dependency, Fragment
+from robochoc.protocols.order import PriorityOrder
+from robochoc.protocols.shared.messages.cycles import Domain
+from robochoc.protocols.shared.messages.cycles import Value as ValueMessage
+from robochoc.solver import exact_costs
+from robochoc.solver.agent_problem import agent_problems
+from robochoc.solver.compiled import LocalProblem
+from robochoc.solver.encoding import TooLargeError
+from tests.protocols.test_maxsum import random_tree
+from tests.support.agents import replies
+from tests.support.brute_force import least_cost
+from tests.support.cost_problems import random_cost_team
+from tests.support.examples import count
+from tests.support.local_search_runs import any_schedule, cost_of_assignment
+from tests.support.problems import team_of
+
+COSTS = Relation("C", 2, Semantics.SOFT, ((1, 1), (1, 2), (2, 1), (2, 2)), (3, 1, 4, 6))
+HARD = Relation("H", 2, Semantics.CONFLICTS, ((2, 1), (2, 2)))
+TWO = Domain([(1,), (2,)])
+
+
+def pair(relation: Relation = COSTS) -> Team:
+    return team_of(dict.fromkeys("AB", (1, 2)), [Constraint("F", relation, ("A", "B"), ("A", "B"))])
+
+
+def robot(team: Team, name: str) -> BoundedMaxSum:
+    found = BoundedMaxSum(LocalProblem(agent_problems(team)[name]), PriorityOrder(team.order))
+    found.start()
+    found.outbox.clear()
+    return found
+
+
+class Run(NamedTuple):
+    verdict: Verdict
+    values: dict[str, int]
+    roots: list[BoundedMaxSum]
+    robots: Mapping[str, BoundedMaxSum]
+
+    @property
+    def bound(self) -> float:
+        return sum(root.optimum or 0 for root in self.roots)
+
+    @property
+    def cut(self) -> float:
+        return sum(root.cut for root in self.roots)
+
+
+def run(team: Team, chance: Random) -> Run:
+    robots: dict[str, BoundedMaxSum] = {}
+
+    class Watched(BoundedMaxSum):
+        def __init__(self, problem: LocalProblem, order: PriorityOrder) -> None:
+            super().__init__(problem, order)
+            robots[problem.agent] = self
+
+    result = Simulation(team, Watched, any_schedule(chance)).search()
+    values = {name: one for given in result.assignments.values() for name, one in given.items()}
+    return Run(result.verdict, values, [one for one in robots.values() if one.optimum is not None], robots)
+
+
+def soft_team(chance: Random, size: int) -> Team:
+    """Any graph, also with several parts."""
+    domains = {f"X{number}": range(1, chance.randint(2, 4)) for number in range(size)}
+    constraints = []
+    for one, other in itertools.combinations(domains, 2):
+        if chance.random() < 0.5:
+            rows = tuple(itertools.product(domains[one], domains[other]))
+            relation = Relation("R", 2, Semantics.SOFT, rows, tuple(chance.randint(0, 9) for _ in rows))
+            constraints.append(Constraint("C", relation, (one, other), (one, other)))
+    return team_of(domains, constraints)
+
+
+def test_the_weight_of_a_dependency_is_the_largest_difference_that_a_value_makes_and_the_lighter_one_may_be_cut() -> (
+    None
+):
+    """By A's value: 1 or 5. By B's: 2 or 2, so B is what is cut, and A keeps the least of each value."""
+    assert replies(robot(pair(), "RB"), ("RA", TWO))[0] == ("RA", Dependency(2, [1, 4]))
+
+
+def test_what_is_always_forbidden_makes_no_difference_and_what_sometimes_is_an_infinite_one() -> None:
+    """A's 2 is out whatever B does."""
+    assert replies(robot(pair(HARD), "RB"), ("RA", TWO))[0] == ("RA", Dependency(0, [0, INFINITE]))
+    equal = Relation("E", 2, Semantics.CONFLICTS, ((1, 1), (2, 2)))
+    assert replies(robot(pair(equal), "RB"), ("RA", TWO))[0] == ("RA", Dependency(INFINITE, []))
+
+
+def test_where_no_function_is_nothing_weighs() -> None:
+    team = team_of(dict.fromkeys("ABC", (1, 2)), [Constraint("F", COSTS, ("A", "B"), ("A", "B"))])
+    alone = robot(team, "RC")
+    assert alone.optimum == 0
+    assert alone.assignment == {"C": 1}
+
+
+def test_costs_go_up_the_tree_and_values_down() -> None:
+    """A is the root: B holds the function, and tells what A's values cost; A tells its value."""
+    low = robot(pair(), "RB")
+    said = replies(low, ("RA", TWO))
+    assert said[1] == ("RA", Fragment("RB"))
+    high = robot(pair(), "RA")
+    heard = {"RA": [message for _, message in said]}
+    for _ in range(6):
+        answers = replies(high, *(("RB", message) for message in heard["RA"]))
+        heard["RA"] = [message for _, message in replies(low, *(("RA", message) for _, message in answers))]
+        if high.optimum is not None:
+            break
+        if any(isinstance(message, Branch) for message in heard["RA"]):
+            assert heard["RA"] == [Branch([1, 4], 0, 6)]
+    assert high.optimum == 1
+    assert (high.assignment, low.assignment) == ({"A": 1}, {"B": 2})
+
+
+def test_a_robot_that_holds_the_function_below_says_what_to_take() -> None:
+    chance = Random("take")
+    kinds: set[str] = set()
+    for _ in range(10):
+        team = random_tree(chance)
+        team = with_order(team, chance.sample(team.order, len(team.order)))
+        result = Simulation(team, BoundedMaxSum, any_schedule(chance)).search()
+        kinds |= result.metrics.messages.keys()
+    assert {Assign.__name__, ValueMessage.__name__} <= kinds
+
+
+@count("teams", 25, 600)
+def test_the_tree_is_a_maximum_spanning_forest(teams: int) -> None:
+    """By Kruskal's algorithm on what the robots say that functions weigh."""
+    chance = Random("forest")
+    for _ in range(teams):
+        team = soft_team(chance, chance.randint(1, 8))
+        robots = run(team, chance).robots
+        edges = sorted(
+            (-one.weights[name], team.order.index(name), team.order.index(one.problem.agent))
+            for one in robots.values()
+            for name in one.functions
+        )
+        part = list(range(len(team.order)))
+        kept = set()
+        for _, high, low in edges:
+            if part[high] != part[low]:
+                kept.add((high, low))
+                part = [part[low] if one == part[high] else one for one in part]
+        ends = {tuple(sorted(map(team.order.index, (name, one)))) for name, it in robots.items() for one in it.joined}
+        assert ends == kept
+        assert len([one for one in robots.values() if one.parent is None]) == len({*part})
+
+
+@count("teams", 40, 2500)
+def test_the_bound_is_below_the_optimum_and_the_result_within_what_was_cut(teams: int) -> None:
+    """So the ratio (bound + cut) / bound is kept, too."""
+    chance = Random("bounds")
+    inexact = 0
+    for _ in range(teams):
+        team = soft_team(chance, chance.randint(2, 7))
+        told = run(team, chance)
+        least = least_cost(team)
+        broken, cost = cost_of_assignment(team, told.values)
+        assert told.verdict is Verdict.SOLUTION
+        assert not broken
+        assert told.bound <= least <= cost <= told.bound + told.cut
+        inexact += told.bound < least
+    assert inexact > teams // 20
+
+
+@count("teams", 40, 2500)
+def test_with_hard_constraints_the_bound_holds_and_what_is_proven_is_true(teams: int) -> None:
+    chance = Random("hard")
+    proofs = 0
+    for _ in range(teams):
+        team = random_cost_team(chance, n_ary=False)
+        told = run(team, chance)
+        least = least_cost(team)
+        if told.verdict is Verdict.NO_SOLUTION:
+            proofs += 1
+            assert least == INFINITE
+            continue
+        assert told.bound <= least
+        broken, cost = cost_of_assignment(team, told.values)
+        assert told.cut == INFINITE or (not broken and cost <= told.bound + told.cut)
+    assert proofs
+
+
+@count("trees", 25, 600)
+def test_on_a_tree_nothing_is_cut_and_the_result_is_the_optimum(trees: int) -> None:
+    chance = Random("trees")
+    for _ in range(trees):
+        team = random_tree(chance)
+        team = with_order(team, chance.sample(team.order, len(team.order)))
+        told = run(team, chance)
+        least = least_cost(team)
+        assert (told.verdict is Verdict.NO_SOLUTION) is (least == INFINITE)
+        if least < INFINITE:
+            assert (told.cut, told.bound) == (0, least)
+            assert cost_of_assignment(team, told.values) == (0, least)
+
+
+def test_what_cannot_be_is_refused() -> None:
+    with pytest.raises(ValueError, match="weighs nan"):
+        replies(robot(pair(), "RA"), ("RB", Dependency(float("nan"), [])))
+    with pytest.raises(ValueError, match="has not 1 rows of 2 entries"):
+        replies(robot(pair(), "RA"), ("RB", Dependency(1, [1, 2, 3])))
+
+
+def test_costs_that_floats_do_not_hold_are_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(exact_costs, "EXACT", 5)
+    with pytest.raises(TooLargeError, match="2\\^53"):
+        run(pair(), Random(0))
+
+
+def test_the_example_in_the_documentation() -> None:
+    assert doctest.testmod(robochoc.protocols.inference.bounded_maxsum).failed == 0
