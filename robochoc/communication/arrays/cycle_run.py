@@ -20,8 +20,10 @@ from robochoc.model.outcome import Metrics, Verdict
 from robochoc.model.problem import INFINITE
 from robochoc.protocols.shared.messages.cycles import Value
 from robochoc.protocols.shared.settings.cycles import CycleSettings
+from robochoc.solver.encoding import UnsupportedError
 from robochoc.solver.exact_costs import EXACT
 
+WITHOUT_ANYTIME = "as arrays, the best cycle is the answer without it"
 Costs = TypeVar("Costs", Integers, Floats)
 
 
@@ -52,6 +54,8 @@ class CycleRun(ABC):
     def __init__(
         self, layout: Layout, settings: CycleSettings, seed: int, *, clocks: bool = True, changes: bool = False
     ) -> None:
+        if settings.anytime == "yes":
+            raise UnsupportedError(f"anytime=yes is for robots that send messages; {WITHOUT_ANYTIME}")
         self.layout = layout
         self.settings = settings
         self.values: Integers = np.zeros(layout.many, layout.kind)

@@ -65,6 +65,7 @@ from robochoc.protocols.inference.messages.maxsum import Q, R
 from robochoc.protocols.inference.settings.maxsum import MaxSumSettings
 from robochoc.protocols.order import PriorityOrder
 from robochoc.protocols.shared.cycles import CycleProtocol
+from robochoc.protocols.shared.messages.anytime import AnytimeMessage
 from robochoc.protocols.shared.messages.cycles import Domain
 from robochoc.protocols.traits import ENDS_WITH_PROOF, Traits
 from robochoc.solver.compiled import LocalProblem
@@ -77,7 +78,7 @@ class MaxSum(CycleProtocol):
     the own functions. `edges` holds the last Q to each function: the own ones first, then those of each robot below.
     """
 
-    messages = Domain | R | Q
+    messages = Domain | R | Q | AnytimeMessage
     settings: ClassVar[MaxSumSettings] = MaxSumSettings()
     traits = Traits(
         concludes=ENDS_WITH_PROOF,

@@ -54,6 +54,7 @@ from robochoc.protocols.inference.messages.maxsum import Q, R
 from robochoc.protocols.inference.settings.maxsum_ad import MaxSumADSettings
 from robochoc.protocols.order import PriorityOrder
 from robochoc.protocols.shared.cycles import CycleProtocol
+from robochoc.protocols.shared.messages.anytime import AnytimeMessage
 from robochoc.protocols.shared.messages.cycles import Domain, Value
 from robochoc.protocols.traits import ENDS_WITH_PROOF, Traits
 from robochoc.solver.compiled import LocalProblem
@@ -71,7 +72,7 @@ class MaxSumAD(CycleProtocol):
     those of the own functions.
     """
 
-    messages = Domain | R | Q | Value
+    messages = Domain | R | Q | Value | AnytimeMessage
     settings: ClassVar[MaxSumADSettings] = MaxSumADSettings()
     traits = Traits(
         concludes=ENDS_WITH_PROOF,

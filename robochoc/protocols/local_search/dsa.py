@@ -48,6 +48,7 @@ from typing import ClassVar
 from robochoc.model.message import Message
 from robochoc.protocols.local_search.settings.dsa import DSASettings
 from robochoc.protocols.shared.cycles import NO_GAIN, CycleProtocol, gain, values_in
+from robochoc.protocols.shared.messages.anytime import AnytimeMessage
 from robochoc.protocols.shared.messages.cycles import Value
 from robochoc.protocols.traits import ENDS_WITH_PROOF, Traits
 from robochoc.solver.compiled import LexicographicCost
@@ -87,7 +88,7 @@ class StochasticSearch(CycleProtocol):
 class DSA(StochasticSearch):
     """One agent of DSA. A cycle has one phase: all robots send their values."""
 
-    messages = Value
+    messages = Value | AnytimeMessage
     settings: ClassVar[DSASettings] = DSASettings()
     traits = Traits(
         concludes=ENDS_WITH_PROOF,

@@ -44,6 +44,7 @@ from typing import ClassVar
 from robochoc.protocols.local_search.dsa import StochasticSearch
 from robochoc.protocols.local_search.settings.dsa_sdp import DSASDPSettings
 from robochoc.protocols.shared.cycles import NO_GAIN, gain
+from robochoc.protocols.shared.messages.anytime import AnytimeMessage
 from robochoc.protocols.shared.messages.cycles import Value
 from robochoc.protocols.traits import ENDS_WITH_PROOF, Traits
 from robochoc.solver.compiled import LexicographicCost
@@ -52,7 +53,7 @@ from robochoc.solver.compiled import LexicographicCost
 class DSASDP(StochasticSearch):
     """One agent of DSA-SDP. A cycle has one phase: all robots send their values."""
 
-    messages = Value
+    messages = Value | AnytimeMessage
     settings: ClassVar[DSASDPSettings] = DSASDPSettings()
     traits = Traits(
         concludes=ENDS_WITH_PROOF,

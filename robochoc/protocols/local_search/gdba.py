@@ -54,6 +54,7 @@ from robochoc.protocols.local_search.mgm import Gainers
 from robochoc.protocols.local_search.settings.gdba import GDBASettings
 from robochoc.protocols.order import PriorityOrder
 from robochoc.protocols.shared.cycles import NO_GAIN, values_in
+from robochoc.protocols.shared.messages.anytime import AnytimeMessage
 from robochoc.protocols.shared.messages.cycles import Value
 from robochoc.protocols.traits import ENDS_WITH_PROOF, Traits
 from robochoc.solver.compiled import Charged, LexicographicCost, LocalProblem
@@ -75,7 +76,7 @@ class GDBA(Gainers):
     `raised` are the modifiers: for each constraint, by its number, how often its entries were raised.
     """
 
-    messages = Value | Improve
+    messages = Value | Improve | AnytimeMessage
     settings: ClassVar[GDBASettings] = GDBASettings()
     traits = Traits(
         concludes=ENDS_WITH_PROOF,

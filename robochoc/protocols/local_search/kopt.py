@@ -57,6 +57,7 @@ from robochoc.protocols.local_search.messages.kopt import Go, Offer, Offers, Par
 from robochoc.protocols.local_search.settings.kopt import KOptSettings
 from robochoc.protocols.order import PriorityOrder
 from robochoc.protocols.shared.cycles import NO_GAIN, CycleProtocol
+from robochoc.protocols.shared.messages.anytime import AnytimeMessage
 from robochoc.protocols.shared.messages.cycles import Domain
 from robochoc.protocols.traits import ENDS_WITH_PROOF, Traits
 from robochoc.solver.compiled import LexicographicCost, LocalProblem
@@ -68,7 +69,7 @@ T = TypeVar("T")
 class KOpt(CycleProtocol):
     """One agent of k-opt. State: the `region` that it knows, the `places` of the values there, and its own `offer`."""
 
-    messages = Domain | Region | Values | Offers | Go
+    messages = Domain | Region | Values | Offers | Go | AnytimeMessage
     settings: ClassVar[KOptSettings] = KOptSettings()
     traits = Traits(
         concludes=ENDS_WITH_PROOF,

@@ -47,6 +47,7 @@ from robochoc.model import message as wire
 from robochoc.protocols.local_search.messages.lamdls import Colour
 from robochoc.protocols.order import PriorityOrder
 from robochoc.protocols.shared.cycles import CycleProtocol, values_in
+from robochoc.protocols.shared.messages.anytime import AnytimeMessage
 from robochoc.protocols.shared.messages.cycles import Value
 from robochoc.protocols.traits import ENDS_WITH_PROOF, Traits
 from robochoc.solver.compiled import LocalProblem
@@ -59,7 +60,7 @@ class LAMDLS(CycleProtocol):
     the values that the neighbours have.
     """
 
-    messages = Colour | Value
+    messages = Colour | Value | AnytimeMessage
     traits = Traits(
         concludes=ENDS_WITH_PROOF,
         paper="Rachmut, Zivan, Yeoh 2022",

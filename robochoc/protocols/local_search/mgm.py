@@ -41,6 +41,7 @@ from robochoc.model import message as wire
 from robochoc.protocols.local_search.messages.mgm import Gain
 from robochoc.protocols.order import PriorityOrder
 from robochoc.protocols.shared.cycles import NO_GAIN, CycleProtocol, gain, values_in
+from robochoc.protocols.shared.messages.anytime import AnytimeMessage
 from robochoc.protocols.shared.messages.cycles import Value
 from robochoc.protocols.traits import ENDS_WITH_PROOF, Traits
 from robochoc.solver.compiled import LexicographicCost, LocalProblem
@@ -82,7 +83,7 @@ class Gainers(CycleProtocol):
 class MGM(Gainers):
     """One agent of MGM. A cycle has two phases: all robots send their values, then their gains."""
 
-    messages = Value | Gain
+    messages = Value | Gain | AnytimeMessage
     traits = Traits(
         concludes=ENDS_WITH_PROOF,
         paper="Maheswaran, Pearce, Tambe 2004",

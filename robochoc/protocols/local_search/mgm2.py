@@ -50,6 +50,7 @@ from robochoc.protocols.local_search.mgm import Gainers
 from robochoc.protocols.local_search.settings.mgm2 import MGM2Settings
 from robochoc.protocols.order import PriorityOrder
 from robochoc.protocols.shared.cycles import NO_GAIN, gain, values_in
+from robochoc.protocols.shared.messages.anytime import AnytimeMessage
 from robochoc.protocols.shared.messages.cycles import Domain, Value
 from robochoc.protocols.traits import ENDS_WITH_PROOF, Traits
 from robochoc.solver.compiled import LexicographicCost, LocalProblem
@@ -67,7 +68,7 @@ class JointMove(NamedTuple):
 class MGM2(Gainers):
     """One agent of MGM-2. State: neighbours' `domains`, the `view`, and the `partner` that it is committed to."""
 
-    messages = Domain | Value | Offer | Accept | Reject | Gain | Go
+    messages = Domain | Value | Offer | Accept | Reject | Gain | Go | AnytimeMessage
     settings: ClassVar[MGM2Settings] = MGM2Settings()
     traits = Traits(
         concludes=ENDS_WITH_PROOF,

@@ -42,6 +42,7 @@ from typing import ClassVar
 from robochoc.protocols.local_search.dsa import StochasticSearch
 from robochoc.protocols.local_search.settings.mixed_dsa import MixedDSASettings
 from robochoc.protocols.shared.cycles import gain
+from robochoc.protocols.shared.messages.anytime import AnytimeMessage
 from robochoc.protocols.shared.messages.cycles import Value
 from robochoc.protocols.traits import ENDS_WITH_PROOF, Traits
 from robochoc.solver.compiled import LexicographicCost
@@ -50,7 +51,7 @@ from robochoc.solver.compiled import LexicographicCost
 class MixedDSA(StochasticSearch):
     """One agent of MixedDSA. A cycle has one phase: all robots send their values."""
 
-    messages = Value
+    messages = Value | AnytimeMessage
     settings: ClassVar[MixedDSASettings] = MixedDSASettings()
     traits = Traits(
         concludes=ENDS_WITH_PROOF,

@@ -56,6 +56,7 @@ from robochoc.protocols.order import PriorityOrder
 from robochoc.protocols.satisfaction.messages.dba import Improve
 from robochoc.protocols.satisfaction.settings.dba import DBASettings
 from robochoc.protocols.shared.cycles import CycleProtocol, values_in
+from robochoc.protocols.shared.messages.anytime import AnytimeMessage
 from robochoc.protocols.shared.messages.cycles import Value
 from robochoc.protocols.traits import Traits
 from robochoc.solver.compiled import Charged, LocalProblem
@@ -67,7 +68,7 @@ class DBA(CycleProtocol):
     `weights` are those of the constraints by number, where they are not 1. `counter` is the termination counter.
     """
 
-    messages = Value | Improve
+    messages = Value | Improve | AnytimeMessage
     settings: ClassVar[DBASettings] = DBASettings()
     traits = Traits(
         concludes=(Verdict.NO_SOLUTION, Verdict.UNKNOWN),
@@ -116,7 +117,7 @@ class DBA(CycleProtocol):
         """Stop, move, or let violated constraints weigh more, with all neighbours' reductions known."""
         told = {name: said for name, said in messages.items() if isinstance(said, Improve)}
         if self._has_ended([self._told, *told.values()]):
-            self.cycle = self.settings.cycles
+            self.finish()
             return
         if not max(said.reduction for said in (self._told, *told.values())):
             for number in self._violated:

@@ -6,7 +6,8 @@ need no number, as they arrive in the order of their phases from each robot. A m
 stored until its phase.
 
 The course of the search does not depend on delays. No robot knows the total cost, so each robot records its values
-(`Trail`); the collected trails give the cheapest cycle.
+(`Trail`); the collected trails give the cheapest cycle. With the setting `anytime` the robots find it themselves
+(`anytime.py`).
 """
 
 from __future__ import annotations
@@ -21,6 +22,8 @@ from robochoc.protocols.chance import one_of
 from robochoc.protocols.findings import Findings, Trail
 from robochoc.protocols.order import PriorityOrder
 from robochoc.protocols.protocol import Protocol
+from robochoc.protocols.shared.anytime import Anytime
+from robochoc.protocols.shared.messages.anytime import Best, Paid, Place, Step
 from robochoc.protocols.shared.messages.cycles import Value
 from robochoc.protocols.shared.settings.cycles import CycleSettings
 from robochoc.solver.compiled import LexicographicCost, LocalProblem
@@ -35,7 +38,8 @@ class CycleProtocol(Protocol):
     """One agent of a synchronous local search. State: `cycle`, and the own value in it.
 
     Subclasses take a first value and send it in `begin`; then they `take` one value per cycle until the search is
-    `over`. They call `listen` with the robots whose messages they need, and a function that processes these.
+    `over`. They call `listen` with the robots whose messages they need, and a function that processes these. `messages`
+    has `AnytimeMessage` in it.
     """
 
     settings: ClassVar[CycleSettings] = CycleSettings()
@@ -50,6 +54,7 @@ class CycleProtocol(Protocol):
         self._awaited: frozenset[str] = frozenset()
         self._missing = 0
         self._then: Then | None = None
+        self._anytime: Anytime | None = None
 
     @abstractmethod
     def begin(self) -> None:
@@ -63,12 +68,18 @@ class CycleProtocol(Protocol):
             burdens = self.problem.lexicographic_costs({})
             self.take(burdens.index(min(burdens)))
             self.cycle = self.settings.cycles
+        elif self.settings.anytime == "yes":
+            self._anytime = Anytime(self.problem, self.order, self.settings.cycles)
+            self._say(self._anytime.tree.start())
         else:
             self.begin()
             self.settle()
 
     def receive(self, sender: str, message: wire.Message) -> None:
-        """Store the message for its phase."""
+        """Store the message for its phase; process one about the best cycle at once."""
+        if isinstance(message, Place | Step | Paid | Best):
+            self._receive_report(sender, message)
+            return
         waiting = self._waiting[sender]
         if not waiting and sender in self._awaited:
             self._missing -= 1
@@ -76,7 +87,7 @@ class CycleProtocol(Protocol):
 
     def settle(self) -> None:
         """Run all phases whose messages have arrived."""
-        while self._then and not self._missing and self.verdict is None:
+        while self._then and not self._missing and self.verdict is None and not self._is_ahead:
             messages = {name: self._waiting[name].pop(0) for name in self._names}
             then, self._then = self._then, None
             then(messages)
@@ -105,6 +116,16 @@ class CycleProtocol(Protocol):
         if index != self.value:
             self.value = index
             self._trail.append((self.cycle, index))
+        if self._anytime:
+            self._say(self._anytime.record(self.cycle, index))
+            self._take_best()
+
+    def finish(self) -> None:
+        """End the search before its last cycle; all connected robots do so in the same one."""
+        if self._anytime:
+            self._anytime.last = self.cycle
+            self._take_best()
+        self.cycle = self.settings.cycles
 
     def any_value(self) -> int:
         """Return a random value of the whole domain, with which the search begins."""
@@ -124,6 +145,31 @@ class CycleProtocol(Protocol):
     def over(self) -> bool:
         """Whether this was the last cycle."""
         return self.cycle >= self.settings.cycles
+
+    def _receive_report(self, sender: str, message: Place | Step | Paid | Best) -> None:
+        """Process a message about the best cycle; begin the search once the tree is complete."""
+        if self._anytime is None:
+            raise ValueError(f"{sender} wants to find the best cycle, and this robot does not (--set anytime=yes)")
+        if self.verdict is not None:
+            return
+        self._say(self._anytime.receive(sender, message))
+        if self.cycle < 0 and self._then is None and self._anytime.tree.height is not None:
+            self.begin()
+        self._take_best()
+
+    def _take_best(self) -> None:
+        """Take the own value of the best cycle, once all cycles are accounted for."""
+        anytime = self._anytime
+        if anytime and anytime.news == anytime.last and anytime.best is not None:
+            self.value = anytime.best
+
+    def _say(self, sent: Iterable[tuple[str, wire.Message]]) -> None:
+        for name, message in sent:
+            self.send(name, message)
+
+    @property
+    def _is_ahead(self) -> bool:
+        return self._anytime is not None and self._anytime.is_ahead(self.cycle)
 
     @property
     def findings(self) -> Findings:

@@ -2,13 +2,19 @@
 
 from __future__ import annotations
 
+from typing import Literal
+
 from robochoc.protocols.settings_base import Settings
 
 
 class CycleSettings(Settings, frozen=True):
-    """`cycles`: the number of cycles after which all robots stop."""
+    """`cycles`: the number of cycles after which all robots stop.
+
+    `anytime`: whether the robots themselves find the best cycle, and end with their values in it (see `anytime.py`).
+    """
 
     cycles: int = 100
+    anytime: Literal["no", "yes"] = "no"
 
     def __post_init__(self) -> None:
         if self.cycles < 1:

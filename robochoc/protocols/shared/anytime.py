@@ -1,0 +1,196 @@
+"""The best cycle, found by the robots themselves (anytime local search).
+
+Without it, somebody outside collects the robots' trails and finds the cheapest cycle. With it (`--set anytime=yes`) the
+robots do: first they build a breadth-first tree. Then the costs of each step go up the tree, and the news which one was
+the best so far comes down. At the end each robot holds its value of the best step (Zivan, Okamoto, Peled: "Explorative
+anytime local search for distributed constraint optimization", AIJ 212, 2014, Section 3). It changes nothing in the
+search itself: cycles, values and random numbers are the same.
+
+- A step is a cycle with all its values. After each, a robot tells its value to its neighbours of lower priority
+  (`Step`), as the lowest robot of a constraint charges it.
+- A robot adds what it charges to what its children have reported of the step, and reports the sum (`Paid`).
+- The root compares, and tells which step was the best so far (`Best`), once for each step.
+- A robot remembers its values of the steps of which it has had no news, and of the best one. It waits where these would
+  be more than twice the tree's height and a few, so that is all the memory that it needs.
+
+The paper sends these along with the search's own messages. Here they are messages of their own, so that any protocol
+may be below: one for each edge and two for each edge of the tree, in each cycle.
+
+The tree: all robots go through rounds, and tell their neighbours the best root that they know of, and how far it is. A
+robot whose neighbours have the same root, and whose children are complete, is complete. Once a root is, it knows the
+height, and word of that spreads. So the tree is the same whatever the delays, and its paths are shortest ones.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Sequence
+
+from robochoc.model import message as wire
+from robochoc.model.problem import INFINITE
+from robochoc.protocols.order import PriorityOrder
+from robochoc.protocols.shared.messages.anytime import AnytimeMessage, Best, Paid, Place, Step
+from robochoc.solver.compiled import LocalProblem
+from robochoc.solver.encoding import Cost
+
+Sent = list[tuple[str, wire.Message]]
+
+
+class BreadthFirstTree:
+    """One robot's place in the tree: `parent` (None: the root) and `children`, final once `height` is known.
+
+    `height` is that of the whole tree.
+    """
+
+    def __init__(self, agent: str, neighbours: Sequence[str], order: PriorityOrder) -> None:
+        self.parent: str | None = None
+        self.children: tuple[str, ...] = ()
+        self.height: int | None = None
+        self._agent = agent
+        self._root = agent
+        self._distance = 0
+        self._rank = order.rank
+        self._waiting: dict[str, deque[Place]] = {name: deque() for name in neighbours}
+
+    def start(self) -> Sent:
+        """Return the messages of the first round."""
+        return self._tell(None)
+
+    def receive(self, sender: str, place: Place) -> Sent:
+        """Process a neighbour's place; return the messages of the next rounds, if there are any.
+
+        Raises:
+            ValueError: for a root that is no robot, or too far away.
+        """
+        if place.root not in self._rank or place.distance >= len(self._rank):
+            raise ValueError(f"{sender} has told a place that no tree of this team has")
+        self._waiting[sender].append(place)
+        sent: Sent = []
+        while self.height is None and all(self._waiting.values()):
+            sent += self._round({name: places.popleft() for name, places in self._waiting.items()})
+        return sent
+
+    def _round(self, told: dict[str, Place]) -> Sent:
+        """Go through one round, with the places of all neighbours."""
+        heights = [place.height for place in told.values() if place.height is not None]
+        if heights:
+            self.height = heights[0]
+        else:
+            self._adopt(told)
+        self.children = tuple(name for name, place in told.items() if self._is_child(place))
+        below = self._depth_below(told)
+        if self._root == self._agent and self.height is None:
+            self.height = below
+        return self._tell(below)
+
+    def _adopt(self, told: dict[str, Place]) -> None:
+        """Take the best root of all, and the nearest neighbour to it as the parent."""
+        name, place = min(told.items(), key=lambda one: (self._rank[one[1].root], one[1].distance, self._rank[one[0]]))
+        if self._rank[place.root] < self._rank[self._root]:
+            self._root, self._distance, self.parent = place.root, place.distance + 1, name
+
+    def _is_child(self, place: Place) -> bool:
+        return place.root == self._root and place.parent == self._agent
+
+    def _depth_below(self, told: dict[str, Place]) -> int | None:
+        """Return the height of the own subtree; None while it may still grow."""
+        if any(place.root != self._root for place in told.values()):
+            return None
+        depths = [told[name].below for name in self.children]
+        return 1 + max((depth for depth in depths if depth is not None), default=-1) if None not in depths else None
+
+    def _tell(self, below: int | None) -> Sent:
+        place = Place(self._root, self._distance, self.parent, below, self.height)
+        return [(name, place) for name in self._waiting]
+
+
+class Anytime:
+    """One robot's part in finding the best step. `best` is the own value in the best step that it has heard of.
+
+    `news` is the last step that is accounted for, `last` the last one that there will be.
+    """
+
+    def __init__(self, problem: LocalProblem, order: PriorityOrder, last: int) -> None:
+        own = order.rank[problem.agent]
+        self.tree = BreadthFirstTree(problem.agent, problem.neighbours, order)
+        self.best: int | None = None
+        self.news = -1
+        self.last = last
+        self._problem = problem
+        self._below = [name for name in problem.neighbours if order.rank[name] > own]
+        self._told: dict[str, deque[wire.Value]] = {
+            name: deque() for name in problem.neighbours if order.rank[name] < own
+        }
+        self._paid: dict[str, deque[Cost]] = {name: deque() for name in problem.neighbours}
+        self._values: dict[int, int] = {}
+        self._priced = -1
+        self._least: Cost = INFINITE
+        self._best_step: int | None = None
+
+    def record(self, step: int, index: int) -> Sent:
+        """Note the own value of a step; return the messages that tell it."""
+        self._values[step] = index
+        told = Step(self._problem.values[index])
+        return [*((name, told) for name in self._below), *self._report()]
+
+    def receive(self, sender: str, message: AnytimeMessage) -> Sent:
+        """Process a message; return the answers.
+
+        Raises:
+            ValueError: for a message that this robot cannot have from `sender`.
+        """
+        if isinstance(message, Place):
+            return self.tree.receive(sender, message)
+        if isinstance(message, Step) and sender in self._told:
+            self._told[sender].append(message.value)
+            return self._report()
+        if isinstance(message, Paid) and message.cost >= 0:
+            self._paid[sender].append(message.cost)
+            return self._report()
+        if isinstance(message, Best) and sender == self.tree.parent and self.news < self._priced:
+            return self._hear(message.step)
+        raise ValueError(f"{sender} has told {type(message).__name__} where it cannot")
+
+    @property
+    def remembered(self) -> int:
+        """The number of steps whose values are remembered."""
+        return len(self._values)
+
+    def is_ahead(self, cycle: int) -> bool:
+        """Return whether a robot in `cycle` has to wait for news, lest it have to remember more."""
+        return self.tree.height is None or cycle - self.news > 2 * self.tree.height + 2
+
+    def _report(self) -> Sent:
+        """Price all steps that can be: with the values of neighbours above, and the reports of children."""
+        sent: Sent = []
+        while (
+            self.tree.height is not None
+            and self._priced + 1 in self._values
+            and all(self._told.values())
+            and all(self._paid[name] for name in self.tree.children)
+        ):
+            self._priced += 1
+            view = {name: values.popleft() for name, values in self._told.items()}
+            cost = self._problem.cost(self._values[self._priced], view)
+            for name in self.tree.children:
+                cost += self._paid[name].popleft()
+            sent += self._compare(cost) if self.tree.parent is None else [(self.tree.parent, Paid(cost))]
+        return sent
+
+    def _compare(self, cost: Cost) -> Sent:
+        """As the root: return the news of the step that is priced, which costs `cost`."""
+        if cost < self._least:
+            self._least, self._best_step = cost, self._priced
+        return self._hear(self._best_step)
+
+    def _hear(self, step: int | None) -> Sent:
+        """Take the news of the next step: the best one so far was `step`. Return it for the children."""
+        self.news += 1
+        if step is not None and step != self._best_step:
+            if step != self.news:
+                raise ValueError("the best step so far is neither the last one nor the one before")
+            self._best_step = step
+        if step == self.news:
+            self.best = self._values[step]
+        del self._values[self.news]
+        return [(name, Best(step)) for name in self.tree.children]

@@ -1,0 +1,290 @@
+"""The best cycle, found by the robots themselves: one test per rule of Zivan, Okamoto, Peled (AIJ 212, 2014), 3."""
+
+from __future__ import annotations
+
+import itertools
+from collections import deque
+from collections.abc import Iterator
+from random import Random
+
+import pytest
+
+from robochoc.communication.arrays.session import ArraysRun
+from robochoc.communication.run_result import RunResult
+from robochoc.communication.simulator.simulator import Simulation
+from robochoc.model.message import Message
+from robochoc.model.outcome import Verdict
+from robochoc.model.problem import INFINITE, Constraint, Team
+from robochoc.protocols.local_search.dsa import DSA
+from robochoc.protocols.order import PriorityOrder
+from robochoc.protocols.settings import SettingsError, settings_of
+from robochoc.protocols.shared.anytime import Anytime, BreadthFirstTree
+from robochoc.protocols.shared.cycles import CycleProtocol
+from robochoc.protocols.shared.messages.anytime import Best, Paid, Place, Step
+from robochoc.protocols.shared.messages.cycles import Value
+from robochoc.run import Options, Runtime, solve
+from robochoc.run.incumbent import costs_by_cycle
+from robochoc.run.registry import protocol_named, protocol_names
+from robochoc.solver.agent_problem import RunParameters
+from robochoc.solver.compiled_team import CompiledTeam
+from robochoc.solver.encoding import UnsupportedError
+from robochoc.verification.objective import Objective, withdrawal_cost
+from tests.support.cost_problems import random_cost_team, random_hard_team
+from tests.support.examples import count
+from tests.support.local_search_runs import any_schedule, robot_of, started
+from tests.support.problems import team_of
+from tests.support.small_teams import DIFFERENT
+
+IN_CYCLES = [
+    name
+    for name in protocol_names()
+    if issubclass(protocol_named(name), CycleProtocol) and protocol_named(name).__module__.startswith("robochoc.")
+]
+MINIMISING = [name for name in IN_CYCLES if protocol_named(name).traits.costs]
+REPORTS = {"Place", "Step", "Paid", "Best"}
+
+
+def path(size: int) -> Team:
+    names = [f"X{number:02}" for number in range(size)]
+    constraints = [Constraint("C", DIFFERENT, pair, pair) for pair in itertools.pairwise(names)]
+    return team_of(dict.fromkeys(names, (1, 2, 3)), constraints)
+
+
+def run(team: Team, name: str, chance: Random, seed: int, price: float | None = None, **settings: str) -> RunResult:
+    given = {"cycles": "12", **settings}
+    parameters = RunParameters(seed, given, withdrawal_cost=price)
+    return Simulation(team, protocol_named(name), any_schedule(chance), parameters=parameters).search()
+
+
+def costs_of(team: Team, result: RunResult, price: float | None) -> tuple[float, float]:
+    """What the robots' last values cost, and what the best cycle does."""
+    compiled = CompiledTeam(team)
+    objective = Objective(team, price)
+    objective.change(result.assignments)
+    trails = {name: found.trail for name, found in result.findings.items() if found.trail}
+    return objective.cost, min(costs_by_cycle(compiled, trails, price))
+
+
+@pytest.mark.parametrize("name", MINIMISING)
+@pytest.mark.parametrize("withdraw", [False, True])
+@count("teams", 2, 150)
+def test_at_the_end_each_robot_holds_its_value_of_the_best_cycle(name: str, withdraw: bool, teams: int) -> None:  # noqa: FBT001
+    """Whatever the protocol and the delays; n-ary, hard and unconnected, and where robots may withdraw."""
+    chance = Random(f"best {name} {withdraw}")
+    for seed in range(teams):
+        team = random_hard_team(chance) if withdraw else random_cost_team(chance)
+        price = withdrawal_cost(team) if withdraw else None
+        result = run(team, name, chance, seed, price, anytime="yes")
+        plain = run(team, name, chance, seed, price)
+        assert result.verdict is plain.verdict
+        if plain.verdict is not Verdict.SOLUTION:
+            continue
+        assert result.findings == plain.findings
+        held, best = costs_of(team, result, price)
+        assert held == best
+
+
+def test_that_is_often_not_the_last_cycle() -> None:
+    chance = Random("moved")
+    teams = [random_cost_team(chance) for _ in range(8)]
+    runs = [(run(t, "gdba", chance, 0, anytime="yes", scope="E"), run(t, "gdba", chance, 0, scope="E")) for t in teams]
+    assert sum(one.assignments != other.assignments for one, other in runs) > 1
+
+
+@pytest.mark.parametrize("name", IN_CYCLES)
+def test_the_search_itself_sends_what_it_sends_without(name: str) -> None:
+    chance = Random(f"counts {name}")
+    for seed in range(2):
+        team = random_hard_team(chance)
+        one, other = run(team, name, chance, seed, anytime="yes"), run(team, name, chance, seed)
+        assert one.verdict is other.verdict
+        if one.verdict is Verdict.SOLUTION:
+            counts = {kind: many for kind, many in one.metrics.messages.items() if kind not in REPORTS}
+            assert counts == other.metrics.messages
+            assert not REPORTS & {*other.metrics.messages}
+
+
+def test_a_breakout_that_ends_early_holds_its_solution() -> None:
+    outcome = solve(
+        path(6), Options(protocol="dba", runtime=Runtime.SIMULATOR, settings={"cycles": "90", "anytime": "yes"})
+    )
+    assert outcome.verdict is Verdict.SOLUTION
+    assert 1 < outcome.metrics.messages["Paid"] < 5 * 90
+
+
+@pytest.mark.parametrize("size", [2, 5, 9])
+def test_one_message_for_each_edge_and_two_for_each_of_the_tree_in_each_cycle(size: int) -> None:
+    messages = run(path(size), "dsa", Random(size), 0, anytime="yes").metrics.messages
+    assert messages["Step"] == messages["Paid"] == messages["Best"] == 13 * (size - 1)
+
+
+def trees_of(team: Team, chance: Random) -> dict[str, BreadthFirstTree]:
+    """The trees that robots build whose messages arrive in any order."""
+    parts = {name: robot_of(DSA, team, name).problem for name in team.order}
+    trees = {name: BreadthFirstTree(name, part.neighbours, PriorityOrder(team.order)) for name, part in parts.items()}
+    trees = {name: tree for name, tree in trees.items() if parts[name].neighbours}
+    channels: dict[tuple[str, str], deque[Message]] = {}
+
+    def send(name: str, sent: list[tuple[str, Message]]) -> None:
+        for receiver, message in sent:
+            channels.setdefault((name, receiver), deque()).append(message)
+
+    for name, tree in trees.items():
+        send(name, tree.start())
+    while waiting := [pair for pair, messages in channels.items() if messages]:
+        sender, receiver = chance.choice(waiting)
+        place = channels[sender, receiver].popleft()
+        assert isinstance(place, Place)
+        send(receiver, trees[receiver].receive(sender, place))
+    return trees
+
+
+@count("teams", 15, 1000)
+def test_the_tree_is_breadth_first_whatever_the_delays(teams: int) -> None:
+    chance = Random("trees")
+    for _ in range(teams):
+        team = random_hard_team(chance)
+        trees = trees_of(team, chance)
+        linked = {name: robot_of(DSA, team, name).problem.neighbours for name in trees}
+        assert {name: tree.parent for name, tree in trees.items()} == {
+            name: tree.parent for name, tree in trees_of(team, chance).items()
+        }
+        for root in (name for name, tree in trees.items() if tree.parent is None):
+            distances = {root: 0}
+            for name in _by_distance(root, linked, distances):
+                tree = trees[name]
+                assert tree.parent is None or distances[tree.parent] == distances[name] - 1
+                assert {*tree.children} == {other for other in trees if trees[other].parent == name}
+                assert tree.height == trees[root].height
+                assert team.order.index(root) <= team.order.index(name)
+            assert trees[root].height == max(distances.values())
+
+
+def _by_distance(root: str, linked: dict[str, tuple[str, ...]], distances: dict[str, int]) -> Iterator[str]:
+    queue = deque([root])
+    while queue:
+        name = queue.popleft()
+        for other in linked[name]:
+            if other not in distances:
+                distances[other] = distances[name] + 1
+                queue.append(other)
+    yield from distances
+
+
+@pytest.mark.parametrize("name", ["dsa", "mgm2", "maxsum"])
+def test_a_robot_remembers_twice_the_height_and_a_few(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    most = 0
+    record = Anytime.record
+
+    def looked_at(self: Anytime, step: int, index: int) -> list[tuple[str, Message]]:
+        nonlocal most
+        sent = record(self, step, index)
+        assert self.tree.height is not None
+        assert self.remembered <= 2 * self.tree.height + 4
+        most = max(most, self.remembered)
+        return sent
+
+    monkeypatch.setattr(Anytime, "record", looked_at)
+    for seed in range(6):
+        run(path(6), name, Random(seed), seed, cycles="60", anytime="yes")
+    assert most > 3
+
+
+def robot(cycles: str = "3", **settings: str) -> DSA:
+    """X01 between X00, the root, and X02."""
+    it = robot_of(DSA, path(3), "X01".replace("X", "RX"))
+    it.settings = settings_of(DSA, {"cycles": cycles, "anytime": "yes", **settings})  # type: ignore[assignment, misc]
+    started(it)
+    return it
+
+
+def ready() -> DSA:
+    """After the tree is built: both children are below X00."""
+    it = robot()
+    it.receive("RX00", Place("RX00", 0, None, None, None))
+    it.receive("RX02", Place("RX02", 0, None, None, None))
+    it.receive("RX00", Place("RX00", 0, None, None, None))
+    it.receive("RX02", Place("RX00", 2, "RX01", 0, None))
+    it.receive("RX00", Place("RX00", 0, None, 2, 2))
+    it.receive("RX02", Place("RX00", 2, "RX01", 0, None))
+    it.outbox.clear()
+    return it
+
+
+def test_the_search_begins_once_the_tree_is_complete() -> None:
+    assert robot().cycle == -1
+    assert ready().cycle == 0
+
+
+def test_what_a_step_costs_goes_up_and_the_best_comes_down() -> None:
+    it = ready()
+    it.receive("RX00", Step((1,)))
+    assert it.outbox == []
+    it.receive("RX02", Paid(4))
+    ((receiver, paid),) = it.outbox
+    assert receiver == "RX00"
+    assert isinstance(paid, Paid)
+    it.outbox.clear()
+    it.receive("RX00", Best(0))
+    assert it.outbox == [("RX02", Best(0))]
+
+
+@pytest.mark.parametrize(
+    ("sender", "message"),
+    [
+        ("RX00", Best(0)),
+        ("RX02", Best(0)),
+        ("RX02", Step((1,))),
+        ("RX02", Paid(-1)),
+        ("RX02", Paid(float("nan"))),
+    ],
+)
+def test_what_cannot_be_is_refused(sender: str, message: Message) -> None:
+    with pytest.raises(ValueError, match=f"{sender} has told {type(message).__name__} where it cannot"):
+        ready().receive(sender, message)
+
+
+def test_news_of_a_step_that_cannot_be_the_best_is_refused() -> None:
+    it = ready()
+    it.receive("RX00", Step((1,)))
+    it.receive("RX02", Paid(4))
+    with pytest.raises(ValueError, match="neither the last one nor the one before"):
+        it.receive("RX00", Best(7))
+
+
+@pytest.mark.parametrize("place", [Place("nobody", 0, None, None, None), Place("RX00", 3, None, None, None)])
+def test_a_place_in_no_tree_is_refused(place: Place) -> None:
+    with pytest.raises(ValueError, match="RX00 has told a place that no tree of this team has"):
+        robot().receive("RX00", place)
+
+
+def test_who_is_not_asked_to_refuses_reports() -> None:
+    it = robot(anytime="no")
+    with pytest.raises(ValueError, match="--set anytime=yes"):
+        it.receive("RX00", Step((1,)))
+    it.receive("RX00", Value((1,)))
+
+
+def test_if_all_steps_break_something_the_last_values_stay() -> None:
+    team = team_of(dict.fromkeys("AB", (1,)), [Constraint("C", DIFFERENT, ("A", "B"), ("A", "B"))])
+    result = run(team, "dsa", Random(0), 0, anytime="yes")
+    assert costs_of(team, result, None) == (INFINITE, INFINITE)
+    assert result.assignments == {"RA": {"A": 1}, "RB": {"B": 1}}
+
+
+def test_it_is_yes_or_no() -> None:
+    with pytest.raises(SettingsError, match="anytime"):
+        settings_of(DSA, {"anytime": "maybe"})
+
+
+def test_arrays_refuse_it() -> None:
+    with pytest.raises(UnsupportedError, match="anytime=yes is for robots that send messages"):
+        ArraysRun(path(3), DSA, parameters=RunParameters(0, {"anytime": "yes"}))
+
+
+def test_processes_find_the_best_cycle_too() -> None:
+    team = random_cost_team(Random(1))
+    settings = {"cycles": "10", "anytime": "yes"}
+    one = solve(team, Options(protocol="dsa", settings=settings, seed=3))
+    other = solve(team, Options(protocol="dsa", runtime=Runtime.SIMULATOR, settings=settings, seed=3))
+    assert (one.cost, one.metrics.messages) == (other.cost, other.metrics.messages)
