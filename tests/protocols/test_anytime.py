@@ -38,7 +38,9 @@ from tests.support.small_teams import DIFFERENT
 IN_CYCLES = [
     name
     for name in protocol_names()
-    if issubclass(protocol_named(name), CycleProtocol) and protocol_named(name).__module__.startswith("robochoc.")
+    if issubclass(protocol_named(name), CycleProtocol)
+    and protocol_named(name).__module__.startswith("robochoc.")
+    and not protocol_named(name).traits.asymmetric
 ]
 MINIMISING = [name for name in IN_CYCLES if protocol_named(name).traits.costs]
 REPORTS = {"Place", "Step", "Paid", "Best"}
@@ -280,6 +282,12 @@ def test_it_is_yes_or_no() -> None:
 def test_arrays_refuse_it() -> None:
     with pytest.raises(UnsupportedError, match="anytime=yes is for robots that send messages"):
         ArraysRun(path(3), DSA, parameters=RunParameters(0, {"anytime": "yes"}))
+
+
+@pytest.mark.parametrize("name", ["acls", "mcs-mgm", "gca-mgm"])
+def test_who_pays_in_secret_does_not_report_it(name: str) -> None:
+    with pytest.raises(UnsupportedError, match="what each pays is its own secret; leave out --set anytime=yes"):
+        solve(path(3), Options(protocol=name, runtime=Runtime.SIMULATOR, settings={"anytime": "yes"}))
 
 
 def test_processes_find_the_best_cycle_too() -> None:
