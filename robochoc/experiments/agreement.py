@@ -83,6 +83,7 @@ def repeat(task: Task) -> str:
     words += ["--schedule", setup.schedule] if setup.schedule != "concurrent" else []
     words += ["--delay", str(setup.delay)] if setup.delay else []
     words += [f"--withdraw={setup.withdraw}"] if setup.withdraw else []
+    words += ["--preprocess", setup.preprocess] if setup.preprocess else []
     words += ["--verify"] * setup.verify
     words += ["--owner", str(problem.parameters["owner"])] if problem.path and "owner" in problem.parameters else []
     words += [word for name, value in setup.settings.items() for word in ("--set", f"{name}={value}")]

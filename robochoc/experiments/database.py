@@ -16,7 +16,7 @@ from robochoc.formats.diagnostics import InvalidInputError, invalid_input
 
 APPLICATION_ID = 0x726F626F
 """The number by which SQLite files of results are known (`PRAGMA application_id`); in ASCII it is `robo`."""
-VERSION = 3
+VERSION = 4
 COLUMNS: Mapping[str, str] = {
     "status": "TEXT", "reason": "TEXT", "team": "TEXT", "digest": "TEXT", "robots": "INTEGER", "variables": "INTEGER",
     "constraints": "INTEGER", "verdict": "TEXT", "cost": "TEXT", "bound": "TEXT", "maximises": "INTEGER",
@@ -24,7 +24,7 @@ COLUMNS: Mapping[str, str] = {
     "messages_by_type": "TEXT", "bytes": "INTEGER", "largest": "INTEGER", "ncccs": "INTEGER", "checks": "INTEGER",
     "simulated_s": "REAL", "cycles": "INTEGER", "wall_s": "REAL", "compile_s": "REAL", "total_s": "REAL",
     "cpu_s": "REAL", "memory": "INTEGER", "cost_over_time": "TEXT", "loads": "TEXT", "machine": "TEXT",
-    "version": "TEXT",
+    "version": "TEXT", "removed": "INTEGER", "removing_messages": "INTEGER", "removing_ncccs": "INTEGER",
 }  # fmt: skip
 """The columns of a row, and their types."""
 NUMBERS = [name for name, kind in COLUMNS.items() if kind != "TEXT"]

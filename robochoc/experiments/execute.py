@@ -167,6 +167,10 @@ def _fill(row: Row, outcome: Outcome, team: Team) -> None:
     row.messages, row.bytes, row.largest = sum(metrics.messages.values()), metrics.bytes, metrics.largest
     row.ncccs, row.checks = metrics.ncccs, metrics.checks
     row.simulated_s, row.cycles = metrics.simulated_s or None, metrics.cycles or None
+    if outcome.preprocessing:
+        spent = outcome.preprocessing.metrics
+        row.removed = outcome.preprocessing.removed
+        row.removing_messages, row.removing_ncccs = sum(spent.messages.values()), spent.ncccs
 
 
 def _exact(cost: Cost | None) -> str | None:

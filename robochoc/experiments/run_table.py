@@ -14,23 +14,24 @@ from robochoc.formats.diagnostics import shortened, suggestion
 from robochoc.model.orders import Order
 from robochoc.run.compatibility import refuse_options, refuse_settings
 from robochoc.run.defaults import AUTO
-from robochoc.run.options import CENTRAL, Runtime, ScheduleName, Withdrawal
+from robochoc.run.options import CENTRAL, Preprocess, Runtime, ScheduleName, Withdrawal
 from robochoc.run.registry import UnknownProtocolError, installed_spelling, protocol_named
 from robochoc.solver.encoding import UnsupportedError
 
 RUN_KEYS = (
-    "protocol", "label", "settings", "order", "runtime", "channel", "seed", "schedule", "delay", "withdraw", "verify",
-    "timeout", "messages", "ncccs", "cycles",
+    "protocol", "label", "settings", "order", "runtime", "channel", "seed", "schedule", "delay", "withdraw",
+    "preprocess", "verify", "timeout", "messages", "ncccs", "cycles",
 )  # fmt: skip
 _CHOICES: Mapping[str, Sequence[str]] = {
     "runtime": tuple(map(str, Runtime)),
     "schedule": tuple(map(str, ScheduleName)),
     "withdraw": tuple(map(str, Withdrawal)),
+    "preprocess": tuple(map(str, Preprocess)),
     "order": tuple(dict.fromkeys((GIVEN, *map(str, Order)))),
 }
 MOST_SETUPS = 2000
 """A table stands for no more ways to run."""
-_TOLD = ("order", "runtime", "channel", "schedule", "delay", "withdraw", "verify")
+_TOLD = ("order", "runtime", "channel", "schedule", "delay", "withdraw", "preprocess", "verify")
 """What a label may say, besides the protocol and its settings."""
 _OWN_LIMITS = ("timeout", "messages", "ncccs", "cycles")
 _WITHIN = ("label", "settings", "seed", *_OWN_LIMITS)

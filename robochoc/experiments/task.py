@@ -11,7 +11,7 @@ import msgspec
 
 from robochoc.communication.simulator.channel import ChannelModel
 from robochoc.model.orders import Order
-from robochoc.run.options import CENTRAL, Options, Runtime, ScheduleName, Withdrawal
+from robochoc.run.options import CENTRAL, Options, Preprocess, Runtime, ScheduleName, Withdrawal
 
 Parameter = str | int | float | bool
 Content = bytes
@@ -64,6 +64,7 @@ class Setup(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True):
     schedule: str = "concurrent"
     delay: int = 0
     withdraw: str | None = None
+    preprocess: str | None = None
     verify: bool = False
 
 
@@ -106,6 +107,7 @@ def options_of(setup: Setup, limits: Limits = NO_LIMITS, seed: int = 0) -> Optio
         seed=seed,
         timeout=limits.timeout,
         withdraw=None if setup.withdraw is None else Withdrawal(setup.withdraw),
+        preprocess=None if setup.preprocess is None else Preprocess(setup.preprocess),
         schedule=ScheduleName(setup.schedule),
         delay=setup.delay,
         verify=setup.verify,
@@ -233,6 +235,9 @@ class Row(msgspec.Struct, kw_only=True, omit_defaults=True):
         cost_over_time: With `COST_OVER_TIME`.
         loads: With `ROBOTS`.
         journal: With `JOURNAL`: the content of the run's journal.
+        removed: With `preprocess`: how many values were removed before the protocol.
+        removing_messages: The messages that it took, which `messages` does not count.
+        removing_ncccs: The same for NCCCs.
         machine: Where it ran: host, processor, Python.
         version: The version of robochoc.
     """
@@ -269,3 +274,6 @@ class Row(msgspec.Struct, kw_only=True, omit_defaults=True):
     journal: Content = b""
     machine: str = ""
     version: str = ""
+    removed: int | None = None
+    removing_messages: int | None = None
+    removing_ncccs: int | None = None

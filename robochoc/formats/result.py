@@ -10,7 +10,7 @@ from typing import Any
 import msgspec
 from msgspec import UNSET, UnsetType
 
-from robochoc.model.outcome import CheckCounts, EpochOutcome, Metrics, Outcome, PseudoTreeNode, Verdict
+from robochoc.model.outcome import CheckCounts, EpochOutcome, Metrics, Outcome, Preprocessing, PseudoTreeNode, Verdict
 from robochoc.system.decode_errors import describe_decode_error
 
 
@@ -55,6 +55,13 @@ class _CheckedForm(msgspec.Struct):
     by_owner: int
 
 
+class _PreprocessingForm(msgspec.Struct):
+    name: str
+    metrics: _MetricsForm
+    removed: int
+    values: int
+
+
 class _Form(msgspec.Struct, omit_defaults=True):
     team: str
     protocol: str
@@ -80,6 +87,7 @@ class _Form(msgspec.Struct, omit_defaults=True):
     checked: _CheckedForm | None = None
     names: dict[str, str] = {}
     chosen: dict[str, str] = {}
+    preprocessing: _PreprocessingForm | None = None
 
 
 _SAME = (
@@ -109,6 +117,7 @@ def result_json(outcome: Outcome, names: Mapping[str, str] = MappingProxyType({}
         metrics=_metrics(outcome.metrics),
         checked=_CheckedForm(*outcome.checked) if outcome.checked else None,
         names=dict(names),
+        preprocessing=_preprocessing(outcome.preprocessing),
     )
     return _ENCODER.encode(form)
 
@@ -127,6 +136,10 @@ def _metrics(spent: Metrics) -> _MetricsForm:
         largest=spent.largest,
         cycles=spent.cycles,
     )
+
+
+def _preprocessing(done: Preprocessing | None) -> _PreprocessingForm | None:
+    return _PreprocessingForm(done.name, _metrics(done.metrics), done.removed, done.values) if done else None
 
 
 def _epoch(epoch: EpochOutcome, outcome: Outcome) -> _EpochForm:
@@ -210,7 +223,12 @@ def read_result(content: bytes) -> Outcome:
         epochs=epochs,
         metrics=_metrics_of(form.metrics),
         checked=CheckCounts(form.checked.by_both, form.checked.by_owner) if form.checked else None,
+        preprocessing=_preprocessing_of(form.preprocessing),
     )
+
+
+def _preprocessing_of(form: _PreprocessingForm | None) -> Preprocessing | None:
+    return Preprocessing(form.name, _metrics_of(form.metrics), form.removed, form.values) if form else None
 
 
 def _metrics_of(form: _MetricsForm) -> Metrics:

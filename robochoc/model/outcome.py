@@ -133,6 +133,23 @@ class CheckCounts(NamedTuple):
 
 
 @dataclass(frozen=True)
+class Preprocessing:
+    """What robots have done before the protocol began.
+
+    Attributes:
+        name: What it is called: `ac`.
+        metrics: What it took. It is not part of the run's other metrics.
+        removed: How many values of robots it has removed.
+        values: How many there were.
+    """
+
+    name: str
+    metrics: Metrics
+    removed: int
+    values: int
+
+
+@dataclass(frozen=True)
 class Outcome:
     """The result of a run. With several epochs the verdict is that of the last one, and metrics are summed up.
 
@@ -168,6 +185,7 @@ class Outcome:
         symbols: The names of the team's symbols, if it has any: the value 2 stands for the one at place 2.
         symbolic: The variables whose values stand for symbols.
         chosen: Why the `protocol`, or the `order`, was chosen, where nobody asked for it.
+        preprocessing: What the robots have done before, if that was asked for.
     """
 
     team: str
@@ -197,6 +215,7 @@ class Outcome:
     symbols: tuple[str, ...] = ()
     symbolic: tuple[str, ...] = ()
     chosen: dict[str, str] = field(default_factory=dict)
+    preprocessing: Preprocessing | None = None
 
     def labelled(self, assignment: Mapping[str, int]) -> dict[str, int | str]:
         """Return `assignment`, of this outcome or of one of its epochs, with symbols by their names."""

@@ -16,7 +16,7 @@ from robochoc.modelling.places import did_you_mean
 from robochoc.modelling.solution import Solution
 from robochoc.run.choice import decided
 from robochoc.run.defaults import AUTO
-from robochoc.run.options import CentralSolverName, OnLoss, Options, Runtime, ScheduleName, Withdrawal
+from robochoc.run.options import CentralSolverName, OnLoss, Options, Preprocess, Runtime, ScheduleName, Withdrawal
 from robochoc.run.orchestrator import solve
 from robochoc.run.registry import installed_spelling
 from robochoc.run.scenario import Environment
@@ -63,6 +63,7 @@ class Solvable(ABC):
         kill: Sequence[Kill] = (),
         filters: Sequence[str] = (),
         bounds: bool = False,
+        preprocess: str | None = None,
         **unknown: Never,
     ) -> Solution:
         """Let the robots solve the problem together.
@@ -100,6 +101,7 @@ class Solvable(ABC):
             kill: Robots whose processes are killed, and when.
             filters: The names of the channel filters that messages on a network go through, in this order.
             bounds: Whether events tell the observer what is proven to be the least cost (processes and simulator).
+            preprocess: What robots do before the protocol: `ac`, they make their domains arc consistent. None: nothing.
             **unknown: There are no other options.
 
         Returns:
@@ -149,6 +151,7 @@ class Solvable(ABC):
             filters=tuple(filters),
             kill=tuple(one._replace(robot=called.get(one.robot, one.robot)) for one in kill),
             bounds=bounds,
+            preprocess=None if preprocess is None else _choice("preprocess", Preprocess, preprocess),
         )
         changes = environment is not None
         options = decided(team, options, environment=changes, ordered=self._is_ordered).options

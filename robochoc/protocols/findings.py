@@ -33,13 +33,14 @@ class Findings(msgspec.Struct, frozen=True):
     """A robot's knowledge of the whole search; None for what it, or its protocol, does not know.
 
     `bound` is a lower bound on the cost of every assignment of the robots that it is for (a root: its tree; the first
-    robot: all robots).
+    robot: all robots). `left` are the places of the own values that preprocessing has left.
     """
 
     best: Incumbent | None = None
     bound: float | None = None
     place: PseudoTreeNode | None = None
     trail: Trail | None = None
+    left: tuple[int, ...] | None = None
 
 
 NOTHING = Findings()

@@ -18,7 +18,8 @@ from robochoc.journal.entries import STAMPED_LATE
 from robochoc.journal.events import AnyEvent, Lost, Received, Sent
 from robochoc.journal.journal import Header, Journal, metrics_of
 from robochoc.model.costs import told_cost
-from robochoc.model.outcome import EpochOutcome, Outcome, Verdict
+from robochoc.model.outcome import EpochOutcome, Metrics, Outcome, Verdict
+from robochoc.protocols.satisfaction.disac import DisAC
 from robochoc.replay.rebuild import RebuiltRobots
 from robochoc.replay.steps import RecordedRun
 from robochoc.run.evaluation import Search, check_with_files, evaluate_search
@@ -77,7 +78,8 @@ def contradicted_claims(journal: Journal, runs: Sequence[ReplayedRun], *, whole:
         return  # who died took its last words with it; across machines robots tell what they like
     if outcome.verdict is not Verdict.UNKNOWN or outcome.runtime == "simulator":
         names = _COUNTED_BEFORE if header.version == STAMPED_LATE else _COUNTED
-        yield from _differing("the outcome's ", outcome.metrics, metrics_of(journal.events), names)
+        before = outcome.preprocessing.metrics if outcome.preprocessing else Metrics()
+        yield from _differing("the outcome's ", before + outcome.metrics, metrics_of(journal.events), names)
     for number, epoch in enumerate(outcome.epochs[: len(runs)]):
         yield from _answers(f"epoch {number}'s ", epoch, runs[number].answer)
     yield from _answers("the outcome's ", outcome, runs[-1].answer)
@@ -87,9 +89,11 @@ def _beginning(header: Header, runs: Sequence[RecordedRun], placed_by: str | Non
     """Yield contradictions between the header and the parameters that the robots were given.
 
     The first run is one of `placed_by` if a robot had no solution by itself, and the search was therefore left out.
+    What robots do before the search is no run of the protocol.
     """
-    first = next((run.began.protocol for run in runs if run.began), "")
-    found = protocol_by_class(first, [header.protocol])  # a class that is installed by no name may be played, too
+    names = [run.began.protocol for run in runs if run.began and run.began.protocol != DisAC.__name__]
+    # A class that is installed by no name may be played, too.
+    found = protocol_by_class(names[0], [header.protocol]) if names else None
     if found is not None and found[0] not in (header.protocol, placed_by):
         yield Contradiction(what="the header's protocol", recorded=header.protocol, replayed=found[0])
     for run in runs:

@@ -21,7 +21,7 @@ from robochoc.protocols.dynamic import DynamicProtocol
 from robochoc.protocols.protocol import Protocol
 from robochoc.protocols.settings import SettingsError
 from robochoc.replay.steps import RecordedRun
-from robochoc.run.registry import UnknownProtocolError, protocol_by_class, protocol_or_first_fit
+from robochoc.run.registry import UnknownProtocolError, protocol_by_class, protocol_or_stage
 from robochoc.solver.ace import AceProcess
 from robochoc.solver.agent_problem import AgentProblem, RunParameters
 from robochoc.solver.cache import SolutionCache
@@ -144,7 +144,7 @@ class Rebuilder:
     @staticmethod
     def _named(name: str) -> type[Protocol]:
         try:
-            return protocol_or_first_fit(name)
+            return protocol_or_stage(name)
         except UnknownProtocolError as unknown:
             raise CannotReplayError(str(unknown)) from unknown
 

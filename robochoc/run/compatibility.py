@@ -22,6 +22,7 @@ from robochoc.model.change import team_after_events
 from robochoc.model.problem import ProblemKind, Team
 from robochoc.protocols.protocol import Protocol
 from robochoc.protocols.requirements import unmet_requirement
+from robochoc.protocols.satisfaction.disac import DisAC
 from robochoc.protocols.satisfaction.first_fit import FirstFit
 from robochoc.protocols.settings import SettingsError, settings_of
 from robochoc.protocols.traits import Traits
@@ -125,6 +126,12 @@ OPTION_RULES = (
     _for_robots("--bounds", lambda o: o.bounds),
     _for_robots("--order", lambda o: o.order is not None),
     _for_robots("--set", lambda o: o.settings),
+    _for_robots("--preprocess", lambda o: o.preprocess),
+    OptionRule(
+        lambda o: o.preprocess and o.runtime in {Runtime.NETWORK, Runtime.ARRAYS},
+        "--preprocess is of robots in processes or the simulator",
+        "drop it",
+    ),
     OptionRule(
         lambda o: o.protocol == CENTRAL and o.withdraw is Withdrawal.MAXIMAL,
         "--withdraw maximal is settled by the robots, in priority order; the central solver finds a minimum",
@@ -187,6 +194,7 @@ ENVIRONMENT_RULES = (
     _not_while_changing("--withdraw", lambda o: o.withdraw is not None),
     _not_while_changing("--runtime network", lambda o: o.runtime is Runtime.NETWORK),
     _not_while_changing("--runtime arrays", lambda o: o.runtime is Runtime.ARRAYS),
+    _not_while_changing("--preprocess", lambda o: o.preprocess),
 )
 """Further combinations that are refused if an environment changes the problem."""
 
@@ -280,6 +288,14 @@ def _not_with_scenario(option: str, given: Callable[[Options], object]) -> TeamR
 TEAM_RULES = (
     _not_with_scenario("--withdraw", lambda o: o.withdraw is not None),
     _not_with_scenario("--count", lambda o: o.count),
+    _not_with_scenario("--preprocess", lambda o: o.preprocess),
+    TeamRule(
+        lambda c: c.options.preprocess and c.minimum_withdrawal and c.traits.costs,
+        "--preprocess removes values that do not go with others, but with --withdraw minimum {protocol} may do without"
+        " these robots",
+        "drop --preprocess, or choose a protocol that does not minimise costs",
+        other_protocol=True,
+    ),
     _not_with_scenario("--runtime network", lambda o: o.protocol != CENTRAL and o.runtime is Runtime.NETWORK),
     _not_with_scenario("--runtime arrays", lambda o: o.protocol != CENTRAL and o.runtime is Runtime.ARRAYS),
     TeamRule(
@@ -362,6 +378,8 @@ def _takers(case: Case) -> Iterator[tuple[str, Traits]]:
         yield "--withdraw maximal", FirstFit.traits
     if options.spares:
         yield "--spare", Traits(costs=True)
+    if options.preprocess:
+        yield f"--preprocess {options.preprocess}", DisAC.traits
 
 
 def _refuse_constraints(team: Team, name: str, traits: Traits) -> None:

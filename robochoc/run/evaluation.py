@@ -13,7 +13,7 @@ from typing import NamedTuple
 from robochoc.communication.run_result import RunResult
 from robochoc.model.cost_units import Cost
 from robochoc.model.costs import told_cost
-from robochoc.model.outcome import CheckCounts, EpochOutcome, Metrics, Outcome, PseudoTreeNode, Verdict
+from robochoc.model.outcome import CheckCounts, EpochOutcome, Metrics, Outcome, Preprocessing, PseudoTreeNode, Verdict
 from robochoc.model.problem import ProblemKind, Team
 from robochoc.run.incumbent import best_known, lower_bound, merged_values, pseudo_tree, robots_without_values
 from robochoc.run.withdrawal import Phase
@@ -71,6 +71,7 @@ class Answer:
     reason: str | None = None
     epochs: tuple[EpochOutcome, ...] = ()
     ended: bool = False
+    preprocessing: Preprocessing | None = None
 
     def confirmed_as(self, solvers: tuple[str, ...]) -> Answer:
         """Return this answer, with which central `solvers` agree: that there is no solution, nothing else shows."""
@@ -86,6 +87,7 @@ class Answer:
             witness=second.witness or self.witness,
             reason=second.reason or self.reason,
             epochs=self.epochs,
+            preprocessing=self.preprocessing,
         )
 
     def as_epoch(self, robots: tuple[str, ...], opened_by: str = "the start", lost: Sequence[str] = ()) -> EpochOutcome:
@@ -124,6 +126,7 @@ class Answer:
             confirmed_by=self.confirmed_by,
             epochs=self.epochs,
             checked=self.checked,
+            preprocessing=self.preprocessing,
         )
 
 

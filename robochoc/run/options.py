@@ -56,6 +56,12 @@ class Withdrawal(StrEnum):
         return cls("minimum") if value == "fewest" else None
 
 
+class Preprocess(StrEnum):
+    """What robots do before the protocol. `AC`: they make their domains arc consistent (`satisfaction/disac.py`)."""
+
+    AC = "ac"
+
+
 class OnLoss(StrEnum):
     """The consequence of the loss of a robot: the run fails, or the robot leaves and the others go on."""
 
@@ -102,6 +108,7 @@ class Options:
         kill: Robots whose processes are killed, and when.
         filters: The names of the channel filters that messages on a network go through, in this order.
         chosen: Why the `protocol`, or the `order`, was chosen, where nobody asked for it.
+        preprocess: What the robots do before the protocol begins (None: nothing).
         bounds: Whether events tell when a robot comes to know that nothing costs less than so much (processes and
             simulator).
     """
@@ -131,6 +138,7 @@ class Options:
     kill: tuple[Kill, ...] = ()
     chosen: Mapping[str, str] = field(default_factory=dict)
     bounds: bool = False
+    preprocess: Preprocess | None = None
 
     @property
     def survives_losses(self) -> bool:

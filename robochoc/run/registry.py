@@ -9,10 +9,11 @@ from typing import cast
 
 from robochoc.protocols.dynamic import DynamicProtocol
 from robochoc.protocols.protocol import Protocol
+from robochoc.protocols.satisfaction.disac import DisAC
 from robochoc.protocols.satisfaction.first_fit import FirstFit
 from robochoc.protocols.settings_base import Settings
 from robochoc.protocols.traits import Traits
-from robochoc.run.defaults import AUTO, DEFAULT_COST_PROTOCOL, FIRST_FIT
+from robochoc.run.defaults import AUTO, DEFAULT_COST_PROTOCOL, FIRST_FIT, PREPROCESSING
 from robochoc.run.options import CENTRAL
 from robochoc.system.entry_points import EntryPoint
 from robochoc.system.installed import (
@@ -24,6 +25,8 @@ from robochoc.system.installed import (
 )
 
 GROUP = "robochoc.protocols"
+_STAGES: dict[str, type[Protocol]] = {FIRST_FIT: FirstFit, PREPROCESSING: DisAC}
+"""Protocols of single stages of a run, which cannot be asked for."""
 
 
 class UnknownProtocolError(LookupError):
@@ -88,9 +91,9 @@ def protocol_named(name: str) -> type[Protocol]:
     return offer.protocol
 
 
-def protocol_or_first_fit(name: str) -> type[Protocol]:
-    """Return what `protocol_named` does, or the protocol `FIRST_FIT`, which cannot be asked for."""
-    return FirstFit if name == FIRST_FIT else protocol_named(name)
+def protocol_or_stage(name: str) -> type[Protocol]:
+    """Return what `protocol_named` does, or a protocol that cannot be asked for: `FIRST_FIT`, `PREPROCESSING`."""
+    return _STAGES[name] if name in _STAGES else protocol_named(name)
 
 
 def protocol_by_class(class_name: str, likely: Iterable[str] = ()) -> tuple[str, type[Protocol]] | None:
@@ -103,9 +106,9 @@ def protocol_by_class(class_name: str, likely: Iterable[str] = ()) -> tuple[str,
     Returns:
         Name and class, or None if no installed protocol has such a class.
     """
-    for name in (*likely, FIRST_FIT, DEFAULT_COST_PROTOCOL):
+    for name in (*likely, *_STAGES, DEFAULT_COST_PROTOCOL):
         with suppress(UnknownProtocolError):
-            protocol = protocol_or_first_fit(name)
+            protocol = protocol_or_stage(name)
             if protocol.__name__ == class_name:
                 return name, protocol
     for offer in installed_protocols():

@@ -11,11 +11,12 @@ from robochoc.communication.session import Epoch, Session
 from robochoc.model.cost_units import Cost
 from robochoc.model.costs import normalized_event, told_cost
 from robochoc.model.orders import Order, compute_order, with_dom_deg_order
-from robochoc.model.outcome import EpochOutcome, Metrics, Verdict
+from robochoc.model.outcome import EpochOutcome, Metrics, Preprocessing, Verdict
 from robochoc.model.problem import INFINITE, ProblemKind, Team
 from robochoc.run.context import RunContext
 from robochoc.run.distributed import Deployment
 from robochoc.run.evaluation import Answer, Search, check_with_files
+from robochoc.run.preprocessing import preprocessing_phase, removed_values, restricted
 from robochoc.run.runtimes import SessionRequest, open_session
 from robochoc.run.scenario import Environment, EpochStart, FinishedEpoch, ScenarioRun
 from robochoc.run.start_events import StartEvents
@@ -135,6 +136,12 @@ class ThisMachine(Deployment):
         except NoLocalSolutionError as alone:
             answer = Answer(Verdict.NO_SOLUTION, witness=alone.robot, reason=str(alone))
             return answer.confirmed_as(self._confirmed(alone.robot))
+        done = None
+        if self.options.preprocess is not None:
+            before, compiled = self._preprocessed()
+            if before.verdict is not Verdict.SOLUTION:
+                return before
+            done = before.preprocessing
         with self._session(phase, compiled) as session:
             for epoch in scenario.epochs(session, partial(self._start_events.report, phase.protocol, session=session)):
                 answer, lost = self._answer_of(phase, epoch), epoch.result.lost
@@ -144,7 +151,25 @@ class ThisMachine(Deployment):
             raise RobotsLostError(lost)
         answer = self._with_epochs(answer)
         reasons = filter(None, [self.why_unknown(phase, answer), *scenario.failed_returns])
-        return replace(answer, reason="; ".join(reasons) or None)
+        return replace(answer, reason="; ".join(reasons) or None, preprocessing=done)
+
+    def _preprocessed(self) -> tuple[Answer, CompiledTeam]:
+        """Let the robots make their domains consistent; return what came of it, and the team that is left.
+
+        The verdict is `solution` where the search can begin; otherwise the answer is that of the run.
+        """
+        phase = preprocessing_phase(self.options)
+        result = self._search_without_losses(phase).result
+        whole = self._scenario.compiled()
+        values = sum(len(robot.domain.values) for robot in whole.robots.values())
+        done = Preprocessing(phase.name, result.metrics, removed_values(whole, result.findings), values)
+        answer = Answer(result.verdict, witness=result.witness, preprocessing=done)
+        if result.verdict is Verdict.NO_SOLUTION:
+            return answer.confirmed_as(self.confirm(phase, answer)), whole
+        if result.verdict is Verdict.UNKNOWN:
+            why = self.why_unknown(phase, replace(answer, metrics=result.metrics))
+            return replace(answer, reason=why), whole
+        return answer, self._compile(restricted(whole, result.findings))
 
     def _answer_of(self, phase: Phase, epoch: FinishedEpoch) -> Answer:
         """Return the answer of an epoch, checked with the files."""

@@ -13,7 +13,7 @@ from robochoc.protocols.protocol import Protocol
 from robochoc.protocols.traits import Traits
 from robochoc.run.defaults import DEFAULT_COST_PROTOCOL, FIRST_FIT
 from robochoc.run.options import Options, Withdrawal
-from robochoc.run.registry import protocol_or_first_fit
+from robochoc.run.registry import protocol_or_stage
 from robochoc.solver.agent_problem import RunParameters
 
 
@@ -56,6 +56,6 @@ def second_phase(options: Options, withdrawal_cost: Callable[[], float]) -> Phas
     The protocol was not asked for, so it gets no settings. For the arguments see `first_phase`.
     """
     name = DEFAULT_COST_PROTOCOL if options.withdraw is Withdrawal.MINIMUM else FIRST_FIT
-    protocol = protocol_or_first_fit(name)
+    protocol = protocol_or_stage(name)
     cost = withdrawal_cost() if protocol.traits.costs else None
     return Phase(name, protocol, RunParameters(options.seed, withdrawal_cost=cost), withdrawal=True, takes_over=True)

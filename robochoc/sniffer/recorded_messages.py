@@ -25,7 +25,7 @@ from msgspec.inspect import (
 from robochoc.model.communicative_acts import INFORM, Act
 from robochoc.model.message import Message
 from robochoc.protocols.protocol import Protocol
-from robochoc.run.registry import UnknownProtocolError, protocol_by_class, protocol_or_first_fit
+from robochoc.run.registry import UnknownProtocolError, protocol_by_class, protocol_or_stage
 from robochoc.sniffer.trace import Trace
 
 _LISTS = (CollectionType, TupleType, StructType)
@@ -109,7 +109,7 @@ def installed_protocol(name: str, asked: str) -> tuple[str, type[Protocol]] | No
     """
     if name == asked:
         with suppress(UnknownProtocolError):
-            return name, protocol_or_first_fit(name)
+            return name, protocol_or_stage(name)
     return protocol_by_class(name, [asked])
 
 

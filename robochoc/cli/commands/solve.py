@@ -36,6 +36,7 @@ from robochoc.cli.options.solve import (
     kill_option,
     messages_option,
     options_of,
+    preprocess_option,
     protocol_option,
     settings_option,
     withdraw_option,
@@ -63,7 +64,7 @@ _SECTIONS: Sections = {
         "--protocol", "--runtime", "--timeout", "--withdraw", "--verify", "--seed",
         "--json", "--html", "--journal", "--sniff", "--help",
     ),
-    "Search": ("--order", "--set", "--messages", "--ncccs", "--cycles", "--count", "--with"),
+    "Search": ("--order", "--set", "--preprocess", "--messages", "--ncccs", "--cycles", "--count", "--with"),
     "Losses of robots (processes and network)": ("--on-loss", "--spare", "--patience", "--kill"),
     "Messages on their way": ("--schedule", "--delay", "--channel", "--filter"),
     "Robots with several variables": ("--local-solutions", "--local-timeout", "--ace", "--no-cache"),
@@ -131,6 +132,7 @@ _SECTIONS: Sections = {
     help="Stop after this time: verdict unknown, exit status 3.",
 )
 @withdraw_option
+@preprocess_option
 @messages_option
 @click.option(
     "--ncccs",

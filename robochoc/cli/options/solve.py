@@ -66,6 +66,12 @@ withdraw_option = click.option(
         " maximal: nobody can be added, found fast."
     ),
 )
+preprocess_option = click.option(
+    "--preprocess",
+    type=click.Choice(["ac"]),
+    metavar="NAME",
+    help="First make domains arc consistent: ac.",
+)
 messages_option = click.option(
     "--messages",
     type=click.IntRange(1),
@@ -217,11 +223,20 @@ def options_of(arguments: dict[str, Any], *, environment: bool) -> Options:
 
 
 def _take_options(arguments: dict[str, Any]) -> Options:
-    from robochoc.run.options import CentralSolverName, OnLoss, Options, Runtime, ScheduleName, Withdrawal
+    from robochoc.run.options import (
+        CentralSolverName,
+        OnLoss,
+        Options,
+        Preprocess,
+        Runtime,
+        ScheduleName,
+        Withdrawal,
+    )
 
     with failures_told("--channel"):
         channel = channel_for(arguments.pop("channel"))
     withdraw, on_loss = arguments.pop("withdraw"), arguments.pop("on_loss")
+    preprocess = arguments.pop("preprocess")
     return Options(
         protocol=arguments["protocol"],
         order=() if arguments["order"] not in {None, GIVEN} else None,  # which one, each team's robots say
@@ -234,6 +249,7 @@ def _take_options(arguments: dict[str, Any]) -> Options:
         schedule=ScheduleName(arguments.pop("schedule")),
         withdraw=Withdrawal(withdraw) if withdraw else None,
         on_loss=OnLoss(on_loss) if on_loss else None,
+        preprocess=Preprocess(preprocess) if preprocess else None,
         central_with=CentralSolverName(arguments.pop("central_with")),
         channel=channel,
         **{name: arguments.pop(name) for name in _SAME_NAMES},

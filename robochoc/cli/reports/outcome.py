@@ -36,7 +36,7 @@ def outcome_report(team: Team, outcome: Outcome) -> str:
     if outcome.lost:
         lost = sorted(outcome.lost, key=natural_key)
         lines += [f"  {len(lost)} lost:", *_wrapped(lost)]
-    lines += _chosen(outcome)
+    lines += [*_chosen(outcome), *_preprocessing(outcome)]
     order = f", order {outcome.order}" if outcome.order else ""
     lines.append(f"  {outcome.protocols}{order}, {_place(team, outcome)}: {_metrics(outcome)}{_simulated(outcome)}")
     return "\n".join(map(on_one_line, lines))
@@ -47,6 +47,14 @@ def _chosen(outcome: Outcome) -> list[str]:
     told = {"protocol": outcome.protocol, "order": f"order {outcome.order}"}
     words = [f"{told[what]}, as {why}" for what, why in outcome.chosen.items()]
     return [f"  chosen: {'; '.join(words)}"] if words else []
+
+
+def _preprocessing(outcome: Outcome) -> list[str]:
+    """Return a line on what was done before the protocol, if something was."""
+    done = outcome.preprocessing
+    if done is None:
+        return []
+    return [f"  before: {done.name} removed {done.removed:,} of {done.values:,} values: {_spent(done.metrics)}"]
 
 
 def _epochs(outcome: Outcome) -> list[str]:
@@ -164,12 +172,17 @@ def _metrics(outcome: Outcome) -> str:
     spent = outcome.metrics
     if outcome.runtime == "central":
         return f"{spent.wall_s:.2f} s"
+    return f"{_spent(spent)}{_local(spent)}"
+
+
+def _spent(spent: Metrics) -> str:
+    """Return what robots have spent on a search."""
     kinds = sorted(spent.messages.items(), key=lambda item: -item[1])
     types = ", ".join(f"{count:,} {kind}" for kind, count in kinds)
     total = sum(spent.messages.values())
     return (
         f"{total:,} message{'s' * (total != 1)} ({types or 'none'}), {spent.bytes:,} bytes{_largest(spent)},"
-        f" {spent.ncccs:,} NCCCs, {spent.checks:,} checks,{_cycles(spent)} {spent.wall_s:.2f} s{_local(spent)}"
+        f" {spent.ncccs:,} NCCCs, {spent.checks:,} checks,{_cycles(spent)} {spent.wall_s:.2f} s"
     )
 
 

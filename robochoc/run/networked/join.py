@@ -16,7 +16,7 @@ from robochoc.formats import check_robot
 from robochoc.model.costs import UnboundedCostError, normalized_robot
 from robochoc.model.problem import Robot
 from robochoc.run.networked.address import Address
-from robochoc.run.registry import protocol_or_first_fit
+from robochoc.run.registry import protocol_or_stage
 from robochoc.solver.compile import Compiler
 from robochoc.solver.compiled_team import CompiledRobot
 from robochoc.solver.encoding import UnsupportedError
@@ -106,4 +106,4 @@ def join(robot: Robot, place: Address, identity: Identity, settings: RobotSettin
     own = CompiledRobot(robot, settings.compiled)
     settings.stage(f"looking for the master at {place}")
     with Transport(str(place), identity, watch=(), patience_s=settings.patience_s) as transport:
-        return NetworkRobot(own, identity, transport, protocol_or_first_fit, settings).run()
+        return NetworkRobot(own, identity, transport, protocol_or_stage, settings).run()

@@ -32,7 +32,7 @@ from robochoc.run.distributed import solve_distributed
 from robochoc.run.networked.address import LOOPBACK, Address
 from robochoc.run.networked.machines import Machines, claimed, first_names, registered_team
 from robochoc.run.options import OnLoss, Options, Runtime, Withdrawal
-from robochoc.run.registry import protocol_or_first_fit
+from robochoc.run.registry import protocol_or_stage
 from robochoc.solver.encoding import UnsupportedError
 from robochoc.verification.checker import RefutedError
 
@@ -195,7 +195,7 @@ def _solve(plan: MasterPlan, master: Master, observer: Observer | None) -> Maste
         raise TeamIncompleteError(f"the team is not complete after {plan.gather_s:g} s; awaited: {names}")
     team = registered_team(master, plan.name)
     options = decided_unseen(team, plan.options(plan.protocol or AUTO)).options
-    name, protocol = options.protocol, protocol_or_first_fit(options.protocol)
+    name, protocol = options.protocol, protocol_or_stage(options.protocol)
     refuse_settings(name, protocol, options.settings)
     refuse_unfit(team, options, protocol.traits)
     machines = Machines(master, options, plan.name, observer)
@@ -219,11 +219,11 @@ def _refuse_early(plan: MasterPlan) -> None:
     refuse_options(plan.options(asked))
     try:
         name = DEFAULT_PROTOCOL if asked == AUTO else asked
-        refuse_settings(name, protocol_or_first_fit(name), plan.settings)
+        refuse_settings(name, protocol_or_stage(name), plan.settings)
     except UnsupportedError:
         if asked != AUTO:
             raise
-        refuse_settings(DEFAULT_COST_PROTOCOL, protocol_or_first_fit(DEFAULT_COST_PROTOCOL), plan.settings)
+        refuse_settings(DEFAULT_COST_PROTOCOL, protocol_or_stage(DEFAULT_COST_PROTOCOL), plan.settings)
 
 
 def _in_words(outcome: Outcome) -> str:

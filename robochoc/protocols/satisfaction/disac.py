@@ -1,0 +1,170 @@
+"""Distributed arc consistency (DisAC-9), which `--preprocess ac` runs before any protocol.
+
+A robot removes each value that some constraint allows with no values of the others that are left: such a value is in no
+solution. It tells its neighbours, who remove values in turn. The end is the same as that of a central algorithm: the
+largest arc consistent domains. Some robot finds that there is no solution if it has no value left.
+
+It is no search: at the end robots have values left, not one value each. The run then takes the protocol that was asked
+for, with the domains restricted to what is left.
+
+- **Guarantees**: no value of a solution is removed. It terminates. At most n d messages to each neighbour.
+- **Parameters**: none.
+- **Reference**: Hamadi: "Optimal distributed arc-consistency", Constraints 7 (2002). Only a digest was at hand.
+
+The rule that saves messages is the paper's: a robot tells a neighbour its removals only if one of them was the last
+that went with a value of the neighbour that is left, but then all of them so far. It knows that the neighbour removes
+that value, and is not told of it.
+
+Choices and differences:
+
+- Constraints over more than two robots: their robots are told all removals, as one robot alone does not see when the
+  last combination for a value of another one is gone.
+- Each robot evaluates its constraints once, as tables (`LocalProblem.allowed`); constraint checks are those, so both
+  robots of a constraint make them. The paper makes each once, as robots also learn each other's constraints.
+- A constraint whose table would be too large is left out. What is removed is right nevertheless.
+- Of costs only infinite ones count.
+- The runtime detects quiescence.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import assert_never, cast
+
+from robochoc.model.message import Message, Value
+from robochoc.model.outcome import Verdict
+from robochoc.protocols.findings import Findings
+from robochoc.protocols.order import PriorityOrder
+from robochoc.protocols.protocol import Protocol
+from robochoc.protocols.satisfaction.messages.disac import Del, Domain
+from robochoc.protocols.traits import ENDS_WITH_PROOF, Traits
+from robochoc.solver.compiled import LocalProblem
+from robochoc.solver.encoding import UnsupportedError
+
+_Table = tuple[tuple[str, ...], dict[tuple[int, ...], int]]
+
+
+class DisAC(Protocol):
+    """One agent. State: `domains` of the neighbours, and what is `left` of them and of the own one, as bitmaps.
+
+    `removed` are own removals in their order, `told` how many of them each neighbour knows. `always` are those who are
+    told all: they share a constraint of more than two robots.
+    """
+
+    messages = Domain | Del
+    traits = Traits(
+        concludes=ENDS_WITH_PROOF,
+        paper="Hamadi 2002",
+        complete=False,
+        costs=True,
+        shared_scopes=True,
+        writes_to_non_neighbours=False,
+    )
+
+    def __init__(self, problem: LocalProblem, order: PriorityOrder) -> None:
+        super().__init__(problem, order)
+        scopes = [scope for scope, _ in problem.scopes(problem.neighbours)]
+        linked = {robot for scope in scopes for robot in scope}
+        self.linked = sorted(linked, key=order.rank.__getitem__)
+        self.always = {robot for scope in scopes if len(scope) > 1 for robot in scope}
+        self.domains: dict[str, tuple[Value, ...]] = {}
+        self.left: dict[str, int] = {}
+        self.own = (1 << len(problem.values)) - 1
+        self.removed: list[int] = []
+        self.told: dict[str, int] = dict.fromkeys(self.linked, 0)
+        self._tables: list[_Table] | None = None
+
+    def start(self) -> None:
+        """Tell the domain to all that share a constraint."""
+        if not self.problem.values:
+            self.conclude(Verdict.NO_SOLUTION)
+            return
+        for neighbour in self.linked:
+            self.send(neighbour, Domain(self.problem.values))
+
+    def receive(self, sender: str, message: Message) -> None:
+        """Dispatch on the message's type."""
+        match cast("Domain | Del", message):
+            case Domain(values):
+                self.domains[sender] = values
+                self.left[sender] = (1 << len(values)) - 1
+            case Del(places):
+                self._remove(sender, places)
+            case never:
+                assert_never(never)
+
+    def settle(self) -> None:
+        """Revise the own domain, and tell the removals. Nothing is done before all domains are known."""
+        if self.verdict is not None or len(self.domains) < len(self.linked):
+            return
+        if self._tables is None:
+            self._tables = self._evaluated()
+        if self._revise():
+            self._tell()
+        else:
+            self.conclude(Verdict.NO_SOLUTION)
+
+    @property
+    def findings(self) -> Findings:
+        """The places of the values that are left."""
+        return Findings(left=tuple(_places(self.own)))
+
+    def _remove(self, sender: str, places: Iterable[int]) -> None:
+        """Remove values from the copy of a neighbour's domain."""
+        size = len(self.domains.get(sender, ()))
+        for place in places:
+            if not 0 <= place < size:
+                raise ValueError(f"{sender} removes its value number {place + 1} of {size}")
+            self.left[sender] &= ~(1 << place)
+
+    def _evaluated(self) -> list[_Table]:
+        """Return the constraints as tables; those over the same robots in one."""
+        found: dict[tuple[str, ...], dict[tuple[int, ...], int]] = {}
+        for lowest in self.linked:
+            try:
+                tables = self.problem.allowed(self.domains, lowest)
+            except UnsupportedError:  # too large: fewer values are removed
+                continue
+            for others, masks in tables:
+                known = found.get(others)
+                found[others] = {place: mask & known[place] for place, mask in masks.items()} if known else masks
+        return list(found.items())
+
+    def _revise(self) -> bool:
+        """Remove the own values without a support; return whether one is left."""
+        assert self._tables is not None  # noqa: S101 - made before
+        before = self.own
+        for others, masks in self._tables:
+            supported = 0
+            for place, mask in masks.items():
+                if all(self.left[robot] >> value & 1 for robot, value in zip(others, place, strict=True)):
+                    supported |= mask
+            self.own &= supported
+        self.removed += _places(before & ~self.own)
+        return bool(self.own)
+
+    def _tell(self) -> None:
+        """Tell removals to each neighbour that needs them: all that it has not been told."""
+        unsupported = self._unsupported()
+        for robot in self.linked:
+            news = tuple(self.removed[self.told[robot] :])
+            if news and (robot in self.always or unsupported[robot]):
+                self.send(robot, Del(news))
+                self.told[robot] = len(self.removed)
+            if robot not in self.always:
+                self.left[robot] &= ~unsupported[robot]
+
+    def _unsupported(self) -> dict[str, int]:
+        """Return, for each neighbour, its values that go with no own value that is left."""
+        assert self._tables is not None  # noqa: S101 - made before
+        lost = dict.fromkeys(self.linked, 0)
+        for others, masks in self._tables:
+            if len(others) == 1:
+                (robot,) = others
+                gone = sum(1 << value for (value,), mask in masks.items() if not mask & self.own)
+                lost[robot] |= gone & self.left[robot]
+        return lost
+
+
+def _places(mask: int) -> list[int]:
+    return [place for place in range(mask.bit_length()) if mask >> place & 1]

@@ -1,0 +1,69 @@
+"""What robots do before the protocol that was asked for: they make their domains arc consistent (`--preprocess ac`).
+
+It is a search of its own, whose findings are the values that are left. The team of the search that follows is the same
+with these values only: so journals and replays of it need nothing else. The answer is checked with the files.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Mapping
+from dataclasses import replace
+
+from robochoc.model.problem import Domain, Robot, Team
+from robochoc.protocols.findings import Findings
+from robochoc.run.defaults import PREPROCESSING
+from robochoc.run.options import Options
+from robochoc.run.registry import protocol_or_stage
+from robochoc.run.withdrawal import Phase
+from robochoc.solver.agent_problem import RunParameters
+from robochoc.solver.compiled_team import CompiledTeam
+
+
+def preprocessing_phase(options: Options) -> Phase:
+    """Return the search before that of the protocol."""
+    return Phase(PREPROCESSING, protocol_or_stage(PREPROCESSING), RunParameters(options.seed))
+
+
+def removed_values(compiled: CompiledTeam, findings: Mapping[str, Findings]) -> int:
+    """Return how many values of the robots are not left."""
+    return sum(
+        len(robot.domain.values) - len(findings[name].left or ())
+        for name, robot in compiled.robots.items()
+        if name in findings
+    )
+
+
+def restricted(compiled: CompiledTeam, findings: Mapping[str, Findings]) -> Team:
+    """Return the team whose robots show only values that are left.
+
+    A value of a robot with several variables is a combination of theirs. There each variable keeps what it has in one
+    of the combinations left: that may be more of them, and never fewer.
+    """
+    robots = []
+    for robot in compiled.team.robots:
+        values = compiled[robot.name].values
+        left = findings[robot.name].left or ()
+        columns = zip(*(values[place] for place in left), strict=True)
+        kept = {name: frozenset(column) for name, column in zip(robot.interface, columns, strict=False)}
+        robots.append(_with_values(robot, kept) if len(left) < len(values) else robot)
+    return replace(compiled.team, robots=tuple(robots))
+
+
+def _with_values(robot: Robot, kept: Mapping[str, Collection[int]]) -> Robot:
+    """Return `robot` with those of its variables' values that are `kept`."""
+    variables = tuple(
+        replace(one, domain=_only(one.domain, kept[one.name])) if one.name in kept else one for one in robot.variables
+    )
+    return replace(robot, variables=variables)
+
+
+def _only(domain: Domain, kept: Collection[int]) -> Domain:
+    """Return `domain` with the values `kept`, in its order."""
+    ranges: list[range] = []
+    for value in domain:
+        if value in kept:
+            if ranges and ranges[-1].stop == value:
+                ranges[-1] = range(ranges[-1].start, value + 1)
+            else:
+                ranges.append(range(value, value + 1))
+    return replace(domain, ranges=tuple(ranges))
