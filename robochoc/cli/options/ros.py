@@ -54,7 +54,7 @@ flight_options = _optional(
         multiple=True,
         type=FailureType(),
         metavar="ROBOT[@SECONDS]",
-        help="Stop a motor of this robot's drone (after 2 s). Repeatable.",
+        help="Stop a motor of its drone (after 2 s). Repeatable.",
     ),
     click.option(
         "--distance",

@@ -69,7 +69,7 @@ withdraw_option = click.option(
 preprocess_option = click.option(
     "--preprocess",
     type=click.Choice(["ac"]),
-    metavar="NAME",
+    metavar="ac",
     help="First make domains arc consistent: ac.",
 )
 messages_option = click.option(
