@@ -63,10 +63,13 @@ def contestants(family: Family) -> list[Contestant]:
 def _ours(family: Family) -> list[Contestant]:
     if family is LOCAL:
         cycles = ("--set", f"cycles={CYCLES}")
-        ours = [robochoc(name, "simulator", *cycles) for name in ("dsa", "mgm", "maxsum")]
+        names = ("dsa", "mgm", "maxsum", "gdba", "mixed-dsa", "a-dsa", "maxsum-ad")
+        ours = [*(robochoc(name, "simulator", *cycles) for name in names), robochoc("cocoa", "simulator")]
         return [*ours, *(robochoc(name, "arrays", *cycles) for name in ("dsa", "mgm", "maxsum"))]
     if family is COSTS:
-        return [robochoc(name, "simulator") for name in ("dpop", "syncbb", "adopt", "afb", "bnb-adopt", "sfb", "auto")]
+        searches = ("syncbb", "adopt", "afb", "bnb-adopt", "ncbb", "pt-fb", "hs-cai", "sfb", "auto")
+        tables = ("dpop", "mb-dpop", "o-dpop", "p-dpop")
+        return [robochoc(name, "simulator") for name in (*tables, *searches)]
     orders: tuple[tuple[str, ...], ...] = ((), ("--order", "max-degree"))
     paper = [
         robochoc(name, runtime, *order)
@@ -117,6 +120,10 @@ _FRODOS = {
     "AFB": ("AFB/AFBagent", "afb.AFBsolver"),
     "ADOPT": ("ADOPT/ADOPTagent", "adopt.ADOPTsolver"),
     "DPOP": ("DPOP/DPOPagent", "dpop.DPOPsolver"),
+    "MB-DPOP": ("DPOP/MB-DPOP/MB-DPOPagent", "dpop.DPOPsolver"),
+    "O-DPOP": ("DPOP/O-DPOP/O-DPOPagent", "odpop.ODPOPsolver"),
+    "P-DPOP": ("DPOP/P-DPOP/P-DPOPagent", "dpop.privacy.P_DPOPsolver"),
+    "DUCT": ("DUCT/DUCTagent", "duct.DUCTsolver"),
     "DSA": ("DSA/DSAagent", "localSearch.dsa.DSAsolver"),
     "MGM": ("MGM/MGMagent", "localSearch.mgm.MGMsolver"),
     "Max-Sum": ("MaxSum/MaxSumAgent", "maxsum.MaxSumSolver"),
@@ -128,7 +135,8 @@ _COUNTED = {"threads": "false", "threads, counting": "true"}
 def _frodos(family: Family) -> list[Contestant]:
     if family is LOCAL:
         return [_frodo(name, "threads", family) for name in ("DSA", "MGM", "Max-Sum")]
-    names = {COSTS: ("DPOP", "SynchBB", "ADOPT", "AFB"), COLOURING: ("SynchBB", "AFB", "ADOPT", "DPOP")}
+    family_of_dpop = ("DPOP", "MB-DPOP", "O-DPOP", "P-DPOP", "DUCT")
+    names = {COSTS: (*family_of_dpop, "SynchBB", "ADOPT", "AFB"), COLOURING: ("SynchBB", "AFB", "ADOPT", "DPOP")}
     return [_frodo(name, way, family) for name in names.get(family, ("SynchBB", "AFB")) for way in _COUNTED]
 
 
@@ -182,9 +190,15 @@ def _of_frodo(folder: Path, _run: Run) -> Answer:
 # pyDCOP
 
 
+_ENDLESS = ("gdba", "mixeddsa", "adsa")
+"""Algorithms that end by no number of cycles: they have `ENDLESS_S`, and what they have then is their answer."""
+ENDLESS_S = 30
+
+
 def _pydcops(family: Family) -> list[Contestant]:
     if family is LOCAL:
-        return [_pydcop(name, family, f"stop_cycle:{CYCLES}") for name in ("dsa", "mgm")]
+        counted = [_pydcop(name, family, f"stop_cycle:{CYCLES}") for name in ("dsa", "mgm")]
+        return [*counted, *(_pydcop(name, family) for name in _ENDLESS)]
     if family is COSTS:
         return [_pydcop(name, family) for name in ("dpop", "syncbb")]
     return [_pydcop("dba" if family is COLOURING else "syncbb", family)]
@@ -193,19 +207,20 @@ def _pydcops(family: Family) -> list[Contestant]:
 def _pydcop(algorithm: str, family: Family, *parameters: str) -> Contestant:
     python = os.environ.get(PYTHON_OF_PYDCOP, "")
     algo = ["--algo", algorithm, *(word for one in parameters for word in ("--algo_params", one))]
-    limit = str(round(family.limit_s))
+    limit = str(ENDLESS_S if algorithm in _ENDLESS else round(family.limit_s))
+    ended = ("FINISHED", "TIMEOUT") if algorithm in _ENDLESS else ("FINISHED",)
 
     def command(folder: Path) -> list[str]:
         once = str(HERE / "pydcop_once.py")
         return [python, once, "--timeout", limit, "solve", *algo, str(folder / FILES["pydcop"])]
 
     missing = "" if python else f"{PYTHON_OF_PYDCOP} names no Python"
-    return Contestant("pyDCOP", algorithm, "threads", command, _of_pydcop, missing)
+    return Contestant("pyDCOP", algorithm, "threads", command, lambda _folder, run: _of_pydcop(run, ended), missing)
 
 
-def _of_pydcop(_folder: Path, run: Run) -> Answer:
+def _of_pydcop(run: Run, ended: tuple[str, ...]) -> Answer:
     found = json.loads(run.output[run.output.index("{") :])
-    if found["status"] != "FINISHED":
+    if found["status"] not in ended:
         return Answer(f"status {found['status']}")
     cost = float(found["cost"])
     return Answer("no-solution" if cost >= FORBIDDEN else f"{cost:g}", found["msg_count"])
