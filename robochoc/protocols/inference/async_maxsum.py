@@ -69,7 +69,7 @@ class AsyncMaxSum(Protocol):
         costs=True,
         writes_to_non_neighbours=False,
         privacy="constraints among others",
-        use_when="costs, graph with few cycles, messages of unequal delay; no proof",
+        use_when="costs, few cycles in the graph, unequal delays; no proof",
     )
 
     def __init__(self, problem: LocalProblem, order: PriorityOrder) -> None:
