@@ -19,6 +19,7 @@ from robochoc.model.message import Envelope, Message, encode
 from robochoc.model.outcome import Metrics, Verdict
 from robochoc.protocols.chance import Chance
 from robochoc.protocols.dynamic import DynamicProtocol
+from robochoc.protocols.key_stream import KeyStream
 from robochoc.protocols.order import PriorityOrder
 from robochoc.protocols.protocol import Protocol
 from robochoc.protocols.settings import equip
@@ -215,6 +216,7 @@ class Host:
         protocol = self.protocol
         equip(protocol, parameters.settings)
         protocol.chance = Chance(parameters.seed, self.name)
+        protocol.secret = KeyStream(parameters.seed, self.name)
 
     def _said(self) -> list[Envelope]:
         """Count the checks of a step that has ended, and wrap what the protocol has said in it."""

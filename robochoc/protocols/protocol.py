@@ -36,7 +36,9 @@ class Protocol(Inspectable, ABC):
     settings: ClassVar[Settings] = NO_SETTINGS
     """The defaults; the host puts what was asked for in their place before `start`."""
     chance: Callable[[], float]
-    """Draws from [0, 1): the host's, seeded for each robot. There before `start`."""
+    """Draws from [0, 1): the host's, seeded for each robot. There before `start`. No secret may depend on it."""
+    secret: Callable[[int], int]
+    """Draws a number of so many bits, for keys (`protocols/key_stream.py`). There before `start`."""
 
     def __init__(self, problem: LocalProblem, order: PriorityOrder) -> None:
         self.problem = problem

@@ -35,6 +35,7 @@ class Traits:
         concludes: The verdicts with which one robot alone may end the search. Other verdicts are refused.
         tables: It computes with tables of floats, and refuses costs that could add up to 2^53 or more
             (`solver/exact_costs.py`).
+        secret_keys: Its robots draw keys (`Protocol.secret`). A run across machines cannot be replayed then.
         arrays: It has a form for whole teams at once (`communication/arrays`).
         privacy: The information that neighbours do not get.
         use_when: A short recommendation, for `robochoc protocols`.
@@ -53,6 +54,7 @@ class Traits:
     dynamic: bool = False
     concludes: tuple[Verdict, ...] = UNDECLARED
     tables: bool = False
+    secret_keys: bool = False
     arrays: bool = False
     privacy: str = ""
     use_when: str = ""

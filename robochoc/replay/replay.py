@@ -18,7 +18,7 @@ from robochoc.journal.events import Sent
 from robochoc.journal.journal import Journal
 from robochoc.replay.claims import Contradiction, ReplayedRun, contradicted_claims, with_answer
 from robochoc.replay.comparison import Difference
-from robochoc.replay.rebuild import Rebuilder, ReplayOptions
+from robochoc.replay.rebuild import CannotReplayError, Rebuilder, ReplayOptions
 from robochoc.replay.run_replay import ReplayStopsError, RunReplay
 from robochoc.replay.steps import runs_of
 
@@ -131,6 +131,8 @@ class _JournalReplay:
         for run in runs_of(self._journal.events):
             self._show(f"run {run.number + 1}: making the robots")
             robots = self._rebuilder.robots_of(run)
+            if robots.protocol.traits.secret_keys and self._journal.header.runtime == "network":
+                raise CannotReplayError("its robots drew keys on their own machines, which no journal holds")
             self._runs += 1
             self._counts.update({name: 0 for name in robots.hosts if name not in self._counts})
             difference = self._play(RunReplay(run, robots, self._journal.header))

@@ -5,6 +5,7 @@ The connection around it is in `robot.py`. The course of a search is in `communi
 
 from __future__ import annotations
 
+import secrets
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -147,6 +148,7 @@ class Searcher(RobotLoop):
         if self._host or (shared and any(child.name not in self._copies for child in self._robot.children)):
             return
         host = Host.of(self._protocol, self._part())
+        host.protocol.secret = secrets.randbits
         self._context.set_rank(self._task.order.index(self._robot.name), len(self._task.order))
         self.confirm(host)
 

@@ -18,7 +18,7 @@ from tests.support.replays import in_text, random_run, recorded
 
 WITH_RULES = (
     "abt", "abt-do-retro", "adopt", "afc", "afc-ng", "afc-tree", "agile-abt", "awc", "bnb-adopt", "disfc", "dpop",
-    "dsa", "dynabt", "sbt", "sfb", "syncbb",
+    "dsa", "dynabt", "p-dpop", "sbt", "sfb", "syncbb",
 )  # fmt: skip
 """Protocols whose messages all have rules; in the others losses are not known."""
 

@@ -1,0 +1,136 @@
+"""Pseudo-trees that robots build without names: no message names a robot, or says how many neighbours one has.
+
+As in `shared/dfs.py` a root is elected by waves of all candidates (the echo algorithm with extinction; Tel,
+"Introduction to Distributed Algorithms", 2nd edition, 2000, Section 7.2), and a token goes depth first from there. The
+differences, for privacy: a candidate is known by a random score, which says nothing of its name or degree; the token
+names nobody, so it bounces off robots that it has visited (Cheung, IEEE TSE 9(4), 1983), two more messages for each
+edge outside the tree; and a robot sends it to its neighbours in a random order.
+
+A robot that gets the token again is above its sender: a neighbour below that was visited has sent the token here
+itself before.
+"""
+
+from __future__ import annotations
+
+from abc import abstractmethod
+from collections.abc import Sequence
+
+from robochoc.model.message import Message
+from robochoc.model.outcome import Verdict
+from robochoc.protocols.key_stream import shuffled
+from robochoc.protocols.order import PriorityOrder
+from robochoc.protocols.private.messages.anonymous_dfs import Back, Bounce, Token, Wave
+from robochoc.protocols.shared.dfs import TreeProtocol
+from robochoc.solver.compiled import LocalProblem
+
+SCORE = 16
+"""Bytes: two robots have the same score once in 2^128 pairs."""
+
+
+class AnonymousTreeProtocol(TreeProtocol):
+    """One agent that takes its place in a pseudo-tree without names, and then runs a protocol on it."""
+
+    def __init__(self, problem: LocalProblem, order: PriorityOrder) -> None:
+        super().__init__(problem, order)
+        self._score = b""
+        self._from: str | None = None
+        self._returned: set[str] = set()
+        self._visited = False
+        self._to_visit: list[str] = []
+
+    @abstractmethod
+    def begin(self) -> None:
+        """Begin the search; the place in the tree is known."""
+
+    def start(self) -> None:
+        """Start the own election wave; a robot with an empty domain ends the search."""
+        if not self.problem.values:
+            self.conclude(Verdict.NO_SOLUTION)
+        elif not self.problem.neighbours:
+            self._enter(None)
+            self.settle()
+        else:
+            self._score = self.secret(8 * SCORE).to_bytes(SCORE, "little")
+            for name in self.problem.neighbours:
+                self.send(name, Wave(self._score))
+
+    def receive(self, sender: str, message: Message) -> None:
+        """Process the messages that build the tree; store messages of the search until `begin`."""
+        if self.verdict is not None:
+            return
+        match message:
+            case Wave(score):
+                self._process_wave(sender, score)
+            case Token():
+                self._process_token(sender)
+            case Bounce():
+                self._met.add(sender)
+                self.pseudo_parents = self._sorted((*self.pseudo_parents, sender))
+                self._pass_on()
+            case Back():
+                self._pass_on()
+            case _ if self.placed:
+                self.handle(sender, message)
+            case _:
+                self._early.append((sender, message))
+
+    def _process_wave(self, sender: str, score: bytes) -> None:
+        """Prefer the candidate with the higher score; its wave goes back once it has come from all neighbours."""
+        if len(score) != SCORE:
+            raise ValueError(f"a score of {len(score)} bytes")
+        if score > self._score:
+            self._score, self._from, self._returned = score, sender, set()
+            for name in self.problem.neighbours:
+                if name != sender:
+                    self.send(name, Wave(score))
+        if score != self._score:
+            return
+        self._returned.add(sender)
+        if len(self._returned) < len(self.problem.neighbours):
+            return
+        if self._from is None:
+            self._enter(None)
+        else:
+            self.send(self._from, Wave(score))
+
+    def _process_token(self, sender: str) -> None:
+        if not self._visited:
+            self._enter(sender)
+            return
+        self._met.add(sender)  # below, as a pseudo-child
+        self.send(sender, Bounce())
+
+    def _enter(self, parent: str | None) -> None:
+        """Take the first visit of the token."""
+        self._visited = True
+        self.parent = parent
+        self._met.update([] if parent is None else [parent])
+        self._to_visit = shuffled([name for name in self.problem.neighbours if name != parent], self.secret)
+        self._pass_on()
+
+    def _pass_on(self) -> None:
+        """Send the token to a neighbour that may not be in the tree, or back if there is none."""
+        while self._to_visit and self._to_visit[-1] in self._met:
+            self._to_visit.pop()
+        if self._to_visit:
+            child = self._to_visit.pop()
+            self._met.add(child)
+            self.children = (*self.children, child)
+            self.send(child, Token())
+            return
+        self._take_place()
+
+    def _take_place(self) -> None:
+        """The whole subtree is in the tree: begin."""
+        above = {*self.ancestors}
+        self.children = self._sorted(name for name in self.children if name not in above)
+        known = above | {*self.children}
+        self.pseudo_children = self._sorted(name for name in self.problem.neighbours if name not in known)
+        if self.parent is not None:
+            self.send(self.parent, Back())
+        self.placed = True
+        self.begin()
+        early: Sequence[tuple[str, Message]]
+        early, self._early = self._early, []
+        for sender, message in early:
+            self.receive(sender, message)

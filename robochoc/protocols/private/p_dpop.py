@@ -1,0 +1,263 @@
+"""Private DPOP (P-DPOP): DPOP whose tables are in codenames, codes and random keys.
+
+Dynamic programming on a pseudo-tree, as DPOP, for minimum cost. Each robot tells its neighbours below (`Codes`) a
+codename for itself, its values in a random order, and a random key for each value, another for each neighbour. Tables
+(UTIL) name robots by codenames and values by their codes; whoever makes one adds, for each neighbour above, the key of
+that neighbour's value. Robots in between join and minimise without understanding: a key depends on an axis that is
+still there. The robot that a codename stands for knows all keys that were added for it, and subtracts them. From the
+root down, robots are told the codes of the values above them (VALUE).
+
+- **When to use**: costs, and constraints that third robots must not learn. Where DPOP's tables fit; it is slower.
+- **Guarantees**: complete; it terminates with an optimum, or with a proof that there is no solution. Robots are taken
+  to keep to the protocol, not to put their knowledge together, and to have channels that nobody else reads.
+- **Parameters (`--set`)**: `cells`, the number of cells that a table may have (default 1,000,000).
+- **References**: Faltings, Leaute, Petcu: "Privacy guarantees through distributed constraint satisfaction", IAT 2008;
+  Leaute, Faltings: "Protecting privacy through distributed computation in multi-agent decision making", JAIR 47, 2013.
+
+What stays hidden, and what does not:
+
+- A robot learns no name of another that it shares no constraint with, from messages (all robots know the team's names).
+- A cell over another robot's codename is hidden by that robot's key. Keys have 100 bits; a broken hard constraint
+  counts 2^60 instead of infinity, so that it shows no more than costs do: to 2^-20 for a million constraints, and less
+  for fewer.
+- Differences along the own axis are seen by the robot that it stands for, and so are costs of a subtree that shares
+  constraints with it alone.
+- Values leak downwards: to robots that share a constraint with the one that takes them. The root's choice and the tree
+  are not hidden from neighbours.
+
+Where keys come from: `Protocol.secret` (`protocols/key_stream.py`). Across machines it is the operating system; in the
+simulator and in processes it follows from the seed, so that runs can be repeated.
+
+The methods:
+
+    choose codes     `begin`              join, subtract keys, minimise   `_compute_util`
+    root, tree       `anonymous_dfs`      choose the value                `_choose`
+
+Choices that the paper leaves open, and differences:
+
+- A robot has one codename and one order of values for all neighbours below (the paper's merged codenames): tables of
+  several branches can be joined. So these see that they have to do with the same robot, if they compare.
+- The root is elected by random scores in asynchronous waves. The paper's rounds with lies, which hide how far away the
+  root is, are left out: a robot sees through which neighbour the root's wave came first.
+- Ties go to the first value in its domain.
+- The costs of a robot, times the number of robots, must be below 2^53; a run with larger ones ends.
+
+>>> from robochoc.communication.simulator.schedule import Concurrent
+>>> from robochoc.communication.simulator.simulator import Simulation
+>>> from robochoc.generators.queens3d import queens3d
+>>> result = Simulation(queens3d(3), PDPOP, Concurrent(seed=0)).run()
+>>> result.verdict.value
+'no-solution'
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import ClassVar, assert_never, cast
+
+import msgspec
+import numpy as np
+from numpy.typing import NDArray
+
+from robochoc.model.message import Message
+from robochoc.model.outcome import Verdict
+from robochoc.model.problem import INFINITE
+from robochoc.protocols.findings import Findings
+from robochoc.protocols.key_stream import shuffled
+from robochoc.protocols.order import PriorityOrder
+from robochoc.protocols.private.anonymous_dfs import AnonymousTreeProtocol
+from robochoc.protocols.private.messages.anonymous_dfs import AnonymousTreeMessage
+from robochoc.protocols.private.messages.p_dpop import (
+    BROKEN,
+    UTIL,
+    VALUE,
+    WIDTH,
+    Codes,
+    Shape,
+    cells_of,
+    numbers,
+    packed,
+)
+from robochoc.protocols.private.settings.p_dpop import PDPOPSettings
+from robochoc.protocols.traits import ENDS_WITH_PROOF, Traits
+from robochoc.solver.compiled import LocalProblem
+from robochoc.solver.encoding import TooLargeError
+from robochoc.solver.exact_costs import check_exact
+
+KEY_BITS = 100
+CODENAME = 16
+"""Bytes."""
+MOST_AXES = 1_000
+Table = NDArray[np.object_]
+"""Integers of any size: keys are larger than those that numpy computes with itself."""
+
+
+class PDPOP(AnonymousTreeProtocol):
+    """One agent of P-DPOP.
+
+    State, in the order in which it becomes known:
+
+    - `codename`; `coded`, for each code the place of the own value; `keys`, for each code the sum of all that were
+      told;
+    - `above`, the codes of the neighbours above; `utils`, the children's tables;
+    - `axes` of the own table, and `choices`, for each of its cells the best own value;
+    - `optimum`: the cost of the whole tree (at its root).
+    """
+
+    messages = AnonymousTreeMessage | Codes | UTIL | VALUE
+    traits = Traits(
+        concludes=ENDS_WITH_PROOF,
+        paper="Faltings, Leaute, Petcu 2008; Leaute & Faltings 2013",
+        costs=True,
+        shared_scopes=True,
+        writes_to_non_neighbours=False,
+        tables=True,
+        secret_keys=True,
+        privacy="constraints of others, and who they are",
+        use_when="costs, and third robots must not learn of constraints",
+    )
+    settings: ClassVar[PDPOPSettings] = PDPOPSettings()
+
+    def __init__(self, problem: LocalProblem, order: PriorityOrder) -> None:
+        super().__init__(problem, order)
+        self.codename = b""
+        self.coded: list[int] = []
+        self.keys: list[int] = []
+        self.above: dict[str, Codes] = {}
+        self.utils: dict[str, UTIL] = {}
+        self.axes: Shape = {}
+        self.choices: NDArray[np.intp] | None = None
+        self.optimum: int | None = None
+        self._asked: dict[str, list[bytes]] = {}
+
+    def begin(self) -> None:
+        """Choose the own codename, the codes and the keys, and tell them the neighbours below."""
+        self.codename = self.secret(8 * CODENAME).to_bytes(CODENAME, "little")
+        self.coded = shuffled(range(len(self.problem.values)), self.secret)
+        self.keys = [0] * len(self.coded)
+        values = [self.problem.values[place] for place in self.coded]
+        for name in self.descendants:
+            keys = [self.secret(KEY_BITS) for _ in values]
+            self.keys = [known + key for known, key in zip(self.keys, keys, strict=True)]
+            self.send(name, Codes(self.codename, values, packed(keys)))
+        self._compute_util()
+
+    def handle(self, sender: str, message: Message) -> None:
+        """Dispatch on the message's type."""
+        match cast("Codes | UTIL | VALUE", message):
+            case Codes() as codes:
+                self._process_codes(sender, codes)
+            case UTIL() as util:
+                self._process_util(sender, util)
+            case VALUE(codes):
+                if self.choices is None or codes.keys() != self.axes.keys():
+                    raise ValueError(f"{sender} tells values of a table that there is not")
+                self._choose(codes)
+            case never:
+                assert_never(never)
+
+    @property
+    def findings(self) -> Findings:
+        """The place in the tree; for a root also its tree's optimum, once it has all tables."""
+        return msgspec.structs.replace(super().findings, bound=self.optimum)
+
+    def _process_codes(self, sender: str, codes: Codes) -> None:
+        if sender not in self.ancestors or sender in self.above:
+            raise ValueError(f"{sender} has no codes to tell")
+        if len(codes.codename) != CODENAME or not 0 < len(codes.values) * WIDTH == len(codes.keys):
+            raise ValueError(f"{sender} tells codes that cannot be")
+        self.above[sender] = codes
+        self._compute_util()
+
+    def _process_util(self, sender: str, util: UTIL) -> None:
+        if sender not in self.children or sender in self.utils:
+            raise ValueError(f"{sender} has no table to send")
+        if (
+            len(util.axes) > MOST_AXES
+            or min(util.axes.values(), default=0) < 1
+            or util.axes.get(self.codename) != len(self.coded)
+            or len(util.cells) != cells_of(util.axes) * WIDTH
+        ):
+            raise ValueError(f"{sender} sends a table that cannot be")
+        self.utils[sender] = util
+        self._compute_util()
+
+    # UTIL, from the leaves up
+
+    def _compute_util(self) -> None:
+        """Once all codes and tables have come: join, subtract the own keys, minimise, and add the keys of others."""
+        if len(self.above) < len(self.ancestors) or len(self.utils) < len(self.children):
+            return
+        self.axes = self._own_axes()
+        joined = self._joined()
+        self.choices = np.asarray(joined.argmin(axis=0))  # numpy makes a number of a single cell
+        cells = np.asarray(joined.min(axis=0), object)
+        self._asked = {child: list(util.axes) for child, util in self.utils.items()}
+        self.utils.clear()
+        if self.parent is not None:
+            self.send(self.parent, UTIL(self.axes, packed(cells.reshape(-1))))
+        elif cells.item() >= BROKEN:
+            self.conclude(Verdict.NO_SOLUTION)
+        else:
+            self.optimum = cells.item()
+            self._choose({})
+
+    def _own_axes(self) -> Shape:
+        """Return the axes of the own table, in an order that says nothing. Raises `TooLargeError`."""
+        axes = {codes.codename: len(codes.values) for codes in self.above.values()}
+        for child, util in self.utils.items():
+            for codename, size in util.axes.items():
+                if codename != self.codename and axes.setdefault(codename, size) != size:
+                    raise ValueError(f"{child} says that a codename has {size} values, and it has not")
+        if cells_of(axes) * len(self.coded) > self.settings.cells:
+            raise TooLargeError(
+                f"{self.problem.agent} needs a table of {cells_of(axes) * len(self.coded):,} cells, more than"
+                f" {self.settings.cells:,} (--set cells=N raises the limit)"
+            )
+        return dict(sorted(axes.items()))
+
+    def _joined(self) -> Table:
+        """Return the sum of the own costs, the children's tables and all keys; the own values come first, uncoded."""
+        charges = self.problem.charges
+        scopes = self.problem.scopes(self.ancestors)
+        dearest = max((cost for cost in charges if cost < INFINITE), default=0)
+        check_exact((dearest + sum(most for _, most in scopes)) * len(self.order.names))
+        uncoded = sorted(range(len(self.coded)), key=self.coded.__getitem__)
+        own = np.array([_number(cost) for cost in charges], object)
+        joined = np.zeros((len(own), *self.axes.values()), object)
+        joined += self._aligned(own, [self.codename])
+        joined -= self._aligned(np.array(self.keys, object)[uncoded], [self.codename])
+        for util in self.utils.values():
+            axes = list(util.axes)
+            table = np.array(numbers(util.cells), object).reshape(list(util.axes.values()))
+            joined += self._aligned(table.take(uncoded, axes.index(self.codename)), axes)
+        for one in self.above.values():
+            joined += self._aligned(np.array(numbers(one.keys), object), [one.codename])
+        domains = {name: codes.values for name, codes in self.above.items()}
+        for charged in self.problem.tables(domains):
+            numbered = np.array([_number(cost) for cost in charged.charges.reshape(-1)], object)
+            names = [*(self.above[name].codename for name in charged.agents), self.codename]
+            joined += self._aligned(numbered.reshape(charged.charges.shape), names)
+        return joined
+
+    def _aligned(self, table: Table, axes: Sequence[bytes]) -> Table:
+        """Return `table` with the own axis first, then those of the own table, of length 1 where it has none."""
+        onto = (self.codename, *self.axes)
+        table = table.transpose([axes.index(codename) for codename in onto if codename in axes])
+        return table[tuple([slice(None) if codename in axes else np.newaxis for codename in onto])]
+
+    # VALUE, from the root down
+
+    def _choose(self, codes: Mapping[bytes, int]) -> None:
+        """Take the best value for these codes, and tell the children the codes that are in their tables."""
+        if self.choices is None or not all(0 <= codes[codename] < size for codename, size in self.axes.items()):
+            raise ValueError(f"{self.problem.agent} has no value for such codes")
+        self.value = int(self.choices[tuple([codes[codename] for codename in self.axes])])
+        self.choices = None
+        known = {**codes, self.codename: self.coded.index(self.value)}
+        for child in self.children:
+            self.send(child, VALUE({codename: known[codename] for codename in self._asked[child]}))
+
+
+def _number(cost: float) -> int:
+    return BROKEN if cost == INFINITE else int(cost)

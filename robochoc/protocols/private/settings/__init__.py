@@ -1,0 +1,1 @@
+"""The settings of the protocols in this family."""
