@@ -85,8 +85,8 @@ from robochoc.solver.encoding import TooLargeError
 from robochoc.solver.exact_costs import check_exact
 
 KEY_BITS = 100
-CODENAME = 16
-"""Bytes."""
+CODENAME = 32
+"""Hexadecimal digits."""
 MOST_AXES = 1_000
 Table = NDArray[np.object_]
 """Integers of any size: keys are larger than those that numpy computes with itself."""
@@ -120,7 +120,7 @@ class PDPOP(AnonymousTreeProtocol):
 
     def __init__(self, problem: LocalProblem, order: PriorityOrder) -> None:
         super().__init__(problem, order)
-        self.codename = b""
+        self.codename = ""
         self.coded: list[int] = []
         self.keys: list[int] = []
         self.above: dict[str, Codes] = {}
@@ -128,11 +128,11 @@ class PDPOP(AnonymousTreeProtocol):
         self.axes: Shape = {}
         self.choices: NDArray[np.intp] | None = None
         self.optimum: int | None = None
-        self._asked: dict[str, list[bytes]] = {}
+        self._asked: dict[str, list[str]] = {}
 
     def begin(self) -> None:
         """Choose the own codename, the codes and the keys, and tell them the neighbours below."""
-        self.codename = self.secret(8 * CODENAME).to_bytes(CODENAME, "little")
+        self.codename = f"{self.secret(4 * CODENAME):0{CODENAME}x}"
         self.coded = shuffled(range(len(self.problem.values)), self.secret)
         self.keys = [0] * len(self.coded)
         values = [self.problem.values[place] for place in self.coded]
@@ -240,7 +240,7 @@ class PDPOP(AnonymousTreeProtocol):
             joined += self._aligned(numbered.reshape(charged.charges.shape), names)
         return joined
 
-    def _aligned(self, table: Table, axes: Sequence[bytes]) -> Table:
+    def _aligned(self, table: Table, axes: Sequence[str]) -> Table:
         """Return `table` with the own axis first, then those of the own table, of length 1 where it has none."""
         onto = (self.codename, *self.axes)
         table = table.transpose([axes.index(codename) for codename in onto if codename in axes])
@@ -248,7 +248,7 @@ class PDPOP(AnonymousTreeProtocol):
 
     # VALUE, from the root down
 
-    def _choose(self, codes: Mapping[bytes, int]) -> None:
+    def _choose(self, codes: Mapping[str, int]) -> None:
         """Take the best value for these codes, and tell the children the codes that are in their tables."""
         if self.choices is None or not all(0 <= codes[codename] < size for codename, size in self.axes.items()):
             raise ValueError(f"{self.problem.agent} has no value for such codes")

@@ -24,7 +24,7 @@ WIDTH = 16
 """Bytes of a cell, and of a key."""
 BROKEN = 1 << 60
 """The cost of a hard constraint that is broken: above all finite costs, and hidden by keys like these."""
-Shape = dict[bytes, int]
+Shape = dict[str, int]
 """The axes of a table: codenames, and how many codes each has."""
 
 
@@ -35,7 +35,7 @@ class Codes(Message, frozen=True):
     has a random key for each of them, which is added to what a table says of it.
     """
 
-    codename: bytes
+    codename: str
     values: list[Value]
     keys: bytes
 
@@ -43,7 +43,7 @@ class Codes(Message, frozen=True):
 
     def in_words(self, words: Wording) -> str:
         """Return what the sender says."""
-        return f"call me {self.codename[:2].hex()}; {words.domain(self.values)}, and you get a key for each"
+        return f"call me {self.codename[:4]}; {words.domain(self.values)}, and you get a key for each"
 
     def proves(self, hearing: Hearing) -> Sequence[Proof]:
         """Return what the message proves to its receiver."""
