@@ -12,7 +12,7 @@ from robochoc.model.outcome import Verdict
 from robochoc.model.problem import Constraint, Relation, Semantics, Team
 from robochoc.protocols.local_search.a_dsa import ADSA
 from robochoc.protocols.local_search.messages.a_dsa import Tick
-from robochoc.protocols.local_search.settings.dsa import DSASettings
+from robochoc.protocols.local_search.settings.a_dsa import ADSASettings
 from robochoc.run.incumbent import best_known, costs_by_cycle
 from robochoc.solver.compiled_team import CompiledTeam
 from tests.support.agents import replies, value
@@ -34,7 +34,7 @@ def star() -> Team:
 def middle(*chances: float, cycles: int = 100) -> ADSA:
     """B, which begins with the value 1."""
     robot = robot_of(ADSA, star(), "RB", 0.0, *chances)
-    robot.settings = DSASettings(cycles=cycles)  # type: ignore[misc]
+    robot.settings = ADSASettings(cycles=cycles)  # type: ignore[misc]
     assert started(robot) == both(Tick((1,), False))
     return robot
 

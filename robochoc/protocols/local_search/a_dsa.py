@@ -42,6 +42,7 @@ from typing import Any, ClassVar, cast
 from robochoc.model import message as wire
 from robochoc.protocols.local_search.dsa import DSA
 from robochoc.protocols.local_search.messages.a_dsa import Tick
+from robochoc.protocols.local_search.settings.a_dsa import ADSASettings
 from robochoc.protocols.order import PriorityOrder
 from robochoc.protocols.traits import ENDS_WITH_PROOF, Traits
 from robochoc.solver.compiled import LocalProblem
@@ -51,6 +52,7 @@ class ADSA(DSA):
     """One agent of A-DSA. State: `cycle` (the number of ticks), the `view`, and the neighbours that are `active`."""
 
     messages: ClassVar[Any] = Tick
+    settings: ClassVar[ADSASettings] = ADSASettings()
     traits = Traits(
         concludes=ENDS_WITH_PROOF,
         paper="Fitzpatrick & Meertens 2003",
