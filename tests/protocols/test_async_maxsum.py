@@ -21,10 +21,9 @@ from robochoc.protocols.settings import SettingsError, settings_of
 from robochoc.protocols.shared.messages.cycles import Domain
 from robochoc.solver.agent_problem import RunParameters, agent_problems
 from robochoc.solver.compiled import LocalProblem
-from tests.protocols.test_maxsum import random_tree
 from tests.support.agents import replies, value
 from tests.support.brute_force import least_cost
-from tests.support.cost_problems import random_cost_team
+from tests.support.cost_problems import random_cost_team, random_tree
 from tests.support.examples import count
 from tests.support.local_search_runs import any_schedule, cost_of_assignment
 from tests.support.problems import team_of

@@ -27,7 +27,7 @@ from robochoc.solver.cost_table import CostTable
 from robochoc.solver.encoding import UnsupportedError
 from tests.support.agents import replies, value
 from tests.support.brute_force import least_cost
-from tests.support.cost_problems import MAX_COST, random_cost_team
+from tests.support.cost_problems import random_cost_team, random_tree
 from tests.support.examples import count
 from tests.support.local_search_runs import (
     any_schedule,
@@ -204,19 +204,6 @@ def test_on_a_tree_the_end_is_an_optimum(batch: int) -> None:
             soluble += 1
             assert cost_of_assignment(team, assignments_by_cycle(team, result)[-1]) == (0, least)
     assert soluble > (60 if batch else 30)
-
-
-def random_tree(chance: Random) -> Team:
-    """Each robot but the first shares a table with one before it."""
-    domains = {f"X{number}": range(1, chance.randint(2, 4)) for number in range(chance.randint(2, 7))}
-    constraints = []
-    for number, name in enumerate(list(domains)[1:], 1):
-        pair = (f"X{chance.randrange(number)}", name)
-        rows = list(itertools.product(*(domains[one] for one in pair)))
-        costs = tuple(INFINITE if chance.random() < 0.15 else chance.randint(0, MAX_COST) for _ in rows)
-        relation = Relation("R", 2, Semantics.SOFT, tuple(rows), costs)
-        constraints.append(Constraint("C", relation, pair, pair))
-    return team_of(domains, constraints)
 
 
 @count("teams", 50, 200)

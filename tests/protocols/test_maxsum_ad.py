@@ -18,10 +18,9 @@ from robochoc.protocols.inference.messages.maxsum import Q, R
 from robochoc.protocols.inference.settings.maxsum_ad import MaxSumADSettings
 from robochoc.protocols.settings import SettingsError, settings_of
 from robochoc.protocols.shared.messages.cycles import Domain, Value
-from tests.protocols.test_maxsum import random_tree
 from tests.support.agents import replies, value
 from tests.support.brute_force import least_cost
-from tests.support.cost_problems import random_cost_team
+from tests.support.cost_problems import random_cost_team, random_tree
 from tests.support.examples import count
 from tests.support.local_search_runs import (
     any_schedule,

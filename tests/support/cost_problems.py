@@ -133,3 +133,16 @@ def soft_table(chance: Random, domains: Mapping[str, Sequence[int]], scope: Sequ
     default = INFINITE if chance.random() < hard else chance.randint(0, MAX_COST)
     relation = Relation("R", len(scope), Semantics.SOFT, tuple(listed), costs, default)
     return Constraint("C", relation, tuple(scope), tuple(scope))
+
+
+def random_tree(chance: Random) -> Team:
+    """Return a team with costs whose graph is a tree: each robot but the first shares a table with one before it."""
+    domains = {f"X{number}": range(1, chance.randint(2, 4)) for number in range(chance.randint(2, 7))}
+    constraints = []
+    for number, name in enumerate(list(domains)[1:], 1):
+        pair = (f"X{chance.randrange(number)}", name)
+        rows = list(itertools.product(*(domains[one] for one in pair)))
+        costs = tuple(INFINITE if chance.random() < 0.15 else chance.randint(0, MAX_COST) for _ in rows)
+        relation = Relation("R", 2, Semantics.SOFT, tuple(rows), costs)
+        constraints.append(Constraint("C", relation, pair, pair))
+    return team_of(domains, constraints)

@@ -46,7 +46,7 @@ Other choices and differences:
 - A robot's constraints are sent when a mediator first asks for them, not at the start: on easy problems never.
 - New values are numbered, so that an old `ok?` never replaces what a mediator has said. A mediator tells the new values
   to all neighbours of those that change, so no `ok?` follows an `accept!`.
-- The mediator's search is in `mediation.py`. It counts its constraint checks.
+- The mediator's search is in `mediation.py`, its constraints are in `compapo_tables.py`. It counts its checks.
 
 Privacy: a mediator learns the domains' sizes, the constraints and the values of all robots in its good_list, and the
 values of those around it. In the worst case one robot learns the whole problem.
@@ -67,6 +67,7 @@ from robochoc.model.message import Message, Value
 from robochoc.model.outcome import Verdict
 from robochoc.protocols.order import PriorityOrder
 from robochoc.protocols.protocol import Protocol
+from robochoc.protocols.satisfaction.compapo_tables import distinct, own_tables, sizes_in
 from robochoc.protocols.satisfaction.mediation import Mediation, allows
 from robochoc.protocols.satisfaction.messages.compapo import (
     Accept,
@@ -326,7 +327,8 @@ class CompAPO(Protocol):
     def _solved(self, places: Mapping[str, int]) -> dict[str, int] | None:
         """Return values for the good_list, which grows by whoever is in conflict with them; None: there are none."""
         tables = self._known_tables()
-        mediation = Mediation(tables, self._sizes(tables, places), places)
+        sizes = sizes_in(tables, places)
+        mediation = Mediation(tables, {robot: sizes[robot] for robot in self._ranked(self.good_list)}, places)
         found = mediation.best()
         self.problem.checks += mediation.checks
         if found is not None:
@@ -353,43 +355,12 @@ class CompAPO(Protocol):
     def _own_tables(self) -> tuple[Table, ...]:
         """Return the own constraints, those over the same robots in one table."""
         if self.name not in self.tables:
-            allowed: dict[tuple[str, ...], dict[tuple[int, ...], int]] = {}
-            for lowest in self.linked:
-                for others, masks in self.problem.allowed(self.domains, lowest):
-                    known = allowed.get(others)
-                    allowed[others] = {p: mask & known[p] for p, mask in masks.items()} if known else masks
-            self.tables[self.name] = tuple([self._table(others, masks) for others, masks in allowed.items()])
+            self.tables[self.name] = own_tables(self.problem, self.linked, self.domains)
         return self.tables[self.name]
-
-    def _table(self, others: tuple[str, ...], masks: Mapping[tuple[int, ...], int]) -> Table:
-        """Return a table whose last robot is this one."""
-        own = len(self.problem.values)
-        bits = 0
-        for row, place in enumerate(sorted(masks)):
-            bits |= masks[place] << row * own
-        sizes = (*(len(self.domains[robot]) for robot in others), own)
-        return Table((*others, self.name), sizes, bits.to_bytes(-(-len(masks) * own // 8), "little"))
 
     def _known_tables(self) -> list[Table]:
         """Return the constraints of the good_list, each once."""
-        found: dict[frozenset[str], Table] = {}
-        for robot in self._ranked(self.good_list):
-            for table in self.tables.get(robot, ()):
-                found.setdefault(frozenset(table.robots), table)
-        return list(found.values())
-
-    def _sizes(self, tables: Iterable[Table], places: Mapping[str, int]) -> dict[str, int]:
-        """Return the sizes of the domains of the robots in the good_list.
-
-        Raises:
-            ValueError: if a table and a value do not go together, or two tables.
-        """
-        sizes: dict[str, int] = {}
-        for table in tables:
-            for robot, size in zip(table.robots, table.sizes, strict=True):
-                if sizes.setdefault(robot, size) != size or not 0 <= places[robot] < size:
-                    raise ValueError(f"what is told of the values of {robot} does not agree")
-        return {robot: sizes[robot] for robot in self._ranked(self.good_list)}
+        return distinct(table for robot in self._ranked(self.good_list) for table in self.tables.get(robot, ()))
 
     # Small things
 
