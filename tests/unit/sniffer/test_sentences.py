@@ -119,6 +119,13 @@ REAL = {
     ("dpop", "VALUE"): (
         "RX03 says: by number, the values of the robots in your separator are 2 and 1, the nearest robot first"
     ),
+    ("p-dpop", "Wave"): "RX00 says: somebody whose score begins with 5df9 wants to be the root",
+    ("p-dpop", "Token"): "RX00 says: if you are not in the tree yet, you are my child",
+    ("p-dpop", "Bounce"): "RX00 says: I am in the tree, above you",
+    ("p-dpop", "Back"): "RX04 says: all below me are in the tree",
+    ("p-dpop", "Codes"): "RX00 says: call me 0a6a; X00 is 5, -3, 0 or 3, and you get a key for each",
+    ("p-dpop", "UTIL"): "RX02 says: a table over 3 codenames: 16 costs, hidden by keys",
+    ("p-dpop", "VALUE"): "RX01 says: the codes of 1 value above you",
     ("mb-dpop", "Place"): "RX02 says: 1 robot above me in the tree; X02 is -3, 0, 1 or 3",
     ("mb-dpop", "Label"): (
         "RX03 says: my table has 16 cells over RX02 (4 values) and RX00 (4 values), and no cost above 19"
