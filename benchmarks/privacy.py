@@ -18,8 +18,8 @@ from robochoc.privacy import Kind, Measure, PrivacyReport, privacy_of
 from robochoc.run import Options, Runtime, solve
 
 PROBLEMS = 20
-SATISFYING = ("abt", "disfc", "afc", "afc-ng", "dpop", "p-dpop", "syncbb", "sfb")
-MINIMISING = ("dpop", "p-dpop", "syncbb", "sfb", "adopt")
+SATISFYING = ("abt", "disfc", "afc", "afc-ng", "dpop", "p-dpop", "syncbb", "afb", "sfb", "ncbb", "pt-fb")
+MINIMISING = ("dpop", "p-dpop", "syncbb", "afb", "sfb", "ncbb", "pt-fb", "adopt")
 MAX_VALUE = 10
 
 

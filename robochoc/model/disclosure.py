@@ -142,6 +142,10 @@ class Hearing(ABC):
         """Return whether no robot has lower priority than `robot`."""
         return bool(self.order) and self.order[-1] == robot
 
+    def is_only_neighbour(self) -> bool:
+        """Return whether the sender shares constraints with the receiver alone."""
+        return {*self.neighbours(self.sender)} == {self.receiver}
+
 
 def can_take(robot: str, value: Value) -> Proof:
     """Return that `robot` can take `value`."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 
 from robochoc.journal.events import Decided, Received, Sent
 from robochoc.journal.given import run_parameters_of
@@ -116,25 +117,21 @@ class _Measured:
                 case Sent():
                     under_way.setdefault((event.sender, event.receiver), deque()).append(event)
                     if event.sender in self._observers:
-                        self._observers[event.sender].says(event.receiver, self._message(event))
+                        message = self._message(event)
+                        with _refusing(event):
+                            self._observers[event.sender].says(event.receiver, message)
                 case Received():
                     waiting = under_way.get((event.sender, event.receiver))
                     if waiting and event.receiver in self._observers:
                         sent = waiting.popleft()
-                        self._deliver(self._observers[event.receiver], sent, self._message(sent))
+                        message = self._message(sent)
+                        with _refusing(sent):
+                            self._observers[event.receiver].hears(sent.sender, message)
                 case _:
                     pass
         for sent in [one for waiting in under_way.values() for one in waiting]:
             if sent.receiver in self._observers:
                 self._observers[sent.receiver].misses(sent.sender, self._message(sent))
-
-    def _deliver(self, observer: Observer, sent: Sent, message: Message) -> None:
-        try:
-            observer.hears(sent.sender, message)
-        except (LookupError, ValueError) as error:
-            raise PrivacyError(
-                f"{sent.type} from {sent.sender} to {sent.receiver} says what no robot can say: {error}", broken=True
-            ) from error
 
     def _message(self, sent: Sent) -> Message:
         kind = self._types.get(sent.type)
@@ -205,3 +202,14 @@ class _Measured:
 def _there(loss: Loss | None) -> Iterator[Loss]:
     if loss is not None:
         yield loss
+
+
+@contextmanager
+def _refusing(sent: Sent) -> Iterator[None]:
+    """Refuse the journal if a message says what cannot be."""
+    try:
+        yield
+    except (LookupError, ValueError) as error:
+        raise PrivacyError(
+            f"{sent.type} from {sent.sender} to {sent.receiver} says what no robot can say: {error}", broken=True
+        ) from error

@@ -5,7 +5,9 @@ from __future__ import annotations
 from collections.abc import Collection, Mapping, Sequence
 from typing import NamedTuple, assert_never
 
+from robochoc.model.communicative_acts import Performative
 from robochoc.model.disclosure import (
+    AT_THE_END,
     FINITE,
     Clash,
     EveryValuePays,
@@ -72,8 +74,13 @@ class Observer:
         self._stands: dict[str, _Stand] = {}
 
     def says(self, receiver: str, message: Message) -> None:
-        """Note a message that the observer sends."""
+        """Note a message that the observer sends; the last values of others that it decides on it knows itself."""
         self._last[type(message), self.name, receiver] = message
+        if message.act.performative is not Performative.CANCEL:
+            return
+        for proof in message.proves(_Heard(self._scene, self.name, receiver, self._values, self._last)) or ():
+            if isinstance(proof, StandsAt) and proof.stamp == AT_THE_END:
+                self._learn(proof)
 
     def hears(self, sender: str, message: Message) -> None:
         """Take in a message, and all that it proves."""

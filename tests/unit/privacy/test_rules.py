@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from random import Random
 
 import msgspec
 import pytest
@@ -12,9 +13,9 @@ from robochoc.journal.journal import Header, Journal, JournalRecorder, read_jour
 from robochoc.model.problem import Constraint, ConstraintModel, Relation, Semantics, Team
 from robochoc.privacy import Kind, Loss, Measure, PrivacyError, PrivacyReport, privacy_of
 from robochoc.privacy.page import page_of
-from robochoc.protocols.local_search.messages.mgm import Gain
+from robochoc.protocols.local_search.messages.cocoa import Inquiry
 from robochoc.run import Options, Runtime, solve
-from tests.support.cost_problems import with_costs
+from tests.support.cost_problems import random_cost_team, with_costs
 from tests.support.problems import team_of
 
 
@@ -97,9 +98,55 @@ def test_the_path_of_syncbb_tells_each_robot_s_cost_exactly() -> None:
     assert loss(report, "RB", "RA", Kind.DECISION).known == 1
 
 
+PRICED = with_costs(team_of({"A": (1, 2), "B": (1, 2)}, [soft("A", "B", {(1, 1): 9}), unary("B", {1: 4, 2: 1})]))
+"""B = 2 costs 1 whatever A is, B = 1 costs 13 or 4."""
+
+
+def test_the_cpa_of_afb_tells_what_it_costs_and_a_solution_decides() -> None:
+    report = report_of(PRICED, "afb")
+    # RA hears of the solution A = 1, B = 2, which costs 1, and that nothing costs less.
+    assert loss(report, "RA", "RB", Kind.DECISION).known == 1
+    assert loss(report, "RA", "RB", Kind.DOMAIN).known == 0.5
+    assert loss(report, "RB", "RA", Kind.DECISION).known == 0  # it ends the search itself, and hears of no end
+
+
+@pytest.mark.parametrize("protocol", ["ncbb", "pt-fb"])
+def test_a_leaf_of_ncbb_and_pt_fb_tells_what_its_value_costs(protocol: str) -> None:
+    report = report_of(PRICED, protocol)
+    assert loss(report, "RA", "RB", Kind.DOMAIN).known == 0.5
+    assert loss(report, "RA", "RB", Kind.DECISION).known == 1  # the robot above decides on it
+    assert loss(report, "RB", "RA", Kind.DECISION).known == 0  # nobody is told the final value of one above
+
+
+def test_the_last_robot_of_afb_hears_that_its_last_solution_is_taken() -> None:
+    team = random_cost_team(Random(0))
+    journal = journal_of(team, "afb")
+    last = team.order[-1]
+    assert any(isinstance(one, Sent) and (one.type, one.receiver) == ("Terminate", last) for one in journal.events)
+    decided = [one for one in privacy_of(journal).losses if (one.observer, one.kind) == (last, Kind.DECISION)]
+    assert {one.known for one in decided} == {1}
+
+
+@pytest.mark.parametrize("protocol", ["mgm", "mgm2"])
+def test_a_gain_tells_what_a_value_costs_at_least_where_no_other_robot_has_a_part_in_it(protocol: str) -> None:
+    alone = loss(report_of(PRICED, protocol), "RA", "RB", Kind.DOMAIN)
+    more = with_costs(team_of({"A": (1, 2), "B": (1, 2), "C": (1, 2)}, [*PRICED.constraints(), differ("B", "C")]))
+    told = loss(report_of(more, protocol), "RA", "RB", Kind.DOMAIN)
+    # Of 11 x 11 states, that both values can be taken leaves 10 x 10.
+    assert told.linear == pytest.approx(21 / 120)
+    assert alone.linear is not None
+    assert alone.linear > 21 / 120
+
+
+def test_dba_tells_whether_values_go_with_each_other() -> None:
+    report = report_of(PAIR, "dba")
+    # RB has been at one of its two values only.
+    assert loss(report, "RA", "RB", Kind.DOMAIN).known == 0.5
+
+
 def test_a_message_without_a_rule_makes_the_loss_not_known_and_not_0() -> None:
-    report = report_of(PAIR, "mgm")
-    assert report.without_rule == (Gain.__name__,)
+    report = report_of(PAIR, "cocoa")
+    assert Inquiry.__name__ in report.without_rule
     assert {one.by(measure) for one in report.losses for measure in Measure} == {None}
     assert report.system_loss(Kind.DOMAIN, Measure.ENTROPY) is None
     assert "not known" in page_of(report, Measure.LINEAR)

@@ -17,8 +17,8 @@ from tests.support.examples import count
 from tests.support.replays import in_text, random_run, recorded
 
 WITH_RULES = (
-    "abt", "abt-do-retro", "adopt", "afc", "afc-ng", "afc-tree", "agile-abt", "awc", "bnb-adopt", "disfc", "dpop",
-    "dsa", "dynabt", "p-dpop", "sbt", "sfb", "syncbb",
+    "abt", "abt-do-retro", "adopt", "afb", "afc", "afc-ng", "afc-tree", "agile-abt", "awc", "bnb-adopt", "dba", "disfc",
+    "dpop", "dsa", "dynabt", "gdba", "mgm", "mgm2", "ncbb", "p-dpop", "pt-fb", "sbt", "sfb", "syncbb",
 )  # fmt: skip
 """Protocols whose messages all have rules; in the others losses are not known."""
 

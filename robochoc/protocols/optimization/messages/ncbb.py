@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 from robochoc.model.communicative_acts import Act, Performative
+from robochoc.model.disclosure import NOTHING, Hearing, Proof, can_take
 from robochoc.model.message import Message, Value
 from robochoc.model.wording import Wording
 from robochoc.protocols import acts
@@ -20,6 +23,10 @@ class Greedy(Message, frozen=True):
         """Return what the sender says."""
         return f"{words.own_value(self.value)} in the first assignment"
 
+    def proves(self, hearing: Hearing) -> Sequence[Proof]:
+        """Return what the message proves to its receiver."""
+        return [can_take(hearing.sender, self.value)]
+
 
 class Search(Message, frozen=True):
     """A request to search the receiver's subtree for less than `bound`, with the values that were told (SEARCH)."""
@@ -31,3 +38,7 @@ class Search(Message, frozen=True):
     def in_words(self, _: Wording) -> str:
         """Return what the sender says."""
         return f"search your subtree {allowance(self.bound)}"
+
+    def proves(self, _: Hearing) -> Sequence[Proof]:
+        """Return what the message proves to its receiver."""
+        return NOTHING

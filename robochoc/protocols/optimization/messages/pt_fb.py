@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 from robochoc.model.communicative_acts import Act, Performative
+from robochoc.model.disclosure import NOTHING, Hearing, Proof, SomeValuePays
 from robochoc.model.message import Message
 from robochoc.model.wording import Wording, cost_text, listed
 from robochoc.protocols.optimization.messages.branching import Number, allowance
@@ -27,6 +30,10 @@ class CPA(Message, frozen=True):
         least = cost_text(sum(self.reports.values()))
         return f"{asked}; at least {least} of it is paid by {listed(self.reports)}"
 
+    def proves(self, _: Hearing) -> Sequence[Proof]:
+        """Return what the message proves to its receiver, which may not know the values that the bounds go with."""
+        return [SomeValuePays(robot, {}, bound) for robot, bound in self.reports.items()]
+
 
 class Reduce(Message, frozen=True):
     """A lower bound for the search that is going on (REDUCE_UB)."""
@@ -38,3 +45,7 @@ class Reduce(Message, frozen=True):
     def in_words(self, _: Wording) -> str:
         """Return what the sender says."""
         return f"search on, {allowance(self.bound)}" if self.bound else "search no further"
+
+    def proves(self, _: Hearing) -> Sequence[Proof]:
+        """Return what the message proves to its receiver."""
+        return NOTHING
