@@ -51,7 +51,7 @@ class TeamSecrets:
         charges: By robot and value.
         entries: By robot, the secrets in its shared constraints.
         most: The largest finite cost of them all.
-        neighbours: By robot, those that share a constraint with it.
+        neighbours: By robot, those that share a constraint with it, or that a file links with it.
     """
 
     def __init__(self, team: CompiledTeam, parameters: RunParameters) -> None:
@@ -75,6 +75,8 @@ class TeamSecrets:
                 self._add_constraint(one.constraint, robot.name)
             for _, part in held_below(robot):
                 self._add_constraint(part.constraint, robot.name)
+            for other in (*(one.name for one in robot.parents), *(one.name for one in robot.children)):
+                self._link(robot.name, other)
         finite = (int(cost) for number, cost in enumerate(self.truths) if self._is_counted_cost(number, cost))
         self.most = max(finite, default=0)
 
@@ -163,6 +165,11 @@ class TeamSecrets:
             self.withdrawing.add(self.charges[robot.name][away])
         self.declared[robot.name] = tuple(declared)
         self.entries[robot.name] = {}
+
+    def _link(self, robot: str, other: str) -> None:
+        """Make neighbours of robots that a file links, also if a scenario has left no constraint between them."""
+        self.neighbours[robot].add(other)
+        self.neighbours[other].add(robot)
 
     def _add_constraint(self, constraint: Constraint, holder: str) -> None:
         names = constraint.variables

@@ -10,7 +10,7 @@ import pytest
 
 from robochoc.journal.events import Sent
 from robochoc.journal.journal import Header, Journal, JournalRecorder, read_journal
-from robochoc.model.problem import Constraint, ConstraintModel, Relation, Semantics, Team
+from robochoc.model.problem import Child, Constraint, ConstraintModel, Parent, Relation, Semantics, Team
 from robochoc.privacy import Kind, Loss, Measure, PrivacyError, PrivacyReport, privacy_of
 from robochoc.privacy.page import page_of
 from robochoc.protocols.local_search.messages.cocoa import Inquiry
@@ -40,9 +40,9 @@ def report_of(team: Team, protocol: str) -> PrivacyReport:
     return privacy_of(journal_of(team, protocol))
 
 
-def journal_of(team: Team, protocol: str) -> Journal:
-    recorder = JournalRecorder(Header(team=team.name, protocol=protocol, runtime="simulator", seed=0))
-    options = Options(protocol=protocol, runtime=Runtime.SIMULATOR, cache=False)
+def journal_of(team: Team, protocol: str, seed: int = 0) -> Journal:
+    recorder = JournalRecorder(Header(team=team.name, protocol=protocol, runtime="simulator", seed=seed))
+    options = Options(protocol=protocol, runtime=Runtime.SIMULATOR, seed=seed, cache=False)
     recorder.outcome = solve(team, options, observer=recorder)
     return read_journal(recorder.content())
 
@@ -127,11 +127,10 @@ def test_the_last_robot_of_afb_hears_that_its_last_solution_is_taken() -> None:
     assert {one.known for one in decided} == {1}
 
 
-@pytest.mark.parametrize("protocol", ["mgm", "mgm2"])
-def test_a_gain_tells_what_a_value_costs_at_least_where_no_other_robot_has_a_part_in_it(protocol: str) -> None:
-    alone = loss(report_of(PRICED, protocol), "RA", "RB", Kind.DOMAIN)
+def test_an_offer_of_mgm2_tells_what_values_cost_at_least_where_no_other_robot_has_a_part_in_it() -> None:
+    alone = loss(report_of(PRICED, "mgm2"), "RA", "RB", Kind.DOMAIN)
     more = with_costs(team_of({"A": (1, 2), "B": (1, 2), "C": (1, 2)}, [*PRICED.constraints(), differ("B", "C")]))
-    told = loss(report_of(more, protocol), "RA", "RB", Kind.DOMAIN)
+    told = loss(report_of(more, "mgm2"), "RA", "RB", Kind.DOMAIN)
     # Of 11 x 11 states, that both values can be taken leaves 10 x 10.
     assert told.linear == pytest.approx(21 / 120)
     assert alone.linear is not None
@@ -185,3 +184,20 @@ def test_the_page_has_a_cell_for_each_pair_and_needs_nothing_else() -> None:
     assert page.count("<svg") == 3
     assert "RC of RA: 1.000" in page
     assert "<script" not in page
+
+
+@pytest.mark.parametrize("protocol", ["mgm", "gdba"])
+def test_values_tell_that_they_can_be_taken_and_gains_nothing(protocol: str) -> None:
+    found = loss(report_of(PRICED, protocol), "RA", "RB", Kind.DOMAIN)
+    assert found.linear in (pytest.approx(11 / 120), pytest.approx(21 / 120))  # one value was taken, or both
+
+
+def test_a_link_without_a_constraint_is_a_link_for_protocols() -> None:
+    team = team_of({"A": (1, 2), "B": (1, 2), "C": (1, 2)}, [differ("A", "B")])
+    robots = (
+        replace(team["RA"], children=(*team["RA"].children, Child("RC", ("A",), ()))),
+        team["RB"],
+        replace(team["RC"], parents=(Parent("RA", ()),)),
+    )
+    report = report_of(replace(team, robots=robots), "p-dpop")
+    assert loss(report, "RA", "RB", Kind.DOMAIN).entropy is not None

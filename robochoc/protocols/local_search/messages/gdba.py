@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
-from robochoc.model.disclosure import NOTHING, Hearing, Proof
 from robochoc.model.wording import Wording
 from robochoc.protocols.local_search.messages.mgm import Gain, saving_in_words
 
@@ -15,7 +12,3 @@ class Improve(Gain, frozen=True):
     def in_words(self, _: Wording) -> str:
         """Return what the sender says."""
         return f"as I weigh constraints by now, my move would save {saving_in_words(self.broken, self.cost)}"
-
-    def proves(self, _: Hearing) -> Sequence[Proof]:
-        """Return what the message proves to its receiver: weights are not costs."""
-        return NOTHING

@@ -6,9 +6,8 @@ from collections.abc import Sequence
 
 from robochoc.model import message as wire
 from robochoc.model.communicative_acts import Act, Performative
-from robochoc.model.disclosure import INFINITE, NOTHING, Hearing, Pays, Proof
+from robochoc.model.disclosure import NOTHING, Hearing, Proof
 from robochoc.model.wording import Wording, cost_text, counted, listed
-from robochoc.protocols.shared.messages.cycles import Value
 
 
 def saving_in_words(broken: int, cost: float) -> str:
@@ -29,14 +28,10 @@ class Gain(wire.Message, frozen=True):
         """Return what the sender says."""
         return f"my move would save {saving_in_words(self.broken, self.cost)}"
 
-    def proves(self, hearing: Hearing) -> Sequence[Proof]:
-        """Return what the message proves to its receiver: that the present value costs no less than a move saves.
+    def proves(self, _: Hearing) -> Sequence[Proof]:
+        """Return what the message proves to its receiver: nothing by itself.
 
-        It does where no other robot's value is in it.
+        A gain may be one of two that move together (MGM-2), weighed (GDBA), or have costs in it that were handed over
+        (MCS-MGM). So it does not bound what the sender pays.
         """
-        own = hearing.last(Value, hearing.receiver, hearing.sender)
-        told = hearing.last(Value, hearing.sender, hearing.receiver)
-        if own is None or told is None or not hearing.is_only_neighbour():
-            return NOTHING
-        least = INFINITE if self.broken else self.cost
-        return [Pays(hearing.sender, told.value, {hearing.receiver: own.value}, least, INFINITE)]
+        return NOTHING
