@@ -17,7 +17,7 @@ from robochoc.protocols.order import PriorityOrder
 from robochoc.protocols.satisfaction.compapo import CompAPO
 from robochoc.protocols.satisfaction.mediation import Mediation, allows
 from robochoc.protocols.satisfaction.messages.compapo import (
-    Accept,
+    Assign,
     Evaluate,
     Evaluation,
     Free,
@@ -127,7 +127,7 @@ def test_choose_solution_tells_each_its_value_and_its_neighbours_new_ones() -> N
     assert replies(robot, ("RB", Evaluation(1, 0, 0, (table("RA", "RB"), table("RC", "RB"))))) == [
         ("RC", Evaluate(1, 2, tables=False))
     ]
-    assert replies(robot, ("RC", Evaluation(1, 1, 4, ()))) == [("RB", Accept(0, {"RA": (1, 1)})), ("RC", Release({}))]
+    assert replies(robot, ("RC", Evaluation(1, 1, 4, ()))) == [("RB", Assign(0, {"RA": (1, 1)})), ("RC", Release({}))]
     assert value(robot) == (2,)
 
 
@@ -138,7 +138,7 @@ def test_robots_outside_that_are_in_conflict_with_the_solution_join_the_good_lis
     one = Table(("RA", "RB"), (1, 2), bytes([0b10]))
     replies(robot, ("RB", Evaluation(1, 0, 0, (one, table("RC", "RB")))))
     assert replies(robot, ("RC", Evaluation(1, 1, 1, ()))) == [
-        ("RB", Accept(1, {})),
+        ("RB", Assign(1, {})),
         ("RC", Release({"RB": (1, 1)})),
     ]
     assert robot.good_list == {"RA", "RB", "RC"}
@@ -163,7 +163,7 @@ def test_whoever_is_held_keeps_its_value() -> None:
 def test_accept_takes_the_value() -> None:
     robot = agent(triangle(), "RB")
     replies(robot, ("RA", Evaluate(1, 3, tables=False)))
-    assert replies(robot, ("RA", Accept(1, {}))) == []
+    assert replies(robot, ("RA", Assign(1, {}))) == []
     assert (value(robot), robot.count, robot.holder) == ((2,), 1, None)
 
 
@@ -197,7 +197,7 @@ def test_a_mediator_that_is_refused_releases_all_and_asks_again_when_the_other_i
         Evaluation(1, 0, 0, (table("RB", "Nobody"),)),
         Evaluation(1, 7, 0, (table("RA", "RB"),)),
         Evaluation(1, -1, 0, (table("RA", "RB"),)),
-        Accept(0, {}),
+        Assign(0, {}),
         Release({"RZ": (0, 1)}),
         Init(()),
     ],

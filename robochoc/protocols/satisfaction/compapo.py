@@ -70,7 +70,7 @@ from robochoc.protocols.protocol import Protocol
 from robochoc.protocols.satisfaction.compapo_tables import distinct, own_tables, sizes_in
 from robochoc.protocols.satisfaction.mediation import Mediation, allows
 from robochoc.protocols.satisfaction.messages.compapo import (
-    Accept,
+    Assign,
     Changes,
     Evaluate,
     Evaluation,
@@ -94,7 +94,7 @@ class CompAPO(Protocol):
     its number `session`, the robots `asked`, and `replies`. `waits_for` is the robot that has refused it.
     """
 
-    messages = Init | Ok | Evaluate | Evaluation | Wait | Free | Accept | Release
+    messages = Init | Ok | Evaluate | Evaluation | Wait | Free | Assign | Release
     traits = Traits(
         concludes=ENDS_WITH_PROOF,
         paper="Mailler & Lesser 2004; Grinshpoun & Meisels 2008",
@@ -138,7 +138,7 @@ class CompAPO(Protocol):
         """Dispatch on the message's type."""
         if self.verdict is not None:
             return
-        match cast("Init | Ok | Evaluate | Evaluation | Wait | Free | Accept | Release", message):
+        match cast("Init | Ok | Evaluate | Evaluation | Wait | Free | Assign | Release", message):
             case Init(values):
                 self._introduce(sender, values)
             case Ok(value, count):
@@ -151,7 +151,7 @@ class CompAPO(Protocol):
                 self._abandon(sender, session)
             case Free():
                 self.waits_for = None if self.waits_for == sender else self.waits_for
-            case Accept(place, changes):
+            case Assign(place, changes):
                 self._accept(sender, place, changes)
             case Release(changes):
                 self._release(sender, changes)
@@ -344,7 +344,7 @@ class CompAPO(Protocol):
                 met.setdefault(robot, set()).update(table.robots)
         for robot in self._ranked(held):
             news = {other: change for other, change in changes.items() if other != robot and other in met[robot]}
-            self.send(robot, Accept(found[robot], news) if robot in found else Release(news))
+            self.send(robot, Assign(found[robot], news) if robot in found else Release(news))
         if self.name in changes:
             self._change(changes[self.name][0])
         self._learn({robot: change for robot, change in changes.items() if robot in self.domains})

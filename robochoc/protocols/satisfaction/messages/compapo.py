@@ -27,7 +27,7 @@ class Table(msgspec.Struct, frozen=True, array_like=True):
 
     def __post_init__(self) -> None:
         """Check that the table is complete."""
-        if len(self.robots) != len(self.sizes) or len({*self.robots}) != len(self.robots) or min(self.sizes) < 1:
+        if not len({*self.robots}) == len(self.robots) == len(self.sizes) > 0 or min(self.sizes) < 1:
             raise ValueError("a table does not say how many values each of its robots has")
         if len(self.allowed) != -(-math.prod(self.sizes) // 8):
             raise ValueError("a table does not have a bit for each combination of values")
@@ -115,7 +115,7 @@ class Free(Message, frozen=True):
         return "you need not wait for me any more"
 
 
-class Accept(Message, frozen=True):
+class Assign(Message, frozen=True):
     """The end of a session: the receiver's value, and its neighbours' new ones (`accept!`)."""
 
     place: int
