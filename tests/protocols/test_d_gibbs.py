@@ -15,7 +15,7 @@ from robochoc.model.message import Message
 from robochoc.model.outcome import Verdict
 from robochoc.model.problem import INFINITE
 from robochoc.protocols.local_search.d_gibbs import DGibbs
-from robochoc.protocols.local_search.messages.d_gibbs import Backtrack, Finish, Value
+from robochoc.protocols.local_search.messages.d_gibbs import Difference, Finish, Value
 from robochoc.protocols.local_search.settings.d_gibbs import DGibbsSettings
 from robochoc.protocols.settings import SettingsError, settings_of
 from robochoc.run.incumbent import costs_by_cycle
@@ -94,27 +94,27 @@ def test_what_breaks_a_hard_constraint_is_drawn_seldom() -> None:
 def test_a_leaf_tells_at_once_by_how_much_the_cost_has_changed() -> None:
     made = robot("C", 0.9)
     said(made)
-    assert replies(made, ("RB", Value((1,), False)))[-1] == ("RB", Backtrack(0, -3))
+    assert replies(made, ("RB", Value((1,), False)))[-1] == ("RB", Difference(0, -3))
 
 
 def test_others_add_up_what_their_children_tell() -> None:
     made = robot("B", 0.9)
     replies(made, ("RC", Value((1,), True)), ("RA", Value((1,), False)))
-    assert replies(made, ("RC", Value((1,), False)), ("RC", Backtrack(0, 2))) == [("RA", Backtrack(0, -6))]
+    assert replies(made, ("RC", Value((1,), False)), ("RC", Difference(0, 2))) == [("RA", Difference(0, -6))]
 
 
 @pytest.mark.parametrize(("change", "kept"), [(-4, True), (5, False)])
 def test_the_root_tells_with_the_next_value_whether_the_sample_was_the_best(change: int, kept: bool) -> None:  # noqa: FBT001
     made = robot("A")
     replies(made, ("RB", Value((1,), True)))
-    told = replies(made, ("RB", Value((1,), True)), ("RB", Backtrack(0, change)))
+    told = replies(made, ("RB", Value((1,), True)), ("RB", Difference(0, change)))
     assert told == [("RB", Value((1,), kept))]
 
 
 def test_the_next_sample_waits_for_the_values_of_all_below() -> None:
     made = robot("A")
     replies(made, ("RB", Value((1,), True)))
-    assert replies(made, ("RB", Backtrack(0, 0))) == []
+    assert replies(made, ("RB", Difference(0, 0))) == []
     assert made.cycle == 1
     assert replies(made, ("RB", Value((1,), True))) == [("RB", Value((1,), False))]
 
@@ -124,7 +124,7 @@ def test_at_the_end_all_take_their_values_of_the_best_sample(kept: bool, best: i
     made = robot("B", 0.0, 0.999, cycles=1)
     replies(made, ("RC", Value((1,), True)), ("RA", Value((2,), True)))
     assert value(made) == (2,)
-    replies(made, ("RC", Value((1,), True)), ("RC", Backtrack(0, 0)))
+    replies(made, ("RC", Value((1,), True)), ("RC", Difference(0, 0)))
     assert replies(made, ("RA", Finish(kept))) == [("RC", Finish(kept))]
     assert value(made) == (best,)
 
@@ -132,7 +132,7 @@ def test_at_the_end_all_take_their_values_of_the_best_sample(kept: bool, best: i
 def test_what_cannot_be_is_refused() -> None:
     made = robot("B")
     with pytest.raises(ValueError, match="RA had nothing to add up"):
-        replies(made, ("RA", Backtrack(0, 0)))
+        replies(made, ("RA", Difference(0, 0)))
     with pytest.raises(ValueError, match="RC is not the parent of RB"):
         replies(made, ("RC", Finish(True)))
 
@@ -185,7 +185,7 @@ def test_a_cycle_takes_two_messages_for_each_link_and_one_for_each_child(teams: 
             if found.place
         )
         assert kinds.count("Value") == links * (2 * 7 + 1)
-        assert (kinds.count("Backtrack"), kinds.count("Finish")) == (7 * children, children)
+        assert (kinds.count("Difference"), kinds.count("Finish")) == (7 * children, children)
 
 
 @pytest.mark.parametrize("setting", ["temperature=0", "cooling=0", "cooling=1.1", "hard=-1", "temperature=inf"])

@@ -16,7 +16,7 @@ from robochoc.model.problem import Assignment, Constraint, Relation, Semantics, 
 from robochoc.protocols.local_search import kopt_groups
 from robochoc.protocols.local_search.kopt import KOpt
 from robochoc.protocols.local_search.kopt_groups import Neighbourhood
-from robochoc.protocols.local_search.messages.kopt import Go, Offer, Offers, Part, Region, Table, Values
+from robochoc.protocols.local_search.messages.kopt import MoveTogether, Offer, Offers, Part, Region, Table, Values
 from robochoc.protocols.local_search.settings.kopt import KOptSettings
 from robochoc.protocols.settings import SettingsError, settings_of
 from robochoc.protocols.shared.messages.cycles import Domain
@@ -92,7 +92,7 @@ def test_of_moves_that_touch_each_other_the_best_is_made_and_of_equal_ones_the_f
     replies(robot, ("RB", Values({})))
     replies(robot, ("RB", Offers({"RB": Offer(0, rival, {"RB": 1})})))
     replies(robot, ("RB", Offers({})))
-    assert replies(robot, ("RB", Offers({}))) == [("RB", Go({"RA": 1, "RB": 1} if moves else {}))]
+    assert replies(robot, ("RB", Offers({}))) == [("RB", MoveTogether({"RA": 1, "RB": 1} if moves else {}))]
 
 
 def test_who_is_told_to_move_takes_its_new_value_and_tells_it() -> None:
@@ -100,7 +100,7 @@ def test_who_is_told_to_move_takes_its_new_value_and_tells_it() -> None:
     replies(robot, ("RB", Values({})))
     for _ in range(3):
         replies(robot, ("RB", Offers({"RB": Offer(0, 9, {"RA": 1, "RB": 1})})))
-    assert replies(robot, ("RB", Go({"RA": 1, "RB": 1}))) == [("RB", Values({"RA": 1}))]
+    assert replies(robot, ("RB", MoveTogether({"RA": 1, "RB": 1}))) == [("RB", Values({"RA": 1}))]
     assert value(robot) == (2,)
 
 
@@ -109,7 +109,7 @@ def test_who_has_not_moved_tells_no_value() -> None:
     replies(robot, ("RB", Values({})))
     for _ in range(3):
         replies(robot, ("RB", Offers({"RB": Offer(0, 9, {"RB": 1})})))
-    assert replies(robot, ("RB", Go({"RB": 1}))) == [("RB", Values({}))]
+    assert replies(robot, ("RB", MoveTogether({"RB": 1}))) == [("RB", Values({}))]
 
 
 @pytest.mark.parametrize(

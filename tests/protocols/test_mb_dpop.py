@@ -19,7 +19,7 @@ from robochoc.model.problem import INFINITE, Team
 from robochoc.model.wording import Wording
 from robochoc.protocols.inference.mb_dpop import MBDPOP
 from robochoc.protocols.inference.messages.dpop import UTIL, VALUE, Need, Proceed
-from robochoc.protocols.inference.messages.mb_dpop import Axis, Context, Label, Place
+from robochoc.protocols.inference.messages.mb_dpop import Axis, Context, DomainAtDepth, Label
 from robochoc.protocols.settings import equip
 from robochoc.run import Options, Runtime, Withdrawal, solve
 from robochoc.solver.encoding import UnsupportedError
@@ -38,8 +38,8 @@ FEW = Need(1, "RX")
 BOUNDED = ("mb-dpop",)
 
 
-def place(depth: int, values: tuple[int, ...] = (1, 2, 3)) -> Place:
-    return Place(depth, [(one,) for one in values])
+def place(depth: int, values: tuple[int, ...] = (1, 2, 3)) -> DomainAtDepth:
+    return DomainAtDepth(depth, [(one,) for one in values])
 
 
 def robot_of(team: Team, name: str, above: str = "", below: str = "", k: int = 1) -> MBDPOP:

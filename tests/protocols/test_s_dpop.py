@@ -33,7 +33,7 @@ from robochoc.model.problem import (
 )
 from robochoc.model.wording import Wording
 from robochoc.protocols.inference.messages.dpop import UTIL, Dimensions, Need
-from robochoc.protocols.inference.messages.s_dpop import Go, Reuse
+from robochoc.protocols.inference.messages.s_dpop import Check, Reuse
 from robochoc.protocols.inference.s_dpop import SDPOP
 from robochoc.run import Options, Runtime, ScheduleName, solve
 from robochoc.run.registry import protocol_named, protocol_names
@@ -76,19 +76,19 @@ PATH = products("ABCDE", "AB BC CD DE")
 def test_an_unchanged_team_says_only_that_it_stands() -> None:
     """The value that B gets is one more, and the first stays the best; so A's table is all that is new."""
     (_, second) = epochs(products("ABC", "AB BC"), AddConstraint("RC", "RB", replace(product("B", "C"), name="More")))
-    assert said(second) == {"Go": 2, "Reuse": 1, "Dimensions": 1, "Proceed": 1, "UTIL": 1, "VALUE": 1}
+    assert said(second) == {"Check": 2, "Reuse": 1, "Dimensions": 1, "Proceed": 1, "UTIL": 1, "VALUE": 1}
 
 
 def test_only_robots_between_the_change_and_the_root_compute_anew() -> None:
     (first, second) = epochs(PATH, AddConstraint("RE", "RD", product("D", "E", "More")))
     assert said(first)["UTIL"] == 4
-    assert said(second) == {"Go": 4, "Reuse": 1, "Dimensions": 3, "Proceed": 3, "UTIL": 3, "VALUE": 3}
+    assert said(second) == {"Check": 4, "Reuse": 1, "Dimensions": 3, "Proceed": 3, "UTIL": 3, "VALUE": 3}
 
 
 def test_a_table_that_turns_out_to_be_the_same_is_not_sent() -> None:
     """E loses a value that it never takes."""
     (_, second) = epochs(PATH, RemoveValue("E", 3))
-    assert said(second) == {"Go": 4, "Reuse": 4, "Dimensions": 3, "Proceed": 3, "VALUE": 3}
+    assert said(second) == {"Check": 4, "Reuse": 4, "Dimensions": 3, "Proceed": 3, "VALUE": 3}
     assert second.metrics.ncccs > 0
 
 
@@ -114,7 +114,7 @@ def test_a_lost_link_that_is_none_of_the_tree_needs_no_new_tree() -> None:
 def test_a_lost_parent_needs_a_new_tree_for_those_below_alone() -> None:
     (_, second) = epochs(PATH, RemoveAgent("RC"))
     assert said(second)["Wave"] == 3  # of D and E
-    assert said(second)["Go"] == 1  # of B, for A
+    assert said(second)["Check"] == 1  # of B, for A
 
 
 def test_a_new_link_between_branches_needs_a_new_tree() -> None:
@@ -163,7 +163,7 @@ def test_reuse_of_a_table_that_is_not_there_is_refused() -> None:
 def test_a_tree_that_does_not_stand_is_not_begun() -> None:
     robot = placed(SDPOP, products("AB", "AB"), "RB", "RA")
     with pytest.raises(ValueError, match="has begun already"):
-        replies(robot, ("RA", Go([])))
+        replies(robot, ("RA", Check([])))
 
 
 def test_a_table_that_was_not_asked_for_is_refused() -> None:
@@ -181,8 +181,8 @@ def test_who_speaks_twice_is_refused() -> None:
 
 def test_what_is_said_in_words() -> None:
     words = Wording("RA", "RB")
-    assert Go([]).in_words(words) == "our tree stands, and above you no values have changed"
-    assert Go(["RC"]).in_words(words) == "our tree stands, and above you the values of RC have changed"
+    assert Check([]).in_words(words) == "our tree stands, and above you no values have changed"
+    assert Check(["RC"]).in_words(words) == "our tree stands, and above you the values of RC have changed"
     assert Reuse().in_words(words) == "my table is still the one that you have"
 
 

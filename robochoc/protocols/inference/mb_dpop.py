@@ -24,7 +24,8 @@ The rules of labeling, leaves first. A robot's list holds the cycle-cut robots o
 
 Choices that the paper leaves open, and differences:
 
-- The robots highest in the tree are added to a list first. Therefore `Place`, DPOP's `Domain`, has the sender's depth.
+- The robots highest in the tree are added to a list first. Therefore `DomainAtDepth`, DPOP's `Domain`, has the
+  sender's depth.
 - Sizes, limits and the permission to proceed are DPOP's, so that nothing is computed before all are known to fit.
 - A context goes to those children only whose tables depend on it, as places of the values in the order of the child's
   list. Tables of other children are asked for once.
@@ -52,7 +53,7 @@ from robochoc.model.message import Message
 from robochoc.protocols.inference.dpop import DPOP, MOST_AXES, keep_once
 from robochoc.protocols.inference.dpop_tables import Codes, Extent, Table, Width, aligned, project, width_of
 from robochoc.protocols.inference.messages.dpop import UTIL, VALUE, Dimensions, Proceed
-from robochoc.protocols.inference.messages.mb_dpop import Axis, Context, Label, Place
+from robochoc.protocols.inference.messages.mb_dpop import Axis, Context, DomainAtDepth, Label
 from robochoc.protocols.inference.settings.mb_dpop import MBDPOPSettings
 from robochoc.protocols.order import PriorityOrder
 from robochoc.protocols.shared.messages.dfs import TreeMessage
@@ -73,7 +74,7 @@ class MBDPOP(DPOP):
     - `context`: the values, as places, that the robots of these lists have now.
     """
 
-    messages = TreeMessage | Place | Label | Proceed | Context | UTIL | VALUE
+    messages = TreeMessage | DomainAtDepth | Label | Proceed | Context | UTIL | VALUE
     traits = Traits(
         concludes=ENDS_WITH_PROOF,
         paper="Petcu & Faltings 2007",
@@ -108,8 +109,8 @@ class MBDPOP(DPOP):
 
     def handle(self, sender: str, message: Message) -> None:
         """Dispatch on the message's type."""
-        match cast("Place | Label | Proceed | Context | UTIL | VALUE", message):
-            case Place(depth, values):
+        match cast("DomainAtDepth | Label | Proceed | Context | UTIL | VALUE", message):
+            case DomainAtDepth(depth, values):
                 keep_once(sender, values, self.domains, self.ancestors)
                 self.depths[sender] = depth
                 if sender == self.parent:
@@ -132,7 +133,7 @@ class MBDPOP(DPOP):
 
     def _send_place(self) -> None:
         for name in self.descendants:
-            self.send(name, Place(self.depth, list(self.problem.values)))
+            self.send(name, DomainAtDepth(self.depth, list(self.problem.values)))
 
     # Labels, from the leaves up
 

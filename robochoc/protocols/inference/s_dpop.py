@@ -16,7 +16,7 @@ The three parts of the paper are these methods:
     self-stabilizing tree   `change`, `resume`, `_renew`      UTIL propagation    `_measure`, `_reuse`, `_pass_on`
     VALUE propagation       `_choose_optimal`
 
-An epoch on a tree that stands goes as follows. The root lets all begin (`Go`), and so everyone learns whose domains
+An epoch on a tree that stands goes as follows. The root lets all begin (`Check`), and so everyone learns whose domains
 above it have changed. From the leaves up, each robot says whether its table can have changed: `Reuse`, or DPOP's
 `Dimensions`. Where it can, the root lets those robots proceed. A table that turns out to be the same is not sent, but
 `Reuse` once more. Down the tree, VALUE goes to children that have computed, or whose separator has other values.
@@ -52,7 +52,7 @@ from robochoc.protocols.dynamic import DynamicProtocol
 from robochoc.protocols.inference.dpop import DPOP, keep_once
 from robochoc.protocols.inference.dpop_tables import Codes, Extent, IncomingTable, Table, Width, project, width_of
 from robochoc.protocols.inference.messages.dpop import UTIL, VALUE, Dimensions, Domain, Proceed
-from robochoc.protocols.inference.messages.s_dpop import Go, Reuse
+from robochoc.protocols.inference.messages.s_dpop import Check, Reuse
 from robochoc.protocols.order import PriorityOrder
 from robochoc.protocols.shared.messages.dfs import TreeMessage, Wave
 from robochoc.protocols.traits import ENDS_WITH_PROOF, Traits
@@ -70,7 +70,7 @@ class SDPOP(DPOP, DynamicProtocol):
     - `told`: for each child the values that it was told last.
     """
 
-    messages = TreeMessage | Go | Domain | Dimensions | Reuse | Proceed | UTIL | VALUE
+    messages = TreeMessage | Check | Domain | Dimensions | Reuse | Proceed | UTIL | VALUE
     traits = Traits(
         concludes=ENDS_WITH_PROOF,
         paper="Petcu & Faltings 2005",
@@ -218,8 +218,8 @@ class SDPOP(DPOP, DynamicProtocol):
 
     def handle(self, sender: str, message: Message) -> None:
         """Dispatch on the message's type."""
-        match cast("Go | Domain | Dimensions | Reuse | Proceed | UTIL | VALUE", message):
-            case Go(changed):
+        match cast("Check | Domain | Dimensions | Reuse | Proceed | UTIL | VALUE", message):
+            case Check(changed):
                 self._go(changed)
             case Domain(values):
                 keep_once(sender, values, self._new_domains, self.ancestors)
@@ -244,7 +244,7 @@ class SDPOP(DPOP, DynamicProtocol):
         self._expected = {*changed} & {*self.ancestors}
         own = [self.problem.agent] if self._has_new_values else []
         for child in self.children:
-            self.send(child, Go([*changed, *own]))
+            self.send(child, Check([*changed, *own]))
         self._measure()
 
     # How large tables will be, and whether they stand

@@ -37,7 +37,7 @@ Choices that the paper leaves open, and differences:
 >>> from robochoc.communication.simulator.simulator import Simulation
 >>> from robochoc.generators.queens3d import queens3d
 >>> result = Simulation(queens3d(3), DGibbs, Concurrent(seed=0)).search()
->>> result.metrics.messages["Value"], result.metrics.messages["Backtrack"], result.metrics.messages["Finish"]
+>>> result.metrics.messages["Value"], result.metrics.messages["Difference"], result.metrics.messages["Finish"]
 (5628, 800, 8)
 """
 
@@ -51,7 +51,7 @@ import msgspec
 
 from robochoc.model import message as wire
 from robochoc.protocols.findings import Findings, Trail
-from robochoc.protocols.local_search.messages.d_gibbs import Backtrack, Finish, Value
+from robochoc.protocols.local_search.messages.d_gibbs import Difference, Finish, Value
 from robochoc.protocols.local_search.settings.d_gibbs import DGibbsSettings
 from robochoc.protocols.order import PriorityOrder
 from robochoc.protocols.shared.cycles import NO_GAIN, gain
@@ -71,7 +71,7 @@ class DGibbs(TreeProtocol):
     sample), and the sums of changes: `change` in this cycle, and (at the root) `total` and `record` since the start.
     """
 
-    messages = TreeMessage | Value | Backtrack | Finish
+    messages = TreeMessage | Value | Difference | Finish
     settings: ClassVar[DGibbsSettings] = DGibbsSettings()
     traits = Traits(
         concludes=ENDS_WITH_PROOF,
@@ -113,12 +113,12 @@ class DGibbs(TreeProtocol):
 
     def handle(self, sender: str, message: wire.Message) -> None:
         """Dispatch on the message's type."""
-        match cast("Value | Backtrack | Finish", message):
+        match cast("Value | Difference | Finish", message):
             case Value(value, kept):
                 self.view[sender] = value
                 self._told_by[sender] += 1
                 self._kept = kept if sender == self.parent else self._kept
-            case Backtrack(broken, cost):
+            case Difference(broken, cost):
                 if sender not in self.children or sender in self._changes:
                     raise ValueError(f"{sender} had nothing to add up, or has told it already")
                 self._changes[sender] = broken, cost
@@ -181,7 +181,7 @@ class DGibbs(TreeProtocol):
         if self.parent is None:
             self._judge()
         else:
-            self.send(self.parent, Backtrack(*map(int, self.change)))
+            self.send(self.parent, Difference(*map(int, self.change)))
 
     def _judge(self) -> None:
         """Decide whether the sample is the best so far; after the last one, end the search."""

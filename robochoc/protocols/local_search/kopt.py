@@ -41,7 +41,7 @@ Choices that the papers leave open, and differences:
 >>> from robochoc.generators.queens3d import queens3d
 >>> result = Simulation(queens3d(2), KOpt, Concurrent(seed=0)).search()
 >>> result.metrics.messages
-{'Domain': 12, 'Go': 1200, 'Offers': 3600, 'Region': 24, 'Values': 2400}
+{'Domain': 12, 'MoveTogether': 1200, 'Offers': 3600, 'Region': 24, 'Values': 2400}
 """
 
 from __future__ import annotations
@@ -53,7 +53,7 @@ import msgspec
 
 from robochoc.model import message as wire
 from robochoc.protocols.local_search.kopt_groups import Neighbourhood
-from robochoc.protocols.local_search.messages.kopt import Go, Offer, Offers, Part, Region, Table, Values
+from robochoc.protocols.local_search.messages.kopt import MoveTogether, Offer, Offers, Part, Region, Table, Values
 from robochoc.protocols.local_search.settings.kopt import KOptSettings
 from robochoc.protocols.order import PriorityOrder
 from robochoc.protocols.shared.cycles import NO_GAIN, CycleProtocol
@@ -69,7 +69,7 @@ T = TypeVar("T")
 class KOpt(CycleProtocol):
     """One agent of k-opt. State: the `region` that it knows, the `places` of the values there, and its own `offer`."""
 
-    messages = Domain | Region | Values | Offers | Go | AnytimeMessage
+    messages = Domain | Region | Values | Offers | MoveTogether | AnytimeMessage
     settings: ClassVar[KOptSettings] = KOptSettings()
     traits = Traits(
         concludes=ENDS_WITH_PROOF,
@@ -178,7 +178,7 @@ class KOpt(CycleProtocol):
     def _choose(self, offers: dict[str, Offer]) -> None:
         """Let the own group move if no other move that touches it gains more."""
         moves = self.offer.moves if self.offer and self._wins(self.offer, offers) else {}
-        self._spread(Go, moves, self.radius, self._move)
+        self._spread(MoveTogether, moves, self.radius, self._move)
 
     def _wins(self, own: Offer, offers: Mapping[str, Offer]) -> bool:
         touched = self._known_region.touched(own.moves)

@@ -65,7 +65,7 @@ class Recording(RandomChannels):
         super().put(envelope, checks)
 
 
-AFTER_CHANGES = {"Go", "Reuse"}
+AFTER_CHANGES = {"Check", "Reuse"}
 """Types of dynamic protocols that are sent only once a problem has changed."""
 
 

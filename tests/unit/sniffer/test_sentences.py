@@ -126,7 +126,7 @@ REAL = {
     ("p-dpop", "Codes"): "RX00 says: call me 0a6a; X00 is 5, -3, 0 or 3, and you get a key for each",
     ("p-dpop", "UTIL"): "RX02 says: a table over 3 codenames: 16 costs, hidden by keys",
     ("p-dpop", "VALUE"): "RX01 says: the codes of 1 value above you",
-    ("mb-dpop", "Place"): "RX02 says: 1 robot above me in the tree; X02 is -3, 0, 1 or 3",
+    ("mb-dpop", "DomainAtDepth"): "RX02 says: 1 robot above me in the tree; X02 is -3, 0, 1 or 3",
     ("mb-dpop", "Label"): (
         "RX03 says: my table has 16 cells over RX02 (4 values) and RX00 (4 values), and no cost above 19"
     ),
@@ -170,9 +170,9 @@ REAL = {
     ("kopt", "Region"): "RX00 says: 2 constraints of RX01, RX02 and RX04, value by value",
     ("kopt", "Values"): "RX00 says: RX00 has its value number 4",
     ("kopt", "Offers"): "RX00 says: I have heard of no move that saves anything",
-    ("kopt", "Go"): "RX00 says: go: RX00",
+    ("kopt", "MoveTogether"): "RX00 says: go: RX00",
     ("d-gibbs", "Value"): "RX00 says: X00 = -3 in this sample; the last sample was the best so far",
-    ("d-gibbs", "Backtrack"): "RX01 says: by this sample my subtree has 1 broken constraint more and 9 of cost less",
+    ("d-gibbs", "Difference"): "RX01 says: by this sample my subtree has 1 broken constraint more and 9 of cost less",
     ("d-gibbs", "Finish"): (
         "RX00 says: the search is over: take your value of the best sample;"
         " the last sample was not better than the best"

@@ -118,7 +118,7 @@ class Assign(Message, frozen=True):
 
     value: message.Value
 
-    act = Act(Performative.REQUEST, "the receiver is to take the value")
+    act = Act(Performative.REQUEST, "the receiver is to take the value that it is given")
 
     def in_words(self, words: Wording) -> str:
         """Return what the sender says."""

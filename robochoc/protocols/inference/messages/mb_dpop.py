@@ -16,7 +16,7 @@ from robochoc.protocols.inference.messages.dpop import Cost, Need, Size
 Depth = Annotated[int, msgspec.Meta(ge=0)]
 
 
-class Place(Message, frozen=True):
+class DomainAtDepth(Message, frozen=True):
     """The sender's domain and its depth in the tree, for the robots below that share a constraint with it."""
 
     depth: Depth

@@ -7,7 +7,7 @@ from robochoc.model.message import Message
 from robochoc.model.wording import Wording, listed
 
 
-class Go(Message, frozen=True):
+class Check(Message, frozen=True):
     """The tree stands; `changed` are the robots above the receiver whose domains have changed.
 
     Those of them that share a constraint with the receiver send it their domains themselves.

@@ -25,7 +25,7 @@ class Value(wire.Message, frozen=True):
         return f"{words.own_value(self.value)} in this sample; {_record(self.kept)}"
 
 
-class Backtrack(wire.Message, frozen=True):
+class Difference(wire.Message, frozen=True):
     """How much more the sender's subtree pays since the sample before: broken hard constraints, and costs (BACKTRACK).
 
     Less is negative.

@@ -86,7 +86,7 @@ class Offers(wire.Message, frozen=True):
         return f"{'; '.join(said)}"
 
 
-class Go(wire.Message, frozen=True):
+class MoveTogether(wire.Message, frozen=True):
     """The moves that are made: the places of the robots' new values, as far as they are new to the sender."""
 
     moves: dict[str, Place]

@@ -58,7 +58,7 @@ class CPA(Message, frozen=True):
     bound: Number
     places: dict[str, int]
 
-    act = Act(Performative.REQUEST, "the receiver is to search its subtree")
+    act = acts.PROPOSE_CPA
 
     def in_words(self, _: Wording) -> str:
         """Return what the sender says."""

@@ -8,6 +8,7 @@ from robochoc.model.communicative_acts import Act, Performative
 from robochoc.model.disclosure import NOTHING, Hearing, Proof, SomeValuePays
 from robochoc.model.message import Message
 from robochoc.model.wording import Wording, cost_text, listed
+from robochoc.protocols import acts
 from robochoc.protocols.optimization.messages.branching import Number, allowance
 
 
@@ -20,7 +21,7 @@ class CPA(Message, frozen=True):
     bound: Number
     reports: dict[str, Number]
 
-    act = Act(Performative.REQUEST, "the receiver is to search its subtree")
+    act = acts.PROPOSE_CPA
 
     def in_words(self, _: Wording) -> str:
         """Return what the sender says."""

@@ -59,7 +59,7 @@ class UTIL(Message, frozen=True):
     axes: Shape
     cells: bytes
 
-    act = Act(Performative.INFORM, "the receiver comes to know sums of costs and keys")
+    act = Act(Performative.INFORM, "the receiver comes to know what the sender's subtree costs")
 
     def in_words(self, _: Wording) -> str:
         """Return what the sender says."""
@@ -93,7 +93,7 @@ class VALUE(Message, frozen=True):
 
     codes: Shape
 
-    act = Act(Performative.INFORM, "the receiver comes to know the codes of the values above it")
+    act = Act(Performative.INFORM, "the receiver comes to know the values above it")
 
     def in_words(self, _: Wording) -> str:
         """Return what the sender says."""

@@ -121,7 +121,7 @@ class Assign(Message, frozen=True):
     place: int
     changes: Changes
 
-    act = Act(Performative.REQUEST, "the sender has mediated, and the receiver takes the value it was given")
+    act = Act(Performative.REQUEST, "the receiver is to take the value that it is given")
 
     def in_words(self, _: Wording) -> str:
         """Return what the sender says."""

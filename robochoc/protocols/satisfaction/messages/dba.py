@@ -26,7 +26,7 @@ class Improve(wire.Message, frozen=True):
     weight: Count
     counter: Count
 
-    act = Act(Performative.PROPOSE, "of neighbours, the one with the largest reduction is to move")
+    act = Act(Performative.INFORM, "the receiver comes to know what the sender's move would save")
 
     def in_words(self, _: Wording) -> str:
         """Return what the sender says."""

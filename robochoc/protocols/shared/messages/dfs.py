@@ -58,7 +58,7 @@ class Back(Message, frozen=True):
 
     visited: Visited
 
-    act = Act(Performative.INFORM, "what `Token` asked for is done: who is in the tree by now")
+    act = Act(Performative.INFORM, "what `Token` asked for is done")
 
     def in_words(self, _: Wording) -> str:
         """Return what the sender says."""
