@@ -46,12 +46,13 @@ def fixed_teams(protocol: str) -> dict[str, Team]:
 
 
 def journal(team: Team, protocol: str, schedule: ScheduleName) -> bytes:
-    """The journal of the fixed run, of a few cycles, in its text form; it was written and read as a file is.
+    """The journal of the fixed run, of a few cycles or samples, in its text form; it was written and read as a file is.
 
     The wall-clock time, which is not fixed, is left out, and so are the robots' files, which are no protocol's.
     """
     withdraw = None if team.dynamic or team.kind is ProblemKind.DISWCSP else Withdrawal.MAXIMAL
-    settings = {"cycles": "3"} if hasattr(protocol_named(protocol).settings, "cycles") else {}
+    known = protocol_named(protocol).settings
+    settings = {name: "3" for name in ("cycles", "samples") if hasattr(known, name)}
     options = Options(
         protocol=protocol, runtime=Runtime.SIMULATOR, schedule=schedule, withdraw=withdraw, settings=settings
     )
