@@ -18,7 +18,7 @@ from robochoc.model.wording import Wording
 from robochoc.protocols.inference.dpop import DPOP
 from robochoc.protocols.local_search.duct import DUCT
 from robochoc.protocols.local_search.duct_samples import Samples
-from robochoc.protocols.local_search.messages.duct import Context, Cost, Fixed, Separator
+from robochoc.protocols.local_search.messages.duct import Fixed, SampleContext, SampleCost, Separator
 from robochoc.protocols.local_search.settings.duct import DUCTSettings
 from robochoc.protocols.settings import SettingsError, settings_of
 from robochoc.solver.compiled import LexicographicCost
@@ -61,27 +61,27 @@ def test_others_add_what_their_children_depend_on_and_cost() -> None:
 
 def test_a_sample_begins_at_the_root() -> None:
     _, said = told("A")
-    assert said == [("RB", Context({"RA": (1,)}))]
+    assert said == [("RB", SampleContext({"RA": (1,)}))]
 
 
 def test_context_comes_down_to_those_that_depend_on_it() -> None:
     made, _ = told("B")
-    assert replies(made, ("RA", Context({"RA": (2,)}))) == [("RC", Context({"RB": (2,)}))]
+    assert replies(made, ("RA", SampleContext({"RA": (2,)}))) == [("RC", SampleContext({"RB": (2,)}))]
 
 
 def test_a_leaf_takes_its_cheapest_value_and_tells_what_it_costs() -> None:
     made = robot("C")
-    assert replies(made, ("RB", Context({"RB": (2,)}))) == [("RB", Cost(0, 0, 0, hopeless=False))]
+    assert replies(made, ("RB", SampleContext({"RB": (2,)}))) == [("RB", SampleCost(0, 0, 0, hopeless=False))]
     assert value(made) == (2,)
     assert not made.known
 
 
 def test_costs_come_up_with_the_own_ones_added() -> None:
     made, _ = told("B")
-    replies(made, ("RA", Context({"RA": (1,)})), ("RC", Cost(0, 3, 2, hopeless=False)))
-    said = replies(made, ("RA", Context({"RA": (1,)})), ("RC", Cost(0, 0, 0, hopeless=False)))
+    replies(made, ("RA", SampleContext({"RA": (1,)})), ("RC", SampleCost(0, 3, 2, hopeless=False)))
+    said = replies(made, ("RA", SampleContext({"RA": (1,)})), ("RC", SampleCost(0, 0, 0, hopeless=False)))
     assert value(made) == (2,)
-    assert said[-1] == ("RA", Cost(0, 5, 2, hopeless=False))
+    assert said[-1] == ("RA", SampleCost(0, 5, 2, hopeless=False))
 
 
 def samples(*local: LexicographicCost, scale: int = 10) -> Samples:
@@ -145,29 +145,33 @@ def test_a_robot_stops_when_no_other_value_is_likely_to_be_better(tries: int, st
 
 def test_after_its_samples_the_root_fixes_the_best_value() -> None:
     made, _ = told("A", samples=2)
-    assert replies(made, ("RB", Cost(0, 4, 4, hopeless=False))) == [("RB", Context({"RA": (2,)}))]
-    assert replies(made, ("RB", Cost(0, 3, 3, hopeless=False))) == [("RB", Fixed({"RA": (2,)}))]
+    assert replies(made, ("RB", SampleCost(0, 4, 4, hopeless=False))) == [("RB", SampleContext({"RA": (2,)}))]
+    assert replies(made, ("RB", SampleCost(0, 3, 3, hopeless=False))) == [("RB", Fixed({"RA": (2,)}))]
     assert value(made) == (2,)
 
 
 def test_then_its_children_go_on_with_the_samples_that_they_have() -> None:
     made, _ = told("B", samples=2)
-    replies(made, ("RA", Context({"RA": (1,)})), ("RC", Cost(0, 3, 3, hopeless=False)))
-    assert replies(made, ("RA", Fixed({"RA": (1,)}))) == [("RC", Context({"RB": (2,)}))]
-    assert replies(made, ("RC", Cost(0, 0, 0, hopeless=False))) == [("RC", Fixed({"RB": (1,)}))]
+    replies(made, ("RA", SampleContext({"RA": (1,)})), ("RC", SampleCost(0, 3, 3, hopeless=False)))
+    assert replies(made, ("RA", Fixed({"RA": (1,)}))) == [("RC", SampleContext({"RB": (2,)}))]
+    assert replies(made, ("RC", SampleCost(0, 0, 0, hopeless=False))) == [("RC", Fixed({"RB": (1,)}))]
 
 
 def test_below_a_hopeless_value_there_is_no_solution() -> None:
     made, _ = told("B")
-    replies(made, ("RA", Context({"RA": (1,)})))
-    assert replies(made, ("RC", Cost(1, 0, None, hopeless=True))) == [("RA", Cost(1, 0, None, hopeless=False))]
-    replies(made, ("RA", Context({"RA": (1,)})))
-    assert replies(made, ("RC", Cost(1, 0, None, hopeless=True))) == [("RA", Cost(1, 5, None, hopeless=True))]
+    replies(made, ("RA", SampleContext({"RA": (1,)})))
+    assert replies(made, ("RC", SampleCost(1, 0, None, hopeless=True))) == [
+        ("RA", SampleCost(1, 0, None, hopeless=False))
+    ]
+    replies(made, ("RA", SampleContext({"RA": (1,)})))
+    assert replies(made, ("RC", SampleCost(1, 0, None, hopeless=True))) == [
+        ("RA", SampleCost(1, 5, None, hopeless=True))
+    ]
 
 
 def test_a_root_without_a_value_that_is_not_hopeless_ends_the_search() -> None:
     made, _ = told("A")
-    hopeless = Cost(1, 0, None, hopeless=True)
+    hopeless = SampleCost(1, 0, None, hopeless=True)
     replies(made, ("RB", hopeless), ("RB", hopeless))
     assert made.verdict is Verdict.NO_SOLUTION
 
@@ -176,15 +180,15 @@ def test_a_leaf_whose_values_all_break_a_constraint_is_hopeless() -> None:
     team = priced("BC", {"BC": [INFINITE, INFINITE, 0, 0]})
     made = placed(DUCT, team, "RC", "RB")
     made.outbox.clear()
-    assert replies(made, ("RB", Context({"RB": (1,)}))) == [("RB", Cost(1, 0, None, hopeless=True))]
+    assert replies(made, ("RB", SampleContext({"RB": (1,)}))) == [("RB", SampleCost(1, 0, None, hopeless=True))]
 
 
 def test_memory_is_bounded_and_new_contexts_get_the_cheapest_value() -> None:
     made, _ = told("B", contexts=1)
-    cost = Cost(0, 0, 0, hopeless=False)
-    replies(made, ("RA", Context({"RA": (1,)})), ("RC", cost))
+    cost = SampleCost(0, 0, 0, hopeless=False)
+    replies(made, ("RA", SampleContext({"RA": (1,)})), ("RC", cost))
     for _ in range(3):
-        assert replies(made, ("RA", Context({"RA": (2,)}))) == [("RC", Context({"RB": (2,)}))]
+        assert replies(made, ("RA", SampleContext({"RA": (2,)}))) == [("RC", SampleContext({"RB": (2,)}))]
         replies(made, ("RC", cost))
     assert len(made.known) == 1
 
@@ -194,10 +198,10 @@ def test_memory_is_bounded_and_new_contexts_get_the_cheapest_value() -> None:
     [
         ("RA", Separator(["RB"], 0), "RA had no separator"),
         ("RC", Separator(["RB"], 3), "RC had no separator"),
-        ("RC", Context({"RA": (1,)}), "RC had no sample to begin"),
-        ("RA", Context({"RC": (1,)}), "RB depends on RA"),
+        ("RC", SampleContext({"RA": (1,)}), "RC had no sample to begin"),
+        ("RA", SampleContext({"RC": (1,)}), "RB depends on RA"),
         ("RC", Fixed({"RA": (1,)}), "RC had no sample to begin"),
-        ("RC", Cost(0, 0, 0, hopeless=False), "RC had no sample to tell of"),
+        ("RC", SampleCost(0, 0, 0, hopeless=False), "RC had no sample to tell of"),
     ],
 )
 def test_what_cannot_be_is_refused(sender: str, message: Message, why: str) -> None:
@@ -207,11 +211,12 @@ def test_what_cannot_be_is_refused(sender: str, message: Message, why: str) -> N
 
 
 @pytest.mark.parametrize(
-    "cost", [Cost(-1, 0, 0, hopeless=False), Cost(0, 0, -1, hopeless=False), Cost(0, 0, 1, hopeless=True)]
+    "cost",
+    [SampleCost(-1, 0, 0, hopeless=False), SampleCost(0, 0, -1, hopeless=False), SampleCost(0, 0, 1, hopeless=True)],
 )
-def test_costs_that_cannot_be_are_refused(cost: Cost) -> None:
+def test_costs_that_cannot_be_are_refused(cost: SampleCost) -> None:
     made, _ = told("B")
-    replies(made, ("RA", Context({"RA": (1,)})))
+    replies(made, ("RA", SampleContext({"RA": (1,)})))
     with pytest.raises(ValueError, match="RC tells costs that cannot be"):
         replies(made, ("RC", cost))
 
@@ -230,9 +235,12 @@ def test_nobody_is_above_a_root() -> None:
 @pytest.mark.parametrize(
     ("message", "words"),
     [
-        (Cost(1, 2, None, hopeless=False), "this sample costs my subtree 2, and breaks 1 constraint; no solution yet"),
         (
-            Cost(2, 0, None, hopeless=True),
+            SampleCost(1, 2, None, hopeless=False),
+            "this sample costs my subtree 2, and breaks 1 constraint; no solution yet",
+        ),
+        (
+            SampleCost(2, 0, None, hopeless=True),
             "this sample costs my subtree 0, and breaks 2 constraints; with these values there is no solution",
         ),
         (Fixed({"RA": (1,)}), "VA = 1 for good; choose your own value"),

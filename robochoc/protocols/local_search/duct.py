@@ -54,7 +54,7 @@ from typing import ClassVar, assert_never, cast
 from robochoc.model import message as wire
 from robochoc.model.outcome import Verdict
 from robochoc.protocols.local_search.duct_samples import Samples
-from robochoc.protocols.local_search.messages.duct import Context, Cost, Fixed, Separator
+from robochoc.protocols.local_search.messages.duct import Fixed, SampleContext, SampleCost, Separator
 from robochoc.protocols.local_search.settings.duct import DUCTSettings
 from robochoc.protocols.order import PriorityOrder
 from robochoc.protocols.shared.dfs import TreeProtocol
@@ -76,7 +76,7 @@ class DUCT(TreeProtocol):
     robots above have chosen. `chosen`: this one has, too.
     """
 
-    messages = TreeMessage | Separator | Context | Cost | Fixed
+    messages = TreeMessage | Separator | SampleContext | SampleCost | Fixed
     settings: ClassVar[DUCTSettings] = DUCTSettings()
     traits = Traits(
         concludes=ENDS_WITH_PROOF,
@@ -98,7 +98,7 @@ class DUCT(TreeProtocol):
         self.view: dict[str, wire.Value] = {}
         self.samples = Samples([], 0)
         self.fixed = self.chosen = False
-        self._costs: dict[str, Cost] = {}
+        self._costs: dict[str, SampleCost] = {}
         """What the children have told of the present sample."""
         self._sampling = False
 
@@ -111,13 +111,13 @@ class DUCT(TreeProtocol):
 
     def handle(self, sender: str, message: wire.Message) -> None:
         """Dispatch on the message's type."""
-        match cast("Separator | Context | Cost | Fixed", message):
+        match cast("Separator | SampleContext | SampleCost | Fixed", message):
             case Separator(robots, dearest):
                 self._keep_separator(sender, robots, dearest)
-            case Context(values):
+            case SampleContext(values):
                 self._enter(sender, values)
                 self._sample()
-            case Cost() as cost:
+            case SampleCost() as cost:
                 self._keep_cost(sender, cost)
             case Fixed(values):
                 self._enter(sender, values)
@@ -193,7 +193,7 @@ class DUCT(TreeProtocol):
         self._costs.clear()
         if self.children and self.samples.options:
             for child in self.children:
-                self.send(child, Context(self._context_of(child)))
+                self.send(child, SampleContext(self._context_of(child)))
         else:
             self._learn()
 
@@ -204,7 +204,7 @@ class DUCT(TreeProtocol):
 
     # Costs, from the leaves up
 
-    def _keep_cost(self, child: str, told: Cost) -> None:
+    def _keep_cost(self, child: str, told: SampleCost) -> None:
         """Store what a child's sample costs; learn from it when all have told."""
         if not self._sampling or child not in self.children or child in self._costs:
             raise ValueError(f"{child} had no sample to tell of, or has told it already")
@@ -227,7 +227,7 @@ class DUCT(TreeProtocol):
             self._carry_on()
         else:
             best = self.samples.best
-            self.send(self.parent or "", Cost(int(broken), int(cost), best, not self.samples.options))
+            self.send(self.parent or "", SampleCost(int(broken), int(cost), best, not self.samples.options))
 
     @property
     def _present(self) -> int:

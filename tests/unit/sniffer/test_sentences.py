@@ -172,8 +172,8 @@ REAL = {
     ("kopt", "Offers"): "RX00 says: I have heard of no move that saves anything",
     ("kopt", "MoveTogether"): "RX00 says: go: RX00",
     ("duct", "Separator"): "RX01 says: my subtree depends on RX02 and RX00, and costs 25 at most",
-    ("duct", "Context"): "RX02 says: sample your subtree with X02 = 1 and X00 = 0",
-    ("duct", "Cost"): "RX02 says: this sample costs my subtree 32; the best so far costs 27",
+    ("duct", "SampleContext"): "RX02 says: sample your subtree with X02 = 1 and X00 = 0",
+    ("duct", "SampleCost"): "RX02 says: this sample costs my subtree 32; the best so far costs 27",
     ("d-gibbs", "Value"): "RX00 says: X00 = -3 in this sample; the last sample was the best so far",
     ("d-gibbs", "Difference"): "RX01 says: by this sample my subtree has 1 broken constraint more and 9 of cost less",
     ("d-gibbs", "Finish"): (

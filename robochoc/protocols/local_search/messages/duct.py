@@ -23,7 +23,7 @@ class Separator(wire.Message, frozen=True):
         return f"my subtree depends on {listed(self.robots)}, and costs {cost_text(self.dearest)} at most"
 
 
-class Context(wire.Message, frozen=True):
+class SampleContext(wire.Message, frozen=True):
     """The values of the receiver's separator in this sample (CONTEXT)."""
 
     values: dict[str, wire.Value]
@@ -35,7 +35,7 @@ class Context(wire.Message, frozen=True):
         return f"sample your subtree with {words.assigned(self.values.items())}"
 
 
-class Cost(wire.Message, frozen=True):
+class SampleCost(wire.Message, frozen=True):
     """What the sample costs the sender's subtree: broken hard constraints, and costs (COST).
 
     `best`: the least that is known for these values without a broken one, and None before there is any. `hopeless`:
