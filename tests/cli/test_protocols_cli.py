@@ -119,6 +119,27 @@ def test_the_long_list_has_all_traits() -> None:
 
 
 @pytest.mark.usefixtures("package")
+def test_the_list_can_be_of_one_kind_of_problem() -> None:
+    kinds = {
+        kind: {line.split()[0] for line in run("--for", kind).stdout.splitlines()[1:]}
+        for kind in ("satisfaction", "costs", "asymmetric")
+    }
+    assert {"abt", "dba", "disfc"} <= kinds["satisfaction"]
+    assert {"dpop", "mgm", "syncabb", "central"} <= kinds["costs"]
+    assert {"acls", "syncabb"} <= kinds["asymmetric"] < kinds["costs"]
+    assert "mgm" not in kinds["asymmetric"]
+    working = {name for name, one in objects(run("--json")).items() if "broken" not in one}
+    assert sorted([*kinds["satisfaction"], *kinds["costs"]]) == sorted(working)
+    assert set(objects(run("--for", "asymmetric", "--json"))) == kinds["asymmetric"]
+
+
+def test_one_protocol_is_not_asked_for_by_kind() -> None:
+    done = run("abt", "--for", "costs")
+    assert done.exit_code == 2
+    assert "--for is for the list" in done.stderr
+
+
+@pytest.mark.usefixtures("package")
 def test_other_packages_protocols_are_listed_beside_ours() -> None:
     told = row(run("--long").stdout, "zz-other")
     assert told.split()[1:7] == ["optimisation", "no", "yes", "binary,", "PKC", "yes"]

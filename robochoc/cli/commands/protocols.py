@@ -10,12 +10,15 @@ from robochoc.cli.options.names import ProtocolName
 from robochoc.cli.reports.failures import USAGE, Failure
 from robochoc.run.defaults import AUTO
 
+PURPOSES = ("satisfaction", "costs", "asymmetric")
+
 
 @click.command()
 @click.argument("name", required=False, type=ProtocolName())
+@click.option("--for", "purpose", type=click.Choice(PURPOSES), help="List only those for one kind of problem.")
 @click.option("--long", is_flag=True, help="List more traits: constraints, privacy, paper.")
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON object per protocol.")
-def protocols(name: str | None, *, as_json: bool, long: bool) -> None:
+def protocols(name: str | None, *, purpose: str | None, as_json: bool, long: bool) -> None:
     """List the installed protocols, or explain the protocol NAME; auto: how one is chosen.
 
     \b
@@ -26,11 +29,18 @@ def protocols(name: str | None, *, as_json: bool, long: bool) -> None:
     constraints   binary, n-ary; PKC: also partially known (--long)
     dynamic       continues when the problem changes (--long)
     privacy       what neighbours do not learn (--long)
+
+    \b
+    robochoc protocols --for satisfaction    any solution, no costs
+    robochoc protocols --for costs           the least cost, or a low one
+    robochoc protocols --for asymmetric      of these, with costs of each side
     """  # noqa: D301 - \\b is how click is told to leave the lines as they are
     from robochoc.cli.reports.protocols import Row, print_protocols, protocol_text, protocols_json, rows
     from robochoc.formats import on_one_line
 
-    found = rows()
+    if name is not None and purpose is not None:
+        raise Failure(USAGE, "--for is for the list, and not for one protocol: leave out one of the two")
+    found = [row for row in rows() if purpose is None or row.is_for(purpose)]
     if name == AUTO:
         from robochoc.cli.reports.choice import rules_text
 

@@ -38,6 +38,17 @@ class Row:
     settings: Settings = NO_SETTINGS
     """Its settings, with the defaults."""
 
+    def is_for(self, purpose: str) -> bool:
+        """Return whether it is for `satisfaction`, `costs` or `asymmetric` costs; a broken one is for nothing."""
+        if self.traits is None:
+            return False
+        kinds = {
+            "satisfaction": not self.traits.costs,
+            "costs": self.traits.costs,
+            "asymmetric": self.traits.costs and self.traits.asymmetric,
+        }
+        return kinds[purpose]
+
 
 def rows() -> list[Row]:
     """Return all protocols that `robochoc solve --protocol` accepts, and the broken ones with the reason."""
