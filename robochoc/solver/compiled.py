@@ -174,10 +174,25 @@ class LocalProblem(LocalConstraints):
 
         Only what is partially known (PKC) is counted, and of it the own parts: `robot` pays its own. One check for each
         part.
+
+        Raises:
+            ValueError: when `robot` has no such value.
         """
+        self.refuse_value(robot, value)
         known = [paid for part in self._parts.get(robot, ()) if (paid := part.costs_in({robot: value})) is not None]
         self.checks += len(known)
         return _lexicographic_cost([paid[index] for paid in known])
+
+    def refuse_value(self, robot: str, value: Value) -> None:
+        """Raise `ValueError` for a `value` that `robot`, as its files declare it, cannot have: others say anything."""
+        names = self._part.known.interfaces.get(robot, ())
+        if len(value) != len(names):
+            raise ValueError(f"a value of {robot} has {len(names)} parts, not {len(value)}")
+        if any(part is not None for part in value):  # none at all: it is withdrawn
+            domains = self._part.known.domains
+            for name, part in zip(names, value, strict=True):
+                if part is None or part not in domains[name]:
+                    raise ValueError(f"{name} of {robot} cannot be {part}")
 
     def charged(self, view: Mapping[str, Value]) -> list[Charged]:
         """Return what each constraint whose other variables are all known charges, with the checks of `costs`.

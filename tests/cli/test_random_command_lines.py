@@ -14,7 +14,7 @@ from typing import Any
 
 from robochoc.formats.folder import write_team
 from robochoc.model.problem import INFINITE, ProblemKind, Team
-from robochoc.run.registry import protocol_names
+from robochoc.run.registry import protocol_named, protocol_names
 from tests.support.cost_problems import minimum_withdrawal
 from tests.support.examples import count
 from tests.support.loose_problems import minimum_cost
@@ -22,14 +22,14 @@ from tests.support.problems import with_unique_definitions
 from tests.support.program import robochoc_within
 from tests.support.random_command_lines import ORDERS, TEAMS, assert_refused, some
 
-IN_CYCLES = ("dsa", "mgm", "mgm2", "maxsum")
+AS_ARRAYS = [name for name in protocol_names() if protocol_named(name).traits.arrays]
 SEEDS = (0, 7, 2**32, 2**63, 2**64 - 1)
 SETTINGS = ("cycles=3", "cycles=", "variant=B", "damping=0.5", "preference=inf", "memory=1", "none=1", "=3")
 
 
 def command_line(folder: Path, chance: Random) -> list[str]:
     runtime = chance.choice(("simulator", "simulator", "arrays"))
-    protocols = (*protocol_names(), "auto") if runtime == "simulator" or chance.random() < 0.2 else IN_CYCLES
+    protocols = (*protocol_names(), "auto") if runtime == "simulator" or chance.random() < 0.2 else AS_ARRAYS
     words = ["--runtime", runtime, *some(chance, 0.6, "--protocol", *protocols)]
     words += some(chance, 0.5, "--order", *ORDERS)
     words += some(chance, 0.5, "--seed", *SEEDS)

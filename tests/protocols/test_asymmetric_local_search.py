@@ -11,6 +11,7 @@ from robochoc.communication.simulator.schedule import RandomChannels
 from robochoc.communication.simulator.simulator import Simulation
 from robochoc.generators.random_csp import random_csp
 from robochoc.model.assembly import Extras, assemble
+from robochoc.model.message import Message
 from robochoc.model.problem import Constraint, Domain, ProblemKind, Relation, Semantics, Team, Variable
 from robochoc.protocols.asymmetric.acls import ACLS
 from robochoc.protocols.asymmetric.gca_mgm import GCAMGM
@@ -19,7 +20,7 @@ from robochoc.protocols.asymmetric.messages.acls import Proposal, Sides
 from robochoc.protocols.asymmetric.messages.transfers import Transfer
 from robochoc.protocols.asymmetric.settings.acls import ACLSSettings
 from robochoc.protocols.local_search.messages.mgm import Gain
-from robochoc.protocols.shared.cycles import NO_GAIN
+from robochoc.protocols.shared.cycles import NO_GAIN, CycleProtocol
 from robochoc.protocols.shared.messages.cycles import Value
 from robochoc.solver.agent_problem import RunParameters
 from tests.support.agents import replies, value
@@ -98,6 +99,21 @@ def test_settings_that_cannot_be_are_refused(wrong: dict[str, float]) -> None:
         ACLSSettings(**wrong)  # type: ignore[arg-type] # none of them is the number of cycles
 
 
+@pytest.mark.parametrize("protocol", [ACLS, MCSMGM, GCAMGM])
+@pytest.mark.parametrize("said", [Value(()), Value((1, 1)), Value((3,)), Gain(0, 1)])
+def test_what_is_no_value_of_the_neighbour_is_refused(protocol: type[CycleProtocol], said: Message) -> None:
+    robot = robot_of(protocol, pair(), "RA", 0.0)
+    started(robot)
+    with pytest.raises(ValueError, match="RB"):
+        replies(robot, ("RB", said))
+
+
+@pytest.mark.parametrize("said", [(), (1, 1), (3,)])
+def test_a_proposal_that_the_neighbour_cannot_take_is_refused(said: tuple[int, ...]) -> None:
+    with pytest.raises(ValueError, match="RB"):
+        replies(proposing(), ("RB", Proposal(said)))
+
+
 # Transfers
 
 
@@ -137,6 +153,14 @@ def test_who_is_handed_an_entry_pays_it(protocol: type[MCSMGM]) -> None:
     assert replies(robot, ("RB", Gain(0, 0))) == [("RB", Value((2,)))]
     replies(robot, ("RB", Value((1,))))
     assert replies(robot, ("RB", Transfer((0, 5)))) == [("RB", Gain(0, 2))]
+
+
+@TRANSFERS
+def test_what_is_no_gain_is_refused(protocol: type[MCSMGM]) -> None:
+    robot = robot_of(protocol, pair(), "RA", 0.0)
+    started(robot)
+    with pytest.raises(ValueError, match="RA"):
+        replies(robot, ("RB", Value((1,))), ("RB", Transfer(None)), ("RB", Value((1,))))
 
 
 @TRANSFERS

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import re
 from itertools import pairwise
+from pathlib import Path
 from random import Random
 
 import pytest
@@ -12,22 +14,13 @@ from robochoc.communication.simulator.simulator import Simulation
 from robochoc.model.outcome import Verdict
 from robochoc.model.problem import Assignment, Constraint, Relation, Semantics, Team
 from robochoc.protocols.findings import Trail
-from robochoc.protocols.inference.maxsum import MaxSum
-from robochoc.protocols.inference.maxsum_ad import MaxSumAD
 from robochoc.protocols.local_search.dsa import DSA
-from robochoc.protocols.local_search.dsa_sdp import DSASDP
-from robochoc.protocols.local_search.gdba import GDBA
-from robochoc.protocols.local_search.kopt import KOpt
-from robochoc.protocols.local_search.lamdls import LAMDLS
-from robochoc.protocols.local_search.mgm import MGM
-from robochoc.protocols.local_search.mgm2 import MGM2
-from robochoc.protocols.local_search.mixed_dsa import MixedDSA
 from robochoc.protocols.settings import SettingsError, settings_of
 from robochoc.protocols.shared.cycles import CycleProtocol
 from robochoc.protocols.shared.messages.cycles import Value
 from robochoc.run import Options, Runtime, Withdrawal, solve
 from robochoc.run.incumbent import best_known
-from robochoc.run.registry import protocol_named
+from robochoc.run.registry import protocol_named, protocol_names
 from robochoc.solver.agent_problem import RunParameters
 from robochoc.solver.compiled_team import CompiledTeam
 from robochoc.verification.checker import violations
@@ -40,16 +33,9 @@ from tests.support.problems import team_of
 from tests.support.small_teams import DIFFERENT
 
 NAMES: dict[type[CycleProtocol], str] = {
-    DSA: "dsa",
-    DSASDP: "dsa-sdp",
-    MixedDSA: "mixed-dsa",
-    LAMDLS: "lamdls",
-    KOpt: "kopt",
-    MGM: "mgm",
-    MGM2: "mgm2",
-    GDBA: "gdba",
-    MaxSum: "maxsum",
-    MaxSumAD: "maxsum-ad",
+    protocol: name
+    for name in protocol_names()
+    if issubclass(protocol := protocol_named(name), CycleProtocol) and protocol.traits.costs and name != "a-dsa"
 }
 ALL = pytest.mark.parametrize("protocol", NAMES)
 
@@ -204,3 +190,10 @@ def test_what_is_set_is_not_set_of_the_protocol_that_says_who_steps_aside() -> N
     outcome = solve(team, options)
     assert outcome.verdict is Verdict.SOLUTION
     assert len(outcome.withdrawn) == 1
+
+
+def test_the_docs_name_all_that_go_through_cycles() -> None:
+    metrics = (Path(__file__).parents[2] / "docs" / "reference" / "metrics.md").read_text(encoding="utf-8")
+    (row,) = re.findall(r"^\| cycles \((.*?)\)", metrics, re.MULTILINE)
+    cyclic = {name for name in protocol_names() if issubclass(protocol_named(name), CycleProtocol)}
+    assert {*re.findall("`(.*?)`", row)} == {*cyclic, "d-gibbs"}

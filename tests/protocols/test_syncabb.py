@@ -145,3 +145,20 @@ def test_a_side_without_an_own_value_is_refused() -> None:
 
 def test_the_example_in_the_documentation() -> None:
     assert doctest.testmod(robochoc.protocols.asymmetric.syncabb).failed == 0
+
+
+@pytest.mark.parametrize(
+    ("robot", "message"),
+    [
+        ("RC", cpa(1, paid=0)),
+        ("RC", cpa(1, 3, paid=0)),
+        ("RC", CPA([(1,), (1, 1)], 0, NONE)),
+        ("RC", CPA([(1,), ()], 0, NONE)),
+        ("RA", CPABack("RC", (1, 1), 0, math.inf, [])),
+        ("RA", CPABack("RC", (), 0, math.inf, [])),
+        ("RA", FullBack([(1,), (1,), ()], 0, math.inf)),
+    ],
+)
+def test_a_cpa_with_values_that_cannot_be_is_refused(robot: str, message: CPA | CPABack | FullBack) -> None:
+    with pytest.raises(ValueError, match="R"):
+        replies(agent(robot), ("RB", message))

@@ -38,7 +38,7 @@ from robochoc.model import message as wire
 from robochoc.protocols.asymmetric.messages.acls import Proposal, Sides
 from robochoc.protocols.asymmetric.settings.acls import ACLSSettings
 from robochoc.protocols.order import PriorityOrder
-from robochoc.protocols.shared.cycles import NO_GAIN, CycleProtocol, gain, values_in
+from robochoc.protocols.shared.cycles import NO_GAIN, CycleProtocol, gain
 from robochoc.protocols.shared.messages.cycles import Value
 from robochoc.protocols.traits import ENDS_WITH_PROOF, Traits
 from robochoc.solver.compiled import LexicographicCost, LocalProblem
@@ -76,7 +76,7 @@ class ACLS(CycleProtocol):
 
     def _propose(self, messages: Mapping[str, wire.Message]) -> None:
         """Draw a value that improves the own side, and propose it."""
-        self._values = values_in(messages)
+        self._values = self.checked_values(messages)
         costs = self.problem.lexicographic_costs(self._values)
         self.before = costs[self.present]
         gains = [gain(self.before, cost) for cost in costs]

@@ -40,7 +40,7 @@ from robochoc.protocols.asymmetric.messages.transfers import Transfer
 from robochoc.protocols.local_search.messages.mgm import Gain
 from robochoc.protocols.local_search.mgm import Gainers
 from robochoc.protocols.order import PriorityOrder
-from robochoc.protocols.shared.cycles import NO_GAIN, gain, values_in
+from robochoc.protocols.shared.cycles import NO_GAIN, gain
 from robochoc.protocols.shared.messages.cycles import Value
 from robochoc.protocols.traits import ENDS_WITH_PROOF, Traits
 from robochoc.solver.compiled import LexicographicCost, LocalProblem
@@ -101,7 +101,7 @@ class MCSMGM(Gainers):
 
     def _transfer(self, messages: Mapping[str, wire.Message]) -> None:
         """Hand over entries that neighbours' moves have made due, with all neighbours' values known."""
-        values = values_in(messages)
+        values = self.checked_values(messages)
         for name, value in values.items():
             before = self._values.get(name, value)
             entry = None
@@ -126,6 +126,8 @@ class MCSMGM(Gainers):
     def _move(self, messages: Mapping[str, wire.Message]) -> None:
         """Move if the own gain is the largest, with all neighbours' gains known."""
         self.told = {name: (told.broken, told.cost) for name, told in messages.items() if isinstance(told, Gain)}
+        if len(self.told) < len(messages):
+            raise ValueError(f"a neighbour of {self.problem.agent} tells something else than its gain in this phase")
         self.take(self.target if self.wins(messages) else self.present)
         if not self.over:
             self.tell_value(self._transfer)

@@ -82,10 +82,8 @@ class SyncABB(SyncBB):
         if self.verdict is not None:
             return
         match cast("CPA | CPABack | FullBack | Priced | TooCostly | Backtrack | Terminate", message):
-            case CPA(values, paid, best):
-                self.values, self.paid, self.best = values, paid, best
-                self._view = dict(zip(self.order.names, values, strict=False))
-                self._extend(0)
+            case CPA() as cpa:
+                self._take_up(cpa)
             case CPABack() as back:
                 self._add_side(back)
             case FullBack() as back:
@@ -101,6 +99,16 @@ class SyncABB(SyncBB):
                 assert_never(never)
 
     # The holder
+
+    def _take_up(self, cpa: CPA) -> None:
+        """Take the first value with a CPA of all robots before, if these can have its values."""
+        if len(cpa.values) != self.rank:
+            raise ValueError(f"a CPA for {self.problem.agent} has {self.rank} values, not {len(cpa.values)}")
+        self._view = dict(zip(self.order.names, cpa.values, strict=False))
+        for robot, value in self._view.items():
+            self.problem.refuse_value(robot, value)
+        self.values, self.paid, self.best = cpa.values, cpa.paid, cpa.best
+        self._extend(0)
 
     def _pass_on(self, cost: Cost) -> bool:
         """Send the CPA back for its cost, if robots before have a side in it; otherwise hand it on."""

@@ -127,6 +127,15 @@ class CycleProtocol(Protocol):
             self._take_best()
         self.cycle = self.settings.cycles
 
+    def checked_values(self, messages: Mapping[str, wire.Message]) -> dict[str, wire.Value]:
+        """Return what `values_in` returns; raise `ValueError` where a robot has said no value that it can have."""
+        values = values_in(messages)
+        for name in messages:
+            if name not in values:
+                raise ValueError(f"{name} tells something else than its value in this phase")
+            self.problem.refuse_value(name, values[name])
+        return values
+
     def any_value(self) -> int:
         """Return a random value of the whole domain, with which the search begins."""
         return self.any_of(range(len(self.problem.values)))

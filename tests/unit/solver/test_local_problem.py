@@ -8,8 +8,19 @@ from random import Random
 
 import pytest
 
+from robochoc.model.assembly import assemble
 from robochoc.model.message import Value
-from robochoc.model.problem import INFINITE, Constraint, ConstraintModel, Relation, Robot, Semantics, Team
+from robochoc.model.problem import (
+    INFINITE,
+    Constraint,
+    ConstraintModel,
+    Domain,
+    Relation,
+    Robot,
+    Semantics,
+    Team,
+    Variable,
+)
 from robochoc.solver import compiled, local_constraints
 from robochoc.solver.agent_problem import AgentProblem, RunParameters, agent_problems
 from robochoc.solver.compiled import LocalProblem
@@ -21,6 +32,7 @@ from tests.support.cost_problems import random_complex_cost_team, random_cost_te
 from tests.support.problems import random_team, team_of
 
 EQUAL = Relation("R", 2, Semantics.SUPPORTS, ((1, 1), (2, 2)))
+WIDE = {"RA": "AB", "RC": "C"}
 ONE = Relation("R", 2, Semantics.SUPPORTS, ((1, 1),))
 
 
@@ -342,6 +354,25 @@ def test_a_withdrawn_robot_costs_nothing_on_the_own_side() -> None:
                 assert problem.own_side(0, other, nothing) == (0, 0)
                 anything = tuple(min(team.variables[one].domain) for one in team[other].interface)
                 assert problem.own_side(len(problem.values) - 1, other, anything) == (0, 0)
+
+
+@pytest.mark.parametrize("shown", [(), (1, 1), (99,), ("x",)])
+def test_a_value_that_a_robot_cannot_have_is_refused(shown: tuple[int, ...]) -> None:
+    team = team_of(dict.fromkeys("AB", (1, 2)), [Constraint("C", EQUAL, ("A", "B"), ("A", "B"))])
+    problem = LocalProblem(agent_problems(team)["RB"])
+    problem.refuse_value("RA", (2,))
+    problem.refuse_value("RA", (None,))
+    with pytest.raises(ValueError, match="RA"):
+        problem.own_side(0, "RA", shown)
+
+
+def test_a_robot_withdraws_with_all_its_variables_or_with_none() -> None:
+    own = {robot: [Variable(name, Domain("D", (range(2),))) for name in names] for robot, names in WIDE.items()}
+    shared = [Constraint("C", EQUAL, ("C", one), ("C", one)) for one in "AB"]
+    problem = LocalProblem(agent_problems(assemble("two", own, shared))["RC"])
+    problem.refuse_value("RA", (0, 1))
+    with pytest.raises(ValueError, match="RA"):
+        problem.refuse_value("RA", (None, 1))
 
 
 @pytest.mark.parametrize("batch", range(2))

@@ -53,11 +53,10 @@ class ForeignDoors:
                 ui.label(say("decide.doors"))
             if result.reason:
                 ui.label(say("foreign.reason", why=result.reason))
-            if facts.events or facts.partial:
-                why = "foreign.no-aside-events" if facts.events else "foreign.no-aside-partial"
-                ui.label(say(why)).classes("soft")
+            if facts.events:
+                ui.label(say("foreign.no-aside-events")).classes("soft")
             with ui.element("div").classes("two"):
-                if not (facts.events or facts.partial):
+                if not facts.events:
                     _door("decide.door-aside", "decide.door-aside-help", partial(decide, withdraw=True))
                 _door("foreign.door-conflict", "foreign.door-conflict-help", self._look)
             self._found = ui.element("div").classes("found").props("aria-live=polite")
