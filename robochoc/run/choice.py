@@ -7,6 +7,7 @@ ones first. The figures behind the rules: docs/guides/which-protocol.md.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from types import MappingProxyType
@@ -38,6 +39,8 @@ MOST_IN_A_TREE = 30_000
 """So many take half a minute in the simulator (docs/guides/large-teams.md)."""
 MANY_ROBOTS = 300
 """With more, what SFB's messages tell of each robot adds up, and local search is all that ends with costs."""
+MANY_COMBINATIONS = 1_000_000
+"""Up to so many combinations of all robots' values, `syncabb` mostly ends within a minute in the simulator."""
 SPARSE = 8
 """The mean number of neighbours up to which a constraint graph is called sparse."""
 FEW_TO_BEGIN_ANEW = 25
@@ -85,6 +88,7 @@ PARTIAL = Condition(
 MANY = Condition(
     lambda f: f.robots > MANY_ROBOTS, f"more than {MANY_ROBOTS} robots", f"there are {MANY_ROBOTS} robots or fewer"
 )
+FORBIDS_NOTHING = Condition(lambda f: not f.forbids, "nothing is forbidden", "some constraints forbid something")
 LARGE_TABLE = Condition(
     lambda f: f.largest_table > MAX_TUPLES,
     f"a constraint of more than {MAX_TUPLES:,} combinations of values",
@@ -123,6 +127,21 @@ RULES = (
         "constraints are partially known: it takes them, and tells nobody a value",
     ),
     Rule("abt", (PARTIAL,), "constraints are partially known, and it takes them"),
+    Rule(
+        "acls",
+        (
+            PARTIAL,
+            COSTS,
+            Condition(
+                lambda f: math.prod(f.sizes.values()) > MANY_COMBINATIONS,
+                f"more than {MANY_COMBINATIONS:,} combinations of all values",
+                f"there are {MANY_COMBINATIONS:,} combinations of all values or fewer",
+            ),
+            FORBIDS_NOTHING,
+        ),
+        "both sides of partially known constraints have costs, and there are too many combinations for a proof: local"
+        " search ends, with a good answer",
+    ),
     Rule(
         "syncabb", (PARTIAL, COSTS), "both sides of partially known constraints have costs, and it proves the best sum"
     ),
@@ -170,7 +189,7 @@ RULES = (
         (
             COSTS,
             MANY,
-            Condition(lambda f: not f.forbids, "nothing is forbidden", "some constraints forbid something"),
+            FORBIDS_NOTHING,
         ),
         "there are too many robots for a proof, and nothing is forbidden: local search ends, with a good answer",
     ),

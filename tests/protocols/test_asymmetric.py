@@ -8,6 +8,7 @@ from random import Random
 
 import pytest
 
+from robochoc.generators.random_csp import random_csp
 from robochoc.model.outcome import Verdict
 from robochoc.model.problem import INFINITE
 from robochoc.run import Options, Runtime, Withdrawal, solve
@@ -93,6 +94,18 @@ def test_auto_takes_a_complete_one() -> None:
     chance = Random("auto")
     for _ in range(5):
         assert decided(random_asymmetric_team(chance), Options(protocol="auto")).options.protocol in COMPLETE
+
+
+@pytest.mark.parametrize(("robots", "name"), [(9, "syncabb"), (10, "acls")])
+def test_auto_takes_local_search_where_a_proof_takes_too_long(robots: int, name: str) -> None:
+    """4^9 combinations are fewer than a million, and 4^10 are more."""
+    team = random_csp(robots, 4, 0.4, 0, max_cost=20, asymmetric=True)
+    assert decided(team, Options(protocol="auto")).options.protocol == name
+
+
+def test_auto_keeps_to_the_complete_one_where_robots_withdraw() -> None:
+    team = random_csp(10, 4, 0.4, 0, max_cost=20, asymmetric=True)
+    assert decided(team, Options(protocol="auto", withdraw=Withdrawal.MINIMUM)).options.protocol in COMPLETE
 
 
 # What is said
