@@ -74,7 +74,7 @@ class _Form(msgspec.Struct, omit_defaults=True):
     epochs: list[_EpochForm]
     metrics: _MetricsForm
     verified: bool
-    count: int | None = None
+    count: Decimal | None = None
     reason: str | None = None
     lost: list[str] = []
     order: str | None = None
@@ -91,7 +91,7 @@ class _Form(msgspec.Struct, omit_defaults=True):
 
 
 _SAME = (
-    *("team", "protocol", "runtime", "seed", "verdict", "cost", "verified", "count", "reason", "order"),
+    *("team", "protocol", "runtime", "seed", "verdict", "cost", "verified", "reason", "order"),
     *("bound", "placed_by", "tree", "confirmed", "channel", "claimed_by", "chosen"),
 )
 """The fields that are the same in an outcome and in its JSON form."""
@@ -113,6 +113,7 @@ def result_json(outcome: Outcome, names: Mapping[str, str] = MappingProxyType({}
         assignment=outcome.labelled(outcome.assignment),
         withdrawn=list(outcome.withdrawn),
         lost=list(outcome.lost),
+        count=None if outcome.count is None else Decimal(outcome.count),  # an integer has 64 bits at most in msgspec
         epochs=[_epoch(epoch, outcome) for epoch in outcome.epochs],
         metrics=_metrics(outcome.metrics),
         checked=_CheckedForm(*outcome.checked) if outcome.checked else None,

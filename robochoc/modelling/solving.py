@@ -87,7 +87,7 @@ class Solvable(ABC):
             ncccs: A limit on non-concurrent constraint checks, in the simulator. None: no limit.
             cycles: A limit on cycles, with the schedule `cycles`. None: no limit.
             verify: Whether the central solver checks a `no-solution` or a minimum cost that robots have found.
-            count: Whether the central solver counts all solutions.
+            count: Whether the central solver counts all solutions, or `count-dpop` all optima.
             central_with: Who decides with the protocol `central`: `ace` or `ortools`.
             cache: Whether solutions of local problems are kept in the user's cache folder.
             local: Limits on the compilation of each robot's domain.

@@ -33,7 +33,8 @@ class Findings(msgspec.Struct, frozen=True):
     """A robot's knowledge of the whole search; None for what it, or its protocol, does not know.
 
     `bound` is a lower bound on the cost of every assignment of the robots that it is for (a root: its tree; the first
-    robot: all robots). `left` are the places of the own values that preprocessing has left.
+    robot: all robots). `count` is the number of optima of a root's tree, in hexadecimal digits, as it may need more
+    than 64 bits. `left` are the places of the own values that preprocessing has left.
     """
 
     best: Incumbent | None = None
@@ -41,6 +42,7 @@ class Findings(msgspec.Struct, frozen=True):
     place: PseudoTreeNode | None = None
     trail: Trail | None = None
     left: tuple[int, ...] | None = None
+    count: str | None = None
 
 
 NOTHING = Findings()

@@ -36,6 +36,7 @@ class Traits:
         tables: It computes with tables of floats, and refuses costs that could add up to 2^53 or more
             (`solver/exact_costs.py`).
         secret_keys: Its robots draw keys (`Protocol.secret`). A run across machines cannot be replayed then.
+        counts: Its robots also count the optima, or without costs the solutions (`--count`).
         arrays: It has a form for whole teams at once (`communication/arrays`).
         privacy: The information that neighbours do not get.
         use_when: A short recommendation, for `robochoc protocols`.
@@ -55,6 +56,7 @@ class Traits:
     concludes: tuple[Verdict, ...] = UNDECLARED
     tables: bool = False
     secret_keys: bool = False
+    counts: bool = False
     arrays: bool = False
     privacy: str = ""
     use_when: str = ""

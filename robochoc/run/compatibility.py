@@ -137,7 +137,6 @@ OPTION_RULES = (
         "--withdraw maximal is settled by the robots, in priority order; the central solver finds a minimum",
         "--withdraw minimum",
     ),
-    OptionRule(lambda o: o.count and o.protocol != CENTRAL, "--count is for --protocol central"),
     OptionRule(
         lambda o: o.central_with != CentralSolverName.ACE and o.protocol != CENTRAL,
         "--with says who decides one model of all files",
@@ -310,9 +309,15 @@ TEAM_RULES = (
     ),
     TeamRule(lambda c: c.unknown_kills, "--kill names a robot that {team} does not have: {case.unknown_kills}"),
     TeamRule(
-        lambda c: c.options.count and c.has_costs,
-        "{team} is a DisWCSP, where every assignment that breaks nothing hard is a solution; --count is for problems"
-        " without costs",
+        lambda c: (
+            c.options.count and c.is_distributed and (not c.traits.counts or c.options.runtime is Runtime.NETWORK)
+        ),
+        "--count is for --protocol central, or count-dpop on one machine: across machines it is one robot's word",
+    ),
+    TeamRule(
+        lambda c: c.options.count and c.has_costs and not c.is_distributed,
+        "{team} is a DisWCSP, where every assignment that breaks nothing hard is a solution",
+        "add --protocol count-dpop, which counts optima",
     ),
     TeamRule(
         lambda c: c.is_distributed and (c.traits.costs or c.minimum_withdrawal) and c.max_total >= LARGEST,

@@ -129,7 +129,13 @@ class Deployment(ABC):
     def outcome(self, header: Outcome, answer: Answer) -> Outcome:
         """Return `header`, which says what was run, with its `answer`."""
         metrics = replace(answer.metrics, compile_s=self.compile_s)
-        return replace(answer, metrics=metrics).as_outcome(header, self.lost)
+        return replace(answer, metrics=metrics, count=self._count(answer)).as_outcome(header, self.lost)
+
+    def _count(self, answer: Answer) -> int | None:
+        """Return how many solutions, or optima, there are, if that is asked for and known."""
+        if not self.options.count:
+            return None
+        return 0 if answer.verdict is Verdict.NO_SOLUTION else answer.count
 
     def _search_without_losses(self, phase: Phase) -> Search:
         """Search until a search ends without a loss. Its metrics are those of all searches together."""

@@ -15,7 +15,7 @@ from robochoc.model.cost_units import Cost
 from robochoc.model.costs import told_cost
 from robochoc.model.outcome import CheckCounts, EpochOutcome, Metrics, Outcome, Preprocessing, PseudoTreeNode, Verdict
 from robochoc.model.problem import ProblemKind, Team
-from robochoc.run.incumbent import best_known, lower_bound, merged_values, pseudo_tree, robots_without_values
+from robochoc.run.incumbent import best_known, lower_bound, merged_values, optima, pseudo_tree, robots_without_values
 from robochoc.run.withdrawal import Phase
 from robochoc.solver.compiled_team import CompiledTeam
 from robochoc.system.garbage import collection_paused
@@ -53,7 +53,7 @@ class Answer:
     """The result of a phase of a run. Most fields are those of `model.outcome.Outcome`: costs are the user's numbers.
 
     `withdrawn` are the robots that withdrew so that the others have a solution; those that were lost are not among
-    them. `ended`: the protocol has come to its end, no limit was reached.
+    them. `ended`: the protocol has come to its end, no limit was reached. `count` is there if the protocol counts.
     """
 
     verdict: Verdict
@@ -72,6 +72,7 @@ class Answer:
     epochs: tuple[EpochOutcome, ...] = ()
     ended: bool = False
     preprocessing: Preprocessing | None = None
+    count: int | None = None
 
     def confirmed_as(self, solvers: tuple[str, ...]) -> Answer:
         """Return this answer, with which central `solvers` agree: that there is no solution, nothing else shows."""
@@ -127,6 +128,7 @@ class Answer:
             epochs=self.epochs,
             checked=self.checked,
             preprocessing=self.preprocessing,
+            count=self.count,
         )
 
 
@@ -142,6 +144,8 @@ def evaluate_search(phase: Phase, search: Search, kind: ProblemKind, told: Calla
     result = search.result
     ended = result.verdict is Verdict.SOLUTION
     answer = Answer(result.verdict, result.metrics, result.witness, tree=pseudo_tree(result.findings), ended=ended)
+    if ended and not result.lost:
+        answer = replace(answer, count=optima(result.findings))
     if result.lost or result.verdict is Verdict.NO_SOLUTION or not (ended or phase.traits.costs):
         return answer
     bound = None if is_proven(phase, result) else _bound_of(phase, result, told)

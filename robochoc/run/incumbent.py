@@ -8,6 +8,7 @@ assignments whose cost can be computed from the files. The cheapest is the answe
 from __future__ import annotations
 
 import itertools
+import math
 from collections.abc import Iterator, Mapping
 from typing import NamedTuple
 
@@ -65,6 +66,12 @@ def lower_bound(findings: Mapping[str, Findings]) -> float | None:
     bounds = [found.bound for found in findings.values() if found.bound is not None]
     least = sum(bounds)
     return int(least) if bounds and least < INFINITE else None
+
+
+def optima(findings: Mapping[str, Findings]) -> int | None:
+    """Return the product of what the roots have counted, each in its tree; None if none has counted."""
+    counts = [int(found.count, 16) for found in findings.values() if found.count is not None]
+    return math.prod(counts) if counts else None
 
 
 def pseudo_tree(findings: Mapping[str, Findings]) -> dict[str, PseudoTreeNode]:

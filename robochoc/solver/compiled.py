@@ -62,6 +62,11 @@ class LocalProblem(LocalConstraints):
     its parts are None, and all constraints with it hold.
     """
 
+    @property
+    def behind(self) -> Sequence[int]:
+        """For each own value the number of local solutions of least private cost behind it; 1 for withdrawal."""
+        return (*self._domain.cheapest, *(1 for _ in self.values[len(self._domain.values) :]))
+
     def solution(self, index: int) -> dict[str, int]:
         """Return the values of all own variables for `values[index]`. Empty if the robot is withdrawn."""
         return self._domain.solution(index)

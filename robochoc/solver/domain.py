@@ -49,7 +49,8 @@ class CompiledDomain:
 
     `values[i]` holds the interface variables' values; `solutions[i]` one local solution behind it (the values of
     `variables`: of the cheapest, the lexicographically first), `counts[i]` the number of local solutions that look
-    like it, and `costs[i]` what the private constraints charge for the cheapest.
+    like it, `cheapest[i]` the number of those that are as cheap as the cheapest, and `costs[i]` what the private
+    constraints charge for that.
     """
 
     variables: tuple[str, ...]
@@ -57,6 +58,7 @@ class CompiledDomain:
     solutions: tuple[tuple[int, ...], ...]
     counts: tuple[int, ...]
     costs: tuple[Cost, ...]
+    cheapest: tuple[int, ...]
 
     @property
     def total(self) -> int:
@@ -74,14 +76,16 @@ class CompiledDomain:
 
 @dataclass
 class _Group:
-    """Local solutions that look alike: the first of the cheapest, what it costs, and how many there are."""
+    """Local solutions that look alike: the first of the cheapest, its cost, how many there are, and as cheap ones."""
 
     solution: tuple[int, ...]
     cost: Cost
-    count: int
+    count: int = 0
+    cheapest: int = 0
 
     def add(self, solution: tuple[int, ...], cost: Cost) -> None:
         self.count += 1
+        self.cheapest = (self.cheapest if cost >= self.cost else 0) + (cost <= self.cost)
         self.cost, self.solution = min((self.cost, self.solution), (cost, solution))
 
 
@@ -100,7 +104,7 @@ def compile_domain(robot: Robot, solve: SolveNetwork | None = None, limit: int =
     soft = [constraint for constraint in robot.private if is_soft(constraint)]
     parts = components(robot.variables, robot.private, [constraint.variables for constraint in soft])
     if any(part.network.impossible for part in parts):
-        return CompiledDomain(tuple(variable.name for variable in robot.variables), (), (), (), ())
+        return CompiledDomain(tuple(variable.name for variable in robot.variables), (), (), (), (), ())
     seen = set(robot.interface)
     paid = [[one for one in soft if _is_paid_in(one, part, parts[0])] for part in parts]
     grouped = [
@@ -139,7 +143,7 @@ def _grouped(
     for codes in solutions:
         solution = part.decoded(codes)
         cost = sum(price(solution) for price in prices)
-        group = groups.setdefault(tuple([solution[place] for place in shown]), _Group(solution, cost, 0))
+        group = groups.setdefault(tuple([solution[place] for place in shown]), _Group(solution, cost))
         group.add(solution, cost)
     return list(groups.values())
 
@@ -155,12 +159,14 @@ def _joined(robot: Robot, names: Sequence[Sequence[str]], grouped: Sequence[Sequ
         flat = tuple(itertools.chain.from_iterable(group.solution for group in combination))
         solution = tuple([flat[index] for index in order])
         count = math.prod(group.count for group in combination)
-        found.append((solution, count, sum(group.cost for group in combination)))
+        cheapest = math.prod(group.cheapest for group in combination)
+        found.append((solution, count, sum(group.cost for group in combination), cheapest))
     found.sort()
     return CompiledDomain(
         variables=variables,
-        values=tuple(tuple([solution[index] for index in shown]) for solution, _, _ in found),
-        solutions=tuple(solution for solution, _, _ in found),
-        counts=tuple(count for _, count, _ in found),
-        costs=tuple(cost for _, _, cost in found),
+        values=tuple(tuple([solution[index] for index in shown]) for solution, *_ in found),
+        solutions=tuple(solution for solution, *_ in found),
+        counts=tuple(count for _, count, _, _ in found),
+        costs=tuple(cost for _, _, cost, _ in found),
+        cheapest=tuple(cheapest for *_, cheapest in found),
     )

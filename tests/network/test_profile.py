@@ -83,7 +83,7 @@ def registered(team: Team) -> Members:
 
 def nothing_of(_robot: Robot) -> CompiledDomain:
     """No values: nobody searches here, and large files need no solver then."""
-    return CompiledDomain((), (), (), (), ())
+    return CompiledDomain((), (), (), (), (), ())
 
 
 def part_of(robot: Robot, task: Task) -> AgentProblem:

@@ -33,6 +33,7 @@ BOUNDING = (
     "p-dpop",
     "s-dpop",
     "o-dpop",
+    "count-dpop",
 )
 INCOMPLETE = tuple(
     name for name in protocol_names() if protocol_named(name).traits.costs and not protocol_named(name).traits.complete

@@ -262,7 +262,7 @@ def check_products(products: Products, wanted: Wanted, options: Options, *, team
         raise click.UsageError(
             "--explain goes without --json: the JSON result always has what was chosen, and the tree"
         )
-    if options.count and (products or wanted.ros):
+    if options.count and options.protocol == "central" and (products or wanted.ros):
         nothing = "--ros" if wanted.ros else "--html, --journal, --serve or --sniff"
         raise click.UsageError(f"--count gives only a number: drop {nothing}")
     if options.bounds and not products.journal:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping
+from decimal import Decimal
 
 from robochoc.cli.reports.table import table_lines
 from robochoc.formats import on_one_line
@@ -103,12 +104,19 @@ def _verdict(team: Team, outcome: Outcome) -> str:
         case Verdict.UNKNOWN:
             return f"unknown: {outcome.reason or 'a limit was reached before a verdict'}{_so_far(team, outcome)}"
         case _ if outcome.count is not None:
-            return f"{outcome.count:,} solution{'s' * (outcome.count != 1)}"
+            return _counted(outcome.count, outcome)
         case Verdict.SOLUTION | Verdict.OPTIMAL if not outcome.withdrawn_alive:
             return f"{headline}{_not_proven(team, outcome)}, {_checked(outcome)}{confirmed}{_trusted(outcome)}"
         case Verdict.SOLUTION | Verdict.OPTIMAL:
             whole = f"no solution{left or ' for the whole team'}{because}"
             return f"{headline}; {whole}; {_checked(outcome)}{confirmed}{_trusted(outcome)}"
+
+
+def _counted(count: int, outcome: Outcome) -> str:
+    """Return the number of solutions, or optima, which may have any number of digits."""
+    if outcome.verdict is Verdict.SOLUTION:
+        return f"{Decimal(count):,} solution{'s' * (count != 1)}"
+    return f"{Decimal(count):,} optim{'um' if count == 1 else 'a'} of cost {cost_shown(outcome.cost or 0)}"
 
 
 def _confirmed(outcome: Outcome) -> str:

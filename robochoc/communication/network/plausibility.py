@@ -8,6 +8,7 @@ against the liar's earlier words, or against a neighbour's. `docs/guides/securit
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Collection, Iterator, Mapping
 from dataclasses import dataclass, field
 from itertools import chain
@@ -36,6 +37,7 @@ NOTICEABLE = 100
 """A gap of fewer messages may be under way when the time is over."""
 _ROUNDED = 1 + 2**-40
 """Costs may be larger than floats are exact, and some travel as floats."""
+HEXADECIMAL = re.compile(r"[0-9a-f]+")
 _NOBODY = Exchanged(0, 0, 0)
 
 
@@ -174,6 +176,8 @@ def fault_of_findings(findings: Findings, order: Collection[str]) -> str:
     costs = (findings.bound or 0, findings.best.cost if findings.best is not None else 0)
     if not all(0 <= cost <= INFINITE for cost in costs):
         return "it tells of costs that cannot be"
+    if findings.count is not None and not HEXADECIMAL.fullmatch(findings.count):
+        return "it tells of a number that is none"
     entries = findings.trail.entries if findings.trail is not None else []
     return "it tells of cycles that cannot be" if any(place < 0 for place in chain.from_iterable(entries)) else ""
 

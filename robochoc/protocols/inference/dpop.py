@@ -277,8 +277,13 @@ class DPOP(TreeProtocol):
                 [dimensions.separator[name] for name in self._table_axes(child)], dimensions.dearest
             )
         self.utils[child].add(width, costs)
-        if len(self.utils) == len(self.children) and all(table.complete for table in self.utils.values()):
+        if self._all_arrived:
             self._compute_utils_of_all()
+
+    @property
+    def _all_arrived(self) -> bool:
+        """Whether the children's tables of costs are complete."""
+        return len(self.utils) == len(self.children) and all(table.complete for table in self.utils.values())
 
     def _table_axes(self, child: str) -> Sequence[str]:
         """Return the robots of the axes of a child's table."""
@@ -298,8 +303,12 @@ class DPOP(TreeProtocol):
         """Compute the minimum cost of the subtree for each combination of values in the separator."""
         shape = [self._sizes[name] for name in self.separator or ()]
         costs, self.choices = project(shape, self.problem.charges, self._joined, width_of(self._dearest))
+        self._use_joined(costs)
         self._joined.clear()
         self._pass_on(costs)
+
+    def _use_joined(self, costs: Codes) -> None:
+        """Compute what else depends on the joined tables, besides the least `costs`; here nothing."""
 
     def _pass_on(self, costs: Codes) -> None:
         """Send the own table to the parent; a root chooses, and a table without a finite cost ends the search."""

@@ -167,6 +167,11 @@ def _block(table: Table, place: Sequence[int]) -> Array:
     return costs
 
 
+def costs_for(table: Table, value: int) -> Array:
+    """Return, as floats, the part of `table` for one place on its first axis; all of it if that has length 1."""
+    return _block(table[value : value + 1] if len(table) > 1 else table, ()).reshape(table.shape[1:])
+
+
 def _max_finite(costs: Codes) -> int:
     """Return the largest finite cost; 0 if there is none."""
     flat = costs.reshape(-1)

@@ -235,10 +235,6 @@ class MBDPOP(DPOP):
         if self.context is not None and self.choices is None and self._all_arrived:
             self._compute_utils()
 
-    @property
-    def _all_arrived(self) -> bool:
-        return len(self.utils) == len(self.children) and all(table.complete for table in self.utils.values())
-
     def _compute_utils_of_all(self) -> None:
         self._compute_if_complete()
 

@@ -130,7 +130,6 @@ REFUSED_OPTIONS: list[tuple[dict[str, Any], str]] = [
     ({"protocol": "central", "order": ("RA", "RB")}, "--order is for robots"),
     ({"protocol": "central", "settings": {"cycles": "5"}}, "--set is for robots"),
     ({"protocol": "central", "withdraw": Withdrawal.MAXIMAL}, "finds a minimum; --withdraw minimum"),
-    ({"count": True}, "--count is for --protocol central"),
     ({"protocol": "central", "count": True, "withdraw": Withdrawal.MINIMUM}, "who can do without"),
     ({"filters": ("signed",)}, "add --runtime network"),
     ({"spares": 1, "runtime": Runtime.NETWORK}, "drop --runtime network"),

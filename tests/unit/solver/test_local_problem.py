@@ -314,7 +314,7 @@ def _any_domains(team: Team, chance: Random) -> CompiledTeam:
         rows = sorted({tuple([chance.choice(list(variable.domain)) for variable in robot.variables]) for _ in range(6)})
         by_value = {tuple([row[names.index(name)] for name in robot.interface]): row for row in rows}
         ones, noughts = (1,) * len(by_value), (0,) * len(by_value)
-        return CompiledDomain(names, tuple(by_value), tuple(by_value.values()), ones, noughts)
+        return CompiledDomain(names, tuple(by_value), tuple(by_value.values()), ones, noughts, ones)
 
     return CompiledTeam(team, compile_robot)
 
