@@ -163,7 +163,7 @@ _SECTIONS: Sections = {
 @kill_option
 @filter_option
 @click.option("--explain", is_flag=True, help="Print why the protocol was chosen, and the pseudo-tree.")
-@click.option("--count", is_flag=True, help="With --protocol central or count-dpop: count all solutions.")
+@click.option("--count", is_flag=True, help="With --protocol central, count-dpop: count solutions.")
 @click.option(
     "--with",
     "central_with",
