@@ -290,8 +290,7 @@ TEAM_RULES = (
     _not_with_scenario("--preprocess", lambda o: o.preprocess),
     TeamRule(
         lambda c: c.options.preprocess and c.minimum_withdrawal and c.traits.costs,
-        "--preprocess removes values that do not go with others, but with --withdraw minimum {protocol} may do without"
-        " these robots",
+        "--preprocess removes values that do not go with robots that may withdraw (--withdraw minimum, {protocol})",
         "drop --preprocess, or choose a protocol that does not minimise costs",
         other_protocol=True,
     ),
