@@ -86,7 +86,7 @@ class DUCT(TreeProtocol):
         shared_scopes=True,
         writes_to_non_neighbours=False,
         privacy="constraints of others, but for sums",
-        use_when="costs, pseudo-tree too wide for dpop: better with more samples",
+        use_when="costs, tree too wide for dpop: better with more samples",
     )
 
     def __init__(self, problem: LocalProblem, order: PriorityOrder) -> None:
