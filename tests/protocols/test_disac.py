@@ -214,7 +214,10 @@ def test_its_journal_is_replayed(protocol: str, team: Team) -> None:
         (replace(AC, runtime=Runtime.NETWORK), "--preprocess is of robots in processes or the simulator"),
         (replace(AC, runtime=Runtime.ARRAYS, protocol="dsa"), "--preprocess is of robots in processes"),
         (Options(protocol="central", preprocess=Preprocess.AC), "--preprocess is for robots that solve it together"),
-        (replace(AC, protocol="sfb", withdraw=Withdrawal.MINIMUM), "--preprocess removes values that do not go with robots"),
+        (
+            replace(AC, protocol="sfb", withdraw=Withdrawal.MINIMUM),
+            "--preprocess removes values that do not go with robots",
+        ),
     ],
 )
 def test_what_it_does_not_go_with_is_refused(options: Options, told: str) -> None:
