@@ -308,9 +308,7 @@ TEAM_RULES = (
     ),
     TeamRule(lambda c: c.unknown_kills, "--kill names a robot that {team} does not have: {case.unknown_kills}"),
     TeamRule(
-        lambda c: (
-            c.options.count and c.is_distributed and (not c.traits.counts or c.options.runtime is Runtime.NETWORK)
-        ),
+        lambda c: c.options.count and c.is_distributed and (c.options.runtime == "network" or not c.traits.counts),
         "--count is for --protocol central, or count-dpop on one machine: across machines it is one robot's word",
     ),
     TeamRule(
