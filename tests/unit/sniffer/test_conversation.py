@@ -128,7 +128,7 @@ def values_of(hint: Any) -> st.SearchStrategy[Any]:  # noqa: ANN401 - any type
     if origin is None:
         return messages_of(hint)
     if origin is Annotated:
-        return st.integers(arguments[1].ge, 2**50)
+        return st.integers(arguments[1].ge, min(arguments[1].le or 2**50, 2**50))
     if origin is Literal:
         return st.sampled_from(arguments)
     within = [values_of(argument) for argument in arguments if argument is not Ellipsis]
