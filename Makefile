@@ -53,7 +53,7 @@ test-slow: $(READY)  ## the rest: random batches in length, faults in all varian
 test-all: test test-slow
 
 # One of PART slow tests, the same ones with the same problems each time: what CI has time for (six minutes, 2 cores).
-PART ?= 8
+PART ?= 16
 test-part: $(READY)  ## a fixed part of the slow tests, for CI
 	$(PYTEST) -m slow -p tests.support.parts --part $(PART)
 

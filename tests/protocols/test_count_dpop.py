@@ -160,7 +160,7 @@ def test_what_is_said_of_numbers_in_words() -> None:
 # The run
 
 
-@count("problems", 60, 2000)
+@count("problems", 15, 2000)
 def test_the_number_is_that_of_all_assignments_of_least_cost(problems: int) -> None:
     chance, several = Random("count"), 0
     for number in range(problems):
