@@ -272,7 +272,7 @@ def test_what_this_version_cannot_solve_is_said_in_one_sentence(tmp_path: Path) 
     differ = Relation("R", 2, Semantics.CONFLICTS, ((1, 1),))
     part = Constraint("C", differ, ("A", "B"), ("A", "B"), model=ConstraintModel.PKC)
     write_team(team_of({"A": (1, 2), "B": (1, 2)}, [part]), tmp_path / "private")
-    done = robochoc_within("solve", tmp_path / "private", "--withdraw")
+    done = robochoc_within("solve", tmp_path / "private", "--withdraw", "maximal")
     assert done.returncode == 2
     assert "PKC" in done.stderr
     assert len(done.stderr.splitlines()) == 1

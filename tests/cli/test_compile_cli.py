@@ -263,7 +263,7 @@ def test_rows_have_the_solutions_that_cells_have(rows: Path) -> None:
 @pytest.mark.parametrize(
     "words",
     [
-        ["--count"],
+        ["--protocol", "abt", "--count"],
         ["--protocol", "central", "--verify"],
         ["--protocol", "central", "--withdraw", "maximal"],
         ["--protocol", "central", "--count", "--html", "page.html"],

@@ -23,9 +23,16 @@ def test_the_example_has_soft_and_hard_constraints() -> None:
     assert least_cost(team) == 6
 
 
+WITHOUT_ANSWER = {"async-maxsum", "bounded-maxsum"}
+"""Their robots have no cycles of which the best is taken, and their last values break something hard here."""
+
+
 @pytest.mark.parametrize("protocol", MINIMISING)
 def test_every_protocol_that_minimises_comes_to_the_tutorials_answer(protocol: str) -> None:
     outcome = solve(read_team(PATROL), Options(protocol=protocol, runtime=Runtime.SIMULATOR))
+    if protocol in WITHOUT_ANSWER:
+        assert (outcome.verdict, outcome.assignment) == (Verdict.UNKNOWN, {})
+        return
     complete = protocol_named(protocol).traits.complete
     assert outcome.verdict is (Verdict.OPTIMAL if complete else Verdict.SOLUTION)
     assert (outcome.assignment, outcome.cost) == (BEST, 6) or not complete

@@ -43,6 +43,7 @@ def test_every_protocol_declares_what_its_robots_conclude() -> None:
     }
     assert not FirstFit.traits.concludes
     assert ends.pop("SBT") == ends.pop("AFC") == {Verdict.SOLUTION, Verdict.NO_SOLUTION}
+    assert ends.pop("DBA") == {Verdict.NO_SOLUTION, Verdict.UNKNOWN}  # it stops, and may give up
     assert set(map(frozenset, ends.values())) == {frozenset({Verdict.NO_SOLUTION})}
     assert Verdict.OPTIMAL not in Traits().concludes
 
