@@ -148,7 +148,7 @@ def test_the_guide_explains_every_trait_and_all_that_a_robot_knows() -> None:
 
 def test_the_guide_names_what_a_protocol_has() -> None:
     said = _explained("you write") | _explained("you use")
-    has = {*dir(Protocol), "value", "verdict", "problem", "order", "chance"}
+    has = {*dir(Protocol), "value", "verdict", "problem", "order", "chance", "secret"}
     assert said == {name for name in has if not name.startswith("_")} - {"messages", "traits", "assignment"}
 
 
