@@ -243,6 +243,7 @@ class Odd(ABT):
         self.best = Incumbent(3.0, {"RA": (1,)})
 
 
+@plain_python_only
 def test_what_a_user_keeps_is_shown_as_far_as_it_can_be() -> None:
     then = states(pair(), "RB", options=ReplayOptions(protocols={"ABT": Odd}))[-1]
     assert then.value == {"B": 2}

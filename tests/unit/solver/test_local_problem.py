@@ -27,6 +27,7 @@ from robochoc.solver.compiled import LocalProblem
 from robochoc.solver.compiled_team import CompiledTeam
 from robochoc.solver.domain import CompiledDomain
 from tests.support.asymmetric_problems import random_asymmetric_team
+from tests.support.compiled import plain_python_only
 from tests.support.complex_problems import random_complex_team
 from tests.support.cost_problems import random_complex_cost_team, random_cost_team
 from tests.support.problems import random_team, team_of
@@ -357,6 +358,7 @@ def test_a_withdrawn_robot_costs_nothing_on_the_own_side() -> None:
 
 
 @pytest.mark.parametrize("shown", [(), (1, 1), (99,), ("x",)])
+@plain_python_only
 def test_a_value_that_a_robot_cannot_have_is_refused(shown: tuple[int, ...]) -> None:
     team = team_of(dict.fromkeys("AB", (1, 2)), [Constraint("C", EQUAL, ("A", "B"), ("A", "B"))])
     problem = LocalProblem(agent_problems(team)["RB"])
