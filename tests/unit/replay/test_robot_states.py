@@ -243,13 +243,12 @@ class Odd(ABT):
         self.best = Incumbent(3.0, {"RA": (1,)})
 
 
-@plain_python_only
 def test_what_a_user_keeps_is_shown_as_far_as_it_can_be() -> None:
     then = states(pair(), "RB", options=ReplayOptions(protocols={"ABT": Odd}))[-1]
     assert then.value == {"B": 2}
     assert then.more["table"] == "<array of 3 x 4>"
-    assert then.more["secret"].startswith("{'key': deque([0, 1, 2, ")
-    assert then.more["secret"].endswith(", ...])}")
+    assert then.more["hidden"].startswith("{'key': deque([0, 1, 2, ")
+    assert then.more["hidden"].endswith(", ...])}")
     assert then.more["context"] == "<Grim cannot be shown: RuntimeError>"
     assert then.more["best"] == "Incumbent(cost=3, values={'RA': (1,)})"
     assert then.more["endless"] == "[[[[...]]]]"
