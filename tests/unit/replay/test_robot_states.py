@@ -238,7 +238,7 @@ class Odd(ABT):
         self.context = Grim()
         self.endless: list[Any] = []
         self.endless.append(self.endless)
-        self._secret = {"key": deque(range(1000))}
+        self._hidden = {"key": deque(range(1000))}
         self.table = np.zeros((3, 4))
         self.best = Incumbent(3.0, {"RA": (1,)})
 
