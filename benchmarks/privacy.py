@@ -1,4 +1,4 @@
-"""How much protocols reveal: mean system losses on random meetings, for the tables in docs/guides/privacy.md.
+"""Measure the privacy loss of protocols on random meetings, for the tables in docs/guides/privacy.md.
 
     python benchmarks/privacy.py [PROBLEMS]
 

@@ -1,4 +1,4 @@
-"""What messages prove about other robots' problems: the terms in which a message's rule is written.
+"""The statements about robots' problems in which a message's rule (`Message.proves`) is written.
 
 A rule stands with its message (`Message.proves`). Its proofs are true statements, each on its own: about the problem,
 which does not change during a run, and about the value that a robot has taken. `robochoc/privacy` adds up what follows.
@@ -70,7 +70,7 @@ class Pays(NamedTuple):
 
 
 class EveryValuePays(NamedTuple):
-    """Whatever value `robot` takes, its own cost in `view` is at least `least`."""
+    """The own cost of every value of `robot` in `view` is at least `least`."""
 
     robot: str
     view: View
@@ -100,7 +100,7 @@ class Clash(NamedTuple):
 
 Proof = StandsAt | StandsWhere | HasOnly | Pays | EveryValuePays | SomeValuePays | Total | Clash
 NOTHING: tuple[Proof, ...] = ()
-"""What a message proves that says nothing of these. It has a rule, unlike a message whose `proves` returns None."""
+"""The proofs of a message that proves none. It has a rule, unlike a message whose `proves` returns None."""
 AT_THE_END = (2**62,)
 """The stamp of a value that is not changed any more."""
 FINITE = float(2**53)

@@ -134,7 +134,7 @@ class CheckCounts(NamedTuple):
 
 @dataclass(frozen=True)
 class Preprocessing:
-    """What robots have done before the protocol began.
+    """The result of a preprocessing step, which robots took before the protocol began.
 
     Attributes:
         name: What it is called: `ac`.

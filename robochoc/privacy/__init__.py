@@ -1,4 +1,4 @@
-"""How much robots learn of each other's problems in a run, from a journal of what each has heard."""
+"""Measure the privacy loss of robots in a run, from a journal of the messages that each has heard."""
 
 from robochoc.privacy.losses import Kind, Loss, Measure, PrivacyReport
 from robochoc.privacy.measure import PrivacyError, privacy_of

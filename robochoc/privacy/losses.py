@@ -33,7 +33,7 @@ class Measure(StrEnum):
 
 @dataclass(frozen=True)
 class Loss:
-    """What `observer` has learnt of one kind of secrets of `subject`.
+    """The loss of one kind of secrets of `subject` to `observer`.
 
     Attributes:
         observer: The robot that has heard.

@@ -1,4 +1,4 @@
-"""From a journal to the privacy loss of a run: every message is heard by its receiver, and by nobody else."""
+"""Measure the privacy loss of a recorded run: every message is heard by its receiver, and by nobody else."""
 
 from __future__ import annotations
 
@@ -58,7 +58,7 @@ def privacy_of(journal: Journal, options: ReplayOptions | None = None, number: i
 
 
 class _Measured:
-    """What the robots of one run have heard, and what it comes to."""
+    """The measurement of one run: its observers hear all messages, and `report` adds up what they can conclude."""
 
     def __init__(self, journal: Journal, runs: Sequence[RecordedRun], number: int, robots: RebuiltRobots) -> None:
         self._journal = journal

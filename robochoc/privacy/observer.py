@@ -32,7 +32,7 @@ Channel = tuple[type[Message], str, str]
 
 
 class Scene(NamedTuple):
-    """What is the same for all observers of a run.
+    """The facts of a run that all its observers share.
 
     Attributes:
         secrets: The secrets of the team.

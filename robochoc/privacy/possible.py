@@ -1,4 +1,4 @@
-"""What a secret may still be, and what statements about sums of secrets rule out.
+"""The costs that a secret may still have, narrowed down by statements about sums of secrets.
 
 A secret is a cost: an integer from 0 up to a known largest one, or `INFINITE`. What is possible is a range of finite
 costs, and whether the secret may be infinite. Statements narrow that down until nothing changes (bounds consistency):
@@ -95,7 +95,7 @@ Statement = AtLeast | AtMost | OneAtMost | OneCase
 
 @dataclass
 class Knowledge:
-    """What one observer knows of all secrets.
+    """The costs that one observer still takes to be possible, for all secrets.
 
     Attributes:
         most: The largest finite cost that a secret may have.
@@ -153,7 +153,7 @@ class Knowledge:
                 assert_never(never)
 
     def _at_least(self, terms: Terms, least: float) -> list[Secret]:
-        """Conclude for each term: it makes up for what all others cannot come to."""
+        """Raise the least cost of each term to what the others at their largest leave of `least`."""
         changed: list[Secret] = []
         unbounded = [secret for secret in terms if self[secret].infinite]
         if len(unbounded) > 1:
@@ -165,7 +165,7 @@ class Knowledge:
         return changed
 
     def _at_most(self, terms: Terms, most: float) -> list[Secret]:
-        """Conclude for each term: it is no more than what all others leave at least."""
+        """Lower the largest cost of each term to what the others at their smallest leave of `most`."""
         changed: list[Secret] = []
         total = self._minimum(terms)
         for secret in terms if total < INFINITE else ():

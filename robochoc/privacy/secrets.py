@@ -62,7 +62,7 @@ class TeamSecrets:
         """With the robots that know each from the start."""
         self.neighbours: dict[str, set[str]] = {robot.name: set() for robot in team.team.robots}
         self.withdrawing: set[Secret] = set()
-        """What it costs to withdraw, and values that cannot be told from that: not counted, and never narrowed."""
+        """Costs of withdrawing, and of values that look like it: they are not counted, and never narrowed."""
         self._shared: dict[str, list[_Entries]] = {robot.name: [] for robot in team.team.robots}
         self._team = team.team
         self._places = {

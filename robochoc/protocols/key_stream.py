@@ -1,4 +1,4 @@
-"""Where keys come from that protocols for privacy draw: the host gives each robot one source, `Protocol.secret`.
+"""The source of random keys for private protocols: the host gives each robot one, `Protocol.secret`.
 
 Across machines it is the operating system's (`secrets.randbits`): nobody can compute the keys, and a run cannot be
 repeated. In the simulator and in processes all robots are in one hand, the user's, and nothing is secret from it. There

@@ -57,7 +57,7 @@ class Withdrawal(StrEnum):
 
 
 class Preprocess(StrEnum):
-    """What robots do before the protocol. `AC`: they make their domains arc consistent (`satisfaction/disac.py`)."""
+    """Preprocessing steps. `AC`: robots make their domains arc consistent first (`satisfaction/disac.py`)."""
 
     AC = "ac"
 

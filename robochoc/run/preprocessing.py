@@ -1,4 +1,4 @@
-"""What robots do before the protocol that was asked for: they make their domains arc consistent (`--preprocess ac`).
+"""Make domains arc consistent before the protocol that was asked for begins (`--preprocess ac`).
 
 It is a search of its own, whose findings are the values that are left. The team of the search that follows is the same
 with these values only: so journals and replays of it need nothing else. The answer is checked with the files.

@@ -35,7 +35,7 @@ constraint weighs more than any cost, and differences are never `inf - inf`."""
 
 
 class Charged(NamedTuple):
-    """What one constraint charges in a view: `costs` of each own value, given what it sees of the `others`.
+    """The costs that one constraint charges in a view, of each own value, given what it sees of the `others`.
 
     `number` is the constraint's place in `LocalProblem`. Own values that it cannot tell apart have the same code.
     """

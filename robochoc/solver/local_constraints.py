@@ -1,4 +1,4 @@
-"""What a robot's local problem holds: its values, and its constraints compiled for them (see `compiled.py`).
+"""The contents of a robot's local problem: its values, and its constraints compiled for them (see `compiled.py`).
 
 Constraints are sorted by their lowest robot, so that those with the robots above a place in the order come first. Each
 is looked up in one place, and its check is counted there.

@@ -60,7 +60,7 @@ def run(team: Team, name: str, chance: Random, seed: int, price: float | None = 
 
 
 def costs_of(team: Team, result: RunResult, price: float | None) -> tuple[float, float]:
-    """What the robots' last values cost, and what the best cycle does."""
+    """Return the cost of the robots' last values, and that of the best cycle."""
     compiled = CompiledTeam(team)
     objective = Objective(team, price)
     objective.change(result.assignments)

@@ -118,7 +118,7 @@ def test_a_proposal_that_the_neighbour_cannot_take_is_refused(said: tuple[int, .
 
 
 def moved(protocol: type[MCSMGM], gained: int) -> list[tuple[str, object]]:
-    """What B, with the value 1, says when A has gone from 1 to 2, which costs B 5, after it announced that gain."""
+    """Return the messages of B = 1 when A has gone from 1 to 2, which costs B 5, after it announced that gain."""
     robot = robot_of(protocol, pair(), "RB", 0.0)
     started(robot)
     replies(robot, ("RA", Value((1,))))

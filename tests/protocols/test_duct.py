@@ -270,12 +270,12 @@ def teams(number: int, name: str) -> list[Team]:
 
 
 def paid(team: Team, result: RunResult) -> LexicographicCost:
-    """What the values at the end cost."""
+    """Return the cost of the values at the end."""
     return cost_of_assignment(team, {name: own for part in result.assignments.values() for name, own in part.items()})
 
 
 def excess(team: Team, chance: Random, **settings: object) -> LexicographicCost | None:
-    """How much more than the optimum the end costs; None where both know that there is no solution."""
+    """Return the cost of the end above the optimum; None where both know that there is no solution."""
     optimum = played(team, DPOP, Concurrent(0))
     result = played(team, DUCT, any_schedule(chance), 0, **settings)
     if optimum.verdict is Verdict.NO_SOLUTION:

@@ -44,7 +44,7 @@ def robot(team: Team, **settings: str) -> GDBA:
 
 
 def cycle(it: GDBA, other: int, told: Improve) -> Improve:
-    """What A tells in a cycle in which B has the value `other`, and tells `told`."""
+    """Return A's message of a cycle in which B has the value `other`, and tells `told`."""
     ((_, said),) = replies(it, ("RB", Value((other,))))
     replies(it, ("RB", told))
     assert isinstance(said, Improve)

@@ -47,7 +47,7 @@ def informed(t: int = 1) -> HSCAI:
 
 
 def search(robot: HSCAI, place: int, bound: float = INFINITE) -> list[tuple[str, Message]]:
-    """What B says to a CPA with a value of A, before both values are searched without success."""
+    """Return B's messages after a CPA with a value of A, before both values are searched without success."""
     said = replies(robot, ("RA", CPA(bound, {"RA": place})))
     while robot.searching:
         replies(robot, ("RC", Result(INFINITE, {})))

@@ -50,7 +50,7 @@ def chain(names: str = "ABC") -> Team:
 
 
 def parts(names: str = "ABCDE") -> dict[str, Part]:
-    """What is told of `chain`."""
+    """Return the part of each robot of `chain`, as its message has it."""
     tables = {left: [Table([f"R{left}", f"R{right}"], COSTS)] for left, right in pairwise(names)}
     return {f"R{name}": Part(FREE, tables.get(name, [])) for name in names}
 

@@ -18,7 +18,7 @@ from tests.support.pkc_problems import pkc_parts, rows, with_constraints
 
 
 class _Watched(list[Cost]):
-    """What each own value pays, and a note of each that is looked at."""
+    """The costs of each own value, with a note of each that is looked at."""
 
     def __init__(
         self, prices: list[Cost], pairs: list[frozenset[tuple[str, int]]], seen: set[frozenset[tuple[str, int]]]

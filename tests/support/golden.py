@@ -74,7 +74,7 @@ def files() -> dict[str, tuple[str, str, ScheduleName]]:
 
 
 def content(file: str) -> bytes:
-    """What the journal called `file` should be."""
+    """Return the journal called `file` as it should be."""
     protocol, team, schedule = files()[file]
     return journal(fixed_teams(protocol)[team], protocol, schedule)
 

@@ -30,7 +30,7 @@ def robot_of(protocol: type[P], team: Team, name: str, *chances: float) -> P:
 
 
 def started(robot: Protocol) -> list[tuple[str, Message]]:
-    """What `robot` says first."""
+    """Return the first messages of `robot`."""
     robot.start()
     said = list(robot.outbox)
     robot.outbox.clear()
@@ -79,7 +79,7 @@ def assignments_by_cycle(team: Team, result: RunResult) -> list[Assignment]:
 
 
 def cost_of_assignment(team: Team, assignment: Assignment) -> LexicographicCost:
-    """How many constraints `assignment` breaks, and what the others charge."""
+    """Return the number of constraints that `assignment` breaks, and the cost of the others."""
     prices = [constraint.price(assignment) for constraint in team.constraints()]
     return prices.count(INFINITE), sum(price for price in prices if price < INFINITE)
 

@@ -33,7 +33,7 @@ Free = Callable[[Mapping[str, int]], bool]
 
 @dataclass(frozen=True)
 class Run:
-    """What came out, every envelope in the order of sending, and the values that each variable took."""
+    """Return the outcome, every envelope in the order of sending, and the values that each variable took."""
 
     result: RunResult
     envelopes: tuple[Envelope, ...]

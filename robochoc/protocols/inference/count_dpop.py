@@ -121,7 +121,7 @@ class CountDPOP(DPOP):
 
     @property
     def findings(self) -> Findings:
-        """DPOP's; for a root also the number of its tree's optima."""
+        """Return DPOP's findings; for a root also the number of its tree's optima."""
         return msgspec.structs.replace(super().findings, count=None if self.count is None else f"{self.count:x}")
 
     # How large tables will be

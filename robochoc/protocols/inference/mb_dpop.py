@@ -177,7 +177,7 @@ class MBDPOP(DPOP):
         return [size for name, size in sizes.items() if name not in self.cuts[child]]
 
     def _kept_bytes(self, inputs: Sequence[Extent]) -> int:
-        """Tables stay for the next context; a cluster root keeps the best cost and context for each cell."""
+        """Keep tables for the next context; a cluster root keeps the best cost and context for each cell."""
         kept = sum(table.cells * table.width for table in inputs)
         if self.enumerated:
             places = _place_type(self.enumerated).itemsize * len(self.enumerated)

@@ -107,7 +107,7 @@ class ODPOP(DPOP):
                 assert_never(never)
 
     def _kept_bytes(self, inputs: Sequence[Extent]) -> int:
-        """Costs stay as floats, and are added up for each good."""
+        """Leave costs as floats: they are added up for each good."""
         cells = len(self.problem.values) * math.prod(self._own_sizes())
         return 40 * cells + sum(10 * table.cells for table in inputs)
 

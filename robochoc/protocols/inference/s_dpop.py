@@ -92,7 +92,7 @@ class SDPOP(DPOP, DynamicProtocol):
         """The own domain, as robots below know it."""
         self._own_tables: list[tuple[Table, tuple[str, ...]]] = []
         self._tabulated: tuple[object, ...] = ()
-        """What the tables of the own constraints were made of."""
+        """The costs of which the tables of the own constraints were made."""
         self._has_new_values = False
         self._stands = False
         """Whether the tree is that of the epoch before."""
@@ -296,7 +296,7 @@ class SDPOP(DPOP, DynamicProtocol):
         return self.problem.table_inputs(self.ancestors), domains, {*self.children}
 
     def _kept_bytes(self, inputs: Sequence[Extent]) -> int:
-        """Tables stay, also while new ones arrive; the own table stays as it was sent."""
+        """Return the bytes of tables that stay: the children's, also while new ones arrive, and the own one as sent."""
         tables = sum(table.cells * table.width for table in inputs)
         return 2 * (tables + math.prod(self._own_sizes()) * width_of(self._dearest))
 

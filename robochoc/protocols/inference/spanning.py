@@ -42,14 +42,14 @@ class SpanningProtocol(Protocol):
         """The neighbours in the tree."""
         self.root = problem.agent
         self.stage: Callable[[], bool] | None = None
-        """What is to be done next: returns False if messages for it are missing."""
+        """The next step of the construction; it returns False while messages for it are missing."""
         self._waiting: dict[str, list[Message]] = {name: [] for name in problem.neighbours}
         self._outer: list[str] = []
         self._own_choice: str | None = None
 
     @abstractmethod
     def begin(self) -> None:
-        """The tree is done."""
+        """Continue, now that the tree is done."""
 
     @property
     def children(self) -> list[str]:
@@ -92,7 +92,7 @@ class SpanningProtocol(Protocol):
         return True
 
     def _report(self) -> bool:
-        """Heaviest the heaviest function that leads out of the branch; at the root, choose it."""
+        """Report the heaviest function that leads out of the branch; at the root, choose it."""
         told = self.heard(self.children)
         if told is None:
             return False

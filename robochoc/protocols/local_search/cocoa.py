@@ -59,7 +59,7 @@ from robochoc.system.compiling import mypyc_attr
 
 
 class State(StrEnum):
-    """What a robot does at the moment."""
+    """The states of a robot."""
 
     IDLE = "idle"
     ACTIVE = "active"

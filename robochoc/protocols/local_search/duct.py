@@ -99,7 +99,7 @@ class DUCT(TreeProtocol):
         self.samples = Samples([], 0)
         self.fixed = self.chosen = False
         self._costs: dict[str, SampleCost] = {}
-        """What the children have told of the present sample."""
+        """The costs of the present sample that children have told."""
         self._sampling = False
 
     def begin(self) -> None:

@@ -1,4 +1,4 @@
-"""What a robot of DUCT knows of its values in one context: how often each was tried, and what its samples cost."""
+"""The samples of a robot of DUCT in one context: how often each value was tried, and the costs that were found."""
 
 from __future__ import annotations
 

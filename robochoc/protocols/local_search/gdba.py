@@ -61,7 +61,7 @@ from robochoc.solver.compiled import Charged, LexicographicCost, LocalProblem
 from robochoc.solver.encoding import Cost
 
 Raised = tuple[int, int]
-"""How often modifiers were raised: where the constraint was broken, and where it just cost something."""
+"""Two counts of raised modifiers: where the constraint was broken, and where it just cost something."""
 
 Key = tuple[int | None, tuple[int, ...] | None]
 """The entries of a table that are raised together: those of one code of own values, of what the others say, or all."""

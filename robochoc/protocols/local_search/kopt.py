@@ -90,7 +90,7 @@ class KOpt(CycleProtocol):
 
     @property
     def radius(self) -> int:
-        """How many links the robots of a group are from its centre at most."""
+        """The most links between a group's centre and a robot of the group."""
         return self.settings.k // 2
 
     def begin(self) -> None:

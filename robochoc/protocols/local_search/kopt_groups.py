@@ -50,7 +50,7 @@ class Move(NamedTuple):
 
 
 class Neighbourhood:
-    """What a centre knows of the robots around it, and the groups that it may lead.
+    """The problem of the robots around a centre, and the groups that the centre may lead.
 
     `groups` are the largest connected ones of at most `k` robots, itself among them, that are at most `radius` links
     away. Smaller ones are contained in them, as robots of a group may keep their values.

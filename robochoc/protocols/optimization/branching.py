@@ -101,7 +101,7 @@ class BranchingProtocol(TreeProtocol):
 
     @property
     def bound(self) -> Number:
-        """What a solution must be cheaper than."""
+        """The cost that a solution must stay below."""
         return min(self.limit, self.best)
 
     def search(self, limit: Number, local: Sequence[Number]) -> None:

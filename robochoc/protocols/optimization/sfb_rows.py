@@ -1,4 +1,4 @@
-"""What the rows of `sfb` prove to the robot that is sent them (`Message.proves`): they hold others' costs.
+"""Compute what rows of `sfb` prove to the robot that receives them (`Message.proves`): they hold others' costs.
 
 A row holds what each value of each robot from the receiver on has to pay by what is chosen above it (see `sfb_bounds`
 and `sfb_bits` for its form).

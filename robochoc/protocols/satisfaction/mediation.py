@@ -79,7 +79,7 @@ class Mediation:
             for name in seen.inside:
                 self._of[name].append(seen)
         self._least = len(tables) + 1
-        """What the best assignment so far breaks."""
+        """The number of constraints that the best assignment so far breaks."""
 
     def best(self) -> dict[str, int] | None:
         """Return the best assignment of the members; None if their constraints allow none."""

@@ -1,1 +1,1 @@
-"""What these protocols send: the messages of `syncabb.py` are in `messages/syncabb.py`."""
+"""The messages of these protocols: those of `syncabb.py` are in `messages/syncabb.py`."""

@@ -7,7 +7,7 @@ from robochoc.protocols.inference.messages import maxsum
 
 
 class R(maxsum.R, frozen=True):
-    """What `maxsum.R` says; `settled`: it is not damped. Otherwise the receiver answers, and more follows."""
+    """The costs of `maxsum.R`; `settled`: they are not damped. Otherwise the receiver answers, and more follows."""
 
     settled: bool
 
@@ -19,7 +19,7 @@ class R(maxsum.R, frozen=True):
 
 
 class Q(maxsum.Q, frozen=True):
-    """What `maxsum.Q` says; `settled`: it is not damped. Otherwise the receiver answers, and more follows."""
+    """The costs of `maxsum.Q`; `settled`: they are not damped. Otherwise the receiver answers, and more follows."""
 
     settled: bool
 

@@ -96,7 +96,7 @@ class NewRoot(Message, frozen=True):
 
 
 class Branch(Message, frozen=True):
-    """What the sender's branch costs at least.
+    """A lower bound on the cost of the sender's branch.
 
     `costs` are of the receiver's values, if the sender holds their function (R), and of its own otherwise (Q). `cut`
     is the weight of all that was cut there, `most` what all could add up to.

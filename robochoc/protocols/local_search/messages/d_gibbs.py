@@ -26,7 +26,7 @@ class Value(wire.Message, frozen=True):
 
 
 class Difference(wire.Message, frozen=True):
-    """How much more the sender's subtree pays since the sample before: broken hard constraints, and costs (BACKTRACK).
+    """The change of the subtree's cost since the last sample: broken hard constraints, and costs (BACKTRACK).
 
     Less is negative.
     """

@@ -36,7 +36,7 @@ class SampleContext(wire.Message, frozen=True):
 
 
 class SampleCost(wire.Message, frozen=True):
-    """What the sample costs the sender's subtree: broken hard constraints, and costs (COST).
+    """The cost of the sample in the sender's subtree: broken hard constraints, and costs (COST).
 
     `best`: the least that is known for these values without a broken one, and None before there is any. `hopeless`:
     there is none, whatever the subtree does.

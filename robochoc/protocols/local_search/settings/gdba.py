@@ -8,7 +8,7 @@ from robochoc.protocols.shared.settings.cycles import CycleSettings
 
 
 class GDBASettings(CycleSettings, frozen=True):
-    """How a constraint that is violated in a quasi-local minimum weighs more from then on.
+    """The rule by which a constraint that is violated in a quasi-local minimum weighs more from then on.
 
     `modifier`: A adds to what it charges, M multiplies it. `violation`: NZ (it charges anything), NM (more than its
     minimum) or MX (its maximum). `scope`: E changes one entry of its table, R those of all own values against the

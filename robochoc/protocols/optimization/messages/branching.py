@@ -1,4 +1,4 @@
-"""What is common to the messages of NCBB, PT-FB and HS-CAI (see `branching.py` and `forward_bounding.py`)."""
+"""The messages that NCBB, PT-FB and HS-CAI share (see `branching.py` and `forward_bounding.py`)."""
 
 from __future__ import annotations
 

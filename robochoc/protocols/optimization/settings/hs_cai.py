@@ -6,7 +6,7 @@ from robochoc.protocols.settings_base import Settings
 
 
 class HSCAISettings(Settings, frozen=True):
-    """How much is inferred before and during the search.
+    """The amount of inference before and during the search.
 
     `k`: the most robots above that a table may be over. With as many as the tree's induced width, all bounds are exact.
     `t`: a robot has its bounds inferred anew when a value above has stayed the same for more than `t` searches.

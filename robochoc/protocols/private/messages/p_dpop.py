@@ -29,7 +29,7 @@ Shape = dict[str, int]
 
 
 class Codes(Message, frozen=True):
-    """What the receiver, a neighbour below, needs to speak of the sender's value without telling others.
+    """Codes and keys for the sender's values, by which a neighbour below speaks of them without telling others.
 
     `codename` stands for the sender; the code of a value is its place in `values`, which are in a random order. `keys`
     has a random key for each of them, which is added to what a table says of it.

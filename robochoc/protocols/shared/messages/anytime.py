@@ -49,7 +49,7 @@ class Step(wire.Message, frozen=True):
 
 
 class Paid(wire.Message, frozen=True):
-    """What the next step has cost in the sender's subtree."""
+    """The cost of the next step in the sender's subtree."""
 
     cost: int | float
 

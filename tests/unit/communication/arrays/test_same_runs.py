@@ -47,7 +47,7 @@ def random_settings(protocol: str, chance: Random) -> dict[str, str]:
 
 
 def both(team: Team | CompiledTeam, protocol: str, parameters: RunParameters) -> tuple[RunResult, RunResult]:
-    """What comes of it in the simulator, and in arrays."""
+    """Return the results in the simulator, and in arrays."""
     objects = Simulation(team, protocol_named(protocol), Concurrent(parameters.seed), parameters=parameters)
     return objects.search(), ArraysRun(team, protocol_named(protocol), parameters=parameters).search()
 
