@@ -35,7 +35,7 @@ from tests.support.random_options import random_options
 from tests.support.wide_problems import wide_team
 
 FEW = Need(1, "RX")
-BOUNDED = ("mb-dpop",)
+BOUNDED = ("mb-dpop", "rmb-dpop")
 
 
 def place(depth: int, values: tuple[int, ...] = (1, 2, 3)) -> DomainAtDepth:
@@ -237,12 +237,18 @@ def tables(team: Team, options: Options) -> tuple[float | Decimal | None, dict[s
     outcome = solve(team, options, observer=events.append)
     sent = [event for event in events if isinstance(event, Sent)]
     dimensions, cells = dict[str, int](), dict[str, int]()
+    axes = dict[str, dict[str, int]]()
     for event in sent:
-        if event.type == "Label":
-            free = [axis for name, axis in event.content["separator"].items() if name not in event.content["cut"]]
-            dimensions[event.sender] = len(free)
-            cells[event.sender] = math.prod(axis.size for axis in free)
-        elif event.type == "UTIL":
+        if event.type in ("Label", "ClusterLabel"):
+            cut = event.content.get("cut", ())
+            axes[event.sender] = {
+                name: axis.size for name, axis in event.content["separator"].items() if name not in cut
+            }
+        elif event.type == "Allocation":
+            axes[event.receiver].pop(event.content["robot"], None)
+        elif event.type in ("UTIL", "CutUTIL"):
+            dimensions[event.sender] = len(axes[event.sender])
+            cells[event.sender] = math.prod(axes[event.sender].values())
             assert len(event.content["costs"]) // event.content["width"] == cells[event.sender]
     return outcome.cost if outcome.verdict is Verdict.OPTIMAL else None, dimensions, sent
 

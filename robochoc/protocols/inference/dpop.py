@@ -163,20 +163,28 @@ class DPOP(TreeProtocol):
         self._report()
 
     def _report(self) -> None:
-        """Send the dimensions of the own table to the parent; a root decides whether all proceed."""
+        """Compute the dimensions of the own table, and announce them."""
         checked = self.problem.scopes(self.ancestors)
         self._sizes = self._separator_sizes([scope for scope, _ in checked])
         self._dearest = self._upper_bound([charge for _, charge in checked])
         self._plan()
-        below = [self.dimensions[child] for child in self.children]
-        width = max([len(self._sizes), *(one.induced_width for one in below)])
-        self._need = self._needed([scope for scope, _ in checked])
-        most = max([self._need, *(one.most for one in below)])
+        self._announce()
+
+    def _announce(self) -> None:
+        """Send the dimensions of the own table to the parent; a root decides whether all proceed."""
+        width, most = self._extremes()
         if self.parent is None:
             self._refuse(most, width)
             self._proceed([])
         else:
             self._tell(Dimensions(self._sizes, self._dearest, width, most))
+
+    def _extremes(self) -> tuple[int, Need]:
+        """Compute the own memory need; return the induced width and the largest memory need from this robot down."""
+        self._need = self._needed([scope for scope, _ in self.problem.scopes(self.ancestors)])
+        below = [self.dimensions[child] for child in self.children]
+        width = max([len(self._sizes), *(one.induced_width for one in below)])
+        return width, max([self._need, *(one.most for one in below)])
 
     def _plan(self) -> None:
         """Decide what is to be decided before memory needs are known; here nothing."""

@@ -9,7 +9,7 @@ takes can be told before: `bytes_of`.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from typing import Any, Literal, NamedTuple
 
 import numpy as np
@@ -99,6 +99,11 @@ def project(shape: Sequence[int], charges: Sequence[float], tables: Sequence[Tab
         np.copyto(costs[*place, ...], least, where=least < np.inf, casting="unsafe")
         choices[*place, ...] = joined.argmin(axis=0)
     return Projection(costs, choices)
+
+
+def place_type(sizes: Iterable[int]) -> np.dtype[np.unsignedinteger[Any]]:
+    """Return the narrowest type, little-endian, that holds places of the values of robots with so many values."""
+    return np.min_scalar_type(max(sizes) - 1).newbyteorder("<")
 
 
 def is_hopeless(costs: Codes) -> bool:

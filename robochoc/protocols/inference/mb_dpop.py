@@ -45,13 +45,23 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Iterator, Mapping, Sequence
-from typing import Any, ClassVar, assert_never, cast
+from typing import ClassVar, assert_never, cast
 
 import numpy as np
 
 from robochoc.model.message import Message
 from robochoc.protocols.inference.dpop import DPOP, MOST_AXES, keep_once
-from robochoc.protocols.inference.dpop_tables import Codes, Extent, Table, Width, aligned, project, width_of
+from robochoc.protocols.inference.dpop_tables import (
+    Codes,
+    Extent,
+    Projection,
+    Table,
+    Width,
+    aligned,
+    place_type,
+    project,
+    width_of,
+)
 from robochoc.protocols.inference.messages.dpop import UTIL, VALUE, Dimensions, Proceed
 from robochoc.protocols.inference.messages.mb_dpop import Axis, Context, DomainAtDepth, Label
 from robochoc.protocols.inference.settings.mb_dpop import MBDPOPSettings
@@ -180,7 +190,7 @@ class MBDPOP(DPOP):
         """Keep tables for the next context; a cluster root keeps the best cost and context for each cell."""
         kept = sum(table.cells * table.width for table in inputs)
         if self.enumerated:
-            places = _place_type(self.enumerated).itemsize * len(self.enumerated)
+            places = place_type(self.enumerated.values()).itemsize * len(self.enumerated)
             kept += math.prod(self._own_sizes()) * (width_of(self._dearest) + places)
         return kept
 
@@ -199,18 +209,22 @@ class MBDPOP(DPOP):
         """Make the tables of the own constraints; who waits for nothing computes at once."""
         tables = self.problem.tables({name: self.domains[name] for name in self.ancestors})
         self._own_tables = [(table.charges, (*table.agents, self.problem.agent)) for table in tables]
+        self._begin_inference()
+        self._compute_if_complete()
+
+    def _begin_inference(self) -> None:
+        """Begin the first context, unless it is the parent who gives it."""
         if self.enumerated:
             self._contexts = itertools.product(*map(range, self.enumerated.values()))
             self._next_context()
         elif not self.cut:
             self.context = {}
-        self._compute_if_complete()
 
     def _take_context(self, values: Sequence[int]) -> None:
         """Process the parent's context."""
         if not self.cut or self.separator is None or (self.context is not None and self.choices is None):
             raise ValueError(f"{self.problem.agent} is not to be given a context now")
-        if len(values) != len(self.cut) or not all(map(_is_place, values, self.cut.values())):
+        if len(values) != len(self.cut) or not all(map(is_place, values, self.cut.values())):
             raise ValueError(f"{values} are no values of {', '.join(self.cut)}")
         self._begin_context(dict(zip(self.cut, values, strict=True)))
         self._compute_if_complete()
@@ -246,14 +260,7 @@ class MBDPOP(DPOP):
 
     def _compute_utils(self) -> None:
         """Compute the minimum cost of the subtree in the context, for each combination of the robots not fixed."""
-        context = self.context or {}
-        children = [(table.costs, self._table_axes(child)) for child, table in self.utils.items()]
-        onto = (self.problem.agent, *self._free)
-        tables = [aligned(*self._fixed(table, axes, context), onto) for table, axes in [*self._own_tables, *children]]
-        own = context.get(self.problem.agent)
-        charges = self.problem.charges if own is None else self.problem.charges[own : own + 1]
-        shape = [self._sizes[name] for name in self._free]
-        costs, self.choices = project(shape, charges, tables, width_of(self._dearest))
+        costs, self.choices = self._projected(self._free, self.context or {})
         if self.cut:
             self._send_table(costs)
         elif not self.enumerated:
@@ -262,6 +269,15 @@ class MBDPOP(DPOP):
             self._compare(costs)
         else:
             self._choose_in_context(self._final)
+
+    def _projected(self, axes: Sequence[str], context: Mapping[str, int]) -> Projection:
+        """Join and project all tables in `context`; `axes` are the robots that are not fixed."""
+        children = [(table.costs, self._table_axes(child)) for child, table in self.utils.items()]
+        onto = (self.problem.agent, *axes)
+        tables = [aligned(*self._fixed(table, over, context), onto) for table, over in [*self._own_tables, *children]]
+        own = context.get(self.problem.agent)
+        charges = self.problem.charges if own is None else self.problem.charges[own : own + 1]
+        return project([self._sizes[name] for name in axes], charges, tables, width_of(self._dearest))
 
     def _fixed(self, table: Table, axes: Sequence[str], context: Mapping[str, int]) -> tuple[Table, list[str]]:
         """Return the part of `table` that is left in `context`, and its axes; the own axis stays, with one place."""
@@ -280,7 +296,7 @@ class MBDPOP(DPOP):
         """Keep what is cheaper in this context than in all before; then begin the next one, or pass on the best."""
         if self._best is None or self._best_context is None:
             self._best = np.full_like(costs, np.iinfo(costs.dtype).max)
-            self._best_context = np.zeros((len(self.enumerated), *costs.shape), _place_type(self.enumerated))
+            self._best_context = np.zeros((len(self.enumerated), *costs.shape), place_type(self.enumerated.values()))
         better = costs < self._best
         np.copyto(self._best, costs, where=better)
         for number, value in enumerate((self.context or {}).values()):
@@ -323,10 +339,6 @@ class MBDPOP(DPOP):
         return int(choices[tuple(free)]) + (self.context or {}).get(self.problem.agent, 0)
 
 
-def _is_place(place: int, size: int) -> bool:
+def is_place(place: int, size: int) -> bool:
+    """Return whether a robot with `size` values has one at `place`."""
     return 0 <= place < size
-
-
-def _place_type(sizes: Mapping[str, int]) -> np.dtype[np.unsignedinteger[Any]]:
-    """Return the narrowest type that holds places of the values of all these robots."""
-    return np.min_scalar_type(max(sizes.values()) - 1)

@@ -1,0 +1,376 @@
+"""Refined memory-bounded DPOP (RMB-DPOP).
+
+MB-DPOP (see `mb_dpop.py`), with fewer and smaller enumerations. A *cluster* is made of neighbouring robots in the tree
+whose separators have more than `k` robots; the robot above it is its *cluster root*. Robots are cut (fixed) one by
+one, so that each relieves as many robots of the cluster as possible. A cut robot within the cluster enumerates its own
+values, for its own branch; the cluster root enumerates the others. So branches go on at the same time, and each is
+given only the values that it needs.
+
+- **When to use**: costs, on a pseudo-tree too wide for `dpop`, as `mb-dpop`. With a `k` of the induced width or more it
+  is DPOP.
+- **Guarantees**: complete; it terminates with an optimum, or with a proof that there is no solution. No table that is
+  sent has more than `k` dimensions. The number of messages is exponential in the cut robots of a branch.
+- **Parameters (`--set`)**: `k`, the most dimensions of a table (default 4); `memory` as in DPOP.
+- **Reference**: Chen, Zhang, Deng, Chen, Li: "RMB-DPOP: refining MB-DPOP by reducing redundant inferences", AAMAS 2020.
+
+Its messages and mechanisms are these methods:
+
+    LABEL, SEP_DEGREE    `_announce`        CONTEXT, distributed enumeration    `_begin_context`, `_ask`
+    ALLOCATION           `_allocate`        cache of a child's table            `_ask`
+    UTIL                 `_compute_utils`   CC_VALUE                            `_settle`
+
+How robots are chosen, in a cluster:
+
+- A robot whose separator has more than `k` robots that are not cut yet proposes all of these. Proposals go up, and are
+  added up for each candidate. Of candidates that are not above a robot, it passes only the best on.
+- The cluster root chooses the candidate that relieves the most robots; of several, the one nearest to the lowest robot
+  that it relieves. Then it asks again, until nobody proposes any.
+
+Choices that the paper leaves open, and differences:
+
+- Only branches that proposed a robot learn that it is cut. Where tables are small enough already, it stays an axis.
+- A table goes up with the best values of the cut robots below, for each cell (`CutUTIL`). In the end they are sent down
+  once (`CutValue`), so that all of the cluster choose under them. A branch without cut robots, whose last context had
+  the same values, is not asked.
+- Separators are known bottom-up, as in `mb_dpop.py`, and so are memory needs, before any table is made.
+- Of what a cluster root enumerates, the robots that the fewest children depend on change fastest.
+
+>>> from robochoc.generators.queens3d import queens3d
+>>> from robochoc.run import Options, Runtime, solve
+>>> outcome = solve(queens3d(3), Options(protocol="rmb-dpop", runtime=Runtime.SIMULATOR, settings={"k": "2"}))
+>>> outcome.verdict.value
+'no-solution'
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Mapping, Sequence
+from typing import assert_never, cast
+
+import msgspec
+
+from robochoc.model.message import Message
+from robochoc.protocols.inference.dpop import MOST_AXES, keep_once
+from robochoc.protocols.inference.dpop_tables import Codes, Extent, Table, aligned, place_type, width_of
+from robochoc.protocols.inference.mb_dpop import MBDPOP, Sizes, is_place
+from robochoc.protocols.inference.messages.dpop import UTIL, VALUE, Dimensions, Proceed
+from robochoc.protocols.inference.messages.mb_dpop import Axis, Context, DomainAtDepth
+from robochoc.protocols.inference.messages.rmb_dpop import (
+    Allocation,
+    Candidate,
+    ClusterLabel,
+    CutUTIL,
+    CutValue,
+    SepDegree,
+)
+from robochoc.protocols.inference.rmb_cuts import (
+    BestTables,
+    IncomingPlaces,
+    added_up,
+    best,
+    bytes_of_best,
+    picked,
+    thinned,
+)
+from robochoc.protocols.order import PriorityOrder
+from robochoc.protocols.shared.messages.dfs import TreeMessage
+from robochoc.protocols.traits import ENDS_WITH_PROOF, Traits
+from robochoc.solver.compiled import LocalProblem
+
+RMBMessage = (
+    DomainAtDepth | ClusterLabel | SepDegree | Allocation | Proceed | Context | UTIL | CutUTIL | CutValue | VALUE
+)
+
+
+class RMBDPOP(MBDPOP):
+    """One agent of RMB-DPOP.
+
+    State besides MB-DPOP's, whose `cut` are here the cut robots above, and `cuts` those above each child:
+
+    - `proposed`: the children's candidates; `candidates`: all together; `awaited`: who is to propose again;
+    - `below`: the cut robots from this one down; `inner`: from each child down;
+    - `best`: the tables of the enumeration; `settled`: whether the cut robots have their last values.
+    """
+
+    messages = TreeMessage | RMBMessage
+    traits = Traits(
+        concludes=ENDS_WITH_PROOF,
+        paper="Chen et al. 2020",
+        costs=True,
+        shared_scopes=True,
+        writes_to_non_neighbours=False,
+        tables=True,
+        privacy="constraints of others, but for sums",
+        use_when="as mb-dpop: branches enumerate for themselves",
+    )
+
+    def __init__(self, problem: LocalProblem, order: PriorityOrder) -> None:
+        super().__init__(problem, order)
+        self.proposed: dict[str, Mapping[str, Candidate]] = {}
+        self.candidates: dict[str, Candidate] = {}
+        self.awaited: set[str] = set()
+        self.below: Sizes = {}
+        self.inner: dict[str, Sizes] = {}
+        self.best: BestTables | None = None
+        self.settled = False
+        self._labelled = False
+        self._above: dict[str, int] = {}
+        self._asked: dict[str, list[int]] = {}
+        self._places: dict[str, IncomingPlaces] = {}
+
+    def handle(self, sender: str, message: Message) -> None:
+        """Dispatch on the message's type."""
+        match cast("RMBMessage", message):
+            case ClusterLabel() as label:
+                self._keep_cluster_label(sender, label)
+                self._measure()
+            case SepDegree() as degrees:
+                self._sep_degree_handler(sender, degrees)
+            case Allocation(robot):
+                self._allocation_handler(robot)
+            case CutUTIL(width, costs, places):
+                self._places_of(sender).add(len(costs) // width, places)
+                self._util_message_handler(sender, width, costs)
+            case CutValue(values):
+                self._take_cut_values(values)
+            case UTIL() if self.inner.get(sender) and not self.settled:
+                raise ValueError(f"{sender} sends a table without the values that it is for")
+            case DomainAtDepth() | Proceed() | Context() | UTIL() | VALUE() as others:
+                super().handle(sender, others)
+            case never:
+                assert_never(never)
+
+    # Labels and the choice of cut robots
+
+    @property
+    def _crowded(self) -> bool:
+        """Whether the own separator is too large: the robot is in a cluster, below its root."""
+        return len(self._sizes) > self.settings.k
+
+    def _keep_cluster_label(self, child: str, label: ClusterLabel) -> None:
+        """Store a child's label. Raises `ValueError` for one that cannot be."""
+        sizes = {name: axis.size for name, axis in label.separator.items()}
+        dimensions = Dimensions(sizes, label.dearest, label.induced_width, label.most)
+        self._check(child, dimensions)
+        if bool(label.candidates) != (len(sizes) > self.settings.k):
+            raise ValueError(f"{child} tells of a separator of {len(sizes)}, and {len(label.candidates)} candidates")
+        keep_once(child, dimensions, self.dimensions, self.children)
+        self._keep_candidates(child, label.candidates)
+        self.cuts[child], self.inner[child] = {}, {}
+        for name, axis in label.separator.items():
+            self.depths.setdefault(name, axis.depth)
+
+    def _keep_candidates(self, child: str, candidates: Mapping[str, Candidate]) -> None:
+        """Store a child's candidates. Raises `ValueError` if there are others than of its separator, and one below."""
+        sizes = self.dimensions[child].separator
+        others = [name for name in candidates if name not in sizes]
+        wrong = any(one.size != sizes.get(name, one.size) for name, one in candidates.items())
+        if len(others) > 1 or self.problem.agent in others or wrong:
+            raise ValueError(f"{child} proposes robots that cannot be cut: {', '.join(candidates)}")
+        self.proposed[child] = candidates
+
+    def _plan(self) -> None:
+        """Who is cut is planned by the cluster root."""
+
+    def _announce(self) -> None:
+        """Tell the parent who may be cut. A cluster root chooses; if nobody needs be cut any more, it has its label."""
+        self.candidates = self._all_candidates()
+        if self._crowded:
+            self.candidates = thinned(self.candidates, self._sizes)
+            self._propose()
+        elif self.candidates:
+            self._allocate(best(self.candidates))
+        else:
+            super()._announce()
+
+    def _all_candidates(self) -> dict[str, Candidate]:
+        free = [name for name in self._sizes if name not in self.cut]
+        own = {name: Candidate(self._sizes[name], self.depths[name], 1, self.depth) for name in free}
+        return added_up([own if len(free) > self.settings.k else {}, *self.proposed.values()])
+
+    def _propose(self) -> None:
+        """Send the parent the candidates: at first with the label."""
+        width, most = self._extremes()
+        if self._labelled:
+            self.send(self.parent or "", SepDegree(self.candidates, most))
+        else:
+            self._tell(Dimensions(self._sizes, self._dearest, width, most))
+        self._labelled = True
+
+    def _tell(self, dimensions: Dimensions) -> None:
+        """Send the parent the own label."""
+        axes = {name: Axis(size, self.depths[name]) for name, size in dimensions.separator.items()}
+        candidates = self.candidates if self._crowded else {}
+        label = ClusterLabel(axes, candidates, dimensions.dearest, dimensions.induced_width, dimensions.most)
+        self.send(self.parent or "", label)
+
+    def _sep_degree_handler(self, child: str, degrees: SepDegree) -> None:
+        """Process what a child proposes after an allocation; go on when all that were told have answered."""
+        if child not in self.awaited or degrees.most.bytes < 0:
+            raise ValueError(f"{child} was not asked who may be cut")
+        self._keep_candidates(child, degrees.candidates)
+        self.dimensions[child] = msgspec.structs.replace(self.dimensions[child], most=degrees.most)
+        self.awaited.remove(child)
+        if not self.awaited:
+            self._announce()
+
+    def _allocation_handler(self, robot: str) -> None:
+        """Process the choice of the cluster root. Raises `ValueError` if this robot did not propose it."""
+        if not self._crowded or not self._labelled or self.awaited or robot not in self.candidates:
+            raise ValueError(f"{self.problem.agent} did not propose to cut {robot}")
+        self._allocate(robot)
+        if not self.awaited:
+            self._announce()
+
+    def _allocate(self, robot: str) -> None:
+        """Cut `robot`, and tell the children that proposed it."""
+        size = self.candidates[robot].size
+        if len(self.cut) + len(self.below) >= MOST_AXES:
+            raise ValueError(f"more than {MOST_AXES} robots are cut")
+        if robot in self._sizes and self._crowded:
+            self.cut[robot] = size
+        elif robot in (*self._sizes, self.problem.agent):
+            self.enumerated[robot] = size
+        if robot not in self._sizes:
+            self.below[robot] = size
+        for child in self.children:
+            if robot in self.proposed[child]:
+                known = self.cuts if robot in self.dimensions[child].separator else self.inner
+                known[child][robot] = size
+                self.awaited.add(child)
+                self.send(child, Allocation(robot))
+
+    def _kept_bytes(self, inputs: Sequence[Extent]) -> int:
+        """Tables stay for the next context, and so do the best costs and values for each cell."""
+        kept = sum(table.cells * table.width for table in inputs)
+        for child, cut in self.inner.items():
+            row = place_type(cut.values()).itemsize * len(cut) if cut else 0
+            kept += math.prod(self._child_sizes(child)) * row
+        own, below = len(self.problem.values), [*self.below.values()]
+        return kept + bytes_of_best(self._own_sizes(), width_of(self._dearest), own, below)
+
+    # Contexts: each enumerates its part
+
+    def _begin_inference(self) -> None:
+        """Begin to enumerate, unless it is the parent who gives a context."""
+        shared = {name: sum(name in cut for cut in self.cuts.values()) for name in self.enumerated}
+        self.enumerated = {name: self.enumerated[name] for name in sorted(shared, key=lambda name: -shared[name])}
+        if not self.cut:
+            self._begin_context({})
+
+    def _begin_context(self, context: dict[str, int]) -> None:
+        """Begin the own enumeration in the parent's context."""
+        self._above, self.choices, self.best = context, None, None
+        self._contexts = itertools.product(*map(range, self.enumerated.values()))
+        self._next_context()
+
+    def _next_context(self) -> bool:
+        """Begin the next context of the own enumeration; return whether there was one."""
+        values = next(self._contexts, None)
+        if values is not None:
+            self.context = {**self._above, **dict(zip(self.enumerated, values, strict=True))}
+            self._ask(self.context)
+        return values is not None
+
+    def _ask(self, context: Mapping[str, int]) -> None:
+        """Ask the children in the cluster for their tables, but for those whose values are the last ones again."""
+        for child, cut in self.cuts.items():
+            values = [context[name] for name in cut]
+            if self._asked.get(child, []) != values:
+                self._forget(child, values)
+                self.send(child, Context(values))
+
+    def _forget(self, child: str, values: list[int]) -> None:
+        self._asked[child] = values
+        self.utils.pop(child, None)
+        self._places.pop(child, None)
+
+    def _places_of(self, child: str) -> IncomingPlaces:
+        """Return what has come of the values with a child's table."""
+        cut = self.inner.get(child)
+        if not cut or child not in self._asked or self.settled:
+            raise ValueError(f"{child} was not asked for a table with values")
+        if child not in self._places:
+            sizes = self.dimensions[child].separator
+            shape = [sizes[name] for name in self._table_axes(child)]
+            self._places[child] = IncomingPlaces(shape, [*cut.values()])
+        return self._places[child]
+
+    def _compute_utils(self) -> None:
+        """Compute the minimum cost of the subtree in the context; after the last one, send the best of all."""
+        context = self.context or {}
+        axes = [name for name in self._free if name not in context]
+        costs, choices = self._projected(axes, context)
+        if self.best is None:
+            shape, below = [self._sizes[name] for name in self._free], [*self.below.values()]
+            self.best = BestTables(shape, costs.dtype, len(self.problem.values), below)
+        at = [context.get(name, slice(None)) for name in self._free]
+        own = context.get(self.problem.agent, choices)
+        self.best.improve(at, costs, own, [] if self.settled else self._best_places(axes, context, choices))
+        if not self._next_context():
+            self._end_contexts(self.best)
+
+    def _best_places(self, axes: Sequence[str], context: Mapping[str, int], choices: Codes) -> list[Table | int]:
+        """Return, for each cut robot from this one down, its value in this context for each cell of the table."""
+        onto = (self.problem.agent, *axes)
+        rows = dict[str, Table]()
+        for child, incoming in self._places.items():
+            for name, row in zip(self.inner[child], incoming.table, strict=True):
+                rows[name] = picked(aligned(*self._fixed(row, self._table_axes(child), context), onto), choices)
+        return [rows[name] if name in rows else context[name] for name in self.below]
+
+    def _end_contexts(self, found: BestTables) -> None:
+        """Send the best of all contexts: a robot of a cluster to its parent, as others do in DPOP."""
+        self.choices = found.choices
+        if self._final is not None:
+            self._choose_in_context(self._final)
+        elif not self._crowded:
+            self._pass_on(found.costs)
+        elif self.settled or not self.below:
+            self._send_table(found.costs)
+        else:
+            for width, costs, places in found.packed():
+                self.send(self.parent or "", CutUTIL(width, costs, places))
+
+    # VALUE, from the root down
+
+    def _choose_optimal(self, assignment: Sequence[int]) -> None:
+        """Take the cheapest value; a cluster root first sends the best values of cut robots down."""
+        if self._crowded or not any(self.cuts.values()):
+            if self.below and not self.settled:
+                raise ValueError(f"{self.problem.agent} does not know the best values of the cut robots")
+            self._choose_in_context(assignment)
+            return
+        if self.best is None or self.choices is None or self._final is not None:
+            raise ValueError(f"{self.problem.agent} has a value already, or no table yet")
+        self._final = assignment
+        values = dict(zip(self.separator or (), assignment, strict=True))
+        rows = zip(self.below, self.best.places, strict=True)
+        self._settle({**values, **{name: int(row[tuple(assignment)]) for name, row in rows}})
+
+    def _take_cut_values(self, values: Sequence[int]) -> None:
+        """Process the best values of cut robots. Raises `ValueError` if this is not the time, or they are none."""
+        cut = {**self.cut, **self.below}
+        if not self.cut or self.choices is None or self.settled:
+            raise ValueError(f"{self.problem.agent} is not to be given the best values now")
+        if len(values) != len(cut) or not all(map(is_place, values, cut.values())):
+            raise ValueError(f"{values} are no values of {', '.join(cut)}")
+        self._settle(dict(zip(cut, values, strict=True)))
+
+    def _settle(self, values: Mapping[str, int]) -> None:
+        """Pass the best values of cut robots on, and make the own table under them."""
+        self.settled, self.choices, self.best = True, None, None
+        self.context = {name: values[name] for name in (*self.cut, *self.enumerated)}
+        for child, cut in self.cuts.items():
+            wanted = [values[name] for name in (*cut, *self.inner[child])]
+            if self.inner[child] or self._asked.get(child, []) != wanted:
+                self._forget(child, wanted)
+                self.send(child, CutValue(wanted))
+        self._compute_if_complete()
+
+    def _best_value(self, choices: Codes, assignment: Sequence[int]) -> int:
+        """Return the place of the cheapest own value: tables here hold the fixed one if it is fixed."""
+        free = [place for name, place in zip(self.separator or (), assignment, strict=True) if name not in self.cut]
+        return int(choices[tuple(free)])
