@@ -68,7 +68,7 @@ def _ours(family: Family) -> list[Contestant]:
         return [*ours, *(robochoc(name, "arrays", *cycles) for name in ("dsa", "mgm", "maxsum"))]
     if family is COSTS:
         searches = ("syncbb", "adopt", "afb", "bnb-adopt", "ncbb", "pt-fb", "hs-cai", "sfb", "auto")
-        tables = ("dpop", "mb-dpop", "o-dpop", "p-dpop")
+        tables = ("dpop", "mb-dpop", "rmb-dpop", "o-dpop", "p-dpop")
         return [robochoc(name, "simulator") for name in (*tables, *searches)]
     orders: tuple[tuple[str, ...], ...] = ((), ("--order", "max-degree"))
     paper = [

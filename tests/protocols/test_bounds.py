@@ -30,6 +30,7 @@ BOUNDING = (
     "pt-fb",
     "hs-cai",
     "mb-dpop",
+    "rmb-dpop",
     "p-dpop",
     "s-dpop",
     "o-dpop",
