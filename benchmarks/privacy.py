@@ -3,7 +3,8 @@
     python benchmarks/privacy.py [PROBLEMS]
 
 First all meetings have to take place (a DisCSP), so that protocols for satisfaction and for costs solve the same
-problems; then what meetings are worth is maximised.
+problems; then what meetings are worth is maximised, by complete and by incomplete protocols. The latter need not tell
+their last values, so their loss of decisions is not known.
 """
 
 from __future__ import annotations
@@ -18,8 +19,14 @@ from robochoc.privacy import Kind, Measure, PrivacyReport, privacy_of
 from robochoc.run import Options, Runtime, solve
 
 PROBLEMS = 20
-SATISFYING = ("abt", "disfc", "afc", "afc-ng", "dpop", "p-dpop", "syncbb", "afb", "sfb", "ncbb", "pt-fb")
-MINIMISING = ("dpop", "p-dpop", "syncbb", "afb", "sfb", "ncbb", "pt-fb", "adopt")
+SATISFYING = (
+    "abt", "abt-hyb", "disfc", "afc", "afc-ng", "compapo", "dpop", "o-dpop", "mb-dpop", "p-dpop", "syncbb", "afb",
+    "sfb", "ncbb", "pt-fb", "hs-cai",
+)  # fmt: skip
+MINIMISING = (
+    "dpop", "o-dpop", "mb-dpop", "p-dpop", "syncbb", "syncabb", "afb", "sfb", "ncbb", "pt-fb", "hs-cai", "adopt",
+)  # fmt: skip
+INCOMPLETE = ("dsa", "mgm", "mgm2", "kopt", "cocoa", "d-gibbs", "duct", "maxsum")
 MAX_VALUE = 10
 
 
@@ -51,7 +58,7 @@ def row(protocol: str, problems: int, max_value: int | None) -> str:
 def main() -> None:
     """Print the tables."""
     problems = int(sys.argv[1]) if sys.argv[1:] else PROBLEMS
-    for protocols, max_value in ((SATISFYING, None), (MINIMISING, MAX_VALUE)):
+    for protocols, max_value in ((SATISFYING, None), (MINIMISING, MAX_VALUE), (INCOMPLETE, MAX_VALUE)):
         print(f"| protocol | {' | '.join(Kind)} |")
         print(f"| --- |{' --- |' * len(Kind)}")
         for protocol in protocols:

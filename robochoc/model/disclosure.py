@@ -15,7 +15,7 @@ from __future__ import annotations
 
 import math
 from abc import ABC, abstractmethod
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING, NamedTuple, TypeVar
 
 if TYPE_CHECKING:
@@ -69,6 +69,16 @@ class Pays(NamedTuple):
     most: float
 
 
+class PartPays(NamedTuple):
+    """The parts of `robot` in partially known constraints with `other` charge `cost` for these values of both."""
+
+    robot: str
+    value: Value
+    other: str
+    theirs: Value
+    cost: float
+
+
 class EveryValuePays(NamedTuple):
     """The own cost of every value of `robot` in `view` is at least `least`."""
 
@@ -98,7 +108,7 @@ class Clash(NamedTuple):
     view: View
 
 
-Proof = StandsAt | StandsWhere | HasOnly | Pays | EveryValuePays | SomeValuePays | Total | Clash
+Proof = StandsAt | StandsWhere | HasOnly | Pays | PartPays | EveryValuePays | SomeValuePays | Total | Clash
 NOTHING: tuple[Proof, ...] = ()
 """The proofs of a message that proves none. It has a rule, unlike a message whose `proves` returns None."""
 AT_THE_END = (2**62,)
@@ -164,4 +174,30 @@ def partial_assignment(robots: Sequence[str], values: Sequence[Value]) -> list[P
     for robot, value in zip(robots, values, strict=False):
         found.append(Pays(robot, value, dict(view), 0, FINITE))
         view[robot] = value
+    return found
+
+
+def table_proves(
+    axes: Sequence[str], cells: Iterable[tuple[Sequence[int], float]], hearing: Hearing
+) -> Sequence[Proof]:
+    """Return what `cells` of the sender's table prove: places on its axes, and the least cost with these values.
+
+    Robots whose values the receiver does not know are left out of the views: what some value of the sender costs at
+    most with one of their values, it costs at most without them.
+    """
+    sender = hearing.sender
+    near = [(robot, hearing.values(robot)) for robot in hearing.neighbours(sender) if robot not in axes]
+    single = {robot: values[0] for robot, values in near if values is not None and len(values) == 1}
+    nobody_below = {*axes, *single} >= set(hearing.neighbours(sender))
+    least: dict[tuple[tuple[str, Value], ...], float] = {}
+    whole = all(hearing.values(robot) is not None for robot in axes)
+    for places, cost in cells:
+        known = zip(axes, places, strict=True)
+        view = tuple([(robot, values[at]) for robot, at in known if (values := hearing.values(robot)) is not None])
+        least[view] = min(cost, least.get(view, INFINITE))
+    found: list[Proof] = []
+    for view, cost in least.items():
+        found.append(SomeValuePays(sender, {**single, **dict(view)}, cost))
+        if nobody_below and whole:
+            found.append(EveryValuePays(sender, {**single, **dict(view)}, cost))
     return found

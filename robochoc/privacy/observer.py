@@ -14,6 +14,7 @@ from robochoc.model.disclosure import (
     HasOnly,
     Hearing,
     M,
+    PartPays,
     Pays,
     Proof,
     SomeValuePays,
@@ -29,6 +30,8 @@ from robochoc.privacy.possible import AtLeast, AtMost, Case, Knowledge, OneAtMos
 from robochoc.privacy.secrets import TeamSecrets
 
 Channel = tuple[type[Message], str, str]
+_DECIDING = (Performative.CANCEL, Performative.REQUEST)
+"""By these acts a robot may decide on others' values: for good, or (to a receiver) for now."""
 
 
 class Scene(NamedTuple):
@@ -74,18 +77,18 @@ class Observer:
         self._stands: dict[str, _Stand] = {}
 
     def says(self, receiver: str, message: Message) -> None:
-        """Note a message that the observer sends; the last values of others that it decides on it knows itself."""
-        self._last[type(message), self.name, receiver] = message
-        if message.act.performative is not Performative.CANCEL:
+        """Note a message that the observer sends; the values of others that it decides on it knows itself."""
+        self._note(message, self.name, receiver)
+        if message.act.performative not in _DECIDING:
             return
         for proof in message.proves(_Heard(self._scene, self.name, receiver, self._values, self._last)) or ():
-            if isinstance(proof, StandsAt) and proof.stamp == AT_THE_END:
+            if isinstance(proof, StandsAt) and (proof.stamp == AT_THE_END or proof.robot == receiver):
                 self._learn(proof)
 
     def hears(self, sender: str, message: Message) -> None:
         """Take in a message, and all that it proves."""
         proofs = message.proves(_Heard(self._scene, sender, self.name, self._values, self._last))
-        self._last[type(message), sender, self.name] = message
+        self._note(message, sender, self.name)
         if proofs is None:
             self.without_rule.add(type(message).__name__)
             return
@@ -97,6 +100,12 @@ class Observer:
         for proof in message.proves(_Heard(self._scene, sender, self.name, self._values, self._last)) or ():
             if isinstance(proof, StandsAt | StandsWhere):
                 self._stands.pop(proof.robot, None)
+
+    def _note(self, message: Message, sender: str, receiver: str) -> None:
+        """Note the last message on a channel, of its type and of those that this extends."""
+        for kind in type(message).__mro__:
+            if issubclass(kind, Message):
+                self._last[kind, sender, receiver] = message
 
     def possible_values(self, robot: str) -> list[Value]:
         """Return the values at which `robot` may stand now, by what was heard of it, after `knowledge.settle()`."""
@@ -124,13 +133,15 @@ class Observer:
             case _:
                 self._learn_cost(proof)
 
-    def _learn_cost(self, proof: Pays | EveryValuePays | SomeValuePays | Total | Clash) -> None:
+    def _learn_cost(self, proof: Pays | PartPays | EveryValuePays | SomeValuePays | Total | Clash) -> None:
         """Put what a message proves of costs in terms of secrets."""
         secrets = self._scene.secrets
         match proof:
             case Pays(robot, value, view, least, most):
                 for complete in secrets.completions(view):
                     self._bound(secrets.own_cost(robot, value, complete), least, most)
+            case PartPays(robot, value, other, theirs, cost):
+                self._bound(secrets.filtered(robot, value, other, theirs, parts_only=True), cost, cost)
             case EveryValuePays(robot, view, least):
                 self._every_value(robot, view, least)
             case SomeValuePays(robot, view, most):

@@ -15,6 +15,7 @@ from robochoc.model.problem import ConstraintModel, ProblemKind, Team
 from robochoc.run import Options, Withdrawal, solve
 from robochoc.run.registry import protocol_named
 from robochoc.solver.ace import AceProcess
+from tests.support.asymmetric_problems import random_asymmetric_team
 from tests.support.complex_changes import random_complex_changing_team
 from tests.support.complex_problems import random_complex_team
 from tests.support.cost_problems import random_complex_cost_team, random_cost_team
@@ -37,7 +38,7 @@ def families(protocol: str) -> list[Callable[[Random], Team]]:
         found.append(random_complex_cost_team if traits.costs else random_complex_team)
         found.append(lambda chance: random_changing_team(chance, 4))
     if traits.partially_known:
-        found.append(random_pkc_team)
+        found.append(random_asymmetric_team if traits.asymmetric else random_pkc_team)
     if traits.n_ary and not traits.costs:
         found.append(lambda chance: random_complex_changing_team(chance, 3))
     return found

@@ -10,10 +10,22 @@ import pytest
 
 from robochoc.journal.events import Sent
 from robochoc.journal.journal import Header, Journal, JournalRecorder, read_journal
-from robochoc.model.problem import Child, Constraint, ConstraintModel, Parent, Relation, Semantics, Team
+from robochoc.model.assembly import Extras, assemble
+from robochoc.model.problem import (
+    Child,
+    Constraint,
+    ConstraintModel,
+    Domain,
+    Parent,
+    ProblemKind,
+    Relation,
+    Semantics,
+    Team,
+    Variable,
+)
 from robochoc.privacy import Kind, Loss, Measure, PrivacyError, PrivacyReport, privacy_of
 from robochoc.privacy.page import page_of
-from robochoc.protocols.local_search.messages.cocoa import Inquiry
+from robochoc.protocols.satisfaction.messages.abt import Ok
 from robochoc.run import Options, Runtime, solve
 from tests.support.cost_problems import random_cost_team, with_costs
 from tests.support.problems import team_of
@@ -143,10 +155,51 @@ def test_dba_tells_whether_values_go_with_each_other() -> None:
     assert loss(report, "RA", "RB", Kind.DOMAIN).known == 0.5
 
 
-def test_a_message_without_a_rule_makes_the_loss_not_known_and_not_0() -> None:
-    report = report_of(PAIR, "cocoa")
-    assert Inquiry.__name__ in report.without_rule
-    assert {one.by(measure) for one in report.losses for measure in Measure} == {None}
+def test_an_answer_of_cocoa_tells_what_values_cost_at_least_where_no_other_robot_has_a_part_in_it() -> None:
+    found = loss(report_of(PRICED, "cocoa"), "RA", "RB", Kind.DOMAIN)
+    # RB says that both values of RA cost it 1 at least: of 0 to 9, and infinity, 0 is left to no value.
+    assert found.linear is not None
+    assert found.linear >= 1 - (10 * 10 - 1) / (11 * 11 - 1)
+
+
+def test_a_region_of_kopt_tells_exactly_what_values_and_pairs_cost() -> None:
+    more = with_costs(team_of({"A": (1, 2), "B": (1, 2), "C": (1, 2)}, [*PRICED.constraints(), differ("B", "C")]))
+    report = report_of(more, "kopt")
+    assert loss(report, "RA", "RB", Kind.DOMAIN).known == 1
+    assert loss(report, "RC", "RB", Kind.DOMAIN).known == 1
+    # The constraint of RA and RB is RA's, and RA has heard no values of RC.
+    assert loss(report, "RC", "RA", Kind.DOMAIN).known == 0
+
+
+def test_tables_of_count_dpop_prove_what_those_of_dpop_do_and_goods_of_o_dpop_no_more() -> None:
+    dpop, counted, opened = (
+        loss(report_of(PRICED, name), "RA", "RB", Kind.DOMAIN).linear or 0 for name in ("dpop", "count-dpop", "o-dpop")
+    )
+    assert dpop == counted
+    assert 0 < opened <= dpop
+
+
+def test_compapo_tells_values_and_a_mediator_knows_those_that_it_gives() -> None:
+    team = team_of({"A": (1,), "B": (1, 2), "C": (1, 2, 3)}, [differ("A", "B"), differ("B", "C"), differ("A", "C")])
+    decided = [one.known for one in report_of(team, "compapo").losses if one.kind is Kind.DECISION]
+    assert set(decided) == {1}
+
+
+def test_the_sides_of_acls_tell_parts_exactly() -> None:
+    parts = {"RA": [soft("A", "B", {(1, 1): 3, (1, 2): 1})], "RB": [soft("A", "B", {(2, 1): 5, (1, 2): 2})]}
+    own = {f"R{name}": [Variable(name, Domain("D", (range(1, 3),)))] for name in "AB"}
+    report = report_of(assemble("pair", own, [], kind=ProblemKind.DISWCSP, extras=Extras(parts=parts)), "acls")
+    told = [one for one in report.losses if one.kind is Kind.CONSTRAINTS]
+    assert {one.secrets for one in told} == {4}
+    assert max(one.known or 0 for one in told) >= 0.25
+
+
+def test_a_message_without_a_rule_makes_the_loss_not_known_and_not_0(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.delattr(Ok, "proves")
+    report = report_of(PAIR, "abt")
+    assert report.without_rule == ("Ok",)
+    heard = [one for one in report.losses if one.observer == "RB"]
+    assert {one.by(measure) for one in heard for measure in Measure} == {None}
     assert report.system_loss(Kind.DOMAIN, Measure.ENTROPY) is None
     assert "not known" in page_of(report, Measure.LINEAR)
 

@@ -3,24 +3,39 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 from random import Random
+from typing import get_args
 
 import pytest
 
 from robochoc.journal.journal import Journal
 from robochoc.privacy import Kind, Measure, PrivacyReport, privacy_of
+from robochoc.protocols.shared.messages.anytime import Step
 from robochoc.replay import ReplayOptions
 from robochoc.replay.steps import runs_of
-from robochoc.run.registry import protocol_names
+from robochoc.run.registry import protocol_named, protocol_names
 from robochoc.solver.ace import AceProcess
 from tests.support.examples import count
 from tests.support.replays import in_text, random_run, recorded
 
 WITH_RULES = (
-    "abt", "abt-do-retro", "adopt", "afb", "afc", "afc-ng", "afc-tree", "agile-abt", "awc", "bnb-adopt", "dba", "disfc",
-    "dpop", "dsa", "dynabt", "gdba", "mgm", "mgm2", "ncbb", "p-dpop", "pt-fb", "sbt", "sfb", "syncbb",
+    "a-dsa", "abt", "abt-do-retro", "abt-hyb", "acls", "adopt", "afb", "afc", "afc-ng", "afc-tree", "agile-abt",
+    "async-maxsum", "awc", "bnb-adopt", "bounded-maxsum", "cocoa", "compapo", "count-dpop", "d-gibbs", "dba", "disfc",
+    "dpop", "dsa", "dsa-sdp", "duct", "dynabt", "gca-mgm", "gdba", "hs-cai", "kopt", "lamdls", "maxsum", "maxsum-ad",
+    "mb-dpop", "mcs-mgm", "mgm", "mgm2", "mixed-dsa", "ncbb", "o-dpop", "p-dpop", "pt-fb", "rmb-dpop", "s-dpop", "sbt",
+    "sfb", "syncabb", "syncbb",
 )  # fmt: skip
-"""Protocols whose messages all have rules; in the others losses are not known."""
+"""Protocols whose messages all have rules; in others losses are not known."""
+VARIANTS = {
+    "hs-cai": {"k": "1"},
+    "kopt": {"k": "4"},
+    "maxsum": {"split": "0.3"},
+    "mb-dpop": {"k": "1"},
+    "rmb-dpop": {"k": "1"},
+    "syncabb": {"phases": "2"},
+}
+"""Settings with which robots say other things."""
 
 
 @pytest.fixture(scope="module")
@@ -36,12 +51,20 @@ def reports(journal: Journal, warm: AceProcess) -> Iterator[PrivacyReport]:
         yield privacy_of(journal, ReplayOptions(solver=warm), number)
 
 
+def variant(protocol: str) -> dict[str, str]:
+    """Return settings with which robots say other things; local search also finds its best cycle."""
+    anytime = {"anytime": "yes"} if Step in get_args(protocol_named(protocol).messages) else {}
+    return {**VARIANTS.get(protocol, {}), **anytime}
+
+
 @pytest.mark.parametrize("protocol", protocol_names())
 @count("number", fast=3, slow=150)
 def test_the_truth_is_never_excluded(protocol: str, number: int, warm: AceProcess) -> None:
     learnt = 0.0
     for seed in range(number):
         team, options = random_run(protocol, Random(f"privacy {protocol} {seed}"), seed)
+        if seed % 2:
+            options = replace(options, settings={**options.settings, **variant(protocol)})
         journal = recorded(team, options, warm)
         for report in reports(in_text(journal) if seed % 2 else journal, warm):
             if report.without_rule:

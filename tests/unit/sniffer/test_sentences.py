@@ -119,6 +119,13 @@ REAL = {
     ("dpop", "VALUE"): (
         "RX03 says: by number, the values of the robots in your separator are 2 and 1, the nearest robot first"
     ),
+    ("count-dpop", "CountDimensions"): (
+        "RX02 says: my table will have 4 cells over RX00 (4 values), and no cost above 60; from me down the induced"
+        " width is 2, and RX03 needs the most memory, 2,152 bytes; 9 bits are enough for my numbers"
+    ),
+    ("count-dpop", "Counts"): (
+        "RX01 says: in how many ways my subtree attains the costs of my table: 16 cells, of 1 byte"
+    ),
     ("p-dpop", "Wave"): "RX00 says: somebody whose score begins with 5df9 wants to be the root",
     ("p-dpop", "Token"): "RX00 says: if you are not in the tree yet, you are my child",
     ("p-dpop", "Bounce"): "RX00 says: I am in the tree, above you",
@@ -364,6 +371,13 @@ def type_with(kind: str, content: Mapping[str, Any]) -> type[Message]:
         ("R", {"rows": [[0, math.inf], [1, 2]]},
          "by our 2 functions, one after the other, Robot1.1's values cost 0 and infinity; 1 and 2"),
         ("Proceed", {"separator": []}, "all tables fit: make yours"),
+        ("InferCtxt", {"places": {"Robot1.1": 1}},
+         "what does your subtree cost at least with Robot1.1's value number 2?"),
+        ("InferCtxt", {"places": {}}, "what does your subtree cost at least with any values?"),
+        ("CtxtUtil", {"axes": [["Robot1.1", 0, 2]], "costs": [3, 9]},
+         "with these values my subtree costs at least 3 to 9, by the values of Robot1.1"),
+        ("CtxtUtil", {"axes": [], "costs": [math.inf]},
+         "with these values my subtree costs infinity, by the values of nobody"),
     ],
 )  # fmt: skip
 def test_the_rarer_things_that_are_said(kind: str, content: dict[str, Any], words: str) -> None:

@@ -38,6 +38,7 @@ class _Writer:
         presentation = {
             "name": flat.team.name,
             "type": kind,
+            "benchmark": "RandomDCOP",  # DCOPSolver fails without a name here, and takes this one for any problem
             "model": "Complex" if any(len(robot.variables) > 1 for robot in flat.team.robots) else "Simple",
             "constraintModel": "PKC" if partly else "TKC",
             "maxConstraintArity": str(max((len(one.constraint.variables) for one in flat.held), default=1)),

@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 from robochoc.model import message as wire
 from robochoc.model.communicative_acts import Act, Performative
+from robochoc.model.disclosure import INFINITE, NOTHING, Hearing, PartPays, Proof, can_take
 from robochoc.model.wording import Wording
 from robochoc.protocols.local_search.messages.mgm import saving_in_words
+from robochoc.protocols.shared.messages.cycles import Value
 
 Paid = tuple[int, int | float]
 """Broken hard constraints, and costs."""
@@ -24,6 +28,10 @@ class Proposal(wire.Message, frozen=True):
             return "I propose no other value in this cycle"
         return f"{words.own_value(self.value)} is what I propose: what would it cost you?"
 
+    def proves(self, hearing: Hearing) -> Sequence[Proof]:
+        """Return what the message proves to its receiver."""
+        return NOTHING if self.value is None else [can_take(hearing.sender, self.value)]
+
 
 class Sides(wire.Message, frozen=True):
     """The sender's own side towards the receiver: with its value now, and with what it proposes (`impact`)."""
@@ -36,3 +44,16 @@ class Sides(wire.Message, frozen=True):
     def in_words(self, _: Wording) -> str:
         """Return what the sender says."""
         return f"my side costs {saving_in_words(*self.now)} now, and {saving_in_words(*self.proposed)} as you propose"
+
+    def proves(self, hearing: Hearing) -> Sequence[Proof]:
+        """Return what the message proves to its receiver: the sender's part, with both values of the receiver."""
+        wanted = hearing.last(Proposal, hearing.receiver, hearing.sender)
+        own = hearing.last(Value, hearing.receiver, hearing.sender)
+        told = hearing.last(Value, hearing.sender, hearing.receiver)
+        if wanted is None or wanted.value is None or own is None or told is None:
+            return NOTHING
+        sides = ((own.value, self.now), (wanted.value, self.proposed))
+        return [
+            PartPays(hearing.sender, told.value, hearing.receiver, value, INFINITE if broken else cost)
+            for value, (broken, cost) in sides
+        ]

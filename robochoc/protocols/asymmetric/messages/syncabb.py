@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 from robochoc.model.communicative_acts import Act, Performative
+from robochoc.model.disclosure import NOTHING, Hearing, Proof, Total, can_take
 from robochoc.model.message import Message, Value
 from robochoc.model.wording import Wording, cost_text, incumbent_text
 from robochoc.protocols import acts
-from robochoc.protocols.optimization.messages.syncbb import BestPath, Cost
+from robochoc.protocols.optimization.messages.syncbb import BestPath, Cost, best_proves
 
 ASK = Act(Performative.QUERY_REF, "the sender asks what the receiver's own side of constraints adds to the cost")
 
@@ -24,6 +27,11 @@ class CPA(Message, frozen=True):
         """Return what the sender says."""
         values, known = words.partial(self.values), incumbent_text(self.best.bound)
         return f"so far {values}, which costs {cost_text(self.paid)}; {known}; it is {words.receiver}'s turn"
+
+    def proves(self, hearing: Hearing) -> Sequence[Proof]:
+        """Return what the message proves to its receiver."""
+        values = [can_take(*chosen) for chosen in zip(hearing.order, self.values, strict=False)]
+        return [*values, *best_proves(self.best, hearing)]
 
 
 class CPABack(Message, frozen=True):
@@ -45,6 +53,10 @@ class CPABack(Message, frozen=True):
         values = words.assigned([(self.robot, self.value)])
         return f"with {values} it costs {cost_text(self.paid)} so far; what does your side of it add?"
 
+    def proves(self, _: Hearing) -> Sequence[Proof]:
+        """Return what the message proves to its receiver."""
+        return [can_take(self.robot, self.value)]
+
 
 class FullBack(Message, frozen=True):
     """A complete CPA on its way back, for the receiver to add its own side towards all robots after it.
@@ -63,6 +75,10 @@ class FullBack(Message, frozen=True):
         values = words.partial(self.values)
         return f"all have values: {values}, which costs {cost_text(self.paid)} so far; what does your side add?"
 
+    def proves(self, hearing: Hearing) -> Sequence[Proof]:
+        """Return what the message proves to its receiver."""
+        return [can_take(*chosen) for chosen in zip(hearing.order, self.values, strict=False)]
+
 
 class Priced(Message, frozen=True):
     """The cost of the CPA with the receiver's value, now that all robots before have added their own sides."""
@@ -75,6 +91,21 @@ class Priced(Message, frozen=True):
         """Return what the sender says."""
         return f"with {words.receiver}'s value it costs {cost_text(self.paid)} in all"
 
+    def proves(self, hearing: Hearing) -> Sequence[Proof]:
+        """Return what the message proves to its receiver: what the CPA costs that it has sent back."""
+        above = hearing.order[: hearing.order.index(hearing.receiver)]
+        if not above:
+            return NOTHING
+        complete = hearing.last(FullBack, hearing.receiver, above[-1])
+        if complete is not None:
+            return [Total(dict(zip(hearing.order, complete.values, strict=False)), self.paid)]
+        taken_up = hearing.last(CPA, above[-1], hearing.receiver)
+        asked = next((one for name in above[::-1] if (one := hearing.last(CPABack, hearing.receiver, name))), None)
+        if taken_up is None or asked is None or asked.robot != hearing.receiver:
+            return NOTHING
+        view = dict(zip(above, taken_up.values, strict=False))
+        return [Total({**view, hearing.receiver: asked.value}, self.paid)]
+
 
 class TooCostly(Message, frozen=True):
     """The CPA with the receiver's value costs the bound or more, with the own sides of robots before."""
@@ -84,3 +115,7 @@ class TooCostly(Message, frozen=True):
     def in_words(self, words: Wording) -> str:
         """Return what the sender says."""
         return f"with {words.receiver}'s value it costs too much"
+
+    def proves(self, _: Hearing) -> Sequence[Proof]:
+        """Return what the message proves to its receiver."""
+        return NOTHING

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 from robochoc.model.communicative_acts import Act, Performative
+from robochoc.model.disclosure import NOTHING, Hearing, Proof
 from robochoc.model.message import Message
 from robochoc.model.wording import Wording
 from robochoc.protocols.local_search.messages.mgm import saving_in_words
@@ -23,3 +26,10 @@ class Transfer(Message, frozen=True):
         if self.entry is None:
             return "I have no costs to hand over to you"
         return f"you pay my side of our two values from now on: {saving_in_words(*self.entry)}"
+
+    def proves(self, _: Hearing) -> Sequence[Proof]:
+        """Return what the message proves to its receiver: nothing by itself.
+
+        The entry may have costs in it that were handed over before.
+        """
+        return NOTHING

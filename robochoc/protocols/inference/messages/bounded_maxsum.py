@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 from robochoc.model import message
 from robochoc.model.communicative_acts import Act, Performative
+from robochoc.model.disclosure import NOTHING, Hearing, Proof
 from robochoc.model.message import Message
 from robochoc.model.wording import Wording, cost_text, costs_text
 from robochoc.protocols import acts
@@ -29,6 +32,10 @@ class Dependency(Message, frozen=True):
             return f"no function joins me and {words.receiver}"
         return f"without our function, costs are at most {cost_text(self.weight)} off"
 
+    def proves(self, _: Hearing) -> Sequence[Proof]:
+        """Return what the message proves to its receiver."""
+        return NOTHING
+
 
 class Fragment(Message, frozen=True):
     """The root of the sender's part of the forest."""
@@ -40,6 +47,10 @@ class Fragment(Message, frozen=True):
     def in_words(self, words: Wording) -> str:  # noqa: ARG002 - the interface
         """Return what the sender says."""
         return f"my tree is that of {self.root}"
+
+    def proves(self, _: Hearing) -> Sequence[Proof]:
+        """Return what the message proves to its receiver."""
+        return NOTHING
 
 
 class Heaviest(Message, frozen=True):
@@ -56,6 +67,10 @@ class Heaviest(Message, frozen=True):
             return "nothing leads out of my branch"
         return f"the heaviest function out of my branch is that of {' and '.join(self.ends)}: {cost_text(self.weight)}"
 
+    def proves(self, _: Hearing) -> Sequence[Proof]:
+        """Return what the message proves to its receiver."""
+        return NOTHING
+
 
 class Choice(Message, frozen=True):
     """The robots of the function that joins this tree with another one. None: there is no other; the tree is done."""
@@ -70,6 +85,10 @@ class Choice(Message, frozen=True):
             return "our tree is done"
         return f"our tree is joined by the function of {' and '.join(self.ends)}"
 
+    def proves(self, _: Hearing) -> Sequence[Proof]:
+        """Return what the message proves to its receiver."""
+        return NOTHING
+
 
 class Join(Message, frozen=True):
     """Whether the sender's tree is joined with the receiver's by their function."""
@@ -82,6 +101,10 @@ class Join(Message, frozen=True):
         """Return what the sender says."""
         return f"my tree is {'' if self.joined else 'not '}joined with that of {words.receiver} here"
 
+    def proves(self, _: Hearing) -> Sequence[Proof]:
+        """Return what the message proves to its receiver."""
+        return NOTHING
+
 
 class NewRoot(Message, frozen=True):
     """The root of the tree that several have become; the sender is the receiver's parent."""
@@ -93,6 +116,10 @@ class NewRoot(Message, frozen=True):
     def in_words(self, words: Wording) -> str:  # noqa: ARG002 - the interface
         """Return what the sender says."""
         return f"we are in the tree of {self.root} now"
+
+    def proves(self, _: Hearing) -> Sequence[Proof]:
+        """Return what the message proves to its receiver."""
+        return NOTHING
 
 
 class Branch(Message, frozen=True):
@@ -112,6 +139,10 @@ class Branch(Message, frozen=True):
         """Return what the sender says."""
         return f"my branch costs {costs_text(self.costs)}, and up to {cost_text(self.cut)} more"
 
+    def proves(self, _: Hearing) -> Sequence[Proof]:
+        """Return what the message proves to its receiver: nothing by itself, as constraints are cut."""
+        return NOTHING
+
 
 class Assign(Message, frozen=True):
     """The receiver's value: the best for the value of the sender, who holds their function."""
@@ -123,3 +154,7 @@ class Assign(Message, frozen=True):
     def in_words(self, words: Wording) -> str:
         """Return what the sender says."""
         return f"take {self.value} as your value, {words.receiver}"
+
+    def proves(self, _: Hearing) -> Sequence[Proof]:
+        """Return what the message proves to its receiver."""
+        return NOTHING

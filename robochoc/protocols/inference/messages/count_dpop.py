@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Annotated
 
 import msgspec
 
 from robochoc.model.communicative_acts import Act, Performative
+from robochoc.model.disclosure import NOTHING, Hearing, Proof
 from robochoc.model.message import Message
 from robochoc.model.wording import Wording, counted
 from robochoc.protocols.inference.messages.dpop import Dimensions
@@ -41,3 +43,7 @@ class Counts(Message, frozen=True):
         """Return what the sender says."""
         cells = counted(len(self.numbers) // self.width, "cell")
         return f"in how many ways my subtree attains the costs of my table: {cells}, of {counted(self.width, 'byte')}"
+
+    def proves(self, _: Hearing) -> Sequence[Proof]:
+        """Return what the message proves to its receiver."""
+        return NOTHING

@@ -4,21 +4,19 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from typing import Annotated
 
 import msgspec
 
 from robochoc.model.communicative_acts import Act, Performative
 from robochoc.model.disclosure import (
-    INFINITE,
     NOTHING,
-    EveryValuePays,
     HasOnly,
     Hearing,
     Proof,
-    SomeValuePays,
     StandsAt,
+    table_proves,
 )
 from robochoc.model.message import Message, Value
 from robochoc.model.wording import Wording, cost_text, counted, listed
@@ -120,20 +118,20 @@ class UTIL(Message, frozen=True):
         return piece_in_words(self.costs, self.width)
 
     def proves(self, hearing: Hearing) -> Sequence[Proof] | None:
-        """Return what the message proves to its receiver. There is no rule for large tables, or MB-DPOP's.
+        """Return what the message proves to its receiver. There is no rule for large tables.
 
         For each combination of values, some value of the sender costs no more than its cell says: all that is below
         costs 0 at least. A sender whose neighbours are all above it has nobody below; then no value costs less.
         """
-        axes = _axes(hearing, hearing.receiver, hearing.sender)
+        axes = axes_of(hearing, hearing.receiver, hearing.sender)
         dimensions = hearing.last(Dimensions, hearing.sender, hearing.receiver)
         if axes is None or dimensions is None:
-            return None
+            return NOTHING  # told in another epoch, or as labels (MB-DPOP)
         shape = [dimensions.separator[robot] for robot in axes]
         cells = cells_of(self.costs, self.width)
         if len(cells) != math.prod(shape) or len(cells) > MOST_CELLS:
             return None
-        return _table_proves(dict(zip(axes, shape, strict=True)), cells, hearing)
+        return table_proves(axes, zip(itertools.product(*map(range, shape)), cells, strict=True), hearing)
 
 
 class VALUE(Message, frozen=True):
@@ -150,40 +148,16 @@ class VALUE(Message, frozen=True):
         places = listed([str(place + 1) for place in self.assignment])
         return f"by number, the values of the robots in your separator are {places}, the nearest robot first"
 
-    def proves(self, hearing: Hearing) -> Sequence[Proof] | None:
+    def proves(self, hearing: Hearing) -> Sequence[Proof]:
         """Return what the message proves to its receiver."""
-        axes = _axes(hearing, hearing.sender, hearing.receiver)
+        axes = axes_of(hearing, hearing.sender, hearing.receiver)
         if axes is None:
-            return None
+            return NOTHING  # told in another epoch
         known = [(robot, hearing.values(robot), place) for robot, place in zip(axes, self.assignment, strict=True)]
         return [StandsAt(robot, values[place]) for robot, values, place in known if values is not None]
 
 
-def _axes(hearing: Hearing, parent: str, child: str) -> Sequence[str] | None:
-    """Return the axes of a child's table. None: they were told otherwise than by DPOP's messages."""
+def axes_of(hearing: Hearing, parent: str, child: str) -> Sequence[str] | None:
+    """Return the axes of a child's table. None: they were not told in this run."""
     told = hearing.last(Proceed, parent, child)
     return None if told is None else told.separator
-
-
-def _table_proves(shape: Mapping[str, int], cells: Sequence[float], hearing: Hearing) -> Sequence[Proof]:
-    """Return what a whole table proves; `shape` has its axes.
-
-    Robots whose values the receiver does not know are left out of the views: what some value of the sender costs at
-    most with one of their values, it costs at most without them.
-    """
-    sender = hearing.sender
-    near = [(robot, hearing.values(robot)) for robot in hearing.neighbours(sender) if robot not in shape]
-    single = {robot: values[0] for robot, values in near if values is not None and len(values) == 1}
-    nobody_below = shape.keys() | single.keys() >= set(hearing.neighbours(sender))
-    least: dict[tuple[tuple[str, Value], ...], float] = {}
-    whole = all(hearing.values(robot) is not None for robot in shape)
-    for places, cost in zip(itertools.product(*map(range, shape.values())), cells, strict=True):
-        known = zip(shape, places, strict=True)
-        view = tuple([(robot, values[at]) for robot, at in known if (values := hearing.values(robot)) is not None])
-        least[view] = min(cost, least.get(view, INFINITE))
-    found: list[Proof] = []
-    for view, cost in least.items():
-        found.append(SomeValuePays(sender, {**single, **dict(view)}, cost))
-        if nobody_below and whole:
-            found.append(EveryValuePays(sender, {**single, **dict(view)}, cost))
-    return found

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 
 from robochoc.model import message as wire
 from robochoc.model.communicative_acts import Act, Performative
+from robochoc.model.disclosure import NOTHING, Hearing, Proof
 from robochoc.model.wording import Wording, costs_text
 from robochoc.protocols.inference.maxsum_factor import Row
 
@@ -26,6 +27,13 @@ class R(wire.Message, frozen=True):
         by = "our function" if many == 1 else f"our {many:,} functions, one after the other"
         return f"by {by}, {words.receiver}'s values cost {_rows_in_words(self.rows)}"
 
+    def proves(self, _: Hearing) -> Sequence[Proof]:
+        """Return what the message proves to its receiver.
+
+        Nothing by itself: costs are sums over many robots, and may be split, damped, or from zero.
+        """
+        return NOTHING
+
 
 class Q(wire.Message, frozen=True):
     """Messages from a variable to functions, a row for each of the receiver's functions, in the order of R.
@@ -42,6 +50,13 @@ class Q(wire.Message, frozen=True):
         many = len(self.rows)
         by = "our function" if many == 1 else f"each of our {many:,} functions in turn"
         return f"without {by}, {words.sender}'s values cost {_rows_in_words(self.rows)}"
+
+    def proves(self, _: Hearing) -> Sequence[Proof]:
+        """Return what the message proves to its receiver.
+
+        Nothing by itself: costs are sums over many robots, and may be split, damped, or from zero.
+        """
+        return NOTHING
 
 
 def _rows_in_words(rows: Sequence[Row]) -> str:

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from typing import Annotated
 
 import msgspec
 
 from robochoc.model.communicative_acts import Act, Performative
+from robochoc.model.disclosure import NOTHING, HasOnly, Hearing, Proof
 from robochoc.model.message import Message, Value
 from robochoc.model.wording import Wording, cost_text, counted, listed
 from robochoc.protocols import acts
@@ -27,6 +29,10 @@ class DomainAtDepth(Message, frozen=True):
     def in_words(self, words: Wording) -> str:
         """Return what the sender says."""
         return f"{counted(self.depth, 'robot')} above me in the tree; {words.domain(self.values)}"
+
+    def proves(self, hearing: Hearing) -> Sequence[Proof]:
+        """Return what the message proves to its receiver."""
+        return [HasOnly(hearing.sender, tuple(self.values))]
 
 
 class Axis(msgspec.Struct, frozen=True, array_like=True):
@@ -61,6 +67,10 @@ class Label(Message, frozen=True):
             f"{fixed}my table has {cells}{' over ' if axes else ''}{axes}, and no cost above {cost_text(self.dearest)}"
         )
 
+    def proves(self, _: Hearing) -> Sequence[Proof]:
+        """Return what the message proves to its receiver."""
+        return NOTHING
+
 
 class Context(Message, frozen=True):
     """Fixed values, as places, for the robots of the receiver's list of cycle-cut robots, in that order."""
@@ -73,3 +83,7 @@ class Context(Message, frozen=True):
         """Return what the sender says."""
         places = listed([str(place + 1) for place in self.values])
         return f"make your table for these values of the robots that are fixed, by number: {places}"
+
+    def proves(self, _: Hearing) -> Sequence[Proof]:
+        """Return what the message proves to its receiver."""
+        return NOTHING

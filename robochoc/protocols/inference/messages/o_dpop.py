@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 from robochoc.model.communicative_acts import Act, Performative
+from robochoc.model.disclosure import NOTHING, Hearing, Proof, table_proves
 from robochoc.model.message import Message
 from robochoc.model.wording import Wording, cost_text, listed
-from robochoc.protocols.inference.messages.dpop import Cost
+from robochoc.protocols.inference.messages.dpop import Cost, axes_of
 
 
 class Ask(Message, frozen=True):
@@ -16,6 +19,10 @@ class Ask(Message, frozen=True):
     def in_words(self, _: Wording) -> str:
         """Return what the sender says."""
         return "what is the next best for your subtree?"
+
+    def proves(self, _: Hearing) -> Sequence[Proof]:
+        """Return what the message proves to its receiver."""
+        return NOTHING
 
 
 class Good(Message, frozen=True):
@@ -35,6 +42,11 @@ class Good(Message, frozen=True):
         where = f", with the values {places} (by number) in my separator" if places else ""
         return f"the next best for my subtree costs {cost_text(self.cost)}{where}"
 
+    def proves(self, hearing: Hearing) -> Sequence[Proof]:
+        """Return what the message proves to its receiver: as much as the same cell of a table of DPOP."""
+        axes = axes_of(hearing, hearing.receiver, hearing.sender)
+        return NOTHING if axes is None else table_proves(axes, [(self.assignment, self.cost)], hearing)
+
 
 class Done(Message, frozen=True):
     """The sender has no more goods: all other combinations break something hard."""
@@ -44,3 +56,7 @@ class Done(Message, frozen=True):
     def in_words(self, _: Wording) -> str:
         """Return what the sender says."""
         return "nothing else is possible in my subtree"
+
+    def proves(self, _: Hearing) -> Sequence[Proof]:
+        """Return what the message proves to its receiver."""
+        return NOTHING

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from typing import Annotated
 
 import msgspec
 
 from robochoc.model.communicative_acts import Act, Performative
+from robochoc.model.disclosure import NOTHING, Hearing, Proof
 from robochoc.model.message import Message
 from robochoc.model.wording import Wording, cost_text, counted, listed
 from robochoc.protocols.inference.dpop_tables import Width, piece_in_words
@@ -51,6 +53,10 @@ class ClusterLabel(Message, frozen=True):
         table = f"my table has {cells}{over}{axes}, and no cost above {cost_text(self.dearest)}"
         return f"{table}; {_in_words(self.candidates)}" if self.candidates else table
 
+    def proves(self, _: Hearing) -> Sequence[Proof]:
+        """Return what the message proves to its receiver."""
+        return NOTHING
+
 
 class SepDegree(Message, frozen=True):
     """Who else may be cut for the sender and its cluster below; `most` is the largest memory need there by now."""
@@ -64,6 +70,10 @@ class SepDegree(Message, frozen=True):
         """Return what the sender says."""
         return _in_words(self.candidates) if self.candidates else "from me down, all tables are small enough"
 
+    def proves(self, _: Hearing) -> Sequence[Proof]:
+        """Return what the message proves to its receiver."""
+        return NOTHING
+
 
 class Allocation(Message, frozen=True):
     """The cluster root's choice: `robot` is cut, and fixed for the tables that it makes too large."""
@@ -75,6 +85,10 @@ class Allocation(Message, frozen=True):
     def in_words(self, _: Wording) -> str:
         """Return what the sender says."""
         return f"{self.robot} will be fixed; who else may be?"
+
+    def proves(self, _: Hearing) -> Sequence[Proof]:
+        """Return what the message proves to its receiver."""
+        return NOTHING
 
 
 class CutUTIL(Message, frozen=True):
@@ -94,6 +108,10 @@ class CutUTIL(Message, frozen=True):
         values = counted(len(self.places), "byte")
         return f"{piece_in_words(self.costs, self.width)}, with the values that are fixed for them ({values})"
 
+    def proves(self, _: Hearing) -> Sequence[Proof]:
+        """Return what the message proves to its receiver."""
+        return NOTHING
+
 
 class CutValue(Message, frozen=True):
     """The optimal values, as places, of the receiver's cut robots: those above it, then those from it down."""
@@ -106,6 +124,10 @@ class CutValue(Message, frozen=True):
         """Return what the sender says."""
         places = listed([str(place + 1) for place in self.values])
         return f"the best values of the robots that are fixed for you, or for others below, are by number {places}"
+
+    def proves(self, _: Hearing) -> Sequence[Proof]:
+        """Return what the message proves to its receiver."""
+        return NOTHING
 
 
 def _in_words(candidates: dict[str, Candidate]) -> str:

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 from robochoc.model.communicative_acts import Act, Performative
+from robochoc.model.disclosure import NOTHING, Hearing, Proof
 from robochoc.model.message import Message
 from robochoc.model.wording import Wording, listed
 
@@ -22,6 +25,10 @@ class Check(Message, frozen=True):
         news = f"the values of {listed(self.changed)} have changed" if self.changed else "no values have changed"
         return f"our tree stands, and above you {news}"
 
+    def proves(self, _: Hearing) -> Sequence[Proof]:
+        """Return what the message proves to its receiver."""
+        return NOTHING
+
 
 class Reuse(Message, frozen=True):
     """The sender's table is the one that the receiver has."""
@@ -31,3 +38,7 @@ class Reuse(Message, frozen=True):
     def in_words(self, _: Wording) -> str:
         """Return what the sender says."""
         return "my table is still the one that you have"
+
+    def proves(self, _: Hearing) -> Sequence[Proof]:
+        """Return what the message proves to its receiver."""
+        return NOTHING

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 from robochoc.model import message as wire
+from robochoc.model.disclosure import Hearing, Proof, can_take
 from robochoc.model.wording import Wording
 from robochoc.protocols import acts
 
@@ -18,3 +21,7 @@ class Tick(wire.Message, frozen=True):
     def in_words(self, words: Wording) -> str:
         """Return what the sender says."""
         return f"{words.own_value(self.value)} {'for good' if self.last else 'at present'}"
+
+    def proves(self, hearing: Hearing) -> Sequence[Proof]:
+        """Return what the message proves to its receiver."""
+        return [can_take(hearing.sender, self.value)]

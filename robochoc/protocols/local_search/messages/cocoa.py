@@ -2,8 +2,21 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 from robochoc.model import message as wire
 from robochoc.model.communicative_acts import Act, Performative
+from robochoc.model.disclosure import (
+    INFINITE,
+    NOTHING,
+    EveryValuePays,
+    HasOnly,
+    Hearing,
+    Proof,
+    SomeValuePays,
+    StandsAt,
+    can_take,
+)
 from robochoc.model.wording import Wording, counted
 from robochoc.protocols import acts
 from robochoc.protocols.local_search.messages.mgm import saving_in_words
@@ -28,6 +41,10 @@ class Inquiry(wire.Message, frozen=True):
         so_far = f"; so far {words.assigned(self.known.items())}" if self.known else ""
         return f"what would each of my {counted(len(self.values), 'value')} cost you at least?{so_far}"
 
+    def proves(self, hearing: Hearing) -> Sequence[Proof]:
+        """Return what the message proves to its receiver."""
+        return [HasOnly(hearing.sender, tuple(self.values)), *(can_take(*known) for known in self.known.items())]
+
 
 class Costs(wire.Message, frozen=True):
     """The answer to an inquiry: for each value that was asked for, the least that it would cost the sender."""
@@ -44,6 +61,24 @@ class Costs(wire.Message, frozen=True):
         price = saving_in_words(*self.burdens[place])
         return f"of your {counted(len(self.burdens), 'value')}, number {place + 1} would cost me least: {price}"
 
+    def proves(self, hearing: Hearing) -> Sequence[Proof]:
+        """Return what the message proves to its receiver: what values cost the sender, given others' final values.
+
+        Where it shares constraints with the receiver alone, and has no final value, all its values cost that much.
+        """
+        asked = hearing.last(Inquiry, hearing.receiver, hearing.sender)
+        if asked is None:
+            return NOTHING
+        alone = hearing.is_only_neighbour() and hearing.last(SetValue, hearing.sender, hearing.receiver) is None
+        found: list[Proof] = []
+        for value, (broken, cost) in zip(asked.values, self.burdens, strict=False):
+            view = {hearing.receiver: value}
+            if not broken:
+                found.append(SomeValuePays(hearing.sender, view, cost))
+            if alone:
+                found.append(EveryValuePays(hearing.sender, view, INFINITE if broken else cost))
+        return found
+
 
 class Hold(wire.Message, frozen=True):
     """The sender waits: too many of its values are equally good."""
@@ -53,6 +88,10 @@ class Hold(wire.Message, frozen=True):
     def in_words(self, _: Wording) -> str:
         """Return what the sender says."""
         return "I wait: too many of my values are equally good"
+
+    def proves(self, _: Hearing) -> Sequence[Proof]:
+        """Return what the message proves to its receiver."""
+        return NOTHING
 
 
 class SetValue(wire.Message, frozen=True):
@@ -65,3 +104,7 @@ class SetValue(wire.Message, frozen=True):
     def in_words(self, words: Wording) -> str:
         """Return what the sender says."""
         return f"{words.own_value(self.value)} for good"
+
+    def proves(self, hearing: Hearing) -> Sequence[Proof]:
+        """Return what the message proves to its receiver."""
+        return [StandsAt(hearing.sender, self.value)]

@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 from robochoc.model import message as wire
 from robochoc.model.communicative_acts import Act, Performative
+from robochoc.model.disclosure import NOTHING, Hearing, Proof, can_take
 from robochoc.model.wording import Wording, cost_text, counted, listed
 from robochoc.protocols import acts
 
@@ -24,6 +27,10 @@ class Value(wire.Message, frozen=True):
         """Return what the sender says."""
         return f"{words.own_value(self.value)} in this sample; {_record(self.kept)}"
 
+    def proves(self, hearing: Hearing) -> Sequence[Proof]:
+        """Return what the message proves to its receiver."""
+        return [can_take(hearing.sender, self.value)]
+
 
 class Difference(wire.Message, frozen=True):
     """The change of the subtree's cost since the last sample: broken hard constraints, and costs (BACKTRACK).
@@ -42,6 +49,10 @@ class Difference(wire.Message, frozen=True):
         changes += [_change(self.cost, f"{cost_text(abs(self.cost))} of cost")] if self.cost else []
         return f"by this sample my subtree has {listed(changes) or 'no other cost'}"
 
+    def proves(self, _: Hearing) -> Sequence[Proof]:
+        """Return what the message proves to its receiver: nothing by itself, as it is a difference of sums."""
+        return NOTHING
+
 
 def _change(number: int, text: str) -> str:
     return f"{text} {'more' if number > 0 else 'less'}"
@@ -57,3 +68,7 @@ class Finish(wire.Message, frozen=True):
     def in_words(self, _: Wording) -> str:
         """Return what the sender says."""
         return f"the search is over: take your value of the best sample; {_record(self.kept)}"
+
+    def proves(self, _: Hearing) -> Sequence[Proof]:
+        """Return what the message proves to its receiver."""
+        return NOTHING

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import itertools
 import math
+from collections.abc import Sequence
 
 from robochoc.model import message
 from robochoc.model.communicative_acts import Act, Performative
+from robochoc.model.disclosure import NOTHING, HasOnly, Hearing, Proof, table_proves
 from robochoc.model.message import Message
 from robochoc.model.wording import Wording, cost_text, listed
 from robochoc.protocols import acts
@@ -26,6 +29,10 @@ class Domain(Message, frozen=True):
     def in_words(self, words: Wording) -> str:
         """Return what the sender says."""
         return f"{words.domain(self.values)}; my depth in the tree is {self.level}"
+
+    def proves(self, hearing: Hearing) -> Sequence[Proof]:
+        """Return what the message proves to its receiver."""
+        return [HasOnly(hearing.sender, tuple(self.values))]
 
 
 class PreUtil(Message, frozen=True):
@@ -48,6 +55,10 @@ class PreUtil(Message, frozen=True):
         told = f"my subtree costs {span_in_words(self.costs)}, by the values of {names or 'nobody'}"
         return f"{told}; left out: {listed(name for name, _, _ in self.dropped)}" if self.dropped else told
 
+    def proves(self, hearing: Hearing) -> Sequence[Proof]:
+        """Return what the message proves to its receiver."""
+        return bounds_prove(self.axes, self.costs, hearing)
+
 
 class CPA(Message, frozen=True):
     """A request to search the receiver's subtree for less than `bound` (CPA).
@@ -64,6 +75,10 @@ class CPA(Message, frozen=True):
         """Return what the sender says."""
         return f"search your subtree {allowance(self.bound)}, with {places_in_words(self.places)}"
 
+    def proves(self, _: Hearing) -> Sequence[Proof]:
+        """Return what the message proves to its receiver."""
+        return NOTHING
+
 
 class InferCtxt(Message, frozen=True):
     """A request for a tighter table, with the values at these places (INFERCTXT)."""
@@ -75,6 +90,10 @@ class InferCtxt(Message, frozen=True):
     def in_words(self, _: Wording) -> str:
         """Return what the sender says."""
         return f"what does your subtree cost at least with {places_in_words(self.places)}?"
+
+    def proves(self, _: Hearing) -> Sequence[Proof]:
+        """Return what the message proves to its receiver."""
+        return NOTHING
 
 
 class CtxtUtil(Message, frozen=True):
@@ -90,6 +109,10 @@ class CtxtUtil(Message, frozen=True):
         names = listed(name for name, _, _ in self.axes)
         return f"with these values my subtree costs {span_in_words(self.costs)}, by the values of {names or 'nobody'}"
 
+    def proves(self, hearing: Hearing) -> Sequence[Proof]:
+        """Return what the message proves to its receiver, whichever request it answers."""
+        return bounds_prove(self.axes, self.costs, hearing)
+
 
 def places_in_words(places: dict[str, int]) -> str:
     """Return values, by their places."""
@@ -103,3 +126,9 @@ def span_in_words(costs: list[Number]) -> str:
         return "infinity"
     least, most = min(finite), max(finite)
     return f"at least {cost_text(least)}{'' if least == most else f' to {cost_text(most)}'}"
+
+
+def bounds_prove(axes: Sequence[Axis], costs: Sequence[Number], hearing: Hearing) -> Sequence[Proof]:
+    """Return what lower bounds over `axes` prove: as much as a table of DPOP, as they hold whatever is left out."""
+    places = itertools.product(*[range(size) for _, _, size in axes])
+    return table_proves([name for name, _, _ in axes], zip(places, costs, strict=True), hearing)

@@ -39,7 +39,7 @@ class Path(Message, frozen=True):
 
     def proves(self, hearing: Hearing) -> Sequence[Proof]:
         """Return what the message proves to its receiver."""
-        found = _best(self.best, hearing)
+        found = best_proves(self.best, hearing)
         view: dict[str, Value] = {}
         for robot, (value, cost) in zip(hearing.order, self.assignments, strict=False):
             found += [StandsAt(robot, value), Pays(robot, value, dict(view), cost, cost)]
@@ -64,7 +64,7 @@ class Backtrack(Message, frozen=True):
 
     def proves(self, hearing: Hearing) -> Sequence[Proof]:
         """Return what the message proves to its receiver."""
-        found = _best(self.best, hearing)
+        found = best_proves(self.best, hearing)
         path = hearing.last(Path, hearing.receiver, hearing.sender)
         if path is not None and hearing.is_lowest(hearing.sender):
             view = {robot: value for robot, (value, _) in zip(hearing.order, path.assignments, strict=False)}
@@ -90,9 +90,9 @@ class Terminate(Message, frozen=True):
     def proves(self, hearing: Hearing) -> Sequence[Proof]:
         """Return what the message proves to its receiver."""
         stands = [StandsAt(robot, value) for robot, value in zip(hearing.order, self.best.values, strict=False)]
-        return [*stands, *_best(self.best, hearing)]
+        return [*stands, *best_proves(self.best, hearing)]
 
 
-def _best(best: BestPath, hearing: Hearing) -> list[Proof]:
+def best_proves(best: BestPath, hearing: Hearing) -> list[Proof]:
     """Return what the best path proves."""
     return [Total(dict(zip(hearing.order, best.values, strict=False)), best.bound)] if best.values else []

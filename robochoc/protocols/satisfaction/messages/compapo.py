@@ -2,17 +2,22 @@
 
 from __future__ import annotations
 
+import itertools
 import math
+from collections.abc import Iterable, Iterator, Sequence
 
 import msgspec
 
 from robochoc.model.communicative_acts import Act, Performative
+from robochoc.model.disclosure import FINITE, NOTHING, Clash, HasOnly, Hearing, Pays, Proof, StandsAt
 from robochoc.model.message import Message, Value
 from robochoc.model.wording import Wording, counted, listed
 from robochoc.protocols import acts
 
 Changes = dict[str, tuple[int, int]]
 """New values of robots: the place in the robot's domain, and how often it has changed its value by then."""
+MOST_PROOFS = 4096
+"""For constraints with more combinations of values no rule says what they prove: it would take too long."""
 
 
 class Table(msgspec.Struct, frozen=True, array_like=True):
@@ -32,6 +37,13 @@ class Table(msgspec.Struct, frozen=True, array_like=True):
         if len(self.allowed) != -(-math.prod(self.sizes) // 8):
             raise ValueError("a table does not have a bit for each combination of values")
 
+    def allows(self, places: Iterable[int]) -> bool:
+        """Return whether the values at these `places` of the robots are allowed."""
+        at = 0
+        for place, size in zip(places, self.sizes, strict=True):
+            at = at * size + place
+        return bool(self.allowed[at >> 3] >> (at & 7) & 1)
+
 
 class Init(Message, frozen=True):
     """The sender's domain; it begins with the first value (`init`)."""
@@ -43,6 +55,10 @@ class Init(Message, frozen=True):
     def in_words(self, words: Wording) -> str:
         """Return what the sender says."""
         return words.domain(self.values)
+
+    def proves(self, hearing: Hearing) -> Sequence[Proof]:
+        """Return what the message proves to its receiver."""
+        return [HasOnly(hearing.sender, self.values), StandsAt(hearing.sender, self.values[0], (0,))]
 
 
 class Ok(Message, frozen=True):
@@ -56,6 +72,10 @@ class Ok(Message, frozen=True):
     def in_words(self, words: Wording) -> str:
         """Return what the sender says."""
         return f"{words.own_value(self.value)} from now on"
+
+    def proves(self, hearing: Hearing) -> Sequence[Proof]:
+        """Return what the message proves to its receiver."""
+        return [StandsAt(hearing.sender, self.value, (self.count,))]
 
 
 class Evaluate(Message, frozen=True):
@@ -72,6 +92,10 @@ class Evaluate(Message, frozen=True):
         known = f"I know the constraints of {counted(self.priority, 'robot')}"
         more = "; tell me yours" if self.tables else ""
         return f"let me mediate: keep {words.variables(words.receiver)} until I say more ({known}{more})"
+
+    def proves(self, _: Hearing) -> Sequence[Proof]:
+        """Return what the message proves to its receiver."""
+        return NOTHING
 
 
 class Evaluation(Message, frozen=True):
@@ -92,6 +116,13 @@ class Evaluation(Message, frozen=True):
         told = f"; my constraints are {counted(len(self.tables), 'table')}" if self.tables else ""
         return f"do mediate: I keep my value number {self.place + 1}{told}"
 
+    def proves(self, hearing: Hearing) -> Sequence[Proof] | None:
+        """Return what the message proves to its receiver: the sender's value, and what its constraints allow."""
+        if sum(math.prod(table.sizes) for table in self.tables) > MOST_PROOFS:
+            return None
+        told = [proof for table in self.tables for proof in _table_proves(table, self.tables, hearing)]
+        return [*_stands({hearing.sender: (self.place, self.count)}, hearing), *told]
+
 
 class Wait(Message, frozen=True):
     """The receiver may not mediate now: the sender is in a session of higher priority (`wait!`)."""
@@ -104,6 +135,10 @@ class Wait(Message, frozen=True):
         """Return what the sender says."""
         return "wait with your mediation: another one is going on here that comes first"
 
+    def proves(self, _: Hearing) -> Sequence[Proof]:
+        """Return what the message proves to its receiver."""
+        return NOTHING
+
 
 class Free(Message, frozen=True):
     """The sender, which told the receiver to wait, is in no session any more."""
@@ -113,6 +148,10 @@ class Free(Message, frozen=True):
     def in_words(self, _: Wording) -> str:
         """Return what the sender says."""
         return "you need not wait for me any more"
+
+    def proves(self, _: Hearing) -> Sequence[Proof]:
+        """Return what the message proves to its receiver."""
+        return NOTHING
 
 
 class Assign(Message, frozen=True):
@@ -127,6 +166,12 @@ class Assign(Message, frozen=True):
         """Return what the sender says."""
         return f"the mediation is over: take your value number {self.place + 1}{_with(self.changes)}"
 
+    def proves(self, hearing: Hearing) -> Sequence[Proof]:
+        """Return what the message proves to its receiver, and to its sender of the receiver's value."""
+        agreed = hearing.last(Evaluation, hearing.receiver, hearing.sender)
+        count = 0 if agreed is None else agreed.count + (agreed.place != self.place)
+        return _stands({**self.changes, hearing.receiver: (self.place, count)}, hearing)
+
 
 class Release(Message, frozen=True):
     """The end of a session for a robot that keeps its value: its neighbours' new values."""
@@ -139,8 +184,36 @@ class Release(Message, frozen=True):
         """Return what the sender says."""
         return f"the mediation is over: {words.variables(words.receiver)} may change again{_with(self.changes)}"
 
+    def proves(self, hearing: Hearing) -> Sequence[Proof]:
+        """Return what the message proves to its receiver."""
+        return _stands(self.changes, hearing)
+
 
 def _with(changes: Changes) -> str:
     """Return the new values of others in words; empty if there are none."""
     told = [f"{robot} now has its value number {place + 1}" for robot, (place, _) in changes.items()]
     return f"; {listed(told)}" if told else ""
+
+
+def _stands(changes: Changes, hearing: Hearing) -> list[Proof]:
+    """Return where robots stand, as far as the observer knows their values."""
+    known = [(robot, hearing.values(robot), place, count) for robot, (place, count) in changes.items()]
+    return [StandsAt(robot, values[place], (count,)) for robot, values, place, count in known if values is not None]
+
+
+def _table_proves(table: Table, tables: Sequence[Table], hearing: Hearing) -> Iterator[Proof]:
+    """Yield what one of the sender's `tables` proves: which values clash, and which go with all of its constraints.
+
+    Nothing is concluded if the receiver does not know whose values the places stand for.
+    """
+    values = [hearing.values(robot) for robot in table.robots]
+    if any(known is None for known in values):
+        return
+    within = [other for other in tables if {*other.robots} <= {*table.robots}]
+    for places in itertools.product(*map(range, table.sizes)):
+        at = dict(zip(table.robots, places, strict=True))
+        view = {robot: known[at[robot]] for robot, known in zip(table.robots, values, strict=True) if known is not None}
+        if not table.allows(places):
+            yield Clash(view)
+        elif all(other.allows(at[robot] for robot in other.robots) for other in within):
+            yield Pays(hearing.sender, view.pop(hearing.sender), view, 0, FINITE)

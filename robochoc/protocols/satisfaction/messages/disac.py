@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 from robochoc.model.communicative_acts import Act, Performative
+from robochoc.model.disclosure import NOTHING, HasOnly, Hearing, Proof
 from robochoc.model.message import Message, Value
 from robochoc.model.wording import Wording, counted
 from robochoc.protocols import acts
@@ -19,6 +22,10 @@ class Domain(Message, frozen=True):
         """Return what the sender says."""
         return words.domain(self.values)
 
+    def proves(self, hearing: Hearing) -> Sequence[Proof]:
+        """Return what the message proves to its receiver."""
+        return [HasOnly(hearing.sender, self.values)]
+
 
 class Del(Message, frozen=True):
     """Values that the sender has removed, as places in its domain (`del`)."""
@@ -30,3 +37,10 @@ class Del(Message, frozen=True):
     def in_words(self, words: Wording) -> str:
         """Return what the sender says."""
         return f"{counted(len(self.places), 'value')} of {words.variables(words.sender)} can be in no solution"
+
+    def proves(self, _: Hearing) -> Sequence[Proof]:
+        """Return what the message proves to its receiver: nothing by itself.
+
+        It may follow from any robot's constraints.
+        """
+        return NOTHING

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Annotated
 
 import msgspec
 
 from robochoc.model import message as wire
 from robochoc.model.communicative_acts import Act, Performative
+from robochoc.model.disclosure import NOTHING, Hearing, Proof, can_take
 from robochoc.model.wording import Wording, cost_text
 from robochoc.protocols import acts
 
@@ -35,6 +37,10 @@ class Place(wire.Message, frozen=True):
             return f"{parent}; the tree is complete, with a height of {self.height}"
         return f"{parent}, at a distance of {self.distance}"
 
+    def proves(self, _: Hearing) -> Sequence[Proof]:
+        """Return what the message proves to its receiver."""
+        return NOTHING
+
 
 class Step(wire.Message, frozen=True):
     """The sender's value in its next step (a cycle): the receiver may have to charge for it."""
@@ -47,6 +53,10 @@ class Step(wire.Message, frozen=True):
         """Return what the sender says."""
         return f"{words.own_value(self.value)} in the next step that is to be priced"
 
+    def proves(self, hearing: Hearing) -> Sequence[Proof]:
+        """Return what the message proves to its receiver."""
+        return [can_take(hearing.sender, self.value)]
+
 
 class Paid(wire.Message, frozen=True):
     """The cost of the next step in the sender's subtree."""
@@ -58,6 +68,10 @@ class Paid(wire.Message, frozen=True):
     def in_words(self, _: Wording) -> str:
         """Return what the sender says."""
         return f"my subtree pays {cost_text(self.cost)} for the next step"
+
+    def proves(self, _: Hearing) -> Sequence[Proof]:
+        """Return what the message proves to its receiver: nothing by itself, as it is a sum over many robots."""
+        return NOTHING
 
 
 class Best(wire.Message, frozen=True):
@@ -72,6 +86,10 @@ class Best(wire.Message, frozen=True):
         if self.step is None:
             return "all steps so far broke a hard constraint"
         return f"the best step so far is that of cycle {self.step}"
+
+    def proves(self, _: Hearing) -> Sequence[Proof]:
+        """Return what the message proves to its receiver."""
+        return NOTHING
 
 
 AnytimeMessage = Place | Step | Paid | Best

@@ -5,10 +5,12 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
+from lxml import etree
 
 from robochoc.formats import InvalidInputError, check_team
 from robochoc.formats.dialects.dialect import ImportOptions
 from robochoc.formats.dialects.registry import dialect_called, read_foreign, recognise
+from robochoc.formats.dialects.xcsp21.xdiscsp_file import xdiscsp_file
 from robochoc.model.assembly import assemble
 from robochoc.model.constraint import Constraint, ConstraintModel, Domain, Function, Relation, Semantics, Variable
 from robochoc.model.cost_units import CostUnits
@@ -124,6 +126,14 @@ def team_with(constraint: Constraint, units: CostUnits = CostUnits()) -> Team:  
 
 def _soft(cost: int) -> Constraint:
     return Constraint("c", Relation("r", 1, Semantics.SOFT, ((1,),), (cost,), 0), ("xa",), ("xa",))
+
+
+def test_dcopsolver_finds_the_format_the_type_and_a_benchmark_in_the_presentation() -> None:
+    (content,) = xdiscsp_file(team_with(_soft(1))).values()
+    presentation = etree.fromstring(content).find("presentation")
+    assert presentation is not None
+    wanted = {"format": "XDisCSP 1.0", "type": "DCOP", "benchmark": "RandomDCOP"}
+    assert {name: presentation.get(name) for name in wanted} == wanted
 
 
 def test_what_cannot_be_written_is_refused_by_name() -> None:
