@@ -3,22 +3,26 @@
 from __future__ import annotations
 
 import html
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 
 from robochoc.model.wording import counted, listed
 from robochoc.privacy.losses import Kind, Measure, PrivacyReport
 
-_CELL, _LABELS, _FONT = 34, 120, 12
+_CELL, _SMALL_CELL = 34, 16
 MOST_NUMBERED = 40
-"""With more robots the cells are too many for numbers in them."""
+"""With more robots the cells are small, and have no numbers in them."""
+_LONGEST_LABEL, _LETTER = 16, 7.5
+"""Longer names are cut; the width of a letter at most."""
 _DARK = 0.55
 """From this loss on a cell is so dark that its number is white."""
 _STYLE = """
 :root { color-scheme: light dark; }
 body { font: 16px/1.5 system-ui, sans-serif; max-width: 72rem; margin: 0 auto; padding: 1rem; }
-h1 { font-size: 1.6rem; } h2 { font-size: 1.2rem; margin-top: 2.2rem; }
-figure { margin: 0; overflow-x: auto; } figcaption { font-size: .85rem; opacity: .8; }
-figure svg { background: #fff; border-radius: 4px; }
+h1 { font-size: 1.6rem; } h2 { font-size: 1.2rem; margin-top: 2.2rem; } h3 { font-size: 1rem; margin-top: 2rem; }
+figure { margin: 0; overflow-x: auto; }
+svg { display: block; font: 12px system-ui, sans-serif; } text { fill: currentColor; }
+rect { fill: #a5141e; stroke: currentColor; stroke-opacity: .25; } .unknown { fill: #888; fill-opacity: .4; }
+text.number { font-size: 10px; text-anchor: middle; } text.white { fill: #fff; }
 table { border-collapse: collapse; font-variant-numeric: tabular-nums; font-size: .9rem; }
 th, td { padding: .2rem .8rem .2rem 0; text-align: right; white-space: nowrap; }
 th:first-child, td:first-child { text-align: left; }
@@ -54,10 +58,27 @@ def _body(report: PrivacyReport, measure: Measure) -> Iterator[str]:
     if report.undecided:
         yield f"<p>No decisions: {html.escape(report.undecided)}.</p>"
     yield _systems(report)
+    if report.kinds():
+        yield (
+            f"<h2>Who knows how much of whom, by {measure}</h2>"
+            "<p>A row for each robot that has secrets, a column for each observer. Where no cell is, there is no"
+            f" secret.</p>{_legend()}"
+        )
     for kind in report.kinds():
-        yield f"<h2>{kind.capitalize()}: {_SECRETS[kind]}</h2>"
-        caption = f"Loss by {measure}. A row for each robot that has secrets, a column for each observer."
-        yield f"<figure>{heat_map(report, kind, measure)}<figcaption>{caption}</figcaption></figure>"
+        caption = f"{kind.capitalize()}: {_SECRETS[kind]}"
+        drawn = heat_map(report, kind, measure)
+        yield f"<h3>{caption}</h3><figure>{drawn}</figure>"
+
+
+def _legend() -> str:
+    """Return an SVG with the colours of losses."""
+    losses = (0.0, 0.25, 0.5, 0.75, 1.0, None)
+    cells = "".join(_cell(_CELL * place + 1, 1, _CELL, loss) for place, loss in enumerate(losses))
+    beside = _CELL * len(losses) + 8
+    return (
+        f'<svg xmlns="http://www.w3.org/2000/svg" width="{beside + 90}" height="{_CELL + 2}" role="img">'
+        f'<title>Colours of losses</title>{cells}<text x="{beside}" y="{_CELL // 2 + 5}">?: not known</text></svg>'
+    )
 
 
 def _systems(report: PrivacyReport) -> str:
@@ -72,52 +93,48 @@ def _systems(report: PrivacyReport) -> str:
 def heat_map(report: PrivacyReport, kind: Kind, measure: Measure) -> str:
     """Return an SVG with a cell for each pair of a subject (row) and an observer (column)."""
     found = {(loss.subject, loss.observer): loss.by(measure) for loss in report.losses if loss.kind is kind}
-    size = _LABELS + _CELL * len(report.robots)
-    parts = [*_labels(report), *_cells(report, found)]
+    names = [name if len(name) <= _LONGEST_LABEL else f"{name[: _LONGEST_LABEL - 1]}…" for name in report.robots]
+    room = round(_LETTER * max(map(len, names))) + 8
+    width = _CELL if len(names) <= MOST_NUMBERED else _SMALL_CELL
+    size = room + width * len(names) + 1
+    parts = [*_labels(names, room, width), *_cells(report.robots, found, room, width)]
     return (
         f'<svg xmlns="http://www.w3.org/2000/svg" width="{size}" height="{size}" viewBox="0 0 {size} {size}"'
-        f' role="img" font-family="system-ui, sans-serif" font-size="{_FONT}">'
-        f"<title>{html.escape(f'Loss of {kind} by {measure}')}</title>{''.join(parts)}</svg>"
+        f' role="img"><title>{html.escape(f"Loss of {kind} by {measure}")}</title>{"".join(parts)}</svg>'
     )
 
 
-def _labels(report: PrivacyReport) -> Iterator[str]:
-    for place, robot in enumerate(report.robots):
-        name = html.escape(robot if len(robot) <= _FONT else f"{robot[: _FONT - 1]}…")
-        middle = _LABELS + _CELL * place + _CELL // 2
-        yield f'<text x="{_LABELS - 6}" y="{middle + 4}" text-anchor="end">{name}</text>'
-        yield f'<text transform="translate({middle + 4} {_LABELS - 6}) rotate(-90)">{name}</text>'
+def _labels(names: Sequence[str], room: int, width: int) -> Iterator[str]:
+    """Yield the names before the rows and above the columns."""
+    for place, name in enumerate(names):
+        text = html.escape(name)
+        middle = room + width * place + width // 2
+        yield f'<text x="{room - 6}" y="{middle + 4}" text-anchor="end">{text}</text>'
+        yield f'<text transform="translate({middle + 4} {room - 6}) rotate(-90)">{text}</text>'
 
 
-def _cells(report: PrivacyReport, found: Mapping[tuple[str, str], float | None]) -> Iterator[str]:
-    for row, subject in enumerate(report.robots):
-        for column, observer in enumerate(report.robots):
-            pair = (subject, observer)
-            if pair not in found:
-                continue
-            loss = found[pair]
-            x, y = _LABELS + _CELL * column, _LABELS + _CELL * row
-            told = html.escape(f"{observer} of {subject}: {_text(loss)}")
-            yield (
-                f'<g><title>{told}</title><rect x="{x}" y="{y}" width="{_CELL - 1}" height="{_CELL - 1}"'
-                f' fill="{_colour(loss)}"/>'
-            )
-            if len(report.robots) <= MOST_NUMBERED:
-                ink = "#fff" if loss is not None and loss >= _DARK else "#222"
-                number = "?" if loss is None else f"{loss:.2f}"
-                yield (
-                    f'<text x="{x + _CELL // 2}" y="{y + _CELL // 2 + 4}" text-anchor="middle" font-size="10"'
-                    f' fill="{ink}">{number}</text>'
-                )
-            yield "</g>"
+def _cells(
+    robots: Sequence[str], found: Mapping[tuple[str, str], float | None], room: int, width: int
+) -> Iterator[str]:
+    """Yield a cell for each pair with a secret."""
+    for row, subject in enumerate(robots):
+        for column, observer in enumerate(robots):
+            if (subject, observer) in found:
+                loss = found[subject, observer]
+                told = html.escape(f"{observer} of {subject}: {_text(loss)}")
+                cell = _cell(room + width * column, room + width * row, width, loss)
+                yield f"<g><title>{told}</title>{cell}</g>"
 
 
-def _colour(loss: float | None) -> str:
-    """Return from near white (no loss) to dark red (all is known); grey: not known."""
-    if loss is None:
-        return "#ccc"
-    red, green, blue = (round(start + (end - start) * loss) for start, end in ((253, 140), (245, 20), (240, 30)))
-    return f"#{red:02x}{green:02x}{blue:02x}"
+def _cell(x: int, y: int, width: int, loss: float | None) -> str:
+    """Return a square, the redder the more is known, grey where that is not known; with a number if there is room."""
+    filled = 'class="unknown"' if loss is None else f'fill-opacity="{loss:.3f}"'
+    square = f'<rect x="{x}" y="{y}" width="{width}" height="{width}" {filled}/>'
+    if width < _CELL:
+        return square
+    ink = "number white" if loss is not None and loss >= _DARK else "number"
+    number = "?" if loss is None else f"{loss:.2f}"
+    return f'{square}<text x="{x + width // 2}" y="{y + width // 2 + 4}" class="{ink}">{number}</text>'
 
 
 def _text(loss: float | None) -> str:

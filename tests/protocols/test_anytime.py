@@ -285,6 +285,11 @@ def test_who_does_not_go_in_step_refuses_it() -> None:
         settings_of(protocol_named("a-dsa"), {"anytime": "yes"})
 
 
+def test_who_keeps_the_best_sample_anyway_has_no_such_setting() -> None:
+    with pytest.raises(SettingsError, match="'anytime' is no setting of this protocol: it has cycles, temperature"):
+        settings_of(protocol_named("d-gibbs"), {"anytime": "yes"})
+
+
 def test_arrays_refuse_it() -> None:
     with pytest.raises(UnsupportedError, match="anytime=yes is for robots that send messages"):
         ArraysRun(path(3), DSA, parameters=RunParameters(0, {"anytime": "yes"}))

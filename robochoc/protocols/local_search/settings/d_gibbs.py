@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import math
 
-from robochoc.protocols.shared.settings.cycles import CycleSettings
+from robochoc.protocols.shared.settings.cycles import CycleCount
 
 
-class DGibbsSettings(CycleSettings, frozen=True):
+class DGibbsSettings(CycleCount, frozen=True):
     """`temperature`: the cost by which a value may be dearer and still be drawn e times less often.
 
     `cooling`: by what it is multiplied after each cycle. `hard`: a value that breaks a hard constraint more is drawn
