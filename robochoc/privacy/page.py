@@ -60,9 +60,9 @@ def _body(report: PrivacyReport, measure: Measure) -> Iterator[str]:
     yield _systems(report)
     if report.kinds():
         yield (
-            f"<h2>Who knows how much of whom, by {measure}</h2>"
-            "<p>A row for each robot that has secrets, a column for each observer. Where no cell is, there is no"
-            f" secret.</p>{_legend()}"
+            "<h2>Who knows how much of whom</h2>"
+            f"<p>Loss by {measure}. A row for each robot that has secrets, a column for each observer. Where no cell"
+            f" is, there is no secret.</p>{_legend()}"
         )
     for kind in report.kinds():
         caption = f"{kind.capitalize()}: {_SECRETS[kind]}"
