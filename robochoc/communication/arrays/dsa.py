@@ -20,7 +20,7 @@ class ArrayDSA(CycleRun):
         self.tell_values()
 
     def _step(self) -> None:
-        """Move or stay (`StochasticSearch._choose`)."""
+        """Move or stay (`StochasticSearch.choice`)."""
         found = self.burdens()
         self.hear()
         self.count_checks(self.all_checks)

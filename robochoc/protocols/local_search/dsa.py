@@ -21,7 +21,7 @@ Its Algorithm 1, line by line:
     randomly choose a value                                        `begin`
     while no termination condition is met: send the value, if      `tell_value`
       it is new, collect neighbours' new values
-    select and assign the next value (Table 1)                     `_choose`
+    select and assign the next value (Table 1)                     `choice`
 
 Choices that the paper leaves open, and differences:
 
@@ -54,8 +54,8 @@ from robochoc.protocols.traits import ENDS_WITH_PROOF, Traits
 from robochoc.solver.compiled import LexicographicCost
 
 
-class StochasticSearch(CycleProtocol):
-    """The common base of DSA and its kin: all robots send their values, and each moves with some probability."""
+class OnePhase(CycleProtocol):
+    """The common base of searches with one phase: all robots send their values, and each chooses its next one."""
 
     def begin(self) -> None:
         """Take a random value."""
@@ -63,18 +63,29 @@ class StochasticSearch(CycleProtocol):
         self.tell_value(self._choose)
 
     @abstractmethod
-    def proposal(self, burdens: Sequence[LexicographicCost]) -> tuple[list[int], float]:
-        """Return the values that this robot may move to, where its own cost `burdens`, and with what probability."""
+    def choice(self, burdens: Sequence[LexicographicCost]) -> int:
+        """Return the own value of the next cycle, where the own values cost `burdens`."""
 
     def _choose(self, messages: Mapping[str, Message]) -> None:
         """Move or stay, with all neighbours' values known."""
-        places, probability = self.proposal(self.problem.lexicographic_costs(values_in(messages)))
-        index = self.present
-        if places and probability and self.chance() < probability:
-            index = self.any_of(places)
-        self.take(index)
+        self.take(self.choice(self.problem.lexicographic_costs(values_in(messages))))
         if not self.over:
             self.tell_value(self._choose)
+
+
+class StochasticSearch(OnePhase):
+    """The common base of DSA and its kin: each robot moves with some probability."""
+
+    @abstractmethod
+    def proposal(self, burdens: Sequence[LexicographicCost]) -> tuple[list[int], float]:
+        """Return the values that this robot may move to, where its own cost `burdens`, and with what probability."""
+
+    def choice(self, burdens: Sequence[LexicographicCost]) -> int:
+        """Return one of the proposed values, with their probability, or else the present one."""
+        places, probability = self.proposal(burdens)
+        if places and probability and self.chance() < probability:
+            return self.any_of(places)
+        return self.present
 
     def places_of(self, burden: LexicographicCost, burdens: Sequence[LexicographicCost]) -> list[int]:
         """Return the values other than the present one that cost as much as `burden`."""

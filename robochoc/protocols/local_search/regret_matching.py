@@ -1,0 +1,118 @@
+"""Regret matching: plain (RM), clipped (RM+), and weighted with inertia (WRM-I).
+
+Local search in cycles. The regret of a value is what a robot would have saved so far by that value, instead of those
+that it had, while its neighbours had theirs. In each cycle a robot draws a value with a probability proportional to
+its regret, if that is positive. So it follows what has paid over many cycles, and not only what pays now.
+
+- **When to use**: as `dsa`, with time for thirty cycles or more.
+- **Guarantees**: incomplete; it stops after `cycles` cycles, without a proof of optimality. The result is the best
+  cycle (anytime); costs rise and fall. A robot with an empty domain proves that there is no solution.
+- **Parameters (`--set`)**: `variant` (rm or rm+; default rm+), `weight` (the fading memory rho: a cycle counts for this
+  part of the regret, those before for the rest; 0: all cycles count alike; default 0.1), `inertia` (the probability to
+  keep a value whatever is regretted; default 0.1), `cycles` (default 100).
+- **References**: Hart, Mas-Colell: "A simple adaptive procedure leading to correlated equilibrium", Econometrica 68,
+  2000 (regret matching); Marden, Arslan, Shamma: "Regret based dynamics: convergence in weakly acyclic games",
+  AAMAS 2007 (fading memory and inertia); Chapman, Rogers, Jennings, Leslie: "A unifying framework for iterative
+  approximate best-response algorithms for distributed constraint optimization problems", Knowledge Engineering Review
+  26, 2011 (WRM-I); Tammelin: "Solving large imperfect information games using CFR+", 2014 (RM+).
+
+The rules, where u is what a value would cost against the neighbours' values of the cycle before:
+
+    regret(k) <- (1 - rho) regret(k) + rho (u(now) - u(k))    `_learn`
+    rm+: max(regret(k), 0) instead                            `_learn`
+    draw k in proportion to max(regret(k), 0)                 `_drawn`
+    inertia; nothing regretted: keep the value                `choice`
+
+Choices that the papers leave open, and differences:
+
+- Regrets are unconditional: one for each value, and not one for each pair of a value and its substitute. They compare
+  with the value that the robot had, as Hart and Mas-Colell do, and not with the mean of what it might have drawn.
+- Who regrets nothing keeps its value, as in the paper of Marden and others. So a local optimum, once all have learnt
+  it, is kept.
+- A broken hard constraint costs 1 more than any own value has cost until then, broken ones not counted.
+- Regrets are integers, in 65,536ths of a cost: nothing depends on how a machine rounds. Rounding is down.
+- First values are random, and constraints may be n-ary, as in `dsa`.
+
+>>> from robochoc.communication.simulator.schedule import Concurrent
+>>> from robochoc.communication.simulator.simulator import Simulation
+>>> from robochoc.generators.queens3d import queens3d
+>>> result = Simulation(queens3d(3), RegretMatching, Concurrent(seed=0)).search()
+>>> result.metrics.messages
+{'Value': 5600}
+"""
+
+from __future__ import annotations
+
+from bisect import bisect_right
+from collections.abc import Mapping, Sequence
+from itertools import accumulate
+from typing import ClassVar
+
+from robochoc.protocols.local_search.dsa import OnePhase
+from robochoc.protocols.local_search.settings.regret_matching import RegretMatchingSettings
+from robochoc.protocols.order import PriorityOrder
+from robochoc.protocols.shared.messages.anytime import AnytimeMessage
+from robochoc.protocols.shared.messages.cycles import Value
+from robochoc.protocols.traits import ENDS_WITH_PROOF, Traits
+from robochoc.solver.compiled import LexicographicCost, LocalProblem
+
+UNIT = 1 << 16
+"""What a regret of one cost is: room for fractions that integers hold exactly."""
+
+CHANCES = 1 << 53
+"""Random numbers are multiples of one part of so many."""
+
+
+class RegretMatching(OnePhase):
+    """One agent of regret matching. A cycle has one phase: all robots send their values.
+
+    `regrets`: for each own value, what it would have saved, in 65,536ths of a cost.
+    """
+
+    messages = Value | AnytimeMessage
+    settings: ClassVar[RegretMatchingSettings] = RegretMatchingSettings()
+    traits = Traits(
+        concludes=ENDS_WITH_PROOF,
+        paper="Hart & Mas-Colell 2000; Chapman, Rogers, Jennings, Leslie 2011",
+        complete=False,
+        costs=True,
+        shared_scopes=True,
+        writes_to_non_neighbours=False,
+        privacy="constraints among others",
+        use_when="as DSA: it follows what has paid over many cycles",
+    )
+
+    def __init__(self, problem: LocalProblem, order: PriorityOrder) -> None:
+        super().__init__(problem, order)
+        self.regrets = [0] * len(problem.values)
+        self._most = 0
+        """The most that any value has cost so far; a broken constraint counts for 1 more."""
+
+    def choice(self, burdens: Sequence[LexicographicCost]) -> int:
+        """Return a value that is regretted, or the present one by inertia, or where nothing is."""
+        self._most = max(self._most, *(int(cost) for _, cost in burdens))
+        self._learn([broken * (self._most + 1) + int(cost) for broken, cost in burdens])
+        wanted = [max(regret, 0) for regret in self.regrets]
+        if not any(wanted) or self.chance() < self.settings.inertia:
+            return self.present
+        return self._drawn(wanted)
+
+    def value_notes(self, index: int) -> Mapping[str, float]:
+        """Return the regret of the value at `index`, for a replay."""
+        return {"regret": self.regrets[index] / UNIT}
+
+    def _learn(self, costs: Sequence[int]) -> None:
+        """Add to the regrets what each value would have saved in this cycle, where own values cost `costs`."""
+        now = costs[self.present]
+        weight = round(self.settings.weight * UNIT)
+        clipped = self.settings.variant == "rm+"
+        for place, cost in enumerate(costs):
+            before, saved = self.regrets[place], (now - cost) * UNIT
+            regret = before + ((saved - before) * weight // UNIT if weight else saved)
+            self.regrets[place] = max(regret, 0) if clipped else regret
+
+    def _drawn(self, wanted: Sequence[int]) -> int:
+        """Return a random place, each with a probability proportional to what is wanted there."""
+        sums = list(accumulate(wanted))
+        point = int(self.chance() * CHANCES) * sums[-1] // CHANCES
+        return bisect_right(sums, point)
