@@ -11,6 +11,7 @@ from robochoc.journal.given import run_parameters_of
 from robochoc.journal.journal import Journal
 from robochoc.model.message import Message, Value
 from robochoc.model.outcome import Verdict
+from robochoc.model.problem import ConstraintModel
 from robochoc.privacy.losses import Kind, Loss, PrivacyReport, loss_between
 from robochoc.privacy.observer import Observer, Scene
 from robochoc.privacy.possible import Secret
@@ -76,6 +77,8 @@ class _Measured:
             order=self._team.order,
             branches=self._branches(),
             fixed_holders=not robots.protocol.traits.shared_scopes,
+            one_sided=robots.protocol.traits.asymmetric
+            and any(one.model is ConstraintModel.PKC for one in self._team.constraints()),
             minimises=any(host.protocol.problem.has_costs for host in robots.hosts.values()),
         )
         self._observers = {

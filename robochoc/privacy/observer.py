@@ -43,6 +43,8 @@ class Scene(NamedTuple):
         branches: By robot, the robots whose values its partial assignments hold.
         fixed_holders: As in `Hearing`.
         minimises: As in `Hearing`.
+        one_sided: Costs in messages may be those of one robot's part of a partially known constraint. No rule is about
+            these: own costs and totals are those of both sides together (`model/disclosure.py`).
     """
 
     secrets: TeamSecrets
@@ -50,6 +52,7 @@ class Scene(NamedTuple):
     branches: Mapping[str, Sequence[str]]
     fixed_holders: bool
     minimises: bool
+    one_sided: bool
 
 
 class _Stand(NamedTuple):
@@ -81,13 +84,13 @@ class Observer:
         self._note(message, self.name, receiver)
         if message.act.performative not in _DECIDING:
             return
-        for proof in message.proves(_Heard(self._scene, self.name, receiver, self._values, self._last)) or ():
+        for proof in self._proofs(message, self.name, receiver) or ():
             if isinstance(proof, StandsAt) and (proof.stamp == AT_THE_END or proof.robot == receiver):
                 self._learn(proof)
 
     def hears(self, sender: str, message: Message) -> None:
         """Take in a message, and all that it proves."""
-        proofs = message.proves(_Heard(self._scene, sender, self.name, self._values, self._last))
+        proofs = self._proofs(message, sender, self.name)
         self._note(message, sender, self.name)
         if proofs is None:
             self.without_rule.add(type(message).__name__)
@@ -97,7 +100,7 @@ class Observer:
 
     def misses(self, sender: str, message: Message) -> None:
         """Forget where a robot stands if a message that does not arrive any more says otherwise."""
-        for proof in message.proves(_Heard(self._scene, sender, self.name, self._values, self._last)) or ():
+        for proof in self._proofs(message, sender, self.name) or ():
             if isinstance(proof, StandsAt | StandsWhere):
                 self._stands.pop(proof.robot, None)
 
@@ -115,6 +118,12 @@ class Observer:
         if stand.cases is None:
             return list(stand.values)
         return [stand.values[place] for place in self.knowledge.open_cases(stand.cases)]
+
+    def _proofs(self, message: Message, sender: str, receiver: str) -> Sequence[Proof] | None:
+        """Return what a message proves; None: there is no rule."""
+        if self._scene.one_sided:
+            return None
+        return message.proves(_Heard(self._scene, sender, receiver, self._values, self._last))
 
     def _learn(self, proof: Proof) -> None:
         """Put what a message proves in terms of secrets."""

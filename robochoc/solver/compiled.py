@@ -188,6 +188,13 @@ class LocalProblem(LocalConstraints):
         self.checks += len(known)
         return _lexicographic_cost([paid[index] for paid in known])
 
+    def least_side(self, robot: str) -> list[Cost]:
+        """Return a lower bound, for each own value, on what `own_side` charges whatever value `robot` takes.
+
+        Broken parts are infinite. As in `lower_bounds`, it is 0 where robots may withdraw, or have too many values.
+        """
+        return self._at_least(self._parts.get(robot, ()))
+
     def refuse_value(self, robot: str, value: Value) -> None:
         """Raise `ValueError` for a `value` that `robot`, as its files declare it, cannot have: others say anything."""
         names = self._part.known.interfaces.get(robot, ())
@@ -261,16 +268,15 @@ class LocalProblem(LocalConstraints):
         These may take any values that their files declare. The bound is 0 where robots may withdraw, and for a
         constraint with more than `MAX_BOUNDED_ROWS` combinations of values.
         """
+        return self._at_least([c for c in self._constraints if c.agents and all(a in robots for a in c.agents)])
+
+    def _at_least(self, constraints: Sequence[SharedConstraint]) -> list[Cost]:
+        """Return a lower bound on what `constraints` charge each own value, over all that files declare for others."""
         least: list[list[Cost]] = []
-        for constraint in self._constraints:
-            if (
-                self._part.parameters.withdrawal_cost is None
-                and constraint.agents
-                and all(a in robots for a in constraint.agents)
-            ):
-                checks, charged = constraint.lower_bounds(self._part.known.domains, MAX_BOUNDED_ROWS)
-                self.checks += checks
-                least.append(charged)
+        for constraint in constraints if self._part.parameters.withdrawal_cost is None else ():
+            checks, charged = constraint.lower_bounds(self._part.known.domains, MAX_BOUNDED_ROWS)
+            self.checks += checks
+            least.append(charged)
         return _summed(len(self.values), least)
 
     def tables(self, domains: Mapping[str, Sequence[Value]], lowest: str | None = None) -> list[CostTable]:

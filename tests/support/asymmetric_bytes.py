@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 from random import Random
 from typing import SupportsIndex
 
@@ -21,23 +21,40 @@ class _Watched(list[Cost]):
     """The costs of each own value, with a note of each that is looked at."""
 
     def __init__(
-        self, prices: list[Cost], pairs: list[frozenset[tuple[str, int]]], seen: set[frozenset[tuple[str, int]]]
+        self,
+        prices: list[Cost],
+        pairs: list[frozenset[tuple[str, int]]],
+        seen: set[frozenset[tuple[str, int]]],
+        *,
+        singly: bool,
     ) -> None:
         super().__init__(prices)
         self._pairs = pairs
         self._seen = seen
+        self._singly = singly
 
     def __getitem__(self, index: SupportsIndex) -> Cost:  # type: ignore[override] # nobody asks for a slice
         self._seen.add(self._pairs[index])
         return super().__getitem__(index)
 
     def __iter__(self) -> Iterator[Cost]:
-        self._seen.update(self._pairs)
+        if not self._singly:
+            self._seen.update(self._pairs)
         return super().__iter__()
 
 
 def watched_costs(team: Team, monkeypatch: pytest.MonkeyPatch) -> Asked:
     """From now on every look at the costs of a part of a PKC is noted. For robots of one variable."""
+    return _watched(team, monkeypatch, frozenset())
+
+
+def watched_entries(team: Team, monkeypatch: pytest.MonkeyPatch) -> Asked:
+    """The same, but of higher robots' parts each entry is noted only when it is picked out of those of a value."""
+    rank = {name: place for place, name in enumerate(team.order)}
+    return _watched(team, monkeypatch, {part for part in pkc_parts(team) if rank[part[0]] < rank[part[1]]})
+
+
+def _watched(team: Team, monkeypatch: pytest.MonkeyPatch, singly: Collection[tuple[str, str, str]]) -> Asked:
     asked = defaultdict[tuple[str, str], set[frozenset[tuple[str, int]]]](set)
     parts = {}
     for holder, other, name in pkc_parts(team):
@@ -55,7 +72,7 @@ def watched_costs(team: Team, monkeypatch: pytest.MonkeyPatch) -> Asked:
             (own,) = constraint.own_part(index)
             assert own is not None
             pairs.append(frozenset({(team[holder].variables[0].name, own), (team[other].variables[0].name, seen)}))
-        return _Watched(prices, pairs, asked[holder, name])
+        return _Watched(prices, pairs, asked[holder, name], singly=parts[constraint.key] in singly)
 
     monkeypatch.setattr(SharedConstraint, "costs", costs)
     return asked
@@ -76,6 +93,38 @@ def costs_changed(team: Team, asked: Asked, chance: Random, *, there: bool = Fal
             redrawn = (frozenset(values.items()) in known) is there
             drawn = INFINITE if chance.random() < 0.1 else chance.randint(0, MAX_COST)
             costs.append(drawn if redrawn else constraint.price(values))
+        table = Relation("redrawn", len(names), Semantics.SOFT, tuple(listed), tuple(costs), 0)
+        return Constraint(constraint.name, table, names, names, ConstraintModel.PKC)
+
+    return with_constraints(team, change)
+
+
+def what_is_not_needed_changed(team: Team, asked: Asked, chance: Random) -> Team:
+    """Entries that nobody picked out are others: of lower robots' parts any, of higher robots' larger than they were.
+
+    Of these, one least entry of each own value stays.
+    """
+    rank = {name: place for place, name in enumerate(team.order)}
+
+    def change(robot: Robot, constraint: Constraint) -> Constraint:
+        if constraint.model is not ConstraintModel.PKC:
+            return constraint
+        names = constraint.variables
+        owners = [team.owner[name] for name in names]
+        above = all(rank[robot.name] <= rank[owner] for owner in owners)
+        known = asked.get((robot.name, constraint.name), set())
+        listed = rows(team, constraint)
+        before = {row: constraint.price(dict(zip(names, row, strict=True))) for row in listed}
+        place = owners.index(robot.name)
+        kept = {min((row for row in listed if row[place] == own), key=before.__getitem__) for own in
+                {row[place] for row in listed}} if above else set()  # fmt: skip
+        costs = []
+        for row in listed:
+            drawn = INFINITE if chance.random() < 0.1 else chance.randint(0, MAX_COST)
+            if row in kept or frozenset(zip(names, row, strict=True)) in known:
+                costs.append(before[row])
+            else:
+                costs.append(before[row] + drawn if above else drawn)
         table = Relation("redrawn", len(names), Semantics.SOFT, tuple(listed), tuple(costs), 0)
         return Constraint(constraint.name, table, names, names, ConstraintModel.PKC)
 

@@ -53,6 +53,7 @@ Choices that the paper leaves open, and differences:
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from typing import assert_never, cast
 
 from robochoc.model.message import Message
@@ -105,7 +106,7 @@ class AFB(Protocol):
         self.bound: Cost = math.inf
         self.solution: NewSolution | None = None
         self.over = False
-        self.costs = CostLookup(problem, order)
+        self.costs = self._cost_lookup()
         self.estimates = Estimates()
         self.lower_bounds: list[Cost] | None = None
         self.paid: Cost = 0
@@ -114,6 +115,10 @@ class AFB(Protocol):
         self._came: list[Cost] | None = None
         self._asked: dict[str, list[Assignment]] = {}
         self._sent_estimates: dict[str, CPAEstimates] = {}
+
+    def _cost_lookup(self) -> CostLookup:
+        """Return what finds the own costs; another one for those that know more of them."""
+        return CostLookup(self.problem, self.order)
 
     def start(self) -> None:
         """Create the CPA, as the first robot; other robots wait."""
@@ -227,10 +232,16 @@ class AFB(Protocol):
                 self._backtrack(self.rank)
                 return
             self._assign(self.left.pop())
-            if self.below:
-                self._send_cpa(lower_bounds)
+            if self._pass_on(lower_bounds):
                 return
+
+    def _pass_on(self, lower_bounds: list[Cost]) -> bool:
+        """Send the CPA with the own value to the next robot. Return False if it is complete: it is a solution."""
+        if not self.below:
             self._send_new_solution()
+            return False
+        self._send_cpa(lower_bounds)
+        return True
 
     def _assign(self, index: int) -> None:
         self.value = index
@@ -240,10 +251,14 @@ class AFB(Protocol):
     def _send_cpa(self, lower_bounds: list[Cost]) -> None:
         """Send the CPA to the next robot, and copies to all robots whose estimates may change."""
         cpa = self._cpa
-        stamp = stamp_of(cpa)
         self.send(self.below[0], CPA(cpa, self.bound, [*lower_bounds, self.cost]))
-        self.estimates.ask(self.below[0], stamp)
-        for robot in self.below[1:]:
+        self.estimates.ask(self.below[0], stamp_of(cpa))
+        self._send_fb_cpas(cpa, self.below[1:])
+
+    def _send_fb_cpas(self, cpa: list[Assignment], robots: Sequence[str]) -> None:
+        """Ask those of `robots` whose estimates may change."""
+        stamp = stamp_of(cpa)
+        for robot in robots:
             if self.estimates.outdated(robot, stamp):
                 self.send(robot, FBCPA(cpa))
                 self.estimates.ask(robot, stamp)

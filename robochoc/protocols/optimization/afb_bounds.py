@@ -74,7 +74,7 @@ class CostLookup:
 
     def _add(self, robot: str, value: Value, length: int) -> None:
         self._view[robot] = value
-        more = self._problem.added(robot, self._view)
+        more = self._added(robot)
         if more is None:
             self._rows.append(self._rows[-1])
             self._depths.append(self._depths[-1])
@@ -83,6 +83,10 @@ class CostLookup:
         self._rows.append([cost + added for cost, added in zip(self._rows[-1], more, strict=True)])
         self._depths.append(length)
         self.estimates.append(self._estimate(self._rows[-1]))
+
+    def _added(self, robot: str) -> Sequence[Cost] | None:
+        """Return what each own value costs more with the value of `robot`, the lowest one known; None: nothing."""
+        return self._problem.added(robot, self._view)
 
     def _estimate(self, row: Sequence[Cost]) -> Cost:
         return min(cost + ahead for cost, ahead in zip(row, self._ahead, strict=True))
@@ -128,12 +132,12 @@ class Estimates:
         self._received: dict[str, CPAEstimates] = {}
 
     def outdated(self, robot: str, stamp: Stamp) -> bool:
-        """Return whether `robot` may have another estimate than for the last CPA that it was sent.
+        """Return whether `robot` may have another estimate than for the last CPA that it was asked about.
 
         The first estimates that a robot sends show on how many robots' values its estimates depend.
         """
         if robot not in self._received:
-            return True
+            return self._asked.get(robot) != stamp
         return common_length(self._asked[robot], stamp) < len(self._received[robot].estimates) - 1
 
     def ask(self, robot: str, stamp: Stamp) -> None:

@@ -16,6 +16,7 @@ from robochoc.replay import ReplayOptions
 from robochoc.replay.steps import runs_of
 from robochoc.run.registry import protocol_named, protocol_names
 from robochoc.solver.ace import AceProcess
+from tests.support.asymmetric_problems import random_asymmetric_team, random_pkc_options
 from tests.support.examples import count
 from tests.support.replays import in_text, random_run, recorded
 
@@ -73,3 +74,16 @@ def test_the_truth_is_never_excluded(protocol: str, number: int, warm: AceProces
             assert all(0 <= (loss.by(one) or 0) <= 1 for loss in report.losses for one in Measure)
             learnt += sum(report.system_loss(kind, Measure.ENTROPY) or 0 for kind in Kind)
     assert learnt > 0 or protocol not in WITH_RULES
+
+
+@pytest.mark.parametrize("protocol", [name for name in protocol_names() if protocol_named(name).traits.asymmetric])
+def test_of_one_side_s_costs_nothing_is_known(protocol: str, warm: AceProcess) -> None:
+    """Rules are about what both sides pay together."""
+    seen = 0
+    for seed in range(6):
+        chance = Random(f"one side {protocol} {seed}")
+        team = random_asymmetric_team(chance, simple=True)
+        for report in reports(recorded(team, random_pkc_options(team, protocol, chance), warm), warm):
+            seen += bool(report.without_rule)
+            assert report.without_rule or all(loss.by(one) in (0, None) for loss in report.losses for one in Measure)
+    assert seen

@@ -1,0 +1,196 @@
+"""Asymmetric Two-Way Bounding (ATWB).
+
+AFB for asymmetric costs: each robot of a constraint pays its own part, and nobody else knows it. The robot that holds
+the current partial assignment (CPA) bounds it both ways at the same time. Robots after it answer with estimates, as in
+AFB (forward bounding). Robots before it that share a partially known constraint with it answer with what their own
+sides cost with its new value (backward bounding). Once all of these have answered, the CPA goes on with its exact cost.
+As soon as the cost so far and the estimates reach the best solution (B), the holder takes its next value.
+
+- **When to use**: asymmetric costs; fewer messages and checks than SyncABB, and more is said of own costs.
+- **Guarantees**: complete; it terminates with an optimum, or with a proof that there is no solution.
+- **Parameters**: none.
+- **Reference**: Grinshpoun, Grubshtein, Zivan, Netzer, Meisels: "Asymmetric distributed constraint optimization
+  problems", JAIR 47, 2013 (ATWB).
+
+The methods, besides those of AFB (`afb.py`):
+
+    backward bounding: ask robots before   `_pass_on`          their answers            `_tell_side`
+    both ways are priced: the CPA goes on  `_assign_cpa`       add them                 `_take_side`
+
+What others learn: robots after the holder learn the values of the CPA, its cost, and B. The holder learns bounds on the
+own costs of robots after it, and of each robot before what its side adds with each value that it tries. Of its part
+towards robots after it, a robot needs the least entry of each own value, and those that it is asked about; nothing else
+of it changes any message.
+
+Choices that the paper leaves open, and differences:
+
+- A request names the counters of both values, and the answer that of the holder's. So a request for a value that its
+  receiver has given up is dropped, and an answer about a value that the holder has given up as well: a stronger CPA is
+  under way, or the search has ended.
+- A robot's cost in the CPA contains, from the beginning, what its own parts charge at least with robots after it. Its
+  answers are what its side costs more than that.
+- Totally known constraints are paid by their lowest robot, as in AFB; they may be n-ary.
+
+>>> from robochoc.communication.simulator.schedule import Concurrent
+>>> from robochoc.communication.simulator.simulator import Simulation
+>>> from robochoc.generators.random_csp import random_csp
+>>> team = random_csp(5, 3, 0.6, 0, max_cost=9, asymmetric=True)
+>>> result = Simulation(team, ATWB, Concurrent(seed=0)).run()
+>>> result.verdict.value, result.assignments["Robot1"]
+('solution', {'V1': 1})
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import assert_never, cast
+
+from robochoc.model.message import Message, Value
+from robochoc.model.problem import INFINITE
+from robochoc.protocols.asymmetric.messages.atwb import Side, SideRequest
+from robochoc.protocols.optimization.afb import AFB
+from robochoc.protocols.optimization.afb_bounds import Cost, CostLookup, stamp_of
+from robochoc.protocols.optimization.messages.afb import CPA, FBCPA, FBEstimate, NewSolution, Terminate
+from robochoc.protocols.order import PriorityOrder
+from robochoc.protocols.traits import ENDS_WITH_PROOF, Traits
+from robochoc.solver.compiled import LocalProblem
+
+
+class KnownSides(CostLookup):
+    """The costs of the own values, and of the other sides what robots before have told: it is asked for once."""
+
+    def __init__(self, problem: LocalProblem, order: PriorityOrder) -> None:
+        super().__init__(problem, order)
+        self._rank = order.rank
+        self._known: dict[tuple[str, Value], dict[int, Cost]] = {}
+        """For a robot's value, its sides by the places of own values."""
+
+    def knows(self, robot: str, index: int | None) -> bool:
+        """Return whether `robot` has told its side for the own value at `index`, with its own in the last CPA."""
+        return index in self._known.get((robot, self._view[robot]), {})
+
+    def learn(self, robot: str, index: int, cost: Cost) -> None:
+        """Add the side of `robot`, with its value in the last CPA, to the own value at `index`."""
+        self._known.setdefault((robot, self._view[robot]), {})[index] = cost
+        first = self._rank[robot] + 1
+        for length in range(first, len(self._rows)):
+            row = [*self._rows[length]]
+            row[index] += cost
+            self._rows[length] = row
+            self._depths[length] = max(self._depths[length], first)
+            self.estimates[length] = self._estimate(row)
+
+    def _added(self, robot: str) -> Sequence[Cost] | None:
+        """Return what each own value costs more with the value of `robot`, with its side as far as it is known."""
+        more = super()._added(robot)
+        told = self._known.get((robot, self._view[robot]))
+        if not told:
+            return more
+        own = more or [0] * len(self._problem.values)
+        return [cost + told.get(index, 0) for index, cost in enumerate(own)]
+
+
+class ATWB(AFB):
+    """One agent of ATWB.
+
+    State, besides AFB's:
+
+    - `least`: for each child, what each own value pays at least for the own parts of constraints with it.
+    - `asked`: the robots before that have not told their sides for the own value yet; None: the CPA has gone on.
+    """
+
+    messages = CPA | FBCPA | FBEstimate | NewSolution | Terminate | SideRequest | Side
+    traits = Traits(
+        concludes=ENDS_WITH_PROOF,
+        paper="Grinshpoun, Grubshtein, Zivan, Netzer & Meisels 2013",
+        costs=True,
+        partially_known=True,
+        asymmetric=True,
+        shared_scopes=True,
+        privacy="parts of PKC but for entries that are asked for, and bounds",
+        use_when="asymmetric costs, fewer messages than syncabb",
+    )
+
+    costs: KnownSides
+
+    def __init__(self, problem: LocalProblem, order: PriorityOrder) -> None:
+        super().__init__(problem, order)
+        self.least: dict[str, list[Cost]] = {}
+        self.asked: set[str] | None = None
+
+    def _cost_lookup(self) -> KnownSides:
+        """Return what finds the own costs, and keeps what robots before have told."""
+        return KnownSides(self.problem, self.order)
+
+    def start(self) -> None:
+        """Compute what the own sides cost at least; then begin as AFB."""
+        self.least = {child: self.problem.least_side(child) for child in self.problem.children}
+        super().start()
+
+    def receive(self, sender: str, message: Message) -> None:
+        """Dispatch on the message's type."""
+        match cast("CPA | FBCPA | FBEstimate | NewSolution | Terminate | SideRequest | Side", message):
+            case SideRequest() as request:
+                self._tell_side(sender, request)
+            case Side() as side:
+                self._take_side(sender, side)
+            case CPA() | FBCPA() | FBEstimate() | NewSolution() | Terminate():
+                super().receive(sender, message)
+            case never:
+                assert_never(never)
+
+    # The holder
+
+    def _assign(self, index: int) -> None:
+        """Take a value; its cost contains what the own sides charge at least, and what is known of other sides."""
+        super()._assign(index)
+        self.cost += sum(least[index] for least in self.least.values())
+
+    def _pass_on(self, lower_bounds: list[Cost]) -> bool:
+        """Ask robots on both sides for their costs, unless all robots before have told theirs: then the CPA goes on.
+
+        Return False if the CPA is complete, or costs too much by what is known of other sides.
+        """
+        cpa = self._cpa
+        if self.cost + self.estimates.totals(stamp_of(cpa))[-1] >= self.bound:
+            self.value = None
+            return False
+        asked = [name for name in self.problem.pkc_parents if not self.costs.knows(name, self.value)]
+        if not asked:
+            return super()._pass_on(lower_bounds)
+        value, counter = cpa[-1]
+        self.asked = {*asked}
+        for name in asked:
+            self.send(name, SideRequest(value, counter, cpa[self.order.rank[name]][1]))
+        self._send_fb_cpas(cpa, self.below)
+        return True
+
+    def _take_side(self, sender: str, side: Side) -> None:
+        """Add the side of a robot before, unless the own value is another one by now."""
+        if self.value is None or side.counter != self.counter:
+            return
+        if self.asked is None or sender not in self.asked:
+            raise ValueError(f"{sender} tells a side that {self.problem.agent} has not asked for")
+        self.asked.remove(sender)
+        self.costs.learn(sender, self.value, side.cost)
+        self.cost += side.cost
+
+    def _assign_cpa(self, lower_bounds: list[Cost]) -> None:
+        """Keep a value, or take the next one, as AFB; once all robots before have told their sides, go on with it."""
+        super()._assign_cpa(lower_bounds)
+        if self.value is not None and self.asked is not None and not self.asked:
+            self.asked = None
+            if not super()._pass_on(lower_bounds):
+                self._assign_cpa(lower_bounds)
+
+    # The robots before
+
+    def _tell_side(self, sender: str, request: SideRequest) -> None:
+        """Tell what the own side charges, besides what the CPA's cost contains; drop what is about another value."""
+        if sender not in self.problem.children:
+            raise ValueError(f"{sender} is not below {self.problem.agent}")
+        if self.over or self.value is None or request.yours != self.counter:
+            return
+        broken, cost = self.problem.own_side(self.value, sender, request.value)
+        more = INFINITE if broken else cost - self.least[sender][self.value]
+        self.send(sender, Side(request.counter, more))
