@@ -12,7 +12,7 @@ constraints are settled once, when the domain is compiled, and are not counted; 
 from __future__ import annotations
 
 from bisect import bisect_left, bisect_right
-from collections.abc import Container, Iterable, Mapping, Sequence
+from collections.abc import Container, Iterable, Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING, NamedTuple
 
 from robochoc.model.message import Value
@@ -22,6 +22,7 @@ from robochoc.solver.local_constraints import LocalConstraints
 from robochoc.solver.shared_constraint import (
     UNKNOWN,
     Conflict,
+    Gap,
     OtherValues,
     SharedConstraint,
 )
@@ -120,6 +121,21 @@ class LocalProblem(LocalConstraints):
         """Return what `conflict_with_key` returns, for every constraint that `values[index]` violates."""
         known = self._known(view)
         return [(c.conflict(others), c.key) for c, others in known if not c.mask(others) >> index & 1]
+
+    def gaps(self, index: int, sets: Mapping[str, Sequence[Value]]) -> Iterator[Gap]:
+        """Yield the constraints that `values[index]` violates for some combination of the others' values in `sets`.
+
+        The order is that of `conflict`, and so is what is passed over. A check for each combination that a constraint
+        can tell apart. Robots do not withdraw here.
+        """
+        for constraint in self._constraints:
+            broken: list[Conflict] = []
+            allowed: list[Conflict] = []
+            for others in constraint.combined(sets):
+                self.checks += 1
+                (allowed if constraint.mask(others) >> index & 1 else broken).append(constraint.conflict(others))
+            if broken:
+                yield Gap(broken, allowed)
 
     def part_conflict(self, index: int, child: str, value: Value) -> Conflict | None:
         """Return the conflict of `values[index]` with `value` of `child`, by this robot's parts of shared PKCs.

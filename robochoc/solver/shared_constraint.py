@@ -5,6 +5,7 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Container, Iterable, Iterator, Mapping, Sequence
+from typing import NamedTuple
 
 from robochoc.model.message import Value
 from robochoc.model.problem import INFINITE, Constraint
@@ -27,6 +28,13 @@ UNKNOWN = -1
 
 OtherValues = tuple[int, ...]
 """The values of other robots' variables in a constraint, in its order."""
+
+
+class Gap(NamedTuple):
+    """The combinations of others' values that an own value violates a constraint with, and those that it goes with."""
+
+    broken: Sequence[Conflict]
+    allowed: Sequence[Conflict]
 
 
 class OwnValues:
@@ -107,6 +115,19 @@ class SharedConstraint:
         except KeyError:
             return None
         return None if None in seen else tuple(seen)  # type: ignore[arg-type]
+
+    def combined(self, sets: Mapping[str, Sequence[Value]]) -> Iterator[OtherValues]:
+        """Yield all that the constraint may see where each other robot has any of its values in `sets`.
+
+        Nothing, if it cannot see a robot there. Values that look alike to it come once.
+        """
+        columns = []
+        for agent in self.agents:
+            places = [place for owner, place in self._seen if owner == agent]
+            shown = dict.fromkeys(tuple([value[place] for place in places]) for value in sets.get(agent, ()))
+            columns.append([part for part in shown if None not in part])
+        for parts in itertools.product(*columns):
+            yield tuple(itertools.chain.from_iterable(parts))  # type: ignore[arg-type]  # no part is None
 
     def holds(self, others: OtherValues) -> list[bool]:
         """Return, for each code of own values, whether it is consistent with `others`."""

@@ -1,0 +1,312 @@
+"""Asynchronous Aggregation Search (AAS).
+
+ABT in which robots propose aggregates, sets of values, instead of single ones. A robot sends lower-priority neighbours
+values that all go with every combination of the sets that it has heard from above. So what all robots propose stays a
+Cartesian product of solutions, a robot has something to fall back on, and one nogood rules out whole sets.
+
+- **When to use**: no costs, constraints that are neither loose nor very tight, and messages are what counts.
+- **Guarantees**: complete; it terminates with a solution or with a proof that there is none. At the end every
+  combination of the robots' aggregates is a solution; each robot takes the first value of its own. Space is polynomial:
+  one nogood for each value.
+- **Parameters (`--set`)**: `largest` (the most values in an aggregate; default 4). With 1 it is ABT, message by message.
+- **Reference**: Silaghi, Sam-Haroud, Faltings: "Asynchronous search with aggregations", AAAI 2000. Only an abstract and
+  a digest of the paper were at hand. The methods that are not named here are those of ABT (`abt.py`), with the same
+  names.
+
+Where its rules are:
+
+    aggregates that go with all of the view         `_choose_aggregate`, `_gaps`
+    the largest Cartesian product                   `_best_part`, `_wanted`
+    nogoods over aggregates                         `aggregates.py`, `_backtrack`, `_resolve_conflict`
+    add-link                                        `_check_add_link`, `_set_link`
+
+What differs from the paper: there robots own constraints and share variables, and a robot narrows other robots'
+variables by itself, with a history of who did so. Here each robot owns one variable, and asks its owner:
+
+- A value of which a constraint excludes every combination of the sets it sees is ruled out by a nogood over these sets.
+  A robot all of whose values are ruled out sends the resolvent: no solution has one of the receiver's values while
+  the others keep to their sets. This is true whatever robots propose, so the end of the search is sound. It can be used
+  as long as what they propose is covered by the sets.
+- A robot of which no value goes with all of the view, but some with a part, takes the value with the largest part,
+  asks those that propose too much to propose no more than that part (`Narrow`), and assumes that they do. They keep the
+  rest for later; nothing is ruled out. Of an n-ary constraint the lowest robot with a choice is asked.
+- A robot keeps of its aggregate what still goes with the view; only when nothing is left it chooses anew.
+
+Why it ends: the highest robot's view never changes. Whatever makes it change its aggregate makes that smaller, or rules
+out values for good; both happen finitely often. Then the view of the next robot changes no more, and so on. Who asks,
+or forgets an aggregate after a nogood, is always told the next one: the receiver either does as asked, and says so, or
+had proposed something else before the request came, and that is on its way.
+
+What ABT's paper leaves open is chosen as in `abt.py`: n-ary constraints, packets, the choice among nogoods,
+interchangeable values. Partially known constraints are refused: a higher robot would have to hear lower ones' sets.
+
+>>> from robochoc.generators.random_csp import random_csp
+>>> from robochoc.run import Options, Runtime, solve
+>>> for largest in ("1", "4"):
+...     options = Options(protocol="aas", runtime=Runtime.SIMULATOR, settings={"largest": largest})
+...     outcome = solve(random_csp(15, 8, 0.3, 0.5, seed=1), options)
+...     print(outcome.verdict.value, sum(outcome.metrics.messages.values()))
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from fractions import Fraction
+from typing import Any, ClassVar, assert_never, cast
+
+from robochoc.model.message import Message, Value
+from robochoc.model.outcome import Verdict
+from robochoc.protocols.order import PriorityOrder
+from robochoc.protocols.protocol import Protocol
+from robochoc.protocols.satisfaction.aggregates import Aggregate, AggregateStore, covers, left_side, matching, met
+from robochoc.protocols.satisfaction.messages.aas import AddLink, Narrow, Nogood, Ok
+from robochoc.protocols.satisfaction.settings.aas import AASSettings
+from robochoc.protocols.traits import ENDS_WITH_PROOF, Traits
+from robochoc.solver.compiled import LocalProblem
+from robochoc.solver.shared_constraint import Gap
+
+
+class AAS(Protocol):
+    """One agent of AAS.
+
+    `aggregate` are the own values that it proposes, by their places; `told` those that others last heard. `sets` are
+    the aggregates of higher robots (the view), `store` the nogoods. `asked` are requests that are not yet sent.
+    """
+
+    messages: ClassVar[Any] = Ok | Nogood | Narrow | AddLink
+    settings: ClassVar[AASSettings] = AASSettings()
+    traits: ClassVar[Traits] = Traits(
+        concludes=ENDS_WITH_PROOF,
+        paper="Silaghi, Sam-Haroud & Faltings 2000",
+        privacy="constraints of lower robots",
+        use_when="no costs, loose constraints: all combinations of what robots propose are solutions",
+    )
+
+    def __init__(self, problem: LocalProblem, order: PriorityOrder) -> None:
+        super().__init__(problem, order)
+        self.sets: dict[str, Aggregate] = {}
+        self.store = AggregateStore(order, len(problem.values))
+        self.higher = set(problem.parents)
+        self.lower = list(problem.children)
+        self.aggregate: list[int] = []
+        self.told: list[int] = []
+        self.asked: dict[str, Aggregate] = {}
+
+    def start(self) -> None:
+        """Choose a first aggregate and send it."""
+        self._check_agent_view()
+
+    def receive(self, sender: str, message: Message) -> None:
+        """Dispatch on the message's type."""
+        if self.verdict is not None:
+            return
+        match cast("Ok | Nogood | Narrow | AddLink", message):
+            case Ok(values):
+                self._process_info(sender, values)
+            case Nogood() as nogood:
+                self._resolve_conflict(sender, nogood)
+            case Narrow(values):
+                self._narrow_down(values)
+            case AddLink():
+                self._set_link(sender)
+            case never:
+                assert_never(never)
+
+    def settle(self) -> None:
+        """Check the view once the inbox is empty."""
+        self._check_agent_view()
+
+    # What the messages do
+
+    def _process_info(self, sender: str, values: Aggregate) -> None:
+        if not 0 < len(values) <= self.settings.largest:
+            raise ValueError(f"{sender} proposes {len(values)} values; it must be 1 to {self.settings.largest}")
+        self._update(sender, values)
+
+    def _resolve_conflict(self, sender: str, nogood: Nogood) -> None:
+        """Accept a nogood about values of the aggregate that agrees with the view; others are obsolete."""
+        self._validate(sender, nogood)
+        left = [index for index in self.aggregate if not self._is_in(nogood.values, index)]
+        if len(left) == len(self.aggregate):
+            return
+        if self._coherent(nogood):
+            self._check_add_link(nogood)
+            for value in nogood.values:
+                for index in self.problem.interchangeable(value):
+                    self.store.add(index, nogood.lhs)
+            self._hold(left)
+            if not left:
+                self.told = []
+        else:
+            # The sender's picture of others was old, and it has forgotten my aggregate: say it again.
+            self.send(sender, self._ok())
+
+    def _validate(self, sender: str, nogood: Nogood) -> None:
+        rank = self.order.rank
+        if not nogood.values or not all(nogood.lhs.values()):
+            raise ValueError(f"a nogood of {sender} has an empty set")
+        if any(rank.get(agent, len(rank)) >= rank[self.problem.agent] for agent in nogood.lhs):
+            raise ValueError(f"a nogood of {sender} names a robot that is not above {self.problem.agent}")
+
+    def _narrow_down(self, values: Aggregate) -> None:
+        """Keep no more than `values`; if none of the aggregate is among them, the request is obsolete."""
+        kept = [index for index in self.aggregate if self._is_in(values, index)]
+        if kept:
+            self._hold(kept)
+
+    def _set_link(self, sender: str) -> None:
+        if sender not in self.lower:
+            self.lower.append(sender)
+        if self.aggregate:
+            self.send(sender, self._ok())
+
+    # The search
+
+    def _check_agent_view(self) -> None:
+        """Keep of the aggregate what the view allows; otherwise choose another, ask, or backtrack until there is one."""
+        while self.verdict is None:
+            kept = [index for index in self.aggregate if self._is_consistent(index)]
+            if not kept:
+                kept, partly = self._choose_aggregate()
+                if not kept:
+                    self._hold([])
+                    self.told = []
+                    if partly:
+                        self._assume_less(self._best_part(partly))
+                    else:
+                        self._backtrack()
+                    continue
+            self._hold(kept)
+            if kept != self.told:
+                self._tell()
+            break
+        self._ask()
+
+    def _is_consistent(self, index: int) -> bool:
+        """Return whether the value at `index` goes with every combination of the view."""
+        return self.store[index] is None and self._gaps(index) == []
+
+    def _choose_aggregate(self) -> tuple[list[int], dict[int, list[Gap]]]:
+        """Return the first values that go with every combination of the view, and those that go with some."""
+        whole: list[int] = []
+        partly: dict[int, list[Gap]] = {}
+        for index in self.store.all_open():
+            gaps = self._gaps(index)
+            if gaps:
+                partly[index] = gaps
+            elif gaps is not None:
+                whole.append(index)
+                if len(whole) == self.settings.largest:
+                    break
+        return whole, partly
+
+    def _gaps(self, index: int) -> list[Gap] | None:
+        """Return the constraints that the value at `index` violates for a part of the view.
+
+        None: it violates one for all of the view, which is a nogood, and is stored.
+        """
+        gaps: list[Gap] = []
+        for gap in self.problem.gaps(index, self.sets):
+            if not gap.allowed:
+                self.store.add(index, left_side(gap.broken))
+                return None
+            gaps.append(gap)
+        return gaps
+
+    def _best_part(self, partly: Mapping[int, Sequence[Gap]]) -> Sequence[Gap]:
+        """Return the constraints of the value that goes with the largest part of the view."""
+        return max(partly.values(), key=_share)
+
+    def _assume_less(self, gaps: Iterable[Gap]) -> None:
+        """Assume that robots of violated constraints propose less: what goes with a value. They are to be asked."""
+        for gap in gaps:
+            agent, wanted = self._wanted(gap)
+            less = matching(wanted, self.sets[agent])
+            if less:
+                self._update(agent, less)
+                self.asked[agent] = less
+
+    def _wanted(self, gap: Gap) -> tuple[str, Sequence[Value]]:
+        """Return the lowest robot of a violated constraint that has a choice, and which of its values are wanted.
+
+        That is, all that go with every combination of the others; if there are none, the one that goes with most.
+        """
+        combinations = [*gap.allowed, *gap.broken]
+        choices = left_side(combinations)
+        agent = self.order.lowest([one for one, values in choices.items() if len(values) > 1])
+        bad = [one[agent] for one in gap.broken]
+        wanted = [value for value in choices[agent] if value not in bad]
+        good = [one[agent] for one in gap.allowed]
+        return agent, wanted or [max(choices[agent], key=good.count)]
+
+    def _ask(self) -> None:
+        """Send the requests to robots that are assumed to propose less."""
+        for agent, values in self.asked.items():
+            self.send(agent, Narrow(values))
+        self.asked.clear()
+
+    def _tell(self) -> None:
+        """Send the aggregate to all robots that it matters to."""
+        self.told = list(self.aggregate)
+        ok = self._ok()
+        for neighbour in self.lower:
+            self.send(neighbour, ok)
+
+    def _backtrack(self) -> None:
+        """Resolve the stored nogoods, one for each value, and send the result to its lowest-priority robot."""
+        lhs = self.store.resolve(self.sets)
+        if not lhs:
+            self.conclude(Verdict.NO_SOLUTION)
+            return
+        culprit = self.order.lowest(lhs)
+        values = lhs.pop(culprit)
+        self.send(culprit, Nogood(lhs, values))
+        self.asked.pop(culprit, None)
+        self._update(culprit, None)
+
+    def _hold(self, aggregate: list[int]) -> None:
+        """Propose `aggregate`; its first value is the own value."""
+        self.aggregate = aggregate
+        self.value = aggregate[0] if aggregate else None
+
+    def _ok(self) -> Ok:
+        return Ok(tuple([self.problem.values[index] for index in self.aggregate]))
+
+    def _is_in(self, values: Aggregate, index: int) -> bool:
+        return covers(values, (self.problem.values[index],))
+
+    # The view
+
+    def _update(self, agent: str, values: Aggregate | None) -> None:
+        """Store a new aggregate of `agent` (None: unknown); drop nogoods that do not cover it."""
+        if values is None:
+            self.sets.pop(agent, None)
+        else:
+            self.sets[agent] = values
+        self.store.forget(agent, values)
+
+    def _coherent(self, nogood: Nogood) -> bool:
+        return all(
+            agent in self.sets and covers(values, self.sets[agent])
+            for agent, values in nogood.lhs.items()
+            if agent in self.higher
+        )
+
+    def _check_add_link(self, nogood: Nogood) -> None:
+        """Request links to robots of the nogood that send nothing yet; assume the nogood's values for now."""
+        for agent, values in nogood.lhs.items():
+            known = self.sets.get(agent)
+            more = values if known is None else met(known, values)
+            if more != known:
+                self._update(agent, more)
+            if agent not in self.higher:
+                self.higher.add(agent)
+                self.send(agent, AddLink())
+
+
+def _share(gaps: Sequence[Gap]) -> Fraction:
+    """Return the part of all combinations that a value goes with, as if no robot were in two constraints."""
+    share = Fraction(1)
+    for gap in gaps:
+        share *= Fraction(len(gap.allowed), len(gap.allowed) + len(gap.broken))
+    return share
