@@ -10,7 +10,6 @@ import pytest
 
 from robochoc.communication.simulator.schedule import Concurrent
 from robochoc.communication.simulator.simulator import Simulation
-from robochoc.generators.random_csp import random_csp
 from robochoc.model.message import Message
 from robochoc.model.outcome import Verdict
 from robochoc.model.problem import Constraint, Relation, Semantics, Team
@@ -32,7 +31,7 @@ from tests.support.small_teams import differ, triangle
 def agent(team: Team, name: str, largest: int = 4) -> AAS:
     """The protocol object of one robot, started, with nothing left to say."""
     robot = AAS(LocalProblem(agent_problems(team)[name]), PriorityOrder(team.order))
-    robot.settings = AASSettings(largest)
+    robot.settings = AASSettings(largest)  # type: ignore[misc]  # as the host does
     robot.start()
     robot.outbox.clear()
     return robot
@@ -119,7 +118,7 @@ def test_a_nogood_holds_as_long_as_what_others_propose_is_covered() -> None:
     replies(robot, ("RA", ok(2)))
     assert robot.store[2] is not None
     replies(robot, ("RA", ok(2, 3)))
-    assert robot.store[2] is None or 3 in {one[0] for one in robot.store[2]["RA"]}
+    assert robot.store[2] is None
 
 
 def test_a_nogood_that_does_not_cover_the_view_is_answered() -> None:
@@ -164,7 +163,7 @@ def test_of_an_n_ary_constraint_the_lowest_robot_with_a_choice_is_asked() -> Non
     ],
 )
 def test_messages_that_cannot_be_are_refused(message: Message) -> None:
-    with pytest.raises(ValueError, match="RA|shorter|longer"):
+    with pytest.raises(ValueError, match=r"RA|shorter|longer"):
         agent(triangle(3), "RB").receive("RA", message)
 
 
@@ -215,15 +214,29 @@ def test_at_the_end_every_combination_of_the_aggregates_is_a_solution(teams: int
             placed = list(zip(robots.values(), chosen, strict=True))
             view = {robot.problem.agent: robot.problem.values[index] for robot, index in placed}
             assert all(robot.problem.conflict(index, view) is None for robot, index in placed)
-    assert proposed > teams // 4
+    assert proposed > teams // 8
 
 
-def test_aggregates_save_messages_near_the_peak() -> None:
+def before(first: str, second: str, by: int, largest: int) -> Constraint:
+    """Return the constraint that `second` is at least `by` after `first`; values are up to `largest`."""
+    pairs = itertools.product(range(1, largest + 1), repeat=2)
+    late = Relation(f"R{by}", 2, Semantics.CONFLICTS, tuple((x, y) for x, y in pairs if x + by > y))
+    return Constraint(f"{first}{second}", late, (first, second), (first, second))
+
+
+def jobs(chance: Random) -> Team:
+    """Return eight jobs with random orders between some of them, often impossible."""
+    pairs = [pair for pair in itertools.combinations("ABCDEFGH", 2) if chance.random() < 0.35]
+    ways = [pair if chance.random() < 0.6 else pair[::-1] for pair in pairs]
+    return team_of(dict.fromkeys("ABCDEFGH", range(1, 13)), [before(*way, chance.randint(1, 3), 12) for way in ways])
+
+
+def test_aggregates_save_messages_where_constraints_are_orders_of_numbers() -> None:
     """The paper's claim, on average: single problems go either way."""
     spent = {"1": 0, "4": 0}
-    for seed in range(8):
-        team = random_csp(12, 6, 0.35, 0.5, seed)
+    for seed in range(4):
+        team = jobs(Random(seed))
         for largest in spent:
             options = Options(protocol="aas", runtime=Runtime.SIMULATOR, settings={"largest": largest})
             spent[largest] += sum(solve(team, options).metrics.messages.values())
-    assert spent["4"] < 0.8 * spent["1"]
+    assert spent["4"] < 0.5 * spent["1"], spent

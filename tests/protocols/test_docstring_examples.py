@@ -10,7 +10,7 @@ import pytest
 from robochoc.system.compiled_core import docstring
 
 
-@pytest.mark.parametrize("name", ["abt_do", "abt_hyb", "afc", "awc", "dynabt", "first_fit", "sbt"])
+@pytest.mark.parametrize("name", ["aas", "abt_do", "abt_hyb", "afc", "awc", "dynabt", "first_fit", "sbt"])
 def test_the_example_shows_what_happens(name: str) -> None:
     module = import_module(f"robochoc.protocols.satisfaction.{name}")
     example = doctest.DocTestParser().get_doctest(docstring(module), {**vars(module)}, name, module.__file__, 0)

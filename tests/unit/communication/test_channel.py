@@ -202,7 +202,7 @@ def test_other_seeds_are_other_times() -> None:
 # Runs
 
 
-SATISFY = ("abt", "abt-hyb", "afc", "afc-ng", "awc", "disfc", "dynabt", "sbt")
+SATISFY = ("aas", "abt", "abt-hyb", "afc", "afc-ng", "awc", "disfc", "dynabt", "sbt")
 
 
 @pytest.mark.parametrize("channel", sorted(CHANNELS))

@@ -39,6 +39,9 @@ TYPES: list[type[Message]] = sorted(
 )
 
 REAL = {
+    ("aas", "Ok"): "Robot1.1 says: V1.1 is 1, 2 or 3 from now on",
+    ("aas", "Nogood"): "Robot2.1 says: as long as V1.1 is 1, it cannot be that V1.2 is 3",
+    ("aas", "Narrow"): "Robot1.2 says: please keep to this: V1.1 is 1",
     ("abt", "Ok"): "Robot1.1 says: V1.1 = 1 from now on",
     ("abt", "Nogood"): "Robot3.2 says: as long as V1.2 = 1, V3.1 cannot be 2",
     ("abt", "AddLink"): "Robot3.1 says: tell me V1.2 from now on",

@@ -34,7 +34,7 @@ class Ok(Message, frozen=True):
 
 
 class Nogood(Message, frozen=True):
-    """A nogood over aggregates: no solution has a value of `values` while all in `lhs` have one of theirs (`nogood`)."""
+    """No solution has a value of `values` while all in `lhs` have one of theirs: a nogood over sets (`nogood`)."""
 
     lhs: dict[str, tuple[Value, ...]]
     values: tuple[Value, ...]
@@ -72,7 +72,7 @@ class Narrow(Message, frozen=True):
 
     def in_words(self, words: Wording) -> str:
         """Return what the sender says."""
-        return f"let {_one_of(words, words.receiver, self.values)} and nothing else"
+        return f"please keep to this: {_one_of(words, words.receiver, self.values)}"
 
     def proves(self, _: Hearing) -> Sequence[Proof]:
         """Return what the message proves to its receiver."""
@@ -94,7 +94,7 @@ class AddLink(Message, frozen=True):
 
 
 def _one_of(words: Wording, robot: str, values: Sequence[Value]) -> str:
-    """Return an aggregate: `V1.1 is 1, 2 or 3`, `(A, B) is (1, 2) or (1, 3)`. Variables that do not matter are left out."""
+    """Return an aggregate: `V1.1 is 1, 2 or 3`, `(A, B) is (1, 2) or (1, 3)`, without variables that do not matter."""
     parts = [words.parts(robot, value) for value in values]
     names = [name for name, _ in parts[0]] if parts else []
     if len(names) == 1:
