@@ -4,9 +4,9 @@ ABT in which robots propose aggregates, sets of values, instead of single ones. 
 values that all go with every combination of the sets that it has heard from above. So what all robots propose stays a
 Cartesian product of solutions, a robot has something to fall back on, and one nogood rules out whole sets.
 
-- **When to use**: no costs, hard problems with large domains (about 16 values and more), best of numbers with
-  constraints such as x + 2 <= y, or of times that do not overlap. With few values, or on easy problems, ABT sends fewer
-  messages. Constraint checks are more nearly everywhere, as each look is at sets.
+- **When to use**: no costs, hard problems over numbers, with constraints such as x + 2 <= y, or times that must not
+  overlap. On constraints without such a structure, and on easy problems, ABT does as well or better; it nearly always
+  makes fewer constraint checks, as each look here is at sets (docs/explanation/replications.md has figures).
 - **Guarantees**: complete; it terminates with a solution or with a proof that there is none. At the end every
   combination of the robots' aggregates is a solution; each robot takes the first value of its own. Space is polynomial:
   one nogood for each value.
@@ -85,7 +85,7 @@ class AAS(Protocol):
         concludes=ENDS_WITH_PROOF,
         paper="Silaghi, Sam-Haroud & Faltings 2000",
         privacy="constraints of lower robots",
-        use_when="no costs: hard, with large domains and constraints of order (<=, intervals)",
+        use_when="no costs: hard, over numbers, with orders (<=) or times that must not overlap",
     )
 
     def __init__(self, problem: LocalProblem, order: PriorityOrder) -> None:
