@@ -85,7 +85,7 @@ class AAS(Protocol):
         concludes=ENDS_WITH_PROOF,
         paper="Silaghi, Sam-Haroud & Faltings 2000",
         privacy="constraints of lower robots",
-        use_when="no costs: hard, over numbers, with orders (<=) or times that must not overlap",
+        use_when="no costs, and orders (<=) or intervals of numbers",
     )
 
     def __init__(self, problem: LocalProblem, order: PriorityOrder) -> None:
