@@ -13,7 +13,7 @@ import click
 from robochoc.system.plain_text import on_one_line
 
 GAP = "  "
-NARROWEST = 20
+NARROWEST = 18
 """Characters. A column of prose is not wrapped to less."""
 
 

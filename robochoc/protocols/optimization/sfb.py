@@ -130,7 +130,7 @@ class SFB(Protocol):
         costs=True,
         shared_scopes=True,
         tables=True,
-        use_when="what auto mostly takes, with and without costs: few messages",
+        use_when="what auto mostly takes, with or without costs: few messages",
     )
     settings: ClassVar[SFBSettings] = SFBSettings()
 
