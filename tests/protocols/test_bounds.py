@@ -24,6 +24,7 @@ BOUNDING = (
     "syncbb",
     "afb",
     "adopt",
+    "adopt-k",
     "bnb-adopt",
     "sfb",
     "dpop",

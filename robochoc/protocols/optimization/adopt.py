@@ -56,6 +56,7 @@ from robochoc.model.problem import INFINITE
 from robochoc.protocols.optimization.bounding import BoundingProtocol
 from robochoc.protocols.optimization.messages.adopt import Cost, Threshold, Value
 from robochoc.protocols.optimization.messages.bounding import Entry, Number, Terminate
+from robochoc.protocols.optimization.shares import clamp_share, split_threshold
 from robochoc.protocols.order import PriorityOrder
 from robochoc.protocols.shared.messages.dfs import TreeMessage
 from robochoc.protocols.traits import ENDS_WITH_PROOF, Traits
@@ -144,19 +145,15 @@ class ADOPT(BoundingProtocol):
 
     def _maintain_child_threshold_invariant(self, child: str, index: int) -> None:
         """Clamp the child's share: lb(d, l) <= t(d, l) <= ub(d, l)."""
-        bounds, t = self.bounds[child], self.t[child]
-        t[index] = min(max(t[index], bounds.lb[index]), bounds.ub[index])
+        clamp_share(self.t[child], self.bounds[child], index)
 
     def _maintain_allocation_invariant(self) -> None:
         """Split the threshold into the own cost and the children's shares; send the shares."""
         index = self.index
         if self.threshold == INFINITE:  # no value is worth a try in this context, and the parent will know
             return
-        spare = self.threshold - self.delta[index] - sum(t[index] for t in self.t.values())
+        split_threshold(self.threshold - self.delta[index], self.t, self.bounds, index)
         for child, t in self.t.items():
-            bounds = self.bounds[child]
-            step = min(spare, bounds.ub[index] - t[index]) if spare > 0 else max(spare, bounds.lb[index] - t[index])
-            t[index] += step
-            spare -= step
-            context = {name: value for name, (value, _) in self.context.items() if name in bounds.scope}
+            scope = self.bounds[child].scope
+            context = {name: value for name, (value, _) in self.context.items() if name in scope}
             self.tell(child, Threshold(t[index], context))

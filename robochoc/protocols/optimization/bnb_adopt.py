@@ -119,38 +119,64 @@ class BnBADOPT(BoundingProtocol):
         news, changed = self.merge(context)
         self._moved = self._moved or bool(news)
         if changed:
-            self.threshold = INFINITE
-            self.threshold_request = True
+            self.drop_threshold()
+
+    def drop_threshold(self) -> None:
+        """Forget the threshold, which was for another context, and request it."""
+        self.threshold = INFINITE
+        self.threshold_request = True
 
     def act(self) -> None:
         """Choose a value and send values and costs that changed (Backtrack)."""
         self._choose()
-        for child in self.children:
-            self._tell_value(child)
+        self.tell_values()
         for name in self.pseudo_children:
-            self.tell(name, Value(*self.own))
-        if self.ub <= self.lb and self.may_end:
+            self.tell(name, self.value_for(name))
+        if self.settled and self.may_end:
             self.terminate()
         elif not self.may_end:
             self._tell_cost()
 
     def _choose(self) -> None:
-        if self.ub <= self.lb:
+        if self.settled:
             self.take(self.cheapest(self.upper))
-        elif self._moved or self.lower[self.index] >= min(self.threshold, self.ub):
+        elif self._moved or self.leaves:
             self.take(self.cheapest(self.lower))
         self._moved = False
 
+    @property
+    def settled(self) -> bool:
+        """Whether the value with the least upper bound is good enough."""
+        return self.ub <= self.lb
+
+    @property
+    def leaves(self) -> bool:
+        """Whether the own value is to be left: its lower bound reaches UB or TH."""
+        return self.lower[self.index] >= min(self.threshold, self.ub)
+
     # What is said
+
+    def tell_values(self) -> None:
+        """Send the children what changed."""
+        for child in self.children:
+            self._tell_value(child)
 
     def _tell_value(self, child: str) -> None:
         """Send `child` a new value, a higher threshold, or a threshold that it requested."""
-        value, last = Value(*self.own, self._share(child)), self.sent_values.get(child)
-        if last is None or last.counter < value.counter or last.threshold < value.threshold:
+        value, last = self.value_for(child), self.sent_values.get(child)
+        if last is None or self.is_news(value, last):
             self.sent_values[child] = value
             self.send(child, value)
 
-    def _share(self, child: str) -> Number:
+    def value_for(self, name: str) -> Value:
+        """Return the own value, and the threshold of `name` if it is a child."""
+        return Value(*self.own, self.share(name) if name in self.bounds else INFINITE)
+
+    def is_news(self, value: Value, last: Value) -> bool:
+        """Return whether a child that was told `last` has to be told `value`."""
+        return last.counter < value.counter or last.threshold < value.threshold
+
+    def share(self, child: str) -> Number:
         """Return the part of the threshold left for `child` if other children cost their lower bounds."""
         limit = min(self.threshold, self.ub)
         if limit == INFINITE:

@@ -98,6 +98,9 @@ REAL = {
     ("bnb-adopt", "Cost"): (
         "RX03 says: as long as X02 = 1 and X00 = 3, my subtree costs between 0 and 9; tell me my threshold again"
     ),
+    ("adopt-k", "Value"): (
+        "RX03 says: X03 = 3 from now on (change 18); try other values once yours costs k more than 0, or 8"
+    ),
     ("ncbb", "Members"): "RX03 says: in my subtree constraints are shared by RX03 with RX02 and RX04 with RX00",
     ("ncbb", "Greedy"): "RX02 says: X02 = 1 in the first assignment",
     ("ncbb", "Request"): "RX02 says: X02 = 3 for now; what will you cost at least?",

@@ -1,0 +1,17 @@
+"""The settings of ADOPT(k) (see `adopt_k.py`)."""
+
+from __future__ import annotations
+
+from robochoc.model.problem import INFINITE
+from robochoc.protocols.settings_base import Settings
+
+
+class ADOPTkSettings(Settings, frozen=True):
+    """`k`: a value is left when its lower bound is k above the threshold; 1: as ADOPT does, `inf`: as BnB-ADOPT."""
+
+    k: int | float = 1000
+
+    def __post_init__(self) -> None:
+        """Raise `ValueError` unless `k` is a whole number from 1, or infinite."""
+        if self.k != INFINITE and (self.k < 1 or not isinstance(self.k, int)):
+            raise ValueError(f"k is {self.k}; it must be a whole number, 1 or more, or inf")
