@@ -79,7 +79,7 @@ class ADOPTk(BnBADOPT):
         shared_scopes=True,
         writes_to_non_neighbours=False,
         privacy="constraints among others",
-        use_when="costs, sparse graph, little memory; between ADOPT and BnB-ADOPT+",
+        use_when="costs, sparse graph, little memory, k to choose",
     )
     settings: ClassVar[ADOPTkSettings] = ADOPTkSettings()
 
