@@ -152,9 +152,12 @@ def evaluate_search(phase: Phase, search: Search, kind: ProblemKind, told: Calla
     found = search.check()
     if found is None:
         return replace(answer, verdict=Verdict.UNKNOWN, bound=bound)
+    verdict = _verdict_of(phase, result, kind, found)
+    if _meets_bound(result, found, told) and verdict is Verdict.SOLUTION and kind is ProblemKind.DISWCSP:
+        verdict, bound = Verdict.OPTIMAL, None
     return replace(
         answer,
-        verdict=_verdict_of(phase, result, kind, found),
+        verdict=verdict,
         assignment=found.assignment,
         cost=found.cost,
         withdrawn=found.withdrawn,
@@ -234,6 +237,12 @@ def _verdict_of(phase: Phase, result: RunResult, kind: ProblemKind, found: Check
     if kind is ProblemKind.DISCSP and not phase.withdrawal:
         return Verdict.SOLUTION
     return result.verdict
+
+
+def _meets_bound(result: RunResult, found: CheckedAssignment, told: Callable[[float], Cost]) -> bool:
+    """Return whether what was found, with all robots, costs as little as their bound says that anything does."""
+    least = lower_bound(result.findings)
+    return least is not None and not found.withdrawn and found.verified and found.cost == told(least)
 
 
 def _bound_of(phase: Phase, result: RunResult, told: Callable[[float], Cost]) -> Cost | None:

@@ -20,13 +20,14 @@ from robochoc.protocols.inference.messages.bounded_maxsum import Assign, Branch,
 from robochoc.protocols.order import PriorityOrder
 from robochoc.protocols.shared.messages.cycles import Domain
 from robochoc.protocols.shared.messages.cycles import Value as ValueMessage
+from robochoc.run import Options, Runtime, solve
 from robochoc.solver import exact_costs
 from robochoc.solver.agent_problem import agent_problems
 from robochoc.solver.compiled import LocalProblem
 from robochoc.solver.encoding import TooLargeError
 from tests.support.agents import replies
 from tests.support.brute_force import least_cost
-from tests.support.cost_problems import random_cost_team, random_tree
+from tests.support.cost_problems import random_cost_team, random_tree, with_costs
 from tests.support.examples import count
 from tests.support.local_search_runs import any_schedule, cost_of_assignment
 from tests.support.problems import team_of
@@ -207,6 +208,32 @@ def test_on_a_tree_nothing_is_cut_and_the_result_is_the_optimum(trees: int) -> N
         if least < INFINITE:
             assert (told.cut, told.bound) == (0, least)
             assert cost_of_assignment(team, told.values) == (0, least)
+
+
+@count("teams", 20, 300)
+def test_a_run_says_optimal_where_the_result_meets_the_bound(teams: int) -> None:
+    """On trees always, elsewhere where nothing that was cut mattered; otherwise it tells the bound."""
+    chance = Random("optimal")
+    trees, unproven = 0, 0
+    for number in range(teams):
+        team = with_costs(random_tree(chance)) if number % 2 else random_cost_team(chance, n_ary=False)
+        least = least_cost(team)
+        options = Options(protocol="bounded-maxsum", runtime=Runtime.SIMULATOR, cache=False)
+        outcome = solve(team, options)
+        if least == INFINITE:
+            assert outcome.verdict in {Verdict.NO_SOLUTION, Verdict.NO_SOLUTION if number % 2 else Verdict.UNKNOWN}
+        elif outcome.verdict is Verdict.OPTIMAL:
+            assert (outcome.cost, outcome.bound) == (least, None)
+            trees += number % 2
+        else:
+            assert not number % 2
+            assert outcome.verdict in {Verdict.SOLUTION, Verdict.UNKNOWN}
+            assert outcome.bound is not None
+            assert outcome.bound <= least
+            assert outcome.cost is None or outcome.bound < outcome.cost
+            unproven += outcome.verdict is Verdict.SOLUTION
+    assert trees
+    assert unproven
 
 
 def test_what_cannot_be_is_refused() -> None:

@@ -6,9 +6,9 @@ solve that. What was cut says how far off the result can be.
 - **When to use**: costs, a large team, and a guarantee without a search.
 - **Guarantees**: incomplete; linear in messages but for the tree. It tells a lower bound of the optimum: the optimum
   of the tree. The result costs at most the bound plus the weight of all that was cut. Where the graph is a forest,
-  nothing is cut, and the result is optimal. The bound holds with hard constraints, too. If one of them is cut, the
-  result may break it, and the weight is infinite: then nothing is promised but the bound. A root whose tree costs
-  `inf` proves that there is no solution.
+  nothing is cut, and the result is optimal. A run says `optimal` wherever the result costs no more than the bound. The
+  bound holds with hard constraints, too. If one of them is cut, the result may break it, and the weight is infinite:
+  then nothing is promised but the bound. A root whose tree costs `inf` proves that there is no solution.
 - **Parameters**: none.
 - **References**: Rogers, Farinelli, Stranders, Jennings: "Bounded approximate decentralised coordination via the
   max-sum algorithm", Artificial Intelligence 175(2), 2011; for the bound: Rollon, Larrosa: "Improved bounded max-sum
