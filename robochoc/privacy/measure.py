@@ -42,9 +42,11 @@ def privacy_of(journal: Journal, options: ReplayOptions | None = None, number: i
         number: Which run, counted from 1. None: the last one.
 
     Raises:
-        PrivacyError: if there is no such run, or what is needed is missing.
+        PrivacyError: if there is no run, or not that one, or what is needed is missing.
     """
     runs = list(runs_of(journal.events))
+    if not runs:
+        raise PrivacyError("it ends before a run begins")
     number = len(runs) if number is None else number
     if not 1 <= number <= len(runs):
         raise PrivacyError(f"there is no run {number}: the journal holds {len(runs)}")

@@ -294,6 +294,10 @@ TEAM_RULES = (
         "drop --preprocess, or choose a protocol that does not minimise costs",
         other_protocol=True,
     ),
+    TeamRule(
+        lambda c: c.options.preprocess and any(unmet_requirement(r, DisAC.traits, c.team.owner) for r in c.team.robots),
+        "{team} has partially known constraints (PKC), which --preprocess does not support: drop it",
+    ),
     _not_with_scenario("--runtime network", lambda o: o.protocol != CENTRAL and o.runtime is Runtime.NETWORK),
     _not_with_scenario("--runtime arrays", lambda o: o.protocol != CENTRAL and o.runtime is Runtime.ARRAYS),
     TeamRule(
@@ -380,8 +384,6 @@ def _takers(case: Case) -> Iterator[tuple[str, Traits]]:
         yield "--withdraw maximal", FirstFit.traits
     if options.spares:
         yield "--spare", Traits(costs=True)
-    if options.preprocess:
-        yield f"--preprocess {options.preprocess}", DisAC.traits
 
 
 def _refuse_constraints(team: Team, name: str, traits: Traits) -> None:

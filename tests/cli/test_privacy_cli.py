@@ -57,6 +57,14 @@ def test_a_run_that_is_not_there_is_wrong_usage(saved: Path) -> None:
     assert "there is no run 3: the journal holds 1" in result.output
 
 
+def test_a_journal_that_ends_before_a_run_begins_is_not_measured(saved: Path, tmp_path: Path) -> None:
+    cut = tmp_path / "cut.journal"
+    cut.write_bytes(saved.read_bytes()[:700])
+    result = run("privacy", cut, "--no-cache")
+    assert result.exit_code == USAGE
+    assert result.output.strip().endswith("cut.journal: it ends before a run begins")
+
+
 def test_what_is_no_journal_is_invalid(tmp_path: Path) -> None:
     (tmp_path / "file").write_text("hello")
     assert run("privacy", tmp_path / "file").exit_code == INVALID

@@ -226,5 +226,5 @@ def test_what_it_does_not_go_with_is_refused(options: Options, told: str) -> Non
 
 
 def test_partially_known_constraints_and_problems_that_change_are_refused() -> None:
-    with pytest.raises(UnsupportedError, match="--preprocess ac does not support"):
+    with pytest.raises(UnsupportedError, match="--preprocess does not support: drop it"):
         solve(pkc_pair(pkc_part("AB", (1, 1)), pkc_part("AB")), replace(AC, protocol="abt"))

@@ -32,7 +32,7 @@ def protocols(name: str | None, *, purpose: str | None, as_json: bool, long: boo
 
     \b
     robochoc protocols --for satisfaction    any solution, no costs
-    robochoc protocols --for costs           the least cost, or a low one
+    robochoc protocols --for costs           the least cost, or a low one; without costs any solution
     robochoc protocols --for asymmetric      of these, with costs of each side
     """  # noqa: D301 - \\b is how click is told to leave the lines as they are
     from robochoc.cli.reports.protocols import Row, print_protocols, protocol_text, protocols_json, rows

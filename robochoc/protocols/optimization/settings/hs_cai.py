@@ -16,5 +16,6 @@ class HSCAISettings(Settings, frozen=True):
     t: int = 1
 
     def __post_init__(self) -> None:
-        if self.k < 1 or self.t < 1:
-            raise ValueError("k and t are 1 or more")
+        for name, number in (("k", self.k), ("t", self.t)):
+            if number < 1:
+                raise ValueError(f"{name} is {number}; it must be 1 or more")
