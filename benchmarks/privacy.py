@@ -20,11 +20,12 @@ from robochoc.run import Options, Runtime, solve
 
 PROBLEMS = 20
 SATISFYING = (
-    "abt", "abt-hyb", "disfc", "afc", "afc-ng", "compapo", "dpop", "o-dpop", "mb-dpop", "p-dpop", "syncbb", "afb",
-    "sfb", "ncbb", "pt-fb", "hs-cai",
+    "abt", "abt-hyb", "disfc", "afc", "afc-ng", "compapo", "dpop", "o-dpop", "mb-dpop", "p-dpop", "p32-dpop", "syncbb",
+    "afb", "sfb", "ncbb", "pt-fb", "hs-cai",
 )  # fmt: skip
 MINIMISING = (
-    "dpop", "o-dpop", "mb-dpop", "p-dpop", "syncbb", "syncabb", "afb", "sfb", "ncbb", "pt-fb", "hs-cai", "adopt",
+    "dpop", "o-dpop", "mb-dpop", "p-dpop", "p32-dpop", "syncbb", "syncabb", "afb", "sfb", "ncbb", "pt-fb",
+    "hs-cai", "adopt",
 )  # fmt: skip
 INCOMPLETE = ("dsa", "mgm", "mgm2", "kopt", "cocoa", "d-gibbs", "duct", "maxsum")
 MAX_VALUE = 10

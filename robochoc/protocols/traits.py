@@ -36,6 +36,7 @@ class Traits:
         tables: It computes with tables of floats, and refuses costs that could add up to 2^53 or more
             (`solver/exact_costs.py`).
         secret_keys: Its robots draw keys (`Protocol.secret`). A run across machines cannot be replayed then.
+        needs: A module of an extra that it computes with, and how to install that. A run without it is refused.
         counts: Its robots also count the optima, or without costs the solutions (`--count`).
         arrays: It has a form for whole teams at once (`communication/arrays`).
         privacy: The information that neighbours do not get.
@@ -56,6 +57,7 @@ class Traits:
     concludes: tuple[Verdict, ...] = UNDECLARED
     tables: bool = False
     secret_keys: bool = False
+    needs: tuple[str, str] | None = None
     counts: bool = False
     arrays: bool = False
     privacy: str = ""

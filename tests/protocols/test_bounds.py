@@ -34,6 +34,7 @@ BOUNDING = (
     "mb-dpop",
     "rmb-dpop",
     "p-dpop",
+    "p32-dpop",
     "s-dpop",
     "o-dpop",
     "count-dpop",

@@ -42,12 +42,21 @@ class AnonymousTreeProtocol(TreeProtocol):
     def begin(self) -> None:
         """Begin the search; the place in the tree is known."""
 
+    def leave_tree(self) -> None:
+        """Forget the place in the tree, but not who was elected: the next tree is another root's."""
+        self.parent = None
+        self.pseudo_parents = self.children = self.pseudo_children = ()
+        self.placed = False
+        self._met = set()
+        self._visited = False
+        self._to_visit = []
+
     def start(self) -> None:
         """Start the own election wave; a robot with an empty domain ends the search."""
         if not self.problem.values:
             self.conclude(Verdict.NO_SOLUTION)
         elif not self.problem.neighbours:
-            self._enter(None)
+            self.enter(None)
             self.settle()
         else:
             self._score = self.secret(8 * SCORE).to_bytes(SCORE, "little")
@@ -89,19 +98,19 @@ class AnonymousTreeProtocol(TreeProtocol):
         if len(self._returned) < len(self.problem.neighbours):
             return
         if self._from is None:
-            self._enter(None)
+            self.enter(None)
         else:
             self.send(self._from, Wave(score))
 
     def _process_token(self, sender: str) -> None:
         if not self._visited:
-            self._enter(sender)
+            self.enter(sender)
             return
         self._met.add(sender)  # below, as a pseudo-child
         self.send(sender, Bounce())
 
-    def _enter(self, parent: str | None) -> None:
-        """Take the first visit of the token."""
+    def enter(self, parent: str | None) -> None:
+        """Take the first visit of the token; the root begins with one from nobody."""
         self._visited = True
         self.parent = parent
         self._met.update([] if parent is None else [parent])

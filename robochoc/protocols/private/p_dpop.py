@@ -88,7 +88,7 @@ KEY_BITS = 100
 CODENAME = 32
 """Hexadecimal digits."""
 MOST_AXES = 1_000
-Table = NDArray[np.object_]
+CellTable = NDArray[np.object_]
 """Integers of any size: keys are larger than those that numpy computes with itself."""
 
 
@@ -189,18 +189,26 @@ class PDPOP(AnonymousTreeProtocol):
         if len(self.above) < len(self.ancestors) or len(self.utils) < len(self.children):
             return
         self.axes = self._own_axes()
-        joined = self._joined()
+        joined = self.joined()
         self.choices = np.asarray(joined.argmin(axis=0))  # numpy makes a number of a single cell
         cells = np.asarray(joined.min(axis=0), object)
         self._asked = {child: list(util.axes) for child, util in self.utils.items()}
         self.utils.clear()
         if self.parent is not None:
-            self.send(self.parent, UTIL(self.axes, packed(cells.reshape(-1))))
+            self.tell(self.parent, packed(cells.reshape(-1)))
         elif cells.item() >= BROKEN:
             self.conclude(Verdict.NO_SOLUTION)
         else:
             self.optimum = cells.item()
-            self._choose({})
+            self.decide_as_root()
+
+    def tell(self, parent: str, cells: bytes) -> None:
+        """Send the own table to the parent."""
+        self.send(parent, UTIL(self.axes, cells))
+
+    def decide_as_root(self) -> None:
+        """Take the best value, and tell the values below from there."""
+        self._choose({})
 
     def _own_axes(self) -> Shape:
         """Return the axes of the own table, in an order that says nothing. Raises `TooLargeError`."""
@@ -216,7 +224,7 @@ class PDPOP(AnonymousTreeProtocol):
             )
         return dict(sorted(axes.items()))
 
-    def _joined(self) -> Table:
+    def joined(self) -> CellTable:
         """Return the sum of the own costs, the children's tables and all keys; the own values come first, uncoded."""
         charges = self.problem.charges
         scopes = self.problem.scopes(self.ancestors)
@@ -240,7 +248,7 @@ class PDPOP(AnonymousTreeProtocol):
             joined += self._aligned(numbered.reshape(charged.charges.shape), names)
         return joined
 
-    def _aligned(self, table: Table, axes: Sequence[str]) -> Table:
+    def _aligned(self, table: CellTable, axes: Sequence[str]) -> CellTable:
         """Return `table` with the own axis first, then those of the own table, of length 1 where it has none."""
         onto = (self.codename, *self.axes)
         table = table.transpose([axes.index(codename) for codename in onto if codename in axes])

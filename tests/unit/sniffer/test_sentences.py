@@ -139,6 +139,11 @@ REAL = {
     ("p-dpop", "Codes"): "RX00 says: call me 0a6a; X00 is 5, -3, 0 or 3, and you get a key for each",
     ("p-dpop", "UTIL"): "RX02 says: a table over 3 codenames: 16 costs, hidden by keys",
     ("p-dpop", "VALUE"): "RX01 says: the codes of 1 value above you",
+    ("p32-dpop", "Join"): "RX00 says: take the next number in the ring, and add your key to 8552",
+    ("p32-dpop", "Setup"): "RX00 says: our key begins with eebb, and there are 5 turns",
+    ("p32-dpop", "Vector"): "RX00 says: somebody's turns, encrypted (4860): shuffle it",
+    ("p32-dpop", "Table"): "RX00 says: a table over 1 codename: 3 costs, hidden by keys, for turn 5",
+    ("p32-dpop", "Next"): "RX00 says: the next turn begins",
     ("mb-dpop", "DomainAtDepth"): "RX02 says: 1 robot above me in the tree; X02 is -3, 0, 1 or 3",
     ("mb-dpop", "Label"): (
         "RX03 says: my table has 16 cells over RX02 (4 values) and RX00 (4 values), and no cost above 19"

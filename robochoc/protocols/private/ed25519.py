@@ -1,0 +1,111 @@
+"""The group that private protocols encrypt in: the points of prime order of Edwards25519, by libsodium.
+
+It is the one module that knows PyNaCl (the extra `private`), which wraps libsodium. Points and scalars are 32 bytes
+that nobody else looks into. What libsodium does not take, a point off the curve or of low order, is a `ValueError`.
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Callable
+from typing import TYPE_CHECKING
+
+from robochoc.solver.encoding import UnsupportedError
+
+if TYPE_CHECKING:
+    from types import ModuleType
+
+NEEDS = ("nacl", "pip install 'robochoc[private]'")
+"""The module of PyNaCl, and how to install it (`Traits.needs`)."""
+NO_ELEMENT = "these bytes are no element of the group"
+Secret = Callable[[int], int]
+"""`Protocol.secret`."""
+
+
+class Group(ABC):
+    """A group of prime order in which discrete logarithms are hard, written additively."""
+
+    size: int
+    """Bytes of an element."""
+    zero: bytes
+    """The neutral element."""
+    one: bytes
+    """The generator."""
+
+    @abstractmethod
+    def scalar(self, secret: Secret) -> bytes:
+        """Draw a scalar; each is as likely as any other."""
+
+    @abstractmethod
+    def multiple(self, scalar: bytes) -> bytes:
+        """Return the generator, `scalar` times."""
+
+    @abstractmethod
+    def times(self, scalar: bytes, element: bytes) -> bytes:
+        """Return `element`, `scalar` times. Raises `ValueError` for what is no element."""
+
+    @abstractmethod
+    def check(self, element: bytes) -> None:
+        """Raise `ValueError` for what is no element, or the neutral one."""
+
+    @abstractmethod
+    def plus(self, first: bytes, second: bytes) -> bytes:
+        """Return the sum of two elements that were checked."""
+
+    @abstractmethod
+    def minus(self, first: bytes, second: bytes) -> bytes:
+        """Return the difference of two elements that were checked."""
+
+
+class Ed25519(Group):
+    """Edwards25519 by libsodium. Raises `UnsupportedError` where PyNaCl is not installed."""
+
+    size = 32
+    zero = b"\x01" + bytes(31)
+
+    def __init__(self) -> None:
+        self._sodium = _bindings()
+        self.one = self.multiple(b"\x01" + bytes(31))
+
+    def scalar(self, secret: Secret) -> bytes:
+        """Draw a scalar: 512 bits, reduced by libsodium."""
+        return bytes(self._sodium.crypto_core_ed25519_scalar_reduce(secret(512).to_bytes(64, "little")))
+
+    def multiple(self, scalar: bytes) -> bytes:
+        """Return the base point, `scalar` times."""
+        return bytes(self._sodium.crypto_scalarmult_ed25519_base_noclamp(scalar))
+
+    def times(self, scalar: bytes, element: bytes) -> bytes:
+        """Return `element`, `scalar` times. Raises `ValueError` for what is no point of prime order."""
+        return self._by(self._sodium.crypto_scalarmult_ed25519_noclamp, scalar, element)
+
+    def check(self, element: bytes) -> None:
+        """Raise `ValueError` for what is no point of prime order."""
+        if len(element) != self.size or not self._sodium.crypto_core_ed25519_is_valid_point(element):
+            raise ValueError(NO_ELEMENT)
+
+    def plus(self, first: bytes, second: bytes) -> bytes:
+        """Return the sum of two points; some that are none are refused."""
+        return self._by(self._sodium.crypto_core_ed25519_add, first, second)
+
+    def minus(self, first: bytes, second: bytes) -> bytes:
+        """Return the difference of two points; some that are none are refused."""
+        return self._by(self._sodium.crypto_core_ed25519_sub, first, second)
+
+    @staticmethod
+    def _by(function: Callable[[bytes, bytes], bytes], first: bytes, second: bytes) -> bytes:
+        try:
+            return bytes(function(first, second))
+        except (RuntimeError, TypeError, ValueError) as refused:  # PyNaCl's own errors are these, too
+            raise ValueError(NO_ELEMENT) from refused
+
+
+def _bindings() -> ModuleType:
+    """Import PyNaCl. Late: who asks what protocols there are has no use for it."""
+    try:
+        from nacl import bindings  # noqa: PLC0415
+    except ModuleNotFoundError as missing:
+        raise UnsupportedError(
+            f"this protocol encrypts with PyNaCl, which is not installed; say: {NEEDS[1]}"
+        ) from missing
+    return bindings

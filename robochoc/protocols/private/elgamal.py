@@ -1,0 +1,65 @@
+"""ElGamal encryption to a whole team, n out of n: nobody can open a cipher unless everybody helps.
+
+Each robot has a share of the secret key, and tells its public half; the team's public key is their sum. A cipher of an
+element M is the pair (r G, M + r H), for a random r, the generator G and the team's key H. Anybody can renew a cipher,
+so that it cannot be told from others, and a robot takes its own share off. With all shares off, M is left. (Desmedt,
+Frankel: "Threshold cryptosystems", CRYPTO 1989.)
+
+Here M is a bit: the neutral element, or the generator.
+"""
+
+from __future__ import annotations
+
+from robochoc.protocols.private.ed25519 import Group, Secret
+
+
+class TeamKey:
+    """One robot's share of the team's key, and what it does with ciphers. `joint` is the team's, once it is known."""
+
+    def __init__(self, group: Group, secret: Secret) -> None:
+        self._group = group
+        self._secret = secret
+        self._own = group.scalar(secret)
+        self.share = group.multiple(self._own)
+        """The public half of the own share."""
+        self.joint = group.zero
+        self.size = 2 * group.size
+        """Bytes of a cipher."""
+
+    def added_to(self, shares: bytes) -> bytes:
+        """Return the sum of public halves with the own one."""
+        self._group.check(shares)
+        return self._group.plus(shares, self.share)
+
+    def encrypt(self, *, bit: bool) -> bytes:
+        """Return a new cipher of a bit."""
+        return self.renewed((self._group.zero, self._group.one if bit else self._group.zero))
+
+    def renewed(self, pair: tuple[bytes, bytes]) -> bytes:
+        """Return another cipher of the same element."""
+        scalar = self._group.scalar(self._secret)
+        pad = self._group.plus(pair[0], self._group.multiple(scalar))
+        return pad + self._group.plus(pair[1], self._group.times(scalar, self.joint))
+
+    def stripped(self, pair: tuple[bytes, bytes]) -> bytes:
+        """Return a cipher without the own share."""
+        return pair[0] + self._group.minus(pair[1], self._group.times(self._own, pair[0]))
+
+    def is_zero(self, stripped: bytes) -> bool:
+        """Return whether a cipher without any share is of the bit 0."""
+        return self.pairs(stripped)[0][1] == self._group.zero
+
+    def checked(self, ciphers: bytes) -> list[tuple[bytes, bytes]]:
+        """Return the halves of ciphers that came from another robot. Raises `ValueError` for what are no elements."""
+        pairs = self.pairs(ciphers)
+        for pair in pairs:
+            for half in pair:
+                self._group.check(half)
+        return pairs
+
+    def pairs(self, ciphers: bytes) -> list[tuple[bytes, bytes]]:
+        """Return the halves of ciphers that stand one after the other."""
+        half = self._group.size
+        return [
+            (ciphers[at : at + half], ciphers[at + half : at + 2 * half]) for at in range(0, len(ciphers), self.size)
+        ]
