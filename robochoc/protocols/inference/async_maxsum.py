@@ -106,6 +106,8 @@ class AsyncMaxSum(Protocol):
             return
         match cast("Domain | R | Q", message):
             case Domain(values):
+                for value in values:
+                    self.problem.refuse_value(sender, value)
                 self._domains[sender] = values
             case R(rows, settled):
                 many = len(self.from_below.get(sender, rows))

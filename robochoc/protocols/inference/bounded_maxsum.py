@@ -128,6 +128,9 @@ class BoundedMaxSum(SpanningProtocol):
         if told is None:
             return False
         self._domains = {name: list(one.values) for name, one in told.items() if isinstance(one, Domain)}
+        for name, values in self._domains.items():
+            for value in values:
+                self.problem.refuse_value(name, value)
         for factor in Factor.joined(self.problem.tables(self._domains)):
             self.functions[factor.agents[0]] = factor.charges
         for name in self.above:

@@ -111,7 +111,7 @@ class MaxSum(CycleProtocol):
 
     def _build(self, messages: Mapping[str, wire.Message]) -> None:
         """Make the own functions from the received domains. All Q are 0 at first."""
-        domains = {name: message.values for name, message in messages.items() if isinstance(message, Domain)}
+        domains = self.checked_domains(messages)
         self.factors = self._split(Factor.joined(self.problem.tables(domains)))
         self.edges = [[0.0] * len(self.preferred) for _ in self.factors]
         zeros = {name: [[0.0] * len(values)] * len(self._with(name)) for name, values in domains.items()}

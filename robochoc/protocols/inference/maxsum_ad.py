@@ -106,7 +106,7 @@ class MaxSumAD(CycleProtocol):
 
     def _build(self, messages: Mapping[str, wire.Message]) -> None:
         """Make the own functions from the received domains."""
-        self._domains = {name: list(told.values) for name, told in messages.items() if isinstance(told, Domain)}
+        self._domains = self.checked_domains(messages)
         self.functions = Functions(self.problem.tables(self._domains), self._domains)
         self._nothing = [[0.0] * len(self.preferred) for _ in self.functions.factors]
         self.own = self._nothing

@@ -81,6 +81,7 @@ class ADSA(DSA):
         if sender not in self.active:
             raise ValueError(f"{sender} is no neighbour of {self.problem.agent}, or has made its last tick")
         told = cast("Tick", message)
+        self.check_value(sender, told.value)
         self.view[sender] = told.value
         self._news = True
         if told.last:

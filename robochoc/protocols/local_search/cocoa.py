@@ -43,7 +43,7 @@ HOLD, and goes on. So nobody is left in HOLD, nor IDLE beside a robot that is no
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from enum import StrEnum
 from typing import Any, ClassVar, assert_never, cast
 
@@ -117,6 +117,7 @@ class CoCoA(Protocol):
             raise ValueError(f"{sender} is no neighbour of {self.problem.agent}")
         match cast("Inquiry | Costs | Hold | SetValue", message):
             case Inquiry(values, known):
+                self._refuse([*((sender, value) for value in values), *known.items()])
                 self.states[sender] = State.ACTIVE
                 self._answer(sender, values, known)
             case Costs(burdens):
@@ -124,6 +125,7 @@ class CoCoA(Protocol):
             case Hold():
                 self.states[sender] = State.HOLD
             case SetValue(value):
+                self._refuse([(sender, value)])
                 self.states[sender] = State.DONE
                 self.view[sender] = value
             case never:
@@ -165,6 +167,12 @@ class CoCoA(Protocol):
         view = {**known, **self.view}
         view.pop(self.problem.agent, None)
         self.send(sender, Costs([self._least(self.problem.lexicographic_costs({**view, sender: v})) for v in values]))
+
+    def _refuse(self, told: Iterable[tuple[str, wire.Value]]) -> None:
+        """Raise `ValueError` for a value that a neighbour cannot have; what others have means nothing here."""
+        for name, value in told:
+            if name in self.states:
+                self.problem.refuse_value(name, value)
 
     def _least(self, burdens: list[Burden]) -> Burden:
         return min(burdens) if self.value is None else burdens[self.value]

@@ -115,6 +115,7 @@ class DGibbs(TreeProtocol):
         """Dispatch on the message's type."""
         match cast("Value | Difference | Finish", message):
             case Value(value, kept):
+                self.problem.refuse_value(sender, value)
                 self.view[sender] = value
                 self._told_by[sender] += 1
                 self._kept = kept if sender == self.parent else self._kept

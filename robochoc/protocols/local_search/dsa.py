@@ -47,7 +47,7 @@ from typing import ClassVar
 
 from robochoc.model.message import Message
 from robochoc.protocols.local_search.settings.dsa import DSASettings
-from robochoc.protocols.shared.cycles import NO_GAIN, CycleProtocol, gain, values_in
+from robochoc.protocols.shared.cycles import NO_GAIN, CycleProtocol, gain
 from robochoc.protocols.shared.messages.anytime import AnytimeMessage
 from robochoc.protocols.shared.messages.cycles import Value
 from robochoc.protocols.traits import ENDS_WITH_PROOF, Traits
@@ -68,7 +68,7 @@ class OnePhase(CycleProtocol):
 
     def _choose(self, messages: Mapping[str, Message]) -> None:
         """Move or stay, with all neighbours' values known."""
-        self.take(self.choice(self.problem.lexicographic_costs(values_in(messages))))
+        self.take(self.choice(self.problem.lexicographic_costs(self.checked_values(messages))))
         if not self.over:
             self.tell_value(self._choose)
 

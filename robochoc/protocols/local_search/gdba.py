@@ -53,7 +53,7 @@ from robochoc.protocols.local_search.messages.gdba import Improve
 from robochoc.protocols.local_search.mgm import Gainers
 from robochoc.protocols.local_search.settings.gdba import GDBASettings
 from robochoc.protocols.order import PriorityOrder
-from robochoc.protocols.shared.cycles import NO_GAIN, values_in
+from robochoc.protocols.shared.cycles import NO_GAIN
 from robochoc.protocols.shared.messages.anytime import AnytimeMessage
 from robochoc.protocols.shared.messages.cycles import Value
 from robochoc.protocols.traits import ENDS_WITH_PROOF, Traits
@@ -102,7 +102,7 @@ class GDBA(Gainers):
 
     def _weigh(self, messages: Mapping[str, wire.Message]) -> None:
         """Send the reduction of the best own move, with all neighbours' values known."""
-        self._charged = self.problem.charged(values_in(messages))
+        self._charged = self.problem.charged(self.checked_values(messages))
         self.best_of(self._burdens())
         broken, cost = self.gain
         self.gain = broken, max(-MOST, min(MOST, cost))

@@ -134,7 +134,7 @@ class KOpt(CycleProtocol):
     def _tell_part(self, messages: Mapping[str, wire.Message]) -> None:
         """Send the own part of the problem, with all neighbours' domains known."""
         own = self.order.rank[self.problem.agent]
-        domains = {name: told.values for name, told in messages.items() if isinstance(told, Domain)}
+        domains = self.checked_domains(messages)
         lower = {name: values for name, values in domains.items() if self.order.rank[name] > own}
         tables = []
         for table in self.problem.tables(lower):

@@ -46,7 +46,7 @@ from collections.abc import Mapping
 from robochoc.model import message as wire
 from robochoc.protocols.local_search.messages.lamdls import Colour
 from robochoc.protocols.order import PriorityOrder
-from robochoc.protocols.shared.cycles import CycleProtocol, values_in
+from robochoc.protocols.shared.cycles import CycleProtocol
 from robochoc.protocols.shared.messages.anytime import AnytimeMessage
 from robochoc.protocols.shared.messages.cycles import Value
 from robochoc.protocols.traits import ENDS_WITH_PROOF, Traits
@@ -110,6 +110,7 @@ class LAMDLS(CycleProtocol):
         for name, message in messages.items():
             if not isinstance(message, Colour):
                 raise ValueError(f"{name} tells no colour, and that comes first")  # noqa: TRY004 - as any bad message
+            self.check_value(name, message.value)
             self.view[name] = message.value
             self._colours[name] = message.colour
 
@@ -118,7 +119,7 @@ class LAMDLS(CycleProtocol):
 
     def _move(self, messages: Mapping[str, wire.Message]) -> None:
         """Take the best value against the neighbours' values, and tell it."""
-        self.view |= values_in(messages)
+        self.view |= self.checked_values(messages)
         burdens = self.problem.lexicographic_costs(self.view)
         least = min(burdens)
         index = self.present
@@ -131,5 +132,5 @@ class LAMDLS(CycleProtocol):
 
     def _wait_for_later(self, messages: Mapping[str, wire.Message]) -> None:
         """Go on with the next step, once all neighbours of larger colours have made the last one."""
-        self.view |= values_in(messages)
+        self.view |= self.checked_values(messages)
         self._wait_for_earlier()

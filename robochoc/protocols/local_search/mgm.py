@@ -40,7 +40,7 @@ from collections.abc import Mapping, Sequence
 from robochoc.model import message as wire
 from robochoc.protocols.local_search.messages.mgm import Gain
 from robochoc.protocols.order import PriorityOrder
-from robochoc.protocols.shared.cycles import NO_GAIN, CycleProtocol, gain, values_in
+from robochoc.protocols.shared.cycles import NO_GAIN, CycleProtocol, gain
 from robochoc.protocols.shared.messages.anytime import AnytimeMessage
 from robochoc.protocols.shared.messages.cycles import Value
 from robochoc.protocols.traits import ENDS_WITH_PROOF, Traits
@@ -103,7 +103,7 @@ class MGM(Gainers):
 
     def _weigh(self, messages: Mapping[str, wire.Message]) -> None:
         """Send the gain of the best own move, with all neighbours' values known."""
-        self.best_unilateral(values_in(messages))
+        self.best_unilateral(self.checked_values(messages))
         self.tell(self.problem.neighbours, Gain(*self.gain))
         self.listen(self.problem.neighbours, self._move)
 

@@ -49,7 +49,7 @@ from robochoc.protocols.local_search.messages.mgm2 import Accept, Gains, Go, Off
 from robochoc.protocols.local_search.mgm import Gainers
 from robochoc.protocols.local_search.settings.mgm2 import MGM2Settings
 from robochoc.protocols.order import PriorityOrder
-from robochoc.protocols.shared.cycles import NO_GAIN, gain, values_in
+from robochoc.protocols.shared.cycles import NO_GAIN, gain
 from robochoc.protocols.shared.messages.anytime import AnytimeMessage
 from robochoc.protocols.shared.messages.cycles import Domain, Value
 from robochoc.protocols.traits import ENDS_WITH_PROOF, Traits
@@ -97,12 +97,12 @@ class MGM2(Gainers):
 
     def _meet(self, messages: Mapping[str, wire.Message]) -> None:
         """Begin the first cycle, with all neighbours' domains known."""
-        self.domains = {name: message.values for name, message in messages.items() if isinstance(message, Domain)}
+        self.domains = self.checked_domains(messages)
         self.tell_value(self._offer)
 
     def _offer(self, messages: Mapping[str, wire.Message]) -> None:
         """Become an offerer or not, with all neighbours' values known."""
-        self.view = values_in(messages)
+        self.view = self.checked_values(messages)
         self.partner = None
         if self.chance() < self.settings.threshold:
             neighbours = self.problem.neighbours

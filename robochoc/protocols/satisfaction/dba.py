@@ -55,7 +55,7 @@ from robochoc.model.problem import INFINITE
 from robochoc.protocols.order import PriorityOrder
 from robochoc.protocols.satisfaction.messages.dba import Improve
 from robochoc.protocols.satisfaction.settings.dba import DBASettings
-from robochoc.protocols.shared.cycles import CycleProtocol, values_in
+from robochoc.protocols.shared.cycles import CycleProtocol
 from robochoc.protocols.shared.messages.anytime import AnytimeMessage
 from robochoc.protocols.shared.messages.cycles import Value
 from robochoc.protocols.traits import Traits
@@ -96,7 +96,7 @@ class DBA(CycleProtocol):
 
     def _weigh(self, messages: Mapping[str, wire.Message]) -> None:
         """Send the reduction by the best own move, with all neighbours' values known."""
-        charged = self.problem.charged(values_in(messages))
+        charged = self.problem.charged(self.checked_values(messages))
         weighed = [self._weight(charged, place) for place in range(len(self.problem.values))]
         now, least = weighed[self.present], min(weighed)
         self._violated = [one.number for one in charged if one.costs[self.present] == INFINITE]

@@ -24,7 +24,7 @@ from robochoc.protocols.order import PriorityOrder
 from robochoc.protocols.protocol import Protocol
 from robochoc.protocols.shared.anytime import Anytime
 from robochoc.protocols.shared.messages.anytime import Best, Paid, Place, Step
-from robochoc.protocols.shared.messages.cycles import Value
+from robochoc.protocols.shared.messages.cycles import Domain, Value
 from robochoc.protocols.shared.settings.cycles import CycleSettings
 from robochoc.solver.compiled import LexicographicCost, LocalProblem
 
@@ -55,6 +55,8 @@ class CycleProtocol(Protocol):
         self._missing = 0
         self._then: Then | None = None
         self._anytime: Anytime | None = None
+        self._checked: dict[str, set[wire.Value]] = {name: set() for name in problem.neighbours}
+        """Of each neighbour, the values that it has said, and can have: most say them again."""
 
     @abstractmethod
     def begin(self) -> None:
@@ -128,13 +130,39 @@ class CycleProtocol(Protocol):
         self.cycle = self.settings.cycles
 
     def checked_values(self, messages: Mapping[str, wire.Message]) -> dict[str, wire.Value]:
-        """Return what `values_in` returns; raise `ValueError` where a robot has said no value that it can have."""
-        values = values_in(messages)
-        for name in messages:
-            if name not in values:
-                raise ValueError(f"{name} tells something else than its value in this phase")
-            self.problem.refuse_value(name, values[name])
+        """Return the values in the messages of a phase in which every robot sends a `Value`.
+
+        Raises:
+            ValueError: where a robot says something else, or no value that it can have.
+        """
+        values: dict[str, wire.Value] = {}
+        known = self._checked
+        for name, message in messages.items():
+            if not isinstance(message, Value):
+                raise ValueError(f"{name} tells something else than its value in this phase")  # noqa: TRY004 - as any
+            value = values[name] = message.value
+            if value not in known[name]:
+                self.check_value(name, value)
         return values
+
+    def checked_domains(self, messages: Mapping[str, wire.Message]) -> dict[str, list[wire.Value]]:
+        """Return the domains in the messages of a phase in which every robot sends a `Domain`.
+
+        Raises:
+            ValueError: where a robot says something else, or a value that it cannot have.
+        """
+        domains = {name: message.values for name, message in messages.items() if isinstance(message, Domain)}
+        for name in messages:
+            if name not in domains:
+                raise ValueError(f"{name} tells something else than its domain in this phase")
+            for value in domains[name]:
+                self.problem.refuse_value(name, value)
+        return domains
+
+    def check_value(self, name: str, value: wire.Value) -> None:
+        """Raise `ValueError` for a `value` that the robot called `name` cannot have."""
+        self.problem.refuse_value(name, value)
+        self._checked[name].add(value)
 
     def any_value(self) -> int:
         """Return a random value of the whole domain, with which the search begins."""
@@ -192,8 +220,3 @@ NO_GAIN: LexicographicCost = (0, 0)
 def gain(before: LexicographicCost, after: LexicographicCost) -> LexicographicCost:
     """Return the reduction from `before` to `after`; the pairs of differences compare lexicographically."""
     return before[0] - after[0], before[1] - after[1]
-
-
-def values_in(messages: Mapping[str, wire.Message]) -> dict[str, wire.Value]:
-    """Return the values in the messages of a phase in which every robot sends a `Value`."""
-    return {name: message.value for name, message in messages.items() if isinstance(message, Value)}
