@@ -10,7 +10,16 @@ from typing import Any
 import msgspec
 from msgspec import UNSET, UnsetType
 
-from robochoc.model.outcome import CheckCounts, EpochOutcome, Metrics, Outcome, Preprocessing, PseudoTreeNode, Verdict
+from robochoc.model.outcome import (
+    CheckCounts,
+    EpochOutcome,
+    Metrics,
+    Optima,
+    Outcome,
+    Preprocessing,
+    PseudoTreeNode,
+    Verdict,
+)
 from robochoc.system.decode_errors import describe_decode_error
 
 
@@ -55,6 +64,11 @@ class _CheckedForm(msgspec.Struct):
     by_owner: int
 
 
+class _OptimaForm(msgspec.Struct):
+    number: Decimal
+    assignments: list[dict[str, int | str]]
+
+
 class _PreprocessingForm(msgspec.Struct):
     name: str
     metrics: _MetricsForm
@@ -88,6 +102,7 @@ class _Form(msgspec.Struct, omit_defaults=True):
     names: dict[str, str] = {}
     chosen: dict[str, str] = {}
     preprocessing: _PreprocessingForm | None = None
+    optima: _OptimaForm | None = None
 
 
 _SAME = (
@@ -119,8 +134,15 @@ def result_json(outcome: Outcome, names: Mapping[str, str] = MappingProxyType({}
         checked=_CheckedForm(*outcome.checked) if outcome.checked else None,
         names=dict(names),
         preprocessing=_preprocessing(outcome.preprocessing),
+        optima=_optima(outcome),
     )
     return _ENCODER.encode(form)
+
+
+def _optima(outcome: Outcome) -> _OptimaForm | None:
+    if outcome.optima is None:
+        return None
+    return _OptimaForm(Decimal(outcome.optima.number), [outcome.labelled(one) for one in outcome.optima.assignments])
 
 
 def _metrics(spent: Metrics) -> _MetricsForm:
@@ -214,6 +236,8 @@ def read_result(content: bytes) -> Outcome:
     symbols = _Symbols()
     assignment = symbols.values(form.assignment)
     epochs = tuple(_epoch_of(epoch, symbols) for epoch in form.epochs)
+    told = form.optima
+    listed = Optima(int(told.number), tuple(map(symbols.values, told.assignments))) if told else None
     return Outcome(
         **same,
         assignment=assignment,
@@ -225,6 +249,7 @@ def read_result(content: bytes) -> Outcome:
         metrics=_metrics_of(form.metrics),
         checked=CheckCounts(form.checked.by_both, form.checked.by_owner) if form.checked else None,
         preprocessing=_preprocessing_of(form.preprocessing),
+        optima=listed,
     )
 
 

@@ -132,6 +132,18 @@ class CheckCounts(NamedTuple):
     by_owner: int
 
 
+class Optima(NamedTuple):
+    """What a protocol that lists optima, or solutions, has found.
+
+    Attributes:
+        number: How many there are that robots can tell apart.
+        assignments: The first ones, each checked: the values of all variables of the robots that are not withdrawn.
+    """
+
+    number: int
+    assignments: tuple[dict[str, int], ...]
+
+
 @dataclass(frozen=True)
 class Preprocessing:
     """The result of a preprocessing step, which robots took before the protocol began.
@@ -186,6 +198,7 @@ class Outcome:
         symbolic: The variables whose values stand for symbols.
         chosen: Why the `protocol`, or the `order`, was chosen, where nobody asked for it.
         preprocessing: What the robots have done before, if that was asked for.
+        optima: The optima, or solutions, if the protocol lists them.
     """
 
     team: str
@@ -216,6 +229,7 @@ class Outcome:
     symbolic: tuple[str, ...] = ()
     chosen: dict[str, str] = field(default_factory=dict)
     preprocessing: Preprocessing | None = None
+    optima: Optima | None = None
 
     def labelled(self, assignment: Mapping[str, int]) -> dict[str, int | str]:
         """Return `assignment`, of this outcome or of one of its epochs, with symbols by their names."""

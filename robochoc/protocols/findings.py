@@ -29,12 +29,20 @@ class Trail(msgspec.Struct, frozen=True):
     cycle: int
 
 
+class Listing(msgspec.Struct, frozen=True):
+    """The places of a robot's values in the optima that its tree lists; at most `limit` are."""
+
+    places: list[int]
+    limit: int
+
+
 class Findings(msgspec.Struct, frozen=True):
     """A robot's knowledge of the whole search; None for what it, or its protocol, does not know.
 
     `bound` is a lower bound on the cost of every assignment of the robots that it is for (a root: its tree; the first
     robot: all robots). `count` is the number of optima of a root's tree, in hexadecimal digits, as it may need more
-    than 64 bits. `left` are the places of the own values that preprocessing has left.
+    than 64 bits; `listing` has the robot's values in some. `left` are the places of the own values that preprocessing
+    has left.
     """
 
     best: Incumbent | None = None
@@ -43,6 +51,7 @@ class Findings(msgspec.Struct, frozen=True):
     trail: Trail | None = None
     left: tuple[int, ...] | None = None
     count: str | None = None
+    listing: Listing | None = None
 
 
 NOTHING = Findings()

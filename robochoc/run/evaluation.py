@@ -13,9 +13,19 @@ from typing import NamedTuple
 from robochoc.communication.run_result import RunResult
 from robochoc.model.cost_units import Cost
 from robochoc.model.costs import told_cost
-from robochoc.model.outcome import CheckCounts, EpochOutcome, Metrics, Outcome, Preprocessing, PseudoTreeNode, Verdict
+from robochoc.model.outcome import (
+    CheckCounts,
+    EpochOutcome,
+    Metrics,
+    Optima,
+    Outcome,
+    Preprocessing,
+    PseudoTreeNode,
+    Verdict,
+)
 from robochoc.model.problem import ProblemKind, Team
 from robochoc.run.incumbent import best_known, lower_bound, merged_values, optima, pseudo_tree, robots_without_values
+from robochoc.run.listed_optima import put_together
 from robochoc.run.withdrawal import Phase
 from robochoc.solver.compiled_team import CompiledTeam
 from robochoc.system.garbage import collection_paused
@@ -26,7 +36,8 @@ class CheckedAssignment(NamedTuple):
     """An assignment that was checked.
 
     `withdrawn` are the robots without values. `verified`: no hard constraint is broken. `check_counts` is set where
-    robots have checked. `reason` says why there is no assignment, or why it was not checked.
+    robots have checked. `reason` says why there is no assignment, or why it was not checked. `optima` are there if the
+    protocol lists them.
     """
 
     assignment: dict[str, int]
@@ -35,6 +46,7 @@ class CheckedAssignment(NamedTuple):
     verified: bool = True
     check_counts: CheckCounts | None = None
     reason: str | None = None
+    optima: Optima | None = None
 
 
 Check = Callable[[], CheckedAssignment | None]
@@ -73,6 +85,7 @@ class Answer:
     ended: bool = False
     preprocessing: Preprocessing | None = None
     count: int | None = None
+    optima: Optima | None = None
 
     def confirmed_as(self, solvers: tuple[str, ...]) -> Answer:
         """Return this answer, with which central `solvers` agree: that there is no solution, nothing else shows."""
@@ -129,6 +142,7 @@ class Answer:
             checked=self.checked,
             preprocessing=self.preprocessing,
             count=self.count,
+            optima=self.optima,
         )
 
 
@@ -165,6 +179,7 @@ def evaluate_search(phase: Phase, search: Search, kind: ProblemKind, told: Calla
         verified=found.verified,
         checked=found.check_counts,
         reason=found.reason,
+        optima=found.optima,
     )
 
 
@@ -201,7 +216,27 @@ def check_with_files(phase: Phase, result: RunResult, team: Team, compiled: Comp
     check_assignment(team, assignment, withdrawn, maximal=proven)
     in_order = {name: assignment[name] for name in team.variables if name in assignment}
     paid = told_cost(team, assignment_cost(team, assignment), without=withdrawn)
-    return CheckedAssignment(in_order, paid, withdrawn)
+    return CheckedAssignment(in_order, paid, withdrawn, optima=_checked_optima(phase, result, team, compiled, paid))
+
+
+def _checked_optima(
+    phase: Phase, result: RunResult, team: Team, compiled: CompiledTeam, cost: Cost | None
+) -> Optima | None:
+    """Return the optima that the robots have listed, if they have, each checked as the assignment was.
+
+    Raises:
+        RefutedError: when one breaks a constraint, or costs something else than `cost`.
+    """
+    found = put_together(compiled, result) if is_proven(phase, result) else None
+    if found is None:
+        return None
+    number, listed = found
+    for assignment in listed:
+        withdrawn = robots_without_values(team, assignment) if phase.withdrawal else ()
+        check_assignment(team, assignment, withdrawn)
+        if told_cost(team, assignment_cost(team, assignment), without=withdrawn) != cost:
+            raise RefutedError(f"the optima that were listed for {team.name} do not cost the same")
+    return Optima(number, tuple([{name: one[name] for name in team.variables if name in one} for one in listed]))
 
 
 def check_assignment(

@@ -29,6 +29,7 @@ def outcome_report(team: Team, outcome: Outcome) -> str:
     if outcome.assignment:
         values = outcome.labelled(outcome.assignment)
         lines += _board(team, values) or _list(team, values)
+    lines += _listed(team, outcome)
     if outcome.withdrawn_alive:
         lines += [
             f"  {len(outcome.withdrawn_alive)} withdrawn{_weight(team, outcome)}:",
@@ -242,6 +243,25 @@ def _list(team: Team, assignment: Mapping[str, int | str]) -> list[str]:
     values = {owner: ", ".join(f"{name} = {assignment[name]}" for name in names) for owner, names in own.items()}
     alike = own == {owner: [owner] for owner in owners}
     return _wrapped([values[owner] if alike else f"{owner}: {values[owner]}" for owner in owners])
+
+
+def _listed(team: Team, outcome: Outcome) -> list[str]:
+    """Return the optima that were listed, but for the first, which is the assignment."""
+    if outcome.optima is None:
+        return []
+    what = "solution" if outcome.verdict is Verdict.SOLUTION else "optimum"
+    number, others = Decimal(outcome.optima.number), outcome.optima.assignments[1:]
+    if number == 1:
+        return [f"  there is no other {what}"]
+    shown = f"the first {len(others) + 1:,}" if len(others) + 1 < number else "all"
+    lines = [
+        f"  one of {number:,} {'solutions' if what == 'solution' else 'optima'}; {shown} are listed, the others are:"
+    ]
+    for place, one in enumerate(others, start=2):
+        values = outcome.labelled(one)
+        rows = _board(team, values) or _list(team, values)
+        lines += [f"  {place:,}.", *rows]
+    return lines
 
 
 def _wrapped(words: tuple[str, ...] | list[str]) -> list[str]:

@@ -178,6 +178,8 @@ def fault_of_findings(findings: Findings, order: Collection[str]) -> str:
         return "it tells of costs that cannot be"
     if findings.count is not None and not HEXADECIMAL.fullmatch(findings.count):
         return "it tells of a number that is none"
+    if findings.listing is not None and min(findings.listing.places, default=0) < 0:
+        return "it tells of optima that cannot be"
     entries = findings.trail.entries if findings.trail is not None else []
     return "it tells of cycles that cannot be" if any(place < 0 for place in chain.from_iterable(entries)) else ""
 

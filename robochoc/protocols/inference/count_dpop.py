@@ -94,6 +94,7 @@ class CountDPOP(DPOP):
         self.bits_below: dict[str, int] = {}
         self.numbers: dict[str, IncomingNumbers] = {}
         self.count: int | None = None
+        self._joined_children: list[str] = []
         self._below: list[Numbers] = []
         self._own_numbers: Numbers | None = None
 
@@ -164,14 +165,18 @@ class CountDPOP(DPOP):
         """Join the children's tables, once those of numbers have arrived as well."""
         if len(self.numbers) < len(self.children) or not all(table.complete for table in self.numbers.values()):
             return
+        self._joined_children = [*self.utils]
         self._below = [self._aligned(self.numbers[child].table, self._axes[child]) for child in self.utils]
         self.numbers.clear()
         super()._compute_utils_of_all()
 
+    def _own_ways(self) -> Numbers:
+        """Return how many local solutions stand behind each own value."""
+        return numbers_of(self.problem.behind, self.bits)
+
     def _use_joined(self, costs: Codes) -> None:
         """Count the assignments that attain each of the least `costs`."""
-        own = numbers_of(self.problem.behind, self.bits)
-        self._own_numbers = count_attaining(costs, self.problem.charges, self._joined, own, self._below)
+        self._own_numbers = count_attaining(costs, self.problem.charges, self._joined, self._own_ways(), self._below)
         self._below = []
         if self.parent is None:
             self.count = int(self._own_numbers.item())

@@ -177,6 +177,16 @@ def costs_for(table: Table, value: int) -> Array:
     return _block(table[value : value + 1] if len(table) > 1 else table, ()).reshape(table.shape[1:])
 
 
+def place_at(table: NDArray[Any], places: Sequence[int]) -> tuple[int, ...]:
+    """Return where `table` has its entry for `places` on the axes that it is aligned to: those of length 1 have one."""
+    return tuple([place if length > 1 else 0 for place, length in zip(places, table.shape, strict=True)])
+
+
+def cost_at(table: Table, at: tuple[int, ...]) -> float:
+    """Return the cost in one cell of `table`."""
+    return math.inf if table.dtype.kind == "u" and table[at] == _top(table.itemsize) else float(table[at])
+
+
 def _max_finite(costs: Codes) -> int:
     """Return the largest finite cost; 0 if there is none."""
     flat = costs.reshape(-1)
