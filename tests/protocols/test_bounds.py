@@ -38,6 +38,7 @@ BOUNDING = (
     "s-dpop",
     "o-dpop",
     "count-dpop",
+    "list-dpop",
 )
 INCOMPLETE = tuple(
     name for name in protocol_names() if protocol_named(name).traits.costs and not protocol_named(name).traits.complete
