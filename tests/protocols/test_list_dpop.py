@@ -170,7 +170,7 @@ def test_the_optima_are_all_assignments_of_least_cost(problems: int) -> None:
             # Another order may take a variable that no constraint needs out of sight.
             team, options = loosened(team, chance), replace(options, order=None)
         outcome, truth = solve(team, options), different_optima(team)
-        assert (outcome.verdict is Verdict.NO_SOLUTION) is not truth
+        assert (outcome.verdict is Verdict.NO_SOLUTION) == (not truth)
         if not truth:
             assert outcome.optima is None
             continue
