@@ -43,8 +43,8 @@ class Scene(NamedTuple):
         branches: By robot, the robots whose values its partial assignments hold.
         fixed_holders: As in `Hearing`.
         minimises: As in `Hearing`.
-        one_sided: Costs in messages may be those of one robot's part of a partially known constraint. No rule is about
-            these: own costs and totals are those of both sides together (`model/disclosure.py`).
+        one_sided: Costs in messages may be those of one robot's part of a partially known constraint. Then only what is
+            proved of single robots counts: own costs and totals are those of both sides (`model/disclosure.py`).
     """
 
     secrets: TeamSecrets
@@ -121,9 +121,10 @@ class Observer:
 
     def _proofs(self, message: Message, sender: str, receiver: str) -> Sequence[Proof] | None:
         """Return what a message proves; None: there is no rule."""
-        if self._scene.one_sided:
-            return None
-        return message.proves(_Heard(self._scene, sender, receiver, self._values, self._last))
+        proofs = message.proves(_Heard(self._scene, sender, receiver, self._values, self._last))
+        if proofs is None or not self._scene.one_sided:
+            return proofs
+        return [proof for proof in proofs if _is_of_one_robot(proof)]
 
     def _learn(self, proof: Proof) -> None:
         """Put what a message proves in terms of secrets."""
@@ -203,6 +204,13 @@ class Observer:
             self.knowledge.tell(AtLeast(terms, least))
         if most < INFINITE:
             self.knowledge.tell(AtMost(terms, most))
+
+
+def _is_of_one_robot(proof: Proof) -> bool:
+    """Return whether a proof is about one robot's values, private costs or parts, and not about sums of two sides."""
+    return isinstance(proof, StandsAt | StandsWhere | HasOnly | PartPays) or (
+        isinstance(proof, Pays) and not proof.view
+    )
 
 
 class _Heard(Hearing):

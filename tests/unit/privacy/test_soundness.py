@@ -78,13 +78,9 @@ def test_the_truth_is_never_excluded(protocol: str, number: int, warm: AceProces
 
 
 @pytest.mark.parametrize("protocol", [name for name in protocol_names() if protocol_named(name).traits.asymmetric])
-def test_of_one_side_s_costs_nothing_is_known(protocol: str, warm: AceProcess) -> None:
-    """Rules are about what both sides pay together."""
-    seen = 0
+def test_of_two_sides_costs_nothing_is_concluded_together(protocol: str, warm: AceProcess) -> None:
     for seed in range(6):
         chance = Random(f"one side {protocol} {seed}")
         team = random_asymmetric_team(chance, simple=True)
         for report in reports(recorded(team, random_pkc_options(team, protocol, chance), warm), warm):
-            seen += bool(report.without_rule)
-            assert report.without_rule or all(loss.by(one) in (0, None) for loss in report.losses for one in Measure)
-    assert seen
+            assert protocol not in WITH_RULES or not report.without_rule
