@@ -39,8 +39,8 @@ MOST_IN_A_TREE = 30_000
 """So many take half a minute in the simulator (docs/guides/large-teams.md)."""
 MANY_ROBOTS = 300
 """With more, what SFB's messages tell of each robot adds up, and local search is all that ends with costs."""
-MANY_COMBINATIONS = 1_000_000
-"""Up to so many combinations of all robots' values, `syncabb` mostly ends within a minute in the simulator."""
+MANY_COMBINATIONS = 100_000_000
+"""Up to so many combinations of all robots' values, `asym-pt-fb` takes seconds in the simulator."""
 SPARSE = 8
 """The mean number of neighbours up to which a constraint graph is called sparse."""
 FEW_TO_BEGIN_ANEW = 25
@@ -143,7 +143,7 @@ RULES = (
         " search ends, with a good answer",
     ),
     Rule(
-        "syncabb", (PARTIAL, COSTS), "both sides of partially known constraints have costs, and it proves the best sum"
+        "asym-pt-fb", (PARTIAL, COSTS), "both sides of partially known constraints have costs; it proves the best sum"
     ),
     Rule(
         "sfb",

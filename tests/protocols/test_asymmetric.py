@@ -98,15 +98,15 @@ def test_auto_takes_a_complete_one() -> None:
         assert decided(random_asymmetric_team(chance), Options(protocol="auto")).options.protocol in COMPLETE
 
 
-@pytest.mark.parametrize(("robots", "name"), [(9, "syncabb"), (10, "acls")])
+@pytest.mark.parametrize(("robots", "name"), [(13, "asym-pt-fb"), (14, "acls")])
 def test_auto_takes_local_search_where_a_proof_takes_too_long(robots: int, name: str) -> None:
-    """4^9 combinations are fewer than a million, and 4^10 are more."""
+    """4^13 combinations are fewer than a hundred millions, and 4^14 are more."""
     team = random_csp(robots, 4, 0.4, 0, max_cost=20, asymmetric=True)
     assert decided(team, Options(protocol="auto")).options.protocol == name
 
 
 def test_auto_keeps_to_the_complete_one_where_robots_withdraw() -> None:
-    team = random_csp(10, 4, 0.4, 0, max_cost=20, asymmetric=True)
+    team = random_csp(14, 4, 0.4, 0, max_cost=20, asymmetric=True)
     assert decided(team, Options(protocol="auto", withdraw=Withdrawal.MINIMUM)).options.protocol in COMPLETE
 
 

@@ -21,6 +21,7 @@ from tests.support.cost_problems import random_complex_cost_team, random_cost_te
 BOUNDING = (
     "syncabb",
     "atwb",
+    "asym-pt-fb",
     "syncbb",
     "afb",
     "adopt",

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Collection, Iterator
+from collections.abc import Collection, Iterator, Mapping
 from random import Random
 from typing import SupportsIndex
 
@@ -48,10 +48,19 @@ def watched_costs(team: Team, monkeypatch: pytest.MonkeyPatch) -> Asked:
     return _watched(team, monkeypatch, frozenset())
 
 
-def watched_entries(team: Team, monkeypatch: pytest.MonkeyPatch) -> Asked:
-    """The same, but of higher robots' parts each entry is noted only when it is picked out of those of a value."""
-    rank = {name: place for place, name in enumerate(team.order)}
-    return _watched(team, monkeypatch, {part for part in pkc_parts(team) if rank[part[0]] < rank[part[1]]})
+Above = Mapping[str, Collection[str]]
+"""For each robot those above it that it shares a constraint with."""
+
+
+def watched_entries(team: Team, monkeypatch: pytest.MonkeyPatch, above: Above | None = None) -> Asked:
+    """The same, but of parts of robots `above` each entry is noted only when it is picked out of those of a value."""
+    above = above or _before(team)
+    return _watched(team, monkeypatch, {part for part in pkc_parts(team) if part[0] in above[part[1]]})
+
+
+def _before(team: Team) -> Above:
+    """For each robot all that have higher priority."""
+    return {name: team.order[:place] for place, name in enumerate(team.order)}
 
 
 def _watched(team: Team, monkeypatch: pytest.MonkeyPatch, singly: Collection[tuple[str, str, str]]) -> Asked:
@@ -99,32 +108,33 @@ def costs_changed(team: Team, asked: Asked, chance: Random, *, there: bool = Fal
     return with_constraints(team, change)
 
 
-def what_is_not_needed_changed(team: Team, asked: Asked, chance: Random) -> Team:
-    """Entries that nobody picked out are others: of lower robots' parts any, of higher robots' larger than they were.
+def what_is_not_needed_changed(team: Team, asked: Asked, chance: Random, above: Above | None = None) -> Team:
+    """Entries that nobody picked out are others: of lower robots' parts any, of robots' `above` larger than they were.
 
     Of these, one least entry of each own value stays.
     """
-    rank = {name: place for place, name in enumerate(team.order)}
+    higher = above or _before(team)
 
     def change(robot: Robot, constraint: Constraint) -> Constraint:
         if constraint.model is not ConstraintModel.PKC:
             return constraint
         names = constraint.variables
         owners = [team.owner[name] for name in names]
-        above = all(rank[robot.name] <= rank[owner] for owner in owners)
+        (other,) = {*owners} - {robot.name}
+        is_above = robot.name in higher[other]
         known = asked.get((robot.name, constraint.name), set())
         listed = rows(team, constraint)
         before = {row: constraint.price(dict(zip(names, row, strict=True))) for row in listed}
         place = owners.index(robot.name)
         kept = {min((row for row in listed if row[place] == own), key=before.__getitem__) for own in
-                {row[place] for row in listed}} if above else set()  # fmt: skip
+                {row[place] for row in listed}} if is_above else set()  # fmt: skip
         costs = []
         for row in listed:
             drawn = INFINITE if chance.random() < 0.1 else chance.randint(0, MAX_COST)
             if row in kept or frozenset(zip(names, row, strict=True)) in known:
                 costs.append(before[row])
             else:
-                costs.append(before[row] + drawn if above else drawn)
+                costs.append(before[row] + drawn if is_above else drawn)
         table = Relation("redrawn", len(names), Semantics.SOFT, tuple(listed), tuple(costs), 0)
         return Constraint(constraint.name, table, names, names, ConstraintModel.PKC)
 

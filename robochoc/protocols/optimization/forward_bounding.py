@@ -34,6 +34,8 @@ class CostsAbove:
 
     def __init__(self, problem: LocalProblem) -> None:
         self._problem = problem
+        self.alone: Sequence[Number] = problem.charges
+        """What each own value costs whatever the robots above do."""
         self.values: dict[str, Value] = {}
         self.totals: dict[str, Sequence[Number]] = {}
 
@@ -43,10 +45,14 @@ class CostsAbove:
         names = [*self.values]
         place = names.index(name)
         view = {above: self.values[above] for above in names[: place + 1]}
-        base = self.totals[names[place - 1]] if place else self._problem.charges
-        added = self._problem.added_by(name, view)
+        base = self.totals[names[place - 1]] if place else self.alone
+        added = self.added(name, view)
         self.totals[name] = [cost + more for cost, more in zip(base, added, strict=True)]
         return self.totals[name]
+
+    def added(self, name: str, view: Mapping[str, Value]) -> Sequence[Number]:
+        """Return what each own value costs more with the value of `name`, below all others in `view`."""
+        return self._problem.added_by(name, view)
 
 
 @mypyc_attr(allow_interpreted_subclasses=True)
@@ -63,12 +69,16 @@ class ForwardBoundingProtocol(BranchingProtocol):
         super().__init__(problem, order)
         self.asked: dict[str, list[str]] = {}
         self.members: dict[str, list[str]] = {}
-        self.above = CostsAbove(problem)
+        self.above = self.costs_above()
         self.handed: dict[str, Number] = {}
         self.answers: dict[str, Number] = {}
         self._linked: dict[str, list[str]] = {}
         self._child_above: dict[str, str] = {}
         self._waiting: dict[str, set[str]] = {}
+
+    def costs_above(self) -> CostsAbove:
+        """Return what finds the own costs; another one for those that know more of them."""
+        return CostsAbove(self.problem)
 
     def begin(self) -> None:
         """Tell the parent who is linked with whom, once all children have done the same."""
@@ -119,11 +129,15 @@ class ForwardBoundingProtocol(BranchingProtocol):
             raise ValueError(f"{sender} is not above {self.problem.agent}")
         costs = self.above.ask(sender, value)
         least = min(costs)
-        if sender != self.parent or self.children:
+        if not self.knows_cost(sender):
             self.send(sender, Report(least))
         else:
             value = self.problem.values[costs.index(least)]
             self.send(sender, Result(least, {self.problem.agent: value} if least < INFINITE else {}))
+
+    def knows_cost(self, sender: str) -> bool:
+        """Return whether the least that an own value costs is the cost of the own subtree, once `sender` has asked."""
+        return sender == self.parent and not self.children
 
     def take_report(self, sender: str, bound: Number) -> None:
         """Note a bound; when all are there, let the child search or take the next value."""
@@ -136,6 +150,12 @@ class ForwardBoundingProtocol(BranchingProtocol):
             branch = self.branches[child]
             branch.lower[self.present(child)] = sum([self.reports.get(name, 0) for name in self.members[child]])
             self.descend(child)
+
+    def child_above(self, robot: str) -> str:
+        """Return the child whose subtree a linked `robot` is in; raise `ValueError` for any other robot."""
+        if robot not in self._child_above:
+            raise ValueError(f"{robot} is not known to be below {self.problem.agent}")
+        return self._child_above[robot]
 
     def take_result(self, child: str, result: Result) -> None:
         """Note the cost of a subtree; a leaf's is its answer."""

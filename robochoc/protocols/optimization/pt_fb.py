@@ -69,7 +69,7 @@ class PTFB(ForwardBoundingProtocol):
 
     def begin_search(self) -> None:
         """Begin the search without a bound, as the root."""
-        self.search(self.limit, self.problem.charges)
+        self.search(self.limit, self.above.alone)
 
     def handle(self, sender: str, message: Message) -> None:
         """Dispatch on the message's type."""
@@ -96,6 +96,11 @@ class PTFB(ForwardBoundingProtocol):
         if self.parent not in self.above.totals or self.searching:
             raise ValueError(f"{self.problem.agent} does not know the value of its parent, or is searching")
         self.handed = dict(reports)
+        self.search_subtree(bound)
+
+    def search_subtree(self, bound: Number) -> None:
+        """Search the own subtree, with the values of the robots above."""
+        assert self.parent is not None  # noqa: S101 - for mypy: the root begins by itself
         self.search(bound, self.above.totals[self.parent])
 
     def _reduce(self, bound: Number) -> None:

@@ -1,0 +1,179 @@
+"""Asymmetric Pseudo-tree Forward Bounding (AsymPT-FB).
+
+PT-FB for asymmetric costs: each robot of a constraint pays its own part, and nobody else knows it. The bounds that
+robots of a subtree report are about their own sides. Before a robot lets its own subtree search, it asks all robots
+above that it shares a constraint with for what their sides cost, for all its values. It keeps the answers: they hold as
+long as that robot has the same value, or has it again, and count in its bounds from then on.
+
+- **When to use**: asymmetric costs, a pseudo-tree with branches.
+- **Guarantees**: complete; it terminates with an optimum, or with a proof that there is no solution. Besides what PT-FB
+  remembers, a robot remembers at most as many costs as the other sides of its constraints have.
+- **Parameters**: none.
+- **Reference**: Litov, Meisels: "Forward bounding on pseudo-trees for DCOPs and ADCOPs", AIJ 252, 2017 (AsymPT-FB).
+
+The methods, besides those of PT-FB (`pt_fb.py`):
+
+    ask robots above for their sides   `search_subtree`     their answers   `_tell_row`     add them    `_take_row`
+
+What others learn: what PT-FB tells, with bounds on own sides; and for each value that a robot has while its subtree
+searches, what its side charges for all values of a robot below, less the least of these. Of its part towards a robot
+below, a robot needs the least entry of each own value, and the rows of values that it takes.
+
+Choices that the paper leaves open, and differences:
+
+- All own values are asked about at once, and once for each value of the robot above.
+- A robot's costs contain, from the beginning, what its own parts charge at least with robots below. Its answers are
+  what its side costs more than that.
+- Totally known constraints are paid by the lowest robot of the scope in the tree, as in PT-FB; they may be n-ary.
+
+>>> from robochoc.communication.simulator.schedule import Concurrent
+>>> from robochoc.communication.simulator.simulator import Simulation
+>>> from robochoc.generators.random_csp import random_csp
+>>> team = random_csp(5, 3, 0.6, 0, max_cost=9, asymmetric=True)
+>>> result = Simulation(team, AsymPTFB, Concurrent(seed=0)).run()
+>>> result.verdict.value, result.assignments["Robot1"]
+('solution', {'V1': 1})
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import assert_never, cast
+
+from robochoc.model.message import Message, Value
+from robochoc.model.problem import INFINITE
+from robochoc.protocols.asymmetric.messages.asym_pt_fb import Row, RowRequest
+from robochoc.protocols.optimization.forward_bounding import CostsAbove
+from robochoc.protocols.optimization.messages.branching import Members, Number, Report, Request, Result, Terminate
+from robochoc.protocols.optimization.messages.pt_fb import CPA, Reduce
+from robochoc.protocols.optimization.pt_fb import PTFB
+from robochoc.protocols.order import PriorityOrder
+from robochoc.protocols.shared.messages.dfs import TreeMessage
+from robochoc.protocols.traits import ENDS_WITH_PROOF, Traits
+from robochoc.solver.compiled import LocalProblem
+
+
+class CostsOfBothSides(CostsAbove):
+    """The own values' costs with robots above, with these robots' sides as far as they have told them."""
+
+    def __init__(self, problem: LocalProblem) -> None:
+        super().__init__(problem)
+        self._rows: dict[tuple[str, Value], Sequence[Number]] = {}
+
+    def knows(self, name: str) -> bool:
+        """Return whether `name` has told its side for its present value."""
+        return (name, self.values[name]) in self._rows
+
+    def learn(self, name: str, row: Sequence[Number]) -> None:
+        """Add the side of `name` with its present value to the own costs, with it and all robots below it."""
+        self._rows[name, self.values[name]] = row
+        names = [*self.values]
+        for lower in names[names.index(name) :]:
+            self.totals[lower] = [cost + more for cost, more in zip(self.totals[lower], row, strict=True)]
+
+    def added(self, name: str, view: Mapping[str, Value]) -> Sequence[Number]:
+        """Return what each own value costs more with the value of `name`, with its side if it is known."""
+        own = super().added(name, view)
+        row = self._rows.get((name, view[name]))
+        return own if row is None else [cost + more for cost, more in zip(own, row, strict=True)]
+
+
+class AsymPTFB(PTFB):
+    """One agent of AsymPT-FB.
+
+    State, besides PT-FB's:
+
+    - `least`: for each robot below that shares a constraint, what each own value pays at least for the own parts of it.
+    - `asking`: robots above that have not told their sides yet; the search begins when they have. None: it is not to.
+    """
+
+    messages = TreeMessage | Members | Request | Report | CPA | Reduce | Result | Terminate | RowRequest | Row
+    traits = Traits(
+        concludes=ENDS_WITH_PROOF,
+        paper="Litov & Meisels 2017",
+        costs=True,
+        partially_known=True,
+        asymmetric=True,
+        shared_scopes=True,
+        writes_to_non_neighbours=False,
+        privacy="parts of PKC but for rows that are asked for, and bounds",
+        use_when="asymmetric costs, pseudo-tree with branches",
+    )
+    above: CostsOfBothSides
+
+    def __init__(self, problem: LocalProblem, order: PriorityOrder) -> None:
+        super().__init__(problem, order)
+        self.least: dict[str, list[Number]] = {}
+        self.asking: set[str] | None = None
+
+    def costs_above(self) -> CostsOfBothSides:
+        """Return what finds the own costs, and keeps what robots above have told."""
+        return CostsOfBothSides(self.problem)
+
+    def begin(self) -> None:
+        """Compute what the own sides cost at least; then begin as PT-FB."""
+        self.least = {name: self.problem.least_side(name) for name in self.descendants}
+        self.above.alone = [sum(costs) for costs in zip(self.problem.charges, *self.least.values(), strict=True)]
+        super().begin()
+
+    def handle(self, sender: str, message: Message) -> None:
+        """Dispatch on the message's type."""
+        match cast("Members | Request | Report | CPA | Reduce | Result | Terminate | RowRequest | Row", message):
+            case RowRequest(values):
+                self._tell_row(sender, values)
+            case Row(costs):
+                self._take_row(sender, costs)
+            case Reduce(bound) if self.asking is not None:
+                self.limit = min(self.limit, bound)
+            case Members() | Request() | Report() | CPA() | Reduce() | Result() | Terminate():
+                super().handle(sender, message)
+            case never:
+                assert_never(never)
+
+    # Robots above
+
+    @property
+    def _unknown(self) -> list[str]:
+        """The robots above that may have a side, and have not told it for their present value.
+
+        A robot knows which of its parents have one; a child may have one that it does not know of.
+        """
+        may = {*self.problem.pkc_parents, *self.problem.children}
+        return [name for name in self.ancestors if name in may and not self.above.knows(name)]
+
+    def knows_cost(self, sender: str) -> bool:
+        """Return whether this is a leaf that knows all sides above."""
+        return super().knows_cost(sender) and not self._unknown
+
+    def search_subtree(self, bound: Number) -> None:
+        """Ask the robots above for their sides; search once all are known."""
+        if self.asking is not None:
+            raise ValueError(f"{self.problem.agent} is asking for sides already")
+        self.limit, self.asking = bound, {*self._unknown}
+        for name in self._unknown:
+            self.send(name, RowRequest([*self.problem.values]))
+        self._search_if_all_is_known()
+
+    def _take_row(self, sender: str, costs: list[Number]) -> None:
+        """Add the side of a robot above."""
+        if not self.asking or sender not in self.asking or len(costs) != len(self.problem.values):
+            raise ValueError(f"{sender} tells sides that {self.problem.agent} has not asked for")
+        self.asking.remove(sender)
+        self.above.learn(sender, costs)
+        self._search_if_all_is_known()
+
+    def _search_if_all_is_known(self) -> None:
+        if not self.asking:
+            self.asking = None
+            super().search_subtree(self.limit)
+
+    # Robots below
+
+    def _tell_row(self, sender: str, values: Sequence[Value]) -> None:
+        """Tell what the own side charges for each value of a robot below, besides what the own costs contain."""
+        index = self.present(self.child_above(sender))
+        self.send(sender, Row([self._side(index, sender, value) for value in values]))
+
+    def _side(self, index: int, robot: str, value: Value) -> Number:
+        broken, cost = self.problem.own_side(index, robot, value)
+        return INFINITE if broken else cost - self.least[robot][index]

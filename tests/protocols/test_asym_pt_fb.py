@@ -1,0 +1,187 @@
+"""One test per rule of AsymPT-FB (Litov, Meisels, AIJ 252, 2017), named for it; PT-FB's are in `test_pt_fb`."""
+
+from __future__ import annotations
+
+import doctest
+from collections.abc import Mapping
+from random import Random
+
+import pytest
+
+import robochoc.protocols.asymmetric.asym_pt_fb
+from robochoc.generators.random_csp import random_csp
+from robochoc.model.assembly import Extras, assemble
+from robochoc.model.problem import INFINITE, Constraint, Domain, ProblemKind, Relation, Semantics, Team, Variable
+from robochoc.protocols.asymmetric.asym_pt_fb import AsymPTFB
+from robochoc.protocols.asymmetric.messages.asym_pt_fb import Row, RowRequest
+from robochoc.protocols.optimization.messages.branching import Members, Report, Request, Result
+from robochoc.protocols.optimization.messages.pt_fb import CPA, Reduce
+from robochoc.run import Options, Runtime, solve
+from tests.support.agents import replies
+from tests.support.asymmetric_bytes import watched_entries, what_is_not_needed_changed
+from tests.support.asymmetric_problems import random_asymmetric_team
+from tests.support.compiled import plain_python_only
+from tests.support.examples import count
+from tests.support.pkc_bytes import nothing_hidden, run
+from tests.support.pseudo_trees import placed
+
+
+def priced(scope: str, costs: Mapping[tuple[int, int], float]) -> Constraint:
+    relation = Relation("R", 2, Semantics.SOFT, tuple(costs), tuple(costs.values()), 0)
+    return Constraint(scope, relation, tuple(scope), tuple(scope))
+
+
+def team() -> Team:
+    """A, B and C, two values each, all with costs of their own; A pays 3 at least to B with its first value."""
+    parts = {
+        "RA": [priced("AB", {(1, 1): 3, (1, 2): 8}), priced("AC", {(1, 1): 5, (2, 2): INFINITE})],
+        "RB": [priced("AB", {(1, 1): 1, (2, 2): 2}), priced("BC", {(1, 1): 6})],
+        "RC": [priced("AC", {(1, 1): 4}), priced("BC", {(1, 1): 1, (1, 2): 2, (2, 2): 9})],
+    }
+    own = {f"R{name}": [Variable(name, Domain("D", (range(1, 3),)))] for name in "ABC"}
+    return assemble("triangle", own, [], kind=ProblemKind.DISWCSP, extras=Extras(parts=parts))
+
+
+def top() -> AsymPTFB:
+    """A, the root, which has asked B and C for bounds with its value 2."""
+    robot = placed(AsymPTFB, team(), "RA", children=["RB"], pseudo_children=["RC"])
+    assert replies(robot, ("RB", Members({"RA": ["RB", "RC"]}))) == [("RB", Request((2,))), ("RC", Request((2,)))]
+    return robot
+
+
+def middle() -> AsymPTFB:
+    """B, which knows that A = 1, and has been told to search."""
+    robot = placed(AsymPTFB, team(), "RB", "RA", children=["RC"])
+    replies(robot, ("RC", Members({"RB": ["RC"], "RA": ["RC"]})))
+    assert replies(robot, ("RA", Request((1,)))) == [("RA", Report(0))]
+    return robot
+
+
+def leaf() -> AsymPTFB:
+    """C, which knows that A = 1 and B = 1."""
+    robot = placed(AsymPTFB, team(), "RC", "RB", pseudo_parents=["RA"])
+    robot.outbox.clear()
+    assert replies(robot, ("RA", Request((1,)))) == [("RA", Report(0))]
+    assert replies(robot, ("RB", Request((1,)))) == [("RB", Report(2))]
+    return robot
+
+
+def test_what_the_own_side_charges_at_least_counts_from_the_beginning() -> None:
+    robot = top()
+    assert robot.least == {"RB": [3, 0], "RC": [0, 0]}
+    assert robot.local == [3, 0]
+
+
+def test_bounds_are_about_the_own_sides() -> None:
+    leaf()
+    middle()
+
+
+def test_before_it_searches_a_robot_asks_those_above_for_their_sides() -> None:
+    robot = middle()
+    assert replies(robot, ("RA", CPA(INFINITE, {}))) == [("RA", RowRequest([(1,), (2,)]))]
+    assert not robot.searching
+
+
+def test_a_robot_above_tells_what_its_side_adds_with_the_value_that_is_searched() -> None:
+    robot = top()
+    replies(robot, ("RB", Report(0)), ("RC", Report(0)))
+    assert replies(robot, ("RC", RowRequest([(1,), (2,)]))) == [("RC", Row([0, INFINITE]))]
+    replies(robot, ("RB", Result(7, {"RB": (1,), "RC": (1,)})), ("RB", Report(0)), ("RC", Report(0)))
+    assert replies(robot, ("RB", RowRequest([(1,), (2,)]))) == [("RB", Row([0, 5]))]
+
+
+def test_the_search_begins_when_all_sides_are_known_and_counts_them() -> None:
+    robot = middle()
+    replies(robot, ("RA", CPA(INFINITE, {})))
+    assert replies(robot, ("RA", Row([0, 5]))) == [("RC", Request((1,)))]
+    assert robot.searching
+    assert robot.local == [1, 5]
+
+
+def test_a_side_is_asked_for_once_for_each_value_above() -> None:
+    robot = middle()
+    replies(robot, ("RA", CPA(7, {})), ("RA", Row([9, 9])))
+    assert replies(robot, ("RA", Request((2,)))) == [("RA", Report(0))]
+    assert replies(robot, ("RA", Request((1,)))) == [("RA", Report(9))]
+    assert replies(robot, ("RA", CPA(3, {}))) == [("RA", Result(INFINITE, {}))]
+
+
+def test_a_leaf_asks_before_it_returns_its_cost() -> None:
+    robot = leaf()
+    asked = [("RB", RowRequest([(1,), (2,)])), ("RA", RowRequest([(1,), (2,)]))]
+    assert replies(robot, ("RB", CPA(INFINITE, {}))) == asked
+    assert replies(robot, ("RB", Row([6, 0]))) == []
+    assert replies(robot, ("RA", Row([5, 0]))) == [("RB", Result(2, {"RC": (2,)}))]
+
+
+def test_a_leaf_that_knows_all_sides_answers_its_parent_with_the_cost_itself() -> None:
+    robot = leaf()
+    replies(robot, ("RB", CPA(INFINITE, {})), ("RB", Row([6, 0])), ("RA", Row([5, 0])))
+    assert replies(robot, ("RB", Request((1,)))) == [("RB", Result(2, {"RC": (2,)}))]
+
+
+def test_a_bound_that_falls_while_sides_are_asked_for_is_kept() -> None:
+    robot = middle()
+    replies(robot, ("RA", CPA(INFINITE, {})), ("RA", Reduce(1)))
+    assert replies(robot, ("RA", Row([0, 5]))) == [("RA", Result(INFINITE, {}))]
+
+
+def test_what_nobody_asked_for_or_may_ask_is_refused() -> None:
+    robot = middle()
+    with pytest.raises(ValueError, match="has not asked for"):
+        replies(robot, ("RA", Row([1, 2])))
+    replies(robot, ("RA", CPA(INFINITE, {})))
+    with pytest.raises(ValueError, match="is asking for sides already"):
+        replies(robot, ("RA", CPA(INFINITE, {})))
+    with pytest.raises(ValueError, match="has not asked for"):
+        replies(robot, ("RA", Row([1])))
+    with pytest.raises(ValueError, match="is not known to be below"):
+        replies(robot, ("RA", RowRequest([(1,)])))
+    with pytest.raises(ValueError, match="was asked nothing"):
+        replies(robot, ("RC", RowRequest([(1,)])))
+
+
+def test_a_request_with_a_value_that_cannot_be_is_refused() -> None:
+    with pytest.raises(ValueError, match="RB"):
+        replies(top(), ("RB", RowRequest([(3,)])))
+
+
+def test_it_needs_fewer_messages_and_checks_than_syncabb() -> None:
+    messages, checks = dict.fromkeys(("syncabb", "asym-pt-fb"), 0), dict.fromkeys(("syncabb", "asym-pt-fb"), 0)
+    for seed in range(3):
+        problem = random_csp(6, 3, 0.6, 0, seed, connected=True, max_cost=20, asymmetric=True)
+        for protocol in messages:
+            metrics = solve(problem, Options(protocol=protocol, runtime=Runtime.SIMULATOR, cache=False)).metrics
+            messages[protocol] += sum(metrics.messages.values())
+            checks[protocol] += metrics.ncccs
+    assert messages["asym-pt-fb"] < messages["syncabb"] / 4
+    assert checks["asym-pt-fb"] < checks["syncabb"] / 5
+
+
+@plain_python_only
+@count("teams", 8, 100)
+def test_what_a_robot_does_not_need_of_its_part_changes_no_message(teams: int) -> None:
+    """Towards robots below: all but the least entry of each own value, and the rows that it was asked for."""
+    chance = Random("bytes asym-pt-fb")
+    others = 0
+    for seed in range(teams):
+        problem = random_asymmetric_team(chance, simple=True)
+        above = {name: set[str]() for name in problem.order}
+        for name, findings in run(problem, AsymPTFB, seed).result.findings.items():
+            if findings.place is not None and findings.place.parent is not None:
+                above[name] = {findings.place.parent, *findings.place.pseudo_parents}
+        with pytest.MonkeyPatch.context() as patch:
+            asked = watched_entries(problem, patch, above)
+            before = run(problem, AsymPTFB, seed)
+        nothing_hidden(AsymPTFB, before.envelopes)
+        elsewhere = what_is_not_needed_changed(problem, asked, chance, above)
+        others += elsewhere != problem
+        assert [one[:3] for one in run(elsewhere, AsymPTFB, seed).envelopes] == [one[:3] for one in before.envelopes]
+    assert others > teams // 2
+
+
+def test_the_example_in_the_documentation() -> None:
+    result = doctest.testmod(robochoc.protocols.asymmetric.asym_pt_fb)
+    assert result.attempted
+    assert not result.failed
