@@ -41,6 +41,9 @@ the mediator had not heard of, and one that is refused follows one of higher pri
 rest no robot is the highest of a conflict, so there is none. That there is no solution is what a mediator finds whose
 good_list has none.
 
+APO itself is left out. With its sessions, of those robots that agree, in place of ours, values may change in circles
+for ever: so on 8 of 150 random problems of 6 robots, of which this protocol ended all. Where it ended, it was right.
+
 Other choices and differences:
 
 - A robot's constraints are sent when a mediator first asks for them, not at the start: on easy problems never.
