@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from importlib.util import find_spec
 
 from robochoc.model.outcome import Verdict
 
@@ -62,6 +63,13 @@ class Traits:
     arrays: bool = False
     privacy: str = ""
     use_when: str = ""
+
+    @property
+    def lacks(self) -> str:
+        """Return what has to be installed first, in words; empty: nothing."""
+        if self.needs is None or find_spec(self.needs[0]) is not None:
+            return ""
+        return f"{self.needs[0]}, which is not installed; say: {self.needs[1]}"
 
     def fault_of_conclusion(self, verdict: str) -> str:
         """Return why no robot of this protocol may end the search with `verdict`; empty if one may.

@@ -7,8 +7,7 @@ There are three lists. Each rule has a condition, the reason, and what to do ins
 - the constraints that a protocol must be able to take (`protocols/requirements.py`, where robots on a network, whose
   files nobody else sees, ask as well).
 
-The command line (`robochoc solve`, `robochoc master`), the API, and robots on a network ask here. Options are named as
-on the command line.
+The command line, the API, and robots on a network ask here. Options are named as on the command line.
 """
 
 from __future__ import annotations
@@ -16,7 +15,6 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from functools import cached_property
-from importlib.util import find_spec
 from typing import NamedTuple
 
 from robochoc.model.change import team_after_events
@@ -301,10 +299,7 @@ TEAM_RULES = (
     ),
     _not_with_scenario("--runtime network", lambda o: o.protocol != CENTRAL and o.runtime is Runtime.NETWORK),
     _not_with_scenario("--runtime arrays", lambda o: o.protocol != CENTRAL and o.runtime is Runtime.ARRAYS),
-    TeamRule(
-        lambda c: c.is_distributed and c.traits.needs and find_spec(c.traits.needs[0]) is None,
-        "{protocol} needs {case.traits.needs[0]}, which is not installed; say: {case.traits.needs[1]}",
-    ),
+    TeamRule(lambda c: c.traits.lacks, "{protocol} needs {case.traits.lacks}"),
     TeamRule(
         lambda c: c.is_distributed and c.options.runtime is Runtime.ARRAYS and not c.traits.arrays,
         "{protocol} has no form as arrays",

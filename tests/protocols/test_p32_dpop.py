@@ -17,20 +17,21 @@ from robochoc.model.message import Message
 from robochoc.model.outcome import Verdict
 from robochoc.model.problem import Team
 from robochoc.privacy import Kind, Measure, privacy_of
+from robochoc.protocols import traits
 from robochoc.protocols.key_stream import KeyStream
 from robochoc.protocols.private.ed25519 import Ed25519
 from robochoc.protocols.private.messages.p32_dpop import Join, Next, Setup, Stage, Vector
 from robochoc.protocols.private.p32_dpop import P32DPOP
 from robochoc.protocols.private.ring import Ring
 from robochoc.protocols.private.settings.p32_dpop import P32DPOPSettings
-from robochoc.run import Options, Runtime, compatibility, solve
+from robochoc.run import Options, Runtime, solve
 from robochoc.solver.agent_problem import RunParameters
 from robochoc.solver.encoding import UnsupportedError
-from tests.protocols.test_p_dpop import RING, own_values, priced, told_values
 from tests.support.cost_problems import random_cost_team, random_hard_team, with_costs
 from tests.support.examples import count
 from tests.support.loose_problems import loosened
 from tests.support.pkc_bytes import run
+from tests.support.private_problems import RING, own_values, priced, told_values
 from tests.support.problems import team_of
 from tests.support.pseudo_trees import unplaced
 from tests.support.random_options import random_options
@@ -228,6 +229,6 @@ def test_spare_turns_have_limits(spare: int) -> None:
 
 
 def test_without_the_extra_a_run_is_refused_and_told_what_to_install(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(compatibility, "find_spec", lambda _: None)
+    monkeypatch.setattr(traits, "find_spec", lambda _: None)
     with pytest.raises(UnsupportedError, match=r"p32-dpop needs nacl.*pip install 'robochoc\[private\]'"):
         solve(RING, Options(protocol="p32-dpop", runtime=Runtime.SIMULATOR))

@@ -14,7 +14,6 @@ from robochoc.communication.simulator.schedule import RandomChannels
 from robochoc.communication.simulator.simulator import Simulation
 from robochoc.journal.events import AnyEvent, Sent
 from robochoc.journal.journal import Header, JournalRecorder, read_journal
-from robochoc.model.message import Envelope
 from robochoc.model.outcome import Verdict
 from robochoc.model.problem import Constraint, Relation, Semantics, Team
 from robochoc.privacy import Kind, Measure, privacy_of
@@ -30,24 +29,9 @@ from tests.support.cost_problems import random_cost_team, random_hard_team, with
 from tests.support.examples import count, examples
 from tests.support.loose_problems import loosened
 from tests.support.pkc_bytes import nothing_hidden, run
+from tests.support.private_problems import RING, own_values, priced, told_values
 from tests.support.problems import team_of
 from tests.support.random_options import random_options
-
-
-def priced(first: str, second: str, rows: dict[tuple[int, int], float]) -> Constraint:
-    relation = Relation(f"{first}{second}", 2, Semantics.SOFT, tuple(rows), tuple(rows.values()))
-    return Constraint("c", relation, (first, second), (first, second))
-
-
-FAR: dict[tuple[int, int], float] = {(711, 811): 97, (711, 812): 1, (712, 811): 1, (712, 812): 98}
-RING = with_costs(
-    team_of(
-        {"AAA": (711, 712), "BBB": (811, 812), "CCC": (711, 712), "DDD": (811, 812)},
-        [priced("AAA", "BBB", FAR), priced("CCC", "BBB", FAR), priced("CCC", "DDD", FAR), priced("AAA", "DDD", FAR)],
-    )
-)
-"""Four robots in a ring; two of them share no constraint."""
-
 
 # The optimum
 
@@ -77,15 +61,6 @@ def test_bodies_hold_no_names_and_values_only_of_the_sender(seed: int) -> None:
     for envelope in done.envelopes:
         assert not any(name.encode() in envelope.content for name in (*RING.order, *RING.variables))
         assert told_values(envelope) <= own_values(envelope.sender)
-
-
-def told_values(envelope: Envelope) -> set[int]:
-    """The values of the team that stand in a message as msgpack writes them."""
-    return {value for value in (711, 712, 811, 812) if b"\xcd" + value.to_bytes(2, "big") in envelope.content}
-
-
-def own_values(robot: str) -> set[int]:
-    return {value for name in RING[robot].interface for value in RING.variables[name].domain}
 
 
 def recorded(team: Team, seed: int = 0) -> list[Sent]:
