@@ -222,6 +222,8 @@ def _of_pydcop(run: Run, ended: tuple[str, ...]) -> Answer:
     found = json.loads(run.output[run.output.index("{") :])
     if found["status"] not in ended:
         return Answer(f"status {found['status']}")
+    if found["cost"] is None:
+        return Answer("a robot has no value")
     cost = float(found["cost"])
     return Answer("no-solution" if cost >= FORBIDDEN else f"{cost:g}", found["msg_count"])
 
