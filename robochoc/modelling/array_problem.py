@@ -27,7 +27,7 @@ from robochoc.model.wording import counted
 from robochoc.protocols.settings import settings_of
 from robochoc.protocols.shared.cycles import CycleProtocol
 from robochoc.protocols.shared.messages.cycles import Domain, Value
-from robochoc.run.compatibility import refuse_settings
+from robochoc.run.protocol_settings import refuse_settings
 from robochoc.run.registry import protocol_named
 from robochoc.solver.encoding import UnsupportedError
 from robochoc.verification.checker import RefutedError

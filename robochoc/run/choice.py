@@ -18,11 +18,11 @@ from robochoc.model.orders import Order
 from robochoc.model.problem import Team
 from robochoc.model.wording import counted
 from robochoc.run.alternatives import refuse_team
-from robochoc.run.compatibility import refuse_settings
 from robochoc.run.context import RunContext
 from robochoc.run.defaults import AUTO, DEFAULT_COST_PROTOCOL, DEFAULT_PROTOCOL
 from robochoc.run.facts import LARGE, Facts, Sizes
 from robochoc.run.options import CENTRAL, Options, Withdrawal
+from robochoc.run.protocol_settings import refuse_settings
 from robochoc.run.registry import UnknownProtocolError, installed_protocols, protocol_named
 from robochoc.solver.compile import CompileError, CompileTimeoutError
 from robochoc.solver.domain import TooManySolutionsError

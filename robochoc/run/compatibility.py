@@ -12,18 +12,16 @@ The command line, the API, and robots on a network ask here. Options are named a
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from functools import cached_property
 from typing import NamedTuple
 
 from robochoc.model.change import team_after_events
 from robochoc.model.problem import ProblemKind, Team
-from robochoc.protocols.protocol import Protocol
 from robochoc.protocols.requirements import unmet_requirement
 from robochoc.protocols.satisfaction.disac import DisAC
 from robochoc.protocols.satisfaction.first_fit import FirstFit
-from robochoc.protocols.settings import SettingsError, settings_of
 from robochoc.protocols.traits import Traits
 from robochoc.run.options import CENTRAL, CentralSolverName, OnLoss, Options, Runtime, ScheduleName, Withdrawal
 from robochoc.solver.encoding import UnsupportedError
@@ -202,14 +200,6 @@ def refuse_options(options: Options, *, environment: bool = False) -> None:
     for rule in (*ENVIRONMENT_RULES * environment, *OPTION_RULES):
         if rule.refuses(options):
             raise UnsupportedError("; ".join(filter(None, [rule.why, rule.instead])))
-
-
-def refuse_settings(name: str, protocol: type[Protocol], settings: Mapping[str, str]) -> None:
-    """Raise `UnsupportedError` for `settings` that the protocol called `name` does not have, or does not accept."""
-    try:
-        settings_of(protocol, settings)
-    except SettingsError as wrong:
-        raise UnsupportedError(f"--set: {wrong} (protocol {name})") from None
 
 
 # Options that do not go with the team

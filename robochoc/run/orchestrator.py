@@ -19,12 +19,12 @@ from robochoc.run.compatibility import (
     CENTRAL_TRAITS,
     UnfitProtocolError,
     refuse_options,
-    refuse_settings,
     refuse_unfit,
 )
 from robochoc.run.context import RunContext
 from robochoc.run.distributed import solve_distributed
 from robochoc.run.options import CENTRAL, Options
+from robochoc.run.protocol_settings import refuse_settings
 from robochoc.run.registry import protocol_named
 from robochoc.run.scenario import Environment
 from robochoc.run.this_machine import ThisMachine

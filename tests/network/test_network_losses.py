@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import signal
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -11,20 +12,24 @@ import pytest
 from robochoc.communication.kill_schedule import Kill
 from robochoc.communication.network.local import LocalNetwork
 from robochoc.communication.network.settings import NetworkSettings
+from robochoc.communication.run_result import RobotsLostError
 from robochoc.formats import PREDEFINED
 from robochoc.generators.queens3d import queens3d
+from robochoc.generators.random_csp import random_csp
 from robochoc.journal.events import AnyEvent, Lost, Sent
 from robochoc.model.outcome import Verdict
-from robochoc.model.problem import Constraint
+from robochoc.model.problem import INFINITE, Constraint
+from robochoc.model.team_edits import without_robots
 from robochoc.run.options import OnLoss, Options, Runtime
 from robochoc.run.orchestrator import solve
-from robochoc.run.registry import protocol_named
+from robochoc.run.registry import protocol_named, protocol_names
 from robochoc.run.scenario import FinishedEpoch, ScenarioRun
 from robochoc.solver.agent_problem import RunParameters
 from robochoc.solver.compiled_team import CompiledTeam
 from robochoc.verification.checker import violations
 from tests.support.complex_problems import complex_team
-from tests.support.loose_problems import untold_interface
+from tests.support.limits import HANG_S
+from tests.support.loose_problems import minimum_cost, untold_interface
 from tests.support.paused_abt import PausedABT
 
 DIFFER = PREDEFINED["ne"]
@@ -81,3 +86,32 @@ def test_a_robot_that_is_killed_at_a_set_time() -> None:
     outcome = solve(queens3d(4), options)
     assert outcome.epochs[0].lost == ("Robot2.2",)
     assert len(outcome.epochs[1].robots) == 15
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("protocol", protocol_names())
+def test_whatever_the_protocol_the_verdict_is_true_for_those_who_are_left(protocol: str) -> None:
+    kind = protocol_named(protocol)
+    costs, tightness = (9, 0.0) if kind.traits.costs else (None, 0.2)
+    team = random_csp(6, 3, 0.5, tightness, seed=3, connected=True, max_cost=costs)
+    options = Options(
+        protocol=protocol,
+        runtime=Runtime.NETWORK,
+        kill=(Kill(team.order[2], 0),),
+        on_loss=OnLoss.WITHDRAW,
+        timeout=HANG_S,
+        settings={"cycles": "20"} if hasattr(kind.settings, "cycles") else {},
+    )
+    outcome = solve(team, options)
+    assert outcome.epochs[0].lost == (team.order[2],)
+    truth = minimum_cost(without_robots(team, {team.order[2]}))
+    assert truth < INFINITE
+    if outcome.verdict is Verdict.UNKNOWN:  # an incomplete protocol may break a constraint in all its cycles
+        assert not kind.traits.complete
+        return
+    assert outcome.verified
+    assert outcome.cost is not None
+    assert outcome.cost >= truth
+    assert outcome.cost == truth or not kind.traits.complete
+    with pytest.raises(RobotsLostError):
+        solve(team, replace(options, on_loss=OnLoss.FAIL))

@@ -24,6 +24,7 @@ from robochoc.protocols.shared.messages.anytime import Best, Paid, Place, Step
 from robochoc.protocols.shared.messages.cycles import Value
 from robochoc.run import Options, Runtime, solve
 from robochoc.run.incumbent import costs_by_cycle
+from robochoc.run.protocol_settings import refuse_settings
 from robochoc.run.registry import protocol_named, protocol_names
 from robochoc.solver.agent_problem import RunParameters
 from robochoc.solver.compiled_team import CompiledTeam
@@ -307,3 +308,16 @@ def test_processes_find_the_best_cycle_too() -> None:
     one = solve(team, Options(protocol="dsa", settings=settings, seed=3))
     other = solve(team, Options(protocol="dsa", runtime=Runtime.SIMULATOR, settings=settings, seed=3))
     assert (one.cost, one.metrics.messages) == (other.cost, other.metrics.messages)
+
+
+def test_a_protocol_from_outside_is_told_which_messages_it_lacks() -> None:
+    class Own(CycleProtocol):
+        messages = Value
+
+        def begin(self) -> None:
+            self.take(0)
+
+    with pytest.raises(UnsupportedError, match="needs `AnytimeMessage` among the `messages` of protocol own"):
+        refuse_settings("own", Own, {"anytime": "yes"})
+    refuse_settings("own", Own, {"anytime": "no"})
+    refuse_settings("dsa", DSA, {"anytime": "yes"})

@@ -26,12 +26,13 @@ from robochoc.model.outcome import Outcome, Verdict
 from robochoc.model.problem import Team
 from robochoc.model.symbols import symbol_table, symbolic_variables
 from robochoc.run.choice import decided_unseen
-from robochoc.run.compatibility import refuse_options, refuse_settings, refuse_unfit
+from robochoc.run.compatibility import refuse_options, refuse_unfit
 from robochoc.run.defaults import AUTO, DEFAULT_COST_PROTOCOL, DEFAULT_PROTOCOL
 from robochoc.run.distributed import solve_distributed
 from robochoc.run.networked.address import LOOPBACK, Address
 from robochoc.run.networked.machines import Machines, claimed, first_names, registered_team
 from robochoc.run.options import OnLoss, Options, Runtime, Withdrawal
+from robochoc.run.protocol_settings import refuse_settings
 from robochoc.run.registry import protocol_or_stage
 from robochoc.solver.encoding import UnsupportedError
 from robochoc.verification.checker import RefutedError

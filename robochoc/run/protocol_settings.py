@@ -1,0 +1,27 @@
+"""Refuse settings that a protocol does not have, or cannot go with."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import get_args
+
+from robochoc.protocols.protocol import Protocol
+from robochoc.protocols.settings import SettingsError, settings_of
+from robochoc.protocols.shared.messages.anytime import AnytimeMessage
+from robochoc.protocols.shared.settings.cycles import CycleSettings
+from robochoc.solver.encoding import UnsupportedError
+
+
+def refuse_settings(name: str, protocol: type[Protocol], settings: Mapping[str, str]) -> None:
+    """Raise `UnsupportedError` for `settings` that the protocol called `name` does not have, or does not accept."""
+    try:
+        known = settings_of(protocol, settings)
+    except SettingsError as wrong:
+        raise UnsupportedError(f"--set: {wrong} (protocol {name})") from None
+    if isinstance(known, CycleSettings) and known.anytime == "yes" and not _finds_best_cycle(protocol):
+        raise UnsupportedError(f"--set: anytime=yes needs `AnytimeMessage` among the `messages` of protocol {name}")
+
+
+def _finds_best_cycle(protocol: type[Protocol]) -> bool:
+    """Return whether robots can receive what is said of the best cycle; asymmetric costs are refused elsewhere."""
+    return protocol.traits.asymmetric or {*get_args(AnytimeMessage)} <= {*get_args(protocol.messages)}
