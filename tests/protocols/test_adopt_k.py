@@ -12,7 +12,7 @@ import pytest
 import robochoc.protocols.optimization.adopt_k
 from robochoc.generators.random_csp import random_csp
 from robochoc.model.outcome import Outcome, Verdict
-from robochoc.model.problem import INFINITE, Team
+from robochoc.model.problem import INFINITE
 from robochoc.protocols.optimization.adopt import ADOPT
 from robochoc.protocols.optimization.adopt_k import ADOPTk
 from robochoc.protocols.optimization.bounding import BoundingProtocol
@@ -24,8 +24,8 @@ from robochoc.protocols.optimization.settings.adopt_k import ADOPTkSettings
 from robochoc.run import Options, Runtime, Withdrawal, solve
 from robochoc.solver.ace import AceProcess
 from tests.support.agents import replies, value
-from tests.support.cost_problems import minimum_withdrawal, random_complex_cost_team, random_cost_team
-from tests.support.loose_problems import loosened, minimum_cost
+from tests.support.cost_problems import minimum_withdrawal, random_cost_team
+from tests.support.loose_problems import loosened_cost_team, minimum_cost
 from tests.support.problems import random_team
 from tests.support.pseudo_trees import context, placed, priced, root, to
 from tests.support.random_options import random_options
@@ -38,7 +38,7 @@ def kind(of_k: float) -> type[ADOPTk]:
     """ADOPT(k) for one k."""
 
     class Kind(ADOPTk):
-        settings = ADOPTkSettings(of_k if of_k == INFINITE else int(of_k))
+        settings = ADOPTkSettings(k=of_k if of_k == INFINITE else int(of_k))
 
     return Kind
 
@@ -202,18 +202,12 @@ def warm(warm_ace: None) -> Iterator[AceProcess]:
         yield ace
 
 
-def some_team(chance: Random) -> Team:
-    """A random team; one in five is of complex robots, half have what nobody needs."""
-    team = random_complex_cost_team(chance) if chance.random() < 0.2 else random_cost_team(chance)
-    return loosened(team, chance) if chance.random() < 0.5 else team
-
-
 @pytest.mark.parametrize("k", ["1", "2", "5", "inf"])
 @pytest.mark.parametrize("batch", [0, *(pytest.param(batch, marks=pytest.mark.slow) for batch in range(1, 6))])
 def test_the_least_cost_is_found_for_every_k(k: str, batch: int, warm: AceProcess) -> None:
     chance = Random(f"adopt-k {k} {batch}")
     for _ in range(200 if batch else 5):
-        team = some_team(chance)
+        team = loosened_cost_team(chance)
         cost = minimum_cost(team)
         outcome = solve(team, replace(random_options(team, "adopt-k", chance), settings={"k": k}), solver=warm)
         assert outcome.verdict is (Verdict.NO_SOLUTION if cost == INFINITE else Verdict.OPTIMAL), team
@@ -236,7 +230,7 @@ def test_as_few_as_possible_step_aside_for_every_k(k: str, teams: int) -> None:
 @pytest.mark.parametrize("k", [0, -1, 2.5, -INFINITE, float("nan")])
 def test_k_is_a_whole_number_from_1_or_infinite(k: float) -> None:
     with pytest.raises(ValueError, match="whole number, 1 or more, or inf"):
-        ADOPTkSettings(k)
+        ADOPTkSettings(k=k)
 
 
 def test_the_docstring_shows_what_happens() -> None:

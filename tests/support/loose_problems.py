@@ -31,7 +31,7 @@ from robochoc.run.registry import protocol_named
 from robochoc.solver.ace import AceProcess
 from tests.support.brute_force import least_cost, solutions
 from tests.support.complex_problems import random_complex_team
-from tests.support.cost_problems import random_cost_team, softened
+from tests.support.cost_problems import random_complex_cost_team, random_cost_team, softened
 from tests.support.pkc_problems import random_pkc_team
 from tests.support.problems import random_team
 
@@ -219,3 +219,9 @@ def several_variables_team(chance: Random, *, n_ary: bool) -> Team:
         return replace(robot, private=(), parents=tuple(parents))
 
     return replace(team, robots=tuple(map(of, team.robots)))
+
+
+def loosened_cost_team(chance: Random) -> Team:
+    """Return a random team with costs: one in five is of complex robots, half have what nobody needs."""
+    team = random_complex_cost_team(chance) if chance.random() < 0.2 else random_cost_team(chance)
+    return loosened(team, chance) if chance.random() < 0.5 else team

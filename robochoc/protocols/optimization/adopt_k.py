@@ -10,7 +10,7 @@ infinite k as BnB-ADOPT.
   number of messages is exponential, memory is linear in values and children.
 - **Parameters (`--set`)**: `k`, how far above ADOPT's threshold the lower bound of a value may rise (default 1000);
   a whole number from 1, or `inf`. It is in units of the costs' last decimal place. Best is two or three times what
-  one constraint costs at most, or anything above.
+  one constraint costs at most, or anything above. `heuristic`: as in `bnb_adopt`.
 - **Reference**: Gutierrez, Meseguer, Yeoh: "Generalizing ADOPT and BnB-ADOPT", IJCAI 2011.
 
 The procedures are BnB-ADOPT's (`bnb_adopt`), and ADOPT's of the threshold:
@@ -55,7 +55,7 @@ from robochoc.model.problem import INFINITE
 from robochoc.protocols.optimization.bnb_adopt import BnBADOPT
 from robochoc.protocols.optimization.messages import bnb_adopt
 from robochoc.protocols.optimization.messages.adopt_k import Value
-from robochoc.protocols.optimization.messages.bnb_adopt import Cost
+from robochoc.protocols.optimization.messages.bnb_adopt import Cost, Domain, Floor
 from robochoc.protocols.optimization.messages.bounding import Entry, Number, Terminate
 from robochoc.protocols.optimization.settings.adopt_k import ADOPTkSettings
 from robochoc.protocols.optimization.shares import clamp_share, split_threshold
@@ -71,7 +71,7 @@ class ADOPTk(BnBADOPT):
     BnB-ADOPT's `threshold` is TH^B.
     """
 
-    messages: ClassVar[Any] = TreeMessage | Value | Cost | Terminate
+    messages: ClassVar[Any] = TreeMessage | Value | Cost | Domain | Floor | Terminate
     traits: ClassVar[Traits] = Traits(
         concludes=ENDS_WITH_PROOF,
         paper="Gutierrez, Meseguer, Yeoh 2011",
@@ -117,9 +117,15 @@ class ADOPTk(BnBADOPT):
     # The children's shares of the allowance
 
     def forget(self, child: str) -> None:
-        """Drop the bounds of `child`, and reset its share."""
+        """Drop the bounds of `child`, and reset its share to them."""
         super().forget(child)
-        self.t[child] = [0] * len(self.problem.values)
+        self.t[child] = [*self.bounds[child].lb]
+
+    def take_floor(self, child: str, costs: list[Number]) -> None:
+        """Raise the lower bounds of `child`, and its share, to what its subtree costs at least."""
+        super().take_floor(child, costs)
+        for index in range(len(costs)):
+            clamp_share(self.t[child], self.bounds[child], index)
 
     def bound(self, child: str, context: Mapping[str, Entry], lb: Number, ub: Number) -> int | None:
         """Store the bounds of a Cost of `child`, and keep its share within them."""

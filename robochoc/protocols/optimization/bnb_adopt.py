@@ -7,9 +7,12 @@ again.
 
 - **When to use**: costs, a sparse graph, little memory.
 - **Guarantees**: complete; it terminates with an optimum, or with a proof that there is no solution.
-- **Parameters**: none.
+- **Parameters (`--set`)**: `heuristic`. With `dp`, children first say what their subtrees cost at least for each value
+  of their parent (two messages a robot), and lower bounds begin there; with `none` (default) they begin at 0.
 - **References**: Yeoh, Felner, Koenig: "BnB-ADOPT: an asynchronous branch-and-bound DCOP algorithm", JAIR 38, 2010,
-  Section 4; for redundant messages: Gutierrez, Meseguer: "Saving redundant messages in BnB-ADOPT", AAAI 2010.
+  Section 4; for redundant messages: Gutierrez, Meseguer: "Saving redundant messages in BnB-ADOPT", AAAI 2010;
+  for the heuristic: Ali, Koenig, Tambe: "Preprocessing techniques for accelerating the DCOP algorithm ADOPT", AAMAS
+  2005.
 
 The methods have the names of the procedures:
 
@@ -21,7 +24,9 @@ The methods have the names of the procedures:
 Choices that the papers leave open, and differences:
 
 - Constraints may be n-ary, and there may be several trees (see `adopt`, also for hard constraints and unknown values
-  of neighbours above). Heuristic values h are 0.
+  of neighbours above).
+- Heuristic values h of a child count what it pays with its parent, and the h of its own children; what it pays with
+  others above is left out. A robot begins once it has those of all its children.
 - A context grows as values become known; there is no initial value that all robots know. A value that was unknown
   before does not invalidate the threshold.
 - Bounds are computed when the inbox has been drained, also for InitSelf. The ID grows when the value changes. SCP of a
@@ -54,11 +59,13 @@ from typing import Any, ClassVar, assert_never, cast
 
 import msgspec
 
+from robochoc.model import message
 from robochoc.model.message import Message
 from robochoc.model.problem import INFINITE
 from robochoc.protocols.optimization.bounding import BoundingProtocol
-from robochoc.protocols.optimization.messages.bnb_adopt import Cost, Value
+from robochoc.protocols.optimization.messages.bnb_adopt import Cost, Domain, Floor, Value
 from robochoc.protocols.optimization.messages.bounding import Context, Number, Terminate
+from robochoc.protocols.optimization.settings.bnb_adopt import BnBADOPTSettings
 from robochoc.protocols.order import PriorityOrder
 from robochoc.protocols.shared.messages.dfs import TreeMessage
 from robochoc.protocols.traits import ENDS_WITH_PROOF, Traits
@@ -71,9 +78,10 @@ class BnBADOPT(BoundingProtocol):
     """One agent of BnB-ADOPT+. State besides the bounds: `threshold` (TH).
 
     `sent_values` are the last Values sent to each child, `sent_cost` the last Cost, without its request.
+    `floors`: for each own value, what the subtree of each child costs at least in any context (h).
     """
 
-    messages: ClassVar[Any] = TreeMessage | Value | Cost | Terminate
+    messages: ClassVar[Any] = TreeMessage | Value | Cost | Domain | Floor | Terminate
     traits: ClassVar[Traits] = Traits(
         concludes=ENDS_WITH_PROOF,
         paper="Yeoh, Felner, Koenig 2010; Gutierrez & Meseguer 2010",
@@ -84,19 +92,35 @@ class BnBADOPT(BoundingProtocol):
         use_when="costs, sparse graph, little memory",
     )
 
+    settings: ClassVar[BnBADOPTSettings] = BnBADOPTSettings()
+
     def __init__(self, problem: LocalProblem, order: PriorityOrder) -> None:
         super().__init__(problem, order)
         self.threshold: Number = INFINITE
         self.threshold_request = False
         self.sent_values: dict[str, Value] = {}
         self.sent_cost: Cost | None = None
+        self.floors: dict[str, list[Number]] = {}
         self._moved = False
+        self._parent_values: list[message.Value] | None = None
+
+    def begin(self) -> None:
+        """Initialise the bounds, and ask the children for their floors."""
+        super().begin()
+        if self.settings.heuristic == "dp":
+            for child in self.children:
+                self.send(child, Domain(list(self.problem.values)))
+
+    def decide(self) -> None:
+        """Compute the bounds and act, unless floors of children are still to come."""
+        if self.settings.heuristic == "none" or len(self.floors) == len(self.children):
+            super().decide()
 
     def handle(self, sender: str, message: Message) -> None:
         """Dispatch on the message's type."""
         if self.terminated:
             return
-        match cast("Value | Cost | Terminate", message):
+        match cast("Value | Cost | Domain | Floor | Terminate", message):
             case Value(value, counter, threshold):
                 self._merge({sender: (value, counter)})
                 if sender == self.parent:
@@ -107,12 +131,57 @@ class BnBADOPT(BoundingProtocol):
                 self.bound(sender, cost.context, cost.lb, cost.ub)
                 if cost.threshold_request:
                     self.sent_values.pop(sender, None)
+            case Domain(values):
+                self._take_domain(sender, values)
+            case Floor(costs):
+                self.take_floor(sender, costs)
             case Terminate(context):
                 self._merge(context)
                 self.threshold = INFINITE
                 self.last_values = True
             case never:
                 assert_never(never)
+
+    # Floors
+
+    def _take_domain(self, sender: str, values: list[message.Value]) -> None:
+        """Note the values of the parent."""
+        if sender != self.parent or self._parent_values is not None or not values:
+            raise ValueError(f"{sender} has no values to tell")
+        for value in values:
+            self.problem.refuse_value(sender, value)
+        self._parent_values = values
+        self._tell_floor()
+
+    def take_floor(self, child: str, costs: list[Number]) -> None:
+        """Raise the lower bounds of `child` to what its subtree costs at least."""
+        if child not in self.bounds or child in self.floors or len(costs) != len(self.problem.values):
+            raise ValueError(f"{child} has no floor to tell")
+        self.floors[child] = costs
+        bounds = self.bounds[child]
+        bounds.lb = [max(pair) for pair in zip(bounds.lb, costs, strict=True)]
+        self._moved = True
+        self._tell_floor()
+
+    def _tell_floor(self) -> None:
+        """Tell the parent the floor, once the parent's values and all children's floors are known."""
+        if self.parent is None or self._parent_values is None or len(self.floors) < len(self.children):
+            return
+        below = [sum(costs) for costs in zip(*self.floors.values(), strict=True)] or [0] * len(self.problem.values)
+        floor: list[Number] = []
+        for value in self._parent_values:
+            paid = self.problem.costs({self.parent: value})
+            floor.append(min(own + others for own, others in zip(paid, below, strict=True)))
+        self.send(self.parent, Floor(floor))
+
+    def forget(self, child: str) -> None:
+        """Drop the bounds of `child`, down to its floor."""
+        super().forget(child)
+        floor = self.floors.get(child)
+        if floor is not None:
+            self.bounds[child].lb = [*floor]
+
+    # Contexts and thresholds
 
     def _merge(self, context: Context) -> None:
         """Merge a context; if it changed, choose the value again and reset TH (InitSelf)."""

@@ -29,7 +29,8 @@ WITH_RULES = (
 )  # fmt: skip
 """Protocols whose messages all have rules; in others losses are not known."""
 VARIANTS = {
-    "adopt-k": {"k": "2"},
+    "adopt-k": {"heuristic": "dp", "k": "2"},
+    "bnb-adopt": {"heuristic": "dp"},
     "hs-cai": {"k": "1"},
     "kopt": {"k": "4"},
     "maxsum": {"split": "0.3"},

@@ -6,7 +6,7 @@ import math
 from collections.abc import Sequence
 
 from robochoc.model import message
-from robochoc.model.disclosure import Hearing, Proof, StandsAt
+from robochoc.model.disclosure import NOTHING, HasOnly, Hearing, Proof, StandsAt
 from robochoc.model.message import Message
 from robochoc.model.problem import INFINITE
 from robochoc.model.wording import Wording, cost_text
@@ -53,3 +53,36 @@ class Cost(Message, frozen=True):
     def proves(self, hearing: Hearing) -> Sequence[Proof]:
         """Return what the message proves to its receiver."""
         return bounds_prove(self.context, self.lb, self.ub, hearing)
+
+
+class Domain(Message, frozen=True):
+    """The sender's values, and a request for the receiver's floor."""
+
+    values: list[message.Value]
+
+    act = acts.TELL_DOMAIN
+
+    def in_words(self, words: Wording) -> str:
+        """Return what the sender says."""
+        return f"{words.domain(self.values)}; what do you cost at least with each of them?"
+
+    def proves(self, hearing: Hearing) -> Sequence[Proof]:
+        """Return what the message proves to its receiver."""
+        return [HasOnly(hearing.sender, tuple(self.values))]
+
+
+class Floor(Message, frozen=True):
+    """For each value of the receiver, what the sender's subtree costs at least, whatever the others' values are (h)."""
+
+    costs: list[Number]
+
+    act = acts.TELL_BOUNDS
+
+    def in_words(self, _: Wording) -> str:
+        """Return what the sender says."""
+        told = ", ".join(cost_text(cost) for cost in self.costs)
+        return f"with your values, one by one, my subtree costs at least {told}"
+
+    def proves(self, _: Hearing) -> Sequence[Proof]:
+        """Return what the message proves to its receiver."""
+        return NOTHING

@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 from robochoc.model.problem import INFINITE
-from robochoc.protocols.settings_base import Settings
+from robochoc.protocols.optimization.settings.bnb_adopt import BnBADOPTSettings
 
 
-class ADOPTkSettings(Settings, frozen=True):
-    """`k`: a value is left when its lower bound is k above the threshold; 1: as ADOPT does, `inf`: as BnB-ADOPT."""
+class ADOPTkSettings(BnBADOPTSettings, frozen=True):
+    """`k`: a value is left when its lower bound is k above the threshold; 1: as ADOPT does, `inf`: as BnB-ADOPT.
+
+    `heuristic`: where lower bounds begin: at 0 (`none`), or at what children say before the search (`dp`).
+    """
 
     k: int | float = 1000
 
