@@ -92,6 +92,12 @@ class Types:
             self._definitions[name] = Definition(text, md5)
         return self._definitions[name]
 
+    def type_hash(self, kind: str) -> str:
+        """Return the hash of `kind` by which ROS 2 compares definitions (REP 2016). Raises `UnknownTypeError`."""
+        name = self._name(kind)
+        self._made(kind, name)
+        return self._store.hash_rihs01(name)
+
     def is_the_same(self, kind: str, text: str) -> bool:
         """Return whether `text` defines the fields that `kind` has. Raises `UnknownTypeError`."""
         return same_fields(short_kind(kind), text, self.definition(kind).text)

@@ -1,0 +1,42 @@
+"""ROS 2: the domain, names of types, and their hashes."""
+
+from __future__ import annotations
+
+import pytest
+
+from robochoc.ros.live.ros2_names import dds_type_name, domain_id
+from robochoc.ros.recordings.types import UnknownTypeError, types_of
+from robochoc.ros.sink import SinkError
+from robochoc.ros.source import SourceError
+
+
+@pytest.mark.parametrize(("given", "domain"), [(None, 0), ("", 0), ("0", 0), (" 7 ", 7), ("232", 232)])
+def test_the_domain(monkeypatch: pytest.MonkeyPatch, given: str | None, domain: int) -> None:
+    monkeypatch.delenv("ROS_DOMAIN_ID", raising=False)
+    if given is not None:
+        monkeypatch.setenv("ROS_DOMAIN_ID", given)
+    assert domain_id(SinkError) == domain
+
+
+@pytest.mark.parametrize("given", ["-1", "233", "one", "1.0", "٣", "9" * 5000, "0\x1b[31m"])
+def test_a_domain_that_is_none(monkeypatch: pytest.MonkeyPatch, given: str) -> None:
+    monkeypatch.setenv("ROS_DOMAIN_ID", given)
+    with pytest.raises(SourceError, match=r"^ROS_DOMAIN_ID must be a whole number from 0 to 232, and is '[^\x1b]*'$"):
+        domain_id(SourceError)
+
+
+@pytest.mark.parametrize("kind", ["geometry_msgs/PoseStamped", "geometry_msgs/msg/PoseStamped"])
+def test_the_name_of_a_type(kind: str) -> None:
+    assert dds_type_name(kind) == "geometry_msgs::msg::dds_::PoseStamped_"
+
+
+def test_hashes_are_those_of_ros_2() -> None:
+    # std_msgs/String's is that of ROS 2's own tools; the other begins as keys seen in a Jazzy system do.
+    string = "RIHS01_df668c740482bbd48fb39d76a70dfd4bd59db1288021743503259e948f6b1a18"
+    assert types_of(2).type_hash("std_msgs/String") == types_of(2).type_hash("std_msgs/msg/String") == string
+    assert types_of(2).type_hash("geometry_msgs/PoseStamped").startswith("RIHS01_10f3786d7d40fd2b")
+
+
+def test_an_unknown_type_has_no_hash() -> None:
+    with pytest.raises(UnknownTypeError, match="has no type 'no_msgs/Such'"):
+        types_of(2).type_hash("no_msgs/Such")
