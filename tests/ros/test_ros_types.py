@@ -12,7 +12,7 @@ from mcap_ros2._dynamic import generate_dynamic
 
 from robochoc.ros.names import REPORTS
 from robochoc.ros.recordings.definitions import DEFINITION_MAX, same_fields
-from robochoc.ros.recordings.types import FieldsError, UnknownTypeError, Version, types_of
+from robochoc.ros.recordings.types import FieldsError, FieldType, UnknownTypeError, Version, types_of
 
 POSE = "geometry_msgs/PoseStamped"
 BATTERY = "sensor_msgs/BatteryState"
@@ -184,3 +184,17 @@ def test_a_definition_with_other_fields_is_another(old: str, new: str) -> None:
 @given(st.text(max_size=200) | st.text("/=[]<# \nMSG:uint8int_x9", max_size=200))
 def test_any_text_is_compared(text: str) -> None:
     assert not same_fields(POSE, text, ELSEWHERE)
+
+
+def test_the_fields_of_a_type_and_their_types() -> None:
+    types = types_of(2)
+    assert types.layout("geometry_msgs/msg/PoseWithCovariance") == (
+        ("pose", FieldType("geometry_msgs/Pose")),
+        ("covariance", FieldType("float64", shape="array", size=36)),
+    )
+    found = dict(types.layout(BATTERY))
+    assert found["cell_voltage"] == FieldType("float32", shape="sequence")
+    assert found["location"] == FieldType("string")
+    assert dict(types.layout("shape_msgs/SolidPrimitive"))["dimensions"] == FieldType("float64", 0, "sequence", 3)
+    with pytest.raises(UnknownTypeError, match="its mapping can bring the definition"):
+        types.layout("my_msgs/Nothing")

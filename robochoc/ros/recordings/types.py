@@ -58,6 +58,17 @@ class Definition(NamedTuple):
     md5: str
 
 
+class FieldType(NamedTuple):
+    """The type of a field: `float64`, `string` or `geometry_msgs/Point`, one or several of it."""
+
+    name: str
+    limit: int = 0
+    """The most characters of a string; 0: any number."""
+    shape: Literal["one", "array", "sequence"] = "one"
+    size: int = 0
+    """The number of values in an array; the most in a sequence, 0: any number."""
+
+
 class _Kind(NamedTuple):
     """Conversions of one type, from fields to the library's object and back; and the object without fields."""
 
@@ -101,6 +112,12 @@ class Types:
     def is_the_same(self, kind: str, text: str) -> bool:
         """Return whether `text` defines the fields that `kind` has. Raises `UnknownTypeError`."""
         return same_fields(short_kind(kind), text, self.definition(kind).text)
+
+    def layout(self, kind: str) -> tuple[tuple[str, FieldType], ...]:
+        """Return the fields of `kind` and their types, in order. Raises `UnknownTypeError`."""
+        name = self._name(kind)
+        self._made(kind, name)  # types of fields that are not defined are found out here
+        return tuple((field, _field_type(desc)) for field, desc in self._store.fielddefs[name][1])
 
     def encode(self, kind: str, fields: Fields) -> bytes:
         """Return a message's bytes: CDR in ROS 2, and ROS 1's own format.
@@ -230,6 +247,16 @@ class Types:
 def types_of(version: Version) -> Types:
     """Return the types of that version, made once."""
     return Types(version)
+
+
+def _field_type(desc: Any) -> FieldType:  # noqa: ANN401 - the library's tuples
+    what, more = desc
+    if what == Nodetype.BASE:
+        return FieldType(more[0], more[1])
+    if what == Nodetype.NAME:
+        return FieldType(short_kind(more))
+    one = _field_type(more[0])
+    return one._replace(shape="array" if what == Nodetype.ARRAY else "sequence", size=more[1])
 
 
 def _values_of(value: object, kind: str, parts: Sequence[tuple[str, _Kind]]) -> list[Any]:
