@@ -190,6 +190,10 @@ class LocalProblem(LocalConstraints):
             return [(0, cost) for cost in costs]
         return [_lexicographic_cost(prices) for prices in zip(self.charges, *known, strict=True)]
 
+    def shares_parts_with(self, robot: str) -> bool:
+        """Return whether this robot has a part of a partially known constraint (PKC) with `robot`, or knows of its."""
+        return robot in self._parts or robot in self.pkc_parents
+
     def own_side(self, index: int, robot: str, value: Value) -> LexicographicCost:
         """Return what `values[index]` pays for the own parts of constraints with `robot`, when that has `value`.
 

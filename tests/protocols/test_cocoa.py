@@ -11,13 +11,22 @@ import pytest
 import robochoc.protocols.local_search.cocoa
 from robochoc.communication.simulator.simulator import Simulation
 from robochoc.journal.events import AnyEvent, Decided, Sent
+from robochoc.model.assembly import Extras, assemble
 from robochoc.model.message import Value
 from robochoc.model.outcome import Verdict
-from robochoc.model.problem import Constraint, Relation, Semantics, Team
+from robochoc.model.problem import Constraint, Domain, ProblemKind, Relation, Semantics, Team, Variable
 from robochoc.protocols.local_search.cocoa import CoCoA, State
-from robochoc.protocols.local_search.messages.cocoa import Costs, Hold, Inquiry, SetValue
+from robochoc.protocols.local_search.messages.cocoa import (
+    Costs,
+    CostsAt,
+    FinalSide,
+    Hold,
+    Inquiry,
+    SetValue,
+)
 from robochoc.solver.agent_problem import RunParameters
 from tests.support.agents import replies, value
+from tests.support.asymmetric_problems import random_asymmetric_team
 from tests.support.cost_problems import random_cost_team, random_hard_team
 from tests.support.examples import count
 from tests.support.local_search_runs import any_schedule, domains_of, robot_of, started
@@ -180,6 +189,106 @@ def test_a_robot_alone_takes_its_cheapest_value() -> None:
 def test_a_robot_with_an_empty_domain_ends_the_search() -> None:
     team = team_of({"A": (1,), "B": ()}, [Constraint("C", SOFT, ("A", "B"), ("A", "B"))])
     assert idle("RB", team=team).verdict is Verdict.NO_SOLUTION
+
+
+# Asymmetric costs
+
+
+def divided() -> Team:
+    """A pays 3 for (1, 1) and 1 for (1, 2), and B for A's 2 with its own 1 pays 5, for (1, 2) 2, for (2, 2) 9."""
+
+    def part(costs: dict[tuple[int, int], int]) -> list[Constraint]:
+        table = Relation("P", 2, Semantics.SOFT, tuple(costs), tuple(costs.values()), 0)
+        return [Constraint("C", table, ("A", "B"), ("A", "B"))]
+
+    parts = {"RA": part({(1, 1): 3, (1, 2): 1}), "RB": part({(2, 1): 5, (1, 2): 2, (2, 2): 9})}
+    own = {f"R{name}": [Variable(name, Domain("D", (range(1, 3),)))] for name in "AB"}
+    return assemble("pair", own, [], kind=ProblemKind.DISWCSP, extras=Extras(parts=parts))
+
+
+def asking() -> CoCoA:
+    robot = robot_of(CoCoA, divided(), "RA")
+    assert started(robot) == [("RB", Inquiry(TWO, {}))]
+    return robot
+
+
+def test_a_neighbour_with_a_part_tells_its_own_side_at_least_and_with_which_value() -> None:
+    asked = ("RA", Inquiry(TWO, {}))
+    assert replies(idle("RB", team=divided()), asked) == [("RA", CostsAt([(0, 0), (0, 5)], [(1,), (1,)]))]
+
+
+def test_the_asker_adds_its_own_side_at_the_values_that_it_is_told() -> None:
+    """By B's side alone the first value would be better: (1, 1) costs A 3, and (2, 1) nothing."""
+    assert replies(asking(), ("RB", CostsAt([(0, 0), (0, 2)], [(1,), (1,)]))) == [("RB", SetValue((2,)))]
+    assert replies(asking(), ("RB", CostsAt([(0, 0), (0, 4)], [(1,), (1,)]))) == [("RB", SetValue((1,)))]
+    assert replies(asking(), ("RB", CostsAt([(0, 0), (0, 2)], [(2,), (1,)]))) == [("RB", SetValue((1,)))]
+
+
+def test_who_is_done_tells_what_its_side_charges_with_its_value() -> None:
+    robot = asking()
+    replies(robot, ("RB", CostsAt([(0, 9), (0, 0)], [(1,), (1,)])))
+    assert replies(robot, ("RB", Inquiry(TWO, {}))) == [("RB", FinalSide([(0, 0), (0, 0)]))]
+    robot = asking()
+    replies(robot, ("RB", CostsAt([(0, 0), (0, 9)], [(1,), (1,)])))
+    assert replies(robot, ("RB", Inquiry(TWO, {}))) == [("RB", FinalSide([(0, 3), (0, 1)]))]
+
+
+def test_a_neighbour_with_a_part_that_is_done_is_asked_and_its_side_counts() -> None:
+    """With A's 2, B's own 1 costs it 5, and 2 costs 9: not if A pays 7 for 1."""
+    robot = idle("RB", team=divided())
+    assert replies(robot, ("RA", SetValue((2,)))) == [("RA", Inquiry(TWO, {"RA": (2,)}))]
+    assert value(robot) is None
+    replies(robot, ("RA", FinalSide([(0, 7), (0, 0)])))
+    assert value(robot) == (2,)
+
+
+def test_who_has_answered_before_it_took_its_value_is_asked_again_at_once() -> None:
+    robot = robot_of(CoCoA, divided(), "RB")
+    started(robot)
+    replies(robot, ("RA", Hold()))
+    assert robot.state is State.ACTIVE
+    robot.receive("RA", CostsAt([(0, 1), (0, 1)], [(1,), (2,)]))
+    assert replies(robot, ("RA", SetValue((2,)))) == [("RA", Inquiry(TWO, {"RA": (2,)}))]
+    replies(robot, ("RA", FinalSide([(0, 0), (0, 0)])))
+    assert value(robot) == (1,)
+
+
+@pytest.mark.parametrize(
+    "wrong",
+    [
+        CostsAt([(0, 0)], [(1,), (1,)]),
+        CostsAt([(0, 0), (0, 0)], [(1,)]),
+        CostsAt([(0, 0), (0, 0)], [(1,), (9,)]),
+        CostsAt([(0, 0), (0, 0)], [(1,), (1, 1)]),
+        FinalSide([(0, 0), (0, 0)]),
+    ],
+)
+def test_sides_that_cannot_be_are_refused(wrong: CostsAt | FinalSide) -> None:
+    with pytest.raises(ValueError, match="RB"):
+        replies(asking(), ("RB", wrong))
+
+
+@count("teams", 10, 1000)
+def test_with_asymmetric_costs_it_ends_with_at_most_one_question_more_for_each_neighbour(teams: int) -> None:
+    chance = Random("divided cocoa")
+    told = 0
+    for seed in range(teams):
+        team = random_asymmetric_team(chance, simple=True)
+        if not all(domains_of(team).values()):
+            continue
+        events: list[AnyEvent] = []
+        run = Simulation(
+            team, CoCoA, any_schedule(chance), observer=events.append, parameters=RunParameters(seed)
+        ).search()
+        assert run.verdict is Verdict.SOLUTION
+        assert all(run.assignments.values())
+        for robot in team.robots:
+            neighbours = len(robot_of(CoCoA, team, robot.name).problem.neighbours)
+            activations = neighbours + len(domains_of(team)[robot.variables[0].name])
+            sent = [event.type for event in events if isinstance(event, Sent) and event.sender == robot.name]
+            assert sent.count("Inquiry") <= neighbours * (activations + 1)
+        told += sum(isinstance(event, Sent) and event.type == "FinalSide" for event in events)
+    assert told
 
 
 @count("teams", 100, 3000)

@@ -21,7 +21,7 @@ from robochoc.protocols.findings import Findings, Listing
 from robochoc.protocols.inference.list_dpop import ListDPOP
 from robochoc.protocols.inference.messages.count_dpop import CountDimensions, Counts
 from robochoc.protocols.inference.messages.dpop import UTIL, Domain, Proceed
-from robochoc.protocols.inference.messages.list_dpop import Values
+from robochoc.protocols.inference.messages.list_dpop import ListedValues
 from robochoc.protocols.settings import equip
 from robochoc.run import Options, Runtime, solve
 from robochoc.run.listed_optima import put_together
@@ -77,8 +77,8 @@ def test_the_root_lists_its_values_and_the_numbers_of_its_childrens_optima() -> 
     assert robot.listed == [0, 0, 0, 0, 0, 0, 1]
     places = [[0]] * 6 + [[1]]
     assert said == [
-        ("RB", Values(places, ["0", "0", "0", "1", "1", "1", "0"])),
-        ("RC", Values(places, ["0", "1", "2", "0", "1", "2", "0"])),
+        ("RB", ListedValues(places, ["0", "0", "0", "1", "1", "1", "0"])),
+        ("RC", ListedValues(places, ["0", "1", "2", "0", "1", "2", "0"])),
     ]
 
 
@@ -98,13 +98,13 @@ def test_no_more_are_listed_than_wanted() -> None:
 def test_a_robot_takes_the_value_with_the_number_that_it_is_told() -> None:
     robot = robot_of("RB", "A")
     replies(robot, ("RA", Proceed(["RA"])))
-    assert replies(robot, ("RA", Values([[0], [1]], ["0", "0"]))) == []
+    assert replies(robot, ("RA", ListedValues([[0], [1]], ["0", "0"]))) == []
     assert robot.listed == [0, 0]
 
 
 def test_what_is_said_of_optima_in_words() -> None:
     words = Wording("RA", "RB")
-    assert Values([[0], [0], [1]], ["0", "1", "0"]).in_words(words) == (
+    assert ListedValues([[0], [0], [1]], ["0", "1", "0"]).in_words(words) == (
         "3 optima, with 2 combinations of values of the robots in your separator"
     )
 
@@ -112,13 +112,13 @@ def test_what_is_said_of_optima_in_words() -> None:
 @pytest.mark.parametrize(
     ("message", "why"),
     [
-        (Values([], []), "0 combinations"),
-        (Values([[0]], ["0", "0"]), "1 combinations of values, and 2 numbers"),
-        (Values([[0]] * 101, ["0"] * 101), "101 combinations"),
-        (Values([[2]], ["0"]), "are no values"),
-        (Values([[-1]], ["0"]), "are no values"),
-        (Values([[0, 0]], ["0"]), "are no values"),
-        (Values([[0]], ["1"]), "has no optimum 1"),
+        (ListedValues([], []), "0 combinations"),
+        (ListedValues([[0]], ["0", "0"]), "1 combinations of values, and 2 numbers"),
+        (ListedValues([[0]] * 101, ["0"] * 101), "101 combinations"),
+        (ListedValues([[2]], ["0"]), "are no values"),
+        (ListedValues([[-1]], ["0"]), "are no values"),
+        (ListedValues([[0, 0]], ["0"]), "are no values"),
+        (ListedValues([[0]], ["1"]), "has no optimum 1"),
     ],
 )
 def test_optima_that_cannot_be_are_refused(message: Message, why: str) -> None:
@@ -131,10 +131,10 @@ def test_optima_that_cannot_be_are_refused(message: Message, why: str) -> None:
 def test_optima_that_come_twice_or_too_early_are_refused() -> None:
     robot = robot_of("RB", "A")
     with pytest.raises(ValueError, match="no table yet"):
-        replies(robot, ("RA", Values([[]], ["0"])))
-    replies(robot, ("RA", Proceed(["RA"])), ("RA", Values([[0]], ["0"])))
+        replies(robot, ("RA", ListedValues([[]], ["0"])))
+    replies(robot, ("RA", Proceed(["RA"])), ("RA", ListedValues([[0]], ["0"])))
     with pytest.raises(ValueError, match="values already"):
-        replies(robot, ("RA", Values([[0]], ["0"])))
+        replies(robot, ("RA", ListedValues([[0]], ["0"])))
 
 
 @pytest.mark.parametrize("limit", ["0", "-1", "10001"])

@@ -54,7 +54,7 @@ from robochoc.protocols.inference.messages.bounded_maxsum import (
     Dependency,
     Fragment,
     Heaviest,
-    Join,
+    Merged,
     NewRoot,
 )
 from robochoc.protocols.inference.spanning import SpanningProtocol
@@ -76,7 +76,7 @@ class BoundedMaxSum(SpanningProtocol):
     the own branch of the tree. A root knows `optimum`, the cost of its tree, and `cut`, the weight of all that was cut.
     """
 
-    messages = Domain | Dependency | Fragment | Heaviest | Choice | Join | NewRoot | Branch | ValueMessage | Assign
+    messages = Domain | Dependency | Fragment | Heaviest | Choice | Merged | NewRoot | Branch | ValueMessage | Assign
     traits = Traits(
         concludes=ENDS_WITH_PROOF,
         paper="Rogers, Farinelli, Stranders, Jennings 2011",

@@ -51,7 +51,7 @@ from robochoc.protocols.inference.dpop_counts import Numbers, bytes_of_numbers, 
 from robochoc.protocols.inference.dpop_tables import Codes, Extent, Table, cost_at, place_at, width_of
 from robochoc.protocols.inference.messages.count_dpop import MOST_BITS, CountDimensions, Counts
 from robochoc.protocols.inference.messages.dpop import UTIL, Domain, Proceed
-from robochoc.protocols.inference.messages.list_dpop import Values
+from robochoc.protocols.inference.messages.list_dpop import ListedValues
 from robochoc.protocols.inference.settings.list_dpop import ListDPOPSettings
 from robochoc.protocols.order import PriorityOrder
 from robochoc.protocols.shared.messages.dfs import TreeMessage
@@ -77,7 +77,7 @@ class ListDPOP(CountDPOP):
     - `listed`: the place of the own value in each optimum that is listed.
     """
 
-    messages = TreeMessage | Domain | CountDimensions | Proceed | UTIL | Counts | Values
+    messages = TreeMessage | Domain | CountDimensions | Proceed | UTIL | Counts | ListedValues
     traits = Traits(
         concludes=ENDS_WITH_PROOF,
         paper="Petcu & Faltings 2005",
@@ -97,8 +97,8 @@ class ListDPOP(CountDPOP):
 
     def handle(self, sender: str, message: Message) -> None:
         """Dispatch on the message's type."""
-        match cast("Domain | CountDimensions | Proceed | UTIL | Counts | Values", message):
-            case Values(assignments, numbers):
+        match cast("Domain | CountDimensions | Proceed | UTIL | Counts | ListedValues", message):
+            case ListedValues(assignments, numbers):
                 self._values_handler(assignments, numbers)
             case Domain() | CountDimensions() | Proceed() | UTIL() | Counts() as others:
                 super().handle(sender, others)
@@ -170,7 +170,7 @@ class ListDPOP(CountDPOP):
         ]
         for child in self.children:
             places = [[view[name] for name in self._axes[child]] for view in views]
-            self.send(child, Values(places, [f"{below[child]:x}" for _, below in picked]))
+            self.send(child, ListedValues(places, [f"{below[child]:x}" for _, below in picked]))
 
     def _pick(self, kept: KeptTables, assignment: Sequence[int], number: int) -> tuple[int, dict[str, int]]:
         """Return the own value in the optimum of the subtree with this `number`, and the numbers for the children."""

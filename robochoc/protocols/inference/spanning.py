@@ -3,7 +3,7 @@
 Each robot begins as a tree of its own. In a round, each tree finds the heaviest function that leads out of it, and all
 trees that such functions join become one; so there are at most log2(n) rounds. All robots of a tree know its root, and
 tell it to the neighbours (Fragment). What leads out is reported up the tree (Heaviest), its root chooses (Choice), and
-robots tell their neighbours in other trees whether their function was chosen (Join). Exactly one function of the new
+robots tell their neighbours in other trees whether their function was chosen (Merged). Exactly one function of the new
 tree was chosen from both sides; the higher of its robots is the new root, and tells all of the tree (NewRoot).
 
 A robot goes on with a round when it has what it needs for it: messages of one robot arrive in the order in which they
@@ -18,7 +18,7 @@ from abc import abstractmethod
 from collections.abc import Callable, Iterable
 
 from robochoc.model.message import Message
-from robochoc.protocols.inference.messages.bounded_maxsum import Choice, Ends, Fragment, Heaviest, Join, NewRoot
+from robochoc.protocols.inference.messages.bounded_maxsum import Choice, Ends, Fragment, Heaviest, Merged, NewRoot
 from robochoc.protocols.order import PriorityOrder
 from robochoc.protocols.protocol import Protocol
 from robochoc.solver.compiled import LocalProblem
@@ -128,7 +128,7 @@ class SpanningProtocol(Protocol):
         for name in self._outer:
             if self._ends(name) == ends:
                 self._own_choice = name
-            self.send(name, Join(name == self._own_choice))
+            self.send(name, Merged(name == self._own_choice))
         self.stage = self._join
 
     def _join(self) -> bool:
@@ -136,7 +136,7 @@ class SpanningProtocol(Protocol):
         told = self.heard(self._outer)
         if told is None:
             return False
-        chosen = [name for name, one in told.items() if isinstance(one, Join) and one.joined]
+        chosen = [name for name, one in told.items() if isinstance(one, Merged) and one.joined]
         new = [name for name in self._outer if name in chosen or name == self._own_choice]
         self._outer = [name for name in self._outer if name not in new]
         self.joined += new

@@ -4,10 +4,12 @@ No cycles: each robot takes one value, once. Before that it asks all neighbours 
 would cost them at least, and takes the value for which the sum is least. If too many values are equally good, it waits
 (HOLD) until a neighbour has taken a value. If nobody around can go on, it accepts more equally good values.
 
-- **When to use**: costs, few messages: a fair answer from a number of messages that does not depend on cycles.
+- **When to use**: costs, also asymmetric ones, few messages: a fair answer from a number of messages that does not
+  depend on cycles.
 - **Guarantees**: incomplete, no proof of optimality. It always ends: a robot with d neighbours and v values becomes
-  active at most d + v times, so it sends at most 2 d (d + v) messages, and as many answers as it is asked for. No
-  robot changes its value. A robot with an empty domain proves that there is no solution.
+  active at most d + v times, so it sends at most 2 d (d + v) messages, and as many answers as it is asked for; with
+  asymmetric costs d questions more. No robot changes its value. A robot with an empty domain proves that there is no
+  solution.
 - **Parameters**: none.
 - **Reference**: van Leeuwen, Pawelczak: "CoCoA: a non-iterative approach to a local search (A)DCOP solver", AAAI 2017.
 
@@ -28,6 +30,9 @@ Choices that the paper leaves open, and differences:
 - If all neighbours are DONE, nothing more can become known: one of the best values is chosen by lot, however many
   there are.
 - A constraint of more than two robots counts when all but one or two have values, once: unknown robots charge nothing.
+- Asymmetric costs (ADCOP): an answer counts the neighbour's own side only, and names the neighbour's value with which
+  it is least. The asker adds its own side at this value. A neighbour that is DONE is asked, too, once: its own side for
+  its value is nobody else's to know. If it is DONE only after its answer, it is asked again.
 - Fewer violated hard constraints are always better, so plain DisCSPs work, too.
 
 It ends: of the robots of a part of the team, the last one to choose or to wait finds all its neighbours DONE or in
@@ -43,14 +48,22 @@ HOLD, and goes on. So nobody is left in HOLD, nor IDLE beside a robot that is no
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from enum import StrEnum
 from typing import Any, ClassVar, assert_never, cast
 
 from robochoc.model import message as wire
 from robochoc.model.outcome import Verdict
 from robochoc.protocols.chance import one_of
-from robochoc.protocols.local_search.messages.cocoa import Burden, Costs, Hold, Inquiry, SetValue
+from robochoc.protocols.local_search.messages.cocoa import (
+    Burden,
+    Costs,
+    CostsAt,
+    FinalSide,
+    Hold,
+    Inquiry,
+    SetValue,
+)
 from robochoc.protocols.order import PriorityOrder
 from robochoc.protocols.protocol import Protocol
 from robochoc.protocols.traits import ENDS_WITH_PROOF, Traits
@@ -75,15 +88,18 @@ class CoCoA(Protocol):
     """One agent of CoCoA.
 
     State: the own `state` and the neighbours' (`states`), the final values of neighbours (`view`), `answers` to the
-    last inquiry, and `bound`: the number of equally good values among which it chooses (beta).
+    last inquiry, and `bound`: the number of equally good values among which it chooses (beta). `sides` are what the
+    parts of neighbours that are DONE charge for each own value.
     """
 
-    messages: ClassVar[Any] = Inquiry | Costs | Hold | SetValue
+    messages: ClassVar[Any] = Inquiry | Costs | CostsAt | FinalSide | Hold | SetValue
     traits: ClassVar[Traits] = Traits(
         concludes=ENDS_WITH_PROOF,
         paper="van Leeuwen & Pawelczak 2017",
         complete=False,
         costs=True,
+        partially_known=True,
+        asymmetric=True,
         shared_scopes=True,
         writes_to_non_neighbours=False,
         privacy="constraints among others",
@@ -96,6 +112,7 @@ class CoCoA(Protocol):
         self.states = dict.fromkeys(problem.neighbours, State.IDLE)
         self.view: dict[str, wire.Value] = {}
         self.answers: dict[str, list[Burden]] = {}
+        self.sides: dict[str, list[Burden]] = {}
         self.bound = 1
         self._asked: tuple[str, ...] = ()
         self._done_before = 0
@@ -115,19 +132,30 @@ class CoCoA(Protocol):
             return
         if sender not in self.states:
             raise ValueError(f"{sender} is no neighbour of {self.problem.agent}")
-        match cast("Inquiry | Costs | Hold | SetValue", message):
+        match cast("Inquiry | Costs | CostsAt | FinalSide | Hold | SetValue", message):
             case Inquiry(values, known):
                 self._refuse([*((sender, value) for value in values), *known.items()])
                 self.states[sender] = State.ACTIVE
                 self._answer(sender, values, known)
+            case CostsAt(burdens, values):
+                self._refuse_number(sender, values)
+                own = self._own_sides(sender, values)
+                self._keep(sender, burdens)
+                self.answers[sender] = _sums(own, burdens)
             case Costs(burdens):
                 self._keep(sender, burdens)
+            case FinalSide(burdens):
+                if self.states[sender] is not State.DONE:
+                    raise ValueError(f"{sender} has told {self.problem.agent} no value that is final")
+                self._keep(sender, burdens)
+                self.sides[sender] = burdens
             case Hold():
                 self.states[sender] = State.HOLD
             case SetValue(value):
                 self._refuse([(sender, value)])
                 self.states[sender] = State.DONE
                 self.view[sender] = value
+                self._ask_again(sender)
             case never:
                 assert_never(never)
 
@@ -153,20 +181,45 @@ class CoCoA(Protocol):
         return True
 
     def _activate(self) -> None:
-        """Ask all neighbours that have no value what the own values would cost them."""
+        """Ask neighbours what the own values would cost them: all that have no value, and parts that are not told."""
         self.state = State.ACTIVE
         self._done_before = len(self.view)
         self.answers = {}
-        self._asked = tuple(name for name, state in self.states.items() if state is not State.DONE)
+        self._asked = tuple(name for name, state in self.states.items() if state is not State.DONE or self._lacks(name))
         inquiry = Inquiry(list(self.problem.values), dict(self.view))
         for name in self._asked:
             self.send(name, inquiry)
 
+    def _lacks(self, name: str) -> bool:
+        """Return whether a neighbour that is DONE has not told yet what its parts charge."""
+        return name not in self.sides and self.problem.shares_parts_with(name)
+
+    def _ask_again(self, name: str) -> None:
+        """Ask a neighbour that has taken its value after its answer for what its parts charge now."""
+        if self.state is State.ACTIVE and name in self.answers and self._lacks(name):
+            del self.answers[name]
+            self.send(name, Inquiry(list(self.problem.values), dict(self.view)))
+
     def _answer(self, sender: str, values: list[wire.Value], known: Mapping[str, wire.Value]) -> None:
         """Send the least cost of each of the sender's values: over all own values, or for the final one."""
+        divided = self.problem.shares_parts_with(sender)
+        if divided and self.value is not None:
+            own = self.value
+            self.send(sender, FinalSide([self.problem.own_side(own, sender, value) for value in values]))
+            return
         view = {**known, **self.view}
         view.pop(self.problem.agent, None)
-        self.send(sender, Costs([self._least(self.problem.lexicographic_costs({**view, sender: v})) for v in values]))
+        totals = [self.problem.lexicographic_costs({**view, sender: value}) for value in values]
+        least = [self._least(burdens) for burdens in totals]
+        if divided:
+            at = [burdens.index(cost) for burdens, cost in zip(totals, least, strict=True)]
+            self.send(sender, CostsAt(least, [self.problem.values[place] for place in at]))
+        else:
+            self.send(sender, Costs(least))
+
+    def _own_sides(self, sender: str, values: list[wire.Value]) -> list[Burden]:
+        """Return what the own parts charge for each own value, where the sender has the value of the same place."""
+        return [self.problem.own_side(place, sender, value) for place, value in enumerate(values)]
 
     def _refuse(self, told: Iterable[tuple[str, wire.Value]]) -> None:
         """Raise `ValueError` for a value that a neighbour cannot have; what others have means nothing here."""
@@ -180,16 +233,22 @@ class CoCoA(Protocol):
     def _keep(self, sender: str, burdens: list[Burden]) -> None:
         """Store an answer; raise `ValueError` if it was not asked for, or is not about the own values."""
         asked = self.state is State.ACTIVE and sender in self._asked and sender not in self.answers
-        if not asked or len(burdens) != len(self.problem.values):
+        if not asked:
             raise ValueError(f"{sender} tells costs that {self.problem.agent} has not asked for")
+        self._refuse_number(sender, burdens)
         self.answers[sender] = burdens
+
+    def _refuse_number(self, sender: str, told: Sequence[object]) -> None:
+        """Raise `ValueError` for an answer that is not about the own values."""
+        if len(told) != len(self.problem.values):
+            raise ValueError(f"{sender} tells costs that {self.problem.agent} has not asked for")
 
     def _decide(self) -> None:
         """Choose one of the best values, or wait if too many are equally good."""
         totals = self.problem.lexicographic_costs(self.view)
         waiting = [name for name in self._asked if name not in self.view]
-        for name in waiting:
-            totals = [(a + c, b + d) for (a, b), (c, d) in zip(totals, self.answers[name], strict=True)]
+        for told in (*self.sides.values(), *(self.answers[name] for name in waiting)):
+            totals = _sums(totals, told)
         least = min(totals)
         best = [place for place, total in enumerate(totals) if total == least]
         if len(best) <= self.bound or not waiting:
@@ -205,3 +264,7 @@ class CoCoA(Protocol):
         for name, state in self.states.items():
             if state is not State.DONE:
                 self.send(name, message)
+
+
+def _sums(some: Sequence[Burden], others: Sequence[Burden]) -> list[Burden]:
+    return [(a + c, b + d) for (a, b), (c, d) in zip(some, others, strict=True)]

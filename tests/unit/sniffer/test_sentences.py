@@ -151,7 +151,7 @@ REAL = {
     ("rmb-dpop", "ClusterLabel"): (
         "RX03 says: my table has 16 cells over RX02 (4 values) and RX00 (4 values), and no cost above 19"
     ),
-    ("list-dpop", "Values"): "RX00 says: 1 optimum, with 1 combination of values of the robots in your separator",
+    ("list-dpop", "ListedValues"): "RX00 says: 1 optimum, with 1 combination of values of the robots in your separator",
     ("afb", "CPA"): (
         "RX03 says: so far X00 = -3, X01 = -1, X02 = 1 and X03 = 3, which costs at least 22;"
         " the best solution so far costs 26; it is RX04's turn"

@@ -340,6 +340,7 @@ def test_the_own_side_of_a_constraint_is_what_the_own_part_says(batch: int) -> N
                 paid = problem.own_side(index, other, views[other])
                 assert paid == (prices.count(INFINITE), sum(price for price in prices if price < INFINITE))
                 assert problem.checks - before == len(prices)
+                assert problem.shares_parts_with(other) == (bool(prices) or other in problem.pkc_parents)
                 seen[bool(prices)] += 1
     assert seen[True] > 40
 

@@ -90,7 +90,7 @@ class Choice(Message, frozen=True):
         return NOTHING
 
 
-class Join(Message, frozen=True):
+class Merged(Message, frozen=True):
     """Whether the sender's tree is joined with the receiver's by their function."""
 
     joined: bool

@@ -15,7 +15,7 @@ Number = Annotated[str, msgspec.Meta(pattern=r"^[0-9a-f]+\Z", max_length=MOST_BI
 """In hexadecimal digits, as it may need more than 64 bits."""
 
 
-class Values(Message, frozen=True):
+class ListedValues(Message, frozen=True):
     """For each optimum that is listed, what DPOP's VALUE has for one, and which of several the receiver's subtree has.
 
     `assignments` are the places of the values of the robots in the receiver's separator. `numbers` count, from 0 on,

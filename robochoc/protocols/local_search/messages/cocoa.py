@@ -12,6 +12,7 @@ from robochoc.model.disclosure import (
     EveryValuePays,
     HasOnly,
     Hearing,
+    PartPays,
     Proof,
     SomeValuePays,
     StandsAt,
@@ -78,6 +79,55 @@ class Costs(wire.Message, frozen=True):
             if alone:
                 found.append(EveryValuePays(hearing.sender, view, INFINITE if broken else cost))
         return found
+
+
+class CostsAt(Costs, frozen=True):
+    """The answer where both sides of a constraint have costs of their own (ADCOP): the sender's side only.
+
+    `values` are the sender's own values with which it costs the sender least, one for each value that was asked for.
+    """
+
+    values: list[wire.Value]
+
+    act = Act(Performative.INFORM, "the receiver comes to know what its values would cost the sender, and with which")
+
+    def in_words(self, words: Wording) -> str:
+        """Return what the sender says."""
+        told = super().in_words(words)
+        if not self.burdens or len(self.values) != len(self.burdens):
+            return told
+        return f"{told}, with {words.own_value(self.values[self.burdens.index(min(self.burdens))])}"
+
+    def proves(self, hearing: Hearing) -> Sequence[Proof]:
+        """Return what the message proves to its receiver."""
+        return [*super().proves(hearing), *(can_take(hearing.sender, value) for value in dict.fromkeys(self.values))]
+
+
+class FinalSide(wire.Message, frozen=True):
+    """The answer of a robot that has its value (ADCOP): what its parts charge for each value that was asked for."""
+
+    burdens: list[Burden]
+
+    act = Act(Performative.INFORM, "the receiver comes to know what the sender's parts charge for its values")
+
+    def in_words(self, _: Wording) -> str:
+        """Return what the sender says."""
+        if not self.burdens:
+            return "you have asked for no value"
+        place = self.burdens.index(min(self.burdens))
+        price = saving_in_words(*self.burdens[place])
+        return f"of your {counted(len(self.burdens), 'value')}, number {place + 1} costs my side least: {price}"
+
+    def proves(self, hearing: Hearing) -> Sequence[Proof]:
+        """Return what the message proves to its receiver: the sender's parts, for its value and all that were asked."""
+        asked = hearing.last(Inquiry, hearing.receiver, hearing.sender)
+        stands = hearing.last(SetValue, hearing.sender, hearing.receiver)
+        if asked is None or stands is None:
+            return NOTHING
+        return [
+            PartPays(hearing.sender, stands.value, hearing.receiver, value, INFINITE if broken else cost)
+            for value, (broken, cost) in zip(asked.values, self.burdens, strict=False)
+        ]
 
 
 class Hold(wire.Message, frozen=True):
