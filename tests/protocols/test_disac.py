@@ -100,23 +100,37 @@ def test_a_value_that_is_not_there_cannot_be_removed() -> None:
 
 
 def fixpoint(team: Team) -> dict[str, set[int]]:
-    """The largest arc consistent domains, by a central loop; a robot has one variable."""
+    """The largest arc consistent domains, by a central loop; a robot has one variable.
+
+    Constraints over the same variables count as one.
+    """
     domains = {name: {*variable.domain} for name, variable in team.variables.items()}
+    together: dict[tuple[str, ...], list[Constraint]] = {}
+    for constraint in team.constraints():
+        together.setdefault(tuple(sorted(set(constraint.variables))), []).append(constraint)
     changed = True
     while changed:
         changed = False
-        for constraint in team.constraints():
-            names = tuple(dict.fromkeys(constraint.variables))
+        for names, constraints in together.items():
             rows = [
                 row
                 for row in itertools.product(*(sorted(domains[name]) for name in names))
-                if constraint.allows(dict(zip(names, row, strict=True)))
+                if all(one.allows(dict(zip(names, row, strict=True))) for one in constraints)
             ]
             for place, name in enumerate(names):
                 supported = {row[place] for row in rows}
                 changed |= supported < domains[name]
                 domains[name] &= supported
     return domains
+
+
+def test_constraints_over_the_same_robots_count_as_one() -> None:
+    """Each by itself has a support for every value."""
+    same = Constraint("S", Relation("S", 2, Semantics.SUPPORTS, ((1, 1), (2, 2), (3, 3))), ("A", "B"), ("A", "B"))
+    other = Constraint("O", Relation("O", 2, Semantics.SUPPORTS, ((1, 1), (2, 3), (3, 2))), ("A", "B"), ("A", "B"))
+    robot = agent(team_of(dict.fromkeys("AB", (1, 2, 3)), [same, other]), "RB")
+    replies(robot, ("RA", three(1, 2, 3)))
+    assert robot.findings.left == (0,)
 
 
 @count("problems", 25, 2000)

@@ -17,6 +17,7 @@ that value, and is not told of it.
 
 Choices and differences:
 
+- Constraints over the same robots count as one, which removes more than each by itself does.
 - Constraints over more than two robots: their robots are told all removals, as one robot alone does not see when the
   last combination for a value of another one is gone.
 - Each robot evaluates its constraints once, as tables (`LocalProblem.allowed`); constraint checks are those, so both
