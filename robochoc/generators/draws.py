@@ -12,7 +12,6 @@ from decimal import Decimal
 from random import Random
 
 from robochoc.model.cost_units import MAX_PLACES
-from robochoc.model.expression import Apply, Constant, Expression
 from robochoc.model.problem import Constraint
 
 MAX_AGENTS = 1000
@@ -80,15 +79,3 @@ def bounded(constraints: Iterable[Constraint]) -> list[Constraint]:
             raise ValueError(f"the team would have more than {MAX_CONSTRAINTS:,} constraints; ask for a smaller one")
         kept.append(constraint)
     return kept
-
-
-def total(terms: Iterable[Expression]) -> Expression:
-    """Return the sum of integer `terms`: their number is free, that of the arguments of `add` is not."""
-    given = tuple(terms)
-    match given:
-        case ():
-            return Constant(0)
-        case (only,):
-            return only
-        case _:
-            return Apply("add", given)

@@ -20,6 +20,7 @@ from robochoc.generators import sensors as sensor_networks
 from robochoc.generators import tasks as allocations
 from robochoc.generators import tracking as trackings
 from robochoc.generators.graph_choice import GraphChoice
+from robochoc.model.allocation import Distance
 from robochoc.model.cost_units import CostUnits
 from robochoc.model.problem import Team
 
@@ -144,7 +145,7 @@ def tasks(  # noqa: PLR0913 - parameters of a family, by their names
     seed: int = 0,
 ) -> Team:
     """Return tasks to be allocated: see `generators/tasks.py`."""
-    ways = allocations.Ways(side, allocations.Distance(distance), places)
+    ways = allocations.Ways(side, Distance(distance), places)
     has = allocations.Skills(skills, skilled)
     return allocations.tasks(agents, tasks, seed, worth=worth, ways=ways, skills=has, model=model, capacity=capacity)
 

@@ -25,9 +25,9 @@ from enum import StrEnum
 from typing import assert_never
 
 from robochoc.formats import PREDEFINED
-from robochoc.generators.draws import MAX_AGENTS, bounded, check_bounds, seeded, some, total
+from robochoc.generators.draws import MAX_AGENTS, bounded, check_bounds, seeded, some
 from robochoc.model.assembly import assemble
-from robochoc.model.expression import Apply, Constant, Name, Type, parse
+from robochoc.model.expression import Apply, Constant, Name, Type, parse, total
 from robochoc.model.problem import Constraint, Domain, Predicate, Relation, Semantics, Team, Term, Variable
 
 MAX_NEEDED = 10

@@ -15,11 +15,7 @@ from where the robot stands.
 
 from __future__ import annotations
 
-import itertools
-from collections.abc import Iterator
 from dataclasses import dataclass
-from enum import StrEnum
-from math import isqrt
 from random import Random
 from typing import assert_never
 
@@ -31,34 +27,15 @@ from robochoc.generators.draws import (
     check_places,
     seeded,
     some,
-    total,
     uniform,
 )
+from robochoc.model.allocation import Distance, Job, TasksModel, Worker, assignment, several, way
 from robochoc.model.assembly import assemble
 from robochoc.model.cost_units import CostUnits
-from robochoc.model.expression import Apply, Constant, Name, Type, parse
-from robochoc.model.problem import Constraint, Domain, Predicate, ProblemKind, Relation, Semantics, Team, Variable
+from robochoc.model.problem import ProblemKind, Team
 
 MAX_SIDE = 10_000
 MAX_SKILLS = 100
-
-NOT_THE_SAME = Predicate("notSame", ("X", "Y"), parse("or(eq(X, 0), ne(X, Y))", ("X", "Y"), Type.BOOLEAN))
-"""Two robots do not do the same task; 0 is none."""
-NOT_BOTH = Predicate("notBoth", ("X", "Y"), parse("or(eq(X, 0), eq(Y, 0))", ("X", "Y"), Type.BOOLEAN))
-
-
-class TasksModel(StrEnum):
-    """How many tasks a robot can do."""
-
-    ASSIGNMENT = "assignment"
-    SEVERAL = "several"
-
-
-class Distance(StrEnum):
-    """How long a way is."""
-
-    STREETS = "streets"
-    STRAIGHT = "straight"
 
 
 @dataclass(frozen=True)
@@ -141,9 +118,10 @@ def tasks(
     problem = drawn_tasks(seeded(seed), (agents, tasks, worth), ways, skills, capacity)
     match model:
         case TasksModel.ASSIGNMENT:
-            variables, constraints = _assignment(problem)
+            variables, constraints = assignment(_workers(problem))
         case TasksModel.SEVERAL:
-            variables, constraints = _several(problem)
+            jobs = {task: Job(str(task), load) for task, load in problem.load.items()}
+            variables, constraints = several(_workers(problem), jobs)
         case never:
             assert_never(never)
     if not variables:
@@ -178,63 +156,8 @@ def drawn_tasks(chance: Random, numbers: tuple[int, int, int], ways: Ways, skill
     return Tasks(profit, load, capacity)
 
 
-def way(start: tuple[int, int], end: tuple[int, int], distance: Distance, places: int) -> int:
-    """Return the length of a way in units of 10**-places: a straight one rounded, halves up."""
-    across, along = abs(start[0] - end[0]), abs(start[1] - end[1])
-    if distance is Distance.STREETS:
-        streets: int = (across + along) * 10**places
-        return streets
-    square: int = (across**2 + along**2) * 100**places
-    return (isqrt(4 * square) + 1) // 2
-
-
-_Parts = tuple[dict[str, list[Variable]], Iterator[Constraint]]
-"""The variables of each robot, and the constraints."""
-
-
-def _assignment(problem: Tasks) -> _Parts:
-    variables = {
-        f"Robot{robot}": [Variable(f"V{robot}", Domain("Tasks", tuple(range(one, one + 1) for one in (0, *profit))))]
+def _workers(problem: Tasks) -> list[Worker]:
+    return [
+        Worker(f"Robot{robot}", str(robot), f"V{robot}", profit, problem.capacity)
         for robot, profit in problem.profit.items()
-    }
-
-    def constraints() -> Iterator[Constraint]:
-        for robot, profit in problem.profit.items():
-            yield _worth(str(robot), profit)
-        for one, other in itertools.combinations(problem.profit, 2):
-            if not problem.profit[one].keys().isdisjoint(problem.profit[other]):
-                scope = (f"V{one}", f"V{other}")
-                yield Constraint("notSame", NOT_THE_SAME, scope, scope)
-
-    return variables, constraints()
-
-
-def _several(problem: Tasks) -> _Parts:
-    done = Domain("Done", (range(2),))
-    able = {robot: profit for robot, profit in problem.profit.items() if profit}
-    variables = {f"Robot{robot}": [Variable(f"V{robot}.{task}", done) for task in able[robot]] for robot in able}
-
-    def constraints() -> Iterator[Constraint]:
-        for robot, profit in able.items():
-            for task, worth in profit.items():
-                yield _worth(f"{robot}.{task}", {1: worth})
-            scope = tuple(f"V{robot}.{task}" for task in profit)
-            yield Constraint("room", _room(robot, [problem.load[task] for task in profit], problem), scope, scope)
-        for one, other in itertools.combinations(able, 2):
-            for task in able[one]:
-                if task in able[other]:
-                    names = (f"V{one}.{task}", f"V{other}.{task}")
-                    yield Constraint("notBoth", NOT_BOTH, names, names)
-
-    return variables, constraints()
-
-
-def _room(robot: int, loads: list[int], problem: Tasks) -> Predicate:
-    names = tuple(f"X{number}" for number in range(1, len(loads) + 1))
-    taken = total(Apply("mul", (Constant(load), Name(name))) for load, name in zip(loads, names, strict=True))
-    return Predicate(f"room{robot}", names, Apply("le", (taken, Constant(problem.capacity))))
-
-
-def _worth(name: str, profit: dict[int, int]) -> Constraint:
-    relation = Relation(f"U{name}", 1, Semantics.SOFT, tuple((task,) for task in profit), tuple(profit.values()))
-    return Constraint(f"U{name}", relation, (f"V{name}",), (f"V{name}",))
+    ]

@@ -17,10 +17,10 @@ from dataclasses import dataclass
 from math import prod
 from random import Random
 
-from robochoc.generators.draws import MAX_AGENTS, bounded, check_bounds, seeded, some, total, uniform
+from robochoc.generators.draws import MAX_AGENTS, bounded, check_bounds, seeded, some, uniform
 from robochoc.model.assembly import assemble
 from robochoc.model.cost_units import CostUnits
-from robochoc.model.expression import Apply, Constant, Expression, Name
+from robochoc.model.expression import Apply, Constant, Expression, Name, total
 from robochoc.model.problem import Constraint, Domain, Function, ProblemKind, Team, Variable
 
 MAX_SIDE = 100

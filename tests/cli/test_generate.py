@@ -15,8 +15,9 @@ from robochoc.generators.ising import ising
 from robochoc.generators.meetings import meetings
 from robochoc.generators.random_csp import random_on
 from robochoc.generators.sensors import Reach, grid_sensors, sensors
-from robochoc.generators.tasks import Distance, Skills, Ways, tasks
+from robochoc.generators.tasks import Skills, Ways, tasks
 from robochoc.generators.tracking import tracking
+from robochoc.model.allocation import Distance
 from robochoc.model.cost_units import CostUnits
 from robochoc.model.problem import Team
 from tests.support.evaluation import best

@@ -67,6 +67,7 @@ def import_(
     frodo    FRODO's XCSP 2.1, one file or one per agent; XCSP 2.0 and 2.1
     xdiscsp  XDisCSP 1.0 of DisChoco and DCOPSolver
     pydcop   pyDCOP's YAML, with distribution files and scenarios
+    tasks    robots, and tasks that are to be shared out among them (YAML)
     xcsp3    XCSP3
     cfn      cost function networks of toulbar2; wcsp: its older format
 

@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
 _Command = TypeVar("_Command", bound=Callable[..., object])
 
-READ = ("frodo", "xdiscsp", "pydcop", "xcsp3", "cfn", "wcsp")
+READ = ("frodo", "xdiscsp", "pydcop", "tasks", "xcsp3", "cfn", "wcsp")
 """The dialects that are imported."""
 WRITTEN = ("xcsp3", "frodo", "xdiscsp", "pydcop", "cfn", "wcsp", "dot", "graphml")
 """The formats that are exported."""

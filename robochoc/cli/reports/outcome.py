@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from decimal import Decimal
 
 from robochoc.cli.reports.table import table_lines
+from robochoc.cli.reports.tasks import task_table
 from robochoc.formats import on_one_line
 from robochoc.formats.diagnostics import shortened
 from robochoc.model.change import team_after_events
@@ -28,7 +29,7 @@ def outcome_report(team: Team, outcome: Outcome) -> str:
     team = team_after_events(team, outcome.events)
     if outcome.assignment:
         values = outcome.labelled(outcome.assignment)
-        lines += _board(team, values) or _list(team, values)
+        lines += _values(team, values)
     lines += _listed(team, outcome)
     if outcome.withdrawn_alive:
         lines += [
@@ -221,6 +222,11 @@ def _simulated(outcome: Outcome) -> str:
     return f"; {f'{seconds:,.2f} s' if seconds >= 1 else f'{seconds * 1000:,.2f} ms'} simulated ({outcome.channel})"
 
 
+def _values(team: Team, assignment: Mapping[str, int | str]) -> list[str]:
+    """Return who does which task, a board, or a list of the values."""
+    return task_table(team, assignment) or _board(team, assignment) or _list(team, assignment)
+
+
 def _board(team: Team, assignment: Mapping[str, int | str]) -> list[str]:
     """Return a board, if variables are named for cells (`V3.1`) and it is not too wide."""
     cells = {}
@@ -259,8 +265,7 @@ def _listed(team: Team, outcome: Outcome) -> list[str]:
     ]
     for place, one in enumerate(others, start=2):
         values = outcome.labelled(one)
-        rows = _board(team, values) or _list(team, values)
-        lines += [f"  {place:,}.", *rows]
+        lines += [f"  {place:,}.", *_values(team, values)]
     return lines
 
 

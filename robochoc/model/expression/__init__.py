@@ -10,7 +10,17 @@ All arguments of an operator are evaluated, whatever the others are; only `if` c
 from robochoc.model.expression.closures import compile_expression
 from robochoc.model.expression.operators import ALIASES, OPERATORS, evaluate
 from robochoc.model.expression.parser import ExpressionError, SymbolNames, parse
-from robochoc.model.expression.tree import Apply, Constant, Expression, Name, Type, UndefinedValueError, names, text
+from robochoc.model.expression.tree import (
+    Apply,
+    Constant,
+    Expression,
+    Name,
+    Type,
+    UndefinedValueError,
+    names,
+    text,
+    total,
+)
 
 __all__ = [
     "ALIASES",
@@ -28,4 +38,5 @@ __all__ = [
     "names",
     "parse",
     "text",
+    "total",
 ]

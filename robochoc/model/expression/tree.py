@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator, Sequence
+from collections.abc import Collection, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
 
@@ -96,3 +96,15 @@ def _every_name(expression: Expression) -> Iterator[str]:
                 yield from _every_name(argument)
         case Constant():
             pass
+
+
+def total(terms: Iterable[Expression]) -> Expression:
+    """Return the sum of integer `terms`: their number is free, that of the arguments of `add` is not."""
+    given = tuple(terms)
+    match given:
+        case ():
+            return Constant(0)
+        case (only,):
+            return only
+        case _:
+            return Apply("add", given)

@@ -13,8 +13,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from robochoc.formats import check_team
-from robochoc.generators.tasks import Distance, Skills, Tasks, Ways, drawn_tasks, tasks, way
+from robochoc.generators.tasks import Skills, Tasks, Ways, drawn_tasks, tasks
 from robochoc.generators.tracking import Field, drawn_field, tracking
+from robochoc.model.allocation import Distance, way
 from robochoc.model.problem import Team
 from robochoc.run.options import Options, Runtime
 from robochoc.run.orchestrator import solve

@@ -9,8 +9,8 @@ from functools import cached_property
 from robochoc.formats.definitions import MAX_VALUES, check_domain
 from robochoc.formats.diagnostics import MistakeError, shortened
 from robochoc.formats.dialects.dialect import Names
-from robochoc.formats.dialects.pydcop.yaml_tree import Node, Scalar, shown
 from robochoc.formats.dialects.tables import word
+from robochoc.formats.dialects.yaml_tree import Node, Scalar, shown
 from robochoc.formats.names import check_integer
 from robochoc.model.constraint import Domain
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from robochoc.formats.diagnostics import MistakeError, shortened, suggestion
 from robochoc.formats.dialects.dialect import Note
 from robochoc.formats.dialects.owners import owners_by
-from robochoc.formats.dialects.pydcop.yaml_tree import Node, Scalar
+from robochoc.formats.dialects.yaml_tree import Node, Scalar
 
 
 @dataclass

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from robochoc.formats.diagnostics import Diagnostic, InvalidInputError, MistakeError, encodable
-from robochoc.formats.dialects.pydcop.yaml_tree import MAX_BYTES, Document, read_yaml
+from robochoc.formats.dialects.yaml_tree import MAX_BYTES, Document, read_yaml
 
 _SECTION = re.compile(r"^([a-z_]+)[ \t]*:", re.MULTILINE)
 _PROBLEM = {"domains", "variables", "constraints", "agents", "objective", "external_variables", "distribution_hints"}
@@ -72,7 +72,7 @@ def read_parts(paths: Sequence[Path]) -> Parts:
     texts: dict[str, list[tuple[Path, str]]] = {"problem": [], "distribution": [], "scenario": []}
     total = 0
     for path in paths:
-        text = _text(path)
+        text = file_text(path)
         total += len(text)
         if total > MAX_BYTES:
             raise _invalid(path, f"makes more than {MAX_BYTES // 2**20} MiB", "import a smaller problem")
@@ -113,7 +113,8 @@ def _joined(texts: Sequence[tuple[Path, str]]) -> Part:
     return Part(tuple(files), "".join(parts))
 
 
-def _text(path: Path) -> str:
+def file_text(path: Path) -> str:
+    """Return the text in the file at `path`. Raises `InvalidInputError`."""
     try:
         content = path.read_bytes()
     except OSError as error:

@@ -18,8 +18,8 @@ from robochoc.formats.dialects.pydcop.events import read_scenario
 from robochoc.formats.dialects.pydcop.hosting import Hosting, agent_names, text_of
 from robochoc.formats.dialects.pydcop.parts import Part, Parts, read_parts
 from robochoc.formats.dialects.pydcop.translation import Violated
-from robochoc.formats.dialects.pydcop.yaml_tree import Node, Scalar
 from robochoc.formats.dialects.tables import CostTable, Scale, definition_name, relation, word
+from robochoc.formats.dialects.yaml_tree import Node, Scalar
 from robochoc.model.assembly import assemble
 from robochoc.model.constraint import (
     INFINITE,

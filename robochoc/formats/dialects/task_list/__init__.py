@@ -1,0 +1,1 @@
+"""Lists of robots and tasks (`tasks.yaml`): what their entries say, and the team that follows."""

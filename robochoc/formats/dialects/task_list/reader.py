@@ -1,0 +1,252 @@
+"""A list of robots and tasks as a team: who could do what, and what that brings."""
+
+from __future__ import annotations
+
+import itertools
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from fractions import Fraction
+from pathlib import Path
+
+from robochoc.formats.diagnostics import DiagnosticCollector, InvalidInputError, MistakeError, encodable, shortened
+from robochoc.formats.dialects.dialect import Imported, ImportOptions, Names, Note, notes_on_names
+from robochoc.formats.dialects.pydcop.parts import file_text
+from robochoc.formats.dialects.tables import Scale
+from robochoc.formats.dialects.task_list.entries import (
+    MAX_PLACES,
+    Entry,
+    Point,
+    RobotEntry,
+    Synergy,
+    TaskEntry,
+    names_in,
+    read_robots,
+    read_synergies,
+    read_tasks,
+)
+from robochoc.formats.dialects.yaml_tree import read_yaml
+from robochoc.formats.symbols import check_symbol
+from robochoc.model.allocation import Distance, Job, TasksModel, Worker, assignment, several, way
+from robochoc.model.assembly import assemble
+from robochoc.model.cost_units import CostUnits
+from robochoc.model.problem import ProblemKind, Team, Variable
+
+MAX_NUMBER = 1000
+"""The maximum number of robots, and of tasks."""
+MAX_CONSTRAINTS = 200_000
+"""The maximum of the whole team."""
+MAX_CREW = 16
+"""The maximum number of robots that could do a task which asks for several: one constraint is over all of them."""
+NONE = "none"
+"""The value of a robot that does no task."""
+_ONLY = "task"
+"""The last part of the name of a robot's only variable."""
+_KEYS = ("name", "model", "distance", "places", "robots", "tasks", "synergies")
+
+
+def read(paths: Sequence[Path], options: ImportOptions) -> Imported:
+    """Return the team of a list of robots and tasks.
+
+    Raises:
+        InvalidInputError: with all mistakes.
+    """
+    if len(paths) > 1:
+        mistakes = DiagnosticCollector(encodable(str(paths[1])))
+        mistakes.add(0, "is a second list of robots and tasks", "name one file")
+        mistakes.finish()
+    path = paths[0]
+    mistakes = DiagnosticCollector(encodable(str(path)))
+    found: Imported | None = None
+    with mistakes.at(0):
+        for option, given in (("infinity", options.infinity), ("owner", options.owner)):
+            if given is not None:
+                raise MistakeError(f"is a list of tasks, which '{option}' says nothing about", "leave it out")
+        found = _Maker(_read(file_text(path), path.stem, mistakes)).imported(options)
+    mistakes.finish()
+    if found is None:
+        raise InvalidInputError([])
+    return found
+
+
+@dataclass(frozen=True)
+class _List:
+    """What a file says."""
+
+    name: str
+    model: TasksModel
+    distance: Distance
+    places: int
+    robots: Mapping[str, RobotEntry]
+    tasks: Mapping[str, TaskEntry]
+    synergies: Sequence[Synergy]
+
+
+def _read(text: str, stem: str, mistakes: DiagnosticCollector) -> _List:
+    document = read_yaml(text)
+    for line, key in document.repeated:
+        mistakes.add(line, f"'{shortened(key)}' stands twice", "delete one, or name it otherwise")
+    head = Entry("the file", document.root, _KEYS)
+    robots, tasks = read_robots(head.node("robots"), mistakes), read_tasks(head.node("tasks"), mistakes)
+    for what, entries in (("robots", robots), ("tasks", tasks)):
+        if len(entries) > MAX_NUMBER:
+            raise MistakeError(f"has {len(entries)} {what}", f"{MAX_NUMBER} are allowed")
+    synergies = read_synergies(head.node("synergies"), names_in(head.node("tasks")), mistakes)
+    model = head.choice("model", list(TasksModel)) or _model(robots, tasks)
+    distance = head.choice("distance", list(Distance)) or Distance.STRAIGHT
+    places = head.whole("places", 0) or 0
+    if places > MAX_PLACES:
+        raise MistakeError(f"has {places} places", f"costs have at most {MAX_PLACES} decimal places")
+    name = " ".join(head.words("name")) or stem
+    _check_points([*robots.values(), *tasks.values()], mistakes)
+    mistakes.finish()
+    read = _List(name, TasksModel(model), Distance(distance), places, robots, tasks, synergies)
+    _check_model(read, mistakes)
+    return read
+
+
+def _model(robots: Mapping[str, RobotEntry], tasks: Mapping[str, TaskEntry]) -> TasksModel:
+    """Return `assignment` where each robot does one task at most, and each task asks for one robot."""
+    alone = all(one.most == 1 for one in robots.values()) and all(one.robots == 1 for one in tasks.values())
+    return TasksModel.ASSIGNMENT if alone else TasksModel.SEVERAL
+
+
+def _check_points(entries: Sequence[RobotEntry | TaskEntry], mistakes: DiagnosticCollector) -> None:
+    known = {len(one.at): one for one in entries if one.at}
+    if len(known) > 1:
+        line = list(known.values())[1].line
+        mistakes.add(line, "a place has another number of coordinates than others", "write all with two, or three")
+
+
+def _check_model(read: _List, mistakes: DiagnosticCollector) -> None:
+    if read.model is TasksModel.ASSIGNMENT:
+        for name, robot in read.robots.items():
+            if robot.most not in (None, 1):
+                what = f"the robot '{shortened(name)}' may do {robot.most} tasks, and the model is assignment"
+                mistakes.add(robot.line, what, "write most: 1, or model: several")
+        for name, task in read.tasks.items():
+            if task.robots > 1:
+                what = f"the task '{shortened(name)}' asks for {task.robots} robots, and the model is assignment"
+                mistakes.add(task.line, what, "write model: several")
+    mistakes.finish()
+
+
+def _check_symbols(tasks: Mapping[str, TaskEntry]) -> None:
+    for name, task in tasks.items():
+        if name == NONE:
+            raise MistakeError(f"a task is called '{NONE}', as no task is", "name it otherwise", task.line)
+        try:
+            check_symbol(name)
+        except MistakeError as mistake:
+            raise MistakeError(mistake.message, mistake.hint, task.line) from None
+
+
+def _check_names(variables: Mapping[str, Sequence[Variable]]) -> None:
+    names: dict[str, str] = {}
+    for robot, own in variables.items():
+        for one in own:
+            if one.name in names:
+                robots = f"{shortened(names[one.name])} and {shortened(robot)}"
+                what = f"the robots {robots} would both have a variable {shortened(one.name)}"
+                raise MistakeError(what, "write robots' names without dots")
+            names[one.name] = robot
+
+
+class _Maker:
+    """Makes the team of a list. Tasks are numbered from 1 on, in the order of the file."""
+
+    def __init__(self, read: _List) -> None:
+        self._read = read
+        self._number = {name: number for number, name in enumerate(read.tasks, start=1)}
+        self._notes: list[Note] = []
+        self._robot_names, self._task_names = Names(), Names()
+        amounts = [one.worth for one in read.tasks.values()] + [one.worth for one in read.synergies]
+        self._scale = Scale([*amounts, Fraction(1, 10**read.places)])
+        if self._scale.rounds:
+            text = f"some worths have more than {MAX_PLACES} decimal places, and were rounded to that many"
+            self._notes.append(Note("rounded", text))
+
+    def imported(self, options: ImportOptions) -> Imported:
+        """Return the team. Raises `MistakeError`."""
+        read = self._read
+        workers = [self._worker(name, robot) for name, robot in read.robots.items()]
+        self._note_what_nobody_does(workers)
+        if read.model is TasksModel.ASSIGNMENT:
+            _check_symbols(read.tasks)
+            variables, constraints = assignment(workers, (NONE, *read.tasks))
+        else:
+            jobs = {self._number[name]: self._job(name, task, workers) for name, task in read.tasks.items()}
+            variables, constraints = several(workers, jobs)
+        if not variables:
+            raise MistakeError("no robot can do any of the tasks", "look at skills, needs, loads and deadlines")
+        _check_names(variables)
+        kept = list(itertools.islice(constraints, MAX_CONSTRAINTS + 1))
+        if len(kept) > MAX_CONSTRAINTS:
+            raise MistakeError(f"makes more than {MAX_CONSTRAINTS:,} constraints", "write fewer robots, or fewer tasks")
+        name = re.sub(r"[^A-Za-z0-9_.-]+", "_", options.name or read.name)[:100].strip("._-") or "team"
+        units = CostUnits(maximize=True, places=self._scale.places)
+        team: Team = assemble(name, variables, kept, kind=ProblemKind.DISWCSP, costs=units)
+        changed = self._originals(workers)
+        return Imported(team, "tasks", changed, (*self._notes, *notes_on_names(list(changed.items()))))
+
+    def _worker(self, name: str, robot: RobotEntry) -> Worker:
+        profit = {
+            self._number[task]: brings
+            for task, entry in self._read.tasks.items()
+            if (brings := self._brings(robot, task, entry)) is not None
+        }
+        together: dict[tuple[int, int], int] = {}
+        for one in self._read.synergies:
+            first, second = sorted(self._number[task] for task in one.tasks)
+            if first in profit and second in profit and self._read.model is TasksModel.SEVERAL:
+                together[first, second] = together.get((first, second), 0) + int(self._scale.units(one.worth))
+        own = self._robot_names.of(name)
+        if self._read.model is TasksModel.ASSIGNMENT:
+            return Worker(own, own, f"{own}.{_ONLY}", profit)
+        if not profit:
+            self._notes.append(Note("left out", f"the robot {shortened(name)}, which can do none of the tasks"))
+        return Worker(own, own, own, profit, robot.capacity, robot.most, together)
+
+    def _job(self, name: str, task: TaskEntry, workers: Sequence[Worker]) -> Job:
+        able = sum(self._number[name] in one.profit for one in workers)
+        if task.robots > 1 and able > MAX_CREW:
+            what = f"the task '{shortened(name)}' asks for {task.robots} robots, and {able} could do it"
+            raise MistakeError(what, f"let at most {MAX_CREW} be able to", task.line)
+        return Job(self._task_names.of(name), task.load, task.robots)
+
+    def _originals(self, workers: Sequence[Worker]) -> dict[str, str]:
+        """Return the names in the file of what is called otherwise in the team."""
+        tasks = list(self._read.tasks)
+        found = dict(self._robot_names.changed)
+        for name, one in zip(self._read.robots, workers, strict=True):
+            if self._read.model is TasksModel.ASSIGNMENT:
+                found[one.variable] = f"{name}.{_ONLY}"
+            else:
+                own = {f"{one.variable}.{self._task_names.of(tasks[task - 1])}": tasks[task - 1] for task in one.profit}
+                found |= {variable: f"{name}.{task}" for variable, task in own.items()}
+        return {name: original for name, original in found.items() if name != original}
+
+    def _note_what_nobody_does(self, workers: Sequence[Worker]) -> None:
+        able = {task for one in workers for task in one.profit}
+        for name, number in self._number.items():
+            if number not in able:
+                self._notes.append(Note("left out", f"the task {shortened(name)}, which no robot can do"))
+
+    def _brings(self, robot: RobotEntry, task: str, entry: TaskEntry) -> int | None:
+        """Return what a task brings a robot, its share of it where it asks for several. None: it cannot do it."""
+        if not entry.needs <= robot.skills or robot.most == 0:
+            return None
+        if robot.capacity is not None and entry.load > robot.capacity:
+            return None
+        if entry.deadline is not None and self._way(robot.at, entry.at, MAX_PLACES) > (
+            entry.deadline * robot.speed * 10**MAX_PLACES
+        ):
+            return None
+        worth = self._scale.units(entry.worth)
+        if worth % entry.robots:
+            what = f"the task '{shortened(task)}' is worth {entry.worth}, which {entry.robots} robots cannot share"
+            raise MistakeError(what, "write a multiple of their number, or more places", entry.line)
+        return int(worth) // entry.robots - self._way(robot.at, entry.at, self._scale.places)
+
+    def _way(self, start: Point, end: Point, places: int) -> int:
+        return way(start, end, self._read.distance, places) if start and end else 0

@@ -1,0 +1,22 @@
+"""Robots, and tasks that are to be shared out among them, as YAML (docs/guides/tasks.md)."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from robochoc.formats.dialects.dialect import Dialect
+from robochoc.formats.dialects.pydcop.parts import sections
+from robochoc.formats.dialects.task_list.reader import read
+
+_SECTIONS = {"robots", "tasks"}
+
+
+def recognises(path: Path, beginning: bytes) -> bool:
+    """Return whether a file is called YAML, and has robots and tasks; of a long list of robots, robots alone."""
+    if path.suffix.lower() not in (".yaml", ".yml"):
+        return False
+    found = sections(beginning.decode("utf-8", "replace").lstrip("\ufeff"))
+    return found >= _SECTIONS or ("robots" in found and "variables" not in found)
+
+
+DIALECT = Dialect("tasks", "a list of robots and tasks", recognises, read)
