@@ -5,6 +5,7 @@ from __future__ import annotations
 import doctest
 import itertools
 from dataclasses import replace
+from itertools import combinations
 from random import Random
 
 import numpy as np
@@ -16,7 +17,7 @@ from robochoc.model.outcome import Verdict
 from robochoc.model.problem import INFINITE, Constraint, Relation, Semantics, Team
 from robochoc.protocols.inference import maxsum_factor
 from robochoc.protocols.inference.maxsum import MaxSum
-from robochoc.protocols.inference.maxsum_factor import Factor
+from robochoc.protocols.inference.maxsum_factor import MOST, Factor, from_zero
 from robochoc.protocols.inference.messages.maxsum import Q, R
 from robochoc.protocols.inference.settings.maxsum import MaxSumSettings
 from robochoc.protocols.settings import SettingsError, settings_of
@@ -27,7 +28,7 @@ from robochoc.solver.cost_table import CostTable
 from robochoc.solver.encoding import UnsupportedError
 from tests.support.agents import replies, value
 from tests.support.brute_force import least_cost
-from tests.support.cost_problems import random_cost_team, random_tree
+from tests.support.cost_problems import random_cost_team, random_tree, with_costs
 from tests.support.examples import count
 from tests.support.local_search_runs import (
     any_schedule,
@@ -204,6 +205,32 @@ def test_on_a_tree_the_end_is_an_optimum(batch: int) -> None:
             soluble += 1
             assert cost_of_assignment(team, assignments_by_cycle(team, result)[-1]) == (0, least)
     assert soluble > (60 if batch else 30)
+
+
+def two_camps() -> Team:
+    """Two groups of six, all equal within each; one is cheapest at 1, the other one at 2, and X equals both."""
+
+    def equal(pair: tuple[str, str], dear: int) -> Constraint:
+        rows = ((1, 1), (2, 2), (1, 2), (2, 1))
+        costs = (10**13 * (dear == 1), 10**13 * (dear == 2), INFINITE, INFINITE)
+        return Constraint("E", Relation("E", 2, Semantics.SOFT, rows, costs), pair, pair)
+
+    within = [equal(pair, dear) for group, dear in (("ABCDEF", 2), ("GHIJKL", 1)) for pair in combinations(group, 2)]
+    team = team_of(dict.fromkeys("ABCDEFGHIJKLX", (1, 2)), [*within, equal(("A", "X"), 0), equal(("G", "X"), 0)])
+    return with_costs(team)
+
+
+@pytest.mark.parametrize("runtime", [Runtime.SIMULATOR, Runtime.ARRAYS])
+def test_entries_that_grow_from_cycle_to_cycle_never_prove_what_is_false(runtime: Runtime) -> None:
+    """By a factor of four here: without a limit they overflow in cycle 490, and both values of X seem forbidden."""
+    options = Options(protocol="maxsum", runtime=runtime, settings={"cycles": "550", "damping": "0"})
+    outcome = solve(two_camps(), options)
+    assert outcome.verdict is Verdict.UNKNOWN
+
+
+def test_what_is_finite_stays_below_a_limit_and_what_is_out_stays_out() -> None:
+    assert from_zero([3.0, 1e300, INFINITE, 5.0]) == [0, MOST, INFINITE, 2]
+    assert from_zero([3.0, INFINITE]) == [0, INFINITE]
 
 
 @count("teams", 50, 200)

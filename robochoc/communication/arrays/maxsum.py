@@ -17,6 +17,7 @@ from robochoc.communication.arrays.tally import list_bytes
 from robochoc.model.message import encode
 from robochoc.model.outcome import Verdict
 from robochoc.model.problem import INFINITE
+from robochoc.protocols.inference.maxsum_factor import MOST
 from robochoc.protocols.inference.messages.maxsum import Q, R
 from robochoc.protocols.inference.settings.maxsum import MaxSumSettings
 from robochoc.protocols.shared.messages.cycles import Domain
@@ -120,6 +121,7 @@ class ArrayMaxSum(CycleRun):
         for ports, preferred, costs in zip(self._ports, self._preferred, z, strict=True):
             fresh = _fresh(ports, preferred, costs)
             fresh -= least(fresh)[:, None]
+            np.minimum(fresh, MOST, out=fresh, where=fresh < INFINITE)
             ports.q = damping * ports.q + (1 - damping) * fresh if self.cycle and damping else fresh
         self.tally.add(Q.__name__, self._link_bytes, np.ones_like(self._link_bytes))
         self._hear(below=False)

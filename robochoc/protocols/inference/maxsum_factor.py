@@ -17,6 +17,14 @@ Row = list[float]
 SMALL = 400
 """Up to so many entries a table over two robots is faster as lists than in numpy."""
 
+MOST = 2.0**512
+"""The most that a finite entry of Q can be.
+
+In a graph with cycles hard constraints can make entries grow in each cycle by as much as a robot has functions. An
+entry that overflowed would be taken for a value that is forbidden, and prove what is false. Sums of so many entries as
+a robot can have stay finite.
+"""
+
 
 class Factor:
     """A function node: the sum of all constraints over the same robots (`agents` and the one that holds it)."""
@@ -82,9 +90,12 @@ def without_each(first: Row, rows: Sequence[Row], z: Row) -> list[Row]:
 
 
 def from_zero(row: Row) -> Row:
-    """Return `row` with a minimum of 0."""
+    """Return `row` with a minimum of 0, and nothing finite above `MOST`."""
     least = min(row)
-    return [entry - least for entry in row]
+    shifted = [entry - least for entry in row]
+    if max(shifted) <= MOST:
+        return shifted
+    return [entry if entry <= MOST or entry == INFINITE else MOST for entry in shifted]
 
 
 def cheapest(row: Row) -> int:
