@@ -36,6 +36,8 @@ class Traits:
         concludes: The verdicts with which one robot alone may end the search. Other verdicts are refused.
         tables: It computes with tables of floats, and refuses costs that could add up to 2^53 or more
             (`solver/exact_costs.py`).
+        wide_tables: Its tables have a dimension for each robot of the pseudo-tree's width: where one such protocol is
+            refused for memory, so are the others.
         secret_keys: Its robots draw keys (`Protocol.secret`). A run across machines cannot be replayed then.
         needs: A module of an extra that it computes with, and how to install that. A run without it is refused.
         counts: Its robots also count the optima, or without costs the solutions (`--count`).
@@ -57,6 +59,7 @@ class Traits:
     dynamic: bool = False
     concludes: tuple[Verdict, ...] = UNDECLARED
     tables: bool = False
+    wide_tables: bool = False
     secret_keys: bool = False
     needs: tuple[str, str] | None = None
     counts: bool = False

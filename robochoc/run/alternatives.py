@@ -14,7 +14,9 @@ from robochoc.solver.exact_costs import EXACT, check_exact
 from robochoc.solver.weighted import MAX_TOTAL_COST
 
 
-def alternatives(team: Team, options: Options, *, complete: bool = False, costs: bool = False) -> str:
+def alternatives(
+    team: Team, options: Options, *, complete: bool = False, costs: bool = False, narrow: bool = False
+) -> str:
     """Return what would do instead of the protocol of `options`, as the end of a sentence that refuses it.
 
     Every protocol is asked as if it had been chosen.
@@ -24,6 +26,7 @@ def alternatives(team: Team, options: Options, *, complete: bool = False, costs:
         options: the options that were refused.
         complete: whether the protocol must be complete.
         costs: whether it must minimise costs.
+        narrow: whether its tables must not be as wide as DPOP's, which were refused for memory.
     """
     names = [
         offer.name
@@ -32,6 +35,7 @@ def alternatives(team: Team, options: Options, *, complete: bool = False, costs:
         and offer.name != options.protocol
         and offer.protocol.traits.complete >= complete
         and offer.protocol.traits.costs >= costs
+        and not (narrow and offer.protocol.traits.wide_tables)
         and fits(team, replace(options, protocol=offer.name), offer.protocol.traits)
     ]
     if names:

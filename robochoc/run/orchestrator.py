@@ -125,18 +125,19 @@ def _solve_distributed(team: Team, context: RunContext, environment: Environment
     try:
         return solve_distributed(deployment, protocol, header)
     except TooLargeError as refused:
-        raise UnsupportedError(f"{refused}{_alternatives(team, options, complete=True, costs=True)}") from None
+        others = _alternatives(team, options, complete=True, costs=True, narrow=protocol.traits.wide_tables)
+        raise UnsupportedError(f"{refused}{others}") from None
     except (TooManySolutionsError, CompileTimeoutError, OutOfTimeError) as limit:
         return deployment.outcome(header, deployment.limit_reached(str(limit)))
     finally:
         context.kills.warn_of_pending()
 
 
-def _alternatives(team: Team, options: Options, *, complete: bool, costs: bool = False) -> str:
+def _alternatives(team: Team, options: Options, *, complete: bool, costs: bool = False, narrow: bool = False) -> str:
     """Return what would do instead. See `run/alternatives.py`."""
     from robochoc.run.alternatives import alternatives  # noqa: PLC0415 - start-up: only refusals need it
 
-    return alternatives(team, options, complete=complete, costs=costs)
+    return alternatives(team, options, complete=complete, costs=costs, narrow=narrow)
 
 
 def _header(team: Team, options: Options) -> Outcome:

@@ -302,6 +302,18 @@ def test_it_works_where_dpop_has_no_room_and_is_named_then(protocol: str) -> Non
     assert solve(team, options).cost == solve(team, replace(options, protocol="dpop", settings={})).cost
 
 
+@pytest.mark.parametrize(
+    ("refused", "settings"),
+    [("dpop", {"memory": "5000"}), ("count-dpop", {"memory": "5000"}), ("p-dpop", {"cells": "500"})],
+)
+def test_whose_tables_are_as_wide_is_not_named_then(refused: str, settings: dict[str, str]) -> None:
+    team = random_csp(9, 3, 0.9, 0, 4, max_cost=9)
+    with pytest.raises(UnsupportedError, match="these do: ") as told:
+        solve(team, Options(protocol=refused, runtime=Runtime.SIMULATOR, settings=settings))
+    named = str(told.value).partition("these do: ")[2].removesuffix(" (--protocol)").split(", ")
+    assert {name for name in named if name.endswith("dpop")} == {"mb-dpop", "rmb-dpop"}
+
+
 def test_with_enough_dimensions_it_is_dpop() -> None:
     team = random_csp(9, 3, 0.5, 0, 4, max_cost=9)
     wide = solve(team, Options(protocol="mb-dpop", runtime=Runtime.SIMULATOR, settings={"k": "9"}))

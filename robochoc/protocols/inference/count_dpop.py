@@ -83,6 +83,7 @@ class CountDPOP(DPOP):
         shared_scopes=True,
         writes_to_non_neighbours=False,
         tables=True,
+        wide_tables=True,
         counts=True,
         privacy="constraints of others, but for sums",
         use_when="counting solutions or optima (--count), small induced width",

@@ -105,6 +105,7 @@ class DPOP(TreeProtocol):
         shared_scopes=True,
         writes_to_non_neighbours=False,
         tables=True,
+        wide_tables=True,
         privacy="constraints of others, but for sums",
         use_when="costs, small induced width: number of messages is linear",
     )

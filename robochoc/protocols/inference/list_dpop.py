@@ -85,6 +85,7 @@ class ListDPOP(CountDPOP):
         shared_scopes=True,
         writes_to_non_neighbours=False,
         tables=True,
+        wide_tables=True,
         privacy="constraints of others, but for sums",
         use_when="listing solutions or optima, small induced width",
     )

@@ -70,6 +70,7 @@ class ODPOP(DPOP):
         shared_scopes=True,
         writes_to_non_neighbours=False,
         tables=True,
+        wide_tables=True,
         privacy="constraints of others, but for sums",
         use_when="costs, few good combinations: short messages",
     )

@@ -79,6 +79,7 @@ class SDPOP(DPOP, DynamicProtocol):
         writes_to_non_neighbours=False,
         dynamic=True,
         tables=True,
+        wide_tables=True,
         privacy="constraints of others, but for sums",
         use_when="costs that change, small induced width: keeps tables",
     )

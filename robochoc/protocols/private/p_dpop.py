@@ -112,6 +112,7 @@ class PDPOP(AnonymousTreeProtocol):
         shared_scopes=True,
         writes_to_non_neighbours=False,
         tables=True,
+        wide_tables=True,
         secret_keys=True,
         privacy="constraints of others, and who they are",
         use_when="costs, and third robots must not learn of constraints",
