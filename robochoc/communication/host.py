@@ -207,6 +207,15 @@ class Host:
         self.protocol.settle()
         return self._said()
 
+    def miss(self, sender: str, many: int) -> None:
+        """Tell the protocol that so `many` messages of `sender` were lost, before its next one is taken in."""
+        for _ in range(many):
+            self.protocol.miss(sender)
+
+    def go_on(self) -> list[Envelope] | None:
+        """Let the protocol continue without what it waits for; return its messages. None: it does not continue."""
+        return self._said() if self.protocol.go_on() else None
+
     def metrics(self) -> Metrics:
         """Return what this robot has sent and checked so far; `ncccs` is its own clock."""
         return Metrics(dict(self.sent), self.bytes, self.clock, self.checks, largest=self.largest)

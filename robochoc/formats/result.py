@@ -39,6 +39,7 @@ class _MetricsForm(msgspec.Struct):
     simulated_s: float = 0.0
     largest: int = 0
     cycles: int = 0
+    lost_messages: int = 0
 
 
 class _EpochForm(msgspec.Struct, omit_defaults=True):
@@ -57,6 +58,7 @@ class _EpochForm(msgspec.Struct, omit_defaults=True):
     confirmed: bool = False
     simulated_s: float | UnsetType = UNSET
     cycles: int | UnsetType = UNSET
+    lost_messages: int | UnsetType = UNSET
 
 
 class _CheckedForm(msgspec.Struct):
@@ -158,6 +160,7 @@ def _metrics(spent: Metrics) -> _MetricsForm:
         simulated_s=spent.simulated_s,
         largest=spent.largest,
         cycles=spent.cycles,
+        lost_messages=spent.lost_messages,
     )
 
 
@@ -183,6 +186,7 @@ def _epoch(epoch: EpochOutcome, outcome: Outcome) -> _EpochForm:
         confirmed=epoch.confirmed,
         simulated_s=spent.simulated_s or UNSET,
         cycles=spent.cycles or UNSET,
+        lost_messages=spent.lost_messages or UNSET,
     )
 
 
@@ -207,7 +211,11 @@ class _Symbols:
 def _epoch_of(form: _EpochForm, symbols: _Symbols) -> EpochOutcome:
     counts = form.bytes, form.ncccs, form.checks, form.wall_s
     metrics = Metrics(
-        {"messages": form.messages}, *counts, simulated_s=form.simulated_s or 0.0, cycles=form.cycles or 0
+        {"messages": form.messages},
+        *counts,
+        simulated_s=form.simulated_s or 0.0,
+        cycles=form.cycles or 0,
+        lost_messages=form.lost_messages or 0,
     )
     return EpochOutcome(
         verdict=form.verdict,
@@ -260,4 +268,5 @@ def _preprocessing_of(form: _PreprocessingForm | None) -> Preprocessing | None:
 def _metrics_of(form: _MetricsForm) -> Metrics:
     messages = form.messages_by_type or {"messages": form.messages}
     counts = form.bytes, form.ncccs, form.checks, form.wall_s, form.compile_s, form.memory, form.simulated_s
-    return Metrics(messages, *counts, largest=form.largest, cycles=form.cycles)
+    rest = {"largest": form.largest, "cycles": form.cycles, "lost_messages": form.lost_messages}
+    return Metrics(messages, *counts, **rest)

@@ -33,6 +33,8 @@ class Header(Event, frozen=True, kw_only=True, tag="Journal"):
     """The priority order, by name or as the list of robots; left out where it was the files'."""
     channel: str | msgspec.UnsetType = msgspec.UNSET
     """The channel model, where there was one: then the times of the search's events are in simulated seconds."""
+    message_loss: float | msgspec.UnsetType = msgspec.UNSET
+    """The probability that a message was lost, where some could be: those have no `Received`."""
     version: int = VERSION
 
 

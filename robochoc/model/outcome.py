@@ -38,6 +38,7 @@ class Metrics:
         simulated_s: Seconds of simulated time, by a channel model. 0: there was none.
         largest: Bytes of the largest message's content.
         cycles: Cycles of the simulator's schedule `cycles`. 0: they were not counted.
+        lost_messages: How many messages were lost on their way, for good.
     """
 
     messages: dict[str, int] = field(default_factory=dict)
@@ -50,6 +51,7 @@ class Metrics:
     simulated_s: float = 0.0
     largest: int = 0
     cycles: int = 0
+    lost_messages: int = 0
 
     def __add__(self, other: Metrics) -> Metrics:
         """Return the cost of two runs, one after the other."""
@@ -65,6 +67,7 @@ class Metrics:
             simulated_s=self.simulated_s + other.simulated_s,
             largest=max(self.largest, other.largest),
             cycles=self.cycles + other.cycles,
+            lost_messages=self.lost_messages + other.lost_messages,
         )
 
 

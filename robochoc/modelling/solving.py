@@ -57,6 +57,7 @@ class Solvable(ABC):
         schedule: str = ScheduleName.CONCURRENT,
         delay: int = 0,
         channel: ChannelModel | None = None,
+        message_loss: float = 0.0,
         on_loss: str | None = None,
         spares: int = 0,
         patience: float | None = None,
@@ -94,6 +95,7 @@ class Solvable(ABC):
             schedule: How the simulator orders events: `concurrent`, `one-by-one`, `cycles` or `random`.
             delay: The longest delay of a message in the simulator, in constraint checks.
             channel: A channel model: the simulator counts seconds of computing and radio.
+            message_loss: The probability that a message is lost in the simulator, for good.
             on_loss: What the loss of a robot means: `fail` or `withdraw`. None: the run fails, unless there are
                 `spares`.
             spares: How many robots that are lost come back.
@@ -147,6 +149,7 @@ class Solvable(ABC):
             spares=spares,
             patience=patience,
             channel=channel,
+            message_loss=message_loss,
             settings={name: str(value) for name, value in settings.items()},
             filters=tuple(filters),
             kill=tuple(one._replace(robot=called.get(one.robot, one.robot)) for one in kill),

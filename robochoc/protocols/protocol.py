@@ -64,6 +64,16 @@ class Protocol(Inspectable, ABC):
     def settle(self) -> None:
         """Decide on the whole view; called when the inbox has been drained."""
 
+    def miss(self, sender: str) -> None:
+        """Note that a message of `sender` is lost: the one that would have come before the next."""
+
+    def go_on(self) -> bool:
+        """Continue without the messages that this robot waits for: nothing more comes. Return False if it cannot.
+
+        It must not return True for ever.
+        """
+        return False
+
     def send(self, receiver: str, message: Message) -> None:
         """Send `message` to `receiver`; its clock does not include later checks."""
         # A replay has a list of its own: as a list's, mypyc would not call its `append`.

@@ -42,6 +42,7 @@ class Traits:
         needs: A module of an extra that it computes with, and how to install that. A run without it is refused.
         counts: Its robots also count the optima, or without costs the solutions (`--count`).
         arrays: It has a form for whole teams at once (`communication/arrays`).
+        bears_loss: It goes on when messages are lost on their way (`Protocol.miss`, `Protocol.go_on`).
         privacy: The information that neighbours do not get.
         use_when: A short recommendation, for `robochoc protocols`.
     """
@@ -64,6 +65,7 @@ class Traits:
     needs: tuple[str, str] | None = None
     counts: bool = False
     arrays: bool = False
+    bears_loss: bool = False
     privacy: str = ""
     use_when: str = ""
 

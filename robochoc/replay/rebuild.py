@@ -96,10 +96,12 @@ class RebuiltRobots(NamedTuple):
 class Rebuilder:
     """Makes the robots of one run after the other; robots that continue into an epoch are the same objects.
 
-    `only` names the robots to be made; None: all.
+    `only` names the robots to be made; None: all. Raises `CannotReplayError` for a run in which messages may be lost.
     """
 
     def __init__(self, header: Header | None, options: ReplayOptions, only: Collection[str] | None = None) -> None:
+        if header is not None and header.message_loss:
+            raise CannotReplayError("messages were lost in it (--message-loss), and no journal says which")
         self._header = header
         self._options = options
         self._only = only

@@ -23,7 +23,16 @@ from robochoc.protocols.requirements import unmet_requirement
 from robochoc.protocols.satisfaction.disac import DisAC
 from robochoc.protocols.satisfaction.first_fit import FirstFit
 from robochoc.protocols.traits import Traits
-from robochoc.run.options import CENTRAL, CentralSolverName, OnLoss, Options, Runtime, ScheduleName, Withdrawal
+from robochoc.run.options import (
+    CENTRAL,
+    MOST_LOSS,
+    CentralSolverName,
+    OnLoss,
+    Options,
+    Runtime,
+    ScheduleName,
+    Withdrawal,
+)
 from robochoc.solver.encoding import UnsupportedError
 from robochoc.verification.objective import withdrawal_cost
 
@@ -93,6 +102,11 @@ OPTION_RULES = (
         lambda o: o.delay and o.schedule in {ScheduleName.CYCLES, ScheduleName.RANDOM},
         "--delay is for --schedule concurrent: in a random one any message may take any time, in cycles each takes one",
     ),
+    OptionRule(lambda o: not 0 <= o.message_loss <= MOST_LOSS, "--message-loss is a probability from 0 to 0.9"),
+    OptionRule(
+        lambda o: o.message_loss and (o.runtime is not Runtime.SIMULATOR or o.preprocess or o.wants_anytime),
+        "--message-loss is for --runtime simulator, without --preprocess and --set anytime=yes",
+    ),
     OptionRule(
         lambda o: o.ncccs is not None and o.runtime is not Runtime.SIMULATOR,
         "--ncccs is a limit for the simulator, which knows all clocks",
@@ -119,6 +133,7 @@ OPTION_RULES = (
     _for_robots("--spare", lambda o: o.spares),
     _for_robots("--kill", lambda o: o.kill),
     _for_robots("--channel", lambda o: o.channel),
+    _for_robots("--message-loss", lambda o: o.message_loss),
     _for_robots("--filter", lambda o: o.filters),
     _for_robots("--bounds", lambda o: o.bounds),
     _for_robots("--order", lambda o: o.order is not None),
@@ -296,7 +311,7 @@ TEAM_RULES = (
         "add --runtime simulator, or choose a protocol that has one ('robochoc protocols --long')",
     ),
     TeamRule(
-        lambda c: c.is_distributed and c.traits.asymmetric and c.options.settings.get("anytime") == "yes",
+        lambda c: c.is_distributed and c.traits.asymmetric and c.options.wants_anytime,
         "{protocol} does not tell robots which cycle is the best: what each pays is its own secret",
         "leave out --set anytime=yes",
     ),

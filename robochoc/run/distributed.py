@@ -108,6 +108,9 @@ class Deployment(ABC):
             return None
         if answer.witness is not None:
             return f"{answer.witness} {GAVE_UP}"
+        lost = answer.metrics.lost_messages
+        if lost and not phase.traits.bears_loss:
+            return f"{lost:,} messages were lost, and {phase.name} needs every one"
         if answer.ended:
             return f"{phase.name} {FOUND_NOTHING}"
         return "; ".join(filter(None, [self._limit_reached(answer.metrics), self.unsettled]))

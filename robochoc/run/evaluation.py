@@ -155,6 +155,8 @@ def evaluate_search(phase: Phase, search: Search, kind: ProblemKind, told: Calla
     Raises:
         RefutedError: when the check refutes what the protocol claims.
     """
+    if is_spoiled(phase, search.result):
+        return _evaluate_spoiled(search)
     result = search.result
     ended = result.verdict is Verdict.SOLUTION
     answer = Answer(result.verdict, result.metrics, result.witness, tree=pseudo_tree(result.findings), ended=ended)
@@ -183,8 +185,34 @@ def evaluate_search(phase: Phase, search: Search, kind: ProblemKind, told: Calla
     )
 
 
+def is_spoiled(phase: Phase, result: RunResult) -> bool:
+    """Return whether messages were lost, and the protocol does not bear that: then nothing that it claims holds."""
+    return result.metrics.lost_messages > 0 and not phase.traits.bears_loss
+
+
+def _evaluate_spoiled(search: Search) -> Answer:
+    """Return the answer of a search that is spoiled: a solution that passes the check, or that nothing is known."""
+    answer = Answer(Verdict.UNKNOWN, search.result.metrics)
+    found = search.check()
+    if found is None:
+        return answer
+    sure = found.verified and not found.withdrawn
+    return replace(
+        answer,
+        verdict=Verdict.SOLUTION if sure else Verdict.UNKNOWN,
+        assignment=found.assignment,
+        cost=found.cost,
+        withdrawn=found.withdrawn,
+        verified=found.verified,
+        checked=found.check_counts,
+        reason=found.reason,
+    )
+
+
 def is_proven(phase: Phase, result: RunResult) -> bool:
     """Return whether the protocol claims more than to have found something: a solution, or one of minimum cost."""
+    if is_spoiled(phase, result):
+        return False
     return result.verdict is Verdict.SOLUTION and (phase.traits.complete or not phase.traits.costs)
 
 

@@ -15,6 +15,8 @@ if TYPE_CHECKING:
     from robochoc.communication.kill_schedule import Kill
     from robochoc.communication.simulator.channel import ChannelModel
 
+MOST_LOSS = 0.9
+"""The largest probability of the loss of a message. With more, next to nothing arrives."""
 CENTRAL = "central"
 """The protocol that is none: one model of all files, which ACE decides."""
 
@@ -104,6 +106,7 @@ class Options:
         patience: A robot whose process is stopped (on a network: that is out of reach) for so many seconds is lost
             (None: it is waited for; on a network 10 seconds).
         channel: A channel model: the simulator counts seconds of computing and radio.
+        message_loss: The probability that a message is lost in the simulator, for good.
         settings: The protocol's settings, as text.
         kill: Robots whose processes are killed, and when.
         filters: The names of the channel filters that messages on a network go through, in this order.
@@ -133,12 +136,18 @@ class Options:
     spares: int = 0
     patience: float | None = None
     channel: ChannelModel | None = None
+    message_loss: float = 0.0
     settings: Mapping[str, str] = field(default_factory=dict)
     filters: tuple[str, ...] = ()
     kill: tuple[Kill, ...] = ()
     chosen: Mapping[str, str] = field(default_factory=dict)
     bounds: bool = False
     preprocess: Preprocess | None = None
+
+    @property
+    def wants_anytime(self) -> bool:
+        """Return whether robots are to find the best cycle themselves."""
+        return self.settings.get("anytime") == "yes"
 
     @property
     def survives_losses(self) -> bool:

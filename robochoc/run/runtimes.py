@@ -117,7 +117,8 @@ def _import_tables(request: SessionRequest) -> None:
 
 def open_simulator(request: SessionRequest) -> Session:
     """Open a session in which all robots live in one thread."""
-    from robochoc.communication.simulator.simulator import (  # noqa: PLC0415 - one runtime is enough
+    from robochoc.communication.simulator.losses import Losses  # noqa: PLC0415 - one runtime is enough
+    from robochoc.communication.simulator.simulator import (  # noqa: PLC0415 - as above
         EffortLimits,
         Simulation,
     )
@@ -131,6 +132,7 @@ def open_simulator(request: SessionRequest) -> Session:
         limits=limits,
         deadline=request.deadline,
         bounds=options.bounds,
+        losses=Losses(options.message_loss, options.seed) if options.message_loss else None,
         **request.common,
     )
 

@@ -66,7 +66,7 @@ _SECTIONS: Sections = {
     ),
     "Search": ("--order", "--set", "--preprocess", "--messages", "--ncccs", "--cycles", "--count", "--with"),
     "Losses of robots (processes and network)": ("--on-loss", "--spare", "--patience", "--kill"),
-    "Messages on their way": ("--schedule", "--delay", "--channel", "--filter"),
+    "Messages on their way": ("--schedule", "--delay", "--channel", "--message-loss", "--filter"),
     "Robots with several variables": ("--local-solutions", "--local-timeout", "--ace", "--no-cache"),
     "Files of other tools (docs/guides/import.md)": ("--infinity", "--owner"),
     "Output": ("--explain", "--bounds", "--serve", "--open"),
@@ -124,6 +124,13 @@ _SECTIONS: Sections = {
     type=CHANNEL_NAME,
     metavar="NAME|FILE",
     help=f"Simulator: seconds of computing and radio, by a channel model: {', '.join(CHANNELS)} or a TOML file.",
+)
+@click.option(
+    "--message-loss",
+    type=click.FloatRange(0, 0.9),
+    default=0.0,
+    metavar="P",
+    help="Simulator: lose each message with this probability.",
 )
 @click.option(
     "--timeout",

@@ -80,10 +80,7 @@ situation_options = _optional(
         "--patience",
         type=Finite(0, min_open=True),
         metavar="SECONDS",
-        help=(
-            "A robot is lost after its process was stopped (on a network: out of reach) for this long.  [default: no"
-            " limit; on a network 10]"
-        ),
+        help=("A robot out of reach, or stopped, for so long is lost.  [default: no limit; on a network 10]"),
     ),
     click.option(
         "--report-timeout",

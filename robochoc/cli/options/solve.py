@@ -113,7 +113,7 @@ filter_option = click.option(
 
 _SAME_NAMES = (
     "seed", "timeout", "delay", "count", "verify", "messages", "ncccs", "cycles", "spares", "patience", "filters",
-    "kill", "bounds",
+    "kill", "bounds", "message_loss",
 )  # fmt: skip
 """Arguments of `robochoc solve` that are called as in `robochoc.run.Options`."""
 

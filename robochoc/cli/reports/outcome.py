@@ -192,8 +192,13 @@ def _spent(spent: Metrics) -> str:
     total = sum(spent.messages.values())
     return (
         f"{total:,} message{'s' * (total != 1)} ({types or 'none'}), {spent.bytes:,} bytes{_largest(spent)},"
-        f" {spent.ncccs:,} NCCCs, {spent.checks:,} checks,{_cycles(spent)} {spent.wall_s:.2f} s"
+        f"{_lost(spent)} {spent.ncccs:,} NCCCs, {spent.checks:,} checks,{_cycles(spent)} {spent.wall_s:.2f} s"
     )
+
+
+def _lost(spent: Metrics) -> str:
+    """Return the number of lost messages, if there were any."""
+    return f" {spent.lost_messages:,} of the messages lost," if spent.lost_messages else ""
 
 
 def _cycles(spent: Metrics) -> str:

@@ -65,7 +65,18 @@ def print_protocols(found: Sequence[Row], *, long: bool = False) -> None:
     """Print name, purpose, completeness and use of each protocol, or with `long` all traits; then what is broken."""
     headings = ["name", "for", "complete", "use when"]
     if long:
-        headings = ["name", "for", "complete", "synchronous", "constraints", "dynamic", "arrays", "privacy", "paper"]
+        headings = [
+            "name",
+            "for",
+            "complete",
+            "synchronous",
+            "constraints",
+            "dynamic",
+            "arrays",
+            "bears loss",
+            "privacy",
+            "paper",
+        ]
     print_table(headings, [[row.name, *_cells(row, headings[1:])] for row in found], prose=headings[-1])
     for row in found:
         if row.broken:
@@ -102,6 +113,7 @@ def _in_a_line(traits: Traits) -> str:
         *(["whose parts may cost"] if traits.asymmetric else []),
         *(["goes on when the problem changes"] if traits.dynamic else []),
         *(["also as arrays (--runtime arrays)"] if traits.arrays else []),
+        *(["bears the loss of messages"] if traits.bears_loss else []),
         *([f"use when: {traits.use_when}"] if traits.use_when else []),
         *([f"keeps private: {traits.privacy}"] if traits.privacy else []),
         *([f"paper: {traits.paper}"] if traits.paper else []),
@@ -170,6 +182,7 @@ def _cells(row: Row, headings: Sequence[str]) -> list[str]:
         "constraints": ("n-ary" if traits.n_ary else "binary") + (", PKC" if traits.partially_known else ""),
         "dynamic": _yes(holds=traits.dynamic),
         "arrays": _yes(holds=traits.arrays),
+        "bears loss": _yes(holds=traits.bears_loss),
         "privacy": traits.privacy,
         "paper": traits.paper,
         "use when": traits.use_when,

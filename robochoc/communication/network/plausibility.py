@@ -160,7 +160,7 @@ def _fault_of_metrics(account: DetailedReport, duration_s: float) -> str:
         return (
             f"its clock is at {spent.ncccs:,}, and neither its own {spent.checks:,} checks nor others' bring it there"
         )
-    others = (spent.wall_s, spent.compile_s, spent.simulated_s)
+    others = (spent.wall_s, spent.compile_s, spent.simulated_s, spent.lost_messages)
     return "it has reported costs that are not its own" if any(others) or spent.memory > LARGEST_MEMORY else ""
 
 

@@ -44,6 +44,12 @@ class Schedule(ABC):
         `checks` is the number of constraint checks that this took.
         """
 
+    def lose(self, envelope: Envelope, checks: int = 0) -> None:  # noqa: B027 - not every schedule has to know
+        """Send `envelope`, as in `put`, which will never arrive."""
+
+    def wait(self) -> None:  # noqa: B027 - not every schedule has to know
+        """Let the time pass after which robots notice that nothing arrives any more."""
+
     def time(self, checks: int) -> float:  # noqa: ARG002 - not every schedule has to know
         """Return the time of an event, this number of checks after a robot began with its packet."""
         return float(self.now)

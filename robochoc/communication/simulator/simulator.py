@@ -14,6 +14,7 @@ from robochoc.communication.host import Host, UnderWay, may_be_shared, order_of
 from robochoc.communication.resources import garbage_frozen
 from robochoc.communication.run_result import Progress, RunResult
 from robochoc.communication.session import Epoch, Session, over
+from robochoc.communication.simulator.losses import Losses
 from robochoc.communication.simulator.schedule import Schedule
 from robochoc.journal.events import Observer
 from robochoc.model.message import Envelope
@@ -64,6 +65,7 @@ class Simulation(Session):
         limits: On what the searches take. They are looked at after each packet.
         deadline: When the time of the run is over, on the monotonic clock.
         bounds: Whether the observer hears of lower bounds, too.
+        losses: Draws which messages are lost. None: none is.
 
     Raises:
         OutOfTimeError: when the deadline comes before all robots are set up; `change` as well.
@@ -81,6 +83,7 @@ class Simulation(Session):
         limits: EffortLimits = NO_LIMITS,
         deadline: float | None = None,
         bounds: bool = False,
+        losses: Losses | None = None,
     ) -> None:
         super().__init__(team)
         self._protocol = protocol
@@ -90,6 +93,7 @@ class Simulation(Session):
         self._limits = limits
         self._deadline = deadline
         self._bounds = bounds
+        self._losses = losses
         self._lossless = True
         self._checks = self._ncccs = self._sent = 0
         self._verdict: Verdict | None = None
@@ -120,7 +124,8 @@ class Simulation(Session):
             [host.metrics() for host in self._hosts.values()],
             time.monotonic() - began,
         )
-        metrics = replace(result.metrics, simulated_s=simulated_s, cycles=cycles)
+        lost = 0 if self._losses is None else self._losses.end()
+        metrics = replace(result.metrics, simulated_s=simulated_s, cycles=cycles, lost_messages=lost)
         self._limits = _left(self._limits, metrics)
         findings = {name: host.protocol.findings for name, host in self._hosts.items()}
         return replace(result, metrics=metrics, findings=findings)
@@ -175,9 +180,7 @@ class Simulation(Session):
         while self._verdict is None:
             answer_signals()
             elapsed_s = time.monotonic() - began
-            if timeout is not None and elapsed_s > timeout:
-                return
-            if messages is not None and self._sent >= messages:
+            if (timeout is not None and elapsed_s > timeout) or (messages is not None and self._sent >= messages):
                 return
             if most_ncccs is not None and self._ncccs >= most_ncccs:
                 return
@@ -188,13 +191,46 @@ class Simulation(Session):
                 if self._is_to_stop(elapsed_s):
                     return
             packet = schedule.get()
-            if not packet:
-                self._verdict, self._lossless = Verdict.SOLUTION, True
-                return
-            host = hosts[packet[0].receiver]
+            if packet:
+                host = hosts[packet[0].receiver]
+                self._checks = host.counted
+                self._send(host, self._handle(host, packet, self._losses) if self._losses else host.handle(packet))
+                packets += 1
+            elif not self._go_on():
+                self._verdict, self._lossless = Verdict.SOLUTION, self._losses is None or not self._losses.lost
+
+    def _handle(self, host: Host, packet: Sequence[Envelope], losses: Losses) -> list[Envelope]:
+        """Let `host` take in a packet, and tell it what is missing before it; return what it says.
+
+        A protocol that does not bear loss is told nothing. It may raise anything then, and that ends the search.
+        """
+        bears = self._protocol.traits.bears_loss
+        try:
+            for envelope in packet:
+                missing = losses.before(envelope)
+                if bears and missing:
+                    host.miss(envelope.sender, missing)
+                host.take_in(envelope)
+            return host.settle()
+        except Exception:
+            if bears or not losses.lost:
+                raise
+            self._verdict = Verdict.UNKNOWN
+            return []
+
+    def _go_on(self) -> bool:
+        """Let all robots continue without what they wait for; return whether one does."""
+        if self._losses is None or not self._protocol.traits.bears_loss:
+            return False
+        self._schedule.wait()
+        went = False
+        for host in self._hosts.values():
             self._checks = host.counted
-            self._send(host, host.handle(packet))
-            packets += 1
+            said = host.go_on()
+            if said is not None:
+                went = True
+                self._send(host, said)
+        return went
 
     def _is_to_stop(self, elapsed_s: float) -> bool:
         """Report the progress; return whether somebody has asked to stop."""
@@ -207,8 +243,12 @@ class Simulation(Session):
         schedule, before, clock = self._schedule, self._checks, host.clock
         if envelopes:
             self._sent += len(envelopes)
+            losses = self._losses
             for envelope, checks in zip(envelopes, host.said_at, strict=True):
-                schedule.put(envelope, checks - before)
+                if losses is not None and losses.takes(envelope):
+                    schedule.lose(envelope, checks - before)
+                else:
+                    schedule.put(envelope, checks - before)
         schedule.done(host.name, clock, host.counted - before)
         if clock > self._ncccs:  # noqa: PLR1730 - faster
             self._ncccs = clock

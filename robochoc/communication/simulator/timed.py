@@ -13,7 +13,7 @@ import random
 from collections.abc import Sequence
 from itertools import count
 
-from robochoc.communication.simulator.channel import NS_PER_S, ChannelModel
+from robochoc.communication.simulator.channel import NS_PER_MS, NS_PER_S, ChannelModel
 from robochoc.communication.simulator.schedule import Schedule
 from robochoc.model.message import Envelope
 
@@ -52,6 +52,14 @@ class Timed(Schedule):
     def put(self, envelope: Envelope, checks: int = 0) -> None:
         """Keep `envelope` until all messages of its sender are known. Its time is the time of sending."""
         self._said.append((self.now + checks * self._channel.check_ns, envelope))
+
+    def lose(self, envelope: Envelope, checks: int = 0) -> None:
+        """Keep `envelope` as in `put`: it takes its time on the air, and reaches nobody."""
+        self.put(envelope._replace(receiver=""), checks)
+
+    def wait(self) -> None:
+        """Let the first timeout of the channel pass, from when the last robot had finished."""
+        self.now = self._end_ns + round(self._channel.timeout_ms * NS_PER_MS)
 
     def done(self, robot: str, clock: int, checks: int) -> None:  # noqa: ARG002 - time is not the NCCC clock
         """Note that the robot has done this number of checks since it began, and is free again."""
@@ -103,6 +111,8 @@ class Timed(Schedule):
         crossing = self._channel.crossing(len(envelope.content), self._chance)
         sent = max(ready, self._free_at.get(medium, 0)) + crossing.air
         self._free_at[medium] = sent
+        if not envelope.receiver:
+            return
         arrival = max(sent + crossing.waiting + crossing.latency, self._last_arrival.get(edge, 0))
         self._last_arrival[edge] = arrival
         inbox = self._inboxes.setdefault(envelope.receiver, [])

@@ -24,6 +24,7 @@ Choices that the papers leave open, and differences:
   case; then the robot tells what is nearer, until the rest is at most `tolerance`. So damping does not change where a
   graph without cycles ends.
 - All robots begin at once, with what they pay alone.
+- Where messages are lost and nothing comes any more, all robots tell their last messages again, up to ten times.
 
 >>> from robochoc.communication.simulator.schedule import Concurrent
 >>> from robochoc.communication.simulator.simulator import Simulation
@@ -51,6 +52,9 @@ from robochoc.protocols.shared.messages.cycles import Domain
 from robochoc.protocols.traits import ENDS_WITH_PROOF, Traits
 from robochoc.solver.compiled import LocalProblem
 
+REPEATS = 10
+"""How often a robot tells everything again where messages are lost."""
+
 
 class AsyncMaxSum(Protocol):
     """One agent of asynchronous Max-Sum.
@@ -68,6 +72,7 @@ class AsyncMaxSum(Protocol):
         complete=False,
         costs=True,
         writes_to_non_neighbours=False,
+        bears_loss=True,
         privacy="constraints among others",
         use_when="costs, few cycles in the graph, unequal delays; no proof",
     )
@@ -84,6 +89,7 @@ class AsyncMaxSum(Protocol):
         self.sent: dict[str, int] = {}
         self.owed: set[str] = set()
         self._domains: dict[str, Sequence[Value]] = {}
+        self._repeated = 0
 
     def start(self) -> None:
         """Take the cheapest value, and tell the domain to the holders of the own functions."""
@@ -141,6 +147,18 @@ class AsyncMaxSum(Protocol):
         rest = iter(q[len(own) :])
         for name, heard in self.from_below.items():
             self._tell(name, [next(rest) for _ in heard], Q)
+
+    def go_on(self) -> bool:
+        """Tell everything again, a number of times: messages were lost, and nothing comes any more."""
+        if self._repeated >= REPEATS or self.verdict is not None or not self.preferred:
+            return False
+        self._repeated += 1
+        for name in self.below:
+            if name not in self.from_below:
+                self.send(name, Domain(list(self.problem.values)))
+        for name, rows in self.told.items():
+            self.send(name, (Q if name in self.below else R)(rows, settled=True))
+        return True
 
     def _owe(self, sender: str, *, settled: bool) -> None:
         """Note whether `sender` waits for an answer."""

@@ -43,6 +43,8 @@ Choices that the paper leaves open, and differences:
 - Q is normalised to a minimum of 0 (in the paper: to a sum of 0), as entries may be infinite: a value that violates a
   hard constraint whatever others do costs `inf`. Nothing is subtracted from `inf`, so such a value stays ruled out.
 - Constraints may be n-ary, up to a maximum size of their tables.
+- Where messages are lost, the last R and Q stand for those that are missing. Where a domain is lost, its functions are
+  left out; instead of R their holder tells its own domain, which asks for the other one again.
 
 >>> from robochoc.communication.simulator.schedule import Concurrent
 >>> from robochoc.communication.simulator.simulator import Simulation
@@ -87,6 +89,7 @@ class MaxSum(CycleProtocol):
         costs=True,
         writes_to_non_neighbours=False,
         arrays=True,
+        bears_loss=True,
         privacy="constraints among others",
         use_when="costs, large team, graph with few cycles; no proof",
     )
@@ -100,6 +103,14 @@ class MaxSum(CycleProtocol):
         self.preferred: Row = []
         self.edges: list[Row] = []
         self._own: list[Row] = []
+        self._domains: dict[str, list[wire.Value]] = {}
+        self._q_of: dict[str, Sequence[Row]] = {}
+        """The last Q of each robot above."""
+        self._r_of: dict[str, Sequence[Row]] = {}
+        """The last R of each robot below that has told one."""
+        self._made = False
+        self._shape: list[tuple[str, int]] = []
+        """Of whom `edges` are: how many, by robot."""
 
     def begin(self) -> None:
         """Take the value with the lowest own charge, and send the domain to the holders of the own functions."""
@@ -110,12 +121,18 @@ class MaxSum(CycleProtocol):
         self.listen(self.above, self._build)
 
     def _build(self, messages: Mapping[str, wire.Message]) -> None:
-        """Make the own functions from the received domains. All Q are 0 at first."""
-        domains = self.checked_domains(messages)
+        """Make the own functions from the received domains."""
+        self._domains = self.checked_domains(messages)
+        self._tell_r()
+
+    def _make_functions(self) -> None:
+        """Make the functions of robots whose domains are known. All Q are 0 at first."""
+        domains = self._domains
+        self._made = True
+        self._shape = []
         self.factors = self._split(Factor.joined(self.problem.tables(domains)))
         self.edges = [[0.0] * len(self.preferred) for _ in self.factors]
-        zeros = {name: [[0.0] * len(values)] * len(self._with(name)) for name, values in domains.items()}
-        self._tell_r(zeros)
+        self._q_of = {name: [[0.0] * len(values)] * len(self._with(name)) for name, values in domains.items()}
 
     def _split(self, factors: list[Factor]) -> list[Factor]:
         """Return two functions for each of `factors`, if that is asked for."""
@@ -133,11 +150,34 @@ class MaxSum(CycleProtocol):
 
     def _hear_q(self, messages: Mapping[str, wire.Message]) -> None:
         """Process all Q of the cycle."""
-        self._tell_r({name: told.rows for name, told in messages.items() if isinstance(told, Q)})
+        for name, message in messages.items():
+            self._hear(name, message)
+        self._tell_r()
 
-    def _tell_r(self, messages: Mapping[str, Sequence[Row]]) -> None:
-        """Send R from the own functions to their variables; the own variable needs no message."""
-        rows = {name: iter(told) for name, told in messages.items()}
+    def hear_late(self, sender: str, message: wire.Message) -> None:
+        """Note what is new in a message whose phase is over."""
+        self._hear(sender, message)
+
+    def _hear(self, name: str, message: wire.Message) -> None:
+        """Note the last R, Q or domain of a robot. Q of functions that have been made anew meanwhile do not fit."""
+        if isinstance(message, R):
+            self._r_of[name] = message.rows
+        elif isinstance(message, Domain) and name in self.above:
+            self._domains.update(self.checked_domains({name: message}))
+            self._made = False
+        elif isinstance(message, Domain):
+            self._r_of.pop(name, None)
+        elif isinstance(message, Q) and len(message.rows) == len(self._q_of.get(name, message.rows)):
+            self._q_of[name] = message.rows
+
+    def _tell_r(self) -> None:
+        """Send R from the own functions to their variables; the own variable needs no message.
+
+        Where a robot's domain is lost, there is no R yet: the own domain asks for it.
+        """
+        if not self._made:
+            self._make_functions()
+        rows = {name: iter(told) for name, told in self._q_of.items()}
         said: dict[str, list[Row]] = {name: [] for name in self.above}
         self._own = []
         for factor, own in zip(self.factors, self.edges, strict=False):
@@ -146,13 +186,16 @@ class MaxSum(CycleProtocol):
             for name, row in zip(factor.agents, answers, strict=True):
                 said[name].append(row)
         for name in self.above:
-            self.send(name, R(said[name]))
+            self.send(name, R(said[name]) if name in self._domains else Domain(list(self.problem.values)))
         self.listen(self.below, self._decide)
 
     def _decide(self, messages: Mapping[str, wire.Message]) -> None:
         """Take the value with the lowest cost by all R, and send Q."""
-        told = {name: said.rows for name, said in messages.items() if isinstance(said, R)}
+        for name, message in messages.items():
+            self._hear(name, message)
+        told = {name: self._r_of[name] for name in self.below if name in self._r_of}
         rows = [*self._own, *(row for rows in told.values() for row in rows)]
+        before, self._shape = self._shape, [("", len(self._own)), *((name, len(told[name])) for name in told)]
         z = self._z(rows)
         if min(z) == INFINITE:
             self.conclude(Verdict.NO_SOLUTION)
@@ -160,22 +203,25 @@ class MaxSum(CycleProtocol):
         self.take(cheapest(z))
         if self.over:
             return
-        self.edges = self._q(rows, z)
+        self.edges = self._q(rows, z, damped=before == self._shape)
         done = len(self.factors)
         for name, answered in told.items():
             self.send(name, Q(self.edges[done : done + len(answered)]))
             done += len(answered)
+        for name in self.below:
+            if name not in told:
+                self.send(name, Domain(list(self.problem.values)))
         self.listen(self.above, self._hear_q)
 
     def _z(self, rows: Sequence[Row]) -> Row:
         """Return the cost of each value: its preference and the sum of all `rows` (Z)."""
         return total(self.preferred, rows)
 
-    def _q(self, rows: Sequence[Row], z: Row) -> list[Row]:
+    def _q(self, rows: Sequence[Row], z: Row, *, damped: bool) -> list[Row]:
         """Return, for each of `rows`, the cost of each value without that row (Q)."""
         fresh = without_each(self.preferred, rows, z)
         damping = self.settings.damping
-        if self.cycle == 1 or not damping:
+        if not damped or not damping:
             return [from_zero(row) for row in fresh]
         rest = 1 - damping
         return [

@@ -25,6 +25,7 @@ Differences, and why it ends:
 - Of two neighbours that go on, each answers the other's message by a tick. So at the end all have made all their ticks.
 - What robots had after their n-th tick, for each n, they need not have had at the same time. It is an assignment all
   the same, and its cost is known: the cheapest one is the answer.
+- Where messages are lost and nothing comes any more, each robot makes a tick with the values that it knows.
 - The first value is chosen at random and sent at once. Constraints may be n-ary; hard constraints are as in `dsa`.
 
 >>> from robochoc.communication.simulator.schedule import Concurrent
@@ -60,6 +61,7 @@ class ADSA(DSA):
         costs=True,
         shared_scopes=True,
         writes_to_non_neighbours=False,
+        bears_loss=True,
         privacy="constraints among others",
         use_when="as DSA, where some robots or links are much slower",
     )
@@ -95,6 +97,13 @@ class ADSA(DSA):
         self._tick()
         while not self.active and not self.over:
             self._tick()
+
+    def go_on(self) -> bool:
+        """Make a tick with what is known: messages were lost, and nothing else would come."""
+        if self.over or self.verdict is not None or self.value is None:
+            return False
+        self._tick()
+        return True
 
     def _tick(self) -> None:
         """Move or stay, against the last known values; tell the value to all that go on."""

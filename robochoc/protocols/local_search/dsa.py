@@ -30,6 +30,7 @@ Choices that the paper leaves open, and differences:
 - Constraints may be n-ary; each robot of a scope counts the whole cost of the constraint.
 - Fewer violated hard constraints are always better.
 - One of several best values is chosen at random.
+- Where messages are lost, the last value known of a neighbour stands for the one of the cycle before.
 
 >>> from robochoc.communication.simulator.schedule import Concurrent
 >>> from robochoc.communication.simulator.simulator import Simulation
@@ -108,6 +109,7 @@ class DSA(StochasticSearch):
         costs=True,
         shared_scopes=True,
         writes_to_non_neighbours=False,
+        bears_loss=True,
         arrays=True,
         privacy="constraints among others",
         use_when="costs, large team: good answers fast, no proof",

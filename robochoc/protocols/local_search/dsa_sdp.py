@@ -62,6 +62,7 @@ class DSASDP(StochasticSearch):
         costs=True,
         shared_scopes=True,
         writes_to_non_neighbours=False,
+        bears_loss=True,
         privacy="constraints among others",
         use_when="as DSA, and many cycles: it explores",
     )

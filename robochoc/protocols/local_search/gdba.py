@@ -32,7 +32,7 @@ Choices that the paper leaves open, and differences:
 - A broken hard constraint stands for a cost larger than all others: costs are pairs as in `mgm`, and a broken
   constraint is raised by one broken constraint (A) or weighs as one more (M).
 - A robot's private costs are no constraints with others, and are never raised.
-- First values, equally good values and equal reductions are treated as in `mgm`.
+- First values, equally good values, equal reductions and lost messages are treated as in `mgm`.
 
 >>> from robochoc.communication.simulator.schedule import Concurrent
 >>> from robochoc.communication.simulator.simulator import Simulation
@@ -85,6 +85,7 @@ class GDBA(Gainers):
         costs=True,
         shared_scopes=True,
         writes_to_non_neighbours=False,
+        bears_loss=True,
         privacy="constraints among others",
         use_when="as MGM, and many cycles: it leaves local optima",
     )
@@ -111,10 +112,11 @@ class GDBA(Gainers):
 
     def _move(self, messages: Mapping[str, wire.Message]) -> None:
         """Move if the own reduction is the largest; raise modifiers in a quasi-local minimum."""
+        complete = len(messages) == len(self.problem.neighbours)
         told = [(said.broken, said.cost) for said in messages.values() if isinstance(said, Improve)]
-        if max(self.gain, *told) <= NO_GAIN:
+        if complete and max(self.gain, *told) <= NO_GAIN:
             self._raise_modifiers()
-        self.take(self.target if self.wins(messages) else self.present)
+        self.take(self.target if complete and self.wins(messages) else self.present)
         if not self.over:
             self.tell_value(self._weigh)
 

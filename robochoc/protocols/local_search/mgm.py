@@ -24,6 +24,7 @@ Choices that the paper leaves open:
 - If neighbours have the same gain, the first one in the priority order moves.
 - Constraints may be n-ary, as all robots of a scope are neighbours.
 - A gain is a pair, violated hard constraints first. So the search also works on plain DisCSPs.
+- Where a value is lost, the last one known stands for it; a robot that misses a gain stays. Then the cost may rise.
 
 >>> from robochoc.communication.simulator.schedule import Concurrent
 >>> from robochoc.communication.simulator.simulator import Simulation
@@ -92,6 +93,7 @@ class MGM(Gainers):
         shared_scopes=True,
         writes_to_non_neighbours=False,
         arrays=True,
+        bears_loss=True,
         privacy="constraints among others",
         use_when="as DSA, and the cost never rises; ends in a local optimum",
     )
@@ -108,7 +110,8 @@ class MGM(Gainers):
         self.listen(self.problem.neighbours, self._move)
 
     def _move(self, messages: Mapping[str, wire.Message]) -> None:
-        """Move if the own gain is the largest, with all neighbours' gains known."""
-        self.take(self.target if self.wins(messages) else self.present)
+        """Move if the own gain is the largest, with all neighbours' gains known; stay where one is lost."""
+        moves = len(messages) == len(self.problem.neighbours) and self.wins(messages)
+        self.take(self.target if moves else self.present)
         if not self.over:
             self.tell_value(self._weigh)

@@ -60,6 +60,7 @@ class MixedDSA(StochasticSearch):
         costs=True,
         shared_scopes=True,
         writes_to_non_neighbours=False,
+        bears_loss=True,
         privacy="constraints among others",
         use_when="as DSA, hard and soft constraints together",
     )

@@ -78,6 +78,7 @@ class RegretMatching(OnePhase):
         costs=True,
         shared_scopes=True,
         writes_to_non_neighbours=False,
+        bears_loss=True,
         privacy="constraints among others",
         use_when="as DSA: it follows what has paid over many cycles",
     )

@@ -5,6 +5,10 @@ waits for one, then waits for one from each robot that it listens to, and contin
 need no number, as they arrive in the order of their phases from each robot. A message from a neighbour that is ahead is
 stored until its phase.
 
+Where messages are lost, the next one of the same robot shows that one is missing before it; where none follows, a robot
+goes on once nothing arrives any more. Either way it does the phase with the messages that it has. A message that comes
+when its phase is over only says what is new. So phases stay in step, and each silence takes the search one further.
+
 The course of the search does not depend on delays. No robot knows the total cost, so each robot records its values
 (`Trail`); the collected trails give the cheapest cycle. With the setting `anytime` the robots find it themselves
 (`anytime.py`).
@@ -31,7 +35,7 @@ from robochoc.solver.compiled import LexicographicCost, LocalProblem
 T = TypeVar("T")
 
 Then = Callable[[Mapping[str, wire.Message]], None]
-"""A function of one message of each robot passed to `listen`, in the order of these robots."""
+"""A function of one message of each robot passed to `listen`, in the order of these robots; lost ones are missing."""
 
 
 class CycleProtocol(Protocol):
@@ -48,8 +52,12 @@ class CycleProtocol(Protocol):
         super().__init__(problem, order)
         self.cycle = -1
         self._trail: list[tuple[int, int]] = []
-        self._waiting: dict[str, list[wire.Message]] = {name: [] for name in problem.neighbours}
-        """A few at most from each: a robot that is ahead soon waits for this one."""
+        self._waiting: dict[str, list[wire.Message | None]] = {name: [] for name in problem.neighbours}
+        """A few at most from each: a robot that is ahead soon waits for this one. None: one that is lost."""
+        self._given_up: dict[str, int] = {}
+        """How many messages of a neighbour belong to phases that this robot has done without them."""
+        self._known: dict[str, wire.Value] = {}
+        """Neighbours' last values."""
         self._names: tuple[str, ...] = ()
         self._awaited: frozenset[str] = frozenset()
         self._missing = 0
@@ -81,7 +89,41 @@ class CycleProtocol(Protocol):
         """Store the message for its phase; process one about the best cycle at once."""
         if isinstance(message, Place | Step | Paid | Best):
             self._receive_report(sender, message)
-            return
+        elif self._given_up and self._was_given_up(sender):
+            self.hear_late(sender, message)
+        else:
+            self._store(sender, message)
+
+    def miss(self, sender: str) -> None:
+        """Note that the message of a phase is lost."""
+        if not self._was_given_up(sender):
+            self._store(sender, None)
+
+    def go_on(self) -> bool:
+        """Do the present phase without the messages that have not come."""
+        if self._then is None or not self._missing or self.verdict is not None:
+            return False
+        for name in self._names:
+            if not self._waiting[name]:
+                self._given_up[name] = self._given_up.get(name, 0) + 1
+                self._store(name, None)
+        self.settle()
+        return True
+
+    def hear_late(self, sender: str, message: wire.Message) -> None:
+        """Note what is new in a message whose phase is over."""
+        if isinstance(message, Value):
+            self.check_value(sender, message.value)
+            self._known[sender] = message.value
+
+    def _was_given_up(self, sender: str) -> bool:
+        """Return whether the next message of `sender` belongs to a phase that was done without it; count it off."""
+        many = self._given_up.get(sender, 0)
+        if many:
+            self._given_up[sender] = many - 1
+        return many > 0
+
+    def _store(self, sender: str, message: wire.Message | None) -> None:
         waiting = self._waiting[sender]
         if not waiting and sender in self._awaited:
             self._missing -= 1
@@ -90,12 +132,13 @@ class CycleProtocol(Protocol):
     def settle(self) -> None:
         """Run all phases whose messages have arrived."""
         while self._then and not self._missing and self.verdict is None and not self._is_ahead:
-            messages = {name: self._waiting[name].pop(0) for name in self._names}
+            heard = [(name, self._waiting[name].pop(0)) for name in self._names]
+            messages = {name: message for name, message in heard if message is not None}
             then, self._then = self._then, None
             then(messages)
 
     def listen(self, names: Sequence[str], then: Then) -> None:
-        """Wait for a message of each robot in `names`, then call `then` with them."""
+        """Wait for a message of each robot in `names`, then call `then` with them: without those that are lost."""
         if names is not self._names:  # in most phases they are the same
             self._names, self._awaited = tuple(names), frozenset(names)
         self._then = then
@@ -132,6 +175,8 @@ class CycleProtocol(Protocol):
     def checked_values(self, messages: Mapping[str, wire.Message]) -> dict[str, wire.Value]:
         """Return the values in the messages of a phase in which every robot sends a `Value`.
 
+        Where a message is lost, the last value that is known stands for it, if there is one.
+
         Raises:
             ValueError: where a robot says something else, or no value that it can have.
         """
@@ -143,6 +188,10 @@ class CycleProtocol(Protocol):
             value = values[name] = message.value
             if value not in known[name]:
                 self.check_value(name, value)
+        if len(values) < len(self._names):
+            values = {name: values.get(name, self._known.get(name, ())) for name in self._names}
+            values = {name: value for name, value in values.items() if value}
+        self._known = values
         return values
 
     def checked_domains(self, messages: Mapping[str, wire.Message]) -> dict[str, list[wire.Value]]:

@@ -1,0 +1,97 @@
+"""Messages that are really lost: every protocol comes to its end, and says nothing that is wrong."""
+
+from __future__ import annotations
+
+from random import Random
+
+from robochoc.model.outcome import Outcome, Verdict
+from robochoc.model.problem import INFINITE, Team
+from robochoc.protocols.shared.cycles import CycleProtocol
+from robochoc.run import Options, Runtime, solve
+from robochoc.run.options import ScheduleName
+from robochoc.run.registry import protocol_named, protocol_names
+from robochoc.solver.encoding import UnsupportedError
+from tests.support.brute_force import least_cost
+from tests.support.cost_problems import random_cost_team
+from tests.support.examples import count
+from tests.support.problems import random_team
+
+OURS = [name for name in protocol_names() if protocol_named(name).__module__.startswith("robochoc.")]
+BEARING = [name for name in OURS if protocol_named(name).traits.bears_loss]
+SCHEDULES = list(ScheduleName)
+
+
+def run(name: str, team: Team, number: int, loss: float = 0.1) -> Outcome | None:
+    """The outcome of `team` by the protocol called `name`; None: it does not take this team."""
+    options = Options(
+        protocol=name,
+        runtime=Runtime.SIMULATOR,
+        seed=number,
+        schedule=SCHEDULES[number % len(SCHEDULES)],
+        message_loss=loss,
+    )
+    try:
+        return solve(team, options)
+    except UnsupportedError:
+        return None
+
+
+def is_true(team: Team, outcome: Outcome) -> bool:
+    """Return whether the verdict is one that brute force does not contradict, and that loss allows."""
+    least = least_cost(team)
+    sure = not outcome.metrics.lost_messages or protocol_named(outcome.protocol).traits.bears_loss
+    match outcome.verdict:
+        case Verdict.SOLUTION:
+            return outcome.verified and outcome.cost is not None and least <= outcome.cost < INFINITE
+        case Verdict.OPTIMAL:
+            return sure and outcome.verified and outcome.cost == least
+        case Verdict.NO_SOLUTION:
+            return sure and least == INFINITE
+        case Verdict.UNKNOWN:
+            return outcome.reason is not None
+
+
+@count("runs", 60, 1000)
+def test_with_a_tenth_of_all_messages_lost_no_protocol_is_wrong(runs: int) -> None:
+    lost = wrong = 0
+    for number in range(runs):
+        name = OURS[number % len(OURS)]
+        chance = Random(number // len(OURS) + 1000)
+        kind = random_cost_team if protocol_named(name).traits.costs and number % 3 else random_team
+        team = kind(chance, n_ary=protocol_named(name).traits.n_ary)
+        outcome = run(name, team, number)
+        if outcome is not None:
+            lost += outcome.metrics.lost_messages
+            wrong += not is_true(team, outcome)
+    assert lost > runs
+    assert wrong == 0
+
+
+@count("runs", 4, 200)
+def test_what_bears_loss_ends_with_an_answer_wherever_there_is_one(runs: int) -> None:
+    """Of the teams that have a solution nearly all get one; none of them is taken from those that have none."""
+    for name in BEARING:
+        solvable = solved = 0
+        for number in range(runs):
+            team = random_cost_team(Random(number), n_ary=protocol_named(name).traits.n_ary)
+            outcome = run(name, team, number)
+            assert outcome is not None
+            assert is_true(team, outcome)
+            solvable += least_cost(team) < INFINITE
+            solved += outcome.verdict in {Verdict.SOLUTION, Verdict.OPTIMAL}
+        assert 0 < solved <= solvable
+        assert solved >= 0.8 * solvable
+
+
+def test_even_nine_of_ten_lost_is_no_reason_to_wait_for_ever() -> None:
+    for name in BEARING:
+        outcome = run(name, random_cost_team(Random(3)), 1, loss=0.9)
+        assert outcome is not None
+        assert is_true(random_cost_team(Random(3)), outcome)
+        assert outcome.metrics.lost_messages > 0
+
+
+def test_all_of_the_three_families_bear_loss() -> None:
+    assert {"dsa", "mgm", "maxsum", "a-dsa", "async-maxsum", "gdba"} <= set(BEARING)
+    assert not any(protocol_named(name).traits.complete for name in BEARING)
+    assert {name for name in BEARING if issubclass(protocol_named(name), CycleProtocol)} > {"dsa", "mgm", "maxsum"}

@@ -1,0 +1,199 @@
+"""Messages lost on their way: what is counted, what robots notice, and what it means for an answer."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from itertools import pairwise
+from random import Random
+from typing import Any
+
+import pytest
+
+from robochoc.communication.run_result import RunResult
+from robochoc.communication.simulator.channel import ChannelModel
+from robochoc.communication.simulator.losses import Losses
+from robochoc.communication.simulator.schedule import Concurrent
+from robochoc.communication.simulator.simulator import Simulation
+from robochoc.communication.simulator.timed import Timed
+from robochoc.formats.result import read_result, result_json
+from robochoc.generators.queens3d import queens3d
+from robochoc.journal.events import AnyEvent, Received, Sent
+from robochoc.model.message import Envelope
+from robochoc.model.orders import constraint_graph
+from robochoc.model.outcome import Verdict
+from robochoc.model.problem import Team
+from robochoc.protocols.local_search.dsa import DSA
+from robochoc.protocols.local_search.mgm import MGM
+from robochoc.protocols.protocol import Protocol
+from robochoc.protocols.satisfaction.abt import ABT
+from robochoc.replay import CannotReplayError, replay
+from robochoc.run import Options, Runtime, solve
+from robochoc.run.options import ScheduleName
+from robochoc.solver.encoding import UnsupportedError
+from tests.support.cost_problems import random_cost_team
+from tests.support.replays import recorded
+
+
+def lossy(protocol: str, loss: float = 0.1, **more: Any) -> Options:
+    return replace(Options(protocol=protocol, runtime=Runtime.SIMULATOR, message_loss=loss), **more)
+
+
+def searched(team: Team, protocol: type[Protocol], seed: int = 0) -> tuple[RunResult, list[AnyEvent]]:
+    events: list[AnyEvent] = []
+    run = Simulation(team, protocol, Concurrent(seed), losses=Losses(0.1, seed), observer=events.append)
+    return run.search(), events
+
+
+class _Sure(Losses):
+    """Loses the messages at these places, counted from 0 over all that are sent."""
+
+    def __init__(self, *places: int) -> None:
+        super().__init__(0, 0)
+        self._places = set(places)
+        self._number = -1
+
+    def takes(self, envelope: Envelope) -> bool:
+        self._number += 1
+        self._probability = float(self._number in self._places)
+        return super().takes(envelope)
+
+
+def test_what_comes_next_on_a_channel_shows_how_many_are_missing_before_it() -> None:
+    losses = _Sure(1, 2, 4)
+    sent = [Envelope("A", receiver, b"", 0) for receiver in "BBBBCC"]
+    assert [losses.takes(one) for one in sent] == [False, True, True, False, True, False]
+    assert [losses.before(sent[place]) for place in (0, 3, 5)] == [0, 2, 1]
+    assert (losses.end(), losses.end()) == (3, 0)
+
+
+@pytest.mark.parametrize("protocol", [DSA, MGM, ABT])
+def test_each_message_has_arrived_or_is_counted_as_lost(protocol: type[Protocol]) -> None:
+    result, events = searched(queens3d(4), protocol)
+    sent, received = (sum(isinstance(event, kind) for event in events) for kind in (Sent, Received))
+    assert result.metrics.lost_messages > 0
+    assert sum(result.metrics.messages.values()) == sent == received + result.metrics.lost_messages
+
+
+def test_the_same_seed_loses_the_same_messages() -> None:
+    for schedule in ScheduleName:
+        once, again, other = (solve(queens3d(3), lossy("mgm", schedule=schedule, seed=seed)) for seed in (1, 1, 2))
+        assert replace(once.metrics, wall_s=0) == replace(again.metrics, wall_s=0)
+        assert once.assignment == again.assignment
+        assert once.metrics.lost_messages != other.metrics.lost_messages
+
+
+def test_all_cycles_are_gone_through_whatever_is_lost() -> None:
+    for seed in range(10):
+        team = random_cost_team(Random(seed))
+        result, _ = searched(team, DSA, seed)
+        trails = [found.trail for found in result.findings.values() if found.trail]
+        assert {trail.cycle for trail in trails} <= {100}
+
+
+def test_two_neighbours_of_mgm_never_move_in_the_same_cycle_whatever_is_lost() -> None:
+    moved = 0
+    for seed in range(20):
+        team = random_cost_team(Random(seed))
+        result, _ = searched(team, MGM, seed)
+        assert result.verdict is Verdict.NO_SOLUTION or result.findings
+        moves = {
+            name: {cycle for cycle, _ in found.trail.entries if cycle} if found.trail else set()
+            for name, found in result.findings.items()
+        }
+        for name, others in constraint_graph(team).items():
+            moved += len(moves[name])
+            assert all(moves[name].isdisjoint(moves[other]) for other in others)
+    assert moved > 20
+
+
+def test_a_robot_uses_the_last_value_that_it_knows_and_keeps_in_step() -> None:
+    """The second value of one robot is lost: the other one goes on with the first, and then with the third."""
+    team = random_cost_team(Random(1), n_ary=False)
+    result = Simulation(team, DSA, Concurrent(0), losses=_Sure(*range(10, 20))).search()
+    assert result.metrics.lost_messages == 10
+    assert {found.trail.cycle for found in result.findings.values() if found.trail} == {100}
+
+
+def test_a_lost_message_takes_its_time_on_the_air_and_silence_its_timeout() -> None:
+    channel = ChannelModel(name="slow", latency_ms=1, frame_us=500_000, timeout_ms=7_000)
+    schedule = Timed(0, channel)
+    schedule.lose(Envelope("A", "B", b"", 0))
+    schedule.put(Envelope("A", "C", b"", 0))
+    schedule.done("A", 0, 0)
+    assert [one.receiver for one in schedule.get()] == ["C"]
+    assert schedule.time(0) == pytest.approx(1.001)
+    schedule.done("C", 0, 0)
+    assert list(schedule.get()) == []
+    schedule.wait()
+    assert schedule.time(0) == pytest.approx(8.001)
+
+
+def test_no_claim_stands_that_may_rest_on_a_lost_message() -> None:
+    """Without losses `abt` proves that two queens have no place, and `dpop` what costs least."""
+    assert solve(queens3d(2), lossy("abt", 0)).verdict is Verdict.NO_SOLUTION
+    spoiled = [solve(queens3d(2), lossy("abt", 0.5, seed=seed)) for seed in range(10)]
+    assert {outcome.verdict for outcome in spoiled if outcome.metrics.lost_messages} == {Verdict.UNKNOWN}
+    found = next(one for one in spoiled if one.metrics.lost_messages > 1)
+    assert found.reason == f"{found.metrics.lost_messages:,} messages were lost, and abt needs every one"
+    assert found.witness is None
+    verdicts = set()
+    for seed in range(20):
+        outcome = solve(random_cost_team(Random(seed)), lossy("dpop", 0.2, seed=seed))
+        if outcome.metrics.lost_messages:
+            verdicts.add(outcome.verdict)
+            assert (outcome.bound, outcome.count, outcome.tree) == (None, None, {})
+    assert verdicts <= {Verdict.UNKNOWN, Verdict.SOLUTION}
+
+
+def test_a_protocol_that_does_not_bear_loss_may_raise_anything_after_one() -> None:
+    class Broken(ABT):
+        def settle(self) -> None:
+            raise KeyError(self.problem.agent)
+
+    with pytest.raises(KeyError):
+        Simulation(queens3d(3), Broken, Concurrent(0), losses=_Sure()).search()
+    assert Simulation(queens3d(3), Broken, Concurrent(0), losses=_Sure(0)).search().verdict is Verdict.UNKNOWN
+
+
+def test_what_bears_loss_may_not_raise() -> None:
+    class Broken(DSA):
+        def settle(self) -> None:
+            if self.cycle >= 0 and self._waiting:
+                raise KeyError(self.problem.agent)
+
+    with pytest.raises(KeyError):
+        Simulation(queens3d(3), Broken, Concurrent(0), losses=_Sure(0)).search()
+
+
+def test_the_result_says_how_many_messages_were_lost() -> None:
+    outcome = solve(queens3d(3), lossy("dsa"))
+    read = read_result(result_json(outcome))
+    assert read.metrics.lost_messages == outcome.metrics.lost_messages > 0
+    assert (outcome.metrics + outcome.metrics).lost_messages == 2 * outcome.metrics.lost_messages
+
+
+def test_a_journal_of_lost_messages_is_not_replayed() -> None:
+    journal = recorded(queens3d(3), lossy("dsa"))
+    assert journal.header.message_loss == 0.1
+    with pytest.raises(CannotReplayError, match="messages were lost"):
+        replay(journal)
+
+
+@pytest.mark.parametrize(
+    "options",
+    [
+        replace(lossy("dsa"), runtime=Runtime.PROCESSES),
+        lossy("dsa", settings={"anytime": "yes"}),
+        lossy("dsa", loss=0.95),
+        lossy("central"),
+    ],
+)
+def test_where_it_makes_no_sense_it_is_refused(options: Options) -> None:
+    with pytest.raises(UnsupportedError, match="--message-loss"):
+        solve(queens3d(2), options)
+
+
+def test_more_loss_costs_no_more_than_quality() -> None:
+    """DSA on queens finds a solution with half of all messages lost, in as many cycles."""
+    costs = [sum(solve(queens3d(4), lossy("dsa", loss)).metrics.messages.values()) for loss in (0.1, 0.3, 0.5)]
+    assert all(before >= after for before, after in pairwise(costs))
