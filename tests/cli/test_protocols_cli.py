@@ -109,7 +109,18 @@ def test_the_list_is_narrow_and_every_protocol_of_ours_says_when_to_use_it() -> 
 
 def test_the_long_list_has_all_traits() -> None:
     told = robochoc_within("protocols", "--long").stdout
-    heading = ["name", "for", "complete", "synchronous", "constraints", "dynamic", "arrays", "privacy", "paper"]
+    heading = [
+        "name",
+        "for",
+        "complete",
+        "synchronous",
+        "constraints",
+        "dynamic",
+        "arrays",
+        "lossy",
+        "privacy",
+        "paper",
+    ]
     assert told.splitlines()[0].split() == heading
     assert row(told, "abt").split()[1:7] == ["satisfaction", "yes", "no", "n-ary,", "PKC", "no"]
     assert abt.ABT.traits.paper in row(told, "abt")

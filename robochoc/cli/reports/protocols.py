@@ -73,7 +73,7 @@ def print_protocols(found: Sequence[Row], *, long: bool = False) -> None:
             "constraints",
             "dynamic",
             "arrays",
-            "bears loss",
+            "lossy",
             "privacy",
             "paper",
         ]
@@ -182,7 +182,7 @@ def _cells(row: Row, headings: Sequence[str]) -> list[str]:
         "constraints": ("n-ary" if traits.n_ary else "binary") + (", PKC" if traits.partially_known else ""),
         "dynamic": _yes(holds=traits.dynamic),
         "arrays": _yes(holds=traits.arrays),
-        "bears loss": _yes(holds=traits.bears_loss),
+        "lossy": _yes(holds=traits.bears_loss),
         "privacy": traits.privacy,
         "paper": traits.paper,
         "use when": traits.use_when,
