@@ -35,8 +35,13 @@ from tests.support.cost_problems import random_cost_team
 from tests.support.replays import recorded
 
 
-def lossy(protocol: str, loss: float = 0.1, **more: object) -> Options:
-    return replace(Options(protocol=protocol, runtime=Runtime.SIMULATOR, message_loss=loss), **more)  # type: ignore[arg-type] - options by name
+def lossy(
+    protocol: str,
+    loss: float = 0.1,
+    seed: int = 0,
+    schedule: ScheduleName = ScheduleName.CONCURRENT,
+) -> Options:
+    return Options(protocol=protocol, runtime=Runtime.SIMULATOR, message_loss=loss, seed=seed, schedule=schedule)
 
 
 def searched(team: Team, protocol: type[Protocol], seed: int = 0) -> tuple[RunResult, list[AnyEvent]]:
@@ -186,7 +191,7 @@ def test_a_journal_of_lost_messages_is_not_replayed() -> None:
     "options",
     [
         replace(lossy("dsa"), runtime=Runtime.PROCESSES),
-        lossy("dsa", settings={"anytime": "yes"}),
+        replace(lossy("dsa"), settings={"anytime": "yes"}),
         lossy("dsa", loss=0.95),
         lossy("central"),
     ],
