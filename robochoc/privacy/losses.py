@@ -70,7 +70,7 @@ class PrivacyReport:
 
     Attributes:
         team: The name of the team.
-        protocol: The protocol of the run, by its class.
+        protocol: The protocol of the run: its name, or that of its class where it has none.
         run: Which run of the journal it is, counted from 1.
         runs: How many there are.
         robots: All robots, the highest priority first.

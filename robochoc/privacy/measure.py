@@ -19,6 +19,7 @@ from robochoc.privacy.secrets import TeamSecrets, TooManySecretsError
 from robochoc.protocols.order import PseudoTree
 from robochoc.replay.rebuild import CannotReplayError, Rebuilder, RebuiltRobots, ReplayOptions
 from robochoc.replay.steps import RecordedRun, runs_of
+from robochoc.run.registry import protocol_by_class
 from robochoc.sniffer.recorded_messages import message_of, types_by_name
 from robochoc.solver.agent_problem import RunParameters
 
@@ -69,6 +70,8 @@ class _Measured:
         self._number = number
         self._run = runs[number - 1]
         self._robots = robots
+        found = protocol_by_class(robots.protocol.__name__, [journal.header.protocol])
+        self._name = found[0] if found else robots.protocol.__name__
         self._types = types_by_name(robots.protocol)
         self._team = robots.compiled.team
         given = self._run.given
@@ -96,7 +99,7 @@ class _Measured:
         losses = [loss for one in self._observers.values() for loss in self._losses(one, decided)]
         return PrivacyReport(
             team=self._team.name,
-            protocol=self._robots.protocol.__name__,
+            protocol=self._name,
             run=self._number,
             runs=self._runs,
             robots=tuple(self._team.order),

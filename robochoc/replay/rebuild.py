@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Iterable, Mapping
 from dataclasses import replace
 from types import MappingProxyType
 from typing import NamedTuple
 
 from robochoc.communication.host import Host
 from robochoc.communication.session import Epoch
-from robochoc.journal.events import Given, Lost
+from robochoc.journal.events import AnyEvent, Given, Lost
 from robochoc.journal.given import GivenProblemError, TeamReader, invalidated_of, run_parameters_of
 from robochoc.journal.journal import Header
 from robochoc.model.change import team_after_events
@@ -91,6 +91,12 @@ class RebuiltRobots(NamedTuple):
     lossless: bool
     continuing: Collection[str]
     compiled: CompiledTeam
+
+
+def reads_files(events: Iterable[AnyEvent]) -> bool:
+    """Return whether robots of a journal with these `events` are rebuilt from the team's files, for lack of others."""
+    given = [event for event in events if isinstance(event, Given)]
+    return not given or any(one.why for one in given)
 
 
 class Rebuilder:

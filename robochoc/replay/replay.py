@@ -16,6 +16,7 @@ import msgspec
 from robochoc.communication.run_result import Progress
 from robochoc.journal.events import Sent
 from robochoc.journal.journal import Journal
+from robochoc.model.outcome import Verdict
 from robochoc.replay.claims import Contradiction, ReplayedRun, contradicted_claims, with_answer
 from robochoc.replay.comparison import Difference
 from robochoc.replay.rebuild import CannotReplayError, Rebuilder, ReplayOptions
@@ -51,6 +52,7 @@ class ReplayResult:
         ended: The journal holds the end of the run.
         contradictions: Claims of header and outcome that do not follow from the steps.
         truncated: The journal is damaged at its end only; it was not altered.
+        decided_before: The run was decided before any robot began, as one has no solution by itself: there is no step.
     """
 
     runs: int
@@ -64,6 +66,7 @@ class ReplayResult:
     ended: bool
     contradictions: tuple[Contradiction, ...] = ()
     truncated: bool = False
+    decided_before: bool = False
 
     @property
     def identical(self) -> bool:
@@ -125,6 +128,7 @@ class _JournalReplay:
             ended=self._journal.outcome is not None,
             contradictions=tuple(found),
             truncated=self._journal.truncated,
+            decided_before=_decided_before(self._journal),
         )
 
     def _first_difference(self) -> Difference | None:
@@ -168,3 +172,11 @@ class _JournalReplay:
     def _show(self, stage: str = "") -> None:
         if self._progress:
             self._progress(Progress(self._messages, time.monotonic() - self._began, stage))
+
+
+def _decided_before(journal: Journal) -> bool:
+    """Return whether the journal says that no robot began, as one of them alone has no solution."""
+    outcome = journal.outcome
+    if outcome is None or journal.events or journal.damage is not None or outcome.metrics.messages:
+        return False
+    return outcome.verdict is Verdict.NO_SOLUTION and bool(outcome.witness)

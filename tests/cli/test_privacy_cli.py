@@ -39,10 +39,18 @@ def test_a_row_for_each_robot_and_each_measure_of_the_system(saved: Path) -> Non
 
 def test_json_holds_every_pair(saved: Path) -> None:
     told = msgspec.json.decode(run("privacy", saved, "--json", "--no-cache").stdout)
-    assert told["protocol"] == "ABT"
+    assert told["protocol"] == "abt"
     assert {(one["observer"], one["subject"]) for one in told["losses"] if one["kind"] == "domain"} == {
         (one, other) for one in told["robots"] for other in told["robots"] if one != other
     }
+
+
+def test_a_folder_that_is_not_needed_is_not_ignored_without_a_word(saved: Path) -> None:
+    plain, told = run("privacy", saved, "--no-cache"), run("privacy", saved, "--team", saved.parent / "team")
+    assert told.exit_code == 0
+    assert told.stderr == "--team is not used: the journal says what the robots were given\n"
+    assert told.stdout == plain.stdout
+    assert not plain.stderr
 
 
 def test_a_page_is_written_beside_the_table(saved: Path, tmp_path: Path) -> None:

@@ -17,7 +17,9 @@ from robochoc.generators.queens3d import queens3d
 from robochoc.journal.events import Sent
 from robochoc.journal.journal import Journal, JournalRecorder, lines_of
 from robochoc.model.outcome import Verdict
+from robochoc.model.problem import Constraint, Relation, Semantics
 from robochoc.run.options import Options, Runtime, Withdrawal
+from tests.support.problems import team_of
 from tests.support.replays import recorded, with_events, without_given
 
 THE_SAME = """\
@@ -156,6 +158,20 @@ def test_where_nothing_is_compared_there_is_no_success(two: Journal, tmp_path: P
         assert "nothing was compared" in said
         told: dict[str, Any] = msgspec.json.decode(ended(tmp_path / "journal", "--json")[1])
         assert told["identical"] is False
+
+
+def test_a_run_that_was_decided_before_any_robot_began_is_no_failure(tmp_path: Path) -> None:
+    none = Relation("none", 1, Semantics.CONFLICTS, ((1,), (2,)))
+    differ = Relation("differ", 2, Semantics.CONFLICTS, ((1, 1), (2, 2)))
+    constraints = [Constraint("D", differ, ("A", "B"), ("A", "B")), Constraint("N", none, ("B",), ("B",))]
+    team = team_of(dict.fromkeys("AB", (1, 2)), constraints)
+    journal = recorded(team, Options(protocol="abt", runtime=Runtime.SIMULATOR))
+    status, said = ended(written(journal, tmp_path / "journal"))
+    assert status == 0
+    assert said.endswith("there are no steps to compare: it was decided before, as RB has no solution by itself\n")
+    assert msgspec.json.decode(ended(tmp_path / "journal", "--json")[1])["decided_before"] is True
+    other = replace(journal, header=msgspec.structs.replace(journal.header, seed=7))
+    assert ended(written(other, tmp_path / "other"))[0] == LOST
 
 
 def test_a_run_without_robots_has_nothing_to_be_compared(tmp_path: Path) -> None:

@@ -81,15 +81,19 @@ def privacy(
 
 def _measured(path: Path, number: int | None, options: ReplayOptions) -> PrivacyReport:
     from robochoc.privacy import PrivacyError, privacy_of
+    from robochoc.replay.rebuild import reads_files
 
     recorded = saved_journal(path)
     if recorded.damage is not None and not recorded.truncated:
         raise Failure(INVALID, f"{path}: it was altered: {recorded.damage}")
     try:
         with failures_told(path):
-            return privacy_of(recorded, options, number)
+            report = privacy_of(recorded, options, number)
     except PrivacyError as why:
         raise Failure(INVALID if why.broken else USAGE, f"{path}: {why}") from why
+    if options.team is not None and not reads_files(recorded.events):
+        click.echo("--team is not used: the journal says what the robots were given", err=True)
+    return report
 
 
 def _write(html: Path, report: PrivacyReport, measure: Measure) -> None:

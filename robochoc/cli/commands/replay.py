@@ -53,7 +53,7 @@ def replay(
     The exit status is 0 if they are the same, and 4 if not: then the protocol or the journal has changed. The first
     difference is printed, and every claim of the header or the outcome that the steps contradict. A journal that ends
     early is replayed to its end. A journal that was altered is replayed up to that place, and is invalid (status 1), as
-    is one without steps.
+    is one without steps, unless a robot without a solution by itself had decided the run before any began.
     """
     from robochoc.formats import read_team
     from robochoc.replay import ReplayOptions
@@ -78,7 +78,7 @@ def replay(
         click.echo(replay_report(recorded, replayed))
     if replayed.differs:
         return LOST
-    return 0 if replayed.identical and not _altered(recorded) else INVALID
+    return 0 if (replayed.identical or replayed.decided_before) and not _altered(recorded) else INVALID
 
 
 def _altered(journal: Journal) -> bool:

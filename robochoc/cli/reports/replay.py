@@ -37,6 +37,9 @@ def replay_report(journal: Journal, replayed: ReplayResult) -> str:
     elif replayed.contradictions:
         lines.append("  different, though all steps are the same:" if replayed.steps else "  different:")
         lines += _contradicted(replayed.contradictions)
+    elif replayed.decided_before:
+        witness = journal.outcome.witness if journal.outcome else ""
+        lines.append(f"  there are no steps to compare: it was decided before, as {witness} has no solution by itself")
     elif not replayed.steps:
         lines.append("  nothing was compared: it holds no step of any robot that could be played")
     elif replayed.damage and not replayed.truncated:
@@ -64,6 +67,7 @@ def replay_json(journal: Journal, replayed: ReplayResult) -> str:
         "ended": replayed.ended,
         "difference": replayed.difference,
         "contradictions": replayed.contradictions,
+        "decided_before": replayed.decided_before,
     }
     return msgspec.json.format(msgspec.json.encode(told), indent=2).decode()
 
