@@ -6,6 +6,7 @@ the name. The caller closes what it has opened.
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 from typing import cast
 
@@ -88,11 +89,17 @@ def _lacking(entry: EntryPoint) -> str:
         entry.load()
     except ModuleNotFoundError as error:
         extras = entry.dist.metadata.get_all("Provides-Extra") or [] if entry.dist else []
-        if entry.dist and entry.name in extras:
-            wanted = f"{entry.dist.name}[{entry.name}]"
+        extra = next((one for one in extras if _normalised(one) == _normalised(entry.name)), "")
+        if entry.dist and extra:
+            wanted = f"{entry.dist.name}[{extra}]"
             return f"{entry.name} needs {error.name}, which is not installed: pip install '{wanted}'"
     except Terminated:
         raise
     except (Exception, SystemExit):  # noqa: BLE001 - raised when it is loaded once more
         return ""
     return ""
+
+
+def _normalised(extra: str) -> str:
+    """Return the one spelling of an extra's name; metadata may have another than `pyproject.toml`."""
+    return re.sub(r"[-_.]+", "-", extra).lower()

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import sys
 from pathlib import Path
 
 import pytest
@@ -239,6 +240,13 @@ def test_what_does_not_go_together(
     assert result.exit_code == 2, result.output
     assert said in " ".join(result.stderr.split())
     assert not list(tmp_path.iterdir())
+
+
+def test_a_live_place_is_published_to_and_listened_to(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "rospy", None)
+    result = ran("solve", HANGAR, "--ros", "rospy", "--situation", "rospy")
+    assert result.exit_code == 1
+    assert "rospy cannot be imported" in result.stderr
 
 
 def test_a_report_timeout_with_a_recording(run: tuple[Path, Result]) -> None:

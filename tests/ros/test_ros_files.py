@@ -293,3 +293,14 @@ def test_an_extra_that_is_not_installed_is_told(monkeypatch: pytest.MonkeyPatch)
         UnknownSinkError, match=r"mcap needs mcap.writer, which is not installed: pip install 'robochoc\[mcap\]'"
     ):
         open_sink("mcap:run.mcap")
+
+
+def test_an_extra_with_another_spelling_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Metadata has `rmw-zenoh` for the extra `rmw_zenoh`."""
+    for name in ("rmw_zenoh", "rmw_zenoh_session"):
+        monkeypatch.delitem(sys.modules, f"robochoc.ros.live.{name}", raising=False)
+    monkeypatch.setitem(sys.modules, "zenoh", None)
+    with pytest.raises(
+        UnknownSinkError, match=r"rmw_zenoh needs zenoh, which is not installed: pip install 'robochoc\[rmw.zenoh\]'"
+    ):
+        open_sink("rmw_zenoh")

@@ -33,8 +33,8 @@ ros_options = _optional(
         multiple=True,
         metavar="SINK",
         help=(
-            "Publish decisions as waypoints: mcap:FILE (for Foxglove), rosbag:FILE, rosbridge://HOST:PORT, rospy, or"
-            " an installed sink. Repeatable."
+            "Publish decisions as waypoints: mcap:FILE (for Foxglove), rosbag:FILE, rmw_zenoh,"
+            " rosbridge://HOST:PORT, rospy, or an installed sink. Repeatable."
         ),
     ),
     click.option("--frame", type=FrameType(), metavar="NAME", help=f"Frame of all positions.  [default: {FRAME}]"),
@@ -72,8 +72,8 @@ situation_options = _optional(
         "--situation",
         metavar="SOURCE",
         help=(
-            "Solve again when robots report a change. SOURCE: flight (decisions are flown in a simulation), mcap:FILE,"
-            " rosbag:FILE, rosbridge://HOST:PORT, rospy or an installed source."
+            "Solve again when robots report a change. SOURCE: flight (decisions are flown in a simulation), or as for"
+            " --ros."
         ),
     ),
     click.option(

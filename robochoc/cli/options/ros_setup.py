@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager, nullcontext
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
@@ -161,8 +162,9 @@ def sink_places(sinks: Sequence[str]) -> list[Place]:
 
 
 def source_places(situation: str | None) -> list[Place]:
-    """Return where `--situation` reads. Raises `click.UsageError`."""
-    return [_place_of("--situation", situation)] if situation else []
+    """Return the file that `--situation` reads; what is live may be published to as well. Raises `click.UsageError`."""
+    places = [_place_of("--situation", situation)] if situation else []
+    return [(place, named) for place, named in places if isinstance(place, Path)]
 
 
 def _place_of(option: str, text: str) -> Place:

@@ -1,9 +1,13 @@
-"""The zenoh configuration of every process of a run. It imports little, so that the router starts fast."""
+"""The zenoh configuration of every process of a run, and of sessions with a ROS 2.
+
+It imports little, so that the router starts fast.
+"""
 
 from __future__ import annotations
 
 import json
 from collections.abc import Mapping
+from pathlib import Path
 
 import zenoh
 
@@ -11,9 +15,12 @@ RX_BYTES = 32 * 2**20
 """The largest message that zenoh receives. It exceeds a frame's limit, so that too large a frame causes an error."""
 
 
-def config(settings: Mapping[str, object]) -> zenoh.Config:
-    """Return a configuration of zenoh with `settings`, and without discovery or other listeners."""
-    made = zenoh.Config()
+def config(settings: Mapping[str, object], file: Path | None = None) -> zenoh.Config:
+    """Return a configuration of zenoh with `settings`, and without discovery or other listeners.
+
+    What these do not say is as `file` has it, or zenoh's default.
+    """
+    made = zenoh.Config() if file is None else zenoh.Config.from_file(file)
     common = {
         "scouting/multicast/enabled": False,
         "scouting/gossip/enabled": False,

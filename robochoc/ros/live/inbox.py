@@ -68,3 +68,16 @@ class RosInbox:
                 if left <= 0 or (over is not None and over.is_set()):
                     return None
                 self._came.wait(left)
+
+
+def weight_of(value: object) -> int:
+    """Return how many characters and fields `value` has."""
+    match value:
+        case dict():
+            return 1 + sum(map(weight_of, value.values()))
+        case list() | tuple():
+            return 1 + sum(map(weight_of, value))
+        case str() | bytes():
+            return 1 + len(value)
+        case _:
+            return 1

@@ -62,16 +62,3 @@ def _plain(value: Any) -> Any:  # noqa: ANN401 - a field is anything
     if hasattr(value, "_slot_types"):
         return fields_of(value)
     return [_plain(one) for one in value] if isinstance(value, list | tuple) else value
-
-
-def weight_of(value: object) -> int:
-    """Return how many characters and fields `value` has."""
-    match value:
-        case dict():
-            return 1 + sum(map(weight_of, value.values()))
-        case list() | tuple():
-            return 1 + sum(map(weight_of, value))
-        case str() | bytes():
-            return 1 + len(value)
-        case _:
-            return 1

@@ -18,9 +18,10 @@ from functools import partial
 from typing import Any
 
 from robochoc.formats.diagnostics import on_one_line, shortened
-from robochoc.ros.live.inbox import RosInbox
+from robochoc.ros.live.in_time import succeeds_in_time
+from robochoc.ros.live.inbox import RosInbox, weight_of
 from robochoc.ros.live.ros_master import Failed, RosMaster
-from robochoc.ros.live.rospy_messages import fields_of, filled, message_class, weight_of
+from robochoc.ros.live.rospy_messages import fields_of, filled, message_class
 from robochoc.ros.sink import Fields, Sink, SinkError
 from robochoc.ros.source import ReceivedMessage, Source, SourceError
 
@@ -65,7 +66,7 @@ def _register(rospy: Any, failed: Failed) -> None:  # noqa: ANN401 - rospy is un
         logging.getLogger(name).propagate = False
     configure, rospy.core.configure_logging = rospy.core.configure_logging, lambda *_, **__: None
     options = {"anonymous": True, "disable_signals": True, "disable_rosout": True, "disable_rostime": True}
-    is_there = _succeeds_in_time(partial(rospy.init_node, "robochoc", argv=[], **options))
+    is_there = succeeds_in_time(partial(rospy.init_node, "robochoc", argv=[], **options), NODE_S)
     rospy.core.configure_logging = configure
     if not is_there or not rospy.core.is_initialized():
         rospy.signal_shutdown("no node")
@@ -96,7 +97,7 @@ class RospySink(Sink):
         if not new:
             return
         self._master.check()
-        if not _succeeds_in_time(partial(self._register, new)):
+        if not succeeds_in_time(partial(self._register, new), NODE_S):
             raise SinkError(f"the ROS master at {self._master.uri} has not registered our topics; see its log")
         self._gather(new)
 
@@ -189,7 +190,7 @@ class RospySink(Sink):
             pause = min(2 * pause, 0.3)
 
     def _end(self) -> None:
-        _succeeds_in_time(lambda: [publisher.unregister() for publisher in self._publishers.values()])
+        succeeds_in_time(lambda: [publisher.unregister() for publisher in self._publishers.values()], NODE_S)
 
 
 class RospySource(Source):
@@ -207,7 +208,7 @@ class RospySource(Source):
         """Subscribe to `topics`."""
         kinds = {topic: (kind, message_class(kind, SourceError)) for topic, kind in topics.items()}
         self._master.check()
-        if not _succeeds_in_time(partial(self._subscribe, kinds)):
+        if not succeeds_in_time(partial(self._subscribe, kinds), NODE_S):
             raise SourceError(
                 f"the ROS master at {self._master.uri} has not registered us as a subscriber; see its log"
             )
@@ -227,24 +228,8 @@ class RospySource(Source):
 
     def close(self) -> None:
         """Unsubscribe."""
-        _succeeds_in_time(lambda: [subscriber.unregister() for subscriber in self._subscribers])
+        succeeds_in_time(lambda: [subscriber.unregister() for subscriber in self._subscribers], NODE_S)
 
     def _receive(self, topic: str, kind: str, message: Any) -> None:  # noqa: ANN401 - messages are untyped
         fields = fields_of(message)
         self._inbox.put(ReceivedMessage(topic, kind, fields, time.time_ns()), weight_of(fields))
-
-
-def _succeeds_in_time(work: Callable[[], object]) -> bool:
-    """Return whether `work`, which asks the master, succeeds in time. Its thread may be left behind."""
-    problems: list[Exception] = []
-
-    def watched() -> None:
-        try:
-            work()
-        except Exception as problem:  # noqa: BLE001 - the caller learns that it failed
-            problems.append(problem)
-
-    doing = threading.Thread(target=watched, daemon=True, name="asks the master")
-    doing.start()
-    doing.join(NODE_S)
-    return not doing.is_alive() and not problems

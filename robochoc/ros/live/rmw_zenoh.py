@@ -1,0 +1,111 @@
+"""rmw_zenoh: topics of a ROS 2 whose middleware is zenoh, so that no ROS has to be installed here."""
+
+from __future__ import annotations
+
+import os
+import time
+from collections.abc import Mapping
+from functools import partial
+
+from robochoc.formats.diagnostics import on_one_line
+from robochoc.ros.live.inbox import RosInbox, weight_of
+from robochoc.ros.live.rmw_zenoh_keys import NO_HASH, Topic
+from robochoc.ros.live.rmw_zenoh_session import RosPublisher, RosSession
+from robochoc.ros.recordings.types import FieldsError, UnknownTypeError, types_of
+from robochoc.ros.sink import Fields, Sink, SinkError
+from robochoc.ros.source import ReceivedMessage, Source, SourceError
+
+MESSAGE_BYTES_MAX = 256 * 1024
+"""A longer message is ignored: reports are short."""
+_CHECK_S = 1.0
+
+
+class RmwZenohSink(Sink):
+    """Publishes by a zenoh router. Topics are reliable and transient local: late subscribers receive the last message.
+
+    With `ROS_DISTRO=humble` keys are those of ROS 2 Humble, which have no hash of the type.
+    """
+
+    def __init__(self, place: str) -> None:
+        super().__init__(place)
+        self._is_humble = os.environ.get("ROS_DISTRO") == "humble"
+        self._publishers: dict[str, RosPublisher] = {}
+        self._session = RosSession(place, SinkError)
+
+    def advertise(self, topics: Mapping[str, str]) -> None:
+        """Declare publishers, which others see from now on."""
+        new = {topic: kind for topic, kind in topics.items() if topic not in self._publishers}
+        for topic, kind in new.items():
+            try:
+                type_hash = types_of(2).type_hash(kind)
+            except UnknownTypeError as error:
+                raise SinkError(on_one_line(f"{topic}: {error}")) from error
+            named = Topic.of(topic, kind, NO_HASH if self._is_humble else type_hash)
+            self._publishers[topic] = self._session.publisher(named)
+
+    def publish(self, topic: str, kind: str, fields: Fields, at_ns: int) -> None:
+        """Publish a message. It leaves in the background."""
+        self.advertise({topic: kind})
+        try:
+            content = types_of(2).encode(kind, fields)
+        except FieldsError as error:
+            raise SinkError(on_one_line(f"{topic}: {error}")) from error
+        self._session.wait_for_link()
+        self._publishers[topic].put(content, at_ns)
+
+    def close(self) -> None:
+        """Wait until the router has been sent everything."""
+        try:
+            self._session.wait_for_link()
+        except SinkError:
+            self.discard()
+            raise
+        if not self._session.close():
+            raise SinkError(f"the zenoh router {self._session.router} does not take our messages; see its log")
+
+    def discard(self) -> None:
+        """End the session."""
+        self._session.close()
+
+
+class RmwZenohSource(Source):
+    """Receives by a zenoh router. Malformed messages, and those of another definition of their type, are ignored."""
+
+    def __init__(self, place: str) -> None:
+        super().__init__(place)
+        self._inbox = RosInbox()
+        self._session = RosSession(place, SourceError)
+
+    def listen(self, topics: Mapping[str, str]) -> None:
+        """Subscribe to `topics`."""
+        for name, kind in topics.items():
+            try:
+                topic = Topic.of(name, kind, types_of(2).type_hash(kind))
+            except UnknownTypeError as error:
+                raise SourceError(on_one_line(f"{name}: {error}")) from error
+            self._session.subscribe(topic, partial(self._receive, topic, kind))
+
+    def next(self, wait_s: float) -> ReceivedMessage | None:
+        """Return the oldest message that is here, or that comes within `wait_s`."""
+        until = time.monotonic() + wait_s
+        while True:
+            left = until - time.monotonic()
+            received = self._inbox.get(min(max(left, 0), _CHECK_S))
+            if received is not None:
+                return received
+            self._session.check()
+            if left <= 0:
+                return None
+
+    def close(self) -> None:
+        """End the session."""
+        self._session.close()
+
+    def _receive(self, topic: Topic, kind: str, key: str, content: bytes) -> None:
+        if key.rpartition("/")[2] not in {topic.hash, NO_HASH} or len(content) > MESSAGE_BYTES_MAX:
+            return
+        try:
+            fields = types_of(2).decode(kind, content)
+        except FieldsError:
+            return
+        self._inbox.put(ReceivedMessage(topic.name, kind, fields, time.time_ns()), weight_of(fields))

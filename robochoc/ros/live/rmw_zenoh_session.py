@@ -1,0 +1,213 @@
+"""A session with the zenoh router of a ROS 2: it publishes bytes on topics, and receives them.
+
+This module and the network's (`communication/network`) alone know zenoh. The session is a client of the router, which
+forwards all; so it listens on no port. zenoh's calls may wait long, and hear no signals: those that open and close have
+a thread of their own. A link that breaks is opened anew by zenoh in the background, with all that was declared.
+"""
+
+from __future__ import annotations
+
+import os
+import socket
+import threading
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import NamedTuple
+from urllib.parse import urlsplit
+
+import zenoh
+import zenoh.ext
+
+from robochoc.communication.network.zenoh_config import config
+from robochoc.formats.diagnostics import on_one_line, shortened
+from robochoc.ros.live.in_time import succeeds_in_time
+from robochoc.ros.live.rmw_zenoh_keys import RosNode, Topic, attachment, gid_of
+from robochoc.ros.live.ros2_names import domain_id
+from robochoc.ros.live.ros_master import Failed
+
+PORT = 7447
+"""The default port of a zenoh router."""
+OPEN_S = 5.0
+"""The longest wait for the router's answer, in seconds."""
+LATE_S = 1.0
+"""Seconds after these in which zenoh itself must have given up."""
+GONE_S = 5.0
+"""The longest time for which the link may be broken, in seconds."""
+CLOSE_S = 10.0
+"""The longest time that closing may take, in seconds."""
+CONFIG_FILE = "ZENOH_SESSION_CONFIG_URI"
+"""The variable that names a file with a zenoh configuration, as for ROS 2 itself: certificates, an endpoint."""
+_HEARTBEAT_S = 0.5
+"""How soon a subscriber learns that it misses the last message, in seconds."""
+_START = "start one: `ros2 run rmw_zenoh_cpp rmw_zenohd`"
+
+Receive = Callable[[str, bytes], None]
+"""Called by zenoh's threads with the key of a message and its bytes."""
+
+
+class RouterAddress(NamedTuple):
+    """The address of a zenoh router."""
+
+    host: str
+    port: int
+
+    @classmethod
+    def of(cls, place: str) -> RouterAddress:
+        """Return the address that `place` names: `HOST`, `HOST:PORT`, `//HOST:PORT` or nothing. Raises `ValueError`."""
+        wanted = f"expected rmw_zenoh, or rmw_zenoh://HOST:PORT, as in rmw_zenoh://localhost:{PORT}"
+        text = place.removeprefix("//")
+        try:
+            parts = urlsplit(f"//{text}")
+            port = PORT if parts.port is None else parts.port
+        except ValueError as error:
+            raise ValueError(f"{shortened(place)!r}: {on_one_line(str(error))}; {wanted}") from error
+        unknown = parts.path or parts.query or parts.fragment or parts.username
+        if unknown or port == 0 or (text and not parts.hostname):
+            raise ValueError(f"{shortened(place)!r} is no place of a zenoh router; {wanted}")
+        return cls(parts.hostname or "localhost", port)
+
+    def __str__(self) -> str:
+        return f"{f'[{self.host}]' if ':' in self.host else self.host}:{self.port}"
+
+
+class RosPublisher:
+    """A publisher on one topic. Late subscribers receive its last message."""
+
+    def __init__(self, session: zenoh.Session, node: RosNode, topic: Topic, number: int) -> None:
+        token = node.entity_token(number, "MP", topic)
+        self._gid = gid_of(token)
+        self._published = 0
+        self._publisher = zenoh.ext.declare_advanced_publisher(
+            session,
+            topic.key(node.domain),
+            congestion_control=zenoh.CongestionControl.BLOCK,
+            reliability=zenoh.Reliability.RELIABLE,
+            cache=zenoh.ext.CacheConfig(1),
+            sample_miss_detection=zenoh.ext.MissDetectionConfig(heartbeat=None, sporadic_heartbeat=_HEARTBEAT_S),
+            publisher_detection=True,
+        )
+        self._token = session.liveliness().declare_token(token)
+
+    def put(self, content: bytes, at_ns: int) -> None:
+        """Publish a message. While a link takes nothing more, this waits; zenoh closes such a link after seconds."""
+        self._published += 1
+        self._publisher.put(content, attachment=attachment(self._published, at_ns, self._gid))
+
+
+class RosSession:
+    """A node of ROS 2 by the router at `place`. Raises `failed` where there is none, or when it is gone."""
+
+    def __init__(self, place: str, failed: Failed) -> None:
+        self._failed = failed
+        domain = domain_id(failed)
+        configured = os.environ.get(CONFIG_FILE, "").strip()
+        try:
+            address = None if configured and not place else RouterAddress.of(place)
+        except ValueError as error:
+            raise failed(str(error)) from error
+        self.router = on_one_line(f"of {configured}") if address is None else f"at {address}"
+        if address is not None:
+            self._reach(address)
+        self._session = self._opened(address, Path(configured) if configured else None)
+        self._node = RosNode(domain, str(self._session.zid()))
+        self._entities = 0
+        self._missed_since: float | None = None
+        self._declared: list[object] = [self._session.liveliness().declare_token(self._node.token)]
+
+    def publisher(self, topic: Topic) -> RosPublisher:
+        """Return a publisher on `topic`, which others see from now on."""
+        self._entities += 1
+        return RosPublisher(self._session, self._node, topic, self._entities)
+
+    def subscribe(self, topic: Topic, receive: Receive) -> None:
+        """Pass what is published on `topic` to `receive`, whatever its type's hash. Last messages come at once."""
+        self._entities += 1
+
+        def take(sample: zenoh.Sample) -> None:
+            receive(str(sample.key_expr), sample.payload.to_bytes())
+
+        subscriber = zenoh.ext.declare_advanced_subscriber(
+            self._session,
+            topic.any_key(self._node.domain),
+            zenoh.handlers.Callback(take, indirect=False),
+            history=zenoh.ext.HistoryConfig(detect_late_publishers=True, max_samples=1),
+            recovery=zenoh.ext.RecoveryConfig(periodic_queries=None, heartbeat=True),
+            subscriber_detection=True,
+        )
+        token = self._session.liveliness().declare_token(self._node.entity_token(self._entities, "MS", topic))
+        self._declared += [subscriber, token]
+
+    def check(self) -> None:
+        """Raise `failed` if the router has been out of reach for `GONE_S`."""
+        info = self._session.info
+        if [*info.routers_zid(), *info.peers_zid()]:
+            self._missed_since = None
+            return
+        now = time.monotonic()
+        self._missed_since = now if self._missed_since is None else self._missed_since
+        if now - self._missed_since > GONE_S:
+            raise self._failed(f"the zenoh router {self.router} is gone; {_START}")
+
+    def wait_for_link(self) -> None:
+        """Return when there is a link. Raises `failed` if there is none for `GONE_S`."""
+        self.check()
+        while self._missed_since is not None:
+            time.sleep(0.02)
+            self.check()
+
+    def close(self) -> bool:
+        """End the session; return whether zenoh has sent all that it had taken over."""
+        return succeeds_in_time(self._session.close, CLOSE_S)
+
+    def _reach(self, address: RouterAddress) -> None:
+        """Raise `failed` at once where nobody listens; zenoh would try on."""
+        try:
+            socket.create_connection(address, OPEN_S).close()
+        except (OSError, UnicodeError) as error:
+            why = shortened(on_one_line(getattr(error, "strerror", None) or str(error) or type(error).__name__))
+            raise self._failed(f"no zenoh router listens at {address} ({why}); {_START}") from error
+
+    def _opened(self, address: RouterAddress | None, file: Path | None) -> zenoh.Session:
+        settings: dict[str, object] = {
+            "mode": "client",
+            "listen/endpoints": [],
+            "connect/timeout_ms": int(OPEN_S * 1000),
+            "connect/exit_on_failure": True,
+        }
+        if address is not None:
+            settings["connect/endpoints"] = [f"tcp/{address}"]
+        try:
+            made = config(settings, file)
+        except zenoh.ZError as error:
+            why = shortened(on_one_line(str(error)))
+            raise self._failed(f"{CONFIG_FILE} names no zenoh configuration: {why}") from error
+        opening = _Opening()
+        succeeds_in_time(lambda: opening.take(zenoh.open(made)), OPEN_S + LATE_S)
+        session = opening.session_in_time()
+        if session is None:
+            raise self._failed(f"what listens as the zenoh router {self.router} does not answer as one; {_START}")
+        return session
+
+
+class _Opening:
+    """A session that is being opened in a thread, which closes it again if it comes too late."""
+
+    def __init__(self) -> None:
+        self._lock = threading.Lock()
+        self._session: zenoh.Session | None = None
+        self._is_late = False
+
+    def take(self, session: zenoh.Session) -> None:
+        """Take the session, in the thread that has opened it."""
+        with self._lock:
+            self._session = session
+            is_late = self._is_late
+        if is_late:
+            session.close()  # type: ignore[no-untyped-call]  # zenoh's stubs
+
+    def session_in_time(self) -> zenoh.Session | None:
+        """Return the session; None if it is not there, and comes too late from now on."""
+        with self._lock:
+            self._is_late = True
+            return self._session
