@@ -21,6 +21,7 @@ import flight
 import journals
 import messages
 import network
+import other_flight
 import own_studies
 import peers
 import simulator
@@ -49,6 +50,7 @@ LONG: dict[str, Callable[[], Section]] = {
     "network": network.measured,
     "sniffer": sniffer.measured,
     "app": app_pages.measured,
+    "rotorpy": other_flight.measured,
 }
 """Parts that take longer than all others together, measured only when they are named."""
 ALL = {**PARTS, **LONG}
