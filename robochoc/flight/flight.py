@@ -37,7 +37,7 @@ from robochoc.flight.quadrotor.trajectory import STOP_S, Trajectory
 from robochoc.flight.reports import Blocked, OutOfOrder, Report
 from robochoc.flight.routes.motion import MotionLimits, RoutePlan
 from robochoc.flight.routes.moves import NoRouteError
-from robochoc.flight.routes.spacing import TooCloseError
+from robochoc.flight.routes.spacing import TooCloseError, squashed
 from robochoc.flight.routes.timetable import plan_routes
 
 DISTANCE_M = 0.5
@@ -95,10 +95,10 @@ class Flight:
         self._origin = origin_of(homes)
         self._homes = homes - self._origin
         self._ground = float(self._homes[:, 2].min())
-        self._distance = conditions.distance or _distance([self._homes])
-        check_separation(
-            "homes", self.names, {number: (x, y, z) for number, (x, y, z) in enumerate(homes)}, self._distance
-        )
+        self._downwash = conditions.downwash
+        self._distance = conditions.distance or _distance([self._homes], self._downwash)
+        places: dict[int, Point] = {number: (x, y, z) for number, (x, y, z) in enumerate(homes)}
+        check_separation("homes", self.names, places, self._distance, self._downwash)
         check_near(["an obstacle"] * len(conditions.obstacles), conditions.obstacles)
         self._obstacles = np.array(conditions.obstacles, dtype=np.float64).reshape(-1, 3) - self._origin
         self._known = np.zeros(len(self._obstacles), dtype=np.bool_)
@@ -127,6 +127,8 @@ class Flight:
                 leave no way.
         """
         began = time.perf_counter()
+        if blocks and self._downwash > 1:
+            raise ValueError("with downwash nothing may be in the way, as the blocks of a map are")
         with np.errstate(all="ignore"):  # the simulation looks for numbers that are none
             self._blocks = np.array(blocks, dtype=np.float64).reshape(-1, 3) - self._origin
             leg_goals = self._leg_goals(goals)
@@ -160,6 +162,7 @@ class Flight:
             nearest=simulation.separation.nearest,
             nearest_fallen=simulation.separation.nearest_fallen,
             distance=self._distance,
+            downwash=self._downwash,
             obstacles=self.conditions.obstacles,
             seen_s=tuple(self._seen_s),
             wall_s=self._wall_s,
@@ -183,10 +186,11 @@ class Flight:
         places = np.array([goal.at for goal in goals.values()]).reshape(-1, 3)
         check_near([self.names[number] for number in goals], places)
         if self.conditions.distance is None:
-            self._distance = min(self._distance, _distance([places]))
+            self._distance = min(self._distance, _distance([places], self._downwash))
         moved = [(x, y, z) for x, y, z in (places - self._origin).tolist()]
         goals = {number: replace(goal, at=at) for (number, goal), at in zip(goals.items(), moved, strict=True)}
-        leg_goals = LegGoals(self.names, goals, simulation.setpoints[:3].T, simulation.failed, self._distance)
+        starts = simulation.setpoints[:3].T
+        leg_goals = LegGoals(self.names, goals, starts, simulation.failed, self._distance, self._downwash)
         self._asked.update(goals)
         return leg_goals
 
@@ -257,6 +261,7 @@ class Flight:
                 limits=LIMITS,
                 ground=self._ground,
                 rises=self._rises,
+                downwash=self._downwash,
             )
         except (TooCloseError, NoRouteError) as refused:
             raise ValueError(self._refusal(refused, who)) from refused
@@ -343,13 +348,14 @@ def fly(
         goals = [np.array([goal.at for goal in leg.goals.values()]).reshape(-1, 3) for leg in mission.legs]
         for leg, places in zip(mission.legs, goals, strict=True):
             check_near([names[number] for number in leg.goals], places)
-        conditions = replace(conditions, distance=_distance([homes, *goals]))
+        conditions = replace(conditions, distance=_distance([homes, *goals], conditions.downwash))
     flight = Flight(names, homes, conditions, progress, rises=mission.rises)
     for number, leg in enumerate(mission.legs):
         flight.fly(leg.opened_by, leg.goals, blocks=[block.at for block in mission.blocks if block.leg <= number])
     return flight.flown()
 
 
-def _distance(places: Sequence[Array]) -> float:
+def _distance(places: Sequence[Array], downwash: float) -> float:
     """Return the default distance: `DISTANCE_M`, or less where two points of the same (K, 3) array are nearer."""
-    return max(DISTANCE_MIN_M, min(DISTANCE_M, *(_SHARE * nearest_two(points) for points in places)))
+    nearest = (nearest_two(squashed(points, downwash)) for points in places)
+    return max(DISTANCE_MIN_M, min(DISTANCE_M, *(_SHARE * apart for apart in nearest)))

@@ -60,6 +60,7 @@ class FlightLog:
         obstacles: All obstacles.
         wall_s: How long simulation and planning took.
         seen_s: When each obstacle was seen first; 0 for one that the planner knew.
+        downwash: The number by which heights are divided in `nearest` and `distance`.
     """
 
     names: tuple[str, ...]
@@ -75,6 +76,7 @@ class FlightLog:
     obstacles: tuple[Point, ...]
     wall_s: float
     seen_s: tuple[float, ...] = ()
+    downwash: float = 1.0
 
     @property
     def simulated_s(self) -> float:

@@ -45,6 +45,7 @@ class FlightSettings:
     wind: Point = (0.0, 0.0, 0.0)
     gusts: float = 0.0
     seed: int = 0
+    downwash: float = 1.0
     failures: tuple[tuple[str, float], ...] = ()
     obstacles: tuple[Point, ...] = ()
 
@@ -59,6 +60,7 @@ class FlightSettings:
             wind=self.wind,
             gusts=self.gusts,
             seed=self.seed,
+            downwash=self.downwash,
             failures=tuple(MotorFailure(_named(drones, name), at_s) for name, at_s in self.failures),
             obstacles=tuple((x * scale, y * scale, z * scale) for x, y, z in self.obstacles),
         )

@@ -13,6 +13,7 @@ from robochoc.cli.options.pages import html_option, serve_option
 from robochoc.cli.options.paths import InputPath, refuse_same_places
 from robochoc.cli.options.ros import (
     FRAME,
+    downwash_option,
     flight_options,
     ros_options,
 )
@@ -28,7 +29,7 @@ if TYPE_CHECKING:
 
 _SECTIONS: Sections = {
     COMMON: ("--html", "--serve", "--json", "--team", "--map", "--help"),
-    "Simulated flight": ("--fail", "--distance", "--wind", "--gusts", "--seed"),
+    "Simulated flight": ("--fail", "--distance", "--downwash", "--wind", "--gusts", "--seed"),
     "ROS (docs/guides/ros.md)": ("--ros", "--frame", "--scale"),
 }
 
@@ -39,6 +40,7 @@ _SECTIONS: Sections = {
 @map_option
 @ros_options
 @flight_options
+@downwash_option
 @click.option("--seed", type=click.IntRange(0), default=0, show_default=True, metavar="N", help="Seed of --gusts.")
 @html_option()
 @serve_option

@@ -67,6 +67,13 @@ flight_options = _optional(
 )
 """`--fail`, `--distance`, `--wind`, `--gusts`."""
 
+downwash_option = click.option(
+    "--downwash",
+    type=Finite(1),
+    metavar="FACTOR",
+    help="Drones keep so many distances right above each other.  [default: 1]",
+)
+
 situation_options = _optional(
     click.option(
         "--situation",

@@ -95,8 +95,10 @@ def _arrival(flown: FlightLog) -> str:
 def _apart(flown: FlightLog) -> str:
     near = flown.nearest
     word = "nearer than set" if near and near.distance_m < flown.distance else "nearest"
+    word += f", heights divided by {flown.downwash:g}" * (flown.downwash != 1)
     told = [f"{word}: {_pair(flown, near)}" if near else "nobody met anybody"]
-    told.append(f"set: {_length(flown.distance)}")
+    above = f", {_length(flown.downwash * flown.distance)} above each other" * (flown.downwash != 1)
+    told.append(f"set: {_length(flown.distance)}{above}")
     if flown.nearest_fallen:
         told.append(f"with one that fell: {_pair(flown, flown.nearest_fallen)}")
     return "; ".join(told)
@@ -145,6 +147,7 @@ def flight_json(mission: Mission, flown: FlightLog) -> bytes:
         "flight_s": float(flown.times[-1]) if len(flown.times) else 0.0,
         "wall_s": flown.wall_s,
         "distance_m": flown.distance,
+        "downwash": flown.downwash,
         "nearest": _approach(flown, flown.nearest),
         "nearest_fallen": _approach(flown, flown.nearest_fallen),
         "drones": [

@@ -11,6 +11,7 @@ from robochoc.flight.quadrotor.airframe import ROTORS
 
 WIND_MAX_M_S = 200.0
 """No wind on the ground is faster."""
+DOWNWASH_MAX = 100.0
 DISTANCE_MIN_M = 0.01
 """The planner's time steps are short enough for this distance."""
 
@@ -31,6 +32,8 @@ class FlightConditions:
     Attributes:
         distance: Metres between drones' centres that all routes keep; None: 0.5, or less where homes or goals are
             nearer to each other.
+        downwash: How many distances drones keep right above each other: for routes they are ellipsoids so much taller
+            than wide. Above 1 nothing else may be in the way: neither obstacles nor drones that fall.
         wind: The mean velocity of the wind, in m/s.
         gusts: The standard deviation of each component of the wind, in m/s.
         seed: The seed of the gusts.
@@ -42,6 +45,7 @@ class FlightConditions:
     """
 
     distance: float | None = None
+    downwash: float = 1.0
     wind: Point = (0.0, 0.0, 0.0)
     gusts: float = 0.0
     seed: int = 0
@@ -49,9 +53,7 @@ class FlightConditions:
     obstacles: tuple[Point, ...] = ()
 
     def __post_init__(self) -> None:
-        if self.distance is not None and not DISTANCE_MIN_M <= self.distance < math.inf:
-            wanted = f"a positive number of metres, {DISTANCE_MIN_M:g} at least, not {self.distance}"
-            raise ValueError(f"the distance between drones has to be {wanted}")
+        self._check_distances()
         if not 0 <= self.gusts <= WIND_MAX_M_S:
             raise ValueError(f"gusts have to be a number from 0 to {WIND_MAX_M_S:g} m/s, not {self.gusts}")
         if max(map(abs, self.wind), default=0) > WIND_MAX_M_S:
@@ -67,6 +69,15 @@ class FlightConditions:
                 raise ValueError(f"drone {failure.drone} has motors 0 to {ROTORS - 1}, no motor {failure.motor}")
             if not 0 <= failure.at_s < math.inf:
                 raise ValueError(f"a motor can stop from second 0 on, not at {failure.at_s}")
+
+    def _check_distances(self) -> None:
+        if self.distance is not None and not DISTANCE_MIN_M <= self.distance < math.inf:
+            wanted = f"a positive number of metres, {DISTANCE_MIN_M:g} at least, not {self.distance}"
+            raise ValueError(f"the distance between drones has to be {wanted}")
+        if not 1 <= self.downwash <= DOWNWASH_MAX:
+            raise ValueError(f"downwash has to be a number from 1 to {DOWNWASH_MAX:g}, not {self.downwash}")
+        if self.downwash > 1 and (self.failures or self.obstacles):
+            raise ValueError("with downwash neither motors can fail nor obstacles be in the way")
 
     def check(self, names: Collection[str]) -> None:
         """Raise `ValueError` if a drone of `failures` is not among `names`."""

@@ -15,7 +15,7 @@ from robochoc.flight.quadrotor.airframe import Array
 from robochoc.flight.quadrotor.conditions import DISTANCE_MIN_M
 from robochoc.flight.quadrotor.free_points import free_point, nearest_distances, nearest_two
 from robochoc.flight.quadrotor.rigid_bodies import Mask
-from robochoc.flight.routes.spacing import SLACK_M
+from robochoc.flight.routes.spacing import SLACK_M, squashed
 
 MARGIN_M = 0.1
 """The margin that routes keep beyond the distance. Tracking errors take 1 cm of it in calm air, and 6 cm where a drone
@@ -44,26 +44,35 @@ class Hazards:
 class LegGoals:
     """The `places` (N, 3) to fly to: the `goals`, or the `starts` of drones without a goal. Failed drones do not count.
 
+    All distances are those of heights that are divided by `downwash`.
+
     Raises:
         ValueError: Two goals are nearer to each other than `distance`.
     """
 
     def __init__(
-        self, names: Sequence[str], goals: Mapping[int, Goal], starts: Array, failed: Mask, distance: float
+        self,
+        names: Sequence[str],
+        goals: Mapping[int, Goal],
+        starts: Array,
+        failed: Mask,
+        distance: float,
+        downwash: float = 1.0,
     ) -> None:
+        self._downwash = downwash
         self.who = np.flatnonzero(~failed)
         self.goals = {number: goal for number, goal in goals.items() if not failed[number]}
         self.places = np.array(starts)
         for number, goal in self.goals.items():
             self.places[number] = goal.at
         self._distance = distance
-        check_separation("goals", names, {number: goal.at for number, goal in self.goals.items()}, distance)
+        check_separation("goals", names, {number: goal.at for number, goal in self.goals.items()}, distance, downwash)
 
     def planned(self, starts: Array, hazards: Hazards | None = None) -> float:
         """Return the distance that routes from `starts` (N, 3) keep: with the margin, or what places leave of it."""
-        leave = min(nearest_two(starts[self.who]), nearest_two(self.places[self.who]))
+        leave = min(nearest_two(self._flat(starts[self.who])), nearest_two(self._flat(self.places[self.who])))
         if hazards is not None:
-            apart = nearest_distances(hazards.points, self._ends(starts))
+            apart = nearest_distances(self._flat(hazards.points), self._ends(starts))
             leave = min(leave, float(apart[apart >= self._distance].min(initial=np.inf)))
         return max(self._distance, min(self._distance + MARGIN_M, _ALL_BUT * leave))
 
@@ -82,25 +91,30 @@ class LegGoals:
                 why = "something is there"
             elif (
                 goal is None
-                and nearest_distances(place[None], self.places[going])[0] < needed(self._distance) - SLACK_M
+                and nearest_distances(self._flat(place[None]), self._flat(self.places[going]))[0]
+                < needed(self._distance) - SLACK_M
             ):
                 why = "another one flies to where it is"
             else:
                 continue
             low = goal.lands if goal is not None else place[2] <= ground + _LOW_M
             radii = np.full(len(others), self._distance + MARGIN_M)
-            taken = Hazards(np.vstack((others, hazards.points)), np.concatenate((radii, hazards.radii)))
-            self.places[number] = free_point(preferred[number], taken.points, taken.radii, ground, low=bool(low))
+            taken, radii = self._flat(np.vstack((others, hazards.points))), np.concatenate((radii, hazards.radii))
+            spot = free_point(self._flat(preferred[number]), taken, radii, ground / self._downwash, low=bool(low))
+            self.places[number] = squashed(spot, 1 / self._downwash)
             off = float(np.sqrt(np.square(self.places[number] - place).sum()))
             moved.append((number, f"{'lands' if low else 'hovers'} {off:.2f} m beside its place: {why}"))
         return moved
 
     def standing(self, hazards: Hazards, starts: Array, planned: float) -> Array:
         """Return the hazards that routes can avoid: no drone starts or ends too near to them."""
-        return np.asarray(hazards.points[nearest_distances(hazards.points, self._ends(starts)) >= planned])
+        return np.asarray(hazards.points[nearest_distances(self._flat(hazards.points), self._ends(starts)) >= planned])
 
     def _ends(self, starts: Array) -> Array:
-        return np.vstack((starts[self.who], self.places[self.who]))
+        return self._flat(np.vstack((starts[self.who], self.places[self.who])))
+
+    def _flat(self, points: Array) -> Array:
+        return squashed(points, self._downwash)
 
 
 def needed(distance: float) -> float:
@@ -108,11 +122,15 @@ def needed(distance: float) -> float:
     return distance + min(MARGIN_M, distance / 4)
 
 
-def check_separation(what: str, names: Sequence[str], places: Mapping[int, Point], distance: float) -> None:
+def check_separation(
+    what: str, names: Sequence[str], places: Mapping[int, Point], distance: float, downwash: float = 1.0
+) -> None:
     """Raise `ValueError` if two of `places`, by drones' numbers, are too near to keep `distance`."""
     least = needed(distance) - SLACK_M
-    if nearest_two(np.array([*places.values()]).reshape(-1, 3)) >= least:
+    if nearest_two(squashed(np.array([*places.values()]).reshape(-1, 3), downwash)) >= least:
         return
+    places = {number: (x, y, z / downwash) for number, (x, y, z) in places.items()}
+    heights = f" with heights divided by the downwash of {downwash:g}" * (downwash != 1)
     for (first, one), (second, other) in combinations(places.items(), 2):
         gap = math.dist(one, other)
         if gap < least:
@@ -126,7 +144,7 @@ def check_separation(what: str, names: Sequence[str], places: Mapping[int, Point
                 else "ask for a larger scale"
             )
             raise ValueError(
-                f"the {what} of {names[first]} and {names[second]} are {apart} m apart, and {asked}: {step}"
+                f"the {what} of {names[first]} and {names[second]} are {apart} m apart{heights}, and {asked}: {step}"
             )
 
 

@@ -14,6 +14,7 @@ import numpy.typing as npt
 from robochoc.flight.log import ClosestApproach
 from robochoc.flight.quadrotor.airframe import Array
 from robochoc.flight.quadrotor.rigid_bodies import Mask
+from robochoc.flight.routes.spacing import squashed
 
 _REACH_M = 0.5
 _ROUNDING_M = 1e-6
@@ -21,9 +22,13 @@ _ROUNDING_M = 1e-6
 
 
 class SeparationMonitor:
-    """Measures all drones' distances at every step. Pairs with a drone that falls, or has fallen, count separately."""
+    """Measures all drones' distances at every step. Pairs with a drone that falls, or has fallen, count separately.
 
-    def __init__(self, number: int) -> None:
+    Heights are divided by `downwash` before.
+    """
+
+    def __init__(self, number: int, downwash: float = 1.0) -> None:
+        self._downwash = downwash
         self.nearest: ClosestApproach | None = None
         self.nearest_fallen: ClosestApproach | None = None
         self._pairs = np.triu_indices(number, 1)
@@ -37,6 +42,7 @@ class SeparationMonitor:
         """Measure the positions (3, N) at a time."""
         if not len(self._pairs[0]):
             return
+        places = squashed(places.T, self._downwash).T if self._downwash != 1 else places
         if self._anchor is None or self._moved(places, self._anchor):
             self._list(places)
         apart = places.take(self._first, 1)

@@ -49,7 +49,7 @@ class QuadrotorSimulation:
         self.hop_m = _HOP_M[1]
         self.failures: list[tuple[int, str, float]] = []
         """Drones that cannot fly any more: number, reason, time in seconds."""
-        self.separation = SeparationMonitor(number)
+        self.separation = SeparationMonitor(number, conditions.downwash)
         self.failed: Mask = np.zeros(number, dtype=np.bool_)
         """(N,): the drones that fall or have fallen."""
         self._names = names

@@ -15,7 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from robochoc.flight.routes.spacing import Array, norms
+from robochoc.flight.routes.spacing import Array, norms, squashed
 
 _TOP_SPEED = 15 / 8
 """The greatest speed of minimum-jerk motion over a unit of length in a unit of time; half way."""
@@ -52,12 +52,15 @@ class Motion:
 
 
 class Route:
-    """One drone's motion along a path (K + 1, 3), from rest to rest. Time begins at 0 with it."""
+    """One drone's motion along a path (K + 1, 3), from rest to rest. Time begins at 0 with it.
 
-    def __init__(self, drone: int, path: Array, limits: MotionLimits) -> None:
+    Heights of the path are divided by `downwash`; `limits` are of the motion where they are not.
+    """
+
+    def __init__(self, drone: int, path: Array, limits: MotionLimits, downwash: float = 1.0) -> None:
         self.drone = drone
         self.path = path
-        self._durations = limits.durations(norms(np.diff(path, axis=0)))
+        self._durations = limits.durations(norms(squashed(np.diff(path, axis=0), 1 / downwash)))
         self._ends = np.cumsum(self._durations)
         self.duration_s = float(self._ends[-1])
 
@@ -92,16 +95,20 @@ class _Window:
 
 
 class RoutePlan:
-    """The positions of all drones from second 0 to `duration_s`. `plan_routes` makes it."""
+    """The positions of all drones from second 0 to `duration_s`. `plan_routes` makes it.
 
-    def __init__(self, starts: Array, flights: Sequence[tuple[Route, float]]) -> None:
-        self._starts = starts.copy()
+    Heights of `starts` and `flights` are divided by `downwash`, those of the plan are not.
+    """
+
+    def __init__(self, starts: Array, flights: Sequence[tuple[Route, float]], downwash: float = 1.0) -> None:
+        self._starts = squashed(starts, 1 / downwash)
         found = [(flight.drone, flight.pieces(begins)) for flight, begins in flights]
         drones = np.repeat([drone for drone, _ in found], [len(pieces[0]) for _, pieces in found]).astype(np.intp)
         joined = [np.concatenate([pieces[part] for _, pieces in found]) for part in range(5)] if found else _NONE
         order = np.argsort(joined[0], kind="stable")
         self._drones = drones[order]
         self._begins, self._ends, self._durations, self._origins, self._goals = (part[order] for part in joined)
+        self._origins, self._goals = squashed(self._origins, 1 / downwash), squashed(self._goals, 1 / downwash)
         self._bounds: list[float] = np.unique(np.concatenate((self._begins, self._ends))).tolist()
         self.duration_s: float = self._bounds[-1] if self._bounds else 0.0
         self._window = self._window_at(0.0)

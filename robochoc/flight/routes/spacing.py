@@ -17,6 +17,11 @@ SLACK_M = 1e-10
 """Rounding: nearer than the distance by no more than this is not too near."""
 
 
+def squashed(points: Array, downwash: float) -> Array:
+    """Return `points` (..., 3) with their heights divided by `downwash`: balls around them are tall ellipsoids here."""
+    return np.asarray(points / np.array([1.0, 1.0, downwash]))
+
+
 class TooCloseError(ValueError):
     """Two drones, or a drone and a standing point, would rest nearer to each other than the distance.
 

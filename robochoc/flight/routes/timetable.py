@@ -26,7 +26,7 @@ from numpy.typing import NDArray
 from robochoc.flight.routes.motion import MotionLimits, Route, RoutePlan
 from robochoc.flight.routes.moves import Move, moves_between
 from robochoc.flight.routes.paths import Space
-from robochoc.flight.routes.spacing import Array, Flags, check_spacing, closest_approach, norms
+from robochoc.flight.routes.spacing import Array, Flags, check_spacing, closest_approach, norms, squashed
 
 Steps = NDArray[np.int64]
 
@@ -43,7 +43,7 @@ _LANES = 4
 _FOREVER = 2**62
 
 
-def plan_routes(
+def plan_routes(  # noqa: PLR0913 - a problem of planning, in its own words
     starts: Array,
     goals: Array,
     *,
@@ -53,8 +53,12 @@ def plan_routes(
     limits: MotionLimits | None = None,
     ground: float = 0.0,
     rises: bool = False,
+    downwash: float = 1.0,
 ) -> RoutePlan:
     """Return how N drones fly from `starts` to `goals`, never nearer to each other than `distance`.
+
+    With a `downwash` above 1, a drone is an ellipsoid for the others, and so many times as tall as it is wide: the
+    plan is one of balls where heights are divided by it.
 
     The result is the same each time. Lengths are in metres.
 
@@ -67,6 +71,7 @@ def plan_routes(
         limits: Speed and acceleration of all drones.
         ground: No drone flies lower, except for starts and goals.
         rises: Drones leave the ground, and land, straight up and down where they can.
+        downwash: The distance needed right above each other, in distances; 1 at least.
 
     Raises:
         TooCloseError: Two starts, or two goals, or one of them and a standing point, are nearer than `distance`.
@@ -78,12 +83,16 @@ def plan_routes(
     delays = np.zeros(len(starts)) if delays is None else np.asarray(delays, dtype=float)
     if not (0 < distance < math.inf and math.isfinite(ground) and np.isfinite(delays).all()):
         raise ValueError(f"distance {distance}, ground {ground} and all delays must be finite, the distance positive")
+    if not 1 <= downwash < math.inf:
+        raise ValueError(f"downwash is a number from 1 on, not {downwash}")
+    starts, goals, standing = (squashed(points, downwash) for points in (starts, goals, standing))
+    ground /= downwash
     _check_counts(starts, goals, delays)
     check_spacing(starts, standing, distance, "start")
     check_spacing(goals, standing, distance, "goal")
     heights = np.concatenate((starts[:, 2], goals[:, 2], standing[:, 2], [ground]))
     space = Space(distance, ground, float(heights.max()) + 2 * distance, rises)
-    table = _Timetable(starts, space, limits or MotionLimits(), delays)
+    table = _Timetable(starts, space, limits or MotionLimits(), delays, downwash)
     for move in moves_between(starts, goals, standing, space, delays):
         table.add(move)
     return table.plan()
@@ -135,8 +144,9 @@ class _Entry:
 class _Timetable:
     """The scheduled moves, and where all drones rest in between."""
 
-    def __init__(self, starts: Array, space: Space, limits: MotionLimits, delays: Array) -> None:
+    def __init__(self, starts: Array, space: Space, limits: MotionLimits, delays: Array, downwash: float) -> None:
         self._starts = starts
+        self._downwash = downwash
         self._space = space
         self._limits = limits
         self._step = min(_STEP_S, math.sqrt(4 * _BULGE * space.distance / limits.acceleration))
@@ -168,11 +178,12 @@ class _Timetable:
 
     def plan(self) -> RoutePlan:
         """Return all scheduled moves, in seconds."""
-        return RoutePlan(self._starts, [(entry.flight, entry.begins * self._step) for entry in self._entries])
+        flights = [(entry.flight, entry.begins * self._step) for entry in self._entries]
+        return RoutePlan(self._starts, flights, self._downwash)
 
     def _entry(self, drone: int, path: Array, earliest: int) -> _Entry:
         """Return the move along `path`, as early as possible."""
-        flight = Route(drone, path, self._limits)
+        flight = Route(drone, path, self._limits, self._downwash)
         steps = max(1, math.ceil(flight.duration_s / self._step))
         entry = _Entry(flight, flight.sample(self._step * np.arange(steps + 1, dtype=np.float64)), earliest)
         if earliest >= self._latest:
