@@ -267,7 +267,7 @@ def test_the_page_and_names_that_are_hostile(tmp_path: Path) -> None:
         (("--scale", 1e5), 1, "V1.2 would have 200,000 m to fly, and 2,000 m is the most: ask for a smaller scale"),
         (("--distance", 1e-9), 2, "positive number of metres, 0.01 at least"),
         (("--distance", "nan"), 2, "nan"),
-        (("--downwash", 2, "--fail", "Robot1.1"), 2, "with downwash neither motors can fail"),
+        (("--downwash", 2, "--fail", "V1.1"), 2, "with downwash neither motors can fail"),
         (("--downwash", 1000), 2, "downwash has to be a number from 1 to 100"),
         (("--wind", 500), 2, "faster than 200 m/s"),
         (("--gusts", 1e9), 2, "gusts have to be"),
