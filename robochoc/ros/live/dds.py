@@ -1,0 +1,147 @@
+"""DDS: topics of ROS 2 as its nodes have them, so that ROS 2 has to be nowhere but in the robots.
+
+A place is `dds:DOMAIN?OPTION=VALUE&...` (`dds_place.py`). Messages carry the bytes that ROS 2 would send.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Collection, Mapping
+from typing import NoReturn
+
+from robochoc.ros.live.dds_participant import MESSAGE_BYTES_MAX, Participant
+from robochoc.ros.live.dds_place import DdsPlace, Quality
+from robochoc.ros.live.inbox import PER_TOPIC_MAX, RosInbox
+from robochoc.ros.live.rospy_messages import weight_of
+from robochoc.ros.mappings import short_kind
+from robochoc.ros.names import REPORTS
+from robochoc.ros.recordings.types import FieldsError, UnknownTypeError, types_of
+from robochoc.ros.sink import Fields, Sink, SinkError
+from robochoc.ros.source import ReceivedMessage, Source, SourceError
+
+WAIT_S = 2.0
+"""The default wait for subscribers, in seconds."""
+SETTLE_S = 0.3
+"""No new subscriber has come for so many seconds: then all are there."""
+STUCK_S = 10.0
+"""The longest time for which a subscriber may leave messages unacknowledged, in seconds."""
+LINGER_S = 0.3
+"""Seconds for which topics stay after the last message. Some subscribers drop unread messages when a topic ends."""
+
+_PUBLISHED = Quality(reliable=True, latched=True, depth=1, wait_s=WAIT_S)
+_RECEIVED = Quality(reliable=False, latched=False, depth=PER_TOPIC_MAX)
+_OPTIONS = ("partition", "reliability", "durability", "depth")
+_CDR = (b"\0\0", b"\0\1")
+"""How messages in CDR begin, big-endian and little-endian."""
+
+
+class DdsSink(Sink):
+    """Publishes in a domain of DDS. Topics are latched, unless the place says otherwise.
+
+    Messages begin to leave when each waypoint's topic has a subscriber, or when the wait for that is over.
+    """
+
+    def __init__(self, place: str) -> None:
+        self._place = DdsPlace.of(place, _PUBLISHED, (*_OPTIONS, "wait"), SinkError)
+        super().__init__(f"domain {self._place.domain} of DDS")
+        self._participant = Participant(self._place, SinkError)
+        self._topics: dict[str, str] = {}
+
+    def advertise(self, topics: Mapping[str, str]) -> None:
+        """Announce `topics`, and wait for the subscribers of waypoints."""
+        new = {topic: kind for topic, kind in topics.items() if topic not in self._topics}
+        for topic, kind in new.items():
+            self._participant.announce(topic, kind)
+            self._topics[topic] = kind
+        self._gather([topic for topic, kind in new.items() if not _is_report(topic, kind)])
+
+    def publish(self, topic: str, kind: str, fields: Fields, at_ns: int) -> None:  # noqa: ARG002 - theirs is the clock
+        """Send a message. Waits where a subscriber is far behind."""
+        self.advertise({topic: kind})
+        try:
+            content = types_of(2).encode(kind, fields)
+        except (UnknownTypeError, FieldsError) as error:
+            raise SinkError(f"{topic} cannot be published: {error}") from error
+        if len(content) > MESSAGE_BYTES_MAX:
+            problem = f"a message on {topic} has {len(content):,} bytes"
+            raise SinkError(f"{problem}, and at most {MESSAGE_BYTES_MAX:,} are sent in DDS")
+        if not self._participant.write(topic, kind, content, STUCK_S):
+            self._stuck()
+
+    def close(self) -> None:
+        """Wait until all subscribers have acknowledged everything."""
+        try:
+            until = time.monotonic() + STUCK_S
+            for topic in self._topics:
+                while not self._participant.is_acknowledged(topic):
+                    if time.monotonic() > until:
+                        self._stuck()
+            if any(self._participant.subscribers(self._topics)):
+                time.sleep(LINGER_S)
+        finally:
+            self.discard()
+
+    def discard(self) -> None:
+        """Leave the domain."""
+        self._participant.close()
+
+    def _gather(self, topics: Collection[str]) -> None:
+        """Wait until each of `topics` has a subscriber and no more come; no longer than the place says."""
+        until = time.monotonic() + self._place.quality.wait_s
+        before, since, pause_s = 0, time.monotonic(), 0.01
+        while topics and time.monotonic() < until:
+            counts = self._participant.subscribers(topics)
+            now = time.monotonic()
+            if sum(counts) != before:
+                before, since = sum(counts), now
+            if all(counts) and now - since >= SETTLE_S:
+                return
+            time.sleep(pause_s)
+            pause_s = min(2 * pause_s, 0.1)
+
+    def _stuck(self) -> NoReturn:
+        raise SinkError(
+            f"a subscriber in domain {self._place.domain} of DDS has acknowledged nothing for {STUCK_S:g} s; "
+            "end it, or publish with reliability=best_effort"
+        )
+
+
+class DdsSource(Source):
+    """Receives in a domain of DDS. Messages that are none of their type are ignored.
+
+    Its readers are as those of ROS 2 for sensors, if the place does not say otherwise: they take reliable messages and
+    others.
+    """
+
+    def __init__(self, place: str) -> None:
+        super().__init__(place)
+        self._inbox = RosInbox()
+        self._participant = Participant(DdsPlace.of(place, _RECEIVED, _OPTIONS, SourceError), SourceError)
+        self._subscription = self._participant.subscribe({}, self._receive)
+
+    def listen(self, topics: Mapping[str, str]) -> None:
+        """Subscribe to `topics`."""
+        self._subscription.close()
+        self._subscription = self._participant.subscribe(topics, self._receive)
+
+    def next(self, wait_s: float) -> ReceivedMessage | None:
+        """Return the oldest message that is here, or that comes within `wait_s`."""
+        return self._inbox.get(wait_s)
+
+    def close(self) -> None:
+        """Leave the domain."""
+        self._subscription.close()
+        self._participant.close()
+
+    def _receive(self, topic: str, kind: str, content: bytes) -> None:
+        if content[:2] not in _CDR:
+            return
+        try:
+            fields = types_of(2).decode(kind, content)
+        except FieldsError:
+            return
+        self._inbox.put(ReceivedMessage(topic, kind, fields, time.time_ns()), weight_of(fields))
+
+
+def _is_report(topic: str, kind: str) -> bool:
+    return REPORTS.get(topic.rpartition("/")[2]) == short_kind(kind)

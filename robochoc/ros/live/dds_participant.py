@@ -1,0 +1,192 @@
+"""A participant of a DDS domain. This module, `dds_subscription` and `dds_types` alone know Cyclone DDS (cyclonedds).
+
+A process has each domain once. A sink and a source of the same domain share it; the last that leaves closes it.
+"""
+
+from __future__ import annotations
+
+import os
+import threading
+import time
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from contextlib import contextmanager
+from typing import Any
+
+from cyclonedds.core import DDSException, Policy, Qos
+from cyclonedds.domain import Domain, DomainParticipant
+from cyclonedds.internal import load_cyclonedds
+from cyclonedds.pub import DataWriter, Publisher
+from cyclonedds.sub import DataReader, Subscriber
+from cyclonedds.topic import Topic
+
+from robochoc.ros.live.dds_place import DdsPlace, Quality
+from robochoc.ros.live.dds_subscription import Subscription
+from robochoc.ros.live.dds_types import raw_type, topic_name
+from robochoc.ros.live.ros_master import Failed
+from robochoc.ros.recordings.types import UnknownTypeError, types_of
+
+CONFIGURATION_VARIABLE = "CYCLONEDDS_URI"
+MESSAGE_BYTES_MAX = 256 * 1024
+"""Longer messages are neither sent nor received: waypoints and reports are short."""
+BLOCKED_S = 0.2
+"""The time after which a call that waits for others comes back, so that a signal is heard."""
+_SECOND_NS = 1_000_000_000
+_LIMIT = (
+    "<CycloneDDS><Domain><Internal>"
+    f"<MaxSampleSize>{MESSAGE_BYTES_MAX} B</MaxSampleSize>"
+    "</Internal></Domain></CycloneDDS>"
+)
+
+
+class _Domains:
+    """The domains of this process that are in use, and by how many."""
+
+    def __init__(self) -> None:
+        self._lock = threading.Lock()
+        self._open: dict[int, tuple[Domain, int]] = {}
+
+    def enter(self, number: int) -> None:
+        """Open the domain if it is not. Raises `DDSException`, `UnicodeEncodeError`."""
+        with self._lock:
+            domain, users = self._open.get(number, (None, 0))
+            if domain is None:
+                given = os.environ.get(CONFIGURATION_VARIABLE, "")
+                domain = Domain(number, f"{given},{_LIMIT}" if given else _LIMIT)
+                # It writes on standard error, a line for each message of a stranger that it does not like.
+                load_cyclonedds().dds_set_log_mask(0)
+            self._open[number] = domain, users + 1
+
+    def leave(self, number: int) -> None:
+        """Close the domain if nobody else uses it."""
+        with self._lock:
+            domain, users = self._open.pop(number)
+            if users > 1:
+                self._open[number] = domain, users - 1
+
+
+_domains = _Domains()
+
+
+class Participant:
+    """A participant of the domain of `place`. Raises `failed`, as its methods do."""
+
+    def __init__(self, place: DdsPlace, failed: Failed) -> None:
+        self.domain, self._quality, self._failed = place.domain, place.quality, failed
+        self._writers: dict[str, Any] = {}
+        self._publisher: Any = None
+        self._participant: Any = None
+        joins = f"domain {self.domain} of DDS cannot be joined"
+        hint = f"; see {CONFIGURATION_VARIABLE}, and whether this machine has a network"
+        with self._reported(joins, hint):
+            _domains.enter(self.domain)
+        self._is_open = True
+        try:
+            with self._reported(joins, hint):
+                self._participant = DomainParticipant(self.domain)
+        except failed:
+            self.close()
+            raise
+
+    def announce(self, topic: str, kind: str) -> None:
+        """Make a writer for `topic`."""
+        with self._reported(f"{topic} cannot be announced in DDS"):
+            if self._publisher is None:
+                self._publisher = Publisher(self._participant, qos=_partitions(self._quality))
+            self._writers[topic] = DataWriter(
+                self._publisher, self._topic(topic, kind), qos=_of_writer(self._quality, kind)
+            )
+
+    def subscribe(self, topics: Mapping[str, str], take: Callable[[str, str, bytes], None]) -> Subscription:
+        """Return a subscription to `topics` with these types. It calls `take` with each message, in its own thread."""
+        with self._reported("the topics cannot be subscribed to in DDS"):
+            subscriber = Subscriber(self._participant, qos=_partitions(self._quality))
+            readers = [
+                (DataReader(subscriber, self._topic(topic, kind), qos=_of_reader(self._quality, kind)), topic, kind)
+                for topic, kind in topics.items()
+            ]
+            return Subscription(self._participant, readers, take)
+
+    def _topic(self, topic: str, kind: str) -> Any:  # noqa: ANN401 - types are made at run time
+        return Topic(self._participant, topic_name(topic), raw_type(kind))
+
+    def write(self, topic: str, kind: str, content: bytes, patience_s: float) -> bool:
+        """Publish a message; return False if a subscriber is behind, and stays so for `patience_s`."""
+        message = raw_type(kind)(content)
+        until = time.monotonic() + patience_s
+        while True:
+            try:
+                with self._reported(f"{len(content):,} bytes cannot be published on {topic} in DDS"):
+                    self._writers[topic].write(message)
+            except TimeoutError:
+                if time.monotonic() > until:
+                    return False
+            else:
+                return True
+
+    def subscribers(self, topics: Iterable[str]) -> list[int]:
+        """Return how many subscribers each of `topics` has now."""
+        with self._reported("the subscribers in DDS cannot be counted"):
+            return [int(self._writers[topic].get_publication_matched_status().current_count) for topic in topics]
+
+    def is_acknowledged(self, topic: str) -> bool:
+        """Return whether all reliable subscribers of `topic` have its messages. Waits for it, up to `BLOCKED_S`."""
+        with self._reported("DDS does not tell who has received what"):
+            try:
+                return bool(self._writers[topic].wait_for_acks(round(BLOCKED_S * _SECOND_NS)))
+            except AttributeError:  # cyclonedds 11.0.1 does not find its own constant when the time is over
+                return False
+
+    def close(self) -> None:
+        """Leave the domain. A second call does nothing."""
+        self._writers.clear()
+        self._publisher = self._participant = None
+        if self._is_open:
+            self._is_open = False
+            _domains.leave(self.domain)
+
+    @contextmanager
+    def _reported(self, what: str, hint: str = "") -> Iterator[None]:
+        """Raise what fails in DDS as `failed`, and `TimeoutError` where time is over."""
+        try:
+            yield
+        except DDSException as error:
+            if error.code == DDSException.DDS_RETCODE_TIMEOUT:
+                raise TimeoutError(what) from error
+            known = DDSException.error_message_mapping.get(error.code, ("", "unknown error"))
+            raise self._failed(f"{what} ({known[1].lower()}){hint}") from error
+        except UnicodeEncodeError as error:
+            raise self._failed(f"{what} (its configuration must be ASCII){hint}") from error
+        except UnknownTypeError as error:
+            raise self._failed(f"{what}: {error}") from error
+
+
+def _partitions(quality: Quality) -> Any:  # noqa: ANN401 - the library's
+    return Qos(Policy.Partition([*quality.partitions])) if quality.partitions else Qos()
+
+
+def _of_writer(quality: Quality, kind: str) -> Any:  # noqa: ANN401 - the library's
+    """Return the quality of a writer. All that subscribers have not acknowledged is kept, `depth` for later ones."""
+    return Qos(
+        *_common(quality, kind),
+        Policy.History.KeepAll,
+        Policy.DurabilityService(0, Policy.History.KeepLast(quality.depth), -1, -1, -1),
+        Policy.WriterDataLifecycle(autodispose=False),
+    )
+
+
+def _of_reader(quality: Quality, kind: str) -> Any:  # noqa: ANN401 - the library's
+    """Return the quality of a reader. Names of fields are not compared: some definitions write `x_` for `x`."""
+    return Qos(
+        *_common(quality, kind),
+        Policy.History.KeepLast(quality.depth),
+        Policy.TypeConsistency.AllowTypeCoercion(ignore_member_names=True),
+    )
+
+
+def _common(quality: Quality, kind: str) -> Iterator[Any]:
+    """Yield what readers and writers have in common. The hash of the type is where ROS 2 looks for it."""
+    blocked = Policy.Reliability.Reliable(round(BLOCKED_S * _SECOND_NS))
+    yield blocked if quality.reliable else Policy.Reliability.BestEffort
+    yield Policy.Durability.TransientLocal if quality.latched else Policy.Durability.Volatile
+    yield Policy.DataRepresentation(use_cdrv0_representation=True)
+    yield Policy.Userdata(f"typehash={types_of(2).type_hash(kind)};".encode())

@@ -1,0 +1,120 @@
+"""Places of DDS: `dds:DOMAIN?OPTION=VALUE&...`, with the options that ROS 2 calls quality of service."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Collection
+from dataclasses import dataclass, replace
+from urllib.parse import parse_qsl
+
+from robochoc.formats.diagnostics import on_one_line, shortened
+from robochoc.ros.live.ros2_names import DOMAIN_MAX, domain_id
+from robochoc.ros.live.ros_master import Failed
+
+DEPTHS = range(1, 1001)
+WAIT_S_MAX = 600.0
+PARTITIONS_MAX = 16
+_NAME_MAX = 255
+_NUMBER = re.compile(r"\d{1,4}", re.ASCII)
+_WORDS = {
+    "reliability": {"reliable": True, "best_effort": False},
+    "durability": {"transient_local": True, "volatile": False},
+}
+
+
+@dataclass(frozen=True)
+class Quality:
+    """Quality of service, as far as a place can choose it."""
+
+    reliable: bool
+    """False: messages that are lost on the way are not sent again, and who asks for reliable ones gets none."""
+    latched: bool
+    """True: transient local. Who subscribes later receives the last messages."""
+    depth: int
+    """The number of messages that are kept of each topic: for those that subscribe later, or until they are read."""
+    wait_s: float = 0.0
+    """The longest wait for the first subscriber of each waypoint's topic, in seconds."""
+    partitions: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class DdsPlace:
+    """A domain, and the quality of service there."""
+
+    domain: int
+    quality: Quality
+
+    @classmethod
+    def of(cls, place: str, usual: Quality, options: Collection[str], failed: Failed) -> DdsPlace:
+        """Return what `place` names, with `options` that it may give; others are as `usual`. Raises `failed`.
+
+        >>> from robochoc.ros.sink import SinkError
+        >>> usual = Quality(reliable=True, latched=True, depth=1)
+        >>> DdsPlace.of("5?partition=hall&depth=3", usual, ("partition", "depth"), SinkError)
+        DdsPlace(domain=5, quality=Quality(reliable=True, latched=True, depth=3, wait_s=0.0, partitions=('hall',)))
+        """
+        number, _, rest = place.partition("?")
+        try:
+            domain = _domain(number) if number else domain_id(failed)
+            quality = usual
+            for name, value in _pairs(rest):
+                if name not in options:
+                    raise _wrong(f"{name!r} is no option of this place", f"known are {', '.join(options)}")
+                quality = _with(quality, name, value)
+        except ValueError as error:
+            raise failed(str(error)) from error
+        return cls(domain, quality)
+
+
+def _domain(number: str) -> int:
+    if _NUMBER.fullmatch(number) and int(number) <= DOMAIN_MAX:
+        return int(number)
+    raise _wrong(f"{number!r} is no domain of DDS", f"expected a number from 0 to {DOMAIN_MAX}, as in dds:0")
+
+
+def _pairs(rest: str) -> list[tuple[str, str]]:
+    if not rest:
+        return []
+    try:
+        return parse_qsl(rest, keep_blank_values=True, strict_parsing=True, errors="strict", max_num_fields=50)
+    except ValueError:
+        raise _wrong(f"the options {rest!r} cannot be read", "expected OPTION=VALUE&OPTION=VALUE") from None
+
+
+def _with(quality: Quality, name: str, value: str) -> Quality:
+    """Return `quality` with an option changed. Raises `ValueError`."""
+    if name == "partition":
+        return replace(quality, partitions=_partitions(quality, value))
+    if name == "depth":
+        if not _NUMBER.fullmatch(value) or int(value) not in DEPTHS:
+            raise _wrong(f"depth={value} is no depth", f"expected a number from 1 to {DEPTHS[-1]:,}")
+        return replace(quality, depth=int(value))
+    if name == "wait":
+        return replace(quality, wait_s=_seconds(value))
+    words = _WORDS[name]
+    if value not in words:
+        raise _wrong(f"{name}={value} is unknown", f"expected {' or '.join(words)}")
+    chosen = words[value]
+    return replace(quality, reliable=chosen) if name == "reliability" else replace(quality, latched=chosen)
+
+
+def _partitions(quality: Quality, value: str) -> tuple[str, ...]:
+    if not value.isascii() or not value.isprintable() or not 0 < len(value) <= _NAME_MAX:
+        raise _wrong(f"partition={value} is no name", f"expected 1 to {_NAME_MAX} characters of ASCII")
+    if len(quality.partitions) >= PARTITIONS_MAX:
+        raise ValueError(f"a place has at most {PARTITIONS_MAX} partitions")
+    return (*quality.partitions, value)
+
+
+def _seconds(value: str) -> float:
+    try:
+        found = float(value)
+    except ValueError:
+        found = -1.0
+    if not 0 <= found <= WAIT_S_MAX:
+        raise _wrong(f"wait={value} is no time", f"expected seconds from 0 to {WAIT_S_MAX:g}")
+    return found
+
+
+def _wrong(problem: str, wanted: str) -> ValueError:
+    return ValueError(f"{shortened(on_one_line(problem))}; {wanted}")
