@@ -33,7 +33,7 @@ ros_options = _optional(
         multiple=True,
         metavar="SINK",
         help=(
-            "Publish decisions as waypoints: mcap:FILE (for Foxglove), rosbag:FILE, rmw_zenoh,"
+            "Publish decisions as waypoints: mcap:FILE (for Foxglove), rosbag:FILE, dds (ROS 2), rmw_zenoh,"
             " rosbridge://HOST:PORT, rospy, or an installed sink. Repeatable."
         ),
     ),

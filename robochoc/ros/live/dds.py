@@ -11,8 +11,7 @@ from typing import NoReturn
 
 from robochoc.ros.live.dds_participant import MESSAGE_BYTES_MAX, Participant
 from robochoc.ros.live.dds_place import DdsPlace, Quality
-from robochoc.ros.live.inbox import PER_TOPIC_MAX, RosInbox
-from robochoc.ros.live.rospy_messages import weight_of
+from robochoc.ros.live.inbox import PER_TOPIC_MAX, RosInbox, weight_of
 from robochoc.ros.mappings import short_kind
 from robochoc.ros.names import REPORTS
 from robochoc.ros.recordings.types import FieldsError, UnknownTypeError, types_of
