@@ -6,6 +6,7 @@ import json
 import math
 import os
 import signal
+import sys
 import time
 from collections import defaultdict
 from pathlib import Path
@@ -271,12 +272,20 @@ def test_nobody_is_waited_for_longer_than_the_place_says(domain: int) -> None:
         sink.publish("/a/waypoint", POSE, pose(1), STAMP)
 
 
+def _stands(thread: Path) -> bool:
+    """Whether a thread of another process is stopped, as /proc says."""
+    return (thread / "stat").read_text(encoding="utf-8").rpartition(")")[2].split()[0] == "T"
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="/proc says whether a process is stopped")
 def test_a_subscriber_that_stands_still_ends_it(domain: int, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(dds_module, "STUCK_S", 0.3)
     with subscriber(domain, {"/a/waypoint": "PoseStamped"}) as peer:
         sink = DdsSink(f"{domain}?{WAITS}")
         sink.advertise({"/a/waypoint": POSE})
         os.kill(peer.process.pid, signal.SIGSTOP)
+        threads = Path(f"/proc/{peer.process.pid}/task")
+        wait_until(lambda: all(_stands(thread) for thread in threads.iterdir()), "it has not stopped")
         sink.publish("/a/waypoint", POSE, pose(1), STAMP)
         with pytest.raises(SinkError, match=r"has acknowledged nothing for 0\.3 s; end it, or publish with"):
             sink.close()
