@@ -20,7 +20,7 @@ from robochoc.system.termination import Terminated
 
 SINKS, SOURCES = "robochoc.sinks", "robochoc.sources"
 
-_ENDINGS = {".mcap": "mcap", ".bag": "rosbag"}
+_ENDINGS = {".mcap": "mcap", ".bag": "rosbag", ".db3": "rosbag2"}
 """Files that may stand alone, without the name of their format."""
 
 

@@ -227,7 +227,7 @@ def test_a_folder_of_ros_2_is_its_recording() -> None:
     file = write(FILES[0], messages(20))
     folder = Path("rosbag2")
     folder.mkdir()
-    with pytest.raises(SourceError, match="rosbag2: is a folder without an MCAP file"):
+    with pytest.raises(SourceError, match="rosbag2: is a folder without a file"):
         open_source("mcap:rosbag2")
     (folder / "metadata.yaml").touch()
     file.rename(folder / "run_0.mcap")

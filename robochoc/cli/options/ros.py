@@ -80,7 +80,7 @@ situation_options = _optional(
         metavar="SOURCE",
         help=(
             "Solve again when robots report a change. SOURCE: flight (decisions are flown in a simulation), or as for"
-            " --ros."
+            " --ros, or rosbag2:FILE."
         ),
     ),
     click.option(

@@ -10,7 +10,6 @@ import struct
 import zlib
 from collections.abc import Iterator, Mapping
 from io import BytesIO
-from pathlib import Path
 from types import MappingProxyType
 from typing import NamedTuple, TypeVar
 
@@ -22,21 +21,20 @@ from mcap.records import Channel as ChannelRecord
 from mcap.records import Schema
 from mcap.writer import MCAP0_MAGIC, CompressionType, Writer
 
-from robochoc.formats.diagnostics import on_one_line
 from robochoc.ros.mappings import short_kind
 from robochoc.ros.recordings.recording import (
     BLOCK_BYTES_MAX,
     Block,
+    ChunkedRecording,
     RecordedChannel,
-    Recording,
     RecordingDamagedError,
     as_it_is,
     from_lz4,
+    inside,
 )
 from robochoc.ros.recordings.recording_sink import RecordingSink
 from robochoc.ros.recordings.types import Version, types_of
 from robochoc.ros.sink import Fields, SinkError
-from robochoc.ros.source import SourceError
 
 NAMES = "robochoc:names"
 """The metadata record of the names that topics have in the team's files."""
@@ -116,13 +114,13 @@ def _from_zstd(packed: bytes, most: int) -> bytes:
     return zstandard.ZstdDecompressor(max_window_size=BLOCK_BYTES_MAX).stream_reader(packed).read(most)
 
 
-class McapSource(Recording):
+class McapSource(ChunkedRecording):
     """Reads an MCAP file of ROS 2 or of ROS 1, or the one in a folder that ROS 2 has recorded."""
 
     packings = MappingProxyType({"": as_it_is, "lz4": from_lz4, "zstd": _from_zstd})
 
     def __init__(self, place: str) -> None:
-        super().__init__(_inside(place))
+        super().__init__(inside(place, "mcap", ".mcap", "rosbag2:FOLDER reads the .db3 of ROS 2"))
 
     def _blocks(self) -> Iterator[Block]:
         self._schemas: dict[int, _Known | None] = {}
@@ -229,19 +227,6 @@ class McapSource(Recording):
             fault = f"its messages are written as {channel.message_encoding[:40]!r}"
             return RecordedChannel(channel.topic, 2, fault)
         return RecordedChannel(channel.topic, version or 2, schema.fault)
-
-
-def _inside(place: str) -> str:
-    """Return the recording in the folder `place`, or `place`. Raises `SourceError`."""
-    if not place or not Path(place).is_dir():
-        return place
-    files = sorted(Path(place).glob("*.mcap"))
-    if not files:
-        hint = "`ros2 bag convert` makes one of what ROS 2 has recorded otherwise"
-        raise SourceError(on_one_line(f"{place}: is a folder without an MCAP file: {hint}"))
-    if len(files) > 1:
-        raise SourceError(on_one_line(f"{place}: holds several recordings: name one, such as mcap:{files[0]}"))
-    return str(files[0])
 
 
 def _fault(kind: str, encoding: str, text: bytes) -> str:

@@ -1,4 +1,4 @@
-"""Recordings as sources: what MCAP files and ROS 1 bags have in common when they are read.
+"""Recordings as sources: what MCAP files, bags of ROS 1 and bags of ROS 2 have in common when they are read.
 
 A recording may come from anywhere. It is read twice: first completely, so that nothing is acted upon that comes from a
 damaged file; then block by block, in the order of time. Sizes are checked before anything is allocated or decompressed.
@@ -130,29 +130,28 @@ _OTHERS_MAX = 1_000
 class Recording(Source):
     """A file that gives its messages in the order of the times at which they were received."""
 
-    packings: ClassVar[Mapping[str, Unpack]]
-    """The functions that decompress chunks, by the format's names of compressions."""
-
     live = False
 
     def __init__(self, place: str) -> None:
         super().__init__(place)
         if not place:
-            raise SourceError("a recording needs the name of its file, as in mcap:run.mcap or rosbag:run.bag")
+            raise SourceError(
+                "a recording needs the name of its file, as in mcap:run.mcap, rosbag:run.bag or rosbag2:run.db3"
+            )
         with self._errors_named():
             self._input = Input(Path(place))
         self._kinds: Mapping[str, str] = {}
-        self._unpacked = 0
         self._entries: Iterator[Entry] = iter(())
 
     def listen(self, topics: Mapping[str, str]) -> None:
         """Read all of the file once. `next` then returns the messages on these topics, from the beginning."""
         self._kinds = topics
-        self._unpacked = 0
         with self._errors_named():
-            self._input.rewind()
-            blocks = sorted(self._blocks())
-        self._entries = self._in_order(blocks)
+            self._entries = self._opened()
+
+    @abstractmethod
+    def _opened(self) -> Iterator[Entry]:
+        """Read all of the file, then return the wanted messages, in order. Raises `RecordingDamagedError`."""
 
     def next(self, wait_s: float) -> ReceivedMessage | None:  # noqa: ARG002 - all has been recorded
         """Return the next message; None at the end."""
@@ -173,6 +172,37 @@ class Recording(Source):
         self._entries = iter(())
         self._input.close()
 
+    def _wanted(self, topic: str, kind: str) -> bool:
+        """Return whether messages of that type on that topic are wanted."""
+        wanted = topic in self._kinds and short_kind(self._kinds[topic]) == short_kind(kind)
+        if not wanted and len(self.others) < _OTHERS_MAX:
+            self.others[topic] = kind
+        return wanted
+
+    @contextmanager
+    def _errors_named(self) -> Iterator[None]:
+        """Raise errors of the file as `SourceError`, with its name."""
+        try:
+            yield
+        except (RecordingDamagedError, UnknownTypeError) as error:
+            raise SourceError(on_one_line(f"{self.place}: {error}")) from error
+        except OSError as error:
+            raise SourceError(on_one_line(f"{self.place}: {error.strerror or error}")) from error
+
+
+class ChunkedRecording(Recording):
+    """A recording whose messages stand in chunks, most of them compressed."""
+
+    packings: ClassVar[Mapping[str, Unpack]]
+    """The functions that decompress chunks, by the format's names of compressions."""
+
+    _unpacked = 0
+
+    def _opened(self) -> Iterator[Entry]:
+        self._unpacked = 0
+        self._input.rewind()
+        return self._in_order(sorted(self._blocks()))
+
     @abstractmethod
     def _blocks(self) -> Iterable[Block]:
         """Read all of the file, and return the blocks with wanted messages. Raises `RecordingDamagedError`."""
@@ -184,13 +214,6 @@ class Recording(Source):
         Raises:
             RecordingDamagedError: The block is damaged.
         """
-
-    def _wanted(self, topic: str, kind: str) -> bool:
-        """Return whether messages of that type on that topic are wanted."""
-        wanted = topic in self._kinds and short_kind(self._kinds[topic]) == short_kind(kind)
-        if not wanted and len(self.others) < _OTHERS_MAX:
-            self.others[topic] = kind
-        return wanted
 
     def _body(self, packed: bytes, packing: str, size: int) -> bytes:
         """Return the content of a chunk, which should be `size` bytes."""
@@ -220,16 +243,6 @@ class Recording(Source):
                     )
         while waiting:
             yield heapq.heappop(waiting)
-
-    @contextmanager
-    def _errors_named(self) -> Iterator[None]:
-        """Raise errors of the file as `SourceError`, with its name."""
-        try:
-            yield
-        except (RecordingDamagedError, UnknownTypeError) as error:
-            raise SourceError(on_one_line(f"{self.place}: {error}")) from error
-        except OSError as error:
-            raise SourceError(on_one_line(f"{self.place}: {error.strerror or error}")) from error
 
 
 def unpacked(packed: bytes, packing: str, size: int, packings: Mapping[str, Unpack]) -> bytes:
@@ -263,3 +276,25 @@ def as_it_is(packed: bytes, _most: int) -> bytes:
 def from_lz4(packed: bytes, most: int) -> bytes:
     """Return up to `most` bytes of an LZ4 frame."""
     return bytes(lz4.frame.LZ4FrameDecompressor().decompress(packed, max_length=most))
+
+
+def inside(place: str, name: str, ending: str, instead: str) -> str:
+    """Return the recording in the folder `place`, or `place` itself where it is no folder.
+
+    Args:
+        place: What follows the name on the command line.
+        name: The source's name on the command line.
+        ending: How the names of its files end.
+        instead: What to do where the folder has no such file.
+
+    Raises:
+        SourceError: There is none in the folder, or there are several.
+    """
+    if not place or not Path(place).is_dir():
+        return place
+    files = sorted(Path(place).glob(f"*{ending}"))
+    if not files:
+        raise SourceError(on_one_line(f"{place}: is a folder without a file *{ending}: {instead}"))
+    if len(files) > 1:
+        raise SourceError(on_one_line(f"{place}: holds several recordings: name one, such as {name}:{files[0]}"))
+    return str(files[0])

@@ -20,8 +20,8 @@ from rosbags.rosbag1 import Writer
 from robochoc.ros.mappings import short_kind
 from robochoc.ros.recordings.recording import (
     Block,
+    ChunkedRecording,
     RecordedChannel,
-    Recording,
     RecordingDamagedError,
     as_it_is,
     from_lz4,
@@ -121,7 +121,7 @@ def _from_bz2(packed: bytes, most: int) -> bytes:
     return bz2.BZ2Decompressor().decompress(packed, max_length=most)
 
 
-class RosbagSource(Recording):
+class RosbagSource(ChunkedRecording):
     """Reads a bag of ROS 1."""
 
     packings = MappingProxyType({"none": as_it_is, "bz2": _from_bz2, "lz4": from_lz4})
