@@ -13,6 +13,7 @@ from rosbags.rosbag2 import StoragePlugin, Writer
 from rosbags.typesys import Stores, get_typestore
 
 from robochoc.ros.recordings.types import types_of
+from robochoc.ros.sink import Fields
 from robochoc.ros.source import SourceError
 from tests.support.ros_recordings import POINT, TOPICS, check, messages, read
 
@@ -22,7 +23,7 @@ FILE = Path("other/other.db3")
 READ = f"rosbag2:{FILE}"
 
 
-def written(version: Literal[8, 9] = 9) -> list[tuple[str, dict[str, object], int]]:
+def written(version: Literal[8, 9] = 9) -> list[tuple[str, Fields, int]]:
     """A bag with some messages, which are returned. Version 9 has definitions of its types in the file."""
     said = messages(60)
     store = get_typestore(Stores.ROS2_HUMBLE)

@@ -144,7 +144,7 @@ def _fault(kind: str, encoding: object, text: str | None) -> str:
 
 def _in_order(rows: sqlite3.Connection, channels: dict[int, RecordedChannel]) -> list[tuple[int, int]]:
     """Return the time and the row of each wanted message, in the order of the times."""
-    found = []
+    found: list[tuple[int, int]] = []
     for row, number, at_ns in rows.execute("SELECT rowid, topic_id, timestamp FROM messages"):
         if number not in channels:
             continue
