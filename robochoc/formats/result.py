@@ -105,11 +105,12 @@ class _Form(msgspec.Struct, omit_defaults=True):
     chosen: dict[str, str] = {}
     preprocessing: _PreprocessingForm | None = None
     optima: _OptimaForm | None = None
+    deadline: float | None = None
 
 
 _SAME = (
     *("team", "protocol", "runtime", "seed", "verdict", "cost", "verified", "reason", "order"),
-    *("bound", "placed_by", "tree", "confirmed", "channel", "claimed_by", "chosen"),
+    *("bound", "placed_by", "tree", "confirmed", "channel", "claimed_by", "chosen", "deadline"),
 )
 """The fields that are the same in an outcome and in its JSON form."""
 

@@ -202,6 +202,7 @@ class Outcome:
         chosen: Why the `protocol`, or the `order`, was chosen, where nobody asked for it.
         preprocessing: What the robots have done before, if that was asked for.
         optima: The optima, or solutions, if the protocol lists them.
+        deadline: The seconds after which the search was ended, if the answer is the best that was known by then.
     """
 
     team: str
@@ -233,6 +234,7 @@ class Outcome:
     chosen: dict[str, str] = field(default_factory=dict)
     preprocessing: Preprocessing | None = None
     optima: Optima | None = None
+    deadline: float | None = None
 
     def labelled(self, assignment: Mapping[str, int]) -> dict[str, int | str]:
         """Return `assignment`, of this outcome or of one of its epochs, with symbols by their names."""

@@ -46,6 +46,7 @@ class Solvable(ABC):
         environment: Environment | None = None,
         seed: int = 0,
         timeout: float | None = None,
+        deadline: float | None = None,
         messages: int | None = None,
         ncccs: int | None = None,
         cycles: int | None = None,
@@ -84,6 +85,7 @@ class Solvable(ABC):
             environment: It gets each answer, and returns what changes next.
             seed: The seed of the simulator, of the order `random`, and of protocols that draw lots.
             timeout: A limit on wall-clock time, in seconds. None: no limit.
+            deadline: The same, when the best assignment that is known counts as an answer.
             messages: A limit on the number of messages. None: no limit.
             ncccs: A limit on non-concurrent constraint checks, in the simulator. None: no limit.
             cycles: A limit on cycles, with the schedule `cycles`. None: no limit.
@@ -124,7 +126,7 @@ class Solvable(ABC):
             10
         """
         _refuse(unknown)
-        _check_numbers(seed=seed, timeout=timeout, delay=delay, spares=spares, patience=patience)
+        _check_numbers(seed=seed, timeout=timeout, deadline=deadline, delay=delay, spares=spares, patience=patience)
         _check_numbers(messages=messages, ncccs=ncccs, cycles=cycles)
         team = self._team_to_solve()
         called = self._robots_called(team)
@@ -133,6 +135,7 @@ class Solvable(ABC):
             runtime=_choice("runtime", Runtime, runtime),
             seed=seed,
             timeout=timeout,
+            deadline=deadline,
             withdraw=None if withdraw is None else _choice("withdraw", Withdrawal, withdraw),
             schedule=_choice("schedule", ScheduleName, schedule),
             delay=delay,
@@ -193,7 +196,7 @@ def _refuse(unknown: Iterable[str]) -> None:
 def _check_numbers(**given: float | None) -> None:
     """Raise `TypeError` for options that are no numbers, or integers, and `ValueError` for those that are negative."""
     for name, value in given.items():
-        whole = name not in {"timeout", "patience"}
+        whole = name not in {"timeout", "deadline", "patience"}
         if value is None:
             continue
         if not isinstance(value, int if whole else (int, float)):

@@ -23,16 +23,8 @@ from robochoc.protocols.requirements import unmet_requirement
 from robochoc.protocols.satisfaction.disac import DisAC
 from robochoc.protocols.satisfaction.first_fit import FirstFit
 from robochoc.protocols.traits import Traits
-from robochoc.run.options import (
-    CENTRAL,
-    MOST_LOSS,
-    CentralSolverName,
-    OnLoss,
-    Options,
-    Runtime,
-    ScheduleName,
-    Withdrawal,
-)
+from robochoc.run.defaults import MOST_LOSS
+from robochoc.run.options import CENTRAL, CentralSolverName, OnLoss, Options, Runtime, ScheduleName, Withdrawal
 from robochoc.solver.encoding import UnsupportedError
 from robochoc.verification.objective import withdrawal_cost
 
@@ -102,6 +94,7 @@ OPTION_RULES = (
         lambda o: o.delay and o.schedule in {ScheduleName.CYCLES, ScheduleName.RANDOM},
         "--delay is for --schedule concurrent: in a random one any message may take any time, in cycles each takes one",
     ),
+    OptionRule(lambda o: o.deadline and o.timeout, "--deadline and --timeout both limit the time: give one of them"),
     OptionRule(lambda o: not 0 <= o.message_loss <= MOST_LOSS, "--message-loss is a probability from 0 to 0.9"),
     OptionRule(
         lambda o: o.message_loss and (o.runtime is not Runtime.SIMULATOR or o.preprocess or o.wants_anytime),
@@ -133,6 +126,7 @@ OPTION_RULES = (
     _for_robots("--spare", lambda o: o.spares),
     _for_robots("--kill", lambda o: o.kill),
     _for_robots("--channel", lambda o: o.channel),
+    _for_robots("--deadline", lambda o: o.deadline),
     _for_robots("--message-loss", lambda o: o.message_loss),
     _for_robots("--filter", lambda o: o.filters),
     _for_robots("--bounds", lambda o: o.bounds),

@@ -41,7 +41,7 @@ class RunContext:
         self.cache = SolutionCache() if options.cache else None
         self.kills = KillSchedule(options.kill)
         self._began = time.monotonic()
-        self.deadline = None if options.timeout is None else self._began + options.timeout
+        self.deadline = None if options.limit_s is None else self._began + options.limit_s
 
     def left_s(self) -> float | None:
         """Return how many seconds are left; None without a limit."""

@@ -10,3 +10,5 @@ PREPROCESSING = "ac"
 """It makes domains arc consistent before the protocol, with `--preprocess ac`. It cannot be asked for by name."""
 FIRST_FIT = "first-fit"
 """It decides which robots withdraw with `--withdraw maximal`. It cannot be asked for by name."""
+MOST_LOSS = 0.9
+"""The largest probability of the loss of a message. With more, next to nothing arrives."""

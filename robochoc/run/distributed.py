@@ -95,7 +95,8 @@ class Deployment(ABC):
 
     def evaluated(self, phase: Phase, search: Search) -> Answer:
         """Return the answer of `search`, confirmed by the central solver if that is asked for."""
-        answer = evaluate_search(phase, search, self.kind, self.told)
+        deadline = self.options.deadline if self.left_s() == 0 else None
+        answer = evaluate_search(phase, search, self.kind, self.told, deadline)
         if answer.verdict is Verdict.NO_SOLUTION:
             return answer.confirmed_as(self.confirm(phase, answer))
         if answer.verdict is Verdict.OPTIMAL:
@@ -127,6 +128,8 @@ class Deployment(ABC):
                 return f"so many checks have been made one after the other (--ncccs {options.ncccs})"
             if options.cycles is not None and spent.cycles >= options.cycles:
                 return f"so many cycles are over (--cycles {options.cycles})"
+        if options.deadline is not None:
+            return f"by the deadline (--deadline {options.deadline:g}) nothing had satisfied all hard constraints"
         return "the time was over" if options.timeout is None else f"the time was over (--timeout {options.timeout:g})"
 
     def outcome(self, header: Outcome, answer: Answer) -> Outcome:

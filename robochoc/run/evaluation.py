@@ -86,6 +86,7 @@ class Answer:
     preprocessing: Preprocessing | None = None
     count: int | None = None
     optima: Optima | None = None
+    deadline: float | None = None
 
     def confirmed_as(self, solvers: tuple[str, ...]) -> Answer:
         """Return this answer, with which central `solvers` agree: that there is no solution, nothing else shows."""
@@ -143,14 +144,18 @@ class Answer:
             preprocessing=self.preprocessing,
             count=self.count,
             optima=self.optima,
+            deadline=self.deadline,
         )
 
 
-def evaluate_search(phase: Phase, search: Search, kind: ProblemKind, told: Callable[[float], Cost]) -> Answer:
+def evaluate_search(
+    phase: Phase, search: Search, kind: ProblemKind, told: Callable[[float], Cost], deadline: float | None = None
+) -> Answer:
     """Return the answer of a `search` in `phase`, for a problem of this `kind`; `told` tells a cost to the user.
 
     A protocol that minimises costs has an assignment whenever it is asked. Whether that is proven depends on the
-    protocol, and on whether it came to its end. A solution of a problem without costs needs no proof.
+    protocol, and on whether it came to its end. A solution of a problem without costs needs no proof. Where a
+    `deadline` (in seconds) has ended the search, what is known by then is a solution if it breaks no hard constraint.
 
     Raises:
         RefutedError: when the check refutes what the protocol claims.
@@ -159,18 +164,22 @@ def evaluate_search(phase: Phase, search: Search, kind: ProblemKind, told: Calla
         return _evaluate_spoiled(search)
     result = search.result
     ended = result.verdict is Verdict.SOLUTION
+    cut = deadline is not None and result.verdict is Verdict.UNKNOWN and result.witness is None
     answer = Answer(result.verdict, result.metrics, result.witness, tree=pseudo_tree(result.findings), ended=ended)
     if ended and not result.lost:
         answer = replace(answer, count=optima(result.findings))
-    if result.lost or result.verdict is Verdict.NO_SOLUTION or not (ended or phase.traits.costs):
+    if result.lost or result.verdict is Verdict.NO_SOLUTION or not (ended or phase.traits.costs or cut):
         return answer
     bound = None if is_proven(phase, result) else _bound_of(phase, result, told)
     found = search.check()
     if found is None:
         return replace(answer, verdict=Verdict.UNKNOWN, bound=bound)
     verdict = _verdict_of(phase, result, kind, found)
+    if cut and found.verified and not found.withdrawn:
+        verdict, answer = Verdict.SOLUTION, replace(answer, deadline=deadline)
     if _meets_bound(result, found, told) and verdict is Verdict.SOLUTION and kind is ProblemKind.DISWCSP:
         verdict, bound = Verdict.OPTIMAL, None
+        answer = replace(answer, deadline=None)
     return replace(
         answer,
         verdict=verdict,

@@ -15,8 +15,6 @@ if TYPE_CHECKING:
     from robochoc.communication.kill_schedule import Kill
     from robochoc.communication.simulator.channel import ChannelModel
 
-MOST_LOSS = 0.9
-"""The largest probability of the loss of a message. With more, next to nothing arrives."""
 CENTRAL = "central"
 """The protocol that is none: one model of all files, which ACE decides."""
 
@@ -88,6 +86,7 @@ class Options:
         runtime: Where the robots live.
         seed: The seed of the simulator, of `Order.RANDOM`, and of protocols that draw lots.
         timeout: A limit on wall-clock time, in seconds (None: no limit).
+        deadline: The same, when the best assignment that is known counts as an answer (None: there is none).
         withdraw: Which robots withdraw when the team has no solution (None: none).
         schedule: How the simulator orders events.
         delay: The longest delay of a message in the simulator, in constraint checks.
@@ -120,6 +119,7 @@ class Options:
     runtime: Runtime = Runtime.PROCESSES
     seed: int = 0
     timeout: float | None = None
+    deadline: float | None = None
     withdraw: Withdrawal | None = None
     schedule: ScheduleName = ScheduleName.CONCURRENT
     delay: int = 0
@@ -143,6 +143,11 @@ class Options:
     chosen: Mapping[str, str] = field(default_factory=dict)
     bounds: bool = False
     preprocess: Preprocess | None = None
+
+    @property
+    def limit_s(self) -> float | None:
+        """Return the limit on wall-clock time, in seconds, by whichever option; None: there is none."""
+        return self.timeout if self.deadline is None else self.deadline
 
     @property
     def wants_anytime(self) -> bool:

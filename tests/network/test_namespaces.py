@@ -15,7 +15,7 @@ from robochoc.model.problem import Constraint
 from robochoc.run import Options, Runtime, solve
 from tests.support.deployments import TRIANGLE, Deployment, Program, ended, written
 from tests.support.journal_entries import entries_of
-from tests.support.namespaces import DELAY_S, TUN, Link, bad_line, namespaces, route, veth, why_not
+from tests.support.namespaces import DELAY_S, LOSS, TUN, Link, bad_line, namespaces, route, veth, why_not
 from tests.support.problems import PREDICATES, team_of
 from tests.support.program import ROOT
 from tests.support.warm_programs import WarmPrograms
@@ -45,10 +45,11 @@ class Apart(NamedTuple):
 
 
 @pytest.fixture
-def apart(tmp_path: Path, warm: WarmPrograms) -> Iterator[Apart]:
+def apart(tmp_path: Path, warm: WarmPrograms, request: pytest.FixtureRequest) -> Iterator[Apart]:
+    loss = getattr(request, "param", LOSS)
     with (
         namespaces(2) as (hill, field),
-        bad_line((hill, f"{HILL}/24"), (field, f"{FIELD}/24"), seed=6) as line,
+        bad_line((hill, f"{HILL}/24"), (field, f"{FIELD}/24"), seed=6, loss=loss) as line,
         Deployment(tmp_path, HILL, PORT, warm) as site,
     ):
         yield Apart(site, hill, field, line)
@@ -138,6 +139,23 @@ def test_a_line_that_delays_and_loses(apart: Apart) -> None:
     assert master.status() == 0, master.errors
     ended({str(number): robot for number, robot in enumerate(crew)})
     nothing_was_lost(master, journal)
+
+
+@needs_tun
+@pytest.mark.slow
+@pytest.mark.parametrize("apart", [0.1], indirect=True)
+@pytest.mark.parametrize("protocol", ["abt", "dpop", "mgm"])
+def test_one_packet_in_ten_lost_makes_no_verdict_wrong_and_nobody_wait_for_ever(apart: Apart, protocol: str) -> None:
+    files = written(TRIANGLE, apart.site)
+    tokens = apart.site.enrol("--team", files)
+    words = ("--team", files, "--protocol", protocol, "--set", "cycles=10") if protocol == "mgm" else (
+        "--team", files, "--protocol", protocol,
+    )  # fmt: skip
+    master = apart.site.master(*words, "--json", "--timeout", 60, "--patience", 30, inside=apart.hill)
+    robots(apart.site, files, tokens, apart.field, "--patience", 60)
+    status = master.status(110)
+    assert status in {0, 3}, master.errors
+    assert master.object["verdict"] in ({"unknown"} if protocol == "mgm" else {"no-solution", "unknown"})
 
 
 @needs_tun

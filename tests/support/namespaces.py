@@ -72,9 +72,9 @@ class Link:
 
 
 @contextmanager
-def bad_line(left: tuple[str, str], right: tuple[str, str], seed: int) -> Iterator[Link]:
-    """A line with a delay of `DELAY_S` each way, which loses one packet in 1 / `LOSS`."""
-    command = [sys.executable, str(Path(__file__).with_name("tun_line.py")), str(DELAY_S), str(LOSS), str(seed)]
+def bad_line(left: tuple[str, str], right: tuple[str, str], seed: int, loss: float = LOSS) -> Iterator[Link]:
+    """A line with a delay of `DELAY_S` each way, which loses one packet in 1 / `loss`."""
+    command = [sys.executable, str(Path(__file__).with_name("tun_line.py")), str(DELAY_S), str(loss), str(seed)]
     with subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE) as process:
         try:
             assert process.stdout

@@ -61,7 +61,7 @@ if TYPE_CHECKING:
 
 _SECTIONS: Sections = {
     COMMON: (
-        "--protocol", "--runtime", "--timeout", "--withdraw", "--verify", "--seed",
+        "--protocol", "--runtime", "--timeout", "--deadline", "--withdraw", "--verify", "--seed",
         "--json", "--html", "--journal", "--sniff", "--help",
     ),
     "Search": ("--order", "--set", "--preprocess", "--messages", "--ncccs", "--cycles", "--count", "--with"),
@@ -137,6 +137,12 @@ _SECTIONS: Sections = {
     type=click.FloatRange(0, min_open=True),
     metavar="SECONDS",
     help="Stop after this time: verdict unknown, exit status 3.",
+)
+@click.option(
+    "--deadline",
+    type=click.FloatRange(0, min_open=True),
+    metavar="SECONDS",
+    help="Stop by then with the best solution so far.",
 )
 @withdraw_option
 @preprocess_option

@@ -55,7 +55,7 @@ settings_option = click.option(
     "settings_given",
     multiple=True,
     metavar="NAME=VALUE",
-    help="Set a parameter of the protocol; 'robochoc protocols NAME' lists them. Repeatable.",
+    help="Set a parameter ('robochoc protocols NAME'). Repeatable.",
 )
 withdraw_option = click.option(
     "--withdraw",
@@ -113,7 +113,7 @@ filter_option = click.option(
 
 _SAME_NAMES = (
     "seed", "timeout", "delay", "count", "verify", "messages", "ncccs", "cycles", "spares", "patience", "filters",
-    "kill", "bounds", "message_loss",
+    "kill", "bounds", "message_loss", "deadline",
 )  # fmt: skip
 """Arguments of `robochoc solve` that are called as in `robochoc.run.Options`."""
 
@@ -212,8 +212,9 @@ def options_of(arguments: dict[str, Any], *, environment: bool) -> Options:
     from robochoc.run.compatibility import refuse_options
     from robochoc.solver.encoding import UnsupportedError
 
-    if arguments["timeout"] is not None and not arguments["timeout"] > 0:
-        raise click.UsageError("--timeout takes a number of seconds")
+    for name in ("timeout", "deadline"):
+        if arguments[name] is not None and not arguments[name] > 0:
+            raise click.UsageError(f"--{name} takes a number of seconds")
     options = _take_options(arguments)
     try:
         refuse_options(options, environment=environment)

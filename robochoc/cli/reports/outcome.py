@@ -149,7 +149,11 @@ def _trusted(outcome: Outcome) -> str:
 
 def _not_proven(team: Team, outcome: Outcome) -> str:
     known = team.kind is ProblemKind.DISCSP or outcome.verdict is Verdict.OPTIMAL
-    return "" if known else " (not proven to be the minimum)"
+    by = "" if outcome.deadline is None else f" by the deadline of {outcome.deadline:g} s"
+    if known:
+        return by
+    bound = f"; lower bound {_number(outcome.bound)}" if by and outcome.bound else ""
+    return f"{by} (not proven to be the minimum{bound})"
 
 
 def _weight(team: Team, outcome: Outcome) -> str:

@@ -46,7 +46,7 @@ class Machines(Deployment):
         self._master = master
         self._name = name
         self._observer = observer
-        self._deadline = None if options.timeout is None else time.monotonic() + options.timeout
+        self._deadline = None if options.limit_s is None else time.monotonic() + options.limit_s
         self._lost: dict[str, str] = {}
         self._values: dict[str, dict[str, int]] = {}
 

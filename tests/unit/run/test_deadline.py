@@ -1,0 +1,123 @@
+"""`--deadline`: at that time, the best that satisfies all hard constraints is the answer."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import partial
+from random import Random
+
+import pytest
+
+from robochoc.cli.reports.outcome import outcome_report
+from robochoc.communication.run_result import RunResult
+from robochoc.formats.result import read_result, result_json
+from robochoc.generators.queens3d import queens3d
+from robochoc.generators.random_csp import random_csp
+from robochoc.model.outcome import Verdict
+from robochoc.model.problem import INFINITE, Team
+from robochoc.protocols.findings import Findings
+from robochoc.run import Options, Runtime, solve
+from robochoc.run.evaluation import Search, check_with_files, evaluate_search
+from robochoc.run.registry import protocol_named, protocol_names
+from robochoc.run.withdrawal import first_phase
+from robochoc.solver.compiled_team import ensure_compiled
+from robochoc.solver.encoding import UnsupportedError
+from robochoc.verification.checker import assignment_cost, violations
+from tests.support.brute_force import least_cost, priced_solutions
+from tests.support.cost_problems import random_cost_team
+from tests.support.examples import count
+from tests.support.problems import random_team
+
+BY_S = 0.4
+
+
+def hard_to_prove() -> Team:
+    """A team whose least cost nobody proves in the time of a test."""
+    return random_csp(24, 8, 0.6, 0.0, seed=1, max_cost=100)
+
+
+@pytest.mark.parametrize(
+    ("protocol", "runtime", "by_s"),
+    [
+        ("bnb-adopt", Runtime.SIMULATOR, 1.5),
+        pytest.param("syncbb", Runtime.SIMULATOR, 1.5, marks=pytest.mark.slow),
+        pytest.param("dsa", Runtime.SIMULATOR, 1.5, marks=pytest.mark.slow),
+        pytest.param("syncbb", Runtime.PROCESSES, 10, marks=pytest.mark.slow),
+        pytest.param("dsa", Runtime.PROCESSES, 10, marks=pytest.mark.slow),
+    ],
+)
+def test_what_is_known_by_then_is_a_solution_and_never_an_optimum(protocol: str, runtime: Runtime, by_s: float) -> None:
+    team = hard_to_prove()
+    settings = {"cycles": "1000000"} if protocol == "dsa" else {}
+    outcome = solve(team, Options(protocol=protocol, runtime=runtime, deadline=by_s, settings=settings))
+    assert (outcome.verdict, outcome.deadline, outcome.verified) == (Verdict.SOLUTION, by_s, True)
+    assert list(violations(team, outcome.assignment)) == []
+    assert outcome.cost == assignment_cost(team, outcome.assignment)
+    assert outcome.bound is None or outcome.bound <= outcome.cost
+    report = outcome_report(team, outcome)
+    assert f"by the deadline of {by_s:g} s (not proven to be the minimum" in report
+    assert read_result(result_json(outcome)).deadline == outcome.deadline
+
+
+def test_without_a_solution_by_then_nothing_is_said() -> None:
+    """A team that has no solution, most likely, and where `sbt` would take long to find that out."""
+    team = random_csp(30, 10, 0.5, 0.5, seed=1)
+    outcome = solve(team, Options(protocol="sbt", runtime=Runtime.SIMULATOR, deadline=BY_S))
+    assert (outcome.verdict, outcome.assignment, outcome.deadline) == (Verdict.UNKNOWN, {}, None)
+    assert outcome.reason == "by the deadline (--deadline 0.4) nothing had satisfied all hard constraints"
+
+
+def test_who_is_done_before_has_the_same_answer_as_without_a_deadline() -> None:
+    for seed in range(20):
+        team = random_cost_team(Random(seed))
+        options = Options(protocol="dpop", runtime=Runtime.SIMULATOR)
+        before, by = solve(team, options), solve(team, replace(options, deadline=3600))
+        assert (before.verdict, before.assignment, before.cost) == (by.verdict, by.assignment, by.cost)
+        assert by.deadline is None
+
+
+def test_a_limit_on_messages_is_none_on_time() -> None:
+    options = Options(protocol="syncbb", runtime=Runtime.SIMULATOR, deadline=3600, messages=3000)
+    outcome = solve(hard_to_prove(), options)
+    assert (outcome.verdict, outcome.deadline) == (Verdict.UNKNOWN, None)
+    assert outcome.reason == "so many messages have been sent (--messages 3000)"
+
+
+def test_it_is_given_instead_of_a_timeout_and_to_robots() -> None:
+    for options in (Options(deadline=1, timeout=2), Options(deadline=1, protocol="central")):
+        with pytest.raises(UnsupportedError, match="--deadline"):
+            solve(queens3d(2), options)
+
+
+@count("runs", 100, 2000)
+def test_whatever_robots_have_at_that_moment_only_what_breaks_nothing_is_an_answer(runs: int) -> None:
+    """Robots with any values, of protocols with and without costs: brute force says what may be answered."""
+    names = [name for name in protocol_names() if protocol_named(name).__module__.startswith("robochoc.")]
+    answered = 0
+    for number in range(runs):
+        chance = Random(number)
+        name = names[number % len(names)]
+        with_costs = protocol_named(name).traits.costs
+        team = (random_cost_team if with_costs else random_team)(chance)
+        compiled = ensure_compiled(team)
+        values = {
+            robot: compiled[robot].solution(chance.randrange(len(compiled[robot].values)))
+            for robot in team.order
+            if compiled[robot].values and chance.random() < 0.97
+        }
+        missing = {robot: {} for robot in team.order if robot not in values}
+        result = RunResult.of(Verdict.UNKNOWN, None, {**values, **missing}, (), 0)
+        result = replace(result, findings={robot: Findings() for robot in team.order})
+        phase = first_phase(Options(protocol=name), protocol_named(name), lambda: 1)
+        search = Search(result, partial(check_with_files, phase, result, team, compiled))
+        answer = evaluate_search(phase, search, team.kind, int, deadline=1.0)
+        merged = {variable: value for own in values.values() for variable, value in own.items()}
+        prices = {tuple(sorted(one.items())): price for one, price in priced_solutions(team)}
+        price = prices.get(tuple(sorted(merged.items())), INFINITE)
+        if price < INFINITE and len(merged) == len(team.variables):
+            answered += 1
+            assert (answer.verdict, answer.cost, answer.deadline) == (Verdict.SOLUTION, price, 1.0)
+            assert least_cost(team) <= price
+        else:
+            assert (answer.verdict, answer.assignment, answer.deadline) == (Verdict.UNKNOWN, {}, None)
+    assert answered > runs / 20
