@@ -105,7 +105,7 @@ def test_whatever_robots_have_at_that_moment_only_what_breaks_nothing_is_an_answ
             for robot in team.order
             if compiled[robot].values and chance.random() < 0.97
         }
-        missing = {robot: {} for robot in team.order if robot not in values}
+        missing: dict[str, dict[str, int]] = {robot: {} for robot in team.order if robot not in values}
         result = RunResult.of(Verdict.UNKNOWN, None, {**values, **missing}, (), 0)
         result = replace(result, findings={robot: Findings() for robot in team.order})
         phase = first_phase(Options(protocol=name), protocol_named(name), lambda: 1)
