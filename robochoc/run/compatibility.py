@@ -304,11 +304,6 @@ TEAM_RULES = (
         "{protocol} has no form as arrays",
         "add --runtime simulator, or choose a protocol that has one ('robochoc protocols --long')",
     ),
-    TeamRule(
-        lambda c: c.is_distributed and c.traits.asymmetric and c.options.wants_anytime,
-        "{protocol} does not tell robots which cycle is the best: what each pays is its own secret",
-        "leave out --set anytime=yes",
-    ),
     TeamRule(lambda c: c.unknown_kills, "--kill names a robot that {team} does not have: {case.unknown_kills}"),
     TeamRule(
         lambda c: c.options.count and c.is_distributed and (c.options.runtime == "network" or not c.traits.counts),

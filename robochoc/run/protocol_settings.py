@@ -23,5 +23,5 @@ def refuse_settings(name: str, protocol: type[Protocol], settings: Mapping[str, 
 
 
 def _finds_best_cycle(protocol: type[Protocol]) -> bool:
-    """Return whether robots can receive what is said of the best cycle; asymmetric costs are refused elsewhere."""
-    return protocol.traits.asymmetric or {*get_args(AnytimeMessage)} <= {*get_args(protocol.messages)}
+    """Return whether robots can receive what is said of the best cycle."""
+    return {*get_args(AnytimeMessage)} <= {*get_args(protocol.messages)}

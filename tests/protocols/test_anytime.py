@@ -298,7 +298,7 @@ def test_arrays_refuse_it() -> None:
 
 @pytest.mark.parametrize("name", ["acls", "mcs-mgm", "gca-mgm"])
 def test_who_pays_in_secret_does_not_report_it(name: str) -> None:
-    with pytest.raises(UnsupportedError, match="what each pays is its own secret; leave out --set anytime=yes"):
+    with pytest.raises(UnsupportedError, match="'anytime' is no setting of this protocol: it has"):
         solve(path(3), Options(protocol=name, runtime=Runtime.SIMULATOR, settings={"anytime": "yes"}))
 
 

@@ -19,7 +19,7 @@ from robochoc.communication.arrays.tally import Tally
 from robochoc.model.outcome import Metrics, Verdict
 from robochoc.model.problem import INFINITE
 from robochoc.protocols.shared.messages.cycles import Value
-from robochoc.protocols.shared.settings.cycles import CycleSettings
+from robochoc.protocols.shared.settings.cycles import CycleCount, CycleSettings
 from robochoc.solver.encoding import UnsupportedError
 from robochoc.solver.exact_costs import EXACT
 
@@ -49,12 +49,12 @@ class CycleRun(ABC):
         clocks: The NCCC clock of each row. None: they are not kept.
     """
 
-    settings: CycleSettings
+    settings: CycleCount
 
     def __init__(
-        self, layout: Layout, settings: CycleSettings, seed: int, *, clocks: bool = True, changes: bool = False
+        self, layout: Layout, settings: CycleCount, seed: int, *, clocks: bool = True, changes: bool = False
     ) -> None:
-        if settings.anytime == "yes":
+        if isinstance(settings, CycleSettings) and settings.anytime == "yes":
             raise UnsupportedError(f"anytime=yes is for robots that send messages; {WITHOUT_ANYTIME}")
         self.layout = layout
         self.settings = settings

@@ -21,7 +21,7 @@ from robochoc.protocols.inference.maxsum_factor import MOST
 from robochoc.protocols.inference.messages.maxsum import Q, R
 from robochoc.protocols.inference.settings.maxsum import MaxSumSettings
 from robochoc.protocols.shared.messages.cycles import Domain
-from robochoc.protocols.shared.settings.cycles import CycleSettings
+from robochoc.protocols.shared.settings.cycles import CycleCount
 from robochoc.solver.encoding import UnsupportedError
 
 _REST = len(encode(R([]))) - 1
@@ -37,7 +37,7 @@ class ArrayMaxSum(CycleRun):
     """
 
     def __init__(
-        self, layout: Layout, settings: CycleSettings, seed: int, *, clocks: bool = True, changes: bool = False
+        self, layout: Layout, settings: CycleCount, seed: int, *, clocks: bool = True, changes: bool = False
     ) -> None:
         if cast("MaxSumSettings", settings).split:
             raise UnsupportedError("maxsum with --set split has no form as arrays; --runtime simulator takes it")

@@ -34,6 +34,7 @@ Choices that the paper leaves open, and differences:
 from __future__ import annotations
 
 from collections.abc import Mapping
+from typing import ClassVar
 
 from robochoc.model import message as wire
 from robochoc.protocols.asymmetric.messages.transfers import Transfer
@@ -42,6 +43,7 @@ from robochoc.protocols.local_search.mgm import Gainers
 from robochoc.protocols.order import PriorityOrder
 from robochoc.protocols.shared.cycles import NO_GAIN, gain
 from robochoc.protocols.shared.messages.cycles import Value
+from robochoc.protocols.shared.settings.cycles import CycleCount
 from robochoc.protocols.traits import ENDS_WITH_PROOF, Traits
 from robochoc.solver.compiled import LexicographicCost, LocalProblem
 
@@ -57,6 +59,7 @@ class MCSMGM(Gainers):
     """
 
     messages = Value | Transfer | Gain
+    settings: ClassVar[CycleCount] = CycleCount()
     traits = Traits(
         concludes=ENDS_WITH_PROOF,
         paper="Grinshpoun, Grubshtein, Zivan, Netzer & Meisels 2013",

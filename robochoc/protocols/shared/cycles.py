@@ -29,7 +29,7 @@ from robochoc.protocols.protocol import Protocol
 from robochoc.protocols.shared.anytime import Anytime
 from robochoc.protocols.shared.messages.anytime import Best, Paid, Place, Step
 from robochoc.protocols.shared.messages.cycles import Domain, Value
-from robochoc.protocols.shared.settings.cycles import CycleSettings
+from robochoc.protocols.shared.settings.cycles import CycleCount, CycleSettings
 from robochoc.solver.compiled import LexicographicCost, LocalProblem
 
 T = TypeVar("T")
@@ -43,10 +43,10 @@ class CycleProtocol(Protocol):
 
     Subclasses take a first value and send it in `begin`; then they `take` one value per cycle until the search is
     `over`. They call `listen` with the robots whose messages they need, and a function that processes these. `messages`
-    has `AnytimeMessage` in it.
+    has `AnytimeMessage` in it, or `settings` no `anytime`.
     """
 
-    settings: ClassVar[CycleSettings] = CycleSettings()
+    settings: ClassVar[CycleCount] = CycleSettings()
 
     def __init__(self, problem: LocalProblem, order: PriorityOrder) -> None:
         super().__init__(problem, order)
@@ -78,7 +78,7 @@ class CycleProtocol(Protocol):
             burdens = self.problem.lexicographic_costs({})
             self.take(burdens.index(min(burdens)))
             self.cycle = self.settings.cycles
-        elif self.settings.anytime == "yes":
+        elif isinstance(self.settings, CycleSettings) and self.settings.anytime == "yes":
             self._anytime = Anytime(self.problem, self.order, self.settings.cycles)
             self._say(self._anytime.tree.start())
         else:

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from robochoc.protocols.shared.settings.cycles import CycleSettings
+from robochoc.protocols.shared.settings.cycles import CycleCount
 
 
-class ACLSSettings(CycleSettings, frozen=True):
+class ACLSSettings(CycleCount, frozen=True):
     """`coordination` (c): a proposal is taken if c times its cost is less than now; 1: only if it is cheaper.
 
     `probability` (p): the probability of a move. `cycles`: the number of cycles.
