@@ -11,6 +11,7 @@ from robochoc.flight.layout import Point
 from robochoc.flight.log import ClosestApproach, FlightEvent, FlightLog, LegTimes
 from robochoc.flight.mission import Mission, mission_of
 from robochoc.flight.preview import preview_of
+from robochoc.generators.queens3d import queens3d
 from robochoc.model.outcome import EpochOutcome, Outcome, Verdict
 from robochoc.model.problem import Domain, Robot, Team, Variable
 from robochoc.view import scene as scenes
@@ -100,3 +101,18 @@ def epochs_of_three(team: str = "watch") -> Outcome:
         EpochOutcome(Verdict.SOLUTION, everybody[:4], "V2.1 without <2>", last),
     )
     return Outcome(team, "dynabt", "simulator", 0, Verdict.SOLUTION, last, epochs=epochs)
+
+
+def planar(n: int, *away: str) -> Mission:
+    """The mission of a solution made by hand: 3 i + 5 j, modulo n. Who is `away` has withdrawn."""
+    team = queens3d(n)
+    heights = {
+        variable.name: sum(
+            factor * int(part) for factor, part in zip((3, 5), variable.name[1:].split("."), strict=True)
+        )
+        for robot in team.robots
+        if robot.name not in away
+        for variable in robot.variables
+    }
+    values = {name: height % n + 1 for name, height in heights.items()}
+    return mission_of(Outcome(team.name, "abt", "simulator", 0, Verdict.SOLUTION, values, withdrawn=away), team)

@@ -122,7 +122,8 @@ def check_against_brute_force(team: Team, options: Options, solver: AceProcess |
         assert outcome.cost >= truth, what
     if not protocol.traits.complete:
         wrong = Verdict.NO_SOLUTION if truth < INFINITE else Verdict.SOLUTION
-        assert outcome.verdict not in {wrong, Verdict.OPTIMAL}, what
+        assert outcome.verdict is not wrong, what
+        assert outcome.verdict is not Verdict.OPTIMAL or outcome.cost == truth, what  # its bound may prove it
         return outcome
     assert outcome.verdict is (found if truth < INFINITE else Verdict.NO_SOLUTION), what
     if truth < INFINITE:

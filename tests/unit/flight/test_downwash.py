@@ -16,7 +16,7 @@ from robochoc.flight.quadrotor.separation import SeparationMonitor
 from robochoc.flight.routes.motion import MotionLimits, RoutePlan
 from robochoc.flight.routes.spacing import TooCloseError
 from robochoc.flight.routes.timetable import plan_routes
-from tests.unit.flight.test_flight import planar
+from tests.support.flights import planar
 
 LIMITS = MotionLimits()
 

@@ -12,7 +12,7 @@ import pytest
 from robochoc.flight.flight import Flight, fly
 from robochoc.flight.layout import Point
 from robochoc.flight.log import FlightLog
-from robochoc.flight.mission import Goal, Mission, mission_of
+from robochoc.flight.mission import Goal, Mission
 from robochoc.flight.quadrotor.airframe import GRAVITY
 from robochoc.flight.quadrotor.bounds import check_length
 from robochoc.flight.quadrotor.conditions import FlightConditions, MotorFailure
@@ -20,27 +20,11 @@ from robochoc.flight.quadrotor.simulation import DT, QuadrotorSimulation
 from robochoc.flight.reports import Blocked, OutOfOrder
 from robochoc.flight.routes.moves import NoRouteError
 from robochoc.flight.routes.spacing import TooCloseError
-from robochoc.generators.queens3d import queens3d
-from robochoc.model.outcome import Outcome, Verdict
+from tests.support.flights import planar
 
 IN_THE_WIND = (3.0, 4.0, 0.0)
 PAIR = np.array([[0.0, 0, 0], [2, 0, 0]])
 UP = {0: Goal((0.0, 0.0, 2.0)), 1: Goal((2.0, 0.0, 3.0))}
-
-
-def planar(n: int, *away: str) -> Mission:
-    """The mission of a solution made by hand: 3 i + 5 j, modulo n. Who is `away` has withdrawn."""
-    team = queens3d(n)
-    heights = {
-        variable.name: sum(
-            factor * int(part) for factor, part in zip((3, 5), variable.name[1:].split("."), strict=True)
-        )
-        for robot in team.robots
-        if robot.name not in away
-        for variable in robot.variables
-    }
-    values = {name: height % n + 1 for name, height in heights.items()}
-    return mission_of(Outcome(team.name, "abt", "simulator", 0, Verdict.SOLUTION, values, withdrawn=away), team)
 
 
 def least(flown: FlightLog) -> float:

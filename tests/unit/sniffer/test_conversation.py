@@ -6,6 +6,7 @@ import math
 import re
 from collections.abc import Sequence
 from datetime import UTC, datetime
+from enum import EnumType
 from functools import cache
 from random import Random
 from types import UnionType
@@ -80,6 +81,8 @@ def other_settings(protocol: type[Protocol]) -> dict[str, str]:
     """Settings with which robots send what they do not send without them."""
     if hasattr(protocol.settings, "phases"):
         return {"phases": "2"}
+    if hasattr(protocol.settings, "heuristic"):
+        return {"heuristic": "dp"}
     anytime = {kind.__name__ for kind in get_args(AnytimeMessage)}
     return {"anytime": "yes", "cycles": "4"} if anytime <= {kind.__name__ for kind in types_of(protocol)} else {}
 
@@ -126,8 +129,10 @@ def values_of(hint: Any) -> st.SearchStrategy[Any]:  # noqa: ANN401 - any type
     if hint in SIMPLE:
         return SIMPLE[hint]
     if origin is None:
-        return messages_of(hint)
+        return st.sampled_from(hint) if isinstance(hint, EnumType) else messages_of(hint)
     if origin is Annotated:
+        if arguments[0] is str:  # digits, the only text that messages bound
+            return st.integers(0, 2**80).map("{:x}".format)
         return st.integers(arguments[1].ge, min(arguments[1].le or 2**50, 2**50))
     if origin is Literal:
         return st.sampled_from(arguments)
