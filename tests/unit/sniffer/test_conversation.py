@@ -129,7 +129,7 @@ def values_of(hint: Any) -> st.SearchStrategy[Any]:  # noqa: ANN401 - any type
     if hint in SIMPLE:
         return SIMPLE[hint]
     if origin is None:
-        return st.sampled_from(hint) if isinstance(hint, EnumType) else messages_of(hint)
+        return st.sampled_from([*hint]) if isinstance(hint, EnumType) else messages_of(hint)
     if origin is Annotated:
         if arguments[0] is str:  # digits, the only text that messages bound
             return st.integers(0, 2**80).map("{:x}".format)
