@@ -38,7 +38,7 @@ Setpoints = Callable[[float], Array]
 
 
 class Case(NamedTuple):
-    """What is flown: from where, which setpoints (9, N) at which second, for how long."""
+    """A flight for both simulators: starts (3, N) in metres, setpoints (9, N) for a second, its length in seconds."""
 
     name: str
     starts: Array
@@ -47,7 +47,7 @@ class Case(NamedTuple):
 
 
 class Difference(NamedTuple):
-    """How far the two are from each other: of a case's positions, over all drones and steps, in metres."""
+    """The distances in metres between both simulators' positions in a case, over all drones and steps."""
 
     case: str
     drones: int

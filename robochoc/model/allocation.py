@@ -32,14 +32,14 @@ Parts = tuple[dict[str, list[Variable]], Iterator[Constraint]]
 
 
 class TasksModel(StrEnum):
-    """How many tasks a robot can do."""
+    """The model of a task allocation: one task for each robot (`assignment`), or `several`."""
 
     ASSIGNMENT = "assignment"
     SEVERAL = "several"
 
 
 class Distance(StrEnum):
-    """How long a way is."""
+    """The measure of a way: along streets (Manhattan's), or straight."""
 
     STREETS = "streets"
     STRAIGHT = "straight"

@@ -136,7 +136,7 @@ class CheckCounts(NamedTuple):
 
 
 class Optima(NamedTuple):
-    """What a protocol that lists optima, or solutions, has found.
+    """The list of optima, or of solutions, that a protocol has found.
 
     Attributes:
         number: How many there are that robots can tell apart.

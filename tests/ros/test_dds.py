@@ -20,7 +20,6 @@ from robochoc.ros.live import dds as dds_module
 from robochoc.ros.live.dds import DdsSink, DdsSource
 from robochoc.ros.live.dds_participant import MESSAGE_BYTES_MAX
 from robochoc.ros.live.dds_place import DdsPlace, Quality
-from robochoc.ros.live.dds_types import described, raw_type, topic_name
 from robochoc.ros.names import REPORTS
 from robochoc.ros.recordings.types import types_of
 from robochoc.ros.sink import SinkError
@@ -130,53 +129,6 @@ def test_the_program_refuses_a_bad_place_in_one_line() -> None:
     assert done.returncode != 0
     assert done.stderr.count("\n") == 1
     assert "'nonsense' is no domain of DDS" in done.stderr
-
-
-# Types
-
-
-KINDS = sorted(
-    name.replace("/msg/", "/")
-    for name in types_of(2)._store.fielddefs  # noqa: SLF001 - all types that there are
-    if name.split("/")[0] in {"diagnostic_msgs", "geometry_msgs", "nav_msgs", "sensor_msgs", "std_msgs", "tf2_msgs"}
-)
-
-
-def filled(kind: str, depth: int = 0) -> dict[str, Any]:
-    """Fields of `kind`, none of them zero or empty."""
-    return {
-        name: value(field, number + depth)
-        for number, (name, field) in enumerate(types_of(2).layout(kind), 1)
-        if name != "structure_needs_at_least_one_member"
-    }
-
-
-def value(field: Any, number: int) -> Any:  # noqa: ANN401 - of any type
-    if field.shape != "one":
-        count = field.size if field.shape == "array" else min(3, field.size or 3)
-        return [value(field._replace(shape="one"), number + one) for one in range(count)]
-    if field.name.startswith("builtin_interfaces/"):
-        return STAMP + number
-    if "/" in field.name:
-        return filled(field.name, number)
-    plain = {"string": ("ü" * number)[: field.limit or number], "bool": number % 2 == 1}
-    return plain.get(field.name, number / 4 if field.name.startswith("float") else number % 100)
-
-
-@pytest.mark.parametrize("kind", KINDS)
-def test_the_description_of_a_type_is_that_of_its_bytes(kind: str) -> None:
-    """The library, which knows the description alone, reads our bytes and writes the same."""
-    content = types_of(2).encode(kind, filled(kind))
-    message = described(kind).deserialize(content)
-    assert message.serialize().rstrip(b"\0") == content.rstrip(b"\0")
-    assert raw_type(kind)(content).content == content
-
-
-def test_names_in_dds() -> None:
-    assert topic_name("/drone3_1/waypoint3_1") == "rt/drone3_1/waypoint3_1"
-    assert raw_type("geometry_msgs/msg/PoseStamped").__idl_typename__ == (  # type: ignore[attr-defined]  # theirs
-        "geometry_msgs::msg::dds_::PoseStamped_"
-    )
 
 
 # Waypoints

@@ -6,11 +6,13 @@ import itertools
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from random import Random
+from typing import NamedTuple
 
+from robochoc.generators.random_csp import random_csp
 from robochoc.model.orders import Order
 from robochoc.model.outcome import Outcome, Verdict
-from robochoc.model.problem import INFINITE, Constraint, ConstraintModel, Team
-from robochoc.run import Options, solve
+from robochoc.model.problem import INFINITE, Constraint, ConstraintModel, Relation, Semantics, Team
+from robochoc.run import Options, Runtime, solve
 from robochoc.run.registry import protocol_named
 from tests.support.cost_problems import MAX_COST, random_cost_team, soft_table, softened
 from tests.support.loose_problems import loosened, minimum_cost, several_variables_team
@@ -102,3 +104,27 @@ def _holding(team: Team, child: str, parent: str, held: Sequence[Constraint]) ->
     robot = team[child]
     parents = tuple(replace(one, constraints=tuple(held)) if one.name == parent else one for one in robot.parents)
     return with_robot(team, replace(robot, parents=parents))
+
+
+def priced_part(scope: str, costs: Mapping[tuple[int, int], float]) -> Constraint:
+    """Return a robot's part of a constraint over two variables of one letter each; what is not listed costs nothing."""
+    relation = Relation("R", 2, Semantics.SOFT, tuple(costs), tuple(costs.values()), 0)
+    return Constraint(scope, relation, tuple(scope), tuple(scope))
+
+
+class Spent(NamedTuple):
+    """The sums over some runs."""
+
+    messages: int
+    ncccs: int
+
+
+def spent_on_asymmetric(protocol: str) -> Spent:
+    """Return what `protocol` needs for three connected problems of six robots, always the same ones."""
+    messages = ncccs = 0
+    for seed in range(3):
+        team = random_csp(6, 3, 0.6, 0, seed, connected=True, max_cost=20, asymmetric=True)
+        metrics = solve(team, Options(protocol=protocol, runtime=Runtime.SIMULATOR, cache=False)).metrics
+        messages += sum(metrics.messages.values())
+        ncccs += metrics.ncccs
+    return Spent(messages, ncccs)

@@ -1,4 +1,4 @@
-"""Who does which task: the answer of a team that was made of a list of robots and tasks (`tasks.yaml`)."""
+"""Print which robot does which task, for a team that was made of a list of robots and tasks (`tasks.yaml`)."""
 
 from __future__ import annotations
 

@@ -53,7 +53,7 @@ from robochoc.protocols.traits import ENDS_WITH_PROOF, Traits
 from robochoc.solver.compiled import LocalProblem
 
 REPEATS = 10
-"""How often a robot tells everything again where messages are lost."""
+"""The number of times that a robot tells everything again where messages are lost."""
 
 
 class AsyncMaxSum(Protocol):

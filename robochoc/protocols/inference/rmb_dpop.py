@@ -172,7 +172,7 @@ class RMBDPOP(MBDPOP):
         self.proposed[child] = candidates
 
     def _plan(self) -> None:
-        """Who is cut is planned by the cluster root."""
+        """Do nothing: the cluster root chooses the robots that are cut."""
 
     def _announce(self) -> None:
         """Tell the parent who may be cut. A cluster root chooses; if nobody needs be cut any more, it has its label."""

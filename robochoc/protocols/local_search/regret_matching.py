@@ -57,7 +57,7 @@ from robochoc.protocols.traits import ENDS_WITH_PROOF, Traits
 from robochoc.solver.compiled import LexicographicCost, LocalProblem
 
 UNIT = 1 << 16
-"""What a regret of one cost is: room for fractions that integers hold exactly."""
+"""The integer that stands for a regret of one cost: room for fractions that integers hold exactly."""
 
 CHANCES = 1 << 53
 """Random numbers are multiples of one part of so many."""

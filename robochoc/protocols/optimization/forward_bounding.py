@@ -35,7 +35,7 @@ class CostsAbove:
     def __init__(self, problem: LocalProblem) -> None:
         self._problem = problem
         self.alone: Sequence[Number] = problem.charges
-        """What each own value costs whatever the robots above do."""
+        """The cost of each own value, whatever the robots above do."""
         self.values: dict[str, Value] = {}
         self.totals: dict[str, Sequence[Number]] = {}
 

@@ -55,7 +55,7 @@ class CycleProtocol(Protocol):
         self._waiting: dict[str, list[wire.Message | None]] = {name: [] for name in problem.neighbours}
         """A few at most from each: a robot that is ahead soon waits for this one. None: one that is lost."""
         self._given_up: dict[str, int] = {}
-        """How many messages of a neighbour belong to phases that this robot has done without them."""
+        """For each neighbour, how many of its messages belong to phases that this robot has done without them."""
         self._known: dict[str, wire.Value] = {}
         """Neighbours' last values."""
         self._names: tuple[str, ...] = ()

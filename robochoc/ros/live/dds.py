@@ -31,7 +31,7 @@ _PUBLISHED = Quality(reliable=True, latched=True, depth=1, wait_s=WAIT_S)
 _RECEIVED = Quality(reliable=False, latched=False, depth=PER_TOPIC_MAX)
 _OPTIONS = ("partition", "reliability", "durability", "depth")
 _CDR = (b"\0\0", b"\0\1")
-"""How messages in CDR begin, big-endian and little-endian."""
+"""The first bytes of messages in CDR, big-endian and little-endian."""
 
 
 class DdsSink(Sink):

@@ -39,7 +39,7 @@ CLOSE_S = 10.0
 CONFIG_FILE = "ZENOH_SESSION_CONFIG_URI"
 """The variable that names a file with a zenoh configuration, as for ROS 2 itself: certificates, an endpoint."""
 _HEARTBEAT_S = 0.5
-"""How soon a subscriber learns that it misses the last message, in seconds."""
+"""Seconds after which a subscriber learns that it misses the last message."""
 _START = "start one: `ros2 run rmw_zenoh_cpp rmw_zenohd`"
 
 Receive = Callable[[str, bytes], None]

@@ -1,4 +1,4 @@
-"""What names mean in ROS 2, whatever carries its messages: the domain, and a type's name in DDS and zenoh."""
+"""Names of ROS 2 that hold whatever carries its messages: the domain, and a type's name in DDS and zenoh."""
 
 from __future__ import annotations
 

@@ -26,7 +26,7 @@ from robochoc.ros.recordings.types import types_of
 
 _MAGIC = b"SQLite format 3\0"
 _ZSTD = b"\x28\xb5\x2f\xfd"
-"""What a compressed message begins with; CDR begins with a zero."""
+"""The first bytes of a compressed message; CDR begins with a zero."""
 _COLUMNS = {"topics": ("id", "name", "type", "serialization_format"), "messages": ("topic_id", "timestamp", "data")}
 _TOPICS_MAX = 1 << 16
 _MESSAGES_MAX = 1 << 24

@@ -63,7 +63,7 @@ class TaskEntry:
 
 @dataclass(frozen=True)
 class Synergy:
-    """What two tasks are worth besides, if the same robot does both."""
+    """The additional worth of two tasks if the same robot does both; it may be negative."""
 
     line: int
     tasks: tuple[str, str]

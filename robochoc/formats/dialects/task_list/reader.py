@@ -71,7 +71,7 @@ def read(paths: Sequence[Path], options: ImportOptions) -> Imported:
 
 @dataclass(frozen=True)
 class _List:
-    """What a file says."""
+    """The content of a `tasks.yaml`, read and checked, before a team is made of it."""
 
     name: str
     model: TasksModel

@@ -21,7 +21,7 @@ class RowRequest(Message, frozen=True):
 
 
 class Row(Message, frozen=True):
-    """What the sender's own side adds for each value of the receiver, besides what the sender counts itself."""
+    """For each value of the receiver, the cost that the sender's own side adds to what the sender counts itself."""
 
     costs: list[Number]
 

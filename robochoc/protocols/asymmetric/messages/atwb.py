@@ -26,7 +26,7 @@ class SideRequest(Message, frozen=True):
 
 
 class Side(Message, frozen=True):
-    """What the sender's own side adds to the CPA with the receiver's `counter`-th value, besides what it counts."""
+    """The cost that the sender's own side adds, beyond what it counts, to the CPA with the `counter`-th value asked."""
 
     counter: int
     cost: Cost

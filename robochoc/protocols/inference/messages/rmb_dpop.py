@@ -59,7 +59,7 @@ class ClusterLabel(Message, frozen=True):
 
 
 class SepDegree(Message, frozen=True):
-    """Who else may be cut for the sender and its cluster below; `most` is the largest memory need there by now."""
+    """The robots that may still be cut for the cluster below; `most` is the largest memory need there by now."""
 
     candidates: dict[str, Candidate]
     most: Need
