@@ -1,4 +1,4 @@
-"""The facts of a team by which a protocol is chosen (`run/choice.py`). They are read off its constraints."""
+"""The facts by which a protocol is chosen for a team (`run/choice.py`). Most are read off its constraints."""
 
 from __future__ import annotations
 
@@ -32,11 +32,13 @@ class Facts:
         environment: Whether something outside changes the problem.
         compiled_sizes: Returns the sizes of the robots' compiled domains; None if only those declared are known. It is
             asked where these are large.
+        loss: The probability that a message is lost on its way.
     """
 
     team: Team
     environment: bool = False
     compiled_sizes: Callable[[], Sizes | None] = lambda: None
+    loss: float = 0.0
 
     @property
     def robots(self) -> int:

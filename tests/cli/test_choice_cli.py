@@ -35,6 +35,7 @@ def test_what_was_chosen_is_said_with_the_reason_and_more_on_request(four: Path)
     assert "  not dpop: there are no costs\n" in said
     assert "  not abt: no constraint is partially known (PKC); there are 300 robots or fewer\n" in said
     assert "  not sfb" not in said
+    assert "message is lost" not in said
 
 
 def test_who_refuses_the_options_is_told_with_the_reason(four: Path) -> None:
@@ -42,6 +43,13 @@ def test_who_refuses_the_options_is_told_with_the_reason(four: Path) -> None:
     assert "  chosen: dsa, as it accepts the team with these options" in said
     assert "  not sfb: the problem does not change; sfb has no form as arrays; add --runtime simulator" in said
     assert "  not dsa" not in said
+
+
+def test_where_messages_are_lost_the_choice_says_so(four: Path) -> None:
+    said = robochoc_within("solve", four, "--runtime", "simulator", "--message-loss", "0.2", "--explain").stdout
+    assert "  chosen: dsa, as many messages may be lost: " in said
+    assert "; messages are lost with a probability of 0.2; " in said
+    assert "  not gdba: more than 10% of the messages are lost\n" in said
 
 
 def test_nothing_is_said_of_a_choice_where_all_was_asked_for(four: Path) -> None:

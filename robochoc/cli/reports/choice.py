@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING
 
 from robochoc.cli.reports.progress import print_above
 from robochoc.formats import on_one_line
-from robochoc.run.choice import ORDERS_TEXT, RULES, Choice, Rule, faster_order
+from robochoc.run.choice import ORDERS_TEXT, Choice, faster_order
+from robochoc.run.choice_rules import RULES, Rule
 
 if TYPE_CHECKING:
     from robochoc.communication.run_result import Progress

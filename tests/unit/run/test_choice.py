@@ -18,7 +18,7 @@ from robochoc.model.orders import Order
 from robochoc.model.outcome import PseudoTreeNode, Verdict
 from robochoc.model.problem import INFINITE, AddAgent, Change, ProblemKind, Team
 from robochoc.run import CENTRAL, Options, Runtime, Withdrawal, choice, solve
-from robochoc.run.choice import decided, decided_unseen
+from robochoc.run.choice import SOMEBODY, decided, decided_unseen
 from robochoc.run.facts import Facts, TreeTables
 from robochoc.run.registry import protocol_named, protocol_names
 from robochoc.solver.encoding import UnsupportedError
@@ -136,6 +136,22 @@ def test_the_answer_is_that_of_brute_force(kind: str, many: int) -> None:
     assert seen or kind == "partially known costs"
 
 
+@pytest.mark.parametrize("kind", KINDS)
+@count("many", 8, 300)
+def test_where_messages_are_lost_a_protocol_that_bears_it_is_taken_if_one_accepts_the_team(
+    kind: str, many: int
+) -> None:
+    for number in range(many):
+        team, options = drawn(kind, number)
+        options = replace(options, runtime=Runtime.SIMULATOR, spares=0, message_loss=(0.05, 0.3)[number % 2])
+        found = decided(team, options)
+        able = taken(team, options)
+        if any(protocol_named(one).traits.bears_loss for one in able):
+            assert protocol_named(found.options.protocol).traits.bears_loss, (kind, number)
+            assert "may be lost" in found.options.chosen["protocol"] or found.options.chosen["protocol"] == SOMEBODY
+        assert f"messages are lost with a probability of {options.message_loss}" in found.facts
+
+
 @count("many", 6, 300)
 def test_each_epoch_of_a_problem_that_changes_is_that_of_brute_force(many: int) -> None:
     for number in range(many):
@@ -171,10 +187,17 @@ PART = pkc_part("AB", (0, 0))
         (random_scenario(random_csp(30, 5, 0.2, 0.5), 2, 0.1), {}, "dynabt", None),
         (team_of({"A": range(3000), "B": range(3000)}, []), {}, "sfb", Order.MIN_WIDTH),
         (random_on(tree(300), 300, 0.00001), {}, "afc-ng", Order.MAX_DEGREE),
+        (random_csp(10, 4, 0.5, 0.3), {"message_loss": 0.1}, "gdba", None),
+        (random_csp(10, 4, 0.5, 0.3), {"message_loss": 0.2}, "dsa", None),
+        (random_csp(10, 4, 0.5, 0, max_cost=9), {"message_loss": 0.1}, "maxsum", None),
+        (random_csp(10, 4, 0.5, 0.3, max_cost=9), {"message_loss": 0.1}, "regret-matching", None),
+        (random_scenario(random_csp(12, 5, 0.5, 0.2), 2, 0.1), {"message_loss": 0.1}, "gdba", None),
+        (pkc_pair(PART, PART), {"message_loss": 0.1}, "disfc", None),
     ],
 )
 def test_what_is_chosen(team: Team, options: dict[str, object], protocol: str, order: Order | None) -> None:
-    asked = replace(Options(), **options)  # type: ignore[arg-type]
+    runtime = Runtime.SIMULATOR if "message_loss" in options else Runtime.PROCESSES
+    asked = replace(Options(runtime=runtime), **options)  # type: ignore[arg-type]
     found = decided(team, asked)
     assert (found.options.protocol, found.options.order) == (protocol, order)
     assert ("order" in found.options.chosen) is (order is not None and asked.order is None)

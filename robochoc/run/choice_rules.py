@@ -1,0 +1,234 @@
+"""The rules by which a protocol is chosen for a team (`run/choice.py`), and the sizes that they speak of.
+
+`RULES` are asked from the first to the last. The figures behind them: docs/guides/which-protocol.md.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from typing import NamedTuple
+
+from robochoc.run.facts import Facts
+from robochoc.solver.encoding import MAX_TUPLES
+from robochoc.solver.filters import MAX_FILTER_BITS
+
+NARROW_CELLS = 65_536
+"""No table on a narrow pseudo-tree has more entries."""
+FEW_ROBOTS = 12
+"""Up to so many, `sfb` needs fewer messages than `dpop` even on trees (docs/explanation/sfb.md)."""
+MOST_IN_A_TREE = 30_000
+"""So many take half a minute in the simulator (docs/guides/large-teams.md)."""
+MANY_ROBOTS = 300
+"""With more, what SFB's messages tell of each robot adds up, and local search is all that ends with costs."""
+MANY_COMBINATIONS = 100_000_000
+"""Up to so many combinations of all robots' values, `asym-pt-fb` takes seconds in the simulator."""
+SPARSE = 8
+"""The mean number of neighbours up to which a constraint graph is called sparse."""
+FEW_TO_BEGIN_ANEW = 25
+"""Up to so many robots `sfb` decides hard problems in the files' order, which a problem that changes keeps."""
+TIGHT = 0.7
+"""The constrainedness from which `sfb`, begun anew after each change, needs fewer messages than `dynabt`."""
+LONG_ROW = 65_536
+"""The values of all robots together up to which many partial assignments of SFB go into a message."""
+
+FEW_LOSSES = 0.1
+"""The share of lost messages up to which `gdba` finds more solutions than `dsa`: who misses a gain does not move."""
+
+
+class Condition(NamedTuple):
+    """What a rule asks of a team: whether it holds, and in words that it does, and that it does not."""
+
+    holds: Callable[[Facts], bool]
+    text: str
+    otherwise: str
+
+
+class Rule(NamedTuple):
+    """A protocol for teams of one sort: what is asked of them, and why it is taken."""
+
+    protocol: str
+    conditions: tuple[Condition, ...]
+    why: str
+
+    def unmet(self, facts: Facts) -> str:
+        """Return why the rule does not hold: the first condition that the team does not meet. Empty if it holds."""
+        return next((one.otherwise for one in self.conditions if not one.holds(facts)), "")
+
+
+COSTS = Condition(lambda f: f.has_costs, "costs", "there are no costs")
+NO_COSTS = Condition(lambda f: not f.has_costs, "no costs", "there are costs")
+CHANGES = Condition(lambda f: f.changes, "a problem that changes", "the problem does not change")
+PARTIAL = Condition(
+    lambda f: f.partially_known, "partially known constraints (PKC)", "no constraint is partially known (PKC)"
+)
+MANY = Condition(
+    lambda f: f.robots > MANY_ROBOTS, f"more than {MANY_ROBOTS} robots", f"there are {MANY_ROBOTS} robots or fewer"
+)
+FORBIDS_NOTHING = Condition(lambda f: not f.forbids, "nothing is forbidden", "some constraints forbid something")
+LARGE_TABLE = Condition(
+    lambda f: f.largest_table > MAX_TUPLES,
+    f"a constraint of more than {MAX_TUPLES:,} combinations of values",
+    f"no constraint has more than {MAX_TUPLES:,} combinations of values",
+)
+LOSSY = Condition(lambda f: f.loss > 0, "messages may be lost", "no message is lost")
+NEARLY_A_TREE = (
+    COSTS,
+    Condition(
+        lambda f: f.robots > FEW_ROBOTS,
+        f"more than {FEW_ROBOTS} robots",
+        f"there are {FEW_ROBOTS} robots or fewer",
+    ),
+    Condition(
+        lambda f: f.robots <= MOST_IN_A_TREE,
+        f"at most {MOST_IN_A_TREE:,} robots",
+        f"there are more than {MOST_IN_A_TREE:,} robots",
+    ),
+    Condition(
+        lambda f: f.tree.cells <= NARROW_CELLS,
+        f"tables of at most {NARROW_CELLS:,} entries on the pseudo-tree",
+        f"a table on the pseudo-tree would have more than {NARROW_CELLS:,} entries",
+    ),
+)
+
+RULES = (
+    Rule(
+        "maxsum",
+        (
+            LOSSY,
+            COSTS,
+            FORBIDS_NOTHING,
+            Condition(lambda f: f.largest_table <= MAX_TUPLES, "domains that are not large", "domains are large"),
+        ),
+        "messages may be lost: it goes on with the last ones that it has, and ends at lower costs than others that do",
+    ),
+    Rule(
+        "regret-matching",
+        (LOSSY, COSTS),
+        "messages may be lost, and it needs none in particular; where hard constraints have to hold, it finds most",
+    ),
+    Rule(
+        "gdba",
+        (
+            LOSSY,
+            Condition(
+                lambda f: f.loss <= FEW_LOSSES,
+                f"at most {FEW_LOSSES:.0%} of them",
+                f"more than {FEW_LOSSES:.0%} of the messages are lost",
+            ),
+        ),
+        "messages may be lost, and it goes on without them; of those that do, it finds most solutions",
+    ),
+    Rule(
+        "dsa",
+        (LOSSY,),
+        "many messages may be lost: its robots move on the last values that they know",
+    ),
+    Rule(
+        "disfc",
+        (
+            PARTIAL,
+            Condition(
+                lambda f: f.largest_domain <= MAX_FILTER_BITS,
+                f"at most {MAX_FILTER_BITS:,} values in a domain",
+                f"a domain has more than {MAX_FILTER_BITS:,} values, too many for its filters",
+            ),
+        ),
+        "constraints are partially known: it takes them, and tells nobody a value",
+    ),
+    Rule("abt", (PARTIAL,), "constraints are partially known, and it takes them"),
+    Rule(
+        "acls",
+        (
+            PARTIAL,
+            COSTS,
+            Condition(
+                lambda f: math.prod(f.sizes.values()) > MANY_COMBINATIONS,
+                f"more than {MANY_COMBINATIONS:,} combinations of all values",
+                f"there are {MANY_COMBINATIONS:,} combinations of all values or fewer",
+            ),
+            FORBIDS_NOTHING,
+        ),
+        "both sides of partially known constraints have costs, and there are too many combinations for a proof: local"
+        " search ends, with a good answer",
+    ),
+    Rule(
+        "asym-pt-fb", (PARTIAL, COSTS), "both sides of partially known constraints have costs; it proves the best sum"
+    ),
+    Rule(
+        "sfb",
+        (
+            CHANGES,
+            NO_COSTS,
+            Condition(lambda f: not f.environment, "changes that files name", "something outside changes the problem"),
+            Condition(
+                lambda f: f.robots <= FEW_TO_BEGIN_ANEW,
+                f"at most {FEW_TO_BEGIN_ANEW} robots",
+                f"there are more than {FEW_TO_BEGIN_ANEW} robots",
+            ),
+            Condition(
+                lambda f: f.constrainedness >= TIGHT,
+                f"a constrainedness of {TIGHT} or more",
+                f"the constrainedness is below {TIGHT}",
+            ),
+            Condition(
+                lambda f: f.largest_table <= MAX_TUPLES and f.values <= LONG_ROW,
+                "domains that are not large",
+                "domains are large",
+            ),
+        ),
+        "the problem changes and is hard: begun anew each time, it needs fewer messages than one that goes on",
+    ),
+    Rule(
+        "dynabt",
+        (CHANGES, NO_COSTS),
+        "the problem changes, and it keeps what still holds",
+    ),
+    Rule(
+        "s-dpop",
+        (CHANGES, *NEARLY_A_TREE),
+        "costs change, and the constraint graph is nearly a tree: it keeps the tables that still hold",
+    ),
+    Rule(
+        "dpop",
+        NEARLY_A_TREE,
+        "the constraint graph is nearly a tree: tables are small, and messages few",
+    ),
+    Rule(
+        "dsa",
+        (
+            COSTS,
+            MANY,
+            FORBIDS_NOTHING,
+        ),
+        "there are too many robots for a proof, and nothing is forbidden: local search ends, with a good answer",
+    ),
+    Rule(
+        "abt",
+        (
+            NO_COSTS,
+            MANY,
+            Condition(
+                lambda f: 2 * f.links <= SPARSE * f.robots,
+                f"at most {SPARSE} neighbours each in the mean",
+                f"robots have more than {SPARSE} neighbours in the mean",
+            ),
+        ),
+        "there are many robots with few neighbours: they search at the same time, with short messages",
+    ),
+    Rule(
+        "afc-ng",
+        (
+            NO_COSTS,
+            Condition(
+                lambda f: f.values > LONG_ROW or f.largest_table > MAX_TUPLES,
+                f"more than {LONG_ROW:,} values in all, or {LARGE_TABLE.text}",
+                f"there are {LONG_ROW:,} values in all or fewer, and {LARGE_TABLE.otherwise}",
+            ),
+        ),
+        "domains are large, and it needs no tables",
+    ),
+    Rule("afb", (LARGE_TABLE,), "domains are large, and it needs no tables"),
+    Rule("sfb", (), "it needs few messages, on hard problems too"),
+)
+"""The rules, in their order."""
