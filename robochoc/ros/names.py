@@ -84,6 +84,11 @@ class TopicNames:
                 yield number, f"{self._namespaces[number]}/{token}"
 
 
+def is_report(topic: str, kind: str) -> bool:
+    """Return whether `topic`, of the ROS type `kind`, is one on which a drone reports."""
+    return REPORTS.get(topic.rpartition("/")[2]) == kind.replace("/msg/", "/")
+
+
 def ros_name(name: str) -> str:
     """Return `name` as ROS allows it: `/drone3_1/waypoint3_1`. Different names may become the same."""
     tokens = [_token(token) for token in name.split("/") if token] or [_token("")]

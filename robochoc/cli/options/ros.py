@@ -34,7 +34,7 @@ ros_options = _optional(
         metavar="SINK",
         help=(
             "Publish decisions as waypoints: mcap:FILE (for Foxglove), rosbag:FILE, dds (ROS 2), rmw_zenoh,"
-            " rosbridge://HOST:PORT, rospy, or an installed sink. Repeatable."
+            " rosbridge://HOST:PORT, rospy, rclpy, or an installed one. Repeatable."
         ),
     ),
     click.option("--frame", type=FrameType(), metavar="NAME", help=f"Frame of all positions.  [default: {FRAME}]"),

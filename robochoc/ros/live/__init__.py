@@ -1,1 +1,1 @@
-"""A ROS that runs: by rosbridge, or by rospy where that is installed."""
+"""A ROS that runs: by DDS, rmw_zenoh or rosbridge, or by rospy or rclpy where these are installed."""

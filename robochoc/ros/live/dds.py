@@ -12,8 +12,7 @@ from typing import NoReturn
 from robochoc.ros.live.dds_participant import MESSAGE_BYTES_MAX, Participant
 from robochoc.ros.live.dds_place import DdsPlace, Quality
 from robochoc.ros.live.inbox import PER_TOPIC_MAX, RosInbox, weight_of
-from robochoc.ros.mappings import short_kind
-from robochoc.ros.names import REPORTS
+from robochoc.ros.names import is_report
 from robochoc.ros.recordings.types import FieldsError, UnknownTypeError, types_of
 from robochoc.ros.sink import Fields, Sink, SinkError
 from robochoc.ros.source import ReceivedMessage, Source, SourceError
@@ -52,7 +51,7 @@ class DdsSink(Sink):
         for topic, kind in new.items():
             self._participant.announce(topic, kind)
             self._topics[topic] = kind
-        self._gather([topic for topic, kind in new.items() if not _is_report(topic, kind)])
+        self._gather([topic for topic, kind in new.items() if not is_report(topic, kind)])
 
     def publish(self, topic: str, kind: str, fields: Fields, at_ns: int) -> None:  # noqa: ARG002 - theirs is the clock
         """Send a message. Waits where a subscriber is far behind."""
@@ -140,7 +139,3 @@ class DdsSource(Source):
         except FieldsError:
             return
         self._inbox.put(ReceivedMessage(topic, kind, fields, time.time_ns()), weight_of(fields))
-
-
-def _is_report(topic: str, kind: str) -> bool:
-    return REPORTS.get(topic.rpartition("/")[2]) == short_kind(kind)

@@ -16,15 +16,15 @@ _NANO = 1_000_000_000
 _TYPE = re.compile(r"([a-z][a-z0-9_]*)/([A-Za-z][A-Za-z0-9_]*)")
 
 
-def message_class(kind: str, failed: Failed) -> Any:  # noqa: ANN401 - messages are untyped
-    """Return the class of the ROS type `kind`, also in ROS 2's spelling with `/msg/`. Raises `failed`."""
+def message_class(kind: str, failed: Failed, library: str = "rospy") -> Any:  # noqa: ANN401 - messages are untyped
+    """Return `library`'s class of the ROS type `kind`, also in ROS 2's spelling with `/msg/`. Raises `failed`."""
     found = _TYPE.fullmatch(kind.replace("/msg/", "/"))
     try:
         package: ModuleType = importlib.import_module(f"{found[1]}.msg" if found else "")
         return getattr(package, found[2] if found else "")
     except (ImportError, AttributeError, ValueError) as missing:
         where = f"install the package {found[1]!r} for Python" if found else "expected PACKAGE/TYPE"
-        raise failed(f"rospy knows no message type {shortened(kind)!r}; {where}") from missing
+        raise failed(f"{library} knows no message type {shortened(kind)!r}; {where}") from missing
 
 
 def filled(message: Any, fields: Fields) -> Any:  # noqa: ANN401 - messages are untyped

@@ -1,0 +1,277 @@
+"""rclpy: a node of ROS 2 in this process, where rclpy can be imported: it comes with a ROS 2, for that ROS's Python.
+
+rclpy is untyped; this module and `rclpy_messages` alone know it. Each sink and each source has a context and a node of
+its own, so that what else uses rclpy in this process is left alone. The domain, the middleware and its network are
+rclpy's own business: `ROS_DOMAIN_ID`, `RMW_IMPLEMENTATION` and the like.
+"""
+
+from __future__ import annotations
+
+import importlib
+import re
+import secrets
+import sys
+import threading
+import time
+from collections.abc import Collection, Mapping
+from contextlib import suppress
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+from robochoc.formats.diagnostics import on_one_line, shortened
+from robochoc.ros.live.inbox import PER_TOPIC_MAX, RosInbox, weight_of
+from robochoc.ros.live.rclpy_messages import fields_of, filled
+from robochoc.ros.live.ros2_names import domain_id
+from robochoc.ros.live.ros_master import Failed
+from robochoc.ros.live.rospy_messages import message_class
+from robochoc.ros.names import is_report
+from robochoc.ros.sink import Fields, Sink, SinkError
+from robochoc.ros.source import ReceivedMessage, Source, SourceError
+
+WAIT_S = 2.0
+"""The longest wait for the first subscriber of each waypoint's topic, in seconds."""
+SETTLE_S = 0.3
+"""No new subscriber has come for so many seconds: then all are there."""
+STUCK_S = 10.0
+"""The longest time for which a subscriber may leave a message unacknowledged, in seconds."""
+LINGER_S = 0.3
+"""Seconds for which topics stay after the last message. Some subscribers drop unread messages when a topic ends."""
+BLOCKED_S = 0.2
+"""The time after which a call that waits for others comes back, so that a signal is heard."""
+END_S = 5.0
+"""The longest wait for the thread that spins, in seconds."""
+MESSAGE_BYTES_MAX = 256 * 1024
+"""A longer message is ignored: reports are short."""
+INSTALLED = Path("/opt/ros")
+"""Where a ROS 2 is installed by its packages."""
+
+OLDEST_PYTHON = (3, 11)
+"""robochoc runs on none that is older."""
+
+_WRONG_FIELDS = (ValueError, TypeError, AttributeError, AssertionError, OverflowError)
+_PYTHON = re.compile(r"python(\d+\.\d+)")
+
+
+class RclpyNode:
+    """A node in a context of its own. Raises `failed`, as its methods do."""
+
+    def __init__(self, place: str, failed: Failed) -> None:
+        if place:
+            raise failed(f"rclpy takes no place, and got {shortened(place)!r}; say the domain in ROS_DOMAIN_ID")
+        self._failed = failed
+        domain_id(failed)  # middlewares do not say what is wrong with it
+        try:
+            importlib.import_module("rclpy")
+            made = importlib.import_module("rclpy.context").Context()
+            node = importlib.import_module("rclpy.node").Node
+            self._qos: Any = importlib.import_module("rclpy.qos")
+        except (ImportError, OSError) as missing:
+            why = shortened(on_one_line(str(missing)))
+            raise failed(f"rclpy cannot be imported ({why}); {_advice()}") from missing
+        self.context: Any = made
+        try:
+            # Neither its signals nor its log, which would be a file.
+            made.init([], initialize_logging=False)
+            self.node: Any = node(
+                f"robochoc_{secrets.token_hex(4)}",
+                context=made,
+                use_global_arguments=False,
+                enable_rosout=False,
+                start_parameter_services=False,
+            )
+        except Exception as error:
+            made.try_shutdown()
+            raise failed(f"rclpy cannot make a node ({_said(error)}); see ROS_DOMAIN_ID, RMW_IMPLEMENTATION") from error
+
+    def quality(self, *, waypoints: bool) -> Any:  # noqa: ANN401 - rclpy is untyped
+        """Return the quality of service: reliable and latched for what is published, or as ROS 2 has it for sensors."""
+        qos = self._qos
+        reliable, latched = qos.ReliabilityPolicy, qos.DurabilityPolicy
+        return qos.QoSProfile(
+            history=qos.HistoryPolicy.KEEP_LAST,
+            depth=1 if waypoints else PER_TOPIC_MAX,
+            reliability=reliable.RELIABLE if waypoints else reliable.BEST_EFFORT,
+            durability=latched.TRANSIENT_LOCAL if waypoints else latched.VOLATILE,
+        )
+
+    def check(self) -> None:
+        """Raise `failed` if the context was shut down, by whoever else is in this process."""
+        if not self.context.ok():
+            raise self._failed("rclpy was shut down in this process; start again")
+
+    def close(self) -> None:
+        """Leave ROS. A second call does nothing."""
+        with suppress(Exception):  # it may be shut down already
+            self.node.destroy_node()
+        self.context.try_shutdown()
+
+
+def _advice() -> str:
+    """Return what to do where rclpy cannot be imported."""
+    ours = f"{sys.version_info.major}.{sys.version_info.minor}"
+    for entry in sys.path:
+        found = _PYTHON.search(entry)
+        if found and found[1] != ours and Path(entry, "rclpy").is_dir():
+            problem = f"the ROS 2 that was sourced is for Python {found[1]}, and this is Python {ours}"
+            if tuple(map(int, found[1].split("."))) < OLDEST_PYTHON:
+                return f"{problem}; robochoc needs 3.11: use dds, which needs no ROS here"
+            return f"{problem}: install robochoc for Python {found[1]}, or use dds, which needs no ROS here"
+    there = sorted(INSTALLED.glob("*/setup.bash"))
+    setup = there[-1] if there else INSTALLED / "DISTRO" / "setup.bash"
+    return f"source {setup} first, or use dds, which needs no ROS here"
+
+
+class RclpySink(Sink):
+    """Publishes as a node of ROS 2. Topics are reliable and latched: later subscribers receive the last message.
+
+    A topic keeps one message. The next is published when all subscribers have acknowledged the one before, so that they
+    receive every one.
+    """
+
+    def __init__(self, place: str) -> None:
+        super().__init__(place or "rclpy")
+        self._ros = RclpyNode(place, SinkError)
+        self._duration: Any = importlib.import_module("rclpy.duration").Duration
+        self._publishers: dict[str, Any] = {}
+        self._kinds: dict[str, Any] = {}
+
+    def advertise(self, topics: Mapping[str, str]) -> None:
+        """Announce `topics`, and wait for the subscribers of waypoints."""
+        new = {topic: kind for topic, kind in topics.items() if topic not in self._kinds}
+        kinds = {topic: message_class(kind, SinkError, "rclpy") for topic, kind in new.items()}
+        for topic, kind in kinds.items():
+            try:
+                publisher = self._ros.node.create_publisher(kind, topic, self._ros.quality(waypoints=True))
+            except Exception as error:
+                raise SinkError(on_one_line(f"{topic} cannot be announced in ROS 2: {_said(error)}")) from error
+            self._publishers[topic], self._kinds[topic] = publisher, kind
+        self._gather([topic for topic, kind in new.items() if not is_report(topic, kind)])
+
+    def publish(self, topic: str, kind: str, fields: Fields, at_ns: int) -> None:  # noqa: ARG002 - theirs is the clock
+        """Publish a message when the one before on its topic was acknowledged."""
+        self.advertise({topic: kind})
+        try:
+            message = filled(self._kinds[topic](), fields)
+        except _WRONG_FIELDS as error:
+            raise SinkError(on_one_line(f"{topic} cannot be published as {kind}: {_said(error)}")) from error
+        self._await_acknowledged(topic)
+        try:
+            self._publishers[topic].publish(message)
+        except Exception as error:
+            raise SinkError(on_one_line(f"{topic} cannot be published in ROS 2: {_said(error)}")) from error
+
+    def close(self) -> None:
+        """Wait until all subscribers have acknowledged everything."""
+        try:
+            for topic in self._publishers:
+                self._await_acknowledged(topic)
+            if any(publisher.get_subscription_count() for publisher in self._publishers.values()):
+                time.sleep(LINGER_S)
+        finally:
+            self.discard()
+
+    def discard(self) -> None:
+        """Leave ROS."""
+        self._ros.close()
+
+    def _gather(self, topics: Collection[str]) -> None:
+        """Wait until each of `topics` has a subscriber and no more come; no longer than `WAIT_S`."""
+        until = time.monotonic() + WAIT_S
+        before, since, pause_s = 0, time.monotonic(), 0.01
+        while topics and time.monotonic() < until:
+            self._ros.check()
+            counts = [self._publishers[topic].get_subscription_count() for topic in topics]
+            now = time.monotonic()
+            if sum(counts) != before:
+                before, since = sum(counts), now
+            if all(counts) and now - since >= SETTLE_S:
+                return
+            time.sleep(pause_s)
+            pause_s = min(2 * pause_s, 0.1)
+
+    def _await_acknowledged(self, topic: str) -> None:
+        """Wait until all subscribers of `topic` have its messages. Raises `SinkError` if one does not for `STUCK_S`."""
+        until = time.monotonic() + STUCK_S
+        while not self._is_acknowledged(topic):
+            if time.monotonic() > until:
+                problem = f"a subscriber of {topic} has acknowledged nothing for {STUCK_S:g} s"
+                raise SinkError(f"{problem}; see `ros2 topic info -v {topic}` for who it is, and end it")
+
+    def _is_acknowledged(self, topic: str) -> bool:
+        self._ros.check()
+        try:
+            return bool(self._publishers[topic].wait_for_all_acked(self._duration(nanoseconds=int(BLOCKED_S * 1e9))))
+        except Exception:  # noqa: BLE001 - a middleware or an rclpy that cannot tell
+            self._ros.check()
+            return True
+
+
+class RclpySource(Source):
+    """Receives as a node of ROS 2. A thread spins it until the source is closed.
+
+    Its subscriptions are as ROS 2 has them for sensors: they take messages of reliable publishers and of others.
+    """
+
+    def __init__(self, place: str) -> None:
+        super().__init__(place)
+        self._ros = RclpyNode(place, SourceError)
+        self._inbox = RosInbox()
+        self._over = threading.Event()
+        self._problem = ""
+        self._decode: Any = importlib.import_module("rclpy.serialization").deserialize_message
+        executors = importlib.import_module("rclpy.executors")
+        self._executor: Any = executors.SingleThreadedExecutor(context=self._ros.context)
+        self._executor.add_node(self._ros.node)
+        self._thread = threading.Thread(target=self._spin, daemon=True, name="rclpy spins")
+        self._thread.start()
+
+    def listen(self, topics: Mapping[str, str]) -> None:
+        """Subscribe to `topics`."""
+        kinds = {topic: (kind, message_class(kind, SourceError, "rclpy")) for topic, kind in topics.items()}
+        quality = self._ros.quality(waypoints=False)
+        for topic, (kind, type_) in kinds.items():
+            take = partial(self._receive, topic, kind, type_)
+            try:
+                self._ros.node.create_subscription(type_, topic, take, quality, raw=True)
+            except Exception as error:
+                raise SourceError(on_one_line(f"{topic} cannot be subscribed to in ROS 2: {_said(error)}")) from error
+
+    def next(self, wait_s: float) -> ReceivedMessage | None:
+        """Return the oldest message that is here, or that comes within `wait_s`."""
+        received = self._inbox.get(wait_s, over=self._over)
+        if received is None and self._over.is_set():
+            raise SourceError(f"rclpy receives nothing any more ({self._problem or 'closed'}); start again")
+        return received
+
+    def close(self) -> None:
+        """End the thread, and leave ROS."""
+        self._over.set()
+        with suppress(Exception):  # it may be shut down already
+            self._executor.wake()
+        self._thread.join(END_S)
+        with suppress(Exception):
+            self._executor.shutdown(timeout_sec=END_S)
+        self._ros.close()
+
+    def _spin(self) -> None:
+        while not self._over.is_set():
+            try:
+                self._executor.spin_once(timeout_sec=BLOCKED_S)
+            except Exception as error:  # noqa: BLE001 - raised by `next`
+                self._problem = _said(error)
+                self._over.set()
+                self._inbox.wake()
+
+    def _receive(self, topic: str, kind: str, type_: Any, content: bytes) -> None:  # noqa: ANN401 - rclpy is untyped
+        if len(content) > MESSAGE_BYTES_MAX:
+            return
+        try:
+            fields = fields_of(self._decode(content, type_))
+        except Exception:  # noqa: BLE001 - bytes that are no message are ignored
+            return
+        self._inbox.put(ReceivedMessage(topic, kind, fields, time.time_ns()), weight_of(fields))
+
+
+def _said(error: Exception) -> str:
+    return shortened(on_one_line(f"{type(error).__name__}: {error}"))
