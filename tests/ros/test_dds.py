@@ -256,11 +256,14 @@ def test_what_cannot_be_published(domain: int) -> None:
 
 # Reports
 
+RELIABLE = "reliability=reliable"
+"""What is published once is received, even if the reader learns of the writer later than the writer of the reader."""
+
 
 def test_reports_are_heard(domain: int) -> None:
     kinds = {"/a/blocked": "PointStamped", "/a/battery": "BatteryState", "/a/out_of_order": "String"}
     wanted = {topic: REPORTS[topic.rpartition("/")[2]] for topic in kinds}
-    with reporter(domain, kinds) as peer, DdsSource(str(domain)) as source:
+    with reporter(domain, kinds) as peer, DdsSource(f"{domain}?{RELIABLE}") as source:
         source.listen(wanted)
         assert source.next(0) is None
         assert peer.heard() == "matched"
@@ -329,7 +332,7 @@ def test_bytes_that_are_no_message_are_passed_over(domain: int, garbage: bytes) 
 
 
 def test_a_message_that_is_too_long_does_not_come(domain: int, capfd: pytest.CaptureFixture[str]) -> None:
-    with reporter(domain, {"/a/out_of_order": "String"}) as peer, DdsSource(str(domain)) as source:
+    with reporter(domain, {"/a/out_of_order": "String"}) as peer, DdsSource(f"{domain}?{RELIABLE}") as source:
         source.listen({"/a/out_of_order": STRING})
         assert peer.heard() == "matched"
         peer.say("/a/out_of_order", data="x" * MESSAGE_BYTES_MAX)
@@ -340,9 +343,9 @@ def test_a_message_that_is_too_long_does_not_come(domain: int, capfd: pytest.Cap
 
 def test_a_message_of_another_type_does_not_come(domain: int) -> None:
     topics = {"/a/battery": "String", "/b/out_of_order": "String"}
-    with reporter(domain, topics) as peer, DdsSource(str(domain)) as source:
+    with reporter(domain, topics) as peer, DdsSource(f"{domain}?{RELIABLE}") as source:
         source.listen({"/a/battery": BATTERY, "/b/out_of_order": STRING})
-        with DdsSource(str(domain)) as other:
+        with DdsSource(f"{domain}?{RELIABLE}") as other:
             other.listen({"/a/battery": STRING})
             assert peer.heard() == "matched"
             peer.say("/a/battery", data="not a battery")
