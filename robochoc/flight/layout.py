@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from itertools import count, product
 
 from robochoc.flight.crafts import Cell, Craft, row_and_column
-from robochoc.flight.ground_map import GroundMap
+from robochoc.formats.ground_map import GroundMap
 
 Point = tuple[float, float, float]
 
@@ -138,7 +138,7 @@ def layout_of(crafts: Sequence[Craft], others: Iterable[Craft] = (), ground: Gro
     held = [*cells, *(other.cell for other in others if other.cell)]
     if ground is not None:
         cells = _standing(crafts, cells, ground)
-        held += [*cells, (1, 1), (ground.columns, ground.rows)]
+        held += [*cells, ground.first, ground.x_and_y(ground.columns, ground.rows)]
     axes = _axes(crafts, others, held, max(ground.columns, ground.rows) if ground else 0)
     rows, columns, levels = axes
     beside = _lines(rows.low, rows.cells, columns.high + _GAP, 1)
@@ -165,7 +165,9 @@ def _standing(crafts: Sequence[Craft], cells: Sequence[Cell], ground: GroundMap)
     """Return where crafts stand on the map; where their robot has several, or is not on it, their own cells."""
     count = Counter(craft.robot for craft in crafts)
     return [
-        ground.starts[craft.robot] if count[craft.robot] == 1 and craft.robot in ground.starts else cell
+        ground.x_and_y(*ground.starts[craft.robot])
+        if count[craft.robot] == 1 and craft.robot in ground.starts
+        else cell
         for craft, cell in zip(crafts, cells, strict=True)
     ]
 

@@ -11,8 +11,8 @@ from collections.abc import Container, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 from robochoc.flight.crafts import Craft, craft_of_variable, crafts_of, possible_crafts, row_and_column
-from robochoc.flight.ground_map import GroundMap
 from robochoc.flight.layout import Axis, Layout, Point, layout_of
+from robochoc.formats.ground_map import GroundMap
 from robochoc.model.outcome import EpochOutcome, Outcome, Verdict
 from robochoc.model.priorities import natural_key
 from robochoc.model.problem import AddAgent, Assignment, Robot, Team, Topic
@@ -99,7 +99,7 @@ class MissionBuilder:
         names: Names of variables and of robots, where nothing else is known.
         others: Crafts at other times; the box holds them, too.
         leaving: How many drones will leave; None: any may.
-        scale: Metres a unit; by default `UNIT_M`, or less where the box would be vast.
+        scale: Metres a unit; by default the map's, or else `UNIT_M`, or less where the box would be vast.
         ground: A map of the ground. Robots whose files name no waypoint then stay where they stand.
     """
 
@@ -121,7 +121,8 @@ class MissionBuilder:
         self._places = {(craft.robot, craft.name): number for number, craft in enumerate(crafts)}
         self._crafts_in_order = crafts
         self.layout: Layout = layout_of(crafts, others, ground)
-        self.scale = _scale(self.layout.axes) if scale is None else scale
+        given = ground.scale if scale is None and ground else scale
+        self.scale = _scale(self.layout.axes) if given is None else given
         self._edge = self.layout.edge(len(crafts) if leaving is None else leaving)
         self._aside: dict[int, Point] = {}
         self._seen: set[str] = set()
@@ -153,9 +154,12 @@ class MissionBuilder:
         return Mission(team, self.drones, tuple(legs), self.layout.axes, self.scale, self._ground is not None, blocks)
 
     def _blocks(self) -> Iterator[Block]:
+        if self._ground is None:
+            return
         rows, columns, _ = self.layout.axes
-        for cell in self._ground.blocked if self._ground else ():
-            spot = rows.at(cell.x), columns.at(cell.y), self.layout.ground + _BLOCK_HIGH
+        for cell in self._ground.blocked:
+            x, y = self._ground.x_and_y(cell.x, cell.y)
+            spot = rows.at(x), columns.at(y), self.layout.ground + _BLOCK_HIGH
             yield Block(self._metres(spot), cell.epoch)
 
     def _crafts(self, values: Assignment, here: Container[str] | None = None) -> Iterator[Craft]:
@@ -191,7 +195,7 @@ def mission_of(
     Args:
         outcome: What was decided.
         team: The team as its files have it, before its scenario. Without it, only names are known.
-        scale: Metres a unit; by default `UNIT_M`, or less where the box would be vast.
+        scale: Metres a unit; by default the map's, or else `UNIT_M`, or less where the box would be vast.
         ground: A map of the ground, if there is one.
     """
     epochs = outcome.epochs or (

@@ -18,6 +18,8 @@ from robochoc.system.files import resolved
 
 SKETCH_FILE = "sketch.json"
 """The file in which `robochoc app` keeps beside a team how it was drawn."""
+GROUND_FILE = "map.json"
+"""The file beside a team that says where its robots stand on a map, and what is blocked: `robochoc fly --map`."""
 _SURELY_READ = 1024 * 1024
 """Bytes of a file that meets no limit of its reader, if the robot is valid."""
 
@@ -31,7 +33,7 @@ def write_team(
         team: A valid team.
         folder: The folder to be written.
         replace: Whether a folder of a team that is there already is replaced: one with XML files only, and those that
-            an import or the application writes.
+            an import, the application or a problem on a map writes.
         beside: The contents of other files that are written there, by their names.
 
     Raises:
@@ -88,7 +90,7 @@ def _may_replace(folder: Path, *, replace: bool) -> None:
 def _is_ours(entry: Path) -> bool:
     if entry.is_dir() and not entry.is_symlink() and re.fullmatch(r"late\d*", entry.name):
         return all(_is_ours(below) for below in entry.iterdir())
-    return entry.is_file() and (entry.suffix == ".xml" or entry.name in {NAMES_FILE, SKETCH_FILE})
+    return entry.is_file() and (entry.suffix == ".xml" or entry.name in {NAMES_FILE, SKETCH_FILE, GROUND_FILE})
 
 
 def _refusal(folder: Path, message: str, hint: str) -> InvalidInputError:

@@ -20,6 +20,8 @@ from robochoc.generators import sensors as sensor_networks
 from robochoc.generators import tasks as allocations
 from robochoc.generators import tracking as trackings
 from robochoc.generators.graph_choice import GraphChoice
+from robochoc.generators.maps import formation as formations
+from robochoc.generators.maps.reach import MapChoice
 from robochoc.model.allocation import Distance
 from robochoc.model.cost_units import CostUnits
 from robochoc.model.problem import Team
@@ -150,9 +152,26 @@ def tasks(  # noqa: PLR0913 - parameters of a family, by their names
     return allocations.tasks(agents, tasks, seed, worth=worth, ways=ways, skills=has, model=model, capacity=capacity)
 
 
+def formation(
+    *,
+    shape: str = "line",
+    spacing: float = 1.0,
+    heading: float = 0.0,
+    anchor: str = "",
+    seed: int = 0,
+    **of_map: Any,  # noqa: ANN401 - `MapChoice`'s own
+) -> Team:
+    """Return a formation on a map: see `generators/maps/formation.py`."""
+    team, _ = formations.formation(
+        MapChoice(**of_map), seed, shape=shape, spacing=spacing, heading=heading, anchor=anchor
+    )
+    return team
+
+
 FAMILIES: Mapping[str, Callable[..., Team]] = MappingProxyType(
     {
         "coloring": coloring,
+        "formation": formation,
         "grid-sensors": grid_sensors,
         "ising": isings.ising,
         "meetings": meetings,
@@ -164,6 +183,10 @@ FAMILIES: Mapping[str, Callable[..., Team]] = MappingProxyType(
     }
 )
 """What makes each family's problems, of parameters by name."""
+_CHOICES: Mapping[str, tuple[type, frozenset[str]]] = MappingProxyType(
+    {"of_graph": (GraphChoice, frozenset({"kind", "agents"})), "of_map": (MapChoice, frozenset())}
+)
+"""The parameters that families share, by their place among a family's own, and those that families name themselves."""
 
 
 @cache
@@ -171,21 +194,24 @@ def parameters_of(family: str) -> Mapping[str, tuple[type, ...]]:
     """Return the parameters of a family, and the types that each may have."""
     make = FAMILIES[family]
     hints = get_type_hints(make)
-    found = {name: _types(hints[name]) for name in inspect.signature(make).parameters if name != "of_graph"}
-    if "graph" in found:
-        of_graph = {name: _types(hint) for name, hint in get_type_hints(GraphChoice).items()}
-        found |= {name: types for name, types in of_graph.items() if name not in {"kind", "agents"}}
+    given = inspect.signature(make).parameters
+    found = {name: _types(hints[name]) for name in given if name not in _CHOICES}
+    for choice, (of_choice, own) in _CHOICES.items():
+        if choice in given:
+            types = {name: _types(hint) for name, hint in get_type_hints(of_choice).items()}
+            found |= {name: type_ for name, type_ in types.items() if name not in own}
     return MappingProxyType(found)
 
 
 def required_of(family: str) -> tuple[str, ...]:
     """Return the parameters of a family that have no default."""
     signature = inspect.signature(FAMILIES[family])
-    return tuple(
+    found = [
         name
         for name, one in signature.parameters.items()
         if one.default is one.empty and one.kind is not one.VAR_KEYWORD
-    )
+    ]
+    return ("map", *found) if "of_map" in signature.parameters else tuple(found)
 
 
 def _types(hint: Any) -> tuple[type, ...]:  # noqa: ANN401 - whatever a parameter is declared as

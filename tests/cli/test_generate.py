@@ -2,16 +2,23 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Callable
+from fractions import Fraction
 from pathlib import Path
 
 import pytest
 
 from robochoc.cli.options.generated import next_step
+from robochoc.cli.reports.failures import INVALID
 from robochoc.formats import read_team
+from robochoc.formats.occupancy.grid import read_occupancy_grid
 from robochoc.generators.coloring import coloring_of
 from robochoc.generators.graphs import grid, scale_free, small_world, tree
 from robochoc.generators.ising import ising
+from robochoc.generators.maps.cells import Cells
+from robochoc.generators.maps.formation import formation
+from robochoc.generators.maps.reach import MapChoice
 from robochoc.generators.meetings import meetings
 from robochoc.generators.random_csp import random_on
 from robochoc.generators.sensors import Reach, grid_sensors, sensors
@@ -21,8 +28,9 @@ from robochoc.model.allocation import Distance
 from robochoc.model.cost_units import CostUnits
 from robochoc.model.problem import Team
 from tests.support.evaluation import best
-from tests.support.program import robochoc_within
+from tests.support.program import ROOT, robochoc_within
 
+BUILDING = str(ROOT / "docs/examples/building/building.yaml")
 FAMILIES: dict[str, Callable[[], Team]] = {
     "random --agents 6 --domain 3 --graph scale-free --links 3 --max-cost 9 --places 2 --maximize": lambda: random_on(
         scale_free(6, 3), 3, 0, max_cost=9, costs=CostUnits(maximize=True, places=2)
@@ -44,6 +52,9 @@ FAMILIES: dict[str, Callable[[], Team]] = {
         2, 3, 2, reach=Reach(sight=2), model="sensors"
     ),
     "tracking --agents 3 --targets 4 --side 5": lambda: tracking(3, 4, 5),
+    f"formation --map {BUILDING} --agents 3 --shape wedge --anchor 7,2 --within 60 --seed 2": lambda: formation(
+        MapChoice(map=BUILDING, agents=3, within=60), 2, shape="wedge", anchor="7,2"
+    )[0],
     "tasks --agents 3 --tasks 3 --distance straight --places 2 --skills 2 --worth 100": lambda: tasks(
         3, 3, worth=100, ways=Ways(100, Distance.STRAIGHT, 2), skills=Skills(2, 1)
     ),
@@ -63,7 +74,7 @@ def test_a_family_is_written_under_its_name(words: str, tmp_path: Path) -> None:
     done = robochoc_within("generate", *words.split())
     assert (done.returncode, done.stderr) == (0, "")
     folder = Path("instances") / team.name
-    assert done.stdout.endswith(f"; next: robochoc solve {folder}\n")
+    assert f"; next: robochoc solve {folder}\n" in done.stdout
     read = read_team(tmp_path / folder)
     assert set(read.order) == set(team.order)
     assert read.variables.keys() == team.variables.keys()
@@ -91,6 +102,8 @@ def test_a_family_is_written_under_its_name(words: str, tmp_path: Path) -> None:
         ("meetings --agents 3 --meetings 2 --slots 3 --participants 4", "participants is 4"),
         ("sensors --sensors 3 --targets 2 --visibility 0", "no sensor sees target 1"),
         ("tasks --agents 3 --tasks 2 --skilled 2", "skilled is 2"),
+        (f"formation --map {BUILDING}", "agents is missing (without at)"),
+        (f"formation --map {BUILDING} --at 4.8,1", "robot 1 at 4.8,1 stands where it does not fit"),
     ],
 )
 @pytest.mark.usefixtures("in_a_folder")
@@ -99,3 +112,32 @@ def test_what_does_not_fit_is_wrong_usage(words: str, said: str, tmp_path: Path)
     assert done.returncode == 2
     assert said in done.stderr
     assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.usefixtures("in_a_folder")
+def test_a_map_is_written_beside_the_team_and_flown_over(tmp_path: Path) -> None:
+    words = ["generate", "formation", "--map", BUILDING, "--agents", "3", "--anchor", "7,2", "-o", "team"]
+    done = robochoc_within(*words)
+    assert done.stdout.endswith("team/map.json: cells of 0.75 m; fly and animate take it with --map\n")
+    assert robochoc_within(*words).returncode == INVALID
+    assert robochoc_within(*words, "--force").returncode == 0
+    solved = robochoc_within("solve", "team", "--runtime", "simulator", "--json")
+    (tmp_path / "result.json").write_text(solved.stdout)
+    flown = robochoc_within("fly", "result.json", "--team", "team", "--map", "team/map.json", "--json")
+    assert flown.returncode == 0, flown.stderr
+    found = json.loads(flown.stdout)
+    assert found["scale"] == 0.75
+    values = json.loads(solved.stdout)["assignment"]
+    grid = read_occupancy_grid(Path(BUILDING))
+    cells = Cells(grid, Fraction("0.75"), grid.free)
+    for drone in found["drones"]:
+        place = cells.centre(values[drone["name"].replace("Robot", "V")])
+        assert drone["at"][:2] == pytest.approx([float(one) for one in place], abs=0.05)
+
+
+@pytest.mark.usefixtures("in_a_folder")
+def test_what_is_no_map_is_said_with_its_file_and_line(tmp_path: Path) -> None:
+    (tmp_path / "plan.yaml").write_text("image: plan.pgm\nresolution: none\n")
+    done = robochoc_within("generate", "formation", "--map", "plan.yaml", "--agents", "3")
+    assert (done.returncode, done.stdout) == (INVALID, "")
+    assert done.stderr.startswith("plan.yaml: has no origin")

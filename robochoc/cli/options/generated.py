@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from functools import wraps
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeAlias
 
 import click
 
@@ -13,6 +13,7 @@ from robochoc.cli.options.paths import InputPath
 from robochoc.cli.reports.failures import invalid_input_fails
 
 if TYPE_CHECKING:
+    from robochoc.formats.ground_map import GroundMap
     from robochoc.generators.graphs import Graph
     from robochoc.model.problem import Team
 
@@ -23,6 +24,7 @@ MAX_PROCESSES = 1000
 """With more robots, the simulator is proposed: docs/guides/large-teams.md."""
 Options = dict[str, Any]
 Command = Callable[..., None]
+TeamOnMap: TypeAlias = "tuple[Team, GroundMap]"
 
 
 def number(name: str, text: str, *, least: int = 1, most: int = MAX, default: int | None = None) -> Callable[..., Any]:
@@ -50,13 +52,13 @@ seed_option = click.option(
 )
 
 
-def team_written(folder: str) -> Callable[[Callable[..., Team]], Command]:
+def team_written(folder: str) -> Callable[[Callable[..., Team | TeamOnMap]], Command]:
     """Return a decorator: the command makes a team, which is written to a folder of -o, or called after the team.
 
     `folder` is how the help calls that. Numbers that do not fit together (`ValueError`) are wrong usage.
     """
 
-    def decorate(make: Callable[..., Team]) -> Command:
+    def decorate(make: Callable[..., Team | TeamOnMap]) -> Command:
         @click.option(
             "-o", "--output", type=InputPath(), metavar="DIR", help=f"Folder to write.  [default: instances/{folder}]"
         )
@@ -71,21 +73,33 @@ def team_written(folder: str) -> Callable[[Callable[..., Team]], Command]:
     return decorate
 
 
-def write(make: Callable[[], Team], output: Path | None, *, replace: bool) -> None:
-    """Write what `make` makes; numbers that do not fit together are wrong usage."""
+def write(make: Callable[[], Team | TeamOnMap], output: Path | None, *, replace: bool) -> None:
+    """Write what `make` makes; numbers that do not fit together are wrong usage.
+
+    With a map of the ground, that is written beside the team, as `robochoc fly --map` reads it.
+    """
     from robochoc.formats import InvalidInputError, write_team
+    from robochoc.formats.folder import GROUND_FILE
 
     try:
-        team = make()
+        made = make()
     except InvalidInputError:
         raise
     except ValueError as error:
         raise click.UsageError(str(error)) from None
+    team, ground = made if isinstance(made, tuple) else (made, None)
     folder = output or Path("instances") / team.name
-    write_team(team, folder, replace=replace)
+    beside = {}
+    if ground:
+        from robochoc.formats.ground_map import ground_map_json
+
+        beside[GROUND_FILE] = ground_map_json(ground)
+    write_team(team, folder, replace=replace, beside=beside)
     constraints = sum(len(robot.shared) for robot in team.robots)
     count = len(team.robots)
     click.echo(f"{folder}: {count} robots, {constraints} constraints; {next_step(folder, count)}")
+    if ground:
+        click.echo(f"{folder / GROUND_FILE}: cells of {ground.scale:g} m; fly and animate take it with --map")
 
 
 def next_step(folder: Path | str, robots: int) -> str:

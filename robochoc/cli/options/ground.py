@@ -11,7 +11,7 @@ from robochoc.cli.options.paths import InputPath
 from robochoc.cli.reports.failures import INVALID, Failure
 
 if TYPE_CHECKING:
-    from robochoc.flight.ground_map import GroundMap
+    from robochoc.formats.ground_map import GroundMap
 
 map_option = click.option(
     "--map",
@@ -24,8 +24,8 @@ map_option = click.option(
 
 def ground_map(file: Path | None) -> GroundMap | None:
     """Return the map in `file`, if there is one. Raises `Failure`."""
-    from robochoc.flight.ground_map import MAX_BYTES, read_ground_map
     from robochoc.formats import on_one_line
+    from robochoc.formats.ground_map import MAX_BYTES, read_ground_map
 
     if file is None:
         return None

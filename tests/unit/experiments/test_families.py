@@ -7,10 +7,13 @@ import pytest
 
 from robochoc.cli.commands.generate import generate
 from robochoc.generators.families import FAMILIES, parameters_of, required_of
+from tests.support.program import ROOT
 
 OF_THE_COMMAND = {"output", "force", "help"}
-EXAMPLES: dict[str, dict[str, int | float]] = {
+BUILDING = str(ROOT / "docs/examples/building/building.yaml")
+EXAMPLES: dict[str, dict[str, int | float | str]] = {
     "coloring": {"agents": 5, "degree": 2.0},
+    "formation": {"map": BUILDING, "agents": 2},
     "grid-sensors": {"rows": 2, "columns": 2, "targets": 1},
     "ising": {"rows": 2, "columns": 2},
     "meetings": {"agents": 3, "meetings": 2, "slots": 3},

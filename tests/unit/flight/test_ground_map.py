@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from robochoc.flight.flight import fly
-from robochoc.flight.ground_map import MAX_BYTES, BlockedCell, GroundMap, read_ground_map
 from robochoc.flight.mission import Block, mission_of
 from robochoc.flight.preview import preview_of
+from robochoc.formats.ground_map import MAX_BYTES, BlockedCell, GroundMap, ground_map_json, read_ground_map
 from robochoc.model.expression import Constant, Name
 from robochoc.model.outcome import EpochOutcome, Outcome, Verdict
 from robochoc.model.problem import Domain, Robot, Team, Topic, Variable
@@ -103,6 +103,19 @@ def test_a_map_is_drawn_whole_however_large_it_is() -> None:
     assert block.top == pytest.approx((60, 60, 0.6))
 
 
+def test_a_map_says_where_its_first_cell_is_and_how_long_a_unit_is() -> None:
+    ground = GroundMap(6, 4, {"A": (2, 3)}, (BlockedCell(3, 1),), (-2, 1), 0.5)
+    assert read_ground_map(ground_map_json(ground)) == ground
+    mission = mission_of(outcome((1, 2)), TEAM, ground=ground)
+    assert mission.scale == 0.5
+    assert mission.drones[0].home == pytest.approx(
+        (-0.5, 1.5, 0)
+    )  # column 2, row 3: x = -1 and y = 3, half a metre each
+    assert [block.at for block in mission.blocks] == [pytest.approx((0, 0.5, 0.3))]
+    assert [(axis.first, axis.last) for axis in mission.axes][:2] == [(-2, 3), (1, 4)]
+    assert mission_of(outcome((1, 2)), TEAM, 2.0, ground).scale == 2
+
+
 def test_a_map_is_read_and_a_wrong_one_told() -> None:
     whole = {"columns": 6, "rows": 4, "starts": {"A": [1, 4]}, "blocked": [{"x": 6, "y": 1, "epoch": 2}]}
     assert read_ground_map(json.dumps(whole).encode()) == GroundMap(6, 4, {"A": (1, 4)}, (BlockedCell(6, 1, 2),))
@@ -114,6 +127,9 @@ def test_a_map_is_read_and_a_wrong_one_told() -> None:
         ({"blocked": [{"x": 1, "y": 1}] * 10_001}, "length"),
         ({"starts": {"A": [1]}}, "length"),
         ({"height": 3}, "height"),
+        ({"first": [1]}, "length"),
+        ({"first": [1, 10**7]}, "first"),
+        ({"scale": 0}, "scale"),
     ):
         with pytest.raises(ValueError, match=why):
             read_ground_map(json.dumps({**whole, **wrong}).encode())

@@ -5,6 +5,7 @@ from __future__ import annotations
 import click
 
 from robochoc.cli.commands.generate.binary import coloring, ising, random_problem
+from robochoc.cli.commands.generate.maps import formation
 from robochoc.cli.commands.generate.missions import grid_sensors, meetings, sensors, tasks, tracking
 from robochoc.cli.commands.generate.queens import queens3d
 from robochoc.cli.commands.generate.scenario import scenario
@@ -21,5 +22,17 @@ def generate() -> None:
     """
 
 
-for family in (coloring, grid_sensors, ising, meetings, queens3d, random_problem, scenario, sensors, tasks, tracking):
+for family in (
+    coloring,
+    formation,
+    grid_sensors,
+    ising,
+    meetings,
+    queens3d,
+    random_problem,
+    scenario,
+    sensors,
+    tasks,
+    tracking,
+):
     generate.add_command(family)

@@ -21,8 +21,8 @@ from robochoc.app.runs.options import RESULT
 from robochoc.app.runs.run import CHANGE, Checked, Run, State
 from robochoc.app.sketch import edits
 from robochoc.app.sketch.sketch import Area, Cell, Decision, Kind, Sketch
-from robochoc.flight.ground_map import BlockedCell
 from robochoc.formats import write_team
+from robochoc.formats.ground_map import BlockedCell
 from robochoc.model.problem import RemoveAgent, ScenarioEvent
 from tests.support.kept_runs import STARTED, cube, kept_run
 from tests.support.small_teams import pair

@@ -1,6 +1,7 @@
 """The ground below a mission, as a map: where robots stand in the beginning, and which cells are blocked.
 
-Files of teams do not have it: whoever draws a map hands it over beside the result (`robochoc fly --map`).
+Files of teams do not have it: whoever draws a map, or makes a team on one, hands it over beside the result (`robochoc
+fly --map`).
 """
 
 from __future__ import annotations
@@ -13,8 +14,10 @@ MAX_BYTES = 4 << 20
 MAX_BLOCKED = 10_000
 """Blocked cells of a map: each is a block to draw, and a point that routes avoid."""
 _SIDE_MAX = 1_000
+_FAR = 1_000_000
 
 _Coordinate = Annotated[int, msgspec.Meta(ge=1, le=_SIDE_MAX)]
+_First = Annotated[int, msgspec.Meta(ge=-_FAR, le=_FAR)]
 
 
 class BlockedCell(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -26,19 +29,32 @@ class BlockedCell(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class GroundMap(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """A map. Columns and rows are numbered from 1: they are the x and y of the robots' topics.
+    """A map. Columns and rows are numbered from 1; unless `first` says otherwise, they are the x and y of topics.
 
     Attributes:
         columns: The number of columns.
         rows: The number of rows.
         starts: Where robots stand in the beginning, by their names: column and row.
         blocked: The cells that are blocked.
+        first: The x and y of topics in the first column and row.
+        scale: Metres a unit of topics; None: the map does not say.
     """
 
     columns: _Coordinate
     rows: _Coordinate
     starts: dict[str, tuple[_Coordinate, _Coordinate]] = {}
     blocked: Annotated[tuple[BlockedCell, ...], msgspec.Meta(max_length=MAX_BLOCKED)] = ()
+    first: tuple[_First, _First] = (1, 1)
+    scale: Annotated[float, msgspec.Meta(gt=0, le=_SIDE_MAX)] | None = None
+
+    def x_and_y(self, column: int, row: int) -> tuple[int, int]:
+        """Return the x and y of topics in a column and a row."""
+        return self.first[0] + column - 1, self.first[1] + row - 1
+
+
+def ground_map_json(ground: GroundMap) -> bytes:
+    """Return the content of the JSON file of a map."""
+    return msgspec.json.encode(ground) + b"\n"
 
 
 def read_ground_map(content: bytes) -> GroundMap:

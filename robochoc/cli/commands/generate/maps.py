@@ -1,0 +1,125 @@
+"""`robochoc generate` of problems on a map: who goes where, around the walls."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from robochoc.cli.options.generated import (
+    OUTPUT,
+    Command,
+    Options,
+    TeamOnMap,
+    seed_option,
+    team_written,
+)
+from robochoc.cli.options.paths import InputPath
+from robochoc.cli.options.sections import COMMON, SectionedCommand
+
+if TYPE_CHECKING:
+    from robochoc.generators.maps.reach import MapChoice
+
+MAX_ROBOTS, MAX_CELLS = 100, 1000
+"""As `generators/maps/reach.py` has them, which is not imported at the start."""
+ON_MAP = ("--radius", "--speed", "--within", "--cell", "--cells")
+"""The section on robots and cells."""
+_OWN = ("map", "agents", "at", "radius", "speed", "within", "cell", "cells")
+
+
+def metres(name: str, text: str, default: float | None = None, unit: str = "M") -> Callable[..., Any]:
+    """Return an option that takes a length, or another measure that is not negative."""
+    return click.option(
+        name, default=default, show_default=default is not None, type=click.FloatRange(0), metavar=unit, help=text
+    )
+
+
+def map_options(command: Command) -> Command:
+    """Add the options of maps, which `choice_of` takes out again."""
+    for option in reversed(
+        (
+            click.option(
+                "--map",
+                "map",
+                type=InputPath(),
+                required=True,
+                metavar="FILE",
+                help="Map as ROS's map_server reads it: YAML, which names a PGM image.",
+            ),
+            click.option(
+                "--agents",
+                type=click.IntRange(1, MAX_ROBOTS),
+                metavar="N",
+                help="Number of robots.  [default: as many as --at has]",
+            ),
+            click.option(
+                "--at", default="", metavar="'X,Y X,Y'", help="Where robots are, in metres.  [default: on free cells]"
+            ),
+            metres("--radius", "Radius of a robot: it keeps so far from all that is not free.", 0.2),
+            metres("--speed", "Metres a second.", 0.5, "M/S"),
+            metres("--within", "Robots get as far as they come in so many seconds.", unit="SECONDS"),
+            metres("--cell", "Side of a cell.  [default: as small as --cells allows]"),
+            click.option(
+                "--cells",
+                type=click.IntRange(1, MAX_CELLS),
+                metavar="N",
+                help="Maximum number of free cells, which are values.  [default: 100; with --cell: 1000]",
+            ),
+        )
+    ):
+        command = option(command)
+    return command
+
+
+def choice_of(options: Options) -> MapChoice:
+    """Take the options of maps out of `options`, and return what they say."""
+    from robochoc.generators.maps.reach import MapChoice
+
+    given = {key: options.pop(key) for key in _OWN}
+    return MapChoice(**{**given, "map": str(Path(given["map"]))})
+
+
+@click.command(
+    cls=SectionedCommand,
+    sections={
+        COMMON: ("--map", "--agents", "--at"),
+        "Shape": ("--shape", "--spacing", "--heading", "--anchor"),
+        "Robots and cells": ON_MAP,
+        "Output": OUTPUT,
+    },
+    short_help="On a map: robots take the slots of a formation.",
+)
+@map_options
+@click.option(
+    "--shape",
+    default="line",
+    show_default=True,
+    metavar="SHAPE",
+    help="line, column, wedge, circle, grid, or a file with 'AHEAD,LEFT' in metres in each line.",
+)
+@metres("--spacing", "Between neighbours in the shape.", 1.0)
+@click.option(
+    "--heading",
+    default=0.0,
+    show_default=True,
+    type=click.FloatRange(-360, 360),
+    metavar="DEGREES",
+    help="Where the formation looks: counterclockwise from x.",
+)
+@click.option("--anchor", default="", metavar="X,Y", help="Middle of the shape.  [default: the mean of all robots]")
+@seed_option
+@team_written("formation-MAP-SHAPE-AGENTS-SEED")
+def formation(**problem: Any) -> TeamOnMap:  # noqa: ANN401 - `formation`'s own
+    """Formations on a map: each robot takes a slot, and the sum of their travel times is minimised.
+
+    A robot's values are the slots that it can get to, around walls and inflated obstacles. No two take the same. Slots
+    in walls move to the nearest free cell. Waypoints are in cells; map.json beside the robots is for fly --map.
+
+    \b
+    robochoc generate formation --map docs/examples/building/building.yaml --agents 4 --shape wedge --anchor 3,2
+    """  # noqa: D301 - \\b is how click is told to leave the lines as they are
+    from robochoc.generators.maps.formation import formation as on_map
+
+    return on_map(choice_of(problem), **problem)

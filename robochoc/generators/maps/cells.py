@@ -1,0 +1,194 @@
+"""The cells of a map: squares of many pixels, which are values of variables.
+
+The centre of a cell lies at whole multiples of its side in the map's frame. So the waypoint of a cell is a pair of
+integers, and the side is the scale: integers x scale are metres in the map's frame, exactly.
+
+A cell is free if all of its pixels are free, and a robot fits at its centre. Cells are where robots go; how they get
+there is found on the pixels (`travel.py`), so that a door narrower than a cell is still a way.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from fractions import Fraction
+from functools import cached_property
+from math import ceil, floor, isqrt
+
+import numpy as np
+import numpy.typing as npt
+
+from robochoc.formats.occupancy.grid import Flags, OccupancyGrid
+
+MAX_SIDE = 1000
+"""The maximum number of columns, and of rows, of cells."""
+MAX_RADIUS = 100
+"""The maximum radius of a robot, in pixels."""
+
+Place = tuple[Fraction, Fraction]
+"""The x and the y of a place, in metres."""
+_HALF = Fraction(1, 2)
+
+
+def passable(grid: OccupancyGrid, radius: Fraction) -> Flags:
+    """Return the pixels where the centre of a robot can be: no pixel that is not free is nearer than its radius.
+
+    Obstacles are inflated, as costmap_2d does with the inscribed radius. Distances are between centres of pixels.
+    What lies outside of the map is not free.
+
+    Raises:
+        ValueError: The radius has more than `MAX_RADIUS` pixels.
+    """
+    limit = (radius / grid.resolution) ** 2
+    reach = isqrt(floor(limit))
+    if reach > MAX_RADIUS:
+        raise ValueError(f"radius is {float(radius):g} m, more than {MAX_RADIUS} pixels of this map")
+    rows, columns = grid.free.shape
+    solid = np.pad(~grid.free, reach, constant_values=True)
+    near = np.zeros_like(grid.free)
+    for step in range(-reach, reach + 1):
+        half = isqrt(floor(limit - step * step))
+        line = solid[reach + step : reach + step + rows]
+        sums = np.cumsum(np.pad(line, ((0, 0), (1, 0))), axis=1, dtype=np.int32)
+        first = reach - half
+        near |= sums[:, first + 2 * half + 1 : first + 2 * half + 1 + columns] > sums[:, first : first + columns]
+    return ~near
+
+
+@dataclass(frozen=True, eq=False)
+class Cells:
+    """The cells of a map.
+
+    Cells are numbered row by row from 0, the row of the lowest y first.
+
+    Attributes:
+        grid: The map.
+        side: The side of a cell, in metres.
+        passable: The pixels where the centre of a robot can be.
+    """
+
+    grid: OccupancyGrid
+    side: Fraction
+    passable: Flags
+
+    @cached_property
+    def first(self) -> tuple[int, int]:
+        """The x and the y of cell 0, in sides of a cell."""
+        x, y = (floor(corner / self.side + _HALF) for corner in self.grid.origin)
+        return x, y
+
+    @cached_property
+    def columns(self) -> int:
+        """The number of columns."""
+        return self._count(0)
+
+    @cached_property
+    def rows(self) -> int:
+        """The number of rows."""
+        return self._count(1)
+
+    @cached_property
+    def free(self) -> tuple[int, ...]:
+        """The numbers of all free cells."""
+        low, high, middle = zip(self._pixels(1), self._pixels(0), strict=True)
+        height, width = self.grid.free.shape
+        whole = np.outer((low[0] >= 0) & (high[0] <= height), (low[1] >= 0) & (high[1] <= width))
+        sizes = np.outer(high[0] - low[0], high[1] - low[1])
+        found = whole & (_sums(self.grid.free, low, high) == sizes)
+        centres = np.ix_(middle[0].clip(0, height - 1), middle[1].clip(0, width - 1))
+        return tuple(np.flatnonzero(found & self.passable[centres]).tolist())
+
+    @cached_property
+    def blocked(self) -> tuple[int, ...]:
+        """The numbers of all cells with an occupied pixel."""
+        low, high, _ = zip(self._pixels(1), self._pixels(0), strict=True)
+        return tuple(np.flatnonzero(_sums(self.grid.occupied, low, high)).tolist())
+
+    def x_and_y(self, cell: int) -> tuple[int, int]:
+        """Return the x and the y of a cell's centre, in sides of a cell."""
+        row, column = divmod(cell, self.columns)
+        return self.first[0] + column, self.first[1] + row
+
+    def centre(self, cell: int) -> Place:
+        """Return the place of a cell's centre."""
+        x, y = self.x_and_y(cell)
+        return x * self.side, y * self.side
+
+    def pixel(self, place: Place) -> tuple[int, int] | None:
+        """Return the row and the column of the pixel of a place; None: it is not on the map."""
+        x, y = (
+            floor((one - corner) / self.grid.resolution) for one, corner in zip(place, self.grid.origin, strict=True)
+        )
+        rows, columns = self.grid.free.shape
+        return (y, x) if 0 <= y < rows and 0 <= x < columns else None
+
+    def column_and_row(self, place: Place) -> tuple[int, int]:
+        """Return the column and the row of the cell in which a place lies, both from 0."""
+        x, y = (floor(one / self.side + _HALF) for one in place)
+        return x - self.first[0], y - self.first[1]
+
+    def _count(self, axis: int) -> int:
+        size = self.grid.free.shape[1 - axis] * self.grid.resolution
+        behind: int = ceil((self.grid.origin[axis] + size) / self.side + _HALF)
+        return behind - self.first[axis]
+
+    def _pixels(self, axis: int) -> tuple[npt.NDArray[np.int64], ...]:
+        """Return for each column (`axis` 0) or row its first pixel, the one behind its last, and that of its centre."""
+        corner, size, first = self.grid.origin[axis], self.grid.resolution, self.first[axis]
+        found = [
+            (
+                floor(((number - _HALF) * self.side - corner) / size),
+                ceil(((number + _HALF) * self.side - corner) / size),
+                floor((number * self.side - corner) / size),
+            )
+            for number in range(first, first + self._count(axis))
+        ]
+        return tuple(np.array(found, dtype=np.int64).T)
+
+
+def _sums(
+    flags: Flags, low: tuple[npt.NDArray[np.int64], ...], high: tuple[npt.NDArray[np.int64], ...]
+) -> npt.NDArray[np.int64]:
+    """Return how many flags are set in each rectangle of rows `low[0]` to `high[0]` and columns likewise."""
+    sums = np.cumsum(np.cumsum(np.pad(flags, ((1, 0), (1, 0))), axis=0, dtype=np.int64), axis=1)
+    bottom, top = (ends[0].clip(0, flags.shape[0]) for ends in (low, high))
+    left, right = (ends[1].clip(0, flags.shape[1]) for ends in (low, high))
+    found: npt.NDArray[np.int64] = (
+        sums[np.ix_(top, right)] - sums[np.ix_(bottom, right)] - sums[np.ix_(top, left)] + sums[np.ix_(bottom, left)]
+    )
+    return found
+
+
+def cells_of(grid: OccupancyGrid, radius: Fraction, most: int, side: Fraction | None = None) -> Cells:
+    """Return the cells of a map for robots of a radius, at most so many free ones.
+
+    Args:
+        grid: The map.
+        radius: The robots' radius in metres.
+        most: The maximum number of free cells.
+        side: The side of a cell. None: the smallest multiple of a pixel's side that makes no more free cells than that.
+
+    Raises:
+        ValueError: There is no free cell, or there are too many of them.
+    """
+    fits = passable(grid, radius)
+    if not fits.any():
+        raise ValueError(f"no pixel is free for a robot of the radius {float(radius):g} m; take a smaller radius")
+    if side is not None:
+        return _checked(Cells(grid, side, fits), most)
+    step = 1
+    while True:
+        cells = Cells(grid, step * grid.resolution, fits)
+        if max(cells.columns, cells.rows) <= MAX_SIDE and len(cells.free) <= most:
+            return _checked(cells, most)
+        step += 1
+
+
+def _checked(cells: Cells, most: int) -> Cells:
+    side = f"{float(cells.side):g} m"
+    if max(cells.columns, cells.rows) > MAX_SIDE:
+        raise ValueError(f"cells of {side} make {cells.columns} columns and {cells.rows} rows; {MAX_SIDE} are allowed")
+    if len(cells.free) > most:
+        raise ValueError(f"{len(cells.free):,} cells of {side} are free, more than {most}: take larger cells, or more")
+    if not cells.free:
+        raise ValueError(f"no cell of {side} is free: take smaller cells, or a smaller radius")
+    return cells

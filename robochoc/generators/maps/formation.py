@@ -1,0 +1,199 @@
+"""Formations on a map: robots take the slots of a shape, and the sum of their ways is as small as it can be.
+
+The shapes are those of Balch and Arkin, "Behavior-based formation control for multirobot teams", IEEE Transactions on
+Robotics and Automation 14 (1998): line, column and wedge; besides a circle and a square grid, or a file of offsets. Who
+takes which slot is the assignment problem (ST-SR-IA in Gerkey and Mataric, IJRR 23, 2004): no two robots take the same
+slot, and the sum of their travel times is minimised. Slots are as good as each other, and a robot chooses among those
+that it can get to.
+
+A slot of the shape may lie in a wall, or where nobody gets: it moves to the nearest cell that a robot can get to and no
+slot before it has.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator, Sequence
+from enum import StrEnum
+from fractions import Fraction
+from math import ceil, cos, pi, radians, sin, sqrt
+from pathlib import Path
+
+from robochoc.formats.diagnostics import invalid_input, shortened
+from robochoc.formats.ground_map import GroundMap
+from robochoc.generators.draws import bounded, check_bounds, seeded
+from robochoc.generators.maps.cells import Place
+from robochoc.generators.maps.reach import (
+    MAX_ROBOTS,
+    PLACES,
+    MapChoice,
+    Reach,
+    all_different,
+    charged,
+    label_of,
+    places_in,
+    reach_of,
+)
+from robochoc.model.assembly import assemble
+from robochoc.model.cost_units import CostUnits
+from robochoc.model.problem import ProblemKind, Team
+
+MAX_SPACING = 1000.0
+MAX_BYTES = 64 * 1024
+MAX_SLOTS = MAX_ROBOTS
+_MM = 1000
+"""Offsets are rounded to millimetres, so that sines that differ in their last digits mean the same."""
+_OFFSET = re.compile(r"([+-]?\d{1,6}(?:\.\d{1,6})?)[,\s]\s*([+-]?\d{1,6}(?:\.\d{1,6})?)")
+
+Offset = tuple[float, float]
+"""Metres ahead of the anchor, and to its left."""
+
+
+class Shape(StrEnum):
+    """The shapes of formations."""
+
+    LINE = "line"
+    COLUMN = "column"
+    WEDGE = "wedge"
+    CIRCLE = "circle"
+    GRID = "grid"
+
+
+SHAPES = tuple(map(str, Shape))
+
+
+def formation(
+    choice: MapChoice,
+    seed: int = 0,
+    *,
+    shape: str = Shape.LINE,
+    spacing: float = 1.0,
+    heading: float = 0.0,
+    anchor: str = "",
+) -> tuple[Team, GroundMap]:
+    """Return the problem of taking the slots of a formation, and the map as the flight reads it.
+
+    `Robot3` owns `V3`, a number of a cell. Costs are seconds.
+
+    Args:
+        choice: The map and the robots.
+        seed: The same seed draws the same places of robots on every machine.
+        shape: One of `SHAPES`, or the path of a file with offsets in metres: `ahead,left` in each line.
+        spacing: Metres between neighbours in the shape.
+        heading: Where the formation looks, in degrees counterclockwise from the x axis.
+        anchor: The middle of the shape, `X,Y`. Empty: the mean of all robots' places.
+
+    Raises:
+        InvalidInputError: A file cannot be read as what it should be.
+        ValueError: A number is out of its bounds, or a robot can get to no slot. The text says which.
+    """
+    check_bounds({"spacing": (spacing, 0.001, MAX_SPACING), "heading": (heading, -360, 360)})
+    middle = places_in(anchor, "anchor")
+    if len(middle) > 1:
+        raise ValueError("anchor is one place")
+    reach = reach_of(choice, seeded(seed))
+    agents = len(reach.starts)
+    offsets = _offsets(shape, agents, spacing)
+    slots = slots_of(reach, offsets, middle[0] if middle else _mean(reach.starts), heading)
+    values = [sorted(set(slots) & own.keys()) for own in reach.seconds]
+    for number, own in enumerate(values, 1):
+        if not own:
+            raise ValueError(f"robot {number} can get to no slot; move the anchor, or allow more time")
+    travel = [
+        charged("travel", number, {cell: seconds[cell] for cell in own})
+        for number, (own, seconds) in enumerate(zip(values, reach.seconds, strict=True), 1)
+    ]
+    label = shape if shape in SHAPES else label_of(shape)
+    team = assemble(
+        f"formation-{label_of(choice.map)}-{label}-{agents}-{seed}",
+        reach.variables(values),
+        bounded([*travel, *all_different(values)]),
+        kind=ProblemKind.DISWCSP,
+        costs=CostUnits(places=PLACES),
+        extras=reach.extras(),
+    )
+    return team, reach.ground()
+
+
+def slots_of(reach: Reach, offsets: Sequence[Offset], anchor: Place, heading: float) -> list[int]:
+    """Return the cell of each slot: the nearest one that a robot can get to and no slot before it has.
+
+    Of cells that are equally near, the one of the lowest number.
+
+    Raises:
+        ValueError: There are fewer such cells than slots.
+    """
+    left = {cell: reach.cells.centre(cell) for cell in reach.reached}
+    if len(left) < len(offsets):
+        raise ValueError(f"robots can get to {len(left)} cells, fewer than {len(offsets)} slots; take smaller cells")
+    slots = []
+    for x, y in _turned(offsets, heading):
+        place = anchor[0] + x, anchor[1] + y
+        nearest = min(left, key=lambda cell: (_square(place, left[cell]), cell))
+        slots.append(nearest)
+        del left[nearest]
+    return slots
+
+
+def _turned(offsets: Sequence[Offset], heading: float) -> Iterator[tuple[Fraction, Fraction]]:
+    """Yield the offsets in the map's frame, in whole millimetres."""
+    turn = radians(heading)
+    for ahead, aside in offsets:
+        x, y = ahead * cos(turn) - aside * sin(turn), ahead * sin(turn) + aside * cos(turn)
+        yield Fraction(round(x * _MM), _MM), Fraction(round(y * _MM), _MM)
+
+
+def _offsets(shape: str, agents: int, spacing: float) -> list[Offset]:
+    """Return the slots of a shape around its anchor, a slot a robot; those of a file may be more."""
+    numbers = range(agents)
+    middle = (agents - 1) / 2
+    match shape:
+        case Shape.LINE:
+            return [(0.0, (number - middle) * spacing) for number in numbers]
+        case Shape.COLUMN:
+            return [((middle - number) * spacing, 0.0) for number in numbers]
+        case Shape.WEDGE:  # the first at the tip, the others behind it, left and right in turn
+            ranks = [(number + 1) // 2 for number in numbers]
+            return [(-rank * spacing, rank * spacing * (1 - 2 * (number % 2))) for number, rank in enumerate(ranks)]
+        case Shape.CIRCLE:
+            radius = spacing / (2 * sin(pi / agents)) if agents > 1 else 0.0
+            angles = [2 * pi * number / agents for number in numbers]
+            return [(radius * cos(angle), radius * sin(angle)) for angle in angles]
+        case Shape.GRID:
+            side = ceil(sqrt(agents))
+            corner = (side - 1) / 2
+            return [((corner - number // side) * spacing, (number % side - corner) * spacing) for number in numbers]
+        case _:
+            return _read_offsets(shape, agents)
+
+
+def _read_offsets(name: str, agents: int) -> list[Offset]:
+    path = Path(name)
+    if not path.is_file():
+        raise ValueError(f"shape {name[:50]!r} is none of {', '.join(SHAPES)}, and no file")
+    try:
+        with path.open("rb") as file:
+            content = file.read(MAX_BYTES + 1)
+    except OSError as error:
+        raise invalid_input(path, error.strerror or str(error), "name a file that can be read") from None
+    if len(content) > MAX_BYTES:
+        raise invalid_input(path, "is too large", f"it may have {MAX_BYTES:,} bytes")
+    found = []
+    for number, line in enumerate(content.decode("utf-8", "replace").splitlines(), 1):
+        told = line.partition("#")[0].strip()
+        matched = _OFFSET.fullmatch(told)
+        if matched:
+            found.append((float(matched[1]), float(matched[2])))
+        elif told:
+            raise invalid_input(path, f"has {shortened(told)}", "expected metres ahead and to the left: 1.5,-2", number)
+    if not agents <= len(found) <= MAX_SLOTS:
+        raise invalid_input(path, f"has {len(found)} slots", f"expected from {agents}, one a robot, to {MAX_SLOTS}")
+    return found
+
+
+def _mean(places: Sequence[Place]) -> Place:
+    return sum(x for x, _ in places) / Fraction(len(places)), sum(y for _, y in places) / Fraction(len(places))
+
+
+def _square(one: Place, other: Place) -> Fraction:
+    return (one[0] - other[0]) ** 2 + (one[1] - other[1]) ** 2

@@ -1,0 +1,284 @@
+"""Problems on maps: what robots reach, by other means than the generators', and that answers are what maps say."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Callable
+from fractions import Fraction
+from math import floor
+from pathlib import Path
+from random import Random
+from tempfile import TemporaryDirectory
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from robochoc.formats import InvalidInputError, check_team, read_team, write_team
+from robochoc.formats.occupancy.grid import OccupancyGrid, read_occupancy_grid
+from robochoc.generators.maps.cells import Cells, cells_of, passable
+from robochoc.generators.maps.formation import formation
+from robochoc.generators.maps.reach import MapChoice, Reach, reach_of
+from robochoc.generators.maps.travel import UNREACHED, lengths_from
+from robochoc.model.expression import evaluate
+from robochoc.model.problem import Team
+from robochoc.run.options import Options, Runtime
+from robochoc.run.orchestrator import solve
+from tests.support.evaluation import best, digest
+from tests.support.examples import examples
+from tests.support.maps import Pixel, drawn_rows, fitting, free_pixels, ways, write_map
+from tests.support.program import ROOT
+
+BUILDING = str(ROOT / "docs/examples/building/building.yaml")
+ROOMS = ["#########", "#...#...#", "#...#...#", "#.......#", "#...#...#", "#...#...#", "#########"]
+"""Two rooms with a door, 0.5 m a pixel."""
+
+
+@pytest.fixture
+def rooms(tmp_path: Path) -> str:
+    return str(write_map(tmp_path, ROOMS))
+
+
+def grid_of(rows: list[str], **how: str) -> OccupancyGrid:
+    with TemporaryDirectory() as folder:
+        return read_occupancy_grid(write_map(Path(folder), rows, **how))
+
+
+def pixels(flags: np.ndarray) -> set[Pixel]:
+    return {(x, y) for y, x in np.argwhere(flags).tolist()}
+
+
+def answers(team: Team, protocol: str) -> tuple[Fraction, dict[str, int]]:
+    found = solve(team, Options(protocol=protocol, runtime=Runtime.SIMULATOR))
+    assert found.cost is not None
+    return Fraction(found.cost), dict(found.assignment)
+
+
+def test_a_seed_is_one_problem_everywhere() -> None:
+    """Fixed for good: who publishes figures names seeds."""
+    choice = MapChoice(map=BUILDING, agents=3, cells=40)
+    teams = [formation(choice, 3, shape=shape, heading=30)[0] for shape in ("wedge", "circle")]
+    assert {team.name: digest(team) for team in teams} == {
+        "formation-building-wedge-3-3": "29326cb01c154856",
+        "formation-building-circle-3-3": "482739f670eada8e",
+    }
+
+
+# Pixels, cells and ways
+
+
+@given(st.integers(1, 9), st.integers(1, 9), st.integers(0, 2**32), st.sampled_from(["0", "0.4", "0.5", "0.8", "1.2"]))
+@examples(60)
+def test_a_robot_keeps_its_radius_from_all_that_is_not_free(columns: int, rows: int, seed: int, radius: str) -> None:
+    drawn = drawn_rows(Random(seed), columns, rows)
+    found = pixels(passable(grid_of(drawn, resolution="0.4"), Fraction(radius)))
+    assert found == fitting(drawn, Fraction(radius) / Fraction("0.4"))
+
+
+@given(st.integers(1, 12), st.integers(1, 12), st.integers(0, 2**32), st.none() | st.integers(0, 60))
+@examples(60)
+def test_ways_are_the_shortest_and_cut_no_corner(columns: int, rows: int, seed: int, longest: int | None) -> None:
+    drawn = drawn_rows(Random(seed), columns, rows, 0.35)
+    free = free_pixels(drawn)
+    flags = grid_of(drawn).free
+    for x, y in sorted(free)[:2]:
+        found = lengths_from((y, x), flags, longest)
+        wanted = {pixel: length for pixel, length in ways((x, y), free).items() if longest is None or length <= longest}
+        assert {(x, y): int(found[y, x]) for x, y in pixels(found != UNREACHED)} == wanted
+
+
+@given(
+    st.integers(1, 9),
+    st.integers(1, 9),
+    st.integers(0, 2**32),
+    st.sampled_from(["0", "-0.25", "1.3", "-7.77"]),
+    st.sampled_from(["0.5", "0.75", "1", "1.7", "0.2"]),
+)
+@examples(15)
+def test_a_cell_is_free_where_all_its_pixels_are(columns: int, rows: int, seed: int, corner: str, side: str) -> None:
+    drawn = drawn_rows(Random(seed), columns, rows, 0.1)
+    grid = grid_of(drawn, resolution="0.5", origin=f"[{corner}, 0, 0]")
+    cells = Cells(grid, Fraction(side), grid.free)
+    free, known = free_pixels(drawn), set[tuple[int, int]]()
+    for cell in range(cells.columns * cells.rows):
+        x, y = cells.centre(cell)
+        half = Fraction(side) / 2 - Fraction(1, 1000)
+        inside = {
+            (floor((x + right - Fraction(corner)) / Fraction("0.5")), floor((y + up) / Fraction("0.5")))
+            for right in spread(half)
+            for up in spread(half)
+        }
+        assert (cell in cells.free) is (inside <= free)
+        walls = {(x, y) for x, y in inside if 0 <= x < columns and 0 <= y < rows and drawn[rows - 1 - y][x] == "#"}
+        assert (cell in cells.blocked) is bool(walls)
+        known |= inside
+    assert known >= set(itertools.product(range(columns), range(rows)))
+
+
+def spread(half: Fraction) -> list[Fraction]:
+    """Return distances from -half to half, at most a pixel apart."""
+    return [half * step / 4 for step in range(-4, 5)]
+
+
+def test_cells_are_as_small_as_their_number_allows() -> None:
+    grid = grid_of(["." * 12] * 12, resolution="0.1", origin="[-0.05, -0.05, 0]")
+    for most, side in ((144, "0.1"), (143, "0.2"), (25, "0.2"), (24, "0.3")):
+        cells = cells_of(grid, Fraction(0), most)
+        assert cells.side == Fraction(side)
+        assert len(cells.free) <= most
+    with pytest.raises(ValueError, match=r"49 cells of 0.2 m are free, more than 9"):
+        cells_of(grid_of(["." * 14] * 14, resolution="0.1", origin="[-0.1, -0.1, 0]"), Fraction(0), 9, Fraction("0.2"))
+
+
+def reached(rows: list[str], start: Pixel, radius: Fraction, seconds_a_pixel: Fraction) -> dict[Pixel, int]:
+    """Return the tenths of seconds to each pixel that a robot can get to."""
+    found = ways(start, fitting(rows, radius))
+    return {pixel: floor(length * seconds_a_pixel * 2 + Fraction(1, 2)) for pixel, length in found.items()}
+
+
+@given(st.integers(3, 9), st.integers(3, 9), st.integers(0, 2**32), st.integers(1, 3))
+@examples(40)
+def test_robots_reach_what_lies_in_no_other_room(columns: int, rows: int, seed: int, agents: int) -> None:
+    drawn = drawn_rows(Random(seed), columns, rows, 0.3)
+    with TemporaryDirectory() as folder:
+        choice = MapChoice(map=str(write_map(Path(folder), drawn)), agents=agents, radius=0.2, cell=0.5, speed=0.4)
+        if len(free := free_pixels(drawn)) < agents:
+            with pytest.raises(ValueError, match="free"):
+                reach_of(choice, Random(seed))
+            return
+        # Cells are pixels here, moved by half of one: each lies on a corner of four.
+        path = Path(choice.map)
+        path.write_text(path.read_text().replace("[0, 0, 0]", "[-0.25, -0.25, 0]"))
+        reach = reach_of(choice, Random(seed))
+    assert len(set(reach.starts)) == agents
+    for (x, y), seconds in zip(reach.starts, reach.seconds, strict=True):
+        start = int(x * 2), int(y * 2)
+        assert start in free
+        wanted = reached(drawn, start, Fraction("0.4"), Fraction("0.5") / Fraction("0.4"))
+        assert {reach.cells.x_and_y(cell): time for cell, time in seconds.items()} == wanted
+
+
+def test_who_has_little_time_gets_less_far(rooms: str) -> None:
+    choice = MapChoice(map=rooms, at="1,1", cell=0.5, radius=0, speed=0.5)
+    near, far = (reach_of(MapChoice(**{**vars(choice), "within": time}), Random(0)).seconds[0] for time in (2.0, None))
+    assert near == {cell: time for cell, time in far.items() if time <= 20}
+    assert 0 < len(near) < len(far)
+
+
+# Formations
+
+
+def check_answer(team: Team, reach: Reach, assignment: dict[str, int]) -> None:
+    """Hold an answer against the map: all cells are different, and ways lead there over pixels that are passable."""
+    assert len(set(assignment.values())) == len(team.robots)
+    fits = pixels(reach.cells.passable)
+    for robot, start in zip(sorted(team.robots, key=lambda one: one.name), reach.starts, strict=True):
+        topic, variable = robot.topics[0], robot.variables[0].name
+        assert topic.x is not None
+        assert topic.y is not None
+        place = [evaluate(one, assignment) * reach.cells.side for one in (topic.x, topic.y)]
+        (row, column), end = reach.cells.pixel(start) or (-1, -1), reach.cells.pixel((place[0], place[1])) or (-1, -1)
+        assert (end[1], end[0]) in ways((column, row), fits)
+        assert assignment[variable] in robot.variables[0].domain
+
+
+@pytest.mark.parametrize("shape", ["line", "column", "wedge", "circle", "grid"])
+def test_formations_take_as_little_time_as_can_be(shape: str, tmp_path: Path) -> None:
+    for seed in range(3):
+        choice = MapChoice(map=BUILDING, agents=4, cells=60)
+        made, ground = formation(choice, seed, shape=shape, anchor="7,2", heading=90)
+        write_team(made, tmp_path / f"{seed}")
+        team = read_team(tmp_path / f"{seed}")
+        check_team(team)
+        reach = reach_of(choice, Random(seed))
+        slots = sorted({cell for variable in made.variables.values() for cell in variable.domain})
+        assert len(slots) == 4
+        totals = [
+            sum(reach.seconds[robot][slot] for robot, slot in enumerate(order))
+            for order in itertools.permutations(slots)
+            if all(slot in reach.seconds[robot] for robot, slot in enumerate(order))
+        ]
+        wanted = Fraction(min(totals), 10)
+        for protocol in ("central", "dpop", "syncbb", "afb", "bnb-adopt"):
+            cost, assignment = answers(team, protocol)
+            assert cost == wanted == best(team)
+            check_answer(team, reach, assignment)
+        assert ground.scale == float(reach.cells.side)
+
+
+def test_slots_are_where_the_shape_is(tmp_path: Path) -> None:
+    """In the open: ahead is x, to the left is y, and turned by 90 degrees ahead is y."""
+    path = str(write_map(tmp_path, ["." * 20] * 20, origin="[-0.25, -0.25, 0]"))
+    choice = MapChoice(map=path, at="1,1 1,2 1,3 1,4", radius=0, cell=0.5)
+
+    def slots(shape: str, heading: float = 0.0) -> list[tuple[float, float]]:
+        team, _ = formation(choice, shape=shape, heading=heading, anchor="5,5", spacing=1)
+        cells = Cells(read_occupancy_grid(Path(path)), Fraction(1, 2), np.ones((20, 20), dtype=np.bool_))
+        return sorted((float(x), float(y)) for x, y in map(cells.centre, team.variables["V1"].domain))
+
+    assert slots("line") == [(5, 3.5), (5, 4.5), (5, 5.5), (5, 6.5)]
+    assert slots("line", 90) == slots("column") == [(3.5, 5), (4.5, 5), (5.5, 5), (6.5, 5)]
+    assert slots("wedge") == [(3, 3), (4, 4), (4, 6), (5, 5)]
+    assert slots("grid") == [(4.5, 4.5), (4.5, 5.5), (5.5, 4.5), (5.5, 5.5)]
+    offsets = tmp_path / "offsets.txt"
+    offsets.write_text("# ahead, left\n0,0\n-1, 2\n-1 -2  # behind\n\n2.5,0\n0,-4\n")
+    assert slots(str(offsets)) == [(4, 3), (4, 7), (5, 1), (5, 5), (7.5, 5)]
+    assert slots(str(offsets), -90)[0] == (1, 5)
+
+
+def test_a_slot_in_a_wall_moves_to_the_nearest_cell(rooms: str) -> None:
+    team, ground = formation(
+        MapChoice(map=rooms, at="1,1 1,2", cell=0.5, radius=0), shape="line", spacing=0.5, anchor="2.25,0.9"
+    )
+    x = {value % ground.columns for one in team.variables.values() for value in one.domain}
+    assert x <= {3, 6}  # left and right of the wall
+
+
+def test_the_flight_reads_the_same_map(rooms: str) -> None:
+    _, ground = formation(MapChoice(map=rooms, at="1,1 3,2.9", cell=0.5, radius=0), anchor="1,2")
+    assert ground.first == (0, 0)
+    assert {name: ground.x_and_y(*cell) for name, cell in ground.starts.items()} == {"Robot1": (2, 2), "Robot2": (6, 6)}
+    assert {ground.x_and_y(cell.x, cell.y) for cell in ground.blocked} >= {(4, 1), (5, 1), (0, 0), (9, 7)}
+
+
+@pytest.mark.parametrize(
+    ("make", "said"),
+    [
+        (lambda choice: formation(choice(agents=None)), "agents is missing"),
+        (lambda choice: formation(choice(agents=3, at="1,1 2,1")), "agents is 3, and at has 2 places"),
+        (lambda choice: formation(choice(agents=101)), "agents is 101; it must be from 1 to 100"),
+        (lambda choice: formation(choice(at="1;1")), "at has '1;1'; expected places in metres"),
+        (lambda choice: formation(choice(at="9,9")), "robot 1 at 9,9 is not on the map"),
+        (lambda choice: formation(choice(at="0.2,1")), "robot 1 at 0.2,1 stands where it does not fit"),
+        (lambda choice: formation(choice(at="0.7,1", radius=0.6)), "robot 1 at 0.7,1 stands where it does not fit"),
+        (lambda choice: formation(choice(radius=3)), "no pixel is free for a robot of the radius 3 m"),
+        (lambda choice: formation(choice(radius=51)), "radius is 51 m, more than 100 pixels"),
+        (lambda choice: formation(choice(speed=0)), "speed is 0"),
+        (lambda choice: formation(choice(cell=5)), "no cell of 5 m is free"),
+        (lambda choice: formation(choice(cell=0.001)), "4501 columns and 3501 rows; 1000 are allowed"),
+        (lambda choice: formation(choice(cell=0.5, cells=3)), "free, more than 3"),
+        (lambda choice: formation(choice(agents=40, cell=0.5)), "40 robots do not fit on"),
+        (lambda choice: formation(choice(), shape="ring"), "shape 'ring' is none of line, column"),
+        (lambda choice: formation(choice(), anchor="1,1 2,2"), "anchor is one place"),
+        (lambda choice: formation(choice(), spacing=0), "spacing is 0"),
+        (
+            lambda choice: formation(choice(at="1,1 3.5,1", within=1.5, cell=0.5, radius=0), anchor="1,1", spacing=0.5),
+            "robot 2 can get to no slot",
+        ),
+    ],
+)
+def test_impossible_ones_are_refused(rooms: str, make: Callable[[Callable[..., MapChoice]], object], said: str) -> None:
+    with pytest.raises(ValueError, match=said):
+        make(lambda **how: MapChoice(**{"map": rooms, **({} if "at" in how else {"agents": 2}), **how}))
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [("1,2,3", "offsets.txt:1: has 1,2,3"), ("0,0", "has 1 slots .*expected from 2"), ("0,0\n" * 101, "has 101 slots")],
+)
+def test_wrong_offsets_are_refused(rooms: str, tmp_path: Path, text: str, said: str) -> None:
+    file = tmp_path / "offsets.txt"
+    file.write_text(text)
+    with pytest.raises(InvalidInputError, match=said):
+        formation(MapChoice(map=rooms, agents=2), shape=str(file))
