@@ -8,11 +8,12 @@ of a topic's coordinates is `scale` metres.
 from __future__ import annotations
 
 from collections.abc import Container, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 from robochoc.flight.crafts import Craft, craft_of_variable, crafts_of, possible_crafts, row_and_column
 from robochoc.flight.layout import Axis, Layout, Point, layout_of
 from robochoc.formats.ground_map import GroundMap
+from robochoc.model.cost_units import Cost
 from robochoc.model.outcome import EpochOutcome, Outcome, Verdict
 from robochoc.model.priorities import natural_key
 from robochoc.model.problem import AddAgent, Assignment, Robot, Team, Topic
@@ -58,6 +59,8 @@ class Leg:
     opened_by: str
     verdict: Verdict
     goals: Mapping[int, Goal]
+    cost: Cost | None = field(default=None, compare=False)
+    """The cost of the decision, which changes nothing for drones. None: it is not known, or there is none."""
 
 
 @dataclass(frozen=True)
@@ -146,7 +149,7 @@ class MissionBuilder:
                 goals[number] = Goal(self._metres(place))
             elif _owner(craft) in gone:
                 goals[number] = Goal(self._metres(self._spot(number)), lands=True)
-        return Leg(epoch.opened_by, epoch.verdict, goals)
+        return Leg(epoch.opened_by, epoch.verdict, goals, epoch.cost)
 
     def mission(self, team: str, legs: Iterable[Leg]) -> Mission:
         """Return the mission with these legs."""

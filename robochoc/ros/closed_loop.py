@@ -20,6 +20,7 @@ from robochoc.model.problem import Assignment, Change, Robot, ScenarioEvent, Tea
 from robochoc.ros.sink import Sink
 from robochoc.ros.sink_publisher import SinkPublisher
 from robochoc.ros.situation import BATTERY, Situation
+from robochoc.ros.team_topics import WAYPOINTS_ALONE, PublishOptions
 
 TOGETHER_S = 0.5
 """Reports within this number of seconds after one that changes the problem belong to the same event."""
@@ -65,6 +66,7 @@ class ClosedLoop:
         frame: The frame of all places.
         scale: Metres a unit of the problem; None: as `mission.py` chooses.
         battery: A drone with less charge is out of order.
+        publish: What else is published, and as what type.
 
     Raises:
         NameClashError: Two topics would have the same name in ROS.
@@ -88,6 +90,7 @@ class ClosedLoop:
         frame: str = "map",
         scale: float | None = None,
         battery: float = BATTERY,
+        publish: PublishOptions = WAYPOINTS_ALONE,
     ) -> None:
         self._team = team
         self._robots = all_robots(team)
@@ -100,7 +103,7 @@ class ClosedLoop:
         self._happened = 0
         self._lost = True
         self.events = []
-        self.publishers = [SinkPublisher(team.name, drones_of(team), sink, frame) for sink in sinks]
+        self.publishers = [SinkPublisher(team.name, drones_of(team), sink, frame, publish) for sink in sinks]
         if feedback:
             feedback.publishers = [
                 publisher for publisher in self.publishers if feedback.simulated or not publisher.live

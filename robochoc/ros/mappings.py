@@ -7,6 +7,7 @@ ROS type, such as `mavros_msgs/PositionTarget`. It names a function that makes a
 
 from __future__ import annotations
 
+import json
 import re
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -23,7 +24,8 @@ from robochoc.system.installed import entry_point_names, entry_points_named, loa
 GROUP = "robochoc.waypoints"
 
 _SPELLING = re.compile(r"([A-Za-z]\w*)/(?:msg/)?([A-Za-z]\w*)", re.ASCII)
-_UPRIGHT = {"w": 1.0}
+UPRIGHT: Fields = {"w": 1.0}
+"""The orientation of what stands upright and looks along x."""
 
 
 class NoMappingError(Exception):
@@ -62,7 +64,7 @@ def mapping_for(kind: str) -> WaypointMapping | None:
     """
     short = short_kind(kind)
     if short in _BUILT_IN:
-        return WaypointMapping(_BUILT_IN[short])
+        return WaypointMapping(_BUILT_IN[short], _DEFINITIONS.get(short, ""))
     namesakes = [
         entry
         for name in entry_point_names(GROUP)
@@ -114,14 +116,14 @@ def header(waypoint: Waypoint) -> Fields:
 
 
 def _pose(waypoint: Waypoint) -> Fields:
-    return {"position": point(waypoint.at), "orientation": _UPRIGHT}
+    return {"position": point(waypoint.at), "orientation": UPRIGHT}
 
 
 def _transform(waypoint: Waypoint) -> Fields:
-    return {"translation": point(waypoint.at), "rotation": _UPRIGHT}
+    return {"translation": point(waypoint.at), "rotation": UPRIGHT}
 
 
-def _with_header(part: str, make: Callable[[Waypoint], Fields]) -> Callable[[Waypoint], Fields]:
+def _with_header(part: str, make: Callable[[Waypoint], object]) -> Callable[[Waypoint], Fields]:
     return lambda waypoint: {"header": header(waypoint), part: make(waypoint)}
 
 
@@ -132,6 +134,41 @@ def _place(waypoint: Waypoint) -> Fields:
 def _transform_stamped(waypoint: Waypoint) -> Fields:
     child = waypoint.topic.removeprefix("/")
     return {"header": header(waypoint), "child_frame_id": child, "transform": _transform(waypoint)}
+
+
+def _transforms(waypoint: Waypoint) -> Fields:
+    return {"transforms": [_transform_stamped(waypoint)]}
+
+
+def _path(waypoint: Waypoint) -> Fields:
+    """The straight way from the goal before, if there was one."""
+    places = [waypoint.at] if waypoint.before is None else [waypoint.before, waypoint.at]
+    stops = [{"header": header(waypoint), "pose": {"position": point(at), "orientation": UPRIGHT}} for at in places]
+    return {"header": header(waypoint), "poses": stops}
+
+
+def _odometry(waypoint: Waypoint) -> Fields:
+    return {
+        "header": header(waypoint),
+        "child_frame_id": waypoint.topic.removeprefix("/"),
+        "pose": {"pose": _pose(waypoint)},
+    }
+
+
+def _trajectory(waypoint: Waypoint) -> Fields:
+    name = waypoint.topic.removeprefix("/")
+    return {
+        "header": header(waypoint),
+        "joint_names": [name],
+        "points": [{"transforms": [_transform(waypoint)], "velocities": [{}], "accelerations": [{}]}],
+    }
+
+
+def _text(waypoint: Waypoint) -> Fields:
+    """JSON on one line, for programs without messages of ROS."""
+    place = dict(zip("xyz", waypoint.at, strict=True))
+    told = {"frame": waypoint.frame, "stamp": waypoint.stamp, **place, "lands": waypoint.lands}
+    return {"data": json.dumps(told)}
 
 
 _BUILT_IN: Mapping[str, Callable[[Waypoint], Fields]] = MappingProxyType(
@@ -145,5 +182,20 @@ _BUILT_IN: Mapping[str, Callable[[Waypoint], Fields]] = MappingProxyType(
         "geometry_msgs/Vector3": _place,
         "geometry_msgs/TransformStamped": _transform_stamped,
         "geometry_msgs/Transform": _transform,
+        "geometry_msgs/Point32": _place,
+        "geometry_msgs/Pose2D": lambda waypoint: {"x": waypoint.at[0], "y": waypoint.at[1]},
+        "geometry_msgs/PoseArray": _with_header("poses", lambda waypoint: [_pose(waypoint)]),
+        "nav_msgs/Odometry": _odometry,
+        "nav_msgs/Path": _path,
+        "std_msgs/Float32": lambda waypoint: {"data": waypoint.at[2]},
+        "std_msgs/Float64": lambda waypoint: {"data": waypoint.at[2]},
+        "std_msgs/Float64MultiArray": lambda waypoint: {"data": [*waypoint.at]},
+        "std_msgs/String": _text,
+        "tf2_msgs/TFMessage": _transforms,
+        "trajectory_msgs/MultiDOFJointTrajectory": _trajectory,
     }
 )
+_DEFINITIONS: Mapping[str, str] = MappingProxyType(
+    {"tf2_msgs/TFMessage": "geometry_msgs/TransformStamped[] transforms\n"}
+)
+"""Types that rosbags does not know for ROS 1."""

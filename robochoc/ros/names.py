@@ -27,11 +27,20 @@ REPORTS: Mapping[str, str] = MappingProxyType(
 )
 """The topics in a drone's namespace, besides its waypoints: the last token, and the ROS type."""
 
+TEAM_TOPICS: Mapping[str, str] = MappingProxyType(
+    {
+        "/tf": "tf2_msgs/TFMessage",
+        "/tf_static": "tf2_msgs/TFMessage",
+        "/diagnostics": "diagnostic_msgs/DiagnosticArray",
+    }
+)
+"""Topics of the whole team, which mean the same in every ROS, and their types."""
+
 NAME_MAX = 240
 """Characters of a name: ROS 2 passes on a few more to DDS."""
 
 _LEGAL = re.compile(r"[A-Za-z](?:_?[A-Za-z0-9])*_?")
-_RESERVED = {"/tf", "/tf_static", "/clock", "/rosout", "/rosout_agg", "/parameter_events", "/diagnostics", "/bond"}
+_RESERVED = {*TEAM_TOPICS, "/clock", "/rosout", "/rosout_agg", "/parameter_events", "/bond"}
 """Topics with a meaning of their own in every ROS."""
 
 
@@ -84,9 +93,9 @@ class TopicNames:
                 yield number, f"{self._namespaces[number]}/{token}"
 
 
-def is_report(topic: str, kind: str) -> bool:
-    """Return whether `topic`, of the ROS type `kind`, is one on which a drone reports."""
-    return REPORTS.get(topic.rpartition("/")[2]) == kind.replace("/msg/", "/")
+def is_for_waypoints(topic: str, kind: str) -> bool:
+    """Return whether `topic`, of the ROS type `kind`, is for waypoints: no report, and no topic of the team's."""
+    return topic not in TEAM_TOPICS and REPORTS.get(topic.rpartition("/")[2]) != kind.replace("/msg/", "/")
 
 
 def ros_name(name: str) -> str:

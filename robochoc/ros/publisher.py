@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import assert_never
 
 import numpy as np
@@ -13,8 +14,9 @@ from robochoc.flight.mission import Drone, Leg
 from robochoc.flight.reports import Battery, Blocked, Cleared, OutOfOrder, Pose, Report
 from robochoc.formats.diagnostics import on_one_line
 from robochoc.ros.mappings import NoMappingError, WaypointMapping, mapping_of, point
-from robochoc.ros.names import REPORTS, TopicNames
+from robochoc.ros.names import REPORTS, TEAM_TOPICS, TopicNames
 from robochoc.ros.sink import Fields, Sink
+from robochoc.ros.team_topics import BODY, GOAL, WAYPOINTS_ALONE, PublishOptions, status, transform, transforms
 from robochoc.ros.waypoint import Waypoint, waypoints
 
 _NOT_MEASURED = {
@@ -31,8 +33,8 @@ class NothingToPublishError(Exception):
 class Publisher:
     """Publishes what `drones` of `team` are to do, and what they report, to each of `sinks`, which it does not close.
 
-    Times are in nanoseconds since the epoch; places in metres, in `frame`. Its methods raise `SinkError`, and
-    `NoMappingError` where a package's mapping fails.
+    Times are in nanoseconds since the epoch; places in metres, in `frame`. `options` say what else is published.
+    Methods raise `SinkError`, and `NoMappingError` where a package's mapping fails.
 
     Raises:
         NameClashError: Two topics would have the same name in ROS.
@@ -41,14 +43,25 @@ class Publisher:
         SinkError: A sink does not take the topics.
     """
 
-    def __init__(self, team: str, drones: Sequence[Drone], sinks: Sequence[Sink], frame: str = "map") -> None:
+    def __init__(
+        self,
+        team: str,
+        drones: Sequence[Drone],
+        sinks: Sequence[Sink],
+        frame: str = "map",
+        options: PublishOptions = WAYPOINTS_ALONE,
+    ) -> None:
         if all(drone.topic is None for drone in drones):
             problem = f"no drone of {team or 'the team'} has a topic to publish its waypoints on"
             raise NothingToPublishError(
                 on_one_line(f"{problem}: give its robot's file a <topic> (docs/reference/format.md)")
             )
         self.names = TopicNames(drones)
-        self._drones = drones
+        self._team = team
+        self._drones = drones = [_with_kind(drone, options.kind) for drone in drones]
+        self._options = options
+        self._goals: dict[int, Point] = {}
+        self._decisions = 0
         self._sinks = sinks
         self._frame = frame
         self._numbers = {drone.name: number for number, drone in reversed([*enumerate(drones)])}
@@ -62,20 +75,33 @@ class Publisher:
                 topics[topic] = kind
         for sink in sinks:
             sink.explain(self.names.original)
-            sink.advertise({**topics, **self.names.reports()})
+            sink.advertise({**topics, **self.names.reports(), **options.topics})
 
     def decide(self, leg: Leg, at_ns: int) -> None:
-        """Publish the waypoints of `leg`: of drones that fly, and of those that land."""
-        for waypoint in waypoints(leg, self._drones, self.names, self._frame, at_ns):
+        """Publish the waypoints of `leg`: of drones that fly, and of those that land. Then what the options ask for."""
+        self._decisions += 1
+        for waypoint in waypoints(leg, self._drones, self.names, self._frame, at_ns, self._goals):
             self._publish(waypoint.topic, waypoint.kind, self._fields(waypoint), at_ns)
+        self._goals |= {number: goal.at for number, goal in leg.goals.items()}
+        header = self._header(at_ns)
+        if self._options.frames:
+            # All goals that stand, as a latched topic keeps its last message alone.
+            frames = [transform(header, self._frame_of(number, GOAL), at) for number, at in sorted(self._goals.items())]
+            self._team_publish("/tf_static", transforms(frames), at_ns)
+        if self._options.diagnostics:
+            self._team_publish("/diagnostics", status(self._team, leg, self._decisions, header), at_ns)
 
     def poses(self, positions: NDArray[np.float64], attitudes: NDArray[np.float64], at_ns: int) -> None:
         """Publish all drones' poses: positions in metres (N, 3), and quaternions x, y, z, w (N, 4)."""
         header = self._header(at_ns)
         flown = zip(positions.tolist(), attitudes.tolist(), strict=True)
+        bodies = []
         for number, (at, (x, y, z, w)) in enumerate(flown):
             turned = {"x": x, "y": y, "z": z, "w": w}
             self._report(number, "pose", {"header": header, "pose": _pose(at, turned)}, at_ns)
+            bodies.append(transform(header, self._frame_of(number, BODY), at, turned))
+        if self._options.frames:
+            self._team_publish("/tf", transforms(bodies), at_ns)
 
     def report(self, report: Report, at_ns: int) -> None:
         """Publish a drone's report. Raises `KeyError` if no drone has that name."""
@@ -108,9 +134,20 @@ class Publisher:
     def _report(self, number: int, token: str, fields: Fields, at_ns: int) -> None:
         self._publish(f"{self.names.namespace(number)}/{token}", REPORTS[token], fields, at_ns)
 
+    def _frame_of(self, number: int, token: str) -> str:
+        return f"{self.names.namespace(number)}/{token}"
+
+    def _team_publish(self, topic: str, fields: Fields, at_ns: int) -> None:
+        self._publish(topic, TEAM_TOPICS[topic], fields, at_ns)
+
     def _publish(self, topic: str, kind: str, fields: Fields, at_ns: int) -> None:
         for sink in self._sinks:
             sink.publish(topic, kind, fields, at_ns)
+
+
+def _with_kind(drone: Drone, kind: str) -> Drone:
+    """Return `drone` with another type of its topic, unless `kind` is empty."""
+    return replace(drone, topic=replace(drone.topic, type=kind)) if kind and drone.topic else drone
 
 
 def _pose(at: Point, orientation: Fields) -> Fields:

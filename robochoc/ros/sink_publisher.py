@@ -14,6 +14,7 @@ from robochoc.flight.mission import Drone, Leg, Mission
 from robochoc.flight.reports import OutOfOrder, Report
 from robochoc.ros.publisher import Publisher
 from robochoc.ros.sink import Sink
+from robochoc.ros.team_topics import WAYPOINTS_ALONE, PublishOptions
 from robochoc.ros.waypoint import waypoints
 
 SECOND_NS = 1_000_000_000
@@ -23,12 +24,14 @@ POSES_HZ = 20
 class SinkPublisher:
     """Publishes decisions, poses and reports of `drones` of `team` into one `sink`. Raises what `Publisher` raises."""
 
-    def __init__(self, team: str, drones: Sequence[Drone], sink: Sink, frame: str) -> None:
+    def __init__(
+        self, team: str, drones: Sequence[Drone], sink: Sink, frame: str, options: PublishOptions = WAYPOINTS_ALONE
+    ) -> None:
         self.live = sink.live
         self.place = sink.place
         self._frame = frame
         self._drones = drones
-        self._publisher = Publisher(team, drones, [sink], frame)
+        self._publisher = Publisher(team, drones, [sink], frame, options)
         self._counts = dict.fromkeys(("waypoint", "landing", "report", "pose"), 0)
 
     def decide(self, leg: Leg, at_ns: int) -> None:

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import time
+from collections import deque
+from dataclasses import replace
 from itertools import starmap
 
 from robochoc.flight.mission import Leg, MissionBuilder
@@ -12,7 +14,8 @@ from robochoc.ros.closed_loop import TOGETHER_S, Feedback
 from robochoc.ros.mappings import short_kind
 from robochoc.ros.names import REPORTS
 from robochoc.ros.report_decoder import ReportDecoder
-from robochoc.ros.source import Source
+from robochoc.ros.sim_clock import CLOCK, SimClock, with_clock
+from robochoc.ros.source import ReceivedMessage, Source, SourceError
 
 PATIENCE_S = 10.0
 """The default time to wait for reports of a live source after a decision, in seconds."""
@@ -26,16 +29,22 @@ class SourceFeedback(Feedback):
 
     After each decision a live source has `patience_s` seconds for a report that changes something; then the run is
     over. A recording is read to its end, as fast as possible: the clock is that of its messages.
+
+    With `sim_time` decisions have the time that comes on `/clock`. Raises `SourceError` if none comes in `patience_s`.
     """
 
-    def __init__(self, source: Source, decoder: ReportDecoder, patience_s: float = PATIENCE_S) -> None:
+    def __init__(
+        self, source: Source, decoder: ReportDecoder, patience_s: float = PATIENCE_S, *, sim_time: bool = False
+    ) -> None:
         self._source = source
         self._decoder = decoder
         self._patience_s = patience_s
         self._deadline: float | None = None
         self._kept: Report | None = None
         self._now_ns: int | None = None
-        source.listen(decoder.topics)
+        self._sim = SimClock() if sim_time else None
+        self._early: deque[ReceivedMessage] = deque()
+        source.listen(with_clock(decoder.topics) if sim_time else decoder.topics)
         if not source.live:
             self._kept = self._pull(None)
 
@@ -60,8 +69,27 @@ class SourceFeedback(Feedback):
         return ""
 
     def now_ns(self) -> int:
-        """Return the wall clock's time, or that of the recording."""
+        """Return the wall clock's time, or that of the recording, or that on `/clock`."""
+        if self._sim is not None:
+            return self._sim_ns(self._sim)
         return time.time_ns() if self._source.live or self._now_ns is None else self._now_ns
+
+    def _sim_ns(self, clock: SimClock) -> int:
+        """Return the time of a simulation: the newest that has come. Waits for the first. Raises `SourceError`."""
+        deadline = time.monotonic() + self._patience_s
+        while self._source.live:
+            received = self._source.next(0 if clock.now_ns is not None else _SLICE_S)
+            if received is None:
+                if clock.now_ns is not None or time.monotonic() >= deadline:
+                    break
+                self.idle()
+            elif not clock.takes(received):
+                self._early.append(received)
+        if clock.now_ns is None:
+            when = f"within {self._patience_s:g} s" if self._source.live else "before its first report"
+            problem = f"no time came on {CLOCK} of {self._source.place or 'the source'} {when}"
+            raise SourceError(on_one_line(f"{problem}; start the simulation, or leave out --use-sim-time"))
+        return clock.now_ns
 
     def on_decision(self, builder: MissionBuilder, leg: Leg, left_s: float | None) -> None:  # noqa: ARG002 - the decision was published
         """Take note of a decision: reports are awaited from now on."""
@@ -81,8 +109,13 @@ class SourceFeedback(Feedback):
             return None
         if report is not None:
             for publisher in self.publishers:
-                publisher.report(report)
+                publisher.report(self._stamped(report))
         return report
+
+    def _stamped(self, report: Report) -> Report:
+        """Return `report` with the time of the simulation, if there is one."""
+        now_ns = self._sim.now_ns if self._sim else None
+        return report if now_ns is None else replace(report, at_s=now_ns / 1e9)
 
     def _pull(self, deadline: float | None) -> Report | None:
         """Return the next report of the source before the deadline; None if there is none."""
@@ -90,13 +123,15 @@ class SourceFeedback(Feedback):
             left_s = _SLICE_S if deadline is None else min(_SLICE_S, deadline - time.monotonic())
             if left_s <= 0:
                 return None
-            received = self._source.next(left_s)
+            received = self._early.popleft() if self._early else self._source.next(left_s)
             if received is None:
                 if not self._source.live:
                     return None
                 self.idle()
                 continue
             self._now_ns = received.at_ns
+            if self._sim is not None and self._sim.takes(received):
+                continue
             report = self._decoder.report(received)
             if report is not None:
                 return report

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import math
 from collections.abc import Mapping
 from dataclasses import replace
@@ -19,6 +20,7 @@ from robochoc.ros.names import REPORTS
 from robochoc.ros.publisher import NothingToPublishError, Publisher
 from robochoc.ros.recordings.types import UnknownTypeError, types_of
 from robochoc.ros.sink import Fields, Sink
+from robochoc.ros.team_topics import PublishOptions
 from robochoc.ros.waypoint import Waypoint
 from tests.support.installed_packages import install_entry_points
 
@@ -36,6 +38,22 @@ LEG = Leg(
     Verdict.SOLUTION,
     {1: Goal((1.0, 2.0, 3.0)), 0: Goal((-2.0, 0.0, 0.0), lands=True), 2: Goal((4.0, 4.0, 4.0))},
 )
+PLAIN = {
+    "geometry_msgs/Pose2D": "'x': 1.5, 'y': -2.5, 'theta': 0.0",
+    "std_msgs/Float32": "3.5",
+    "std_msgs/Float64": "3.5",
+    "std_msgs/Float64MultiArray": "[1.5, -2.5, 3.5]",
+    "std_msgs/String": '"x": 1.5, "y": -2.5, "z": 3.5',
+}
+"""What a waypoint is in types that have no place with three coordinates."""
+WITH_HEADER = {
+    "geometry_msgs/PoseArray",
+    "nav_msgs/Odometry",
+    "nav_msgs/Path",
+    "std_msgs/String",
+    "tf2_msgs/TFMessage",
+    "trajectory_msgs/MultiDOFJointTrajectory",
+}
 LANDS = Leg("begin", Verdict.SOLUTION, {0: Goal((-2.0, 0.0, 0.0), lands=True)})
 
 
@@ -184,9 +202,98 @@ def test_every_built_in_type_is_a_type_of_ros_and_holds_the_place(kind: str, ver
     fields = mapping.fields(Waypoint(0, "/a/b", kind, (1.5, -2.5, 3.5), False, "map", NOW))
     types = types_of(1 if version == 1 else 2)
     told = str(types.decode(kind, types.encode(kind, fields)))
-    assert "'x': 1.5, 'y': -2.5, 'z': 3.5" in told
-    assert ("Stamped" in kind) == (str(NOW) in told)
-    assert ("Po" not in kind or "Point" in kind) or "'w': 1.0" in told
+    assert PLAIN.get(kind, "'x': 1.5, 'y': -2.5, 'z': 3.5") in told
+    assert (kind in WITH_HEADER or "Stamped" in kind) == (str(NOW) in told)
+    assert ("Po" not in kind or "Point" in kind or kind in PLAIN) or "'w': 1.0" in told
+
+
+def test_a_path_leads_from_the_goal_before() -> None:
+    drone = replace(DRONES[0], topic=Topic("/drone1.1/waypoint1.1", "nav_msgs/Path"))
+    heap = Heap()
+    publisher = Publisher("team", [drone], [heap])
+    for place in ((1.0, 2.0, 3.0), (4.0, 5.0, 6.0)):
+        publisher.decide(Leg("begin", Verdict.SOLUTION, {0: Goal(place)}), NOW)
+    paths = [[stop["pose"]["position"]["x"] for stop in fields["poses"]] for _, _, fields, _ in heap.said]
+    assert paths == [[1.0], [1.0, 4.0]]
+    assert heap.said[1][2]["poses"][0]["header"] == HEADER
+
+
+def test_a_text_is_json() -> None:
+    mapping = mapping_for("std_msgs/String")
+    assert mapping is not None
+    told = mapping.fields(Waypoint(0, "/a/b", "std_msgs/String", (1.5, -2.5, 3.5), True, "map", NOW))["data"]
+    assert json.loads(told) == {"frame": "map", "stamp": NOW, "x": 1.5, "y": -2.5, "z": 3.5, "lands": True}
+
+
+# What else is published
+
+
+def test_one_type_for_all_waypoints() -> None:
+    heap = Heap()
+    Publisher("team", DRONES, [heap], options=PublishOptions(kind="geometry_msgs/msg/Vector3")).decide(LEG, NOW)
+    assert [kind for _, kind, _, _ in heap.said] == ["geometry_msgs/msg/Vector3"] * 2
+    with pytest.raises(NoMappingError, match="'sensor_msgs/Image'"):
+        Publisher("team", DRONES, [heap], options=PublishOptions(kind="sensor_msgs/Image"))
+
+
+def test_goals_and_drones_are_frames() -> None:
+    """Every message on a latched topic has all goals that stand, as later ones hear the last message alone."""
+    heap = Heap()
+    publisher = Publisher("team", DRONES, [heap], options=PublishOptions(frames=True))
+    publisher.decide(LEG, NOW)
+    publisher.decide(LANDS, NOW + 1)
+    publisher.poses(np.zeros((4, 3)), np.tile([0.0, 0.0, 0.0, 1.0], (4, 1)), NOW + 2)
+    said = [fields for topic, kind, fields, _ in heap.said if (topic, kind) == ("/tf_static", "tf2_msgs/TFMessage")]
+    assert [[one["child_frame_id"] for one in each["transforms"]] for each in said] == [
+        ["drone1_1/goal", "drone1_2/goal", "drone1_3/goal"]
+    ] * 2
+    assert said[1]["transforms"][1] == {
+        "header": {"stamp": NOW + 1, "frame_id": "map"},
+        "child_frame_id": "drone1_2/goal",
+        "transform": {"translation": {"x": 1.0, "y": 2.0, "z": 3.0}, "rotation": {"w": 1.0}},
+    }
+    (topic, kind, bodies, at_ns) = heap.said[-1]
+    assert (topic, kind, at_ns) == ("/tf", "tf2_msgs/TFMessage", NOW + 2)
+    assert [one["child_frame_id"] for one in bodies["transforms"]][3] == "drone1_4/base_link"
+    assert heap.advertised[0].keys() >= {"/tf", "/tf_static"}
+    for version in (1, 2):
+        types = types_of(version)
+        back = types.decode("tf2_msgs/TFMessage", types.encode("tf2_msgs/TFMessage", bodies))
+        assert back["transforms"][0]["child_frame_id"] == "drone1_1/base_link"
+
+
+@pytest.mark.parametrize(
+    ("verdict", "level"),
+    [(Verdict.SOLUTION, 0), (Verdict.OPTIMAL, 0), (Verdict.UNKNOWN, 1), (Verdict.NO_SOLUTION, 2)],
+)
+def test_how_the_run_stands(verdict: Verdict, level: int) -> None:
+    heap = Heap()
+    publisher = Publisher("team", DRONES, [heap], options=PublishOptions(diagnostics=True))
+    publisher.decide(LANDS, NOW)
+    publisher.decide(Leg("-Nose\n", verdict, {1: Goal((0.0, 0.0, 0.0))}, cost=7), NOW)
+    topic, kind, fields, _ = heap.said[-1]
+    assert (topic, kind, fields["header"]["stamp"]) == ("/diagnostics", "diagnostic_msgs/DiagnosticArray", NOW)
+    (told,) = fields["status"]
+    assert (told["level"], told["name"], told["message"]) == (level, "robochoc: team", f"{verdict.value}, epoch 2")
+    values = {one["key"]: one["value"] for one in told["values"]}
+    assert values == {
+        "verdict": verdict.value,
+        "epoch": "2",
+        "opened by": r"-Nose\n",
+        "cost": "7",
+        "waypoints": "1",
+        "landings": "0",
+    }
+    for version in (1, 2):
+        assert types_of(version).encode(kind, fields)
+
+
+def test_nothing_else_is_published_that_was_not_asked_for() -> None:
+    heap = Heap()
+    publisher = Publisher("team", DRONES, [heap])
+    publisher.decide(LEG, NOW)
+    publisher.poses(np.zeros((4, 3)), np.tile([0.0, 0.0, 0.0, 1.0], (4, 1)), NOW)
+    assert not {"/tf", "/tf_static", "/diagnostics"} & {*heap.advertised[0], *(topic for topic, *_ in heap.said)}
 
 
 def test_both_spellings_are_one_type() -> None:

@@ -17,7 +17,7 @@ from robochoc.cli.options.ros import (
     flight_options,
     ros_options,
 )
-from robochoc.cli.options.ros_setup import conditions_of, open_sinks, ros_errors_fail, sink_places
+from robochoc.cli.options.ros_setup import conditions_of, open_sinks, publish_options, ros_errors_fail, sink_places
 from robochoc.cli.options.saved import saved_outcome, saved_team, team_option
 from robochoc.cli.options.sections import COMMON, SectionedCommand, Sections
 from robochoc.cli.reports.failures import INVALID, LOST, Failure, invalid_input_fails
@@ -30,7 +30,7 @@ if TYPE_CHECKING:
 _SECTIONS: Sections = {
     COMMON: ("--html", "--serve", "--json", "--team", "--map", "--help"),
     "Simulated flight": ("--fail", "--distance", "--downwash", "--wind", "--gusts", "--seed"),
-    "ROS (docs/guides/ros.md)": ("--ros", "--frame", "--scale"),
+    "ROS (docs/guides/ros.md)": ("--ros", "--frame", "--scale", "--ros-type", "--tf", "--diagnostics"),
 }
 
 
@@ -95,7 +95,8 @@ def _flown(saved: Path, mission: Mission, given: dict[str, Any]) -> tuple[Flight
     with ros_errors_fail(), ExitStack() as stack:
         sinks = open_sinks(given["sinks"], stack)
         frame = given["frame"] or FRAME
-        publishers = [SinkPublisher(mission.team, mission.drones, sink, frame) for sink in sinks]
+        options = publish_options(given)
+        publishers = [SinkPublisher(mission.team, mission.drones, sink, frame, options) for sink in sinks]
         try:
             with stages(mission.team) as progress:
                 flown = flight(mission, conditions, progress)

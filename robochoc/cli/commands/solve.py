@@ -70,7 +70,10 @@ _SECTIONS: Sections = {
     "Robots with several variables": ("--local-solutions", "--local-timeout", "--ace", "--no-cache"),
     "Files of other tools (docs/guides/import.md)": ("--infinity", "--owner"),
     "Output": ("--explain", "--bounds", "--serve", "--open"),
-    "ROS (docs/guides/ros.md)": ("--ros", "--frame", "--scale", "--situation", "--report-timeout", "--battery"),
+    "ROS (docs/guides/ros.md)": (
+        "--ros", "--frame", "--scale", "--ros-type", "--tf", "--diagnostics",
+        "--situation", "--report-timeout", "--battery", "--use-sim-time",
+    ),
     "Simulated flight (--situation flight)": ("--fail", "--distance", "--wind", "--gusts", "--obstacle"),
 }  # fmt: skip
 

@@ -33,8 +33,8 @@ ros_options = _optional(
         multiple=True,
         metavar="SINK",
         help=(
-            "Publish decisions as waypoints: mcap:FILE (for Foxglove), rosbag:FILE, dds (ROS 2), rmw_zenoh,"
-            " rosbridge://HOST:PORT, rospy, rclpy, or an installed one. Repeatable."
+            "Publish waypoints: mcap:FILE, rosbag:FILE, dds (ROS 2), rmw_zenoh, rclpy, rospy, rosbridge://HOST:PORT"
+            ", installed ones. Repeatable."
         ),
     ),
     click.option("--frame", type=FrameType(), metavar="NAME", help=f"Frame of all positions.  [default: {FRAME}]"),
@@ -42,10 +42,13 @@ ros_options = _optional(
         "--scale",
         type=Finite(1e-6, 1e6),
         metavar="METRES",
-        help="Length of one unit of the problem's x, y and z.  [default: 1, less for a vast field]",
+        help="Metres a unit.  [default: 1 or less]",
     ),
+    click.option("--ros-type", "ros_type", metavar="TYPE", help="ROS type of all waypoints, such as nav_msgs/Path."),
+    click.option("--tf", is_flag=True, help="Goals become frames on /tf_static, flights on /tf."),
+    click.option("--diagnostics", is_flag=True, help="Publish verdict, epoch and cost on /diagnostics."),
 )
-"""`--ros`, `--frame`, `--scale`."""
+"""`--ros`, `--frame`, `--scale`, `--ros-type`, `--tf`, `--diagnostics`."""
 
 flight_options = _optional(
     click.option(
@@ -78,10 +81,7 @@ situation_options = _optional(
     click.option(
         "--situation",
         metavar="SOURCE",
-        help=(
-            "Solve again when robots report a change. SOURCE: flight (decisions are flown in a simulation), or as for"
-            " --ros, or rosbag2:FILE."
-        ),
+        help=("Solve again when robots report a change: flight (a simulated one), or as for --ros, or rosbag2:FILE."),
     ),
     click.option(
         "--patience",
@@ -99,8 +99,9 @@ situation_options = _optional(
         "--battery",
         type=Finite(0, 1),
         metavar="LEVEL",
-        help="A robot leaves when a battery of its drones falls below this (1: full).  [default: 0.2]",
+        help="A robot leaves below this charge.  [default: 0.2]",
     ),
+    click.option("--use-sim-time", is_flag=True, help="Stamps are the time on /clock of --situation."),
     click.option(
         "--obstacle",
         "obstacles",
@@ -110,12 +111,13 @@ situation_options = _optional(
         help="An obstacle, in the problem's units. Repeatable.",
     ),
 )
-"""`--situation`, `--patience`, `--report-timeout`, `--battery`, `--obstacle`."""
+"""`--situation`, `--patience`, `--report-timeout`, `--battery`, `--use-sim-time`, `--obstacle`."""
 
 CONDITIONS = {"failures": "--fail", "distance": "--distance", "wind": "--wind", "gusts": "--gusts"}
 _SIMULATED = {**CONDITIONS, "obstacles": "--obstacle"}
-_FROM_REPORTS = {"battery": "--battery", "report_timeout": "--report-timeout"}
+_FROM_REPORTS = {"battery": "--battery", "report_timeout": "--report-timeout", "use_sim_time": "--use-sim-time"}
 IN_FRAME = {"frame": "--frame", "scale": "--scale"}
+PUBLISHED = {"ros_type": "--ros-type", "tf": "--tf", "diagnostics": "--diagnostics"}
 NOT_PUBLISHED = "is for what is published: add --ros SINK"
 
 
@@ -123,7 +125,7 @@ NOT_PUBLISHED = "is for what is published: add --ros SINK"
 class RosOptions:
     """The options of this file: where decisions go, and where the robots' situation comes from.
 
-    `flight` holds those of `FlightSettings` that were given.
+    `flight` holds those of `FlightSettings` that were given, and `published` those of `PUBLISHED`.
     """
 
     sinks: tuple[str, ...]
@@ -132,6 +134,8 @@ class RosOptions:
     scale: float | None
     report_timeout: float | None
     battery: float | None
+    use_sim_time: bool
+    published: Mapping[str, Any]
     flight: Mapping[str, Any]
 
     def __bool__(self) -> bool:
@@ -141,17 +145,34 @@ class RosOptions:
 def take_ros_options(settings: dict[str, Any]) -> RosOptions:
     """Take the options of this file out of `settings`. Raises `click.UsageError` for one that would be ignored."""
     sinks, situation = settings.pop("sinks"), settings.pop("situation")
-    given = {name: settings.pop(name) for name in (*_SIMULATED, *_FROM_REPORTS, *IN_FRAME)}
-    asked = {name for name, value in given.items() if value not in (None, ())}
+    given = {name: settings.pop(name) for name in (*_SIMULATED, *_FROM_REPORTS, *IN_FRAME, *PUBLISHED)}
+    asked = given_names(given)
     if situation != FLIGHT:
         refuse(_SIMULATED, asked, "is for the simulated flight: add --situation flight")
     if situation in {None, FLIGHT}:
         refuse(_FROM_REPORTS, asked, "is for robots that report: add --situation mcap:FILE, or another source")
     if not (sinks or situation):
         refuse(IN_FRAME, asked, NOT_PUBLISHED)
+    if not sinks:
+        refuse(PUBLISHED, asked, NOT_PUBLISHED)
     flight = {name: given[name] for name in _SIMULATED if name in asked}
     frame = given["frame"] or FRAME
-    return RosOptions(sinks, situation, frame, given["scale"], given["report_timeout"], given["battery"], flight)
+    return RosOptions(
+        sinks,
+        situation,
+        frame,
+        given["scale"],
+        given["report_timeout"],
+        given["battery"],
+        bool(given["use_sim_time"]),
+        {name: given[name] for name in PUBLISHED},
+        flight,
+    )
+
+
+def given_names(options: Mapping[str, Any]) -> set[str]:
+    """Return the names of the options that were given."""
+    return {name for name, value in options.items() if value not in (None, (), False)}
 
 
 def refuse(options: Mapping[str, str], asked: set[str], why: str) -> None:

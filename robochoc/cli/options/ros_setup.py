@@ -10,7 +10,17 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from robochoc.cli.options.paths import Place, refuse_same_places
-from robochoc.cli.options.ros import CONDITIONS, FLIGHT, FRAME, IN_FRAME, NOT_PUBLISHED, RosOptions, refuse
+from robochoc.cli.options.ros import (
+    CONDITIONS,
+    FLIGHT,
+    FRAME,
+    IN_FRAME,
+    NOT_PUBLISHED,
+    PUBLISHED,
+    RosOptions,
+    given_names,
+    refuse,
+)
 from robochoc.cli.reports.failures import INVALID, USAGE, Failure
 
 if TYPE_CHECKING:
@@ -20,6 +30,7 @@ if TYPE_CHECKING:
     from robochoc.ros.closed_loop import ClosedLoop, Feedback
     from robochoc.ros.simulated_feedback import FlightSettings
     from robochoc.ros.sink import Sink
+    from robochoc.ros.team_topics import PublishOptions
 
 
 @contextmanager
@@ -56,6 +67,13 @@ def open_sinks(texts: Sequence[str], stack: ExitStack) -> list[Sink]:
     from robochoc.ros.sinks import open_sink
 
     return [stack.enter_context(open_sink(text)) for text in texts]
+
+
+def publish_options(given: Mapping[str, Any]) -> PublishOptions:
+    """Return what `--ros-type`, `--tf` and `--diagnostics` ask for."""
+    from robochoc.ros.team_topics import PublishOptions
+
+    return PublishOptions(kind=given["ros_type"] or "", frames=given["tf"], diagnostics=given["diagnostics"])
 
 
 def flight_settings(given: Mapping[str, Any], seed: int) -> FlightSettings:
@@ -103,7 +121,15 @@ def closed_loop(ros: RosOptions, team: Team, seed: int) -> Iterator[ClosedLoop |
         feedback = _feedback(ros, drones_of(team), seed, stack) if ros.situation else None
         battery = BATTERY if ros.battery is None else ros.battery
         sinks = open_sinks(ros.sinks, stack)
-        yield ClosedLoop(team, sinks, feedback, frame=ros.frame, scale=ros.scale, battery=battery)
+        yield ClosedLoop(
+            team,
+            sinks,
+            feedback,
+            frame=ros.frame,
+            scale=ros.scale,
+            battery=battery,
+            publish=publish_options(ros.published),
+        )
 
 
 def _feedback(ros: RosOptions, drones: Sequence[Drone], seed: int, stack: ExitStack) -> Feedback:
@@ -122,19 +148,23 @@ def _feedback(ros: RosOptions, drones: Sequence[Drone], seed: int, stack: ExitSt
     source = stack.enter_context(open_source(ros.situation or ""))
     if ros.report_timeout is not None and not source.live:
         raise click.UsageError(f"--report-timeout is for a live source; {ros.situation} is a recording")
-    return SourceFeedback(source, ReportDecoder(drones, ros.frame), ros.report_timeout or PATIENCE_S)
+    return SourceFeedback(
+        source, ReportDecoder(drones, ros.frame), ros.report_timeout or PATIENCE_S, sim_time=ros.use_sim_time
+    )
 
 
 @contextmanager
 def robot_publisher(robot: Robot, given: dict[str, Any]) -> Iterator[Callable[[str, Assignment], list[str]]]:
     """Give a function that publishes the decision of `robot` alone, and returns what was published where.
 
-    The function takes the master's word for how the run ended, and the robot's own decision. The options --ros, --frame
-    and --scale are taken out of `given`. Raises `Failure`.
+    The function takes the master's word for how the run ended, and the robot's own decision. All options of
+    `ros_options` are taken out of `given`. Raises `Failure`.
     """
-    texts, frame, scale = (given.pop(name) for name in ("sinks", *IN_FRAME))
+    texts = given.pop("sinks")
+    asked = {name: given.pop(name) for name in (*IN_FRAME, *PUBLISHED)}
+    frame, scale, options = asked["frame"] or FRAME, asked["scale"], publish_options(asked)
     if not texts:
-        refuse(IN_FRAME, {name for name, value in zip(IN_FRAME, (frame, scale), strict=True) if value}, NOT_PUBLISHED)
+        refuse({**IN_FRAME, **PUBLISHED}, given_names(asked), NOT_PUBLISHED)
         yield lambda _why, _assignment: []
         return
     import time
@@ -145,7 +175,7 @@ def robot_publisher(robot: Robot, given: dict[str, Any]) -> Iterator[Callable[[s
     refuse_same_places({}, more_outputs=sink_places(texts))
     with ros_errors_fail(), ExitStack() as stack:
         opened = open_sinks(texts, stack)
-        found = [SinkPublisher(robot.name, drones_of_robot(robot), sink, frame or FRAME) for sink in opened]
+        found = [SinkPublisher(robot.name, drones_of_robot(robot), sink, frame, options) for sink in opened]
 
         def publish(why: str, assignment: Assignment) -> list[str]:
             leg = leg_of_robot(robot, why, assignment, scale)

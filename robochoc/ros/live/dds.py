@@ -12,7 +12,7 @@ from typing import NoReturn
 from robochoc.ros.live.dds_participant import MESSAGE_BYTES_MAX, Participant
 from robochoc.ros.live.dds_place import DdsPlace, Quality
 from robochoc.ros.live.inbox import PER_TOPIC_MAX, RosInbox, weight_of
-from robochoc.ros.names import is_report
+from robochoc.ros.names import is_for_waypoints
 from robochoc.ros.recordings.types import FieldsError, UnknownTypeError, types_of
 from robochoc.ros.sink import Fields, Sink, SinkError
 from robochoc.ros.source import ReceivedMessage, Source, SourceError
@@ -51,7 +51,7 @@ class DdsSink(Sink):
         for topic, kind in new.items():
             self._participant.announce(topic, kind)
             self._topics[topic] = kind
-        self._gather([topic for topic, kind in new.items() if not is_report(topic, kind)])
+        self._gather([topic for topic, kind in new.items() if is_for_waypoints(topic, kind)])
 
     def publish(self, topic: str, kind: str, fields: Fields, at_ns: int) -> None:  # noqa: ARG002 - theirs is the clock
         """Send a message. Waits where a subscriber is far behind."""

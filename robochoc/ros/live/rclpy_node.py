@@ -25,7 +25,7 @@ from robochoc.ros.live.rclpy_messages import fields_of, filled
 from robochoc.ros.live.ros2_names import domain_id
 from robochoc.ros.live.ros_master import Failed
 from robochoc.ros.live.rospy_messages import message_class
-from robochoc.ros.names import is_report
+from robochoc.ros.names import is_for_waypoints
 from robochoc.ros.sink import Fields, Sink, SinkError
 from robochoc.ros.source import ReceivedMessage, Source, SourceError
 
@@ -146,7 +146,7 @@ class RclpySink(Sink):
             except Exception as error:
                 raise SinkError(on_one_line(f"{topic} cannot be announced in ROS 2: {_said(error)}")) from error
             self._publishers[topic], self._kinds[topic] = publisher, kind
-        self._gather([topic for topic, kind in new.items() if not is_report(topic, kind)])
+        self._gather([topic for topic, kind in new.items() if is_for_waypoints(topic, kind)])
 
     def publish(self, topic: str, kind: str, fields: Fields, at_ns: int) -> None:  # noqa: ARG002 - theirs is the clock
         """Publish a message when the one before on its topic was acknowledged."""

@@ -1,0 +1,229 @@
+"""`--use-sim-time`: what is published has the time of the simulation that the source's `/clock` tells."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import pytest
+from click.testing import CliRunner
+
+from robochoc.cli.group import cli
+from robochoc.formats import read_team
+from robochoc.ros.closed_loop import ClosedLoop, drones_of
+from robochoc.ros.recordings.mcap_file import McapSink
+from robochoc.ros.report_decoder import ReportDecoder
+from robochoc.ros.sim_clock import CLOCK, CLOCK_KIND, SimClock
+from robochoc.ros.sink import Fields, Sink
+from robochoc.ros.sinks import open_source
+from robochoc.ros.source import ReceivedMessage, Source, SourceError
+from robochoc.ros.source_feedback import SourceFeedback
+from robochoc.run import Options, Runtime, solve
+from tests.support.program import ROOT
+
+FOLDER = ROOT / "docs" / "examples" / "hangar"
+HANGAR = read_team(FOLDER)
+SECOND = 1_000_000_000
+PORTS = {"point": {"x": 3.0, "y": 1.0, "z": 3.0}}
+"""Where Port flies first."""
+
+
+class Waited:
+    """A clock that goes on while somebody waits, and then only."""
+
+    waited_s = 0.0
+
+    def monotonic(self) -> float:
+        return self.waited_s
+
+    time = monotonic
+
+    def time_ns(self) -> int:
+        return round(self.waited_s * SECOND)
+
+
+class Live(Source):
+    """A live source that gives what it was given: messages, or seconds in which nothing comes."""
+
+    def __init__(self, clock: Waited, *messages: ReceivedMessage | float) -> None:
+        super().__init__("live")
+        self.messages = [*messages]
+        self.clock = clock
+        self.topics: Mapping[str, str] = {}
+
+    def listen(self, topics: Mapping[str, str]) -> None:
+        self.topics = topics
+
+    def next(self, wait_s: float) -> ReceivedMessage | None:
+        if self.messages and isinstance(self.messages[0], ReceivedMessage):
+            return self.messages.pop(0)  # type: ignore[return-value]  # looked at above
+        self.clock.waited_s += wait_s
+        if self.messages and self.clock.waited_s >= float(self.messages[0]):  # type: ignore[arg-type]  # a number
+            self.messages.pop(0)
+        return None
+
+    def close(self) -> None:
+        """Nothing to leave."""
+
+
+class Kept(Sink):
+    """A recording that keeps what is published."""
+
+    live = False
+
+    def __init__(self) -> None:
+        super().__init__("kept")
+        self.messages: list[tuple[str, Fields, int]] = []
+
+    def publish(self, topic: str, kind: str, fields: Fields, at_ns: int) -> None:
+        assert kind
+        self.messages.append((topic, fields, at_ns))
+
+    def close(self) -> None:
+        """Nothing to write."""
+
+
+def tick(seconds: float) -> ReceivedMessage:
+    return ReceivedMessage(CLOCK, CLOCK_KIND, {"clock": round(seconds * SECOND)}, 77)
+
+
+def blocked() -> ReceivedMessage:
+    return ReceivedMessage("/port/blocked", "geometry_msgs/PointStamped", PORTS, 0)
+
+
+@pytest.fixture
+def waited(monkeypatch: pytest.MonkeyPatch) -> Waited:
+    clock = Waited()
+    monkeypatch.setattr("robochoc.ros.source_feedback.time", clock)
+    return clock
+
+
+def run(source: Source, patience_s: float = 60.0) -> Kept:
+    """What is published in a run."""
+    sink = Kept()
+    feedback = SourceFeedback(source, ReportDecoder(drones_of(HANGAR), "map"), patience_s, sim_time=True)
+    options = Options(protocol="dynabt", runtime=Runtime.SIMULATOR)
+    solve(HANGAR, options, environment=ClosedLoop(HANGAR, [sink], feedback))
+    return sink
+
+
+def test_decisions_and_reports_have_the_time_of_the_simulation(waited: Waited) -> None:
+    source = Live(waited, 2.0, tick(100), tick(100.5), blocked(), tick(101), tick(103))
+    times = [(topic, at_ns / SECOND) for topic, _, at_ns in run(source).messages]
+    assert source.topics[CLOCK] == CLOCK_KIND
+    waypoint = "/port/waypoint"
+    assert [at_s for topic, at_s in times if topic == waypoint] == [103, 103]
+    assert [at_s for topic, at_s in times if topic == "/port/blocked"] == [103]
+
+
+def test_a_report_that_came_before_the_first_decision_counts(waited: Waited) -> None:
+    """It waits while the clock is read."""
+    published = run(Live(waited, blocked(), tick(5))).messages
+    assert len([topic for topic, _, _ in published if topic == "/port/waypoint"]) == 2
+
+
+def test_without_a_clock_the_run_ends(waited: Waited) -> None:
+    told = r"no time came on /clock of live within 3 s; start the simulation, or leave out --use-sim-time"
+    with pytest.raises(SourceError, match=told):
+        run(Live(waited, blocked()), patience_s=3)
+    assert waited.waited_s == pytest.approx(3, abs=0.5)
+
+
+@pytest.mark.parametrize(
+    "clock",
+    [None, True, "1", 1.5, -1, 1 << 70, {}, {"sec": 1}, {"sec": -1, "nanosec": 0}, {"sec": 1, "nanosec": SECOND}],
+)
+def test_what_is_no_time_changes_none(clock: object) -> None:
+    found = SimClock()
+    nothing = ReceivedMessage(CLOCK, CLOCK_KIND, {"clock": clock}, 0)
+    assert found.takes(nothing)
+    assert now_of(found) is None
+    assert found.takes(tick(2))
+    assert found.takes(nothing)
+    assert now_of(found) == 2 * SECOND
+    assert not found.takes(blocked())
+
+
+def now_of(clock: SimClock) -> int | None:
+    return clock.now_ns
+
+
+@pytest.mark.parametrize("names", [("sec", "nanosec"), ("secs", "nsecs")])
+def test_a_time_of_a_rosbridge(names: tuple[str, str]) -> None:
+    found = SimClock()
+    found.takes(ReceivedMessage(CLOCK, CLOCK_KIND, {"clock": dict(zip(names, (3, 4), strict=True))}, 0))
+    assert found.now_ns == 3 * SECOND + 4
+
+
+# The command
+
+
+def recorded(path: Path, *messages: tuple[str, str, dict[str, Any]]) -> str:
+    with McapSink(str(path)) as sink:
+        for number, (topic, kind, fields) in enumerate(messages, 1):
+            sink.publish(topic, kind, fields, number * 10**15)
+    return f"mcap:{path}"
+
+
+def solved(*words: str) -> tuple[int, str]:
+    common = ["solve", str(FOLDER), "--protocol", "dynabt", "--runtime", "simulator"]
+    done = CliRunner().invoke(cli, [*common, *words], catch_exceptions=False)
+    return done.exit_code, done.stderr
+
+
+def test_a_recording_with_a_clock(tmp_path: Path) -> None:
+    said = (CLOCK, CLOCK_KIND, {"clock": 7 * SECOND})
+    place = recorded(tmp_path / "in.mcap", said, ("/port/blocked", "geometry_msgs/PointStamped", PORTS))
+    out = f"mcap:{tmp_path}/out.mcap"
+    assert solved("--situation", place, "--use-sim-time", "--ros", out)[0] == 0
+    with open_source(out) as source:
+        source.listen({"/port/waypoint": "geometry_msgs/PoseStamped"})
+        stamps = []
+        while (heard := source.next(0)) is not None:
+            stamps.append(heard.fields["header"]["stamp"])
+    assert stamps == [7 * SECOND] * 2
+
+
+def test_a_recording_without_a_clock(tmp_path: Path) -> None:
+    place = recorded(tmp_path / "in.mcap", ("/port/blocked", "geometry_msgs/PointStamped", PORTS))
+    code, told = solved("--situation", place, "--use-sim-time")
+    assert code != 0
+    assert told.count("\n") == 1
+    assert "before its first report; start the simulation, or leave out --use-sim-time" in told
+
+
+@pytest.mark.parametrize("words", [(), ("--situation", "flight")])
+def test_it_needs_a_source(words: tuple[str, ...]) -> None:
+    code, told = solved(*words, "--use-sim-time")
+    assert code != 0
+    assert "--use-sim-time is for robots that report: add --situation" in told
+
+
+@pytest.mark.parametrize("word", [("--tf",), ("--diagnostics",), ("--ros-type", "nav_msgs/Path")])
+def test_what_else_is_published_needs_a_sink(word: tuple[str, ...]) -> None:
+    code, told = solved("--situation", "flight", *word)
+    assert code != 0
+    assert f"{word[0]} is for what is published: add --ros SINK" in told
+
+
+def test_all_that_can_be_published(tmp_path: Path) -> None:
+    out = tmp_path / "out.mcap"
+    words = ("--ros", f"mcap:{out}", "--tf", "--diagnostics", "--ros-type", "nav_msgs/Path")
+    assert solved(*words)[0] == 0
+    wanted = {
+        "/tf_static": "tf2_msgs/TFMessage",
+        "/diagnostics": "diagnostic_msgs/DiagnosticArray",
+        "/port/waypoint": "nav_msgs/Path",
+    }
+    with open_source(f"mcap:{out}") as source:
+        source.listen(wanted)
+        heard = {}
+        while (one := source.next(0)) is not None:
+            heard[one.topic] = one.fields
+    assert heard.keys() == wanted.keys()
+    assert [one["child_frame_id"] for one in heard["/tf_static"]["transforms"]][-1] == "tail/goal"
+    assert heard["/diagnostics"]["status"][0]["message"] == "solution, epoch 1"
+    code, told = solved("--ros", f"mcap:{out}", "--ros-type", "sensor_msgs/Image")
+    assert code != 0
+    assert "has the type 'sensor_msgs/Image', and there is no mapping from waypoints to it" in told
