@@ -43,6 +43,8 @@ class Traits:
         counts: Its robots also count the optima, or without costs the solutions (`--count`).
         arrays: It has a form for whole teams at once (`communication/arrays`).
         bears_loss: It goes on when messages are lost on their way (`Protocol.miss`, `Protocol.go_on`).
+        allocates: It takes task allocations only: teams that share nothing but that some things are done by one robot
+            at most, and in which each robot can do without (`solver/exclusions.py`).
         privacy: The information that neighbours do not get.
         use_when: A short recommendation, for `robochoc protocols`.
     """
@@ -66,6 +68,7 @@ class Traits:
     counts: bool = False
     arrays: bool = False
     bears_loss: bool = False
+    allocates: bool = False
     privacy: str = ""
     use_when: str = ""
 

@@ -26,6 +26,7 @@ from robochoc.protocols.traits import Traits
 from robochoc.run.defaults import MOST_LOSS
 from robochoc.run.options import CENTRAL, CentralSolverName, OnLoss, Options, Runtime, ScheduleName, Withdrawal
 from robochoc.solver.encoding import UnsupportedError
+from robochoc.solver.exclusions import allocation_fault
 from robochoc.verification.objective import withdrawal_cost
 
 LARGEST = 2**62
@@ -386,6 +387,8 @@ def _refuse_constraints(team: Team, name: str, traits: Traits) -> None:
         unmet = unmet_requirement(robot, traits, team.owner)
         if unmet:
             raise UnfitProtocolError(f"{unmet}, which {name} does not support")
+    if traits.allocates and (fault := allocation_fault(team)):
+        raise UnfitProtocolError(f"{team.name} is no task allocation, and {name} takes nothing else: {fault}")
 
 
 def max_total(team: Team, options: Options) -> float:

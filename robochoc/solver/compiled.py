@@ -29,6 +29,7 @@ from robochoc.solver.shared_constraint import (
 
 if TYPE_CHECKING:
     from robochoc.solver.cost_table import CostTable
+    from robochoc.solver.exclusions import Task
 
 LexicographicCost = tuple[int, Cost]
 """The number of constraints that a value violates, and the cost of all others. Pairs compare as tuples: a violated
@@ -359,6 +360,14 @@ class LocalProblem(LocalConstraints):
                 continue
             combinations = constraint.declared(declared, MAX_BOUNDED_ROWS // max(1, len(self.values)))
             self.checks += constraint.evaluate(combinations) * len(self.values)
+
+    def tasks(self) -> tuple[Task, ...]:
+        """Return what is done by one robot at most. Raises `UnsupportedError`. See `solver/exclusions.py`."""
+        from robochoc.solver.exclusions import tasks_of  # noqa: PLC0415 - for auctions only
+
+        checks, tasks = tasks_of(self._part)
+        self.checks += checks
+        return tasks
 
     def interchangeable(self, value: Value) -> Sequence[int]:
         """Return the places of all own values that agree with `value` wherever that is not None.

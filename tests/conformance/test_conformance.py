@@ -13,8 +13,9 @@ from robochoc.communication.run_result import RunResult
 from robochoc.model.outcome import Outcome, Verdict
 from robochoc.model.problem import INFINITE, Team
 from robochoc.run import Options, Runtime, Withdrawal, solve
-from robochoc.run.registry import protocol_named, protocol_names
+from robochoc.run.registry import protocol_named
 from robochoc.verification.checker import violations
+from tests.support.allocation_problems import ANY_TEAM
 from tests.support.brute_force import solutions
 from tests.support.examples import examples
 from tests.support.limits import HANG_S
@@ -24,7 +25,7 @@ from tests.support.random_options import MAX_MESSAGES, random_options
 
 PER_BATCH, FIRST_BATCH = 300, 90
 BATCHES = [0, *(pytest.param(batch, marks=pytest.mark.slow) for batch in range(1, 10))]
-EVERY_PROTOCOL = pytest.mark.parametrize("protocol", protocol_names())
+EVERY_PROTOCOL = pytest.mark.parametrize("protocol", ANY_TEAM)
 
 
 def part_of(count: int, protocol: str, batch: int) -> int:

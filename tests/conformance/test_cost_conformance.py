@@ -14,6 +14,7 @@ from robochoc.run import Options, Runtime, Withdrawal, solve
 from robochoc.run.registry import protocol_named, protocol_names
 from robochoc.solver.ace import AceProcess
 from robochoc.solver.encoding import UnsupportedError
+from tests.support.allocation_problems import ALLOCATING, simple_allocation_team
 from tests.support.cost_problems import minimum_withdrawal, random_complex_cost_team, random_cost_team
 from tests.support.limits import HANG_S
 from tests.support.loose_problems import any_order, loosened, minimum_cost
@@ -32,6 +33,8 @@ BATCHES = [0, *(pytest.param(batch, marks=pytest.mark.slow) for batch in range(1
 def team_for(protocol: str, chance: Random) -> Team:
     """A random team that the protocol can take; one in five is of complex robots, half have what nobody needs."""
     n_ary = protocol_named(protocol).traits.n_ary
+    if protocol in ALLOCATING:
+        return loosened(simple_allocation_team(chance), chance)
     complicated = n_ary and chance.random() < 0.2
     team = random_complex_cost_team(chance) if complicated else random_cost_team(chance, n_ary=n_ary)
     return loosened(team, chance) if chance.random() < 0.5 else team

@@ -12,6 +12,7 @@ from robochoc.model.orders import Order
 from robochoc.model.outcome import Verdict
 from robochoc.run import Options, Runtime
 from robochoc.run.registry import protocol_named, protocol_names
+from tests.support.allocation_problems import ANY_TEAM
 from tests.support.loose_problems import check_against_brute_force, every_order, loose_team, turned_interface
 from tests.support.random_options import random_schedule
 
@@ -35,7 +36,7 @@ def solved(protocol: str, seed: str, kind: int, runtime: Runtime = Runtime.SIMUL
         raise AssertionError(f"solved({protocol!r}, {seed!r}, {kind}, {runtime!r}): {error}") from error
 
 
-@EVERY_PROTOCOL
+@pytest.mark.parametrize("protocol", ANY_TEAM)
 def test_a_turned_link_takes_a_variable_out_of_sight(protocol: str) -> None:
     """Domains were once compiled from the team in the files: eleven protocols found no solution, five crashed."""
     team = turned_interface()

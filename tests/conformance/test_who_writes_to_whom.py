@@ -19,6 +19,7 @@ from robochoc.protocols.satisfaction.first_fit import FirstFit
 from robochoc.run.registry import protocol_named, protocol_names
 from robochoc.solver.agent_problem import DEFAULT_PARAMETERS, RunParameters
 from robochoc.verification.objective import withdrawal_cost
+from tests.support.allocation_problems import simple_allocation_team
 from tests.support.complex_problems import random_complex_team
 from tests.support.cost_problems import random_complex_cost_team, random_cost_team
 from tests.support.problems import random_team
@@ -72,11 +73,12 @@ def open_hearted(team: Team) -> Team:
 @pytest.mark.parametrize("protocol", WITHIN, ids=name_of)
 def test_who_stays_within_never_writes_to_a_stranger(protocol: type[Protocol]) -> None:
     for seed in range(4):
-        for team in random_teams(seed, costs=protocol.traits.costs):
+        allocations = [simple_allocation_team(Random(seed))] if protocol.traits.allocates else None
+        for team in allocations or random_teams(seed, costs=protocol.traits.costs):
             if any(unmet_requirement(robot, protocol.traits, team.owner) for robot in team.robots):
                 continue
             assert strangers(team, protocol, seed) == set()
-            if protocol.traits.costs:  # the last value is to withdraw
+            if protocol.traits.costs and not allocations:  # the last value is to withdraw
                 assert (
                     strangers(team, protocol, seed, RunParameters(seed, withdrawal_cost=withdrawal_cost(team))) == set()
                 )

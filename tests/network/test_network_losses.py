@@ -16,7 +16,9 @@ from robochoc.communication.run_result import RobotsLostError
 from robochoc.formats import PREDEFINED
 from robochoc.generators.queens3d import queens3d
 from robochoc.generators.random_csp import random_csp
+from robochoc.generators.tasks import tasks
 from robochoc.journal.events import AnyEvent, Lost, Sent
+from robochoc.model.costs import normalized
 from robochoc.model.outcome import Verdict
 from robochoc.model.problem import INFINITE, Constraint
 from robochoc.model.team_edits import without_robots
@@ -94,6 +96,8 @@ def test_whatever_the_protocol_the_verdict_is_true_for_those_who_are_left(protoc
     kind = protocol_named(protocol)
     costs, tightness = (9, 0.0) if kind.traits.costs else (None, 0.2)
     team = random_csp(6, 3, 0.5, tightness, seed=3, connected=True, max_cost=costs)
+    if kind.traits.allocates:
+        team = normalized(tasks(6, 4, 3))
     options = Options(
         protocol=protocol,
         runtime=Runtime.NETWORK,

@@ -12,6 +12,7 @@ from robochoc.model.problem import INFINITE
 from robochoc.protocols.satisfaction.abt import ABT
 from robochoc.run.registry import protocol_named, protocol_names
 from robochoc.solver.agent_problem import RunParameters
+from tests.support.allocation_problems import simple_allocation_team
 from tests.support.brute_force import least_cost, solutions
 from tests.support.cost_problems import random_cost_team
 from tests.support.in_memory_network import InMemoryNetwork
@@ -46,6 +47,8 @@ def test_nobody_is_doubted_who_is_honest(name: str) -> None:
     protocol = protocol_named(name)
     chance = Random(4)
     team = random_cost_team(chance, n_ary=False) if protocol.traits.costs else random_team(chance, n_ary=False)
+    if protocol.traits.allocates:
+        team = simple_allocation_team(chance)
     parameters = RunParameters(settings={"cycles": "5"} if hasattr(protocol.settings, "cycles") else {})
     office = InMemoryNetwork(known_to_both(team), protocol, parameters=parameters)
     result = office.search()

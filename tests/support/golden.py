@@ -6,8 +6,10 @@ from functools import cache
 
 from robochoc.formats import read_team
 from robochoc.generators.queens3d import queens3d
+from robochoc.generators.tasks import tasks
 from robochoc.journal.events import Given
 from robochoc.journal.journal import Header, JournalRecorder, lines_of, read_journal
+from robochoc.model.allocation import TasksModel
 from robochoc.model.problem import Constraint, ProblemKind, Relation, Semantics, Team
 from robochoc.run import Options, Runtime, ScheduleName, Withdrawal, solve
 from robochoc.run.registry import protocol_named, protocol_names
@@ -36,9 +38,12 @@ def odd_team(*, n_ary: bool = True) -> Team:
 def fixed_teams(protocol: str) -> dict[str, Team]:
     """Three small teams, by name; without the ternary constraint for a protocol that cannot take it.
 
-    A protocol that goes on when the problem changes also has one that does; one that minimises, one with costs.
+    A protocol that goes on when the problem changes also has one that does; one that minimises, one with costs. One
+    that takes task allocations only has two of these instead.
     """
     traits = protocol_named(protocol).traits
+    if traits.allocates:
+        return {f"tasks-{model}": tasks(3, 4, 2, model=model) for model in TasksModel}
     teams = {"queens3d-2": queens3d(2), "queens3d-3-full": queens3d(3, "full"), "odd": odd_team(n_ary=traits.n_ary)}
     if traits.costs:
         teams["patrol"] = read_team(PATROL)

@@ -29,6 +29,7 @@ from robochoc.run import solve
 from robochoc.run.options import Options
 from robochoc.run.registry import protocol_named
 from robochoc.solver.ace import AceProcess
+from tests.support.allocation_problems import simple_allocation_team
 from tests.support.brute_force import least_cost, solutions
 from tests.support.complex_problems import random_complex_team
 from tests.support.cost_problems import random_complex_cost_team, random_cost_team, softened
@@ -91,6 +92,8 @@ def loose_team(protocol: str, chance: Random, *, costs: bool = False) -> Team:
     No robot needs a solver for its private constraints.
     """
     traits = protocol_named(protocol).traits
+    if traits.allocates:
+        return loosened(simple_allocation_team(chance), chance)
     if costs and chance.random() < 0.2:
         return loosened(softened(several_variables_team(chance, n_ary=traits.n_ary), chance), chance)
     if costs:

@@ -6,6 +6,7 @@ from functools import cache
 from random import Random
 
 from robochoc.generators.queens3d import queens3d
+from robochoc.generators.tasks import tasks
 from robochoc.journal.journal import Header, Journal, JournalRecorder, read_journal
 from robochoc.model.problem import Team
 from robochoc.run import Options, Runtime, ScheduleName, solve
@@ -26,8 +27,9 @@ def record(team: Team, options: Options) -> Journal:
 
 @cache
 def recorded(protocol: str, n: int = 3, schedule: ScheduleName = ScheduleName.CONCURRENT) -> Journal:
-    """A short run in the simulator: queens in space, or a few robots with costs where that is what it is about."""
-    team = random_cost_team(Random(5)) if protocol_named(protocol).traits.costs else queens3d(n)
+    """A short run in the simulator: queens in space, or a few robots with costs or tasks where it is about these."""
+    traits = protocol_named(protocol).traits
+    team = tasks(4, 4) if traits.allocates else random_cost_team(Random(5)) if traits.costs else queens3d(n)
     options = Options(protocol=protocol, runtime=Runtime.SIMULATOR, schedule=schedule, messages=2_000, cache=False)
     return record(team, options)
 

@@ -15,6 +15,7 @@ from robochoc.model.problem import ConstraintModel, ProblemKind, Team
 from robochoc.run import Options, Withdrawal, solve
 from robochoc.run.registry import protocol_named
 from robochoc.solver.ace import AceProcess
+from tests.support.allocation_problems import random_allocation_team, simple_allocation_team
 from tests.support.asymmetric_problems import random_asymmetric_team
 from tests.support.complex_changes import random_complex_changing_team
 from tests.support.complex_problems import random_complex_team
@@ -31,6 +32,8 @@ ENOUGH = 1500
 def families(protocol: str) -> list[Callable[[Random], Team]]:
     """What makes random teams that `protocol` can take."""
     traits = protocol_named(protocol).traits
+    if traits.allocates:
+        return [simple_allocation_team, random_allocation_team]
     found: list[Callable[[Random], Team]] = [lambda chance: random_team(chance, n_ary=traits.n_ary)]
     if traits.costs:
         found.append(lambda chance: random_cost_team(chance, n_ary=traits.n_ary))

@@ -113,6 +113,7 @@ def _in_a_line(traits: Traits) -> str:
         *(["whose parts may cost"] if traits.asymmetric else []),
         *(["goes on when the problem changes"] if traits.dynamic else []),
         *(["also as arrays (--runtime arrays)"] if traits.arrays else []),
+        *(["task allocations only"] if traits.allocates else []),
         *(["bears the loss of messages"] if traits.bears_loss else []),
         *([f"use when: {traits.use_when}"] if traits.use_when else []),
         *([f"keeps private: {traits.privacy}"] if traits.privacy else []),

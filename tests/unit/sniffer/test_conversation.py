@@ -43,6 +43,7 @@ from tests.support.acl_conversations import (
     returned,
     types_of,
 )
+from tests.support.allocation_problems import simple_allocation_team
 from tests.support.asymmetric_problems import random_asymmetric_team
 from tests.support.cost_problems import random_cost_team
 from tests.support.examples import examples
@@ -73,6 +74,8 @@ AFTER_CHANGES = {"Check", "Reuse"}
 def a_team(protocol: type[Protocol], chance: Random) -> Team:
     if protocol.traits.asymmetric:
         return random_asymmetric_team(chance)
+    if protocol.traits.allocates:
+        return simple_allocation_team(chance)
     make = random_cost_team if protocol.traits.costs else random_team
     return make(chance, n_ary=protocol.traits.n_ary)
 

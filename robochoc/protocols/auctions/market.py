@@ -1,0 +1,172 @@
+"""The common part of auctions: what is for sale, what it is worth to a robot, and the base of their protocols.
+
+A *task* is something that is done by one robot at most (`solver/exclusions.py`). A robot's *bundle* is the set of tasks
+that it takes; of the robot's values with the same tasks only the cheapest counts. A task is worth to a robot what its
+cost is less with the task than without, given the bundle: in maximised problems, what is gained. That is its *marginal
+score*.
+
+Where the marginal score of a task never rises as the bundle grows, scores have *diminishing marginal gain* (DMG). Where
+they may rise, as with synergies, a bid is never higher than the robot's last one in the bundle (*bid warping*: Johnson,
+Choi, Ponda, How, "Allowing non-submodular score functions in distributed task allocation", CDC 2012). With DMG this
+changes nothing.
+"""
+
+from __future__ import annotations
+
+from abc import abstractmethod
+from collections.abc import Callable, Collection
+from typing import NamedTuple
+
+from robochoc.model.outcome import Verdict
+from robochoc.model.problem import INFINITE
+from robochoc.protocols.auctions.messages.lots import Lot
+from robochoc.protocols.order import PriorityOrder
+from robochoc.protocols.protocol import Protocol
+from robochoc.solver.compiled import LocalProblem
+from robochoc.solver.encoding import Cost, UnsupportedError
+
+NO_LIMIT = 2**63 - 1
+
+
+class Offer(NamedTuple):
+    """What a robot bids: `amount` for `task`, whose marginal score is `score`."""
+
+    task: int
+    amount: int
+    score: int
+
+
+class Market:
+    """The tasks of one robot, by number.
+
+    Attributes:
+        rivals: For each task the other robots that can do it, in priority order.
+        shared: For each rival, the tasks that both can do.
+        idle: The place of the cheapest own value without a task. None: there is no value at all.
+
+    Raises:
+        UnsupportedError: when the robot's constraints allocate no tasks, or it cannot do without.
+    """
+
+    def __init__(self, problem: LocalProblem) -> None:
+        self._tasks = problem.tasks()
+        self._charges = problem.charges
+        self._places = self._cheapest(problem)
+        self.rivals = [tuple(task.others) for task in self._tasks]
+        self.shared: dict[str, list[int]] = {}
+        self._named: dict[tuple[str, Lot], int] = {}
+        for number, task in enumerate(self._tasks):
+            for robot, choices in task.others.items():
+                self.shared.setdefault(robot, []).append(number)
+                self._named.update({(robot, choice): number for choice in choices})
+        self._lots = [self._lot(problem, number) for number in range(len(self._tasks))]
+        self.idle = self._places.get(frozenset())
+        if self.idle is None and self._places:
+            raise UnsupportedError(f"{problem.agent} has no value without a task, and in an auction it may get none")
+
+    def _cheapest(self, problem: LocalProblem) -> dict[frozenset[int], int]:
+        """Return the place of the cheapest value for each set of tasks that the robot can do together."""
+        task_of = {choice: number for number, task in enumerate(self._tasks) for choice in task.own}
+        found: dict[frozenset[int], int] = {}
+        for index, value in enumerate(problem.values):
+            chosen = [task_of.get((place, part)) for place, part in enumerate(value) if part is not None]
+            bundle = frozenset(number for number in chosen if number is not None)
+            least = self._charges[found[bundle]] if bundle in found else INFINITE
+            if self._charges[index] < least:
+                found[bundle] = index
+        return found
+
+    def _lot(self, problem: LocalProblem, task: int) -> Lot:
+        """Return how this robot does `task` if it does nothing else; if it cannot, the first way."""
+        index = self._places.get(frozenset((task,)))
+        value = () if index is None else problem.values[index]
+        own = self._tasks[task].own
+        return next((choice for choice in own if choice[0] < len(value) and value[choice[0]] == choice[1]), own[0])
+
+    def lot(self, task: int) -> Lot:
+        """Return how this robot names `task`."""
+        return self._lots[task]
+
+    def task(self, robot: str, lot: Lot) -> int:
+        """Return the task that `robot` names `lot`.
+
+        Raises:
+            ValueError: when both can do no such task.
+        """
+        number = self._named.get((robot, lot))
+        if number is None:
+            raise ValueError(f"{robot} names a task that it does not share")
+        return number
+
+    def place(self, bundle: Collection[int]) -> int:
+        """Return the place of the cheapest own value with the tasks of `bundle`, which there is."""
+        return self._places[frozenset(bundle)]
+
+    def best(self, bundle: Collection[int], limit: int, admits: Callable[[int, int], bool]) -> Offer | None:
+        """Return the best offer for a task besides `bundle`; None if no task is worth more than nothing.
+
+        Args:
+            bundle: The tasks that the robot has.
+            limit: No bid is higher.
+            admits: Whether a bid of so much for a task will do.
+        """
+        had = frozenset(bundle)
+        before = self._charge(had)
+        best: Offer | None = None
+        for task in range(len(self._tasks)):
+            more = had | {task}
+            if task in had or more not in self._places:
+                continue
+            score = int(before - self._charge(more))
+            offer = Offer(task, min(score, limit), score)
+            is_better = best is None or offer[1:] > best[1:]
+            if offer.amount > 0 and is_better and admits(task, offer.amount):
+                best = offer
+        return best
+
+    def _charge(self, bundle: frozenset[int]) -> Cost:
+        return self._charges[self._places[bundle]]
+
+
+class Auction(Protocol):
+    """One agent of an auction. State: its `market`, and the `bundle`, its tasks in the order in which it took them."""
+
+    def __init__(self, problem: LocalProblem, order: PriorityOrder) -> None:
+        super().__init__(problem, order)
+        self.market = Market(problem)
+        self.bundle: list[int] = []
+
+    @abstractmethod
+    def begin(self) -> None:
+        """Begin to bid, for a robot that has values, and neighbours."""
+
+    def start(self) -> None:
+        """Start; a robot without values ends the search, one without rivals takes its cheapest value."""
+        if self.market.idle is None:
+            self.conclude(Verdict.NO_SOLUTION)
+        elif not self.market.shared:
+            self.value = self.problem.charges.index(min(self.problem.charges))
+        else:
+            self.take()
+            self.begin()
+
+    def take(self) -> None:
+        """Take the value with the tasks of the bundle."""
+        self.value = self.market.place(self.bundle)
+
+    def refuse_winner(self, task: int, winner: str, amount: int) -> None:
+        """Raise `ValueError` for a bid that no robot can have made for `task`."""
+        if winner != self.problem.agent and winner not in self.market.rivals[task]:
+            raise ValueError(f"{winner} cannot have won a task that it does not share")
+        if amount <= 0:
+            raise ValueError(f"{winner} cannot have won a task for {amount}")
+
+    def outbids(self, robot: str, amount: int, other: str | None, most: int) -> bool:
+        """Return whether `robot` with a bid of `amount` comes before `other` with `most`; None: nobody has bid.
+
+        Of equal bids that of the robot of higher priority counts.
+        """
+        if other is None:
+            return True
+        rank = self.order.rank
+        return (amount, -rank[robot]) > (most, -rank[other])

@@ -1,0 +1,1 @@
+"""What these protocols send: the messages of `ssi.py` are in `messages/ssi.py`."""

@@ -1,0 +1,145 @@
+"""Sequential Single-Item auctions (SSI).
+
+Tasks are sold one after the other. Each robot bids for the task that is worth most to it, given the tasks that it has
+won before; the highest bid wins. Then all bid anew.
+
+- **When to use**: for task allocation, where a good answer by few messages will do. Never are two robots assigned the
+  same task, so the answer can be used at any moment.
+- **Guarantees**: incomplete: no proof of optimality. The outcome is that of the sequential greedy algorithm. Where
+  scores have diminishing marginal gain (`market.py`), the gain is at least half of the optimum, as of greedy
+  allocation to submodular bidders (Lehmann, Lehmann, Nisan, GEB 55, 2006). With loads and capacities there is no bound.
+- **References**: Koenig, Tovey, Lagoudakis, Markakis, Kempe, Keskinocak, Kleywegt, Meyerson, Jain: "The power of
+  sequential single-item auctions for agent coordination", AAAI 2006; Lagoudakis et al.: "Auction-based multi-robot
+  routing", RSS 2005.
+
+The papers' procedure:
+
+    each robot bids on the target that costs it least more     `_bid`
+    the robot with the best of all bids wins that target       `_has_the_best_bid`, `_buy`
+    the winner is told to all, and the next round begins       `_tell`, `_sell`
+
+Choices that the papers leave open, and differences:
+
+- There are no rounds. A robot's bids never rise, so the last bid of each that can do the same task bounds what it will
+  bid. As soon as a robot's bid is above all of these, it buys. So sales that have nothing to do with each other happen
+  at the same time, and the outcome is as if there were rounds.
+- A bid does not name its task: until it is sold, nobody needs to know.
+- Bids of 0 or less are not made. Of equal bids that of the robot of higher priority wins.
+- Bids may rise where scores lack diminishing marginal gain: they are warped (`market.py`).
+- The papers' robots plan tours, and minimise costs. Here a task's score is what constraints say of it.
+- A robot that shares no task with others takes its cheapest value.
+
+>>> from robochoc.communication.simulator.schedule import Concurrent
+>>> from robochoc.communication.simulator.simulator import Simulation
+>>> from robochoc.generators.tasks import tasks
+>>> from robochoc.model.costs import normalized
+>>> result = Simulation(normalized(tasks(4, 4)), SSI, Concurrent(seed=0)).search()
+>>> result.metrics.messages
+{'Bid': 15, 'Won': 9}
+"""
+
+from __future__ import annotations
+
+from typing import assert_never, cast
+
+from robochoc.model.message import Message
+from robochoc.protocols.auctions.market import NO_LIMIT, Auction, Offer
+from robochoc.protocols.auctions.messages.ssi import Bid, Won
+from robochoc.protocols.order import PriorityOrder
+from robochoc.protocols.traits import ENDS_WITH_PROOF, Traits
+from robochoc.solver.compiled import LocalProblem
+
+
+class SSI(Auction):
+    """One agent of SSI.
+
+    State: the own `offer`, the `sold` tasks (its own among them), and the last `bids` of the other robots.
+    """
+
+    messages = Bid | Won
+    traits = Traits(
+        concludes=ENDS_WITH_PROOF,
+        paper="Koenig et al. 2006; Lagoudakis et al. 2005",
+        complete=False,
+        costs=True,
+        shared_scopes=True,
+        writes_to_non_neighbours=False,
+        allocates=True,
+        privacy="what tasks are worth, but for bids",
+        use_when="tasks are to be allocated: a good answer, few messages",
+    )
+
+    def __init__(self, problem: LocalProblem, order: PriorityOrder) -> None:
+        super().__init__(problem, order)
+        self.offer: Offer | None = None
+        self.sold: set[int] = set()
+        self.bids: dict[str, int] = {}
+        self._limit = NO_LIMIT
+        self._told = -1
+
+    def begin(self) -> None:
+        """Make the first bid."""
+        self._bid()
+        self._tell([])
+
+    def receive(self, sender: str, message: Message) -> None:
+        """Note another robot's bid, and what it has won."""
+        if self.verdict is not None:
+            return
+        match cast("Bid | Won", message):
+            case Bid(amount):
+                pass
+            case Won(lots, amount):
+                self._sell(sender, lots)
+            case never:
+                assert_never(never)
+        if sender not in self.market.shared or amount < 0:
+            raise ValueError(f"{sender} bids {amount}, and shares {len(self.market.shared.get(sender, ()))} tasks")
+        self.bids[sender] = amount
+
+    def settle(self) -> None:
+        """Bid anew if the task is sold, buy as long as the own bid is the best, and tell."""
+        if self.verdict is not None or not self.market.shared:
+            return
+        if self.offer and self.offer.task in self.sold:
+            self._bid()
+        bought = []
+        while self.offer and self._has_the_best_bid(self.offer):
+            bought.append(self.offer.task)
+            self._buy(self.offer)
+        self._tell(bought)
+
+    def _sell(self, sender: str, lots: list[tuple[int, int]]) -> None:
+        for lot in lots:
+            task = self.market.task(sender, lot)
+            if task in self.sold:
+                raise ValueError(f"{sender} has won a task that is sold")
+            self.sold.add(task)
+
+    def _bid(self) -> None:
+        """Find the task that is worth most, of those that are for sale."""
+        self.offer = self.market.best(self.bundle, self._limit, lambda task, _: task not in self.sold)
+
+    def _has_the_best_bid(self, offer: Offer) -> bool:
+        """Return whether nobody who can do the task has a bid as good, or can have one later."""
+        own = self.problem.agent
+        rivals = self.market.rivals[offer.task]
+        return all(rival in self.bids and self.outbids(own, offer.amount, rival, self.bids[rival]) for rival in rivals)
+
+    def _buy(self, offer: Offer) -> None:
+        self.bundle.append(offer.task)
+        self.sold.add(offer.task)
+        self._limit = offer.amount
+        self.take()
+        self._bid()
+
+    def _tell(self, bought: list[int]) -> None:
+        """Tell those who can do them which tasks are bought, and all rivals the own bid if it is another."""
+        amount = self.offer.amount if self.offer else 0
+        for rival, shared in self.market.shared.items():
+            lots = [self.market.lot(task) for task in bought if task in shared]
+            if lots:
+                self.send(rival, Won(lots, amount))
+            elif amount != self._told:
+                self.send(rival, Bid(amount))
+        self._told = amount

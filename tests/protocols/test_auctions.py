@@ -1,0 +1,249 @@
+"""What SSI, CBAA and CBBA have in common: the outcome of the sequential greedy algorithm, and its bounds."""
+
+from __future__ import annotations
+
+import doctest
+from collections import Counter
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+from random import Random
+from types import ModuleType
+
+import pytest
+
+import robochoc.protocols.auctions.cbaa
+import robochoc.protocols.auctions.cbba
+import robochoc.protocols.auctions.ssi
+from robochoc.generators.tasks import tasks
+from robochoc.model.allocation import Job, Worker, several
+from robochoc.model.assembly import assemble
+from robochoc.model.constraint import Constraint, Relation, Semantics
+from robochoc.model.cost_units import CostUnits
+from robochoc.model.costs import normalized, told_cost
+from robochoc.model.message import Message
+from robochoc.model.orders import with_order
+from robochoc.model.outcome import Outcome, Verdict
+from robochoc.model.problem import ProblemKind, Team
+from robochoc.protocols.auctions.messages.cbaa import WinningBids
+from robochoc.protocols.auctions.messages.cbba import Bundles
+from robochoc.protocols.auctions.messages.ssi import Bid, Won
+from robochoc.run import Options, Runtime, ScheduleName, solve
+from robochoc.run.registry import protocol_named
+from robochoc.solver.ace import AceProcess
+from robochoc.solver.encoding import UnsupportedError
+from tests.support.allocation_problems import Allocation, greedy, idle, optimum, random_allocation
+from tests.support.brute_force import least_cost
+from tests.support.examples import count
+from tests.support.limits import HANG_S
+from tests.support.local_search_runs import robot_of, started
+from tests.support.problems import team_of
+from tests.support.random_options import random_schedule
+
+BUNDLING = ("ssi", "cbba")
+AUCTIONS = (*BUNDLING, "cbaa")
+MODULES = (robochoc.protocols.auctions.ssi, robochoc.protocols.auctions.cbaa, robochoc.protocols.auctions.cbba)
+
+
+def cost(allocation: Allocation, total: float) -> float:
+    """`total`, a sum of normalised costs, as it is told to the user."""
+    return float(told_cost(normalized(allocation.team), total))
+
+
+def run(allocation: Allocation, protocol: str, chance: Random, solver: AceProcess) -> Outcome:
+    """The outcome of a run on a random schedule; `solve` has it checked against all constraints."""
+    options = replace(random_schedule(chance), protocol=protocol, messages=5000)
+    outcome = solve(allocation.team, options, solver=solver)
+    assert outcome.verdict is Verdict.SOLUTION, (allocation, options)
+    assert outcome.verified
+    return outcome
+
+
+def any_order(allocation: Allocation, chance: Random) -> Allocation:
+    order = tuple(chance.sample(allocation.team.order, len(allocation.team.order)))
+    return allocation._replace(team=with_order(allocation.team, order))
+
+
+@pytest.fixture
+def warm(warm_ace: None) -> Iterator[AceProcess]:
+    """A solver for robots with several variables that need not be started for each team."""
+    del warm_ace
+    with AceProcess() as ace:
+        yield ace
+
+
+@pytest.mark.parametrize("protocol", AUCTIONS)
+@count("runs", 60, 2000)
+def test_the_outcome_is_that_of_the_sequential_greedy_algorithm(protocol: str, runs: int, warm: AceProcess) -> None:
+    chance, found = Random(f"greedy {protocol}"), Counter[str]()
+    for _ in range(runs):
+        allocation = any_order(random_allocation(chance), chance)
+        outcome = run(allocation, protocol, chance, warm)
+        assert outcome.cost is not None
+        expected = greedy(allocation, most=1 if protocol == "cbaa" else None)
+        assert float(outcome.cost) == cost(allocation, expected), allocation
+        assert float(outcome.cost) <= cost(allocation, optimum(allocation))
+        found[allocation.model] += 1
+        found["optimal"] += expected == optimum(allocation)
+    assert min(found["assignment"], found["several"]) > runs // 4
+    assert runs // 2 < found["optimal"] < runs
+
+
+@pytest.mark.parametrize("protocol", AUCTIONS)
+@count("runs", 40, 200)
+def test_with_diminishing_marginal_gain_at_least_half_of_the_optimum_is_gained(
+    protocol: str, runs: int, warm: AceProcess
+) -> None:
+    """Choi et al., Theorem 2; Lehmann et al. 2006. Of CBAA where a robot can do one task only."""
+    chance, worst = Random(f"half {protocol}"), 1.0
+    for _ in range(runs):
+        allocation = random_allocation(chance, dmg=True, model="assignment" if protocol == "cbaa" else None)
+        outcome = run(allocation, protocol, chance, warm)
+        assert outcome.cost is not None
+        nothing, most = (cost(allocation, total(allocation)) for total in (idle, optimum))
+        gained = float(outcome.cost) - nothing
+        assert gained >= (most - nothing) / 2, allocation
+        worst = min(worst, gained / (most - nothing) if most > nothing else 1)
+    assert 0.5 <= worst < 1
+
+
+@pytest.mark.parametrize("protocol", ["ssi", "cbba"])
+def test_with_loads_there_is_no_such_bound(protocol: str) -> None:
+    """A robot with room for 3 is sold a task of load 3 for 10, and not three of load 1 for 9 each."""
+    workers = [Worker(f"R{name}", name, name, dict(profit), 3) for name, profit in (("A", HEAVY), ("B", LIGHT))]
+    jobs = {1: Job("1", 3), 2: Job("2"), 3: Job("3"), 4: Job("4")}
+    variables, constraints = several(workers, jobs)
+    team = assemble("loads", variables, constraints, kind=ProblemKind.DISWCSP, costs=CostUnits(maximize=True))
+    costs = [solve(team, Options(protocol=name, runtime=Runtime.SIMULATOR)).cost for name in (protocol, "dpop")]
+    assert costs == [10, 27]
+
+
+HEAVY = {1: 10, 2: 9, 3: 9, 4: 9}
+LIGHT = {1: -1, 2: -1, 3: -1, 4: -1}
+
+
+@pytest.mark.parametrize("protocol", ["cbaa", "cbba"])
+@count("runs", 60, 1000)
+def test_in_rounds_it_ends_after_as_many_as_tasks_times_the_diameter(protocol: str, runs: int) -> None:
+    """Choi et al., Theorem 1: rounds in which something is told. The network of robots that share tasks is a clique."""
+    chance, longest = Random(f"rounds {protocol}"), 0
+    for number in range(runs):
+        count_of = chance.randint(1, 6)
+        team = tasks(chance.randint(2, 6), count_of, number, model=chance.choice(["assignment", "several"]))
+        options = Options(protocol=protocol, runtime=Runtime.SIMULATOR, schedule=ScheduleName.CYCLES)
+        cycles = solve(team, options).metrics.cycles
+        assert cycles is not None
+        assert cycles <= count_of + 1, (number, cycles)
+        longest = max(longest, cycles)
+    assert longest > 2
+
+
+@pytest.mark.parametrize("protocol", AUCTIONS)
+@pytest.mark.parametrize("runtime", [Runtime.PROCESSES, Runtime.NETWORK])
+def test_the_outcome_is_the_same_on_every_runtime(protocol: str, runtime: Runtime) -> None:
+    team = tasks(4, 4, 3)
+    simulated, real = (
+        solve(team, Options(protocol=protocol, runtime=kind, timeout=HANG_S)) for kind in (Runtime.SIMULATOR, runtime)
+    )
+    assert (real.verdict, real.assignment) == (Verdict.SOLUTION, simulated.assignment)
+    assert real.verified
+
+
+# What is no task allocation
+
+NOT_BOTH = Relation("notBoth", 2, Semantics.CONFLICTS, ((1, 1),))
+OTHER_TEAMS: Sequence[tuple[str, Sequence[tuple[Relation, str]], str]] = (
+    ("a constraint over three robots", [(replace(NOT_BOTH, arity=3, tuples=((1, 1, 1),)), "ABC")], "not over one"),
+    ("soft", [(Relation("S", 2, Semantics.SOFT, ((1, 1),), (5,)), "AB")], "costs 5 for A = 1 and B = 1"),
+    ("no value is free", [(Relation("D", 2, Semantics.CONFLICTS, ((0, 0), (1, 1))), "AB")], "cannot leave all tasks"),
+    ("a chain", [(NOT_BOTH, "AB"), (NOT_BOTH, "BC")], "A = 1 and C = 1 do not exclude each other"),
+)
+
+
+def team_with(constraints: Sequence[tuple[Relation, str]]) -> Team:
+    made = [Constraint(one.name, one, tuple(scope), tuple(scope)) for one, scope in constraints]
+    team = team_of(dict.fromkeys("ABC", (0, 1)), made)
+    return replace(team, robots=tuple(replace(one, kind=ProblemKind.DISWCSP) for one in team.robots))
+
+
+@pytest.mark.parametrize("protocol", AUCTIONS)
+@pytest.mark.parametrize(
+    ("constraints", "why"), [case[1:] for case in OTHER_TEAMS], ids=[case[0] for case in OTHER_TEAMS]
+)
+def test_other_teams_are_refused_with_the_reason(
+    protocol: str, constraints: Sequence[tuple[Relation, str]], why: str
+) -> None:
+    with pytest.raises(UnsupportedError, match="is no task allocation, and") as refused:
+        solve(team_with(constraints), Options(protocol=protocol, runtime=Runtime.SIMULATOR))
+    assert why in str(refused.value)
+    assert "; these do: " in str(refused.value)
+
+
+@pytest.mark.parametrize("protocol", AUCTIONS)
+def test_a_robot_that_must_do_a_task_is_refused(protocol: str) -> None:
+    must = Relation("must", 1, Semantics.SUPPORTS, ((1,),))
+    team = team_with([(NOT_BOTH, "AB"), (must, "A")])
+    for runtime in (Runtime.SIMULATOR, Runtime.PROCESSES):
+        with pytest.raises(UnsupportedError, match="RA has no value without a task"):
+            solve(team, Options(protocol=protocol, runtime=runtime, timeout=HANG_S))
+
+
+@pytest.mark.parametrize("protocol", AUCTIONS)
+def test_a_robot_without_values_ends_it(protocol: str) -> None:
+    none = Relation("none", 1, Semantics.SUPPORTS, ())
+    outcome = solve(team_with([(NOT_BOTH, "AB"), (none, "A")]), Options(protocol=protocol, runtime=Runtime.SIMULATOR))
+    assert outcome.verdict is Verdict.NO_SOLUTION
+
+
+@pytest.mark.parametrize("protocol", AUCTIONS)
+def test_a_task_for_several_robots_is_refused(protocol: str) -> None:
+    workers = [Worker(f"R{name}", name, name, {1: 9}) for name in "ABC"]
+    for able in (2, 3):
+        variables, constraints = several(workers[:able], {1: Job("1", robots=2)})
+        team = assemble("crews", variables, constraints, kind=ProblemKind.DISWCSP, costs=CostUnits(maximize=True))
+        with pytest.raises(UnsupportedError, match="is no task allocation"):
+            solve(team, Options(protocol=protocol, runtime=Runtime.SIMULATOR))
+
+
+@pytest.mark.parametrize("protocol", AUCTIONS)
+def test_two_ways_to_do_a_task_are_one_task(protocol: str) -> None:
+    """A does it by 1 or 2, which costs less; B by 1."""
+    either = Relation("either", 2, Semantics.CONFLICTS, ((1, 1), (2, 1)))
+    price = Relation("price", 1, Semantics.SOFT, ((0,), (1,), (2,)), (9, 5, 2))
+    wish = Relation("wish", 1, Semantics.SOFT, ((0,),), (6,))
+    made = [Constraint("E", either, ("A", "B"), ("A", "B")), Constraint("P", price, ("A",), ("A",), None)]
+    team = team_of({"A": (0, 1, 2), "B": (0, 1)}, [*made, Constraint("W", wish, ("B",), ("B",), None)])
+    team = replace(team, robots=tuple(replace(one, kind=ProblemKind.DISWCSP) for one in team.robots))
+    outcome = solve(team, Options(protocol=protocol, runtime=Runtime.SIMULATOR))
+    assert outcome.assignment == {"A": 2, "B": 0}
+    assert outcome.cost == least_cost(team) == 8
+
+
+@pytest.mark.parametrize("module", MODULES, ids=lambda one: one.__name__)
+def test_the_examples_in_the_docstrings(module: ModuleType) -> None:
+    assert doctest.testmod(module).failed == 0
+
+
+@pytest.mark.parametrize("protocol", AUCTIONS)
+def test_a_lie_is_refused(protocol: str) -> None:
+    """A task that the sender does not share, a winner that cannot have won, a bid that nobody makes."""
+    team = normalized(tasks(3, 3, 1))
+    first, second, third = team.order
+    lies: dict[str, list[Message]] = {
+        "ssi": [Won([(0, 9)], 1), Won([(7, 1)], 1), Bid(-1)],
+        "cbaa": [
+            WinningBids([((0, 9), second, 1)]),
+            WinningBids([((0, 1), "X", 1)]),
+            WinningBids([((0, 1), third, 0)]),
+        ],
+        "cbba": [
+            Bundles([((0, 9), second, 1)], {}),
+            Bundles([((0, task), "X", 1) for task in (1, 2, 3)], {}),
+            Bundles([((0, task), third, -1) for task in (1, 2, 3)], {}),
+            Bundles([((0, 1), second, 1)], {}),
+        ],
+    }
+    for lie in lies[protocol]:
+        robot = robot_of(protocol_named(protocol), team, first)
+        started(robot)
+        with pytest.raises(ValueError, match=r"task|bids"):
+            robot.receive(second, lie)
