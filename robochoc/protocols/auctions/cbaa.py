@@ -58,7 +58,7 @@ class CBAA(Auction):
         writes_to_non_neighbours=False,
         allocates=True,
         privacy="what tasks are worth, but for bids",
-        use_when="each robot is to have one task at most: a good answer, soon",
+        use_when="tasks are to be allocated, one to a robot",
     )
 
     def __init__(self, problem: LocalProblem, order: PriorityOrder) -> None:

@@ -89,7 +89,7 @@ class CBBA(Auction):
         writes_to_non_neighbours=False,
         allocates=True,
         privacy="what tasks are worth, but for bids",
-        use_when="tasks are to be allocated, several to a robot: a good answer, soon",
+        use_when="tasks are to be allocated, several to a robot",
     )
 
     def __init__(self, problem: LocalProblem, order: PriorityOrder) -> None:

@@ -66,7 +66,7 @@ class SSI(Auction):
         writes_to_non_neighbours=False,
         allocates=True,
         privacy="what tasks are worth, but for bids",
-        use_when="tasks are to be allocated: a good answer, few messages",
+        use_when="tasks are to be allocated, with short messages",
     )
 
     def __init__(self, problem: LocalProblem, order: PriorityOrder) -> None:
