@@ -20,6 +20,7 @@ from robochoc.generators import sensors as sensor_networks
 from robochoc.generators import tasks as allocations
 from robochoc.generators import tracking as trackings
 from robochoc.generators.graph_choice import GraphChoice
+from robochoc.generators.maps import coverage as coverages
 from robochoc.generators.maps import formation as formations
 from robochoc.generators.maps.reach import MapChoice
 from robochoc.model.allocation import Distance
@@ -152,6 +153,18 @@ def tasks(  # noqa: PLR0913 - parameters of a family, by their names
     return allocations.tasks(agents, tasks, seed, worth=worth, ways=ways, skills=has, model=model, capacity=capacity)
 
 
+def coverage(
+    *,
+    sensing: float = 3.0,
+    worth: float = 10.0,
+    seed: int = 0,
+    **of_map: Any,  # noqa: ANN401 - `MapChoice`'s own
+) -> Team:
+    """Return a map to be covered: see `generators/maps/coverage.py`."""
+    team, _ = coverages.coverage(MapChoice(**of_map), seed, sensing=sensing, worth=worth)
+    return team
+
+
 def formation(
     *,
     shape: str = "line",
@@ -171,6 +184,7 @@ def formation(
 FAMILIES: Mapping[str, Callable[..., Team]] = MappingProxyType(
     {
         "coloring": coloring,
+        "coverage": coverage,
         "formation": formation,
         "grid-sensors": grid_sensors,
         "ising": isings.ising,

@@ -70,3 +70,15 @@ def ways(start: Pixel, among: set[Pixel]) -> Mapping[Pixel, int]:
                 if (right or up) and beside <= among:
                     heapq.heappush(queue, (length + (7 if right and up else 5), (x + right, y + up)))
     return done
+
+
+def touched(start: tuple[Fraction, Fraction], end: tuple[Fraction, Fraction], pixel: Pixel) -> bool:
+    """Return whether a straight line touches a pixel, its border included; places are in pixels.
+
+    By separating axes: they do not touch if they lie apart along x, along y, or across the line.
+    """
+    (a, b), (c, d), (x, y) = start, end, pixel
+    if max(a, c) < x or min(a, c) > x + 1 or max(b, d) < y or min(b, d) > y + 1:
+        return False
+    sides = [(c - a) * (up - b) - (d - b) * (right - a) for right in (x, x + 1) for up in (y, y + 1)]
+    return min(sides) <= 0 <= max(sides)

@@ -137,11 +137,11 @@ def reach_of(choice: MapChoice, chance: Random) -> Reach:
     """
     places = places_in(choice.at, "at")
     agents = _agents(choice.agents, places)
-    radius, speed = _exact("radius", choice.radius, 0, 100), _exact("speed", choice.speed, 0.001, 100)
-    side = None if choice.cell is None else _exact("cell", choice.cell, 0.001, 1000)
+    radius, speed = exact("radius", choice.radius, 0, 100), exact("speed", choice.speed, 0.001, 100)
+    side = None if choice.cell is None else exact("cell", choice.cell, 0.001, 1000)
     most = choice.cells or (USUAL_CELLS if side is None else MAX_CELLS)
     check_bounds({"cells": (most, 1, MAX_CELLS)})
-    within = None if choice.within is None else _exact("within", choice.within, 0, 1_000_000)
+    within = None if choice.within is None else exact("within", choice.within, 0, 1_000_000)
     cells = cells_of(read_occupancy_grid(Path(choice.map)), radius, most, side)
     if not places:
         if agents > len(cells.free):
@@ -187,6 +187,12 @@ def charged(name: str, number: int, costs: Mapping[int, int]) -> Constraint:
     return Constraint(name, relation, (f"V{number}",), (f"V{number}",))
 
 
+def exact(name: str, number: float, least: float, most: float) -> Fraction:
+    """Return the decimal that a number is written as. Raises `ValueError` where it is out of bounds."""
+    check_bounds({name: (number, least, most)})
+    return Fraction(str(number))
+
+
 def label_of(path: str) -> str:
     """Return the name of a map's file as a part of a team's name."""
     return re.sub(r"[^A-Za-z0-9_]+", "-", Path(path).stem)[:50].strip("-") or "map"
@@ -200,12 +206,6 @@ def _agents(agents: int | None, places: Sequence[Place]) -> int:
     found = agents or len(places)
     check_bounds({"agents": (found, 1, MAX_ROBOTS)})
     return found
-
-
-def _exact(name: str, number: float, least: float, most: float) -> Fraction:
-    """Return the decimal that a number is written as."""
-    check_bounds({name: (number, least, most)})
-    return Fraction(str(number))
 
 
 def _seconds(cells: Cells, number: int, place: Place, unit: Fraction, longest: int | None) -> dict[int, int]:

@@ -13,6 +13,7 @@ OF_THE_COMMAND = {"output", "force", "help"}
 BUILDING = str(ROOT / "docs/examples/building/building.yaml")
 EXAMPLES: dict[str, dict[str, int | float | str]] = {
     "coloring": {"agents": 5, "degree": 2.0},
+    "coverage": {"map": BUILDING, "agents": 2, "cells": 20},
     "formation": {"map": BUILDING, "agents": 2},
     "grid-sensors": {"rows": 2, "columns": 2, "targets": 1},
     "ising": {"rows": 2, "columns": 2},

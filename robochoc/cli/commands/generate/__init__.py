@@ -5,7 +5,7 @@ from __future__ import annotations
 import click
 
 from robochoc.cli.commands.generate.binary import coloring, ising, random_problem
-from robochoc.cli.commands.generate.maps import formation
+from robochoc.cli.commands.generate.maps import coverage, formation
 from robochoc.cli.commands.generate.missions import grid_sensors, meetings, sensors, tasks, tracking
 from robochoc.cli.commands.generate.queens import queens3d
 from robochoc.cli.commands.generate.scenario import scenario
@@ -24,6 +24,7 @@ def generate() -> None:
 
 for family in (
     coloring,
+    coverage,
     formation,
     grid_sensors,
     ising,

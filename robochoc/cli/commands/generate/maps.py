@@ -123,3 +123,32 @@ def formation(**problem: Any) -> TeamOnMap:  # noqa: ANN401 - `formation`'s own
     from robochoc.generators.maps.formation import formation as on_map
 
     return on_map(choice_of(problem), **problem)
+
+
+@click.command(
+    cls=SectionedCommand,
+    sections={
+        COMMON: ("--map", "--agents", "--at"),
+        "Coverage": ("--sensing", "--worth"),
+        "Robots and cells": ON_MAP,
+        "Output": OUTPUT,
+    },
+    short_help="On a map: robots see as much as they can.",
+)
+@map_options
+@metres("--sensing", "How far robots see, along free lines.", 3.0)
+@metres("--worth", "Travel time that it is worth to see a square metre.", 10.0, "SECONDS")
+@seed_option
+@team_written("coverage-MAP-AGENTS-SEED")
+def coverage(**problem: Any) -> TeamOnMap:  # noqa: ANN401 - `coverage`'s own
+    """Coverage of a map (Cortes et al. 2004): robots choose cells from which they see much together.
+
+    The cost is the travel time of all robots and the worth of what they do not see. What two robots both see counts
+    once; of what three see, it counts less. A robot's values are the cells that it can get to.
+
+    \b
+    robochoc generate coverage --map docs/examples/building/building.yaml --agents 3 --cells 40 --within 12
+    """  # noqa: D301 - \\b is how click is told to leave the lines as they are
+    from robochoc.generators.maps.coverage import coverage as on_map
+
+    return on_map(choice_of(problem), **problem)

@@ -1,0 +1,110 @@
+"""Coverage of a map: robots choose where to stand, so that they see much of it together and do not travel far.
+
+The aim is that of Cortes, Martinez, Karatas and Bullo, "Coverage control for mobile sensing networks", IEEE
+Transactions on Robotics and Automation 20 (2004), and of mobile sensing teams (Zivan and others, JAAMAS 29, 2015): one
+step, in which each robot chooses among the cells that it can get to.
+
+A robot sees the free cells within its sensing range to which a straight line is free. Seen area is worth travel time.
+What a team sees is the union of what its robots see, a function over all of them. Here it is charged in pairs: all that
+each robot sees, less what each pair of robots sees twice. The union is never smaller than that (the second Bonferroni
+inequality, 1936), and as large where no cell is seen by three robots. So constraints are binary, and the cost is never
+less than the travel time and the worth of what is not seen.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from fractions import Fraction
+from itertools import combinations
+from math import floor
+
+from robochoc.formats.ground_map import GroundMap
+from robochoc.generators.draws import bounded, seeded
+from robochoc.generators.maps.reach import (
+    PLACES,
+    MapChoice,
+    Reach,
+    all_different,
+    charged,
+    exact,
+    label_of,
+    reach_of,
+)
+from robochoc.generators.maps.sight import Sight
+from robochoc.model.assembly import assemble
+from robochoc.model.constraint import Constraint, Relation, Semantics
+from robochoc.model.cost_units import CostUnits
+from robochoc.model.problem import ProblemKind, Team
+
+MAX_TUPLES = 1_000_000
+"""The maximum number of pairs of cells that robots could choose and overlap, of all pairs of robots together."""
+
+Seen = Mapping[int, frozenset[int]]
+"""The cells that are seen from each cell."""
+
+
+def coverage(choice: MapChoice, seed: int = 0, *, sensing: float = 3.0, worth: float = 10.0) -> tuple[Team, GroundMap]:
+    """Return the problem of covering a map, and the map as the flight reads it.
+
+    `Robot3` owns `V3`, a number of a cell. Costs are seconds.
+
+    Args:
+        choice: The map and the robots.
+        seed: The same seed draws the same places of robots on every machine.
+        sensing: How far robots see, in metres.
+        worth: The travel time that a square metre is worth, in seconds.
+
+    Raises:
+        InvalidInputError: The files hold no map.
+        ValueError: A number is out of its bounds, or a robot can get to no cell. The text says which.
+    """
+    range_m, seconds = exact("sensing", sensing, 0, 1000), exact("worth", worth, 0, 10_000)
+    reach = reach_of(choice, seeded(seed))
+    for number, own in enumerate(reach.seconds, 1):
+        if not own:
+            raise ValueError(f"robot {number} can get to no cell; take smaller cells, or allow more time")
+    seen = Sight(reach.cells).seen(range_m)
+    a_cell = worth_of_a_cell(reach, seconds)
+    most = [max(len(seen[cell]) for cell in own) for own in reach.seconds]
+    gains = (
+        charged("unseen", number, {cell: time + a_cell * (best - len(seen[cell])) for cell, time in own.items()})
+        for number, (own, best) in enumerate(zip(reach.seconds, most, strict=True), 1)
+    )
+    team = assemble(
+        f"coverage-{label_of(choice.map)}-{len(reach.starts)}-{seed}",
+        reach.variables(reach.seconds),
+        bounded([*gains, *all_different(reach.seconds), *_overlaps(reach.seconds, seen, a_cell)]),
+        kind=ProblemKind.DISWCSP,
+        costs=CostUnits(places=PLACES, constant=a_cell * (len(reach.cells.free) - sum(most))),
+        extras=reach.extras(),
+    )
+    return team, reach.ground()
+
+
+def worth_of_a_cell(reach: Reach, seconds: Fraction) -> int:
+    """Return what it is worth to see a cell, in the unit of costs, if a square metre is worth so many seconds."""
+    exactly: Fraction = reach.cells.side**2 * seconds * 10**PLACES
+    return floor(exactly + Fraction(1, 2))
+
+
+def _overlaps(values: Sequence[Mapping[int, int]], seen: Seen, a_cell: int) -> Iterator[Constraint]:
+    """Yield what pairs of robots lose where both see the same."""
+    bits = {cell: sum(1 << other for other in others) for cell, others in seen.items()}
+    left = MAX_TUPLES
+    for (one, own), (other, others) in combinations(enumerate(values, 1), 2):
+        twice = {
+            (cell, second): (bits[cell] & bits[second]).bit_count()
+            for cell in own
+            for second in others
+            if bits[cell] & bits[second]
+        }
+        left -= len(twice)
+        if left < 0:
+            raise ValueError(
+                f"the robots could see the same from more than {MAX_TUPLES:,} pairs of cells;"
+                " take larger cells, fewer robots, or less of sensing or within"
+            )
+        if twice and a_cell:
+            costs = tuple(a_cell * count for count in twice.values())
+            relation = Relation(f"overlap{one}.{other}", 2, Semantics.SOFT, tuple(twice), costs)
+            yield Constraint("overlap", relation, (f"V{one}", f"V{other}"), (f"V{one}", f"V{other}"))
