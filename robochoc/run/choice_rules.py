@@ -108,6 +108,11 @@ RULES = (
         "messages may be lost, and it needs none in particular; where hard constraints have to hold, it finds most",
     ),
     Rule(
+        "acls",
+        (LOSSY, PARTIAL),
+        "messages may be lost, and constraints are partially known: of those that bear both, it ends lowest",
+    ),
+    Rule(
         "gdba",
         (
             LOSSY,
@@ -124,6 +129,7 @@ RULES = (
         (LOSSY,),
         "many messages may be lost: its robots move on the last values that they know",
     ),
+    Rule("dba", (LOSSY, NO_COSTS), "messages may be lost, and others that bear it do not accept the options"),
     Rule(
         "disfc",
         (

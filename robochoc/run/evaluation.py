@@ -219,8 +219,11 @@ def _evaluate_spoiled(search: Search) -> Answer:
 
 
 def is_proven(phase: Phase, result: RunResult) -> bool:
-    """Return whether the protocol claims more than to have found something: a solution, or one of minimum cost."""
-    if is_spoiled(phase, result):
+    """Return whether the protocol claims more than to have found something: a solution, or one of minimum cost.
+
+    Where messages were lost, an incomplete protocol ends without knowing that it has found a solution.
+    """
+    if is_spoiled(phase, result) or (result.metrics.lost_messages and not phase.traits.complete):
         return False
     return result.verdict is Verdict.SOLUTION and (phase.traits.complete or not phase.traits.costs)
 

@@ -14,6 +14,7 @@ from robochoc.model.outcome import Verdict
 from robochoc.model.problem import INFINITE, Constraint, Relation, Semantics, Team
 from robochoc.protocols.satisfaction.dba import DBA
 from robochoc.protocols.satisfaction.messages.dba import Improve
+from robochoc.protocols.satisfaction.settings.dba import DBASettings
 from robochoc.protocols.shared.messages.cycles import Value
 from robochoc.run import Options, Runtime, solve
 from robochoc.solver.agent_problem import RunParameters
@@ -53,6 +54,26 @@ def test_the_largest_reduction_of_weights_is_told() -> None:
     assert hears(middle(), 1, 1) == Improve(2, 2, 0)
     assert hears(middle(), 1, 2) == Improve(0, 1, 0)
     assert hears(middle(), 2, 2) == Improve(0, 0, 0)
+
+
+def test_who_misses_a_value_tells_that_something_may_be_violated() -> None:
+    robot = middle()
+    robot.miss("RC")
+    (_, said), _ = replies(robot, ("RA", Value((2,))))
+    assert said == Improve(0, 1, 0)
+
+
+def test_who_misses_a_reduction_stays_and_counts_from_0_and_does_not_give_up_for_all() -> None:
+
+    class Short(DBA):
+        settings = DBASettings(cycles=1)
+
+    robot = robot_of(Short, path("A", "B", "C"), "RB", 0.0)
+    started(robot)
+    hears(robot, 1, 1)
+    robot.miss("RA")
+    replies(robot, ("RC", Improve(0, 1, 0)))
+    assert (value(robot), robot.counter, robot.verdict) == ((1,), 0, None)
 
 
 @pytest.mark.parametrize(

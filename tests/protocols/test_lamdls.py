@@ -98,11 +98,22 @@ def test_who_cannot_gain_keeps_its_value() -> None:
     assert replies(robot, ("RC", Value((1,))), ("RA", Value((2,)))) == both(Value((3,)))
 
 
-def test_a_neighbour_of_the_same_colour_is_refused() -> None:
+def test_of_neighbours_with_the_same_colour_the_one_of_higher_priority_moves_first() -> None:
+    """Where its colour is lost, a neighbour may choose the same one."""
     robot = robot_of(LAMDLS, triangle(), "RB", 0.0)
     started(robot)
-    with pytest.raises(ValueError, match="has chosen the same colour"):
-        replies(robot, ("RA", Colour((1,), 0)), ("RC", Colour((1,), 1)))
+    replies(robot, ("RA", Colour((1,), 0)), ("RC", Colour((1,), 1)))
+    assert (robot.earlier, robot.later) == (("RA",), ("RC",))
+
+
+def test_of_a_neighbour_whose_colour_is_lost_the_priority_decides() -> None:
+    robot = robot_of(LAMDLS, triangle(), "RB", 0.0)
+    started(robot)
+    robot.miss("RA")
+    robot.settle()
+    assert robot.colour == 0
+    replies(robot, ("RC", Colour((1,), 1)))
+    assert (robot.earlier, robot.later) == (("RA",), ("RC",))
 
 
 def test_a_value_instead_of_a_colour_is_refused() -> None:

@@ -131,11 +131,25 @@ def test_what_has_the_wrong_size_is_refused() -> None:
     robot = middle()
     replies(robot, ("RC", R([[0, 0]])))
     with pytest.raises(ValueError, match="has not 1 rows of 2 entries"):
-        replies(robot, ("RA", Q([[0, 0], [0, 0]])))
+        replies(robot, ("RA", Q([[0, 0, 0]])))
     robot = middle("ADVP")
     replies(robot, ("RC", R([[0, 0]])))
     with pytest.raises(ValueError, match="not in list"):
         replies(robot, ("RA", Value((9,))))
+
+
+def test_q_of_another_number_of_functions_says_nothing() -> None:
+    """The sender has not heard yet that a domain came late: of the functions as they were."""
+    robot = middle()
+    replies(robot, ("RC", R([[0, 0]])), ("RA", Q([[0, 9], [9, 0]])))
+    assert robot.functions.q == {"RA": [[0, 0]]}
+
+
+def test_who_has_no_r_from_below_tells_its_domain_again() -> None:
+    robot = middle()
+    robot.miss("RC")
+    robot.settle()
+    assert ("RC", Domain([(1,), (2,)])) in replies(robot, ("RA", Q([[0, 0]])))
 
 
 @count("trees", 60, 500)

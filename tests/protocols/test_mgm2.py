@@ -72,6 +72,53 @@ def test_who_is_no_offerer_tells_that_there_is_no_offer() -> None:
     assert replies(middle(WAITS), *both(Value((1,)))) == both(Offer(None))
 
 
+def missing(robot: MGM2, *senders: str) -> None:
+    for sender in senders:
+        robot.miss(sender)
+    robot.settle()
+
+
+def test_an_answer_that_does_not_come_is_a_rejection() -> None:
+    """C has not received the offer, and tells its gain: that is kept for the next phase."""
+    robot = middle(OFFERS, SECOND)
+    replies(robot, *both(Value((1,))))
+    assert replies(robot, *both(Offer(None))) == []
+    assert replies(robot, ("RC", Gain(0, 3))) == both(Gain(0, 0))
+    assert robot.partner is None
+    assert replies(robot, ("RA", Gain(0, 0))) == both(Value((1,)))
+
+
+def test_who_misses_a_gain_does_not_move() -> None:
+    for missed in (False, True):
+        robot = middle(WAITS)
+        replies(robot, *both(Value((2,))))
+        assert replies(robot, *both(Offer(None))) == both(Gain(0, 18))
+        if missed:
+            missing(robot, "RC")
+        replies(robot, ("RA", Gain(0, 0)), *([] if missed else [("RC", Gain(0, 0))]))
+        assert value(robot) == ((1,) if missed else (2,))
+
+
+def test_what_belongs_to_a_phase_that_is_over_tells_the_value_only() -> None:
+    """A's value comes when all have gone on without it: the offer after it is the one of this phase."""
+    robot = middle(WAITS)
+    replies(robot, ("RC", Value((1,))))
+    assert robot.go_on()
+    assert replies(robot, ("RA", Value((2,))), ("RA", Offer(None)), ("RC", Offer(None))) != []
+    assert robot.outbox == []
+    assert replies(robot, *both(Gain(9, 0))) == both(Value((1,)))
+    missing(robot, "RA", "RC")
+    assert robot.view == {"RA": (2,), "RC": (1,)}
+
+
+def test_a_neighbour_whose_domain_is_lost_is_offered_nothing() -> None:
+    robot = robot_of(MGM2, chain(), "RB", 0.0, OFFERS, SECOND)
+    started(robot)
+    robot.miss("RC")
+    replies(robot, ("RA", TWO))
+    assert replies(robot, *both(Value((1,)))) == both(Offer(None))
+
+
 @pytest.mark.parametrize(("lot", "offers"), [(0.49, True), (0.5, False)])
 def test_the_threshold_is_the_probability_of_being_an_offerer(lot: float, offers: bool) -> None:  # noqa: FBT001
     said = replies(middle(lot), *both(Value((1,))))

@@ -18,6 +18,7 @@ Choices that the paper leaves open, and differences:
 - Of broken hard constraints and costs, the first decide: a proposal that breaks less is cheaper, one that breaks more
   is not taken. c is for costs.
 - Totally known constraints are part of every robot's own costs; they may be n-ary.
+- Where a value is lost, the last one known stands for it. A robot that misses a neighbour's side does not move.
 
 >>> from robochoc.communication.simulator.schedule import Concurrent
 >>> from robochoc.communication.simulator.simulator import Simulation
@@ -58,6 +59,7 @@ class ACLS(CycleProtocol):
         asymmetric=True,
         shared_scopes=True,
         writes_to_non_neighbours=False,
+        bears_loss=True,
         privacy="parts of PKC but for entries that proposals ask for",
         use_when="asymmetric costs, many robots",
     )
@@ -99,10 +101,11 @@ class ACLS(CycleProtocol):
 
     def _answer(self, messages: Mapping[str, wire.Message]) -> None:
         """Tell each neighbour that proposes a value what the own side costs now, and would cost."""
-        for name, message in messages.items():
+        for name in self.problem.neighbours:
+            message = messages.get(name)
             wanted = message.value if isinstance(message, Proposal) else None
             sides = Sides(NO_GAIN, NO_GAIN)
-            if wanted is not None:
+            if wanted is not None and name in self._values:
                 now = self.problem.own_side(self.present, name, self._values[name])
                 sides = Sides(now, self.problem.own_side(self.present, name, wanted))
             self.send(name, sides)
@@ -111,7 +114,7 @@ class ACLS(CycleProtocol):
     def _decide(self, messages: Mapping[str, wire.Message]) -> None:
         """Take the proposal with a probability, if it is cheap enough for both sides together."""
         index = self.present
-        if self.proposal is not None:
+        if self.proposal is not None and len(messages) == len(self.problem.neighbours):
             told = [message for message in messages.values() if isinstance(message, Sides)]
             before = _sum([self.before, *(sides.now for sides in told)])
             after = _sum([self.after, *(sides.proposed for sides in told)])

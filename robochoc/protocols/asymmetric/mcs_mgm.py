@@ -21,6 +21,9 @@ Choices that the paper leaves open, and differences:
 - If neighbours have the same gain, the first one in the priority order moves.
 - Gains and entries are pairs, broken hard constraints first. Totally known constraints are paid by all robots of the
   scope, as in MGM, and never handed over.
+- Where a value is lost, the last one known stands for it; a robot that misses a gain stays. An entry that is lost is
+  paid by nobody from then on: P_ij + P_ji then falls in the robots' eyes, not in the answer, whose cost is computed
+  from the files.
 
 >>> from robochoc.communication.simulator.schedule import Concurrent
 >>> from robochoc.communication.simulator.simulator import Simulation
@@ -69,6 +72,7 @@ class MCSMGM(Gainers):
         asymmetric=True,
         shared_scopes=True,
         writes_to_non_neighbours=False,
+        bears_loss=True,
         privacy="parts of PKC but for entries that are handed over",
         use_when="asymmetric costs, many robots, little told of them",
     )
@@ -105,22 +109,25 @@ class MCSMGM(Gainers):
     def _transfer(self, messages: Mapping[str, wire.Message]) -> None:
         """Hand over entries that neighbours' moves have made due, with all neighbours' values known."""
         values = self.checked_values(messages)
+        entries: dict[str, LexicographicCost | None] = {}
         for name, value in values.items():
             before = self._values.get(name, value)
             entry = None
             if value != before:
                 now = self.side(name, value)
-                if self.too_much(gain(now, self.side(name, before)), self.told[name]):
+                if self.too_much(gain(now, self.side(name, before)), self.told.get(name, NO_GAIN)):
                     entry = now
                     self._add(name, value, gain(NO_GAIN, now))
-            self.send(name, Transfer(entry))
+            entries[name] = entry
+        for name in self.problem.neighbours:
+            self.send(name, Transfer(entries.get(name)))
         self._values = values
         self.listen(self.problem.neighbours, self._weigh)
 
     def _weigh(self, messages: Mapping[str, wire.Message]) -> None:
         """Take what was handed over, and send the gain of the best own move."""
         for name, message in messages.items():
-            if isinstance(message, Transfer) and message.entry is not None:
+            if isinstance(message, Transfer) and message.entry is not None and name in self._values:
                 self._add(name, self._values[name], message.entry)
         self.best_of(self.burdens(self._values))
         self.tell(self.problem.neighbours, Gain(*self.gain))
@@ -131,7 +138,8 @@ class MCSMGM(Gainers):
         self.told = {name: (told.broken, told.cost) for name, told in messages.items() if isinstance(told, Gain)}
         if len(self.told) < len(messages):
             raise ValueError(f"a neighbour of {self.problem.agent} tells something else than its gain in this phase")
-        self.take(self.target if self.wins(messages) else self.present)
+        moves = len(messages) == len(self.problem.neighbours) and self.wins(messages)
+        self.take(self.target if moves else self.present)
         if not self.over:
             self.tell_value(self._transfer)
 

@@ -30,6 +30,8 @@ Choices that the papers leave open, and differences:
 - A value is told as a Q that rules out all other values, so one rule makes R from both.
 - Where all values cost `inf` by told values, a robot takes the one that violates the fewest functions. Its Q then says
   nothing.
+- Where messages are lost, the last R and Q stand. A robot that has no R yet from one below tells its domain again, and
+  a function whose robots are not all known yet is left out; its holder asks for the domain. The cost may rise then.
 - With constraints of three or more robots, a robot may answer values of the phase before. Then ADVP need not settle.
 
 >>> from robochoc.communication.simulator.schedule import Concurrent
@@ -80,6 +82,7 @@ class MaxSumAD(CycleProtocol):
         complete=False,
         costs=True,
         writes_to_non_neighbours=False,
+        bears_loss=True,
         privacy="constraints among others",
         use_when="costs, graph with many cycles; no proof",
     )
@@ -107,24 +110,26 @@ class MaxSumAD(CycleProtocol):
     def _build(self, messages: Mapping[str, wire.Message]) -> None:
         """Make the own functions from the received domains."""
         self._domains = self.checked_domains(messages)
+        self._make_functions()
+        self.listen(self.below, self._up)
+
+    def _make_functions(self) -> None:
+        """Make the functions of robots whose domains are known."""
         self.functions = Functions(self.problem.tables(self._domains), self._domains)
         self._nothing = [[0.0] * len(self.preferred) for _ in self.functions.factors]
         self.own = self._nothing
-        self.listen(self.below, self._up)
 
     # Phases
 
     def _up(self, messages: Mapping[str, wire.Message]) -> None:
         """Hear R from below, take a value, and send R to the robots above."""
         for name, message in messages.items():
-            if isinstance(message, R):
-                many = len(self.from_below.get(name, message.rows))
-                self.from_below[name] = checked(message.rows, many, len(self.preferred))
+            self._hear(name, message)
         if not self._choose():
             return
         _, said = self.functions.answers(self._q()[: len(self._nothing)])
-        for name, rows in said.items():
-            self.send(name, R(rows))
+        for name in self.above:
+            self.send(name, R(said[name]) if name in said else Domain(list(self.problem.values)))
         if not self.over:
             self.listen(self.above, self._down)
 
@@ -135,12 +140,14 @@ class MaxSumAD(CycleProtocol):
         self.own, _ = self.functions.answers(self._nothing)
         if not self._choose():
             return
+        rows = iter(self._q()[len(self._nothing) :])
+        told: dict[str, Q | Value]
         if self._tells_values:
-            self.tell(self.below, Value(self.problem.values[self.present]))
+            told = dict.fromkeys(self.from_below, Value(self.problem.values[self.present]))
         else:
-            rows = iter(self._q()[len(self._nothing) :])
-            for name, heard in self.from_below.items():
-                self.send(name, Q([next(rows) for _ in heard]))
+            told = {name: Q([next(rows) for _ in heard]) for name, heard in self.from_below.items()}
+        for name in self.below:
+            self.send(name, told.get(name) or Domain(list(self.problem.values)))
         if not self.over:
             self.listen(self.below, self._up)
 
@@ -153,14 +160,31 @@ class MaxSumAD(CycleProtocol):
         return variant == "ADVP" or (phase - FIRST_WITH_VALUES) % PERIOD < PERIOD - 1
 
     def _hear(self, name: str, message: wire.Message) -> None:
-        """Keep what a robot above has told. A value rules out all others."""
-        if isinstance(message, Value):
+        """Keep what a robot has told. A value rules out all others; a domain says that nothing is known of the own one.
+
+        A robot whose functions are others than before, as a domain has come late, sends other rows, or takes others.
+        """
+        if isinstance(message, R) and name in self.below:
+            self.from_below[name] = checked(message.rows, len(message.rows), len(self.preferred))
+        elif isinstance(message, Domain) and name in self.above:
+            self._domains.update(self.checked_domains({name: message}))
+            self._make_functions()
+        elif isinstance(message, Domain):
+            self.from_below.pop(name, None)
+        elif name not in self._domains:
+            return
+        elif isinstance(message, Value):
             values = self._domains[name]
             row = [INFINITE] * len(values)
             row[values.index(message.value)] = 0.0
             self.functions.hear(name, [row] * len(self.functions.q[name]))
-        elif isinstance(message, Q):
+        elif isinstance(message, Q) and len(message.rows) == len(self.functions.q[name]):
             self.functions.hear(name, message.rows)
+
+    def hear_late(self, sender: str, message: wire.Message) -> None:
+        """Note what is new in a message whose phase is over."""
+        if isinstance(message, R | Q | Domain):
+            self._hear(sender, message)
 
     # Equations
 

@@ -27,6 +27,8 @@ Choices that the paper leaves open, and differences:
 - Values need no step number: from each neighbour they arrive in the order of its steps.
 - Constraints may be n-ary, as all robots of a scope are neighbours.
 - Fewer violated hard constraints are always better, so plain DisCSPs work, too.
+- Where messages are lost, the last value known of a neighbour stands for the one that is missing. One whose colour is
+  lost goes before or after by its priority. Then neighbours may move at the same time, and the cost may rise.
 
 Why the cost never rises: when a robot moves, it knows the values that its neighbours have now, and none of them can
 move before it has told its own. So each move saves the team what it saves the robot.
@@ -68,6 +70,7 @@ class LAMDLS(CycleProtocol):
         costs=True,
         shared_scopes=True,
         writes_to_non_neighbours=False,
+        bears_loss=True,
         privacy="constraints among others",
         use_when="as MGM: the cost never rises; half the messages",
     )
@@ -98,12 +101,25 @@ class LAMDLS(CycleProtocol):
     def _meet(self, messages: Mapping[str, wire.Message]) -> None:
         """Begin with the first step, with all neighbours' colours known."""
         self._note(messages)
-        own = self.colour
-        if own is None or own in self._colours.values():
-            raise ValueError(f"a neighbour of {self.problem.agent} has chosen the same colour")
-        self.earlier = tuple(name for name in self.problem.neighbours if self._colours[name] < own)
-        self.later = tuple(name for name in self.problem.neighbours if self._colours[name] > own)
+        neighbours = self.problem.neighbours
+        higher = {*self.earlier}
+        before = {name: self._is_before(name, higher=name in higher) for name in neighbours}
+        self.earlier = tuple(name for name in neighbours if before[name])
+        self.later = tuple(name for name in neighbours if not before[name])
         self._wait_for_earlier()
+
+    def _is_before(self, name: str, *, higher: bool) -> bool:
+        """Return whether a neighbour moves first: by its colour; where that is lost, or the same, by its priority."""
+        colour, own = self._colours.get(name), self.colour
+        return higher if colour is None or own is None or colour == own else colour < own
+
+    def hear_late(self, sender: str, message: wire.Message) -> None:
+        """Note the value in a message whose phase is over."""
+        super().hear_late(sender, message)
+        if isinstance(message, Colour):
+            self.check_value(sender, message.value)
+        if isinstance(message, Colour | Value):
+            self.view[sender] = message.value
 
     def _note(self, messages: Mapping[str, wire.Message]) -> None:
         """Store first values and colours."""

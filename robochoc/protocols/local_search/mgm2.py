@@ -29,6 +29,10 @@ Choices that the paper leaves open, and differences:
   2-optimum.
 - A robot that is no offerer, or has no offer for a neighbour, says so, as its neighbours wait for all offers.
 - First values, equally good values and equal gains are treated as in `mgm`. Constraints may be n-ary.
+- Where messages are lost, the last value known stands for the one that is missing. A neighbour whose domain or value is
+  not known is offered nothing; an answer that does not come is a rejection; a robot that misses a gain, or its
+  partner's `Go`, stays. If only one of a pair moves, the cost may rise. What tells the phases apart is then the kinds
+  of messages, as answers and `Go` are sent to some neighbours only.
 
 >>> from robochoc.communication.simulator.schedule import Concurrent
 >>> from robochoc.communication.simulator.simulator import Simulation
@@ -40,7 +44,7 @@ Choices that the paper leaves open, and differences:
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from typing import ClassVar, NamedTuple
 
 from robochoc.model import message as wire
@@ -49,11 +53,35 @@ from robochoc.protocols.local_search.messages.mgm2 import Accept, Gains, Go, Off
 from robochoc.protocols.local_search.mgm import Gainers
 from robochoc.protocols.local_search.settings.mgm2 import MGM2Settings
 from robochoc.protocols.order import PriorityOrder
-from robochoc.protocols.shared.cycles import NO_GAIN, gain
+from robochoc.protocols.shared.cycles import NO_GAIN, Then, gain
 from robochoc.protocols.shared.messages.anytime import AnytimeMessage
 from robochoc.protocols.shared.messages.cycles import Domain, Value
 from robochoc.protocols.traits import ENDS_WITH_PROOF, Traits
 from robochoc.solver.compiled import LexicographicCost, LocalProblem
+
+_DOMAINS, _VALUES, _OFFERS, _ANSWERS, _GAINS, _GO = range(-1, 5)
+"""The phases: once, and those of each cycle."""
+_PHASES = 5
+"""The phases of a cycle."""
+_MOST_AHEAD = 2
+"""A neighbour is at most so many phases ahead, as it waits for this robot in three of five."""
+
+
+def _phase_of(message: wire.Message) -> int:
+    """Return the phase that a message belongs to; of what is about the best cycle, that of values."""
+    match message:
+        case Domain():
+            return _DOMAINS
+        case Offer():
+            return _OFFERS
+        case Accept() | Reject():
+            return _ANSWERS
+        case Gain():
+            return _GAINS
+        case Go():
+            return _GO
+        case _:
+            return _VALUES
 
 
 class JointMove(NamedTuple):
@@ -78,6 +106,7 @@ class MGM2(Gainers):
         shared_scopes=True,
         writes_to_non_neighbours=False,
         arrays=True,
+        bears_loss=True,
         privacy="constraints among others",
         use_when="as MGM: better answers, more messages",
     )
@@ -88,17 +117,22 @@ class MGM2(Gainers):
         self.view: dict[str, wire.Value] = {}
         self.partner: str | None = None
         self._wins = False
+        self._phase = _DOMAINS
 
     def begin(self) -> None:
         """Take a random value and send the domain."""
         self.take(self.any_value())
         self.tell(self.problem.neighbours, Domain(list(self.problem.values)))
-        self.listen(self.problem.neighbours, self._meet)
+        self.listen_for(_DOMAINS, self.problem.neighbours, self._meet)
 
     def _meet(self, messages: Mapping[str, wire.Message]) -> None:
         """Begin the first cycle, with all neighbours' domains known."""
         self.domains = self.checked_domains(messages)
-        self.tell_value(self._offer)
+        self._tell_own_value()
+
+    def _tell_own_value(self) -> None:
+        self.tell(self.problem.neighbours, Value(self.problem.values[self.present]))
+        self.listen_for(_VALUES, self.problem.neighbours, self._offer)
 
     def _offer(self, messages: Mapping[str, wire.Message]) -> None:
         """Become an offerer or not, with all neighbours' values known."""
@@ -106,10 +140,12 @@ class MGM2(Gainers):
         self.partner = None
         if self.chance() < self.settings.threshold:
             neighbours = self.problem.neighbours
-            self.partner = neighbours[int(self.chance() * len(neighbours))]
+            partner = neighbours[int(self.chance() * len(neighbours))]
+            if partner in self.domains and partner in self.view:
+                self.partner = partner
         for name in self.problem.neighbours:
             self.send(name, Offer(self._gains(name) if name == self.partner else None))
-        self.listen(self.problem.neighbours, self._answer)
+        self.listen_for(_OFFERS, self.problem.neighbours, self._answer)
 
     def _gains(self, partner: str) -> Gains:
         """Return the gain for each of the partner's values and each own value."""
@@ -122,7 +158,7 @@ class MGM2(Gainers):
         offers = {name: told.gains for name, told in messages.items() if isinstance(told, Offer) and told.gains}
         if self.partner is not None:
             self.tell(offers, Reject())
-            self.listen((self.partner,), self._hear_answer)
+            self.listen_for(_ANSWERS, (self.partner,), self._hear_answer)
         else:
             self.partner = self._commit(offers)
             self.tell([name for name in offers if name != self.partner], Reject())
@@ -155,7 +191,7 @@ class MGM2(Gainers):
 
     def _hear_answer(self, messages: Mapping[str, wire.Message]) -> None:
         """Commit to the partner if it accepted the offer; otherwise use the best own move."""
-        (answer,) = messages.values()
+        answer = next(iter(messages.values()), None)
         if isinstance(answer, Accept):
             self.target, self.gain = answer.place, (answer.broken, answer.cost)
         else:
@@ -166,24 +202,60 @@ class MGM2(Gainers):
         if self.partner is None:
             self.best_unilateral(self.view)
         self.tell(self.problem.neighbours, Gain(*self.gain))
-        self.listen(self.problem.neighbours, self._decide)
+        self.listen_for(_GAINS, self.problem.neighbours, self._decide)
 
     def _decide(self, messages: Mapping[str, wire.Message]) -> None:
         """Move alone, or send the partner `Go`, with all neighbours' gains known."""
-        wins = self.wins({name: told for name, told in messages.items() if name != self.partner})
+        complete = len(messages) == len(self.problem.neighbours)
+        wins = complete and self.wins({name: told for name, told in messages.items() if name != self.partner})
         if self.partner is None:
             self._end_cycle(move=wins)
         else:
             self.send(self.partner, Go(wins))
             self._wins = wins
-            self.listen((self.partner,), self._go)
+            self.listen_for(_GO, (self.partner,), self._go)
 
     def _go(self, messages: Mapping[str, wire.Message]) -> None:
         """Make the joint move if both robots allow it."""
-        (told,) = messages.values()
+        told = next(iter(messages.values()), None)
         self._end_cycle(move=self._wins and isinstance(told, Go) and told.go)
 
     def _end_cycle(self, *, move: bool) -> None:
         self.take(self.target if move else self.present)
         if not self.over:
-            self.tell_value(self._offer)
+            self._tell_own_value()
+
+    # Phases, where messages are lost
+
+    def listen_for(self, phase: int, names: Sequence[str], then: Then) -> None:
+        """Listen to the robots in `names` for messages of a phase."""
+        self._phase = phase
+        self.listen(names, then)
+
+    def may_be_late(self, message: wire.Message) -> bool:
+        """Return whether a message belongs to a phase that is over."""
+        phase = _phase_of(message)
+        if phase == _DOMAINS:
+            return self._phase != _DOMAINS
+        return self._phase != _DOMAINS and (phase - self._phase) % _PHASES > _MOST_AHEAD
+
+    def next_messages(self) -> list[tuple[str, wire.Message | None]] | None:
+        """Take the next messages that are of this phase; what belongs to a later one stays, for its phase."""
+        waiting = [self._waiting[name] for name in self._names]
+        for name, queue in zip(self._names, waiting, strict=True):
+            while queue and (first := queue[0]) is not None and self.may_be_late(first):
+                self.hear_late(name, first)
+                del queue[0]
+        self._missing = waiting.count([])
+        if self._missing:
+            return None
+        return [
+            (name, queue.pop(0) if queue[0] is None or _phase_of(queue[0]) == self._phase else None)
+            for name, queue in zip(self._names, waiting, strict=True)
+        ]
+
+    def hear_late(self, sender: str, message: wire.Message) -> None:
+        """Note what is new in a message whose phase is over."""
+        super().hear_late(sender, message)
+        if isinstance(message, Domain):
+            self.domains.update(self.checked_domains({sender: message}))

@@ -35,6 +35,9 @@ Choices that the papers leave open, and differences:
 - The first value is chosen at random, and so is one of several best values.
 - Of equal reductions, that of the first robot in the priority order counts.
 - Constraints may be n-ary, as all robots of a scope are neighbours.
+- Where a value is lost, the last one known stands for it, and the robot tells that something may be violated; one that
+  misses a reduction stays, and counts from 0. So counters seldom get far. A robot that has missed anything does not
+  give up for all, and the best cycle is the answer, if it passes the check.
 
 >>> from robochoc.communication.simulator.schedule import Concurrent
 >>> from robochoc.communication.simulator.simulator import Simulation
@@ -76,6 +79,7 @@ class DBA(CycleProtocol):
         complete=False,
         shared_scopes=True,
         writes_to_non_neighbours=False,
+        bears_loss=True,
         privacy="constraints among others",
         use_when="large team, and a solution surely exists",
     )
@@ -88,6 +92,7 @@ class DBA(CycleProtocol):
         self._violated: list[int] = []
         self._told = Improve(0, 0, 0)
         self._target = 0
+        self._missed = False
 
     def begin(self) -> None:
         """Take a random value."""
@@ -97,15 +102,16 @@ class DBA(CycleProtocol):
     def _weigh(self, messages: Mapping[str, wire.Message]) -> None:
         """Send the reduction by the best own move, with all neighbours' values known."""
         charged = self.problem.charged(self.checked_values(messages))
+        complete = self._are_complete(messages)
         weighed = [self._weight(charged, place) for place in range(len(self.problem.values))]
         now, least = weighed[self.present], min(weighed)
         self._violated = [one.number for one in charged if one.costs[self.present] == INFINITE]
         self._target = self.present
         if least < now:
             self._target = self.any_of([place for place, weight in enumerate(weighed) if weight == least])
-        if now:
+        if now or not complete:
             self.counter = 0
-        self._told = Improve(now - least, now, self.counter)
+        self._told = Improve(now - least, now if complete else max(now, 1), self.counter)
         self.tell(self.problem.neighbours, self._told)
         self.listen(self.problem.neighbours, self._move)
 
@@ -116,17 +122,26 @@ class DBA(CycleProtocol):
     def _move(self, messages: Mapping[str, wire.Message]) -> None:
         """Stop, move, or let violated constraints weigh more, with all neighbours' reductions known."""
         told = {name: said for name, said in messages.items() if isinstance(said, Improve)}
-        if self._has_ended([self._told, *told.values()]):
+        complete = self._are_complete(messages)
+        if not complete:
+            self.counter = 0
+        elif self._has_ended([self._told, *told.values()]):
             self.finish()
             return
-        if not max(said.reduction for said in (self._told, *told.values())):
+        if complete and not max(said.reduction for said in (self._told, *told.values())):
             for number in self._violated:
                 self.weights[number] = self.weights.get(number, 1) + 1
-        self.take(self._target if self._wins(told) else self.present)
-        if self.over:
-            self.conclude(Verdict.UNKNOWN)
-        else:
+        self.take(self._target if complete and self._wins(told) else self.present)
+        if not self.over:
             self.tell_value(self._weigh)
+        elif not self._missed:
+            self.conclude(Verdict.UNKNOWN)
+
+    def _are_complete(self, messages: Mapping[str, wire.Message]) -> bool:
+        """Return whether a message of each neighbour has come in this phase, and note if not."""
+        complete = len(messages) == len(self.problem.neighbours)
+        self._missed = self._missed or not complete
+        return complete
 
     def _has_ended(self, told: list[Improve]) -> bool:
         """Count on, or begin again; return whether no robot of the component violates anything."""

@@ -89,7 +89,7 @@ class CycleProtocol(Protocol):
         """Store the message for its phase; process one about the best cycle at once."""
         if isinstance(message, Place | Step | Paid | Best):
             self._receive_report(sender, message)
-        elif self._given_up and self._was_given_up(sender):
+        elif self._given_up and self._was_given_up(sender, message):
             self.hear_late(sender, message)
         else:
             self._store(sender, message)
@@ -116,12 +116,18 @@ class CycleProtocol(Protocol):
             self.check_value(sender, message.value)
             self._known[sender] = message.value
 
-    def _was_given_up(self, sender: str) -> bool:
+    def _was_given_up(self, sender: str, message: wire.Message | None = None) -> bool:
         """Return whether the next message of `sender` belongs to a phase that was done without it; count it off."""
-        many = self._given_up.get(sender, 0)
-        if many:
+        many = self._given_up.pop(sender, 0)
+        if many and message is not None and not self.may_be_late(message):
+            return False  # those that were given up have never been sent
+        if many > 1:
             self._given_up[sender] = many - 1
         return many > 0
+
+    def may_be_late(self, message: wire.Message) -> bool:  # noqa: ARG002 - for protocols whose messages tell their phase
+        """Return whether a message may belong to a phase that is over, as one from its sender was given up."""
+        return True
 
     def _store(self, sender: str, message: wire.Message | None) -> None:
         waiting = self._waiting[sender]
@@ -132,10 +138,16 @@ class CycleProtocol(Protocol):
     def settle(self) -> None:
         """Run all phases whose messages have arrived."""
         while self._then and not self._missing and self.verdict is None and not self._is_ahead:
-            heard = [(name, self._waiting[name].pop(0)) for name in self._names]
+            heard = self.next_messages()
+            if heard is None:
+                return
             messages = {name: message for name, message in heard if message is not None}
             then, self._then = self._then, None
             then(messages)
+
+    def next_messages(self) -> list[tuple[str, wire.Message | None]] | None:
+        """Take the next message of each robot that this one listens to. None: one has to be waited for after all."""
+        return [(name, self._waiting[name].pop(0)) for name in self._names]
 
     def listen(self, names: Sequence[str], then: Then) -> None:
         """Wait for a message of each robot in `names`, then call `then` with them: without those that are lost."""

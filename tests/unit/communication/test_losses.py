@@ -23,7 +23,9 @@ from robochoc.model.outcome import Verdict
 from robochoc.model.problem import Team
 from robochoc.protocols.inference.maxsum import MaxSum
 from robochoc.protocols.local_search.dsa import DSA
+from robochoc.protocols.local_search.lamdls import LAMDLS
 from robochoc.protocols.local_search.mgm import MGM
+from robochoc.protocols.local_search.mgm2 import MGM2
 from robochoc.protocols.protocol import Protocol
 from robochoc.protocols.satisfaction.abt import ABT
 from robochoc.replay import CannotReplayError, replay
@@ -88,10 +90,11 @@ def test_the_same_seed_loses_the_same_messages() -> None:
         assert once.metrics.lost_messages != other.metrics.lost_messages
 
 
-def test_all_cycles_are_gone_through_whatever_is_lost() -> None:
+@pytest.mark.parametrize("protocol", [DSA, MGM2, LAMDLS])
+def test_all_cycles_are_gone_through_whatever_is_lost(protocol: type[Protocol]) -> None:
     for seed in range(10):
         team = random_cost_team(Random(seed))
-        result, _ = searched(team, DSA, seed)
+        result, _ = searched(team, protocol, seed)
         trails = [found.trail for found in result.findings.values() if found.trail]
         assert {trail.cycle for trail in trails} <= {100}
 
