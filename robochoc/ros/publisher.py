@@ -74,13 +74,17 @@ class Publisher:
                 self._mappings[kind] = mapping_of(drone.topic.name, drone.robot, kind)
                 topics[topic] = kind
         for sink in sinks:
+            sink.assign(drones)
             sink.explain(self.names.original)
             sink.advertise({**topics, **self.names.reports(), **options.topics})
 
     def decide(self, leg: Leg, at_ns: int) -> None:
         """Publish the waypoints of `leg`: of drones that fly, and of those that land. Then what the options ask for."""
         self._decisions += 1
-        for waypoint in waypoints(leg, self._drones, self.names, self._frame, at_ns, self._goals):
+        decided = waypoints(leg, self._drones, self.names, self._frame, at_ns, self._goals)
+        for sink in self._sinks:
+            sink.decide(decided)
+        for waypoint in decided:
             self._publish(waypoint.topic, waypoint.kind, self._fields(waypoint), at_ns)
         self._goals |= {number: goal.at for number, goal in leg.goals.items()}
         header = self._header(at_ns)

@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from types import TracebackType
 from typing import Any, Self
+
+from robochoc.flight.mission import Drone
+from robochoc.ros.waypoint import Waypoint
 
 Fields = Mapping[str, Any]
 """A message's fields by their ROS names, nested. Times (`stamp`) are integers, in nanoseconds. A field without a value
@@ -26,8 +29,22 @@ class Sink(ABC):
     live: bool = True
     """True if robots may receive what is published. False for a recording, which only stores it."""
 
+    arms: bool = False
+    """True if it commands robots, which `allow_arming` lets it arm."""
+    summary: str = ""
+    """What has become of the decisions, after `close`; empty if publishing is all."""
+
     def __init__(self, place: str) -> None:
         self.place = place
+
+    def allow_arming(self) -> None:  # noqa: B027 - most command nothing
+        """Let robots be armed; without it a sink that `arms` only observes. Raises `SinkError`."""
+
+    def assign(self, drones: Sequence[Drone]) -> None:  # noqa: B027 - only who commands robots wants to know
+        """Take all drones that waypoints may be for, by their numbers. Raises `SinkError`."""
+
+    def decide(self, waypoints: Sequence[Waypoint]) -> None:  # noqa: B027 - most publish each by itself
+        """Take all waypoints of a decision at once, before each is published. Raises `SinkError`."""
 
     def explain(self, original: Mapping[str, str]) -> None:  # noqa: B027 - only a recording can keep it
         """Take the names that topics (by their ROS names) have in the team's files. Raises `SinkError`."""

@@ -27,6 +27,7 @@ class SinkPublisher:
     def __init__(
         self, team: str, drones: Sequence[Drone], sink: Sink, frame: str, options: PublishOptions = WAYPOINTS_ALONE
     ) -> None:
+        self._sink = sink
         self.live = sink.live
         self.place = sink.place
         self._frame = frame
@@ -52,12 +53,12 @@ class SinkPublisher:
 
     @property
     def summary(self) -> str:
-        """Return a short text on what was published, such as `10 waypoints, 6 landings`."""
+        """Return a short text on what was published, such as `10 waypoints, 6 landings`, and what came of it."""
         first = ("waypoint", "landing")
         words = [
             f"{count:,} {name}{'s' * (count != 1)}" for name, count in self._counts.items() if count or name in first
         ]
-        return ", ".join(words)
+        return "; ".join(filter(None, [", ".join(words), self._sink.summary]))
 
 
 class FlightBroadcast:

@@ -28,6 +28,7 @@ _PROGRAMS = {
     "solver": b"robochoc.solver.ace_process",
     "router": b"robochoc.communication.network.router_process",
     "viewer": b"robochoc.sniffer.viewer_process",
+    "guard": b"robochoc.ros.autopilots.guard",
 }
 """Processes of a run that are programs of their own, and no robots."""
 
@@ -77,7 +78,7 @@ class Run:
         return self.robots()
 
     def program(self, role: str) -> int | None:
-        """The id of the `solver`, the `router` or the `viewer`, while there is one."""
+        """The id of the `solver`, the `router`, the `viewer` or the `guard`, while there is one."""
         return self._first(lambda pid: _PROGRAMS[role] in _read(pid, "cmdline"))
 
     def robot(self, name: str) -> int | None:

@@ -20,6 +20,7 @@ from robochoc.cli.options.paths import refuse_same_places, teams_at
 from robochoc.cli.options.problems import Problem, reading_options
 from robochoc.cli.options.recording import bounds_option, journal_option, recording, shown_and_flushed
 from robochoc.cli.options.ros import (
+    arm_option,
     flight_options,
     ros_options,
     situation_options,
@@ -71,7 +72,7 @@ _SECTIONS: Sections = {
     "Files of other tools (docs/guides/import.md)": ("--infinity", "--owner"),
     "Output": ("--explain", "--bounds", "--serve", "--open"),
     "ROS (docs/guides/ros.md)": (
-        "--ros", "--frame", "--scale", "--ros-type", "--tf", "--diagnostics",
+        "--ros", "--frame", "--scale", "--ros-type", "--tf", "--diagnostics", "--arm",
         "--situation", "--report-timeout", "--battery", "--use-sim-time",
     ),
     "Simulated flight (--situation flight)": ("--fail", "--distance", "--wind", "--gusts", "--obstacle"),
@@ -192,6 +193,7 @@ _SECTIONS: Sections = {
 @local_options
 @reading_options
 @ros_options
+@arm_option
 @situation_options
 @flight_options
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON object per team, and nothing else.")

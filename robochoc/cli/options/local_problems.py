@@ -19,7 +19,7 @@ _LOCAL_OPTIONS = (
         default=100_000,
         show_default=True,
         metavar="N",
-        help="Limit on the local solutions of one robot, and on their groups.",
+        help="Limit on a robot's solutions.",
     ),
     click.option(
         "--local-timeout",

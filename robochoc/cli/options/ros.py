@@ -33,8 +33,8 @@ ros_options = _optional(
         multiple=True,
         metavar="SINK",
         help=(
-            "Publish waypoints: mcap:FILE, rosbag:FILE, dds (ROS 2), rmw_zenoh, rclpy, rospy, rosbridge://HOST:PORT"
-            ", installed ones. Repeatable."
+            "Publish waypoints: mcap:FILE, rosbag:FILE, dds, rmw_zenoh, rclpy, rospy, rosbridge://HOST:PORT"
+            ", mavlink:FILE, installed ones. Repeatable."
         ),
     ),
     click.option("--frame", type=FrameType(), metavar="NAME", help=f"Frame of all positions.  [default: {FRAME}]"),
@@ -75,6 +75,12 @@ downwash_option = click.option(
     type=Finite(1),
     metavar="FACTOR",
     help="Drones keep so many distances right above each other.  [default: 1]",
+)
+
+arm_option = click.option(
+    "--arm",
+    is_flag=True,
+    help="With --ros mavlink:FILE: let vehicles fly.",
 )
 
 situation_options = _optional(
@@ -137,6 +143,7 @@ class RosOptions:
     use_sim_time: bool
     published: Mapping[str, Any]
     flight: Mapping[str, Any]
+    arm: bool = False
 
     def __bool__(self) -> bool:
         return bool(self.sinks or self.situation)
@@ -144,7 +151,7 @@ class RosOptions:
 
 def take_ros_options(settings: dict[str, Any]) -> RosOptions:
     """Take the options of this file out of `settings`. Raises `click.UsageError` for one that would be ignored."""
-    sinks, situation = settings.pop("sinks"), settings.pop("situation")
+    sinks, situation, arm = settings.pop("sinks"), settings.pop("situation"), settings.pop("arm")
     given = {name: settings.pop(name) for name in (*_SIMULATED, *_FROM_REPORTS, *IN_FRAME, *PUBLISHED)}
     asked = given_names(given)
     if situation != FLIGHT:
@@ -155,6 +162,8 @@ def take_ros_options(settings: dict[str, Any]) -> RosOptions:
         refuse(IN_FRAME, asked, NOT_PUBLISHED)
     if not sinks:
         refuse(PUBLISHED, asked, NOT_PUBLISHED)
+    if arm and not sinks:
+        raise click.UsageError("--arm is for robots that are commanded: add --ros mavlink:FILE")
     flight = {name: given[name] for name in _SIMULATED if name in asked}
     frame = given["frame"] or FRAME
     return RosOptions(
@@ -167,6 +176,7 @@ def take_ros_options(settings: dict[str, Any]) -> RosOptions:
         bool(given["use_sim_time"]),
         {name: given[name] for name in PUBLISHED},
         flight,
+        arm,
     )
 
 

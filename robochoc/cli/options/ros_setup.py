@@ -76,6 +76,15 @@ def publish_options(given: Mapping[str, Any]) -> PublishOptions:
     return PublishOptions(kind=given["ros_type"] or "", frames=given["tf"], diagnostics=given["diagnostics"])
 
 
+def _allow_arming(texts: Sequence[str], sinks: Sequence[Sink]) -> None:
+    """Let those of `sinks` arm that can. Raises `click.UsageError` if none can, and `SinkError`."""
+    able = [sink for sink in sinks if sink.arms]
+    if not able:
+        raise click.UsageError(f"--arm is for --ros mavlink:FILE; {', '.join(texts)} arms nothing")
+    for sink in able:
+        sink.allow_arming()
+
+
 def flight_settings(given: Mapping[str, Any], seed: int) -> FlightSettings:
     """Return the settings of a simulated flight, of options that were `given`."""
     from robochoc.ros.simulated_feedback import FlightSettings
@@ -121,6 +130,8 @@ def closed_loop(ros: RosOptions, team: Team, seed: int) -> Iterator[ClosedLoop |
         feedback = _feedback(ros, drones_of(team), seed, stack) if ros.situation else None
         battery = BATTERY if ros.battery is None else ros.battery
         sinks = open_sinks(ros.sinks, stack)
+        if ros.arm:
+            _allow_arming(ros.sinks, sinks)
         yield ClosedLoop(
             team,
             sinks,

@@ -1,0 +1,74 @@
+"""An autopilot as a pilot sees it: what it tells, and the few commands it takes. Places are in the team's frame."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from dataclasses import dataclass
+
+from robochoc.flight.layout import Point
+
+OFFBOARD = "OFFBOARD"
+"""The mode in which an autopilot follows our set points."""
+MANUAL = frozenset({"MANUAL", "ALTCTL", "POSCTL", "ACRO", "STABILIZED", "RATTITUDE"})
+"""Modes in which a person flies, by remote control."""
+
+
+class RefusedError(Exception):
+    """The autopilot has denied a command, or did not answer. The message says which."""
+
+
+@dataclass(frozen=True)
+class Telemetry:
+    """The state of a vehicle, as far as it has told it."""
+
+    place: Point | None = None
+    battery: float | None = None
+    mode: str = ""
+    armed: bool = False
+    in_air: bool = False
+    healthy: bool = False
+    silent_s: float = 0.0
+    """The time since the last heartbeat, in seconds."""
+
+
+class Autopilot(ABC):
+    """A vehicle's autopilot. Commands wait for the answer, a few seconds at most, and raise `RefusedError`."""
+
+    url: str
+    """The link, for messages."""
+
+    @abstractmethod
+    def connect(self) -> bool:
+        """Return whether the vehicle has been heard; the first call opens the link. Raises `RefusedError`."""
+
+    @abstractmethod
+    def look(self) -> Telemetry:
+        """Return the newest telemetry. Does not wait."""
+
+    @abstractmethod
+    def arm(self) -> None:
+        """Arm the motors."""
+
+    @abstractmethod
+    def disarm(self) -> None:
+        """Disarm the motors: refused in the air."""
+
+    @abstractmethod
+    def take_off(self, height_m: float) -> None:
+        """Rise to a height above where it stands, and hold there."""
+
+    @abstractmethod
+    def go_to(self, place: Point) -> None:
+        """Fly straight to `place`, by set points that are repeated until another command comes."""
+
+    @abstractmethod
+    def hold(self) -> None:
+        """Stay where it is, without us."""
+
+    @abstractmethod
+    def land(self) -> None:
+        """Land where it is, without us."""
+
+    @abstractmethod
+    def close(self) -> None:
+        """Close the link. No command is sent by that."""

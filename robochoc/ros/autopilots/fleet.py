@@ -1,0 +1,245 @@
+"""The fleet file: which vehicle each drone is, by which link it is reached, and how it may fly.
+
+The place of `mavlink:FILE` is such a file, in YAML (docs/guides/autopilots.md). All of it is checked when it is read.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Collection, Mapping
+from enum import StrEnum
+from fractions import Fraction
+from pathlib import Path
+
+import msgspec
+
+from robochoc.flight.layout import Point
+from robochoc.formats.diagnostics import MistakeError, on_one_line, shortened, suggestion
+from robochoc.formats.dialects.yaml_tree import Node, read_yaml, shown
+from robochoc.ros.autopilots.frames import FAR_M, LATITUDE_MAX, GpsPlace
+
+BYTES_MAX = 64 * 1024
+VEHICLES_MAX = 64
+_LINK = re.compile(
+    r"(?:udpin|udpout|tcpin|tcpout)://(?:[A-Za-z0-9._-]{1,253}|\[[0-9A-Fa-f:.]{2,45}\]):(?P<port>\d{1,5})"
+    r"|serial:///dev/[A-Za-z0-9._/-]{1,200}:\d{2,8}",
+    re.ASCII,
+)
+_PORTS = range(1, 65_536)
+_KNOWN = ("vehicles", "fence", "origin", "takeoff", "near", "end", "patience", "time")
+_CORNERS, _AXES = 2, 3
+_LARGE = 10**9
+
+
+class FleetError(Exception):
+    """A fleet file that is not as it should be. The message has the file, the line, and what was expected."""
+
+
+class AtEnd(StrEnum):
+    """What vehicles do when a run is over, however it ends."""
+
+    LAND = "land"
+    HOLD = "hold"
+
+
+class Fence(msgspec.Struct, frozen=True):
+    """A box that no vehicle may leave, in metres: its lowest and its highest corner."""
+
+    low: Point
+    high: Point
+
+    def holds(self, place: Point, margin_m: float = 0.0) -> bool:
+        """Return whether `place` is in the box, or no more than `margin_m` out of it along each axis."""
+        sides = zip(self.low, place, self.high, strict=True)
+        return all(low - margin_m <= at <= high + margin_m for low, at, high in sides)
+
+    def holds_above(self, place: Point, margin_m: float = 0.0) -> bool:
+        """Return whether `place` is in the box or right below it, as a place on the ground may be."""
+        x, y, z = place
+        return self.holds((x, y, max(z, self.low[2])), margin_m)
+
+    def __str__(self) -> str:
+        return f"{point_text(self.low)} to {point_text(self.high)}"
+
+
+class Link(msgspec.Struct, frozen=True):
+    """The link to a vehicle, as MAVSDK names it, and where the vehicle's own origin lies in the team's frame."""
+
+    url: str
+    at: Point = (0.0, 0.0, 0.0)
+
+
+class Fleet(msgspec.Struct, frozen=True):
+    """The content of a fleet file."""
+
+    vehicles: Mapping[str, Link]
+    """By the drones' names."""
+    fence: Fence
+    origin: GpsPlace | None = None
+    """Where the team's origin lies on the earth. None: places are those of the vehicles' own frames."""
+    takeoff_m: float = 2.5
+    """The height of a take-off, above where the vehicle stands."""
+    near_m: float = 0.5
+    """A place is reached within this distance."""
+    end: AtEnd = AtEnd.LAND
+    patience_s: float = 10.0
+    """A vehicle whose link is silent for so long is lost."""
+    time_s: float = 120.0
+    """The longest time that a decision may take to be flown."""
+
+
+def read_fleet(path: Path) -> Fleet:
+    """Return the fleet in the file at `path`. Raises `FleetError`."""
+    try:
+        with path.open("rb") as file:
+            content = file.read(BYTES_MAX + 1)
+    except OSError as error:
+        raise FleetError(
+            on_one_line(f"{path}: {error.strerror}; name a fleet file, as in mavlink:fleet.yaml")
+        ) from None
+    if len(content) > BYTES_MAX:
+        raise FleetError(on_one_line(f"{path}: a fleet file has at most {BYTES_MAX:,} bytes"))
+    try:
+        return _fleet(read_yaml(content.decode()).root)
+    except UnicodeDecodeError:
+        raise FleetError(on_one_line(f"{path}: is no text in UTF-8")) from None
+    except MistakeError as mistake:
+        where = f"{path}:{mistake.line}" if mistake.line else f"{path}"
+        raise FleetError(on_one_line(f"{where}: {mistake.message}; {mistake.hint}")) from None
+
+
+def _fleet(root: Node) -> Fleet:
+    entries = _mapping(root, "a fleet file", _KNOWN)
+    for name in ("vehicles", "fence"):
+        if name not in entries:
+            raise MistakeError(f"has no '{name}'", "see docs/guides/autopilots.md for what a fleet file has", root.line)
+    origin = _origin(entries["origin"]) if "origin" in entries else None
+    fleet = Fleet(
+        _vehicles(entries["vehicles"], origin),
+        _fence(entries["fence"]),
+        origin,
+        takeoff_m=_number(entries, "takeoff", 2.5, 0.5, 100),
+        near_m=_number(entries, "near", 0.5, 0.05, 10),
+        end=_end(entries["end"]) if "end" in entries else AtEnd.LAND,
+        patience_s=_number(entries, "patience", 10, 1, 600),
+        time_s=_number(entries, "time", 120, 1, 3_600),
+    )
+    low, high = fleet.fence.low[2], fleet.fence.high[2]
+    if fleet.takeoff_m > high - low:
+        line = entries.get("takeoff", entries["fence"]).line
+        raise MistakeError(
+            f"a take-off to {fleet.takeoff_m:g} m leaves a fence that is {high - low:g} m high",
+            "raise the fence, or lower 'takeoff'",
+            line,
+        )
+    return fleet
+
+
+def _vehicles(node: Node, origin: GpsPlace | None) -> dict[str, Link]:
+    found: dict[str, Link] = {}
+    urls: dict[str, str] = {}
+    for name, entry in _mapping(node, "'vehicles'").items():
+        link = _link(entry, name, origin)
+        if link.url in urls:
+            problem = f"{shortened(name)} and {shortened(urls[link.url])} have the same link"
+            raise MistakeError(problem, "a vehicle has a link of its own", entry.line)
+        urls[link.url] = name
+        found[name] = link
+    if not 0 < len(found) <= VEHICLES_MAX:
+        raise MistakeError(f"{len(found)} vehicles", f"a fleet has 1 to {VEHICLES_MAX}", node.line)
+    return found
+
+
+def _link(node: Node, name: str, origin: GpsPlace | None) -> Link:
+    if node.entries is None:
+        return Link(_url(node, name))
+    entries = _mapping(node, f"vehicle {shortened(name)}", ("link", "at"))
+    if "link" not in entries:
+        raise MistakeError(f"vehicle {shortened(name)} has no 'link'", "as in link: udpin://0.0.0.0:14540", node.line)
+    if "at" not in entries:
+        return Link(_url(entries["link"], name))
+    if origin:
+        raise MistakeError("'at' is for vehicles without GPS", "delete it, or 'origin'", entries["at"].line)
+    return Link(_url(entries["link"], name), _point(entries["at"], "'at'"))
+
+
+def _url(node: Node, name: str) -> str:
+    text = node.scalar
+    found = _LINK.fullmatch(text) if isinstance(text, str) else None
+    if isinstance(text, str) and found and (found["port"] is None or int(found["port"]) in _PORTS):
+        return text
+    raise MistakeError(
+        f"the link of {shortened(name)}, {shortened(shown(text))!r}, is none",
+        "expected udpin://0.0.0.0:14540, or udpout, tcpin, tcpout, or serial:///dev/ttyUSB0:57600",
+        node.line,
+    )
+
+
+def _fence(node: Node) -> Fence:
+    corners = [_point(one, "a corner of the fence") for one in node.items or ()]
+    if len(corners) != _CORNERS:
+        raise MistakeError("'fence' is no box", "expected two corners, as in [[0, 0, 0], [6, 6, 6]]", node.line)
+    low_x, low_y, low_z = (min(pair) for pair in zip(*corners, strict=True))
+    high_x, high_y, high_z = (max(pair) for pair in zip(*corners, strict=True))
+    return Fence((low_x, low_y, low_z), (high_x, high_y, high_z))
+
+
+def _origin(node: Node) -> GpsPlace:
+    values = [_decimal(one) for one in node.items or ()]
+    latitude, longitude, altitude = values if len(values) == _AXES else (None, None, None)
+    if latitude is None or longitude is None or altitude is None:
+        raise MistakeError(
+            "'origin' is no place", "expected [latitude, longitude, metres above sea level], in degrees", node.line
+        )
+    if abs(latitude) > LATITUDE_MAX or abs(longitude) > 180 or not -500 <= altitude <= 9_000:  # noqa: PLR2004
+        limits = f"latitudes within {LATITUDE_MAX:g}, longitudes within 180 degrees, -500 to 9,000 m"
+        raise MistakeError("'origin' is too far off", f"expected {limits}", node.line)
+    return GpsPlace(latitude, longitude, altitude)
+
+
+def _end(node: Node) -> AtEnd:
+    for how in AtEnd:
+        if node.scalar == how.value:
+            return how
+    raise MistakeError(f"'end' is {shortened(shown(node.scalar))!r}", f"expected {' or '.join(AtEnd)}", node.line)
+
+
+def _point(node: Node, what: str) -> Point:
+    values = [_decimal(one) for one in node.items or ()]
+    x, y, z = values if len(values) == _AXES else (None, None, None)
+    if x is None or y is None or z is None or max(abs(x), abs(y), abs(z)) > FAR_M:
+        raise MistakeError(f"{what} is no place", f"expected [x, y, z] in metres, within {FAR_M:,g}", node.line)
+    return x, y, z
+
+
+def _number(entries: Mapping[str, Node], name: str, usual: float, least: float, most: float) -> float:
+    if name not in entries:
+        return usual
+    found = _decimal(entries[name])
+    if found is None or not least <= found <= most:
+        given = shortened(shown(entries[name].scalar))
+        raise MistakeError(f"'{name}' is {given!r}", f"expected {least:g} to {most:,g}", entries[name].line)
+    return found
+
+
+def _decimal(node: Node) -> float | None:
+    value = node.scalar
+    if isinstance(value, bool) or not isinstance(value, int | Fraction):
+        return None
+    return float(value) if -_LARGE <= value <= _LARGE else None
+
+
+def _mapping(node: Node, what: str, known: Collection[str] = ()) -> dict[str, Node]:
+    if node.entries is None:
+        raise MistakeError(f"{what} is no mapping", "expected lines of NAME: VALUE", node.line)
+    found = {shown(key): entry for key, entry in node.entries.items()}
+    for name in found if known else ():
+        if name not in known:
+            hint = suggestion(name, known, "entries") or f"known are {', '.join(known)}"
+            raise MistakeError(f"{shortened(name)!r} does not belong in {what}", hint, node.keys.get(name, node.line))
+    return found
+
+
+def point_text(place: Point) -> str:
+    """Return a place in words, in metres: `3, 1, 2.5`."""
+    return ", ".join(f"{round(at, 2):g}" for at in place)

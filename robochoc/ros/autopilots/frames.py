@@ -1,0 +1,87 @@
+"""Frames: ours is east, north, up (ENU); an autopilot's is north, east, down (NED), or latitude and longitude.
+
+A place on the earth is developed at the origin, on the ellipsoid WGS 84, with M and N its radii of curvature along
+the meridian and across it, to the second order:
+
+    north = (M + h) dlat + east^2 tan(lat0) / (2 (N + h))
+    east = (N + h) cos(lat) dlon
+
+That is off by less than 1 mm within 1 km of the origin, and less than 0.2 m within 5 km, for latitudes up to 75
+degrees. Up is the difference of the heights above sea level: it follows the earth, as barometers do, and not the
+plane that touches it (8 cm lower at 1 km).
+
+Source: the radii, J. P. Snyder, "Map Projections: A Working Manual", USGS Professional Paper 1395, 1987, equations
+4-18 to 4-20.
+"""
+
+from __future__ import annotations
+
+from math import cos, degrees, radians, sin, sqrt, tan
+
+import msgspec
+
+from robochoc.flight.layout import Point
+
+LATITUDE_MAX = 75.0
+"""The largest latitude of an origin, in degrees: nearer to a pole the error is larger."""
+FAR_M = 5_000.0
+"""No place is farther from the origin along one axis, in metres."""
+_SEMI_MAJOR_M = 6_378_137.0
+_FLATTENING = 1 / 298.257223563
+_ECCENTRICITY_2 = _FLATTENING * (2 - _FLATTENING)
+
+
+class GpsPlace(msgspec.Struct, frozen=True):
+    """A place on the earth: degrees, and metres above mean sea level."""
+
+    latitude: float
+    longitude: float
+    altitude_m: float
+
+
+def ned_of(enu: Point) -> Point:
+    """Return north, east, down of a place that is given as east, north, up.
+
+    >>> ned_of((1.0, 2.0, 3.0))
+    (2.0, 1.0, -3.0)
+    """
+    east, north, up = enu
+    return north, east, -up
+
+
+def enu_of(ned: Point) -> Point:
+    """Return east, north, up of a place that is given as north, east, down: the same exchange."""
+    return ned_of(ned)
+
+
+def gps_of(enu: Point, origin: GpsPlace) -> GpsPlace:
+    """Return the place on the earth of a place near `origin`."""
+    east, north, up = enu
+    latitude = radians(origin.latitude)
+    meridian_m, normal_m = _radii(origin)
+    north -= east**2 * tan(latitude) / (2 * normal_m)
+    there = latitude + north / meridian_m
+    longitude = origin.longitude + degrees(east / (normal_m * cos(there)))
+    return GpsPlace(degrees(there), _in_turn(longitude), origin.altitude_m + up)
+
+
+def enu_from_gps(place: GpsPlace, origin: GpsPlace) -> Point:
+    """Return east, north, up of a place on the earth near `origin`."""
+    latitude = radians(origin.latitude)
+    meridian_m, normal_m = _radii(origin)
+    east = normal_m * cos(radians(place.latitude)) * radians(_in_turn(place.longitude - origin.longitude))
+    north = meridian_m * radians(place.latitude - origin.latitude) + east**2 * tan(latitude) / (2 * normal_m)
+    return east, north, place.altitude_m - origin.altitude_m
+
+
+def _radii(origin: GpsPlace) -> tuple[float, float]:
+    """Return the radii of curvature along the meridian and across it, at the height of `origin`, in metres."""
+    part = 1 - _ECCENTRICITY_2 * sin(radians(origin.latitude)) ** 2
+    meridian_m = _SEMI_MAJOR_M * (1 - _ECCENTRICITY_2) / (part * sqrt(part))
+    normal_m = _SEMI_MAJOR_M / sqrt(part)
+    return meridian_m + origin.altitude_m, normal_m + origin.altitude_m
+
+
+def _in_turn(degrees_east: float) -> float:
+    """Return an angle between -180 and 180 degrees."""
+    return (degrees_east + 180) % 360 - 180

@@ -1,0 +1,214 @@
+"""The guard: a process of its own that owns all links, and brings every vehicle to an end when its parent is gone.
+
+Its standard input has orders, its standard output states (`messages.py`). When the input ends, when its parent has
+died, or when it is told to end by SIGTERM, vehicles that were commanded land, or hold, as the fleet file says; then it
+ends. Ctrl-C is left to the parent.
+
+    python -m robochoc.ros.autopilots.guard
+"""
+
+from __future__ import annotations
+
+import os
+import select
+import signal
+import sys
+import threading
+import time
+from collections import deque
+from collections.abc import Callable
+
+import msgspec
+
+from robochoc.ros.autopilots.autopilot import Autopilot
+from robochoc.ros.autopilots.fleet import AtEnd, Fleet
+from robochoc.ros.autopilots.messages import (
+    LINE_MAX,
+    End,
+    Ended,
+    Failed,
+    Fly,
+    FromGuard,
+    Permit,
+    Setup,
+    State,
+    ToGuard,
+    line_of,
+)
+from robochoc.ros.autopilots.pilot import Pilot
+
+STEP_S = 0.1
+"""The time between two steps of a pilot, in seconds."""
+TOLD_S = 0.25
+"""The time between two states of a vehicle that does nothing new, in seconds."""
+_ORDERS_MAX = 1 << 20
+Tell = Callable[[FromGuard], None]
+
+
+class _Flight(threading.Thread):
+    """A thread in which one pilot flies."""
+
+    def __init__(self, name: str, autopilot: Autopilot, fleet: Fleet, tell: Tell) -> None:
+        super().__init__(name=f"pilot of {name}", daemon=True)
+        self.pilot = Pilot(name, autopilot, fleet)
+        self._autopilot = autopilot
+        self._tell = tell
+
+    def run(self) -> None:
+        """Fly until all is over."""
+        told, told_s = None, 0.0
+        try:
+            while not self.pilot.ended:
+                state = self.pilot.step()
+                now = time.monotonic()
+                if self._news(state) != told or now - told_s >= TOLD_S or self.pilot.ended:
+                    told, told_s = self._news(state), now
+                    self._tell(state)
+                time.sleep(STEP_S)
+        except Exception as error:  # noqa: BLE001 - said to the parent; the others fly on
+            self._tell(Failed(f"the pilot of {self.pilot.name} failed: {type(error).__name__}: {error}"))
+        finally:
+            self._autopilot.close()
+
+    @staticmethod
+    def _news(state: State) -> tuple[object, ...]:
+        return state.phase, state.order, state.why
+
+
+class Guard:
+    """Owns the vehicles' links. `tell` takes what it has to say; `open_autopilot` opens a link by a vehicle's name."""
+
+    def __init__(self, fleet: Fleet, open_autopilot: Callable[[str], Autopilot], tell: Tell) -> None:
+        self.at_end = fleet.end
+        self._tell = tell
+        self._permitted = False
+        self._flights = {name: _Flight(name, open_autopilot(name), fleet, tell) for name in fleet.vehicles}
+        for flight in self._flights.values():
+            flight.start()
+
+    def take(self, order: ToGuard) -> None:
+        """Obey an order."""
+        match order:
+            case Permit():
+                self._permitted = True
+            case Fly() if not self._permitted:
+                self._tell(Failed("nothing may be armed: an order to fly came without a permit"))
+            case Fly():
+                for name, target in order.targets.items():
+                    self._flights[name].pilot.fly(order.order, target)
+            case End():
+                self.end(order.how, waits=order.waits)
+            case _:
+                pass
+
+    def end(self, how: AtEnd, *, waits: bool) -> None:
+        """Bring all vehicles to an end."""
+        for flight in self._flights.values():
+            flight.pilot.end(how, waits=waits)
+
+    @property
+    def ended(self) -> bool:
+        """Return whether all vehicles have been brought to an end."""
+        return not any(flight.is_alive() for flight in self._flights.values())
+
+
+class _Orders:
+    """Orders from standard input. `over` is True when it has ended, or the parent has died."""
+
+    def __init__(self) -> None:
+        self._parent = os.getppid()
+        self._buffer = b""
+        self._lines: deque[bytes] = deque()
+        self._is_closed = False
+
+    @property
+    def over(self) -> bool:
+        """Robots' processes, too, may hold the other end of the pipe: so the parent itself counts."""
+        return self._is_closed or os.getppid() != self._parent
+
+    def next(self, wait_s: float) -> ToGuard | None:
+        """Return the next order; None if none comes within `wait_s`."""
+        if not self._lines and self._is_closed:
+            time.sleep(wait_s)
+        elif not self._lines and select.select([0], [], [], wait_s)[0]:
+            chunk = os.read(0, _ORDERS_MAX)
+            self._is_closed = not chunk
+            *lines, self._buffer = (self._buffer + chunk).split(b"\n")
+            self._lines.extend(lines)
+        return msgspec.json.decode(self._lines.popleft(), type=ToGuard) if self._lines else None
+
+
+class _Outlet:
+    """Writes lines to what was standard output; MAVSDK writes a log there, which nobody reads.
+
+    It never waits for a parent that does not read: states are dropped then.
+    """
+
+    def __init__(self) -> None:
+        self._descriptor = os.dup(1)
+        os.set_blocking(self._descriptor, False)
+        nowhere = os.open(os.devnull, os.O_WRONLY)
+        os.dup2(nowhere, 1)
+        os.close(nowhere)
+
+    def tell(self, message: FromGuard) -> None:
+        line = line_of(message)
+        if len(line) > LINE_MAX:
+            line = line_of(Failed("a message of the guard was too long"))
+        try:
+            os.write(self._descriptor, line)
+        except OSError:  # full, or nobody is there any more
+            return
+
+
+def main() -> None:
+    """Guard the vehicles of the fleet that standard input names."""
+    told_to_end = threading.Event()
+    signal.signal(signal.SIGTERM, lambda _number, _frame: told_to_end.set())
+    for ignored in (signal.SIGINT, signal.SIGHUP, signal.SIGPIPE):
+        signal.signal(ignored, signal.SIG_IGN)
+    signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGINT, signal.SIGTERM})
+    outlet, orders = _Outlet(), _Orders()
+    try:
+        guard = _begun(orders, outlet.tell)
+        if guard:
+            _watch(guard, orders, told_to_end)
+            outlet.tell(Ended())
+    except Exception as error:  # noqa: BLE001 - the parent says it
+        outlet.tell(Failed(f"{type(error).__name__}: {error}"))
+
+
+def _begun(orders: _Orders, tell: Tell) -> Guard | None:
+    """Return the guard of the fleet that is named first; None if the parent is gone before."""
+    while not orders.over:
+        order = orders.next(STEP_S)
+        if isinstance(order, Setup):
+            return _guard_of(order.fleet, tell)
+    return None
+
+
+def _guard_of(fleet: Fleet, tell: Tell) -> Guard:
+    from robochoc.ros.autopilots.mavsdk_autopilot import MavsdkAutopilot  # noqa: PLC0415 - its library may be broken
+
+    return Guard(fleet, lambda name: MavsdkAutopilot(fleet.vehicles[name], fleet.origin), tell)
+
+
+def _watch(guard: Guard, orders: _Orders, told_to_end: threading.Event) -> None:
+    """Obey orders until all is over; then bring all vehicles to an end.
+
+    `Ended` follows when each of them has been. If the parent dies meanwhile, it is not waited for landings.
+    """
+    left = False
+    while not guard.ended:
+        order = orders.next(STEP_S)
+        if order is not None:
+            guard.take(order)
+        if not left and (orders.over or told_to_end.is_set()):
+            left = True
+            guard.end(guard.at_end, waits=False)
+
+
+if __name__ == "__main__":
+    main()
+    sys.stdout.flush()
+    os._exit(0)  # the threads of a library that hangs must not keep it

@@ -1,0 +1,183 @@
+"""The sink `mavlink:FILE`: decisions are flown by vehicles whose autopilots speak MAVLink.
+
+Without permission to arm it only observes: links, vehicles and the fence are checked, and no command is sent.
+"""
+
+from __future__ import annotations
+
+import importlib.util
+from collections import Counter
+from collections.abc import Iterable, Iterator, Sequence
+from contextlib import contextmanager, suppress
+from pathlib import Path
+
+from robochoc.flight.mission import Drone
+from robochoc.formats.diagnostics import on_one_line
+from robochoc.ros.autopilots.fleet import AtEnd, FleetError, point_text, read_fleet
+from robochoc.ros.autopilots.guard_process import GuardError, shared
+from robochoc.ros.autopilots.messages import Phase, State, Target
+from robochoc.ros.sink import Fields, Sink, SinkError
+from robochoc.ros.waypoint import Waypoint
+
+if importlib.util.find_spec("mavsdk") is None:  # the guard's process imports it, not this one
+    raise ModuleNotFoundError("No module named 'mavsdk'", name="mavsdk")
+
+_SPARE_S = 5.0
+"""A vehicle that is not heard is told so by the guard, a moment after the time that the fleet file gives it."""
+
+
+class MavlinkSink(Sink):
+    """Flies decisions. After each it waits until the vehicles are there, unless a source has their reports."""
+
+    arms = True
+
+    def __init__(self, place: str) -> None:
+        super().__init__(place)
+        self._path = Path(place)
+        with _reported():
+            self._fleet = read_fleet(self._path)
+            self._guard = shared.enter(self._path, self._fleet)
+        self._names: dict[int, str] = {}
+        self._may_arm = self._is_closed = False
+        self._flown: set[str] = set()
+
+    def allow_arming(self) -> None:
+        """Let vehicles be armed."""
+        with _reported():
+            self._guard.permit()
+        self._may_arm = True
+
+    def assign(self, drones: Sequence[Drone]) -> None:
+        """Check that drones and vehicles match, and wait until each vehicle is heard."""
+        self._names = {number: drone.name for number, drone in enumerate(drones)}
+        doubled = [name for name, count in Counter(self._names.values()).items() if count > 1]
+        missing = [
+            *dict.fromkeys(drone.name for drone in drones if drone.topic and drone.name not in self._fleet.vehicles)
+        ]
+        strange = [name for name in self._fleet.vehicles if name not in self._names.values()]
+        if doubled:
+            raise self._wrong(f"two drones are called {doubled[0]}", "a vehicle flies for one")
+        if missing:
+            raise self._wrong(f"there is no vehicle for {missing[0]}", "each drone with a topic needs one")
+        if strange:
+            known = ", ".join(self._names.values())
+            raise self._wrong(f"no drone is called {strange[0]}", f"the team's drones are {known}")
+        self._await_vehicles()
+
+    def decide(self, waypoints: Sequence[Waypoint]) -> None:
+        """Fly a decision. Nothing is armed if one of its places is outside of the fence."""
+        fence = self._fleet.fence
+        for one in waypoints:
+            inside = fence.holds_above(one.at) if one.lands else fence.holds(one.at)
+            if not inside:
+                what = "landing point" if one.lands else "waypoint"
+                problem = f"the {what} of {self._names[one.drone]}, {point_text(one.at)}, is outside of the fence"
+                raise self._wrong(problem, f"the fence is from {fence}; the decision is not flown")
+        targets = {self._names[one.drone]: Target(one.at, one.lands) for one in waypoints}
+        if not self._may_arm or not targets:
+            return
+        self._flown |= {name for name, target in targets.items() if not target.lands}
+        with _reported():
+            self._guard.fly(targets)
+            if not self._guard.observers:
+                self._await_arrival(targets)
+
+    def publish(self, topic: str, kind: str, fields: Fields, at_ns: int) -> None:
+        """Do nothing: waypoints are flown by `decide`, and vehicles report by themselves."""
+
+    def close(self) -> None:
+        """Wait until all vehicles are where they were sent; then they land, or hold."""
+        try:
+            with _reported():
+                if self._may_arm and self._guard.observers:
+                    self._guard.wait_for(lambda: all(map(self._is_through, self._flown)), self._fleet.time_s)
+            self._end(waits=True)
+        finally:
+            self._leave()
+
+    def discard(self) -> None:
+        """Let all vehicles land, or hold, at once. The error that is on its way says what has failed."""
+        try:
+            with suppress(SinkError):
+                self._end(waits=False)
+        finally:
+            self._leave()
+
+    def _end(self, *, waits: bool) -> None:
+        if self._is_closed:
+            return
+        with _reported():
+            self._guard.end(self._fleet.end, waits=waits)
+        self.summary = self._told()
+
+    def _leave(self) -> None:
+        if not self._is_closed:
+            self._is_closed = True
+            shared.leave(self._path)
+
+    # Waiting
+
+    def _await_vehicles(self) -> None:
+        guard, names = self._guard, [*self._fleet.vehicles]
+
+        def is_known(name: str) -> bool:
+            return name in guard.states and guard.states[name].phase is not Phase.CONNECTING
+
+        with _reported():
+            guard.wait_for(lambda: all(map(is_known, names)), self._fleet.patience_s + _SPARE_S)
+        for name in names:
+            state = guard.states.get(name)
+            why = state.why if state else "nothing is known of it"
+            if state is None or state.phase is Phase.OUT:
+                raise self._wrong(f"{name} cannot be flown: {why}", "nothing was armed")
+            if self._may_arm and state.place and not state.in_air and not self._fleet.fence.holds_above(state.place):
+                where = f"{name} stands at {point_text(state.place)}, outside of the fence"
+                raise self._wrong(where, f"the fence is from {self._fleet.fence}; nothing was armed")
+
+    def _await_arrival(self, names: Iterable[str]) -> None:
+        """Wait until all are where they were sent. One that falls out ends the run, as nobody else could take over."""
+        sent = [*names]
+        self._guard.wait_for(
+            lambda: all(map(self._guard.is_done, sent)) or any(self._fell_out(sent)), self._fleet.time_s
+        )
+        fallen = [*self._fell_out(sent)]
+        if fallen:
+            raise self._wrong(f"{fallen[0].vehicle} is out of order: {fallen[0].why}", "the others are brought down")
+        late = [name for name in sent if not self._guard.is_done(name)]
+        if late:
+            raise self._wrong(
+                f"{late[0]} is not there after {self._fleet.time_s:g} s", "'time' says how long it may take"
+            )
+
+    def _fell_out(self, names: Iterable[str]) -> Iterator[State]:
+        for name in names:
+            state = self._guard.states.get(name)
+            if state is not None and state.phase is Phase.OUT:
+                yield state
+
+    def _is_through(self, name: str) -> bool:
+        state = self._guard.states.get(name)
+        return self._guard.is_done(name) or (state is not None and state.phase in {Phase.LANDED, Phase.OUT})
+
+    def _told(self) -> str:
+        """Return what has become of the vehicles, in one line."""
+        if not self._may_arm:
+            return f"{len(self._fleet.vehicles)} vehicles seen, none armed (--arm lets them fly)"
+        states = [self._guard.states[name] for name in sorted(self._flown) if name in self._guard.states]
+        ended = sum(state.phase is Phase.LANDED for state in states)
+        words = [f"{len(self._flown)} flown"]
+        words.append(f"{ended} landed" if self._fleet.end is AtEnd.LAND else f"{len(states) - ended} hold")
+        words += [f"{state.vehicle} is out of order: {state.why}" for state in states if state.phase is Phase.OUT]
+        return on_one_line(", ".join(words))
+
+    def _wrong(self, problem: str, hint: str) -> SinkError:
+        return SinkError(on_one_line(f"{self._path}: {problem}; {hint}"))
+
+
+@contextmanager
+def _reported() -> Iterator[None]:
+    """Raise what fails as `SinkError`."""
+    try:
+        yield
+    except (FleetError, GuardError) as error:
+        raise SinkError(str(error)) from error

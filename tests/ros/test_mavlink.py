@@ -1,0 +1,245 @@
+"""Autopilots by MAVLink: played vehicles are armed, fly, hold and land, and none of them without being told to."""
+
+from __future__ import annotations
+
+import subprocess
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
+from pathlib import Path
+
+import pytest
+
+pytest.importorskip("mavsdk")
+
+from robochoc.ros.autopilots.fleet import read_fleet
+from robochoc.ros.autopilots.guard_process import GuardError, GuardProcess
+from robochoc.ros.autopilots.messages import Phase, Target
+from robochoc.ros.autopilots.sink import MavlinkSink
+from robochoc.ros.closed_loop import drones_of
+from robochoc.ros.sink import SinkError
+from robochoc.ros.waypoint import Waypoint
+from tests.support.limits import HANG_S
+from tests.support.mavlink_teams import NAMES, fleet_file, four_drones, team_folder, udp_ports
+from tests.support.mavlink_vehicles import HOME, Vehicle, Vehicles
+from tests.support.program import robochoc_within
+from tests.support.wgs84 import geodetic_of
+
+STANDS = tuple((2.0 * n, 0.0, 0.0) for n in range(len(NAMES)))
+
+
+@contextmanager
+def field(folder: Path, **settings: object) -> Iterator[tuple[Vehicles, Path]]:
+    """Four vehicles below their places, which share one frame, and their fleet file."""
+    ports = udp_ports(len(NAMES))
+    with Vehicles([Vehicle(port, at=at) for port, at in zip(ports, STANDS, strict=True)]) as vehicles:
+        yield vehicles, fleet_file(folder, dict(zip(NAMES, ports, strict=True)), **settings)
+
+
+def solve(folder: Path, fleet: Path, *words: str) -> subprocess.CompletedProcess[str]:
+    done = robochoc_within("solve", team_folder(folder), "--runtime", "simulator", "--ros", f"mavlink:{fleet}", *words)
+    assert "Traceback" not in done.stderr
+    return done
+
+
+def reached(vehicle: Vehicle) -> list[str]:
+    return [line.removeprefix("reached ") for line in vehicle.log if line.startswith("reached")]
+
+
+def test_without_permission_vehicles_are_seen_and_none_is_commanded(tmp_path: Path) -> None:
+    with field(tmp_path) as (vehicles, fleet):
+        done = solve(tmp_path, fleet)
+        assert f"{fleet}: 4 waypoints, 0 landings; 4 vehicles seen, none armed (--arm lets them fly)" in done.stderr
+        assert done.returncode == 0
+        assert [vehicle.log for vehicle in vehicles] == [[]] * 4
+
+
+def test_vehicles_take_off_reach_their_places_and_land(tmp_path: Path) -> None:
+    with field(tmp_path) as (vehicles, fleet):
+        done = solve(tmp_path, fleet, "--arm")
+        assert f"{fleet}: 4 waypoints, 0 landings; 4 flown, 4 landed" in done.stderr
+        assert done.returncode == 0
+        for n, vehicle in enumerate(vehicles):
+            (place,) = reached(vehicle)
+            assert place.startswith(f"{2 * n},0,")
+            assert vehicle.takeoff_m == pytest.approx(1.4)
+            assert [line for line in vehicle.log if "reached" not in line] == [
+                *("armed", "takeoff", "took off", "hold", "offboard", "land", "landed", "hold"),
+            ]
+        assert len({reached(vehicle)[0][-1] for vehicle in vehicles}) > 1
+
+
+def test_at_the_end_vehicles_may_hold(tmp_path: Path) -> None:
+    with field(tmp_path, end="hold") as (vehicles, fleet):
+        done = solve(tmp_path, fleet, "--arm")
+        assert "4 flown, 4 hold" in done.stderr
+        assert all(vehicle.mode == "hold" and vehicle.armed and vehicle.flies for vehicle in vehicles)
+
+
+def test_places_on_the_earth(tmp_path: Path) -> None:
+    origin = f"[{HOME.lat}, {HOME.lon}, {HOME.alt}]"
+    with field(tmp_path, origin=origin) as (vehicles, fleet):
+        for vehicle, at in zip(vehicles, STANDS, strict=True):
+            vehicle.home, vehicle.at = geodetic_of(at, HOME), (0.0, 0.0, 0.0)
+        assert solve(tmp_path, fleet, "--arm").returncode == 0
+        for vehicle in vehicles:
+            east, north, up = map(float, reached(vehicle)[-1].split(","))
+            assert (east, north, up - round(up)) == pytest.approx((0, 0, 0), abs=0.02)
+            assert up > 0.9
+
+
+# What is refused before anything is armed
+
+
+def test_a_place_outside_of_the_fence_is_refused_before_anything_is_armed(tmp_path: Path) -> None:
+    with field(tmp_path, fence="[[-1, -1, 0], [5, 5, 6]]", end="land") as (vehicles, fleet):
+        vehicles[3].at = (4.0, 1.0, 0.0)
+        done = solve(tmp_path, fleet, "--arm")
+        assert "the waypoint of RD, 6, 0, " in done.stderr
+        assert (
+            "is outside of the fence; the fence is from -1, -1, 0 to 5, 5, 6; the decision is not flown" in done.stderr
+        )
+        assert done.returncode == 1
+        assert [vehicle.log for vehicle in vehicles] == [[]] * 4
+
+
+def test_a_vehicle_that_stands_outside_of_the_fence_is_refused(tmp_path: Path) -> None:
+    with field(tmp_path) as (vehicles, fleet):
+        vehicles[1].at = (0.0, 700.0, 0.0)
+        done = solve(tmp_path, fleet, "--arm")
+        assert "RB stands at 0, 700, 0, outside of the fence" in done.stderr
+        assert [vehicle.log for vehicle in vehicles] == [[]] * 4
+
+
+def test_a_link_that_is_silent_ends_with_one_message(tmp_path: Path) -> None:
+    with field(tmp_path, patience=1) as (vehicles, fleet):
+        vehicles[2].silent = True
+        done = solve(tmp_path, fleet, "--arm")
+        assert "RC cannot be flown: it is not heard on udpin://127.0.0.1:" in done.stderr
+        assert "within 1 s; nothing was armed" in done.stderr
+        assert done.stderr.count("\n") == 1
+        assert done.returncode == 1
+        assert [vehicle.log for vehicle in vehicles] == [[]] * 4
+
+
+def test_a_link_that_cannot_be_opened(tmp_path: Path) -> None:
+    with field(tmp_path) as (_, fleet):
+        fleet.write_text(fleet.read_text().replace("udpin://127.0.0.1", "udpin://no.such.host.invalid"))
+        done = solve(tmp_path, fleet)
+        assert "RA cannot be flown: udpin://no.such.host.invalid" in done.stderr
+
+
+@pytest.mark.parametrize(
+    ("names", "told"),
+    [
+        (["RA", "RB", "RC"], "there is no vehicle for RD; each drone with a topic needs one"),
+        ([*NAMES, "RX"], "no drone is called RX; the team's drones are RA, RB, RC, RD"),
+    ],
+)
+def test_drones_and_vehicles_match(tmp_path: Path, names: list[str], told: str) -> None:
+    fleet = fleet_file(tmp_path, dict(zip(names, udp_ports(len(names)), strict=True)))
+    assert told in solve(tmp_path, fleet).stderr
+
+
+@pytest.mark.parametrize(
+    ("words", "told"),
+    [
+        (["--arm"], "--arm is for robots that are commanded: add --ros mavlink:FILE"),
+        (["--arm", "--ros", "mcap:run.mcap"], "--arm is for --ros mavlink:FILE; mcap:run.mcap arms nothing"),
+        (["--ros", "mavlink:nowhere.yaml"], "nowhere.yaml: No such file or directory; name a fleet file"),
+    ],
+)
+@pytest.mark.usefixtures("in_a_folder")
+def test_options_that_do_not_fit(tmp_path: Path, words: list[str], told: str) -> None:
+    done = robochoc_within("solve", team_folder(tmp_path), *words)
+    assert told in done.stderr
+    assert done.returncode in {1, 2}
+
+
+# What goes wrong on the way
+
+
+@pytest.mark.parametrize(
+    ("refused", "why"),
+    [
+        ("arm", "it did not arm (command denied)"),
+        pytest.param("takeoff", "it did not take off (command denied)", marks=pytest.mark.slow),
+    ],
+)
+def test_who_refuses_ends_the_flight_of_all(tmp_path: Path, refused: str, why: str) -> None:
+    with field(tmp_path) as (vehicles, fleet):
+        vehicles[1].refuses = {refused}
+        done = solve(tmp_path, fleet, "--arm")
+        assert f"RB is out of order: {why}; the others are brought down" in done.stderr
+        assert done.returncode == 1
+        vehicles.wait_until_landed()
+
+
+@pytest.mark.slow
+def test_who_loses_its_link_ends_the_flight_and_lands_by_itself(tmp_path: Path) -> None:
+    with field(tmp_path, patience=1) as (vehicles, fleet):
+        vehicles[1].silent_from = "offboard"
+        done = solve(tmp_path, fleet, "--arm")
+        assert "RB is out of order: its link has been silent for 1 s; the others are brought down" in done.stderr
+        vehicles.wait_until_landed()
+        assert "offboard lost" in vehicles[1].log
+
+
+# The guard process
+
+
+def waypoints_of_four() -> list[Waypoint]:
+    kind = "geometry_msgs/PoseStamped"
+    return [
+        Waypoint(n, f"/{name}/waypoint", kind, (x, y, 2.0), lands=False, frame="map", stamp=0)
+        for n, (name, (x, y, _)) in enumerate(zip(NAMES, STANDS, strict=True))
+    ]
+
+
+def drones_targets() -> Mapping[str, Target]:
+    return {name: Target((x, y, 2.0)) for name, (x, y, _) in zip(NAMES, STANDS, strict=True)}
+
+
+@contextmanager
+def guarded(fleet: Path) -> Iterator[GuardProcess]:
+    guard = GuardProcess(read_fleet(fleet))
+    try:
+        yield guard
+    finally:
+        guard.close()
+
+
+def all_in(guard: GuardProcess, phase: Phase) -> Callable[[], bool]:
+    return lambda: [state.phase for state in guard.states.values()] == [phase] * len(NAMES)
+
+
+def test_the_guard_flies_nobody_without_a_permit(tmp_path: Path) -> None:
+    with field(tmp_path) as (vehicles, fleet), guarded(fleet) as guard:
+        assert guard.wait_for(all_in(guard, Phase.READY), HANG_S)
+        guard.fly(drones_targets())
+        with pytest.raises(GuardError, match="nothing may be armed: an order to fly came without a permit"):
+            guard.wait_for(lambda: False, HANG_S)
+        assert [vehicle.log for vehicle in vehicles] == [[]] * 4
+
+
+def test_a_guard_that_hears_nothing_more_lands_all(tmp_path: Path) -> None:
+    with field(tmp_path) as (vehicles, fleet):
+        with guarded(fleet) as guard:
+            guard.permit()
+            assert guard.wait_for(all_in(guard, Phase.READY), HANG_S)
+            guard.fly(drones_targets())
+            assert guard.wait_for(all_in(guard, Phase.ARRIVED), HANG_S)
+        vehicles.wait_until_landed()
+        assert not any("offboard lost" in vehicle.log for vehicle in vehicles)
+
+
+def test_a_sink_whose_guard_is_gone_says_so(tmp_path: Path) -> None:
+    with field(tmp_path) as (_, fleet):
+        sink = MavlinkSink(str(fleet))
+        try:
+            sink.assign(drones_of(four_drones()))
+            sink.allow_arming()
+            sink._guard._process.kill()  # noqa: SLF001 - as the system might
+            with pytest.raises(SinkError, match="the guard process has ended; vehicles in the air do what their own"):
+                sink.decide(waypoints_of_four())
+        finally:
+            sink.discard()

@@ -1,0 +1,115 @@
+"""Fleet files: what they say, and what is wrong with them, in one line with its place."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from robochoc.ros.autopilots.fleet import BYTES_MAX, AtEnd, Fence, Fleet, FleetError, Link, read_fleet
+from robochoc.ros.autopilots.frames import GpsPlace
+
+LINK = "udpin://0.0.0.0:14540"
+FENCE = "fence: [[0, 0, 0], [6, 6, 6]]"
+BOX = Fence((0, 0, 0), (6, 6, 6))
+
+
+def read(folder: Path, text: str) -> Fleet:
+    file = folder / "fleet.yaml"
+    file.write_text(text)
+    return read_fleet(file)
+
+
+def test_a_fleet_file_and_what_it_leaves_out(tmp_path: Path) -> None:
+    found = read(tmp_path, f"vehicles:\n  Nose: {LINK}\n{FENCE}\n")
+    assert found == Fleet({"Nose": Link(LINK)}, BOX)
+    assert (found.takeoff_m, found.near_m, found.end, found.patience_s, found.time_s) == (
+        (2.5, 0.5, AtEnd.LAND, 10, 120)
+    )
+
+
+def test_a_fleet_file_that_says_all(tmp_path: Path) -> None:
+    text = (
+        "vehicles:\n  Nose: {link: udpout://10.0.0.7:14550, at: [1, -2.5, 0]}\n"
+        "  3: serial:///dev/ttyUSB0:57600\n  Fin: tcpout://[::1]:5760\n"
+        "fence: [[6, 0, 9], [0, 6.5, -1]]\ntakeoff: 3\nnear: 0.25\nend: hold\npatience: 4\ntime: 60\n"
+    )
+    links = {
+        "Nose": Link("udpout://10.0.0.7:14550", (1, -2.5, 0)),
+        "3": Link("serial:///dev/ttyUSB0:57600"),
+        "Fin": Link("tcpout://[::1]:5760"),
+    }
+    expected = Fleet(links, Fence((0, 0, -1), (6, 6.5, 9)), None, 3, 0.25, AtEnd.HOLD, 4, 60)
+    assert read(tmp_path, text) == expected
+
+
+def test_the_origin_on_the_earth(tmp_path: Path) -> None:
+    found = read(tmp_path, f"vehicles: {{Nose: {LINK}}}\n{FENCE}\norigin: [47.397742, 8.545594, 488]\n")
+    assert found.origin == GpsPlace(47.397742, 8.545594, 488)
+
+
+GOOD = f"vehicles:\n  Nose: {LINK}\n{FENCE}\n"
+
+
+@pytest.mark.parametrize(
+    ("text", "told"),
+    [
+        ("", "is empty"),
+        ("[1]", "fleet.yaml:1: a fleet file is no mapping"),
+        ("a: {", "is not YAML"),
+        ("a: !!python/object:os.system x", "the tag .* is not allowed"),
+        (FENCE, "has no 'vehicles'"),
+        (f"vehicles: {{Nose: {LINK}}}", "has no 'fence'"),
+        (f"{GOOD}fance: 3", r"fleet.yaml:4: 'fance' does not belong in a fleet file; did you mean 'fence'\?"),
+        (f"vehicles: [Nose]\n{FENCE}", "'vehicles' is no mapping"),
+        (f"vehicles: {{}}\n{FENCE}", "0 vehicles; a fleet has 1 to 64"),
+        (f"vehicles: {{Nose: 3}}\n{FENCE}", r"the link of Nose, '3', is none; expected udpin://0.0.0.0:14540"),
+        (f"vehicles: {{Nose: 'udpin://0.0.0.0:70000'}}\n{FENCE}", "is none"),
+        (f"vehicles: {{Nose: 'udpin://0.0.0.0:1 x'}}\n{FENCE}", "is none"),
+        (f"vehicles: {{Nose: 'serial:///etc/passwd:57600'}}\n{FENCE}", "is none"),
+        (f"vehicles:\n  A: {LINK}\n  B: {LINK}\n{FENCE}", "fleet.yaml:3: B and A have the same link"),
+        (f"vehicles: {{A: {{at: [0, 0, 0]}}}}\n{FENCE}", "vehicle A has no 'link'"),
+        (f"vehicles: {{A: {{link: '{LINK}', at: [0, 0]}}}}\n{FENCE}", r"'at' is no place; expected \[x, y, z\]"),
+        (f"vehicles: {{A: {{link: '{LINK}', by: 1}}}}\n{FENCE}", "'by' does not belong in vehicle A"),
+        (
+            f"vehicles: {{A: {{link: '{LINK}', at: [0, 0, 0]}}}}\n{FENCE}\norigin: [1, 2, 3]",
+            "'at' is for vehicles with",
+        ),
+        (f"vehicles: {{A: {LINK}}}\nfence: [[0, 0, 0]]", "'fence' is no box; expected two corners"),
+        (f"vehicles: {{A: {LINK}}}\nfence: [[0, 0, 0], [1, 1, 9e99]]", "a corner of the fence is no place"),
+        (f"vehicles: {{A: {LINK}}}\nfence: [[0, 0, 0], [1, 1, true]]", "a corner of the fence is no place"),
+        (
+            f"vehicles: {{A: {LINK}}}\nfence: [[0, 0, 0], [9, 9, 2]]",
+            "a take-off to 2.5 m leaves a fence that is 2 m high",
+        ),
+        (f"{GOOD}origin: [47, 8]", "'origin' is no place"),
+        (f"{GOOD}origin: [80, 8, 0]", "'origin' is too far off; expected latitudes within 75"),
+        (f"{GOOD}takeoff: 0", "'takeoff' is '0'; expected 0.5 to 100"),
+        (f"{GOOD}takeoff: high", "'takeoff' is 'high'"),
+        (f"{GOOD}patience: .inf", "'patience' is 'inf'"),
+        (f"{GOOD}end: fly", "'end' is 'fly'; expected land or hold"),
+        ("#" * (BYTES_MAX + 1), "has at most 65,536 bytes"),
+    ],
+)
+def test_what_is_wrong_is_said_in_one_line(tmp_path: Path, text: str, told: str) -> None:
+    with pytest.raises(FleetError, match=told) as caught:
+        read(tmp_path, text)
+    assert "\n" not in str(caught.value)
+
+
+def test_files_that_are_none(tmp_path: Path) -> None:
+    with pytest.raises(FleetError, match="No such file or directory; name a fleet file"):
+        read_fleet(tmp_path / "nowhere.yaml")
+    (tmp_path / "bytes").write_bytes(b"\xff\xfe\0")
+    with pytest.raises(FleetError, match="is no text in UTF-8"):
+        read_fleet(tmp_path / "bytes")
+
+
+def test_the_fence_holds_what_is_in_it_and_the_ground_below() -> None:
+    fence = Fence((0, 0, 1), (6, 6, 6))
+    assert fence.holds((0, 6, 1))
+    assert not fence.holds((3, 3, 0.5))
+    assert fence.holds_above((3, 3, 0.5))
+    assert not fence.holds_above((3, 3, 6.5))
+    assert not fence.holds_above((-0.1, 3, 0))
+    assert fence.holds((-0.5, 6.5, 6.5), margin_m=0.5)

@@ -1,0 +1,281 @@
+"""A pilot flies one vehicle: orders, what goes wrong on the way, and the end. Autopilot and clock are played."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import pytest
+
+from robochoc.flight.layout import Point
+from robochoc.ros.autopilots.autopilot import OFFBOARD, Autopilot, RefusedError, Telemetry
+from robochoc.ros.autopilots.fleet import AtEnd, Fence, Fleet, Link
+from robochoc.ros.autopilots.messages import Phase, State, Target
+from robochoc.ros.autopilots.pilot import CLIMB_S, END_S, LANDING_S, MODE_S, Pilot
+
+FLEET = Fleet({"A": Link("udpin://0.0.0.0:1")}, Fence((-1, -1, 0), (9, 9, 9)))
+GROUND = Telemetry((0, 0, 0), 1.0, "HOLD", healthy=True)
+THERE = Target((3, 1, 2))
+
+
+class Played(Autopilot):
+    """Does what it is told, at once, and keeps what that was."""
+
+    url = "udpin://0.0.0.0:1"
+
+    def __init__(self) -> None:
+        self.now = 0.0
+        self.seen = GROUND
+        self.done: list[str] = []
+        self.refuses: set[str] = set()
+        self.connects = True
+
+    def take(self, what: str, **after: object) -> None:
+        self.done.append(what)
+        if what.split(maxsplit=1)[0] in self.refuses:
+            raise RefusedError(f"it did not {what}")
+        self.seen = replace(self.seen, **after)  # type: ignore[arg-type]
+
+    def connect(self) -> bool:
+        return self.connects
+
+    def look(self) -> Telemetry:
+        return self.seen
+
+    def arm(self) -> None:
+        self.take("arm", armed=True)
+
+    def disarm(self) -> None:
+        self.take("disarm", armed=False)
+
+    def take_off(self, height_m: float) -> None:
+        self.take(f"rise {height_m:g}", in_air=True, mode="TAKEOFF", place=(0.0, 0.0, height_m))
+
+    def go_to(self, place: Point) -> None:
+        self.take(f"go {place}", mode=OFFBOARD, place=place)
+
+    def hold(self) -> None:
+        self.take("hold", mode="HOLD")
+
+    def land(self) -> None:
+        self.take("land", mode="LAND")
+
+    def close(self) -> None:
+        pass
+
+
+@pytest.fixture
+def played() -> Played:
+    return Played()
+
+
+@pytest.fixture
+def pilot(played: Played) -> Pilot:
+    return Pilot("A", played, FLEET, lambda: played.now)
+
+
+def steps(pilot: Pilot, played: Played, count: int = 1, each_s: float = 0.1) -> State:
+    for _ in range(count):
+        played.now += each_s
+        state = pilot.step()
+    return state
+
+
+def flying(pilot: Pilot, target: Target = THERE) -> None:
+    pilot.step()
+    pilot.fly(1, target)
+
+
+def is_over(pilot: Pilot) -> bool:
+    return pilot.ended
+
+
+def landed(played: Played) -> None:
+    played.seen = replace(played.seen, armed=False, in_air=False)
+
+
+def test_a_vehicle_arms_takes_off_flies_and_lands_at_the_end(pilot: Pilot, played: Played) -> None:
+    flying(pilot)
+    phases = [steps(pilot, played).phase for _ in range(3)]
+    assert phases == [Phase.CLIMBING, Phase.FLYING, Phase.ARRIVED]
+    pilot.end(AtEnd.LAND, waits=True)
+    assert steps(pilot, played).phase is Phase.LANDING
+    assert not is_over(pilot)
+    landed(played)
+    assert steps(pilot, played) == State("A", Phase.LANDED, 1, (3, 1, 2), 1.0, healthy=True, commanded=True)
+    assert is_over(pilot)
+    assert played.done == ["arm", "rise 2.5", "go (3, 1, 2)", "land"]
+
+
+def test_a_vehicle_without_an_order_is_never_commanded(pilot: Pilot, played: Played) -> None:
+    assert steps(pilot, played, 20).phase is Phase.READY
+    pilot.end(AtEnd.LAND, waits=True)
+    steps(pilot, played)
+    assert is_over(pilot)
+    assert played.done == []
+
+
+def test_a_new_order_takes_the_place_of_the_one_before(pilot: Pilot, played: Played) -> None:
+    flying(pilot)
+    steps(pilot, played, 2)
+    pilot.fly(2, Target((5, 5, 5)))
+    assert steps(pilot, played).order == 2
+    assert played.done[-1] == "go (5, 5, 5)"
+    assert steps(pilot, played).phase is Phase.ARRIVED
+
+
+def test_who_is_to_land_flies_above_the_point_first(pilot: Pilot, played: Played) -> None:
+    flying(pilot)
+    steps(pilot, played, 3)
+    pilot.fly(2, Target((8, 0, 0), lands=True))
+    assert steps(pilot, played, 2).phase is Phase.LANDING
+    assert played.done[-2:] == ["go (8, 0, 2)", "land"]
+    landed(played)
+    assert steps(pilot, played).phase is Phase.LANDED
+
+
+def test_who_is_to_land_and_stands_on_the_ground_does_nothing(pilot: Pilot, played: Played) -> None:
+    flying(pilot, Target((8, 0, 0), lands=True))
+    assert steps(pilot, played).phase is Phase.LANDED
+    assert played.done == []
+
+
+def test_who_has_landed_takes_off_again(pilot: Pilot, played: Played) -> None:
+    flying(pilot, Target((8, 0, 0), lands=True))
+    steps(pilot, played)
+    pilot.fly(2, THERE)
+    assert steps(pilot, played, 3).phase is Phase.ARRIVED
+
+
+@pytest.mark.parametrize(
+    ("seen", "why"),
+    [
+        (replace(GROUND, healthy=False), "its autopilot is not ready to arm"),
+        (replace(GROUND, place=(50, 0, 0)), "it stands at 50, 0, 0, outside of the fence (-1, -1, 0 to 9, 9, 9)"),
+    ],
+)
+def test_nothing_is_armed_that_is_not_ready(pilot: Pilot, played: Played, seen: Telemetry, why: str) -> None:
+    played.seen = seen
+    flying(pilot)
+    assert steps(pilot, played).why == why
+    assert played.done == []
+
+
+@pytest.mark.parametrize("refused", ["arm", "rise"])
+def test_who_refuses_is_out_and_is_not_left_armed(pilot: Pilot, played: Played, refused: str) -> None:
+    played.refuses = {refused, "land"}
+    flying(pilot)
+    assert steps(pilot, played).phase is Phase.OUT
+    steps(pilot, played)
+    assert not played.seen.armed
+    assert played.done[-2:] == ["land", "disarm"]
+
+
+def test_who_refuses_set_points_at_first_is_asked_again(pilot: Pilot, played: Played) -> None:
+    played.refuses = {"go"}
+    flying(pilot)
+    assert steps(pilot, played, 4).phase is Phase.CLIMBING
+    played.refuses = set()
+    assert steps(pilot, played).phase is Phase.FLYING
+
+
+def test_who_refuses_set_points_for_good_is_out(pilot: Pilot, played: Played) -> None:
+    played.refuses = {"go"}
+    flying(pilot)
+    assert steps(pilot, played, 4, CLIMB_S / 2).why == "it did not go (3, 1, 2)"
+
+
+def test_a_take_off_that_never_ends(pilot: Pilot, played: Played) -> None:
+    flying(pilot)
+    steps(pilot, played)
+    played.seen = replace(played.seen, place=(0, 0, 0.5))
+    assert steps(pilot, played, 4, CLIMB_S / 2).why == "it has not reached the height of its take-off within 30 s"
+
+
+@pytest.mark.parametrize(
+    ("seen", "why"),
+    [
+        ({"silent_s": 11.0}, "its link has been silent for 10 s"),
+        ({"place": (3.0, 11.0, 2.0)}, "it has left the fence, at 3, 11, 2"),
+        ({"place": (3.0, 1.0, 10.5)}, "it has left the fence, at 3, 1, 10.5"),
+        ({"armed": False}, "its motors have stopped"),
+        ({"mode": "RETURN_TO_LAUNCH"}, "it no longer follows set points: its mode is return_to_launch"),
+    ],
+)
+def test_who_does_not_fly_as_told_is_out_and_lands(
+    pilot: Pilot, played: Played, seen: dict[str, object], why: str
+) -> None:
+    flying(pilot)
+    steps(pilot, played, 3)
+    steps(pilot, played, 1, 2 * MODE_S)
+    played.seen = replace(played.seen, **seen)  # type: ignore[arg-type]
+    assert steps(pilot, played).why == why
+    steps(pilot, played, 3)
+    assert played.done[-1] == "land"
+    assert played.done.count("land") == 1
+    pilot.fly(2, Target((5, 5, 5)))
+    assert steps(pilot, played, 3).phase is Phase.OUT
+    assert played.done[-1] == "land"
+
+
+@pytest.mark.parametrize("within", [1, 3])
+def test_whom_a_person_has_taken_over_gets_no_command_any_more(pilot: Pilot, played: Played, within: int) -> None:
+    flying(pilot)
+    steps(pilot, played, within)
+    played.seen = replace(played.seen, mode="POSCTL", place=(0, 0, 1))
+    done = [*played.done]
+    assert steps(pilot, played, 1, 2 * MODE_S).why == "it no longer follows set points: its mode is posctl"
+    steps(pilot, played, 3)
+    pilot.end(AtEnd.LAND, waits=True)
+    steps(pilot, played)
+    assert is_over(pilot)
+    assert played.done == done
+
+
+def test_a_mode_that_was_told_before_is_no_reason(pilot: Pilot, played: Played) -> None:
+    flying(pilot)
+    steps(pilot, played)
+    played.seen = replace(played.seen, mode="MANUAL")
+    pilot.end(AtEnd.LAND, waits=False)
+    steps(pilot, played, 2)
+    assert played.done[-1] == "land"
+    assert is_over(pilot)
+
+
+def test_at_the_end_a_vehicle_may_hold(pilot: Pilot, played: Played) -> None:
+    flying(pilot)
+    steps(pilot, played, 3)
+    pilot.end(AtEnd.HOLD, waits=True)
+    assert steps(pilot, played, 2).phase is Phase.ARRIVED
+    assert is_over(pilot)
+    assert played.done[-1] == "hold"
+
+
+def test_an_end_that_is_refused_is_asked_for_again_and_given_up_at_last(pilot: Pilot, played: Played) -> None:
+    flying(pilot)
+    steps(pilot, played, 3)
+    played.refuses = {"land"}
+    pilot.end(AtEnd.LAND, waits=True)
+    steps(pilot, played, 3, 1.0)
+    assert played.done[-3:] == ["land"] * 3
+    assert not is_over(pilot)
+    assert steps(pilot, played, 1, 2 * END_S).why == "it has not answered at the end, for 10 s"
+    assert is_over(pilot)
+
+
+def test_a_landing_that_never_ends_is_not_waited_for_for_ever(pilot: Pilot, played: Played) -> None:
+    flying(pilot)
+    steps(pilot, played, 3)
+    pilot.end(AtEnd.LAND, waits=True)
+    assert steps(pilot, played, 2, LANDING_S).why == "it has not landed within 90 s"
+    assert is_over(pilot)
+
+
+def test_who_is_not_heard_in_time_is_out(pilot: Pilot, played: Played) -> None:
+    played.connects, played.seen = False, Telemetry()
+    assert steps(pilot, played, 9, 1.0).phase is Phase.CONNECTING
+    assert steps(pilot, played, 3, 1.0).why == "it is not heard on udpin://0.0.0.0:1 within 10 s"
+
+
+def test_who_tells_no_place_is_out(pilot: Pilot, played: Played) -> None:
+    played.seen = replace(GROUND, place=None)
+    assert steps(pilot, played, 12, 1.0).why == "it has told no place on udpin://0.0.0.0:1 within 10 s"

@@ -1,0 +1,325 @@
+"""Vehicles that speak MAVLink as PX4 does, played in a thread of the test: no autopilot, no simulator, no ROS.
+
+They know what robochoc relies on: arming and its refusal, take-off, offboard set points, hold, land, what PX4 does by
+itself when set points stay away (`COM_OF_LOSS_T`, `COM_OBL_RC_ACT`), when nobody takes off (`COM_DISARM_PRFLT`), and
+after a landing. A vehicle moves straight towards its target at a constant speed. Places are ENU, in metres, from where
+the vehicle was switched on; to the other end they are NED, or GPS.
+"""
+
+from __future__ import annotations
+
+import math
+import selectors
+import socket
+import threading
+import time
+from collections.abc import Sequence
+from contextlib import suppress
+from dataclasses import dataclass, field
+from types import TracebackType
+from typing import Any, Self
+
+from pymavlink.dialects.v20 import common
+
+from tests.support.limits import HANG_S, wait_until
+from tests.support.ports import LOOPBACK
+from tests.support.wgs84 import Geodetic, enu_of, geodetic_of
+
+OFFBOARD_LOSS_S = 1.0
+"""PX4's COM_OF_LOSS_T: after so long without a set point it leaves the offboard mode."""
+DISARM_S = 3.0
+"""PX4's COM_DISARM_PRFLT, shortened: who is armed and does not take off is disarmed."""
+TICK_S = 0.02
+_HEARTBEAT_S, _TELEMETRY_S = 0.2, 0.05
+_NEAR_M = 0.05
+_AUTO = {"takeoff": 2, "hold": 3, "land": 6}
+_MAIN_AUTO, _MAIN_OFFBOARD = 4, 6
+_MODES = {(_MAIN_AUTO, sub): name for name, sub in _AUTO.items()} | {(_MAIN_OFFBOARD, 0): "offboard"}
+_CUSTOM = {"offboard": _MAIN_OFFBOARD << 16, **{name: _MAIN_AUTO << 16 | sub << 24 for name, sub in _AUTO.items()}}
+HOME = Geodetic(47.397742, 8.545594, 488.0)
+"""Where vehicles are switched on, unless a test says otherwise: PX4's own simulated field."""
+
+
+@dataclass
+class Vehicle:
+    """A vehicle: what it is told to be, and what has become of it. Tests read and set the fields while it lives."""
+
+    port: int
+    home: Geodetic = HOME
+    at: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    speed: float = 20.0
+    battery: float = 1.0
+    refuses: set[str] = field(default_factory=set)
+    """Of "arm", "takeoff", "offboard", "land": commands that are denied."""
+    silent: bool = False
+    """True: neither sends nor hears, as without radio."""
+    silent_from: str = ""
+    """The mode from whose beginning on it is silent."""
+    healthy: bool = True
+    mode: str = "hold"
+    armed: bool = False
+    log: list[str] = field(default_factory=list)
+    """What has happened to it, in order."""
+    setpoints: list[float] = field(default_factory=list)
+    """When set points came."""
+    takeoff_m: float = 2.5
+    target: tuple[float, float, float] | None = None
+
+    @property
+    def flies(self) -> bool:
+        return self.at[2] > _NEAR_M
+
+    @property
+    def is_safe(self) -> bool:
+        """Return whether it is on the ground and disarmed, or keeps its place by itself, or lands."""
+        return not self.armed or (self.flies and self.mode in {"hold", "land"})
+
+    def is_near(self, at: tuple[float, float, float], within: float = 0.3) -> bool:
+        return math.dist(self.at, at) < within
+
+
+class _Played:
+    """The machinery of one vehicle."""
+
+    def __init__(self, vehicle: Vehicle, system: int) -> None:
+        self.vehicle = vehicle
+        self.socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+        self.socket.bind((LOOPBACK, 0))
+        self.socket.setblocking(False)
+        self._mav: Any = common.MAVLink(self, srcSystem=system, srcComponent=1)
+        self._mav.robust_parsing = True
+        self._begun = time.monotonic()
+        self._heartbeat_at = self._telemetry_at = self._armed_at = 0.0
+        self._setpoint_at = -math.inf
+        self._wanted: tuple[float, float, float] | None = None
+
+    def write(self, content: bytes) -> None:
+        """Send, as the library's file."""
+        if not self.vehicle.silent:
+            with suppress(OSError):
+                self.socket.sendto(content, (LOOPBACK, self.vehicle.port))
+
+    def hear(self) -> None:
+        while True:
+            try:
+                content = self.socket.recv(4096)
+            except BlockingIOError:
+                return
+            except OSError:
+                continue  # what was sent before has reached nobody
+            if self.vehicle.silent:
+                continue
+            for message in self._mav.parse_buffer(content) or ():
+                self._take(message)
+
+    # Time goes by
+
+    def live(self, now: float, passed: float) -> None:
+        vehicle = self.vehicle
+        self._move(vehicle, passed)
+        if vehicle.mode == "offboard" and now - self._setpoint_at > OFFBOARD_LOSS_S:
+            self._enter("land", "offboard lost")
+        if vehicle.armed and not vehicle.flies:
+            if vehicle.mode == "land":
+                self._disarm("landed")
+            elif vehicle.mode == "hold" and now - self._armed_at > DISARM_S:
+                self._disarm("disarmed by itself")
+        if now - self._heartbeat_at > _HEARTBEAT_S:
+            self._heartbeat_at = now
+            base = common.MAV_MODE_FLAG_CUSTOM_MODE_ENABLED | (
+                common.MAV_MODE_FLAG_SAFETY_ARMED if vehicle.armed else 0
+            )
+            state = common.MAV_STATE_ACTIVE if vehicle.armed else common.MAV_STATE_STANDBY
+            self._mav.heartbeat_send(
+                common.MAV_TYPE_QUADROTOR, common.MAV_AUTOPILOT_PX4, base, _CUSTOM[vehicle.mode], state
+            )
+        if now - self._telemetry_at > _TELEMETRY_S:
+            self._telemetry_at = now
+            self._tell(round((now - self._begun) * 1000))
+
+    def _move(self, vehicle: Vehicle, passed: float) -> None:
+        if not vehicle.armed:
+            return
+        if vehicle.mode == "land":
+            vehicle.target = (vehicle.at[0], vehicle.at[1], 0.0)
+        elif vehicle.mode == "offboard":
+            vehicle.target = self._wanted
+        if vehicle.target is None:
+            return
+        left = math.dist(vehicle.at, vehicle.target)
+        step = vehicle.speed * passed
+        if left <= step:
+            if left and vehicle.mode == "offboard":
+                vehicle.log.append("reached " + ",".join(f"{one:g}" for one in vehicle.target))
+            vehicle.at = vehicle.target
+            if vehicle.mode == "takeoff":
+                self._enter("hold", "took off")
+            return
+        e, n, u = (here + (there - here) * step / left for here, there in zip(vehicle.at, vehicle.target, strict=True))
+        vehicle.at = (e, n, u)
+
+    def _enter(self, mode: str, why: str = "") -> None:
+        if why:
+            self.vehicle.log.append(why)
+        if mode != self.vehicle.mode:
+            self.vehicle.mode = mode
+            self.vehicle.silent = self.vehicle.silent or mode == self.vehicle.silent_from
+            self.vehicle.log.append(mode)
+        if mode == "hold":
+            self.vehicle.target = self.vehicle.at if self.vehicle.flies else None
+
+    def _disarm(self, why: str) -> None:
+        self.vehicle.armed = False
+        self.vehicle.log.append(why)
+        self._enter("hold")
+
+    def _tell(self, boot_ms: int) -> None:
+        vehicle, mav = self.vehicle, self._mav
+        east, north, up = vehicle.at
+        place = geodetic_of((east, north, up), vehicle.home)
+        lat, lon = round(place.lat * 1e7), round(place.lon * 1e7)
+        mav.local_position_ned_send(boot_ms, north, east, -up, 0, 0, 0)
+        mav.global_position_int_send(boot_ms, lat, lon, round(place.alt * 1000), round(up * 1000), 0, 0, 0, 0)
+        mav.gps_raw_int_send(boot_ms * 1000, 3, lat, lon, round(place.alt * 1000), 100, 100, 0, 0, 10)
+        home = vehicle.home
+        mav.home_position_send(
+            round(home.lat * 1e7), round(home.lon * 1e7), round(home.alt * 1000), 0, 0, 0, [1, 0, 0, 0], 0, 0, 0
+        )
+        landed = common.MAV_LANDED_STATE_IN_AIR if vehicle.flies else common.MAV_LANDED_STATE_ON_GROUND
+        mav.extended_sys_state_send(0, landed)
+        sensors = common.MAV_SYS_STATUS_SENSOR_3D_GYRO | common.MAV_SYS_STATUS_PREARM_CHECK
+        percent = round(vehicle.battery * 100)
+        mav.sys_status_send(sensors, sensors, sensors if vehicle.healthy else 0, 0, 12000, 0, percent, 0, 0, 0, 0, 0, 0)
+        mav.battery_status_send(0, 0, 0, 0, [12000] + [65535] * 9, 0, -1, -1, percent)
+
+    # What comes
+
+    def _take(self, message: Any) -> None:  # noqa: ANN401 - the library's
+        match message.get_type():
+            case "COMMAND_LONG":
+                self._mav.command_ack_send(message.command, self._obey(message))
+            case "SET_POSITION_TARGET_LOCAL_NED":
+                self._set((message.y, message.x, -message.z))
+            case "SET_POSITION_TARGET_GLOBAL_INT":
+                place = Geodetic(message.lat_int / 1e7, message.lon_int / 1e7, message.alt)
+                self._set(enu_of(place, self.vehicle.home))
+            case "PARAM_SET":
+                if message.param_id == "MIS_TAKEOFF_ALT":
+                    self.vehicle.takeoff_m = message.param_value
+                self._value(message.param_id, message.param_value, message.param_type)
+            case "PARAM_REQUEST_READ":
+                if message.param_id == "MIS_TAKEOFF_ALT":
+                    self._value(message.param_id, self.vehicle.takeoff_m, common.MAV_PARAM_TYPE_REAL32)
+            case _:
+                pass
+
+    def _value(self, name: str, value: float, kind: int) -> None:
+        self._mav.param_value_send(name.encode(), value, kind, 1, 0)
+
+    def _set(self, place: tuple[float, float, float]) -> None:
+        self._setpoint_at = time.monotonic()
+        self.vehicle.setpoints.append(self._setpoint_at)
+        self._wanted = place
+
+    def _obey(self, message: Any) -> int:  # noqa: ANN401 - the library's
+        match message.command:
+            case common.MAV_CMD_COMPONENT_ARM_DISARM:
+                result = self._armed(on=message.param1 > 0)
+            case common.MAV_CMD_NAV_TAKEOFF:
+                result = self._mode("takeoff")
+            case common.MAV_CMD_NAV_LAND:
+                result = self._mode("land")
+            case common.MAV_CMD_DO_SET_MODE:
+                main, sub = round(message.param2), round(message.param3)
+                result = self._mode(_MODES.get((main, 0 if main == _MAIN_OFFBOARD else sub), ""))
+            case common.MAV_CMD_REQUEST_MESSAGE:
+                result = self._answer(round(message.param1))
+            case common.MAV_CMD_SET_MESSAGE_INTERVAL:
+                result = common.MAV_RESULT_ACCEPTED
+            case _:
+                result = common.MAV_RESULT_UNSUPPORTED
+        return int(result)
+
+    def _answer(self, number: int) -> int:
+        """Send a message that was asked for, by its number."""
+        if number == common.MAVLINK_MSG_ID_AUTOPILOT_VERSION:
+            self._mav.autopilot_version_send(0, 0, 0, 0, 0, [0] * 8, [0] * 8, [0] * 8, 0, 0, self.vehicle.port)
+            return int(common.MAV_RESULT_ACCEPTED)
+        return int(common.MAV_RESULT_UNSUPPORTED)
+
+    def _armed(self, *, on: bool) -> int:
+        vehicle = self.vehicle
+        if "arm" in vehicle.refuses or (not on and vehicle.flies):
+            vehicle.log.append("refused to arm")
+            return int(common.MAV_RESULT_DENIED)
+        if on and not vehicle.armed:
+            vehicle.armed, self._armed_at = True, time.monotonic()
+            vehicle.log.append("armed")
+        elif not on and vehicle.armed:
+            self._disarm("disarmed")
+        return int(common.MAV_RESULT_ACCEPTED)
+
+    def _mode(self, mode: str) -> int:
+        vehicle = self.vehicle
+        stale = mode == "offboard" and time.monotonic() - self._setpoint_at > OFFBOARD_LOSS_S
+        if not mode or mode in vehicle.refuses or stale or (mode == "takeoff" and not vehicle.armed):
+            vehicle.log.append(f"refused {mode}")
+            return int(common.MAV_RESULT_DENIED)
+        self._enter(mode)
+        if mode == "takeoff":
+            vehicle.target = (vehicle.at[0], vehicle.at[1], vehicle.takeoff_m)
+        return int(common.MAV_RESULT_ACCEPTED)
+
+
+class Vehicles:
+    """Plays `vehicles` while it is a context, each with a MAVLink system of its own."""
+
+    def __init__(self, vehicles: Sequence[Vehicle]) -> None:
+        self.vehicles = [*vehicles]
+        self._played: list[_Played] = []
+        self._over = threading.Event()
+        self._thread = threading.Thread(target=self._play, name="played vehicles")
+
+    def __enter__(self) -> Self:
+        self._played = [_Played(vehicle, number + 1) for number, vehicle in enumerate(self.vehicles)]
+        self._thread.start()
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self._over.set()
+        self._thread.join(HANG_S)
+        for played in self._played:
+            played.socket.close()
+
+    def __iter__(self) -> Any:  # noqa: ANN401 - an iterator
+        return iter(self.vehicles)
+
+    def __getitem__(self, number: int) -> Vehicle:
+        return self.vehicles[number]
+
+    def wait_until_safe(self) -> None:
+        """Wait until each is on the ground, or holds or lands by itself."""
+        wait_until(lambda: all(vehicle.is_safe for vehicle in self.vehicles), self.state)
+
+    def wait_until_landed(self) -> None:
+        wait_until(lambda: not any(one.armed or one.flies for one in self.vehicles), self.state)
+
+    def state(self) -> str:
+        """Return in words where all are."""
+        return "; ".join(f"{one.mode} armed={one.armed} at {one.at}: {one.log}" for one in self.vehicles)
+
+    def _play(self) -> None:
+        with selectors.DefaultSelector() as selector:
+            for played in self._played:
+                selector.register(played.socket, selectors.EVENT_READ, played)
+            before = time.monotonic()
+            while not self._over.is_set():
+                for key, _ in selector.select(TICK_S):
+                    key.data.hear()
+                now = time.monotonic()
+                if now - before >= TICK_S:
+                    passed, before = now - before, now
+                    for played in self._played:
+                        played.live(now, passed)
