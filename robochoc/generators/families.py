@@ -22,6 +22,7 @@ from robochoc.generators import tracking as trackings
 from robochoc.generators.graph_choice import GraphChoice
 from robochoc.generators.maps import coverage as coverages
 from robochoc.generators.maps import formation as formations
+from robochoc.generators.maps import patrol as patrols
 from robochoc.generators.maps.reach import MapChoice
 from robochoc.model.allocation import Distance
 from robochoc.model.cost_units import CostUnits
@@ -181,6 +182,23 @@ def formation(
     return team
 
 
+def patrol(
+    *,
+    points: int = 6,
+    visit: str = "",
+    idle: int = 120,
+    rounds: int = 1,
+    apart: float = 2.0,
+    seed: int = 0,
+    **of_map: Any,  # noqa: ANN401 - `MapChoice`'s own
+) -> Team:
+    """Return the next visits of a patrol on a map: see `generators/maps/patrol.py`."""
+    team, _ = patrols.patrol(
+        MapChoice(**of_map), seed, points=points, visit=visit, idle=idle, rounds=rounds, apart=apart
+    )
+    return team
+
+
 FAMILIES: Mapping[str, Callable[..., Team]] = MappingProxyType(
     {
         "coloring": coloring,
@@ -189,6 +207,7 @@ FAMILIES: Mapping[str, Callable[..., Team]] = MappingProxyType(
         "grid-sensors": grid_sensors,
         "ising": isings.ising,
         "meetings": meetings,
+        "patrol": patrol,
         "queens3d": queens.queens3d,
         "random": random,
         "sensors": sensor_networks.sensors,

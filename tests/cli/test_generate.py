@@ -19,6 +19,7 @@ from robochoc.generators.ising import ising
 from robochoc.generators.maps.cells import Cells
 from robochoc.generators.maps.coverage import coverage
 from robochoc.generators.maps.formation import formation
+from robochoc.generators.maps.patrol import patrol
 from robochoc.generators.maps.reach import MapChoice
 from robochoc.generators.meetings import meetings
 from robochoc.generators.random_csp import random_on
@@ -55,6 +56,9 @@ FAMILIES: dict[str, Callable[[], Team]] = {
     "tracking --agents 3 --targets 4 --side 5": lambda: tracking(3, 4, 5),
     f"coverage --map {BUILDING} --agents 2 --cells 16 --sensing 2 --worth 3.5": lambda: coverage(
         MapChoice(map=BUILDING, agents=2, cells=16), sensing=2, worth=3.5
+    )[0],
+    f"patrol --map {BUILDING} --agents 2 --points 5 --idle 30 --rounds 2 --apart 4": lambda: patrol(
+        MapChoice(map=BUILDING, agents=2), points=5, idle=30, rounds=2, apart=4
     )[0],
     f"formation --map {BUILDING} --agents 3 --shape wedge --anchor 7,2 --within 60 --seed 2": lambda: formation(
         MapChoice(map=BUILDING, agents=3, within=60), 2, shape="wedge", anchor="7,2"

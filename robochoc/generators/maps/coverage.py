@@ -67,7 +67,7 @@ def coverage(choice: MapChoice, seed: int = 0, *, sensing: float = 3.0, worth: f
     a_cell = worth_of_a_cell(reach, seconds)
     most = [max(len(seen[cell]) for cell in own) for own in reach.seconds]
     gains = (
-        charged("unseen", number, {cell: time + a_cell * (best - len(seen[cell])) for cell, time in own.items()})
+        charged("unseen", f"V{number}", {cell: time + a_cell * (best - len(seen[cell])) for cell, time in own.items()})
         for number, (own, best) in enumerate(zip(reach.seconds, most, strict=True), 1)
     )
     team = assemble(

@@ -100,7 +100,7 @@ def formation(
         if not own:
             raise ValueError(f"robot {number} can get to no slot; move the anchor, or allow more time")
     travel = [
-        charged("travel", number, {cell: seconds[cell] for cell in own})
+        charged("travel", f"V{number}", {cell: seconds[cell] for cell in own})
         for number, (own, seconds) in enumerate(zip(values, reach.seconds, strict=True), 1)
     ]
     label = shape if shape in SHAPES else label_of(shape)
@@ -123,15 +123,13 @@ def slots_of(reach: Reach, offsets: Sequence[Offset], anchor: Place, heading: fl
     Raises:
         ValueError: There are fewer such cells than slots.
     """
-    left = {cell: reach.cells.centre(cell) for cell in reach.reached}
+    left = set(reach.reached)
     if len(left) < len(offsets):
         raise ValueError(f"robots can get to {len(left)} cells, fewer than {len(offsets)} slots; take smaller cells")
     slots = []
     for x, y in _turned(offsets, heading):
-        place = anchor[0] + x, anchor[1] + y
-        nearest = min(left, key=lambda cell: (_square(place, left[cell]), cell))
-        slots.append(nearest)
-        del left[nearest]
+        slots.append(reach.nearest((anchor[0] + x, anchor[1] + y), left))
+        left.remove(slots[-1])
     return slots
 
 
@@ -193,7 +191,3 @@ def _read_offsets(name: str, agents: int) -> list[Offset]:
 
 def _mean(places: Sequence[Place]) -> Place:
     return sum(x for x, _ in places) / Fraction(len(places)), sum(y for _, y in places) / Fraction(len(places))
-
-
-def _square(one: Place, other: Place) -> Fraction:
-    return (one[0] - other[0]) ** 2 + (one[1] - other[1]) ** 2

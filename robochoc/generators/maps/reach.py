@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from fractions import Fraction
 from itertools import combinations
 from math import floor
@@ -65,12 +65,16 @@ class Reach:
     Attributes:
         cells: The cells of the map.
         starts: Where each robot is.
+        unit: The time of a length of 1 on the pixels, in seconds.
+        longest: The longest way of a robot, as a length on the pixels. None: any.
         seconds: For each robot the time to each cell that it can get to, in units of 10**-`PLACES` seconds.
     """
 
     cells: Cells
     starts: tuple[Place, ...]
-    seconds: tuple[Mapping[int, int], ...]
+    unit: Fraction
+    longest: int | None
+    seconds: tuple[Mapping[int, int], ...] = ()
 
     @property
     def names(self) -> list[str]:
@@ -89,9 +93,34 @@ class Reach:
             for number, (name, own) in enumerate(zip(self.names, values, strict=True), 1)
         }
 
-    def extras(self) -> Extras:
-        """Return the waypoints of all robots: formulas over the numbers of cells."""
-        return Extras(topics={name: (self._waypoint(name, f"V{number}"),) for number, name in enumerate(self.names, 1)})
+    def extras(self, suffix: str = "") -> Extras:
+        """Return the waypoints of all robots: formulas over the numbers of cells, which variables `V1` have as values.
+
+        With a suffix these are `V1` and the suffix.
+        """
+        return Extras(
+            topics={name: (self._waypoint(name, f"V{number}{suffix}"),) for number, name in enumerate(self.names, 1)}
+        )
+
+    def nearest(self, place: Place, among: Iterable[int]) -> int:
+        """Return the cell whose centre is nearest to a place; of several the one of the lowest number."""
+
+        def distance(cell: int) -> tuple[Fraction, int]:
+            x, y = self.cells.centre(cell)
+            return (x - place[0]) ** 2 + (y - place[1]) ** 2, cell
+
+        return min(among, key=distance)
+
+    def seconds_from(self, pixel: tuple[int, int]) -> dict[int, int]:
+        """Return the time from a passable pixel to each free cell to which a way leads."""
+        lengths = lengths_from(pixel, self.cells.passable, self.longest)
+        found = {}
+        for cell in self.cells.free:
+            end = self.cells.pixel(self.cells.centre(cell))
+            length = UNREACHED if end is None else int(lengths[end])
+            if length != UNREACHED:
+                found[cell] = floor(length * self.unit * 10**PLACES + _HALF)
+        return found
 
     def ground(self) -> GroundMap:
         """Return the map as the flight reads it.
@@ -150,8 +179,9 @@ def reach_of(choice: MapChoice, chance: Random) -> Reach:
     # A step of STRAIGHT is one pixel.
     unit = cells.grid.resolution / (STRAIGHT * speed)
     longest = None if within is None else floor(within / unit)
-    seconds = tuple(_seconds(cells, number, place, unit, longest) for number, place in enumerate(places, 1))
-    return Reach(cells, tuple(places), seconds)
+    pixels = [_standing(cells, number, place) for number, place in enumerate(places, 1)]
+    reach = Reach(cells, tuple(places), unit, longest)
+    return replace(reach, seconds=tuple(map(reach.seconds_from, pixels)))
 
 
 def places_in(text: str, name: str) -> list[Place]:
@@ -174,17 +204,17 @@ def all_different(values: Sequence[Iterable[int]]) -> Iterator[Constraint]:
             yield Constraint("different", PREDEFINED["ne"], scope, scope)
 
 
-def charged(name: str, number: int, costs: Mapping[int, int]) -> Constraint:
-    """Return what the values of a robot cost it."""
+def charged(name: str, variable: str, costs: Mapping[int, int]) -> Constraint:
+    """Return what the values of a variable cost its robot."""
     values = sorted(costs)
     relation = Relation(
-        f"{name}{number}",
+        f"{name}{variable.removeprefix('V')}",
         1,
         Semantics.SOFT,
         tuple((value,) for value in values),
         tuple(costs[value] for value in values),
     )
-    return Constraint(name, relation, (f"V{number}",), (f"V{number}",))
+    return Constraint(name, relation, (variable,), (variable,))
 
 
 def exact(name: str, number: float, least: float, most: float) -> Fraction:
@@ -208,19 +238,12 @@ def _agents(agents: int | None, places: Sequence[Place]) -> int:
     return found
 
 
-def _seconds(cells: Cells, number: int, place: Place, unit: Fraction, longest: int | None) -> dict[int, int]:
-    """Return the time to each free cell that a robot can get to."""
-    start = cells.pixel(place)
+def _standing(cells: Cells, number: int, place: Place) -> tuple[int, int]:
+    """Return the pixel on which a robot stands."""
+    pixel = cells.pixel(place)
     told = f"robot {number} at {float(place[0]):g},{float(place[1]):g}"
-    if start is None:
+    if pixel is None:
         raise ValueError(f"{told} is not on the map")
-    if not cells.passable[start]:
+    if not cells.passable[pixel]:
         raise ValueError(f"{told} stands where it does not fit: its radius, or what is not free, is in the way")
-    lengths = lengths_from(start, cells.passable, longest)
-    found = {}
-    for cell in cells.free:
-        pixel = cells.pixel(cells.centre(cell))
-        length = UNREACHED if pixel is None else int(lengths[pixel])
-        if length != UNREACHED:
-            found[cell] = floor(length * unit * 10**PLACES + _HALF)
-    return found
+    return pixel

@@ -18,6 +18,7 @@ EXAMPLES: dict[str, dict[str, int | float | str]] = {
     "grid-sensors": {"rows": 2, "columns": 2, "targets": 1},
     "ising": {"rows": 2, "columns": 2},
     "meetings": {"agents": 3, "meetings": 2, "slots": 3},
+    "patrol": {"map": BUILDING, "agents": 2},
     "queens3d": {"n": 2},
     "random": {"agents": 4, "domain": 2, "density": 0.5, "tightness": 0.5},
     "sensors": {"sensors": 4, "targets": 1},

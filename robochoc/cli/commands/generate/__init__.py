@@ -5,7 +5,7 @@ from __future__ import annotations
 import click
 
 from robochoc.cli.commands.generate.binary import coloring, ising, random_problem
-from robochoc.cli.commands.generate.maps import coverage, formation
+from robochoc.cli.commands.generate.maps import coverage, formation, patrol
 from robochoc.cli.commands.generate.missions import grid_sensors, meetings, sensors, tasks, tracking
 from robochoc.cli.commands.generate.queens import queens3d
 from robochoc.cli.commands.generate.scenario import scenario
@@ -29,6 +29,7 @@ for family in (
     grid_sensors,
     ising,
     meetings,
+    patrol,
     queens3d,
     random_problem,
     scenario,

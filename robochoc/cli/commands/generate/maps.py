@@ -13,6 +13,7 @@ from robochoc.cli.options.generated import (
     Command,
     Options,
     TeamOnMap,
+    number,
     seed_option,
     team_written,
 )
@@ -150,5 +151,38 @@ def coverage(**problem: Any) -> TeamOnMap:  # noqa: ANN401 - `coverage`'s own
     robochoc generate coverage --map docs/examples/building/building.yaml --agents 3 --cells 40 --within 12
     """  # noqa: D301 - \\b is how click is told to leave the lines as they are
     from robochoc.generators.maps.coverage import coverage as on_map
+
+    return on_map(choice_of(problem), **problem)
+
+
+@click.command(
+    cls=SectionedCommand,
+    sections={
+        COMMON: ("--map", "--agents", "--at"),
+        "Points of interest": ("--points", "--visit", "--idle", "--rounds", "--apart"),
+        "Robots and cells": ON_MAP,
+        "Output": OUTPUT,
+    },
+    short_help="On a map: who visits which point of interest next.",
+)
+@map_options
+@number("--points", "Number of points that are drawn, far from each other.", most=100, default=6)
+@click.option("--visit", default="", metavar="'X,Y X,Y'", help="The points, in metres, in the place of drawn ones.")
+@number("--idle", "Nobody has been at a point for 0 to N seconds.", least=0, most=1_000_000, default=120)
+@number("--rounds", "Visits that each robot plans.", most=4, default=1)
+@metres("--apart", "Robots that are nearer to each other pay for it.", 2.0)
+@seed_option
+@team_written("patrol-MAP-AGENTS-POINTS-ROUNDS-SEED")
+def patrol(**problem: Any) -> TeamOnMap:  # noqa: ANN401 - `patrol`'s own
+    """Patrols on a map (Machado et al. 2002, Portugal and Rocha 2013): each robot visits a point in each round.
+
+    The cost is the travel time of all robots, and how long the points that nobody visits have been idle. No point is
+    visited twice. With --rounds a robot has a variable for each round; it flies to the first.
+
+    \b
+    robochoc generate patrol --map docs/examples/building/building.yaml --agents 3 --points 8
+    robochoc generate patrol --map docs/examples/building/building.yaml --agents 2 --points 6 --rounds 2
+    """  # noqa: D301 - \\b is how click is told to leave the lines as they are
+    from robochoc.generators.maps.patrol import patrol as on_map
 
     return on_map(choice_of(problem), **problem)

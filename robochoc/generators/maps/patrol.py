@@ -1,0 +1,225 @@
+"""Patrols on a map: which robot visits which point of interest next, and where it goes from there.
+
+A point that nobody has visited for long should be visited soon. How long that is, its idleness, is what patrols are
+measured by: Machado, Ramalho, Zucker and Drogoul, "Multi-agent patrolling: an empirical analysis of alternative
+architectures", MABS 2002; Portugal and Rocha, "Multi-robot patrolling algorithms: examining performance and
+scalability", Advanced Robotics 27 (2013). Here robots plan a few visits ahead, `rounds`:
+
+- each robot visits a point in each round, and no point is visited twice;
+- the cost is the travel time of all robots, and the idleness of the points that nobody visits;
+- robots that are nearer to each other than `apart` after a round pay for it, in the time that it takes to drive the
+  missing metres.
+
+Points of interest are given, or drawn: the first by chance, and each of the others as far from those before it as can
+be (Gonzalez, "Clustering to minimize the maximum intercluster distance", TCS 38, 1985).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from fractions import Fraction
+from itertools import combinations, pairwise, product
+from math import floor, isqrt
+from random import Random
+
+from robochoc.formats import PREDEFINED
+from robochoc.formats.ground_map import GroundMap
+from robochoc.generators.draws import bounded, check_bounds, seeded, uniform
+from robochoc.generators.maps.reach import (
+    PLACES,
+    MapChoice,
+    Reach,
+    charged,
+    exact,
+    label_of,
+    places_in,
+    reach_of,
+)
+from robochoc.model.assembly import assemble
+from robochoc.model.constraint import Constraint, Domain, Relation, Semantics, Variable
+from robochoc.model.cost_units import CostUnits
+from robochoc.model.problem import INFINITE, ProblemKind, Team
+
+MAX_POINTS = 100
+MAX_ROUNDS = 4
+MAX_PLANS = 100_000
+"""The maximum number of plans of a robot: points to the power of rounds."""
+MAX_IDLE = 1_000_000
+_MM = 1000
+"""Distances are rounded down to millimetres."""
+_HALF = Fraction(1, 2)
+
+Legs = Mapping[int, Mapping[int, int]]
+"""The time from each point to each other one, where a way leads."""
+
+
+def patrol(
+    choice: MapChoice,
+    seed: int = 0,
+    *,
+    points: int = 6,
+    visit: str = "",
+    idle: int = 120,
+    rounds: int = 1,
+    apart: float = 2.0,
+) -> tuple[Team, GroundMap]:
+    """Return the problem of the next visits of a patrol, and the map as the flight reads it.
+
+    `Robot3` owns `V3`, the cell of the point that it visits; with several rounds `V3.1`, `V3.2` and so on. Its waypoint
+    is the first. Costs are seconds.
+
+    Args:
+        choice: The map and the robots. Each leg takes a robot at most the time of `within`.
+        seed: The same seed makes the same problem on every machine.
+        points: The number of points that are drawn.
+        visit: The points, `X,Y X,Y`, in metres; each is the nearest cell that a robot can get to. Empty: drawn.
+        idle: Points are idle for 0 to so many seconds, each number as likely as any other.
+        rounds: The number of visits that each robot plans.
+        apart: How far apart robots should be, in metres.
+
+    Raises:
+        InvalidInputError: The files hold no map.
+        ValueError: A number is out of its bounds, or a robot can get to no point. The text says which.
+    """
+    chance = seeded(seed)
+    given = places_in(visit, "visit")
+    count = len(given) or points
+    check_bounds({"points": (count, 1, MAX_POINTS), "rounds": (rounds, 1, MAX_ROUNDS), "idle": (idle, 0, MAX_IDLE)})
+    metres = exact("apart", apart, 0, 1000)
+    reach = reach_of(choice, chance)
+    agents = len(reach.starts)
+    if agents * rounds > count:
+        raise ValueError(
+            f"{agents} robots make {agents * rounds} visits, more than {count} points; ask for more points"
+        )
+    if count**rounds > MAX_PLANS:
+        raise ValueError(f"{count} points in {rounds} rounds are more than {MAX_PLANS:,} plans; ask for fewer")
+    if count > len(reach.reached):
+        raise ValueError(f"robots can get to {len(reach.reached)} cells, fewer than {count} points; take smaller cells")
+    chosen = _nearest(reach, given) if given else drawn_points(reach, count, chance)
+    idleness = {point: uniform(chance, 0, idle) * 10**PLACES for point in chosen}
+    legs = _legs(reach, chosen) if rounds > 1 else {}
+    plans = [_Plan(reach, number, chosen, rounds) for number in range(1, agents + 1)]
+    constraints = [
+        *(one for plan in plans for one in plan.private(reach, idleness, legs)),
+        *_between(plans, _crowding(reach, chosen, metres, choice.speed)),
+    ]
+    # What is charged for a visit is the idleness that another point would have had.
+    unvisited = sum(idleness.values()) - agents * rounds * max(idleness.values())
+    team = assemble(
+        f"patrol-{label_of(choice.map)}-{agents}-{count}-{rounds}-{seed}",
+        {name: plan.variables for name, plan in zip(reach.names, plans, strict=True)},
+        bounded(constraints),
+        kind=ProblemKind.DISWCSP,
+        costs=CostUnits(places=PLACES, constant=unvisited),
+        extras=reach.extras(".1" if rounds > 1 else ""),
+    )
+    return team, reach.ground()
+
+
+def drawn_points(reach: Reach, count: int, chance: Random) -> list[int]:
+    """Return points of interest that are spread over the cells that robots can get to."""
+    cells = reach.reached
+    found = [cells[uniform(chance, 0, len(cells) - 1)]]
+    away = dict.fromkeys(cells, MAX_IDLE**2)
+    while len(found) < count:
+        x, y = reach.cells.x_and_y(found[-1])
+        for cell in cells:
+            right, up = reach.cells.x_and_y(cell)
+            away[cell] = min(away[cell], (x - right) ** 2 + (y - up) ** 2)
+        found.append(max(cells, key=lambda cell: (away[cell], -cell)))
+    return sorted(found)
+
+
+class _Plan:
+    """The visits of a robot: a variable for each round, whose values are the points that it can get to."""
+
+    def __init__(self, reach: Reach, number: int, points: Sequence[int], rounds: int) -> None:
+        self.number = number
+        self.first = [point for point in points if point in reach.seconds[number - 1]]
+        if not self.first:
+            raise ValueError(f"robot {number} can get to no point; give other points, or allow more time")
+        self._points = points
+        self.names = [f"V{number}"] if rounds == 1 else [f"V{number}.{turn}" for turn in range(1, rounds + 1)]
+
+    @property
+    def variables(self) -> list[Variable]:
+        """The robot's variables, one a round."""
+        return [
+            Variable(name, Domain(f"Points{name.removeprefix('V')}", tuple(range(one, one + 1) for one in values)))
+            for name, values in zip(self.names, self.values, strict=True)
+        ]
+
+    @property
+    def values(self) -> list[Sequence[int]]:
+        """The points that can be visited, round by round."""
+        return [self.first, *[self._points] * (len(self.names) - 1)]
+
+    def private(self, reach: Reach, idleness: Mapping[int, int], legs: Legs) -> Iterator[Constraint]:
+        """Yield what the robot's visits cost: ways, and what is gained less than at the point that is idle longest."""
+        longest = max(idleness.values())
+        seconds = reach.seconds[self.number - 1]
+        for name, values in zip(self.names, self.values, strict=True):
+            way = seconds if name == self.names[0] else dict.fromkeys(values, 0)
+            yield charged("visit", name, {point: way[point] + longest - idleness[point] for point in values})
+        for scope in pairwise(self.names):
+            rows = {(one, other): time for one in legs for other, time in legs[one].items() if one != other}
+            relation = Relation(
+                f"leg{scope[0].removeprefix('V')}",
+                2,
+                Semantics.SOFT,
+                tuple(rows),
+                tuple(rows.values()),
+                default_cost=INFINITE,
+            )
+            yield Constraint("leg", relation, scope, scope)
+        for one, other in combinations(self.names, 2):
+            yield Constraint("different", PREDEFINED["ne"], (one, other), (one, other))
+
+
+def _between(plans: Sequence[_Plan], crowding: Mapping[tuple[int, int], int]) -> Iterator[Constraint]:
+    """Yield that no two robots visit the same point, and what it costs to be near each other after a round."""
+    for one, other in combinations(plans, 2):
+        for scope, (values, others) in zip(
+            product(one.names, other.names), product(one.values, other.values), strict=True
+        ):
+            if not set(values).isdisjoint(others):
+                yield Constraint("different", PREDEFINED["ne"], scope, scope)
+        for turn, scope in enumerate(zip(one.names, other.names, strict=True)):
+            pairs = product(one.values[turn], other.values[turn])
+            rows = {pair: crowding[pair] for pair in pairs if crowding.get(pair)}
+            if rows:
+                name = "-".join(name.removeprefix("V") for name in scope)
+                relation = Relation(f"near{name}", 2, Semantics.SOFT, tuple(rows), tuple(rows.values()))
+                yield Constraint("near", relation, scope, scope)
+
+
+def _nearest(reach: Reach, places: Sequence[tuple[Fraction, Fraction]]) -> list[int]:
+    """Return the cells of given points; no two have the same."""
+    left, found = set(reach.reached), []
+    for place in places:
+        found.append(reach.nearest(place, left))
+        left.remove(found[-1])
+    return sorted(found)
+
+
+def _legs(reach: Reach, points: Sequence[int]) -> dict[int, dict[int, int]]:
+    found = {}
+    for point in points:
+        pixel = reach.cells.pixel(reach.cells.centre(point))
+        times = reach.seconds_from(pixel) if pixel else {}
+        found[point] = {other: times[other] for other in points if other in times}
+    return found
+
+
+def _crowding(reach: Reach, points: Sequence[int], apart: Fraction, speed: float) -> dict[tuple[int, int], int]:
+    """Return the time that it takes to drive the metres that two points are too near to each other."""
+    found = {}
+    for one, other in combinations(points, 2):
+        (a, b), (c, d) = reach.cells.centre(one), reach.cells.centre(other)
+        square = (a - c) ** 2 + (b - d) ** 2
+        if square < apart**2:
+            missing = apart - Fraction(isqrt(floor(square * _MM**2)), _MM)
+            exactly: Fraction = missing / Fraction(str(speed)) * 10**PLACES
+            found[one, other] = found[other, one] = floor(exactly + _HALF)
+    return found
