@@ -68,7 +68,7 @@ def test_a_mutant_meets_the_tests_of_its_file_then_those_of_all_who_use_it() -> 
     bounding = [tests for tests, _ in commands_for("robochoc/protocols/optimization/bounding.py")]
     assert bounding[0] == ("tests/protocols/test_bounding.py",)
     assert {"tests/protocols/test_adopt.py", "tests/protocols/test_bnb_adopt.py"} <= set(bounding[1])
-    assert bounding[2] == ("tests/conformance", "-k", "adopt or adopt-k or bnb-adopt")
+    assert bounding[2] == ("tests/conformance", "-k", "adopt or adopt-k or bnb-adopt or bnb-adopt-fdac")
     assert next(commands_for("robochoc/communication/host.py"))[0] == ("tests/unit/communication/test_host.py",)
     assert all(Path(ROOT, test).exists() for test in (*bounding[0], *bounding[1]))
 

@@ -28,6 +28,7 @@ BOUNDING = (
     "adopt",
     "adopt-k",
     "bnb-adopt",
+    "bnb-adopt-fdac",
     "sfb",
     "dpop",
     "ncbb",

@@ -69,6 +69,12 @@ REAL = {
     ("bnb-adopt", "Cost"): (
         "RX03 says: as long as X02 = 1 and X00 = 3, my subtree costs between 0 and 9; tell me my threshold again"
     ),
+    ("bnb-adopt-fdac", "Domain"): "RX02 says: X02 is -3, 0, 1 or 3; what can you move to each of them?",
+    ("bnb-adopt-fdac", "Moved"): "RX01 says: count as your own, with your values one by one: 13, 12, 13, 12",
+    ("bnb-adopt-fdac", "Value"): "RX02 says: X02 = 1 from now on (change 1)",
+    ("bnb-adopt-fdac", "Cost"): (
+        "RX01 says: as long as X00 = -3 and X02 = 1, my subtree costs 0 more than it has moved up"
+    ),
     ("adopt-k", "Value"): (
         "RX03 says: X03 = 3 from now on (change 18); try other values once yours costs k more than 0, or 8"
     ),

@@ -14,7 +14,7 @@ again.
   for the heuristic: Ali, Koenig, Tambe: "Preprocessing techniques for accelerating the DCOP algorithm ADOPT", AAMAS
   2005.
 
-The methods have the names of the procedures:
+The methods have the names of the procedures, some of them in `depth_first`:
 
     Start          `begin`                 InitSelf        `_merge`, `_choose`
     When Received  `handle`                InitChild       `forget` (in `bounding`, as the next ones)
@@ -55,16 +55,13 @@ to a leaf, where LB = UB: a contradiction.
 
 from __future__ import annotations
 
-from typing import Any, ClassVar, assert_never, cast
-
-import msgspec
+from typing import Any, ClassVar, cast
 
 from robochoc.model import message
 from robochoc.model.message import Message
-from robochoc.model.problem import INFINITE
-from robochoc.protocols.optimization.bounding import BoundingProtocol
+from robochoc.protocols.optimization.depth_first import DepthFirstProtocol
 from robochoc.protocols.optimization.messages.bnb_adopt import Cost, Domain, Floor, Value
-from robochoc.protocols.optimization.messages.bounding import Context, Number, Terminate
+from robochoc.protocols.optimization.messages.bounding import Number, Terminate
 from robochoc.protocols.optimization.settings.bnb_adopt import BnBADOPTSettings
 from robochoc.protocols.order import PriorityOrder
 from robochoc.protocols.shared.messages.dfs import TreeMessage
@@ -74,11 +71,10 @@ from robochoc.system.compiling import mypyc_attr
 
 
 @mypyc_attr(allow_interpreted_subclasses=True)
-class BnBADOPT(BoundingProtocol):
-    """One agent of BnB-ADOPT+. State besides the bounds: `threshold` (TH).
+class BnBADOPT(DepthFirstProtocol):
+    """One agent of BnB-ADOPT+. State besides the search's (`depth_first`): `floors`.
 
-    `sent_values` are the last Values sent to each child, `sent_cost` the last Cost, without its request.
-    `floors`: for each own value, what the subtree of each child costs at least in any context (h).
+    These are, for each own value, what the subtree of each child costs at least in any context (h).
     """
 
     messages: ClassVar[Any] = TreeMessage | Value | Cost | Domain | Floor | Terminate
@@ -96,12 +92,7 @@ class BnBADOPT(BoundingProtocol):
 
     def __init__(self, problem: LocalProblem, order: PriorityOrder) -> None:
         super().__init__(problem, order)
-        self.threshold: Number = INFINITE
-        self.threshold_request = False
-        self.sent_values: dict[str, Value] = {}
-        self.sent_cost: Cost | None = None
         self.floors: dict[str, list[Number]] = {}
-        self._moved = False
         self._parent_values: list[message.Value] | None = None
 
     def begin(self) -> None:
@@ -118,29 +109,13 @@ class BnBADOPT(BoundingProtocol):
 
     def handle(self, sender: str, message: Message) -> None:
         """Dispatch on the message's type."""
-        if self.terminated:
-            return
         match cast("Value | Cost | Domain | Floor | Terminate", message):
-            case Value(value, counter, threshold):
-                self._merge({sender: (value, counter)})
-                if sender == self.parent:
-                    self.threshold = threshold
-                    self.threshold_request = False
-            case Cost() as cost:
-                self._merge(cost.context)
-                self.bound(sender, cost.context, cost.lb, cost.ub)
-                if cost.threshold_request:
-                    self.sent_values.pop(sender, None)
             case Domain(values):
                 self._take_domain(sender, values)
             case Floor(costs):
                 self.take_floor(sender, costs)
-            case Terminate(context):
-                self._merge(context)
-                self.threshold = INFINITE
-                self.last_values = True
-            case never:
-                assert_never(never)
+            case _:
+                super().handle(sender, message)
 
     # Floors
 
@@ -180,83 +155,3 @@ class BnBADOPT(BoundingProtocol):
         floor = self.floors.get(child)
         if floor is not None:
             self.bounds[child].lb = [*floor]
-
-    # Contexts and thresholds
-
-    def _merge(self, context: Context) -> None:
-        """Merge a context; if it changed, choose the value again and reset TH (InitSelf)."""
-        news, changed = self.merge(context)
-        self._moved = self._moved or bool(news)
-        if changed:
-            self.drop_threshold()
-
-    def drop_threshold(self) -> None:
-        """Forget the threshold, which was for another context, and request it."""
-        self.threshold = INFINITE
-        self.threshold_request = True
-
-    def act(self) -> None:
-        """Choose a value and send values and costs that changed (Backtrack)."""
-        self._choose()
-        self.tell_values()
-        for name in self.pseudo_children:
-            self.tell(name, self.value_for(name))
-        if self.settled and self.may_end:
-            self.terminate()
-        elif not self.may_end:
-            self._tell_cost()
-
-    def _choose(self) -> None:
-        if self.settled:
-            self.take(self.cheapest(self.upper))
-        elif self._moved or self.leaves:
-            self.take(self.cheapest(self.lower))
-        self._moved = False
-
-    @property
-    def settled(self) -> bool:
-        """Whether the value with the least upper bound is good enough."""
-        return self.ub <= self.lb
-
-    @property
-    def leaves(self) -> bool:
-        """Whether the own value is to be left: its lower bound reaches UB or TH."""
-        return self.lower[self.index] >= min(self.threshold, self.ub)
-
-    # What is said
-
-    def tell_values(self) -> None:
-        """Send the children what changed."""
-        for child in self.children:
-            self._tell_value(child)
-
-    def _tell_value(self, child: str) -> None:
-        """Send `child` a new value, a higher threshold, or a threshold that it requested."""
-        value, last = self.value_for(child), self.sent_values.get(child)
-        if last is None or self.is_news(value, last):
-            self.sent_values[child] = value
-            self.send(child, value)
-
-    def value_for(self, name: str) -> Value:
-        """Return the own value, and the threshold of `name` if it is a child."""
-        return Value(*self.own, self.share(name) if name in self.bounds else INFINITE)
-
-    def is_news(self, value: Value, last: Value) -> bool:
-        """Return whether a child that was told `last` has to be told `value`."""
-        return last.counter < value.counter or last.threshold < value.threshold
-
-    def share(self, child: str) -> Number:
-        """Return the part of the threshold left for `child` if other children cost their lower bounds."""
-        limit = min(self.threshold, self.ub)
-        if limit == INFINITE:
-            return INFINITE
-        others = sum(bounds.lb[self.index] for name, bounds in self.bounds.items() if name != child)
-        return max(0, limit - self.delta[self.index] - others)
-
-    def _tell_cost(self) -> None:
-        """Send the parent new bounds, bounds in a new context, or a request for the threshold."""
-        cost = Cost(dict(self.context), self.lb, self.ub)
-        if self.parent is not None and (self.threshold_request or cost != self.sent_cost):
-            self.sent_cost = cost
-            self.send(self.parent, msgspec.structs.replace(cost, threshold_request=self.threshold_request))
-            self.threshold_request = False

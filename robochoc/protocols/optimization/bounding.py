@@ -150,7 +150,7 @@ class BoundingProtocol(TreeProtocol):
         """
         if self._outdated:
             self._outdated = False
-            self.delta = self.problem.costs({name: self.context[name][0] for name in self._known})
+            self.delta = self.costs_in({name: self.context[name][0] for name in self._known})
         bounds = self.bounds.values()
         self.lower = [sum(parts) for parts in zip(self.delta, *(one.lb for one in bounds), strict=True)]
         if len(self._known) == len(self.ancestors):
@@ -158,6 +158,10 @@ class BoundingProtocol(TreeProtocol):
         else:
             self.upper = [INFINITE] * len(self.lower)
         self.lb, self.ub = min(self.lower), min(self.upper)
+
+    def costs_in(self, view: Mapping[str, message.Value]) -> list[Number]:
+        """Return what each own value pays here with the values of neighbours above in `view` (delta)."""
+        return self.problem.costs(view)
 
     def cheapest(self, costs: Sequence[Number]) -> int:
         """Return the value with the minimum of `costs`; the current value if it is one of several."""

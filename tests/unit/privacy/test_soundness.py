@@ -22,15 +22,16 @@ from tests.support.replays import in_text, random_run, recorded
 
 WITH_RULES = (
     "a-dsa", "abt", "abt-do-retro", "abt-hyb", "acls", "adopt", "adopt-k", "afb", "afc", "afc-ng", "afc-tree",
-    "agile-abt", "async-maxsum", "awc", "bnb-adopt", "bounded-maxsum", "cocoa", "compapo", "count-dpop", "d-gibbs",
-    "dba", "disfc", "dpop", "dsa", "dsa-sdp", "duct", "dynabt", "gca-mgm", "gdba", "hs-cai", "kopt", "lamdls",
-    "maxsum", "maxsum-ad", "mb-dpop", "mcs-mgm", "mgm", "mgm2", "mixed-dsa", "ncbb", "o-dpop", "p-dpop", "p32-dpop",
-    "pt-fb", "rmb-dpop", "s-dpop", "sbt", "sfb", "syncabb", "syncbb",
+    "agile-abt", "async-maxsum", "awc", "bnb-adopt", "bnb-adopt-fdac", "bounded-maxsum", "cocoa", "compapo",
+    "count-dpop", "d-gibbs", "dba", "disfc", "dpop", "dsa", "dsa-sdp", "duct", "dynabt", "gca-mgm", "gdba",
+    "hs-cai", "kopt", "lamdls", "maxsum", "maxsum-ad", "mb-dpop", "mcs-mgm", "mgm", "mgm2", "mixed-dsa", "ncbb",
+    "o-dpop", "p-dpop", "p32-dpop", "pt-fb", "rmb-dpop", "s-dpop", "sbt", "sfb", "syncabb", "syncbb",
 )  # fmt: skip
 """Protocols whose messages all have rules; in others losses are not known."""
 VARIANTS = {
     "adopt-k": {"heuristic": "dp", "k": "2"},
     "bnb-adopt": {"heuristic": "dp"},
+    "bnb-adopt-fdac": {"level": "ac"},
     "hs-cai": {"k": "1"},
     "kopt": {"k": "4"},
     "maxsum": {"split": "0.3"},

@@ -1,0 +1,270 @@
+"""One test per rule of BnB-ADOPT+ with soft arc consistency (Gutierrez, Meseguer, ECAI 2010), and brute force."""
+
+from __future__ import annotations
+
+import doctest
+from collections.abc import Iterator
+from dataclasses import replace
+from random import Random
+
+import pytest
+
+import robochoc.protocols.optimization.bnb_adopt_fdac
+from robochoc.generators.random_csp import random_csp
+from robochoc.model.message import Message
+from robochoc.model.outcome import Verdict
+from robochoc.model.problem import INFINITE, Team
+from robochoc.protocols.optimization import bnb_adopt_fdac
+from robochoc.protocols.optimization.bnb_adopt_fdac import BnBADOPTFDAC
+from robochoc.protocols.optimization.messages.bnb_adopt_fdac import Cost, Domain, Moved, Value
+from robochoc.protocols.optimization.messages.bounding import Terminate
+from robochoc.protocols.optimization.settings.bnb_adopt_fdac import BnBADOPTFDACSettings
+from robochoc.run import Options, Runtime, Withdrawal, solve
+from robochoc.solver.ace import AceProcess
+from tests.support.agents import replies, value
+from tests.support.cost_problems import minimum_withdrawal
+from tests.support.loose_problems import loosened_cost_team, minimum_cost
+from tests.support.problems import random_team
+from tests.support.pseudo_trees import context, placed, priced, to
+from tests.support.random_options import random_options
+
+TEAM = priced(
+    "ZABCDE",
+    {"B": [4, 1], "ZB": [0, 1, 2, 0], "AB": [5, 3, 6, 2], "BC": [0] * 4, "BD": [0] * 4, "BE": [0] * 4, "ZAE": [0] * 8},
+)
+"""B stands below A and, further up, Z; C and D are its children, and E is a pseudo-child."""
+DOMAIN = Domain([(1,), (2,)])
+
+
+class ArcConsistent(BnBADOPTFDAC):
+    """BnB-ADOPT+-AC."""
+
+    settings = BnBADOPTFDACSettings("ac")
+
+
+def middle(kind: type[BnBADOPTFDAC] = BnBADOPTFDAC, team: Team = TEAM) -> BnBADOPTFDAC:
+    """B, after it has begun."""
+    return placed(kind, team, "RB", "RA", pseudo_parents=["RZ"], children=["RC", "RD"], pseudo_children=["RE"])
+
+
+def moved(kind: type[BnBADOPTFDAC] = BnBADOPTFDAC) -> BnBADOPTFDAC:
+    """B, when it has moved costs: 0 and 3 are moved to it in all."""
+    robot = middle(kind)
+    robot.outbox.clear()
+    replies(robot, ("RC", Moved([0, 1])), ("RD", Moved([0, 0])), ("RE", Moved([0, 2])))
+    replies(robot, ("RA", DOMAIN), ("RZ", DOMAIN))
+    return robot
+
+
+def informed() -> BnBADOPTFDAC:
+    """B, when it also knows the values above, both 1."""
+    robot = moved()
+    replies(robot, ("RZ", Value((1,), 1)), ("RA", Value((1,), 1)))
+    return robot
+
+
+# Before the search
+
+
+def test_values_are_told_to_all_below_with_a_binary_constraint_and_to_children() -> None:
+    assert middle().outbox == [(name, DOMAIN) for name in ("RC", "RD", "RE")]
+
+
+def test_a_pseudo_child_of_a_ternary_constraint_is_told_nothing_and_a_child_is() -> None:
+    team = priced("BCD", {"BCD": [0] * 8})
+    robot = placed(BnBADOPTFDAC, team, "RB", children=["RC"], pseudo_children=["RD"])
+    assert robot.outbox == [("RC", DOMAIN)]
+    assert to("RD", replies(robot, ("RC", Moved([0, 3])))) == [Value((1,), 1)]
+
+
+def test_costs_are_moved_when_those_from_below_and_the_values_above_have_come() -> None:
+    robot = middle()
+    robot.outbox.clear()
+    assert replies(robot, ("RC", Moved([0, 1])), ("RA", DOMAIN), ("RE", Moved([0, 2])), ("RD", Moved([0, 0]))) == []
+    said = replies(robot, ("RZ", DOMAIN))
+    # B costs 4 and 1, to which 0 and 3 have come; with A at 1 it costs 5 and 3 more, with A at 2 it costs 6 and 2.
+    assert to("RA", said) == [Moved([min(4 + 5, 4 + 3), min(4 + 6, 4 + 2)])]
+    # Of B's value 1 all 4 are kept but for what A's values 1 and 2 need: 2 and 0. With Z at 1 it costs 0 and 1.
+    assert to("RZ", said) == [Moved([1, 0])]
+
+
+def test_with_ac_costs_are_moved_out_of_constraints_only_but_for_the_least_own_cost() -> None:
+    robot = middle(ArcConsistent)
+    robot.outbox.clear()
+    replies(robot, ("RC", Moved([0, 1])), ("RD", Moved([0, 0])), ("RE", Moved([0, 2])))
+    said = replies(robot, ("RA", DOMAIN), ("RZ", DOMAIN))
+    # What is left with A is 2 and 0, or 4 and 0: 2 comes down to the value 1 of B, so B costs 6 and 4.
+    assert to("RA", said) == [Moved([3 + 4, 2 + 4])]
+    assert to("RZ", said) == [Moved([0, 0])]
+    assert robot.unary == [2, 0]
+
+
+def test_a_leaf_on_a_tree_moves_all_that_it_costs() -> None:
+    team = priced("AB", {"B": [4, 1], "AB": [5, 3, 6, 2]})
+    robot = placed(BnBADOPTFDAC, team, "RB", "RA")
+    assert replies(robot, ("RA", DOMAIN)) == [("RA", Moved([4, 3]))]
+    said = replies(robot, ("RA", Value((2,), 1)))
+    assert value(robot) == (2,)
+    assert said == [("RA", Cost(context(A=2), 0, 0))]
+
+
+def test_a_root_begins_with_the_value_that_costs_least_with_what_was_moved() -> None:
+    team = priced("BC", {"B": [0, 2], "BC": [0] * 4})
+    robot = placed(BnBADOPTFDAC, team, "RB", children=["RC"])
+    robot.outbox.clear()
+    said = replies(robot, ("RC", Moved([7, 4])))
+    assert (value(robot), robot.lb) == ((2,), 6)
+    assert said == [("RC", Value((2,), 2))]
+
+
+def test_a_parent_without_a_constraint_gets_what_the_cheapest_value_costs() -> None:
+    robot = placed(BnBADOPTFDAC, priced("ABC", {"B": [4, 1], "AC": [0] * 4, "BC": [0] * 4}), "RB", "RA")
+    assert replies(robot, ("RA", DOMAIN)) == [("RA", Moved([1, 1]))]
+
+
+def test_a_table_that_is_too_large_is_left_as_it_is(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(bnb_adopt_fdac, "MAX_ENTRIES", 3)
+    robot = placed(BnBADOPTFDAC, priced("AB", {"B": [4, 1], "AB": [5, 3, 6, 2]}), "RB", "RA")
+    checks = robot.problem.checks
+    assert replies(robot, ("RA", DOMAIN)) == [("RA", Moved([1, 1]))]
+    assert robot.problem.checks == checks
+    assert replies(robot, ("RA", Value((2,), 1))) == [("RA", Cost(context(A=2), 2, 2))]
+
+
+def test_a_robot_that_has_no_value_left_ends_the_search_of_all() -> None:
+    robot = moved()
+    assert robot.verdict is None
+    robot = middle()
+    replies(robot, ("RC", Moved([INFINITE, 0])), ("RD", Moved([0, INFINITE])), ("RE", Moved([0, 0])))
+    assert replies(robot, ("RA", DOMAIN), ("RZ", DOMAIN))[-1:] == []
+    assert robot.verdict is Verdict.NO_SOLUTION
+
+
+@pytest.mark.parametrize(
+    ("sender", "message"),
+    [
+        ("RC", DOMAIN),
+        ("RA", Domain([])),
+        ("RA", Domain([(9,)])),
+        ("RA", Moved([0, 0])),
+        ("RC", Moved([0])),
+        ("RC", Moved([0, -1])),
+        ("RC", Moved([0, float("nan")])),
+    ],
+)
+def test_what_cannot_be_is_refused(sender: str, message: Message) -> None:
+    with pytest.raises(ValueError, match=r"R[AC]"):
+        replies(middle(), (sender, message))
+
+
+@pytest.mark.parametrize("again", [("RA", DOMAIN), ("RC", Moved([0, 0]))])
+def test_nothing_is_moved_twice(again: tuple[str, Message]) -> None:
+    with pytest.raises(ValueError, match=again[0]):
+        replies(moved(), again)
+
+
+def test_a_value_that_a_robot_above_has_not_told_before_is_refused() -> None:
+    with pytest.raises(ValueError, match="RA has no such value"):
+        replies(moved(), ("RA", Value((9,), 1)))
+
+
+# The search
+
+
+def test_delta_is_what_is_paid_with_what_was_moved_here_and_without_what_was_moved_up() -> None:
+    robot = informed()
+    # With A and Z at 1: 4 + 5 + 0 + 0 and 1 + 3 + 1 + 3, of which 7 and 1 were moved up.
+    assert list(robot.delta) == [9 - 8, 8 - 8]
+
+
+def test_of_a_robot_above_whose_value_is_unknown_only_what_was_put_in_is_missing() -> None:
+    robot = moved()
+    assert robot.costs_in({}) == robot.unary == [1, 0]
+    replies(robot, ("RA", Value((1,), 1)))
+    assert list(robot.delta) == [1, 0]
+    assert list(informed().delta) == [1, 0]
+
+
+def test_nothing_is_told_before_the_parent_has_a_value() -> None:
+    robot = moved()
+    assert replies(robot, ("RZ", Value((1,), 1))) == []
+    said = replies(robot, ("RA", Value((1,), 1)))
+    assert to("RA", said) == [Cost(context(Z=1, A=1), 0, INFINITE)]
+    assert to("RC", said) == [Value((2,), 1)]
+
+
+def test_bounds_and_thresholds_are_on_what_is_left() -> None:
+    robot = informed()
+    said = replies(robot, ("RC", Cost(context(B=2), 0, 2)), ("RD", Cost(context(B=2), 0, 0, True)))
+    assert to("RA", said) == [Cost(context(Z=1, A=1), 0, 2)]
+    assert to("RD", said) == [Value((2,), 1, 2)]
+
+
+def test_the_end_is_bnb_adopt_s() -> None:
+    robot = informed()
+    replies(robot, ("RC", Cost(context(B=2), 0, 0)), ("RD", Cost(context(B=2), 0, 0)))
+    said = replies(robot, ("RA", Terminate(context(Z=1, A=1))))
+    assert said == [(child, Terminate(context(Z=1, A=1, B=2))) for child in ("RC", "RD")]
+
+
+# Against others, and against brute force
+
+
+@pytest.mark.parametrize("level", ["ac", "fdac"])
+def test_two_messages_for_each_pair_save_more_than_they_cost(level: str) -> None:
+    sent = dict.fromkeys(("bnb-adopt", "bnb-adopt-fdac"), 0)
+    for seed in range(4):
+        team = random_csp(8, 4, 0.4, 0, seed, connected=True, max_cost=20)
+        for protocol in sent:
+            settings = {"level": level} if protocol == "bnb-adopt-fdac" else {}
+            options = Options(protocol=protocol, runtime=Runtime.SIMULATOR, cache=False, settings=settings)
+            sent[protocol] += sum(solve(team, options).metrics.messages.values())
+    assert sent["bnb-adopt-fdac"] < 0.8 * sent["bnb-adopt"]
+
+
+def test_on_a_tree_the_first_values_are_the_last_ones() -> None:
+    for seed in range(4):
+        team = random_csp(9, 4, 8 / 36, 0, seed, connected=True, max_cost=20)
+        options = Options(protocol="bnb-adopt-fdac", runtime=Runtime.SIMULATOR, cache=False)
+        messages = solve(team, options).metrics.messages
+        assert {messages[kind] for kind in ("Domain", "Moved", "Value", "Terminate")} == {8}
+
+
+@pytest.fixture
+def warm(warm_ace: None) -> Iterator[AceProcess]:
+    """A solver for complex robots that need not be started for each team."""
+    del warm_ace
+    with AceProcess() as ace:
+        yield ace
+
+
+@pytest.mark.parametrize("level", ["ac", "fdac"])
+@pytest.mark.parametrize("batch", [0, *(pytest.param(batch, marks=pytest.mark.slow) for batch in range(1, 11))])
+def test_the_least_cost_is_found(level: str, batch: int, warm: AceProcess) -> None:
+    chance = Random(f"bnb-adopt-fdac {level} {batch}")
+    for _ in range(200 if batch else 10):
+        team = loosened_cost_team(chance)
+        cost = minimum_cost(team)
+        options = replace(random_options(team, "bnb-adopt-fdac", chance), settings={"level": level})
+        outcome = solve(team, options, solver=warm)
+        assert outcome.verdict is (Verdict.NO_SOLUTION if cost == INFINITE else Verdict.OPTIMAL), team
+        assert outcome.cost == (None if cost == INFINITE else cost), team
+
+
+@pytest.mark.parametrize("level", ["ac", "fdac"])
+@pytest.mark.parametrize("teams", [4, pytest.param(60, marks=pytest.mark.slow)])
+def test_as_few_as_possible_withdraw(level: str, teams: int) -> None:
+    chance = Random(f"withdraw bnb-adopt-fdac {level}")
+    for _ in range(teams):
+        team = random_team(chance)
+        robots = tuple(replace(robot, weight=chance.choice((1, 1, 2, 3))) for robot in team.robots)
+        team = replace(team, robots=robots)
+        options = random_options(team, "bnb-adopt-fdac", chance)
+        outcome = solve(team, replace(options, settings={"level": level}, withdraw=Withdrawal.MINIMUM))
+        assert sum(team[name].weight for name in outcome.withdrawn) == minimum_withdrawal(team)
+
+
+def test_the_docstring_shows_what_happens() -> None:
+    result = doctest.testmod(robochoc.protocols.optimization.bnb_adopt_fdac)
+    assert result.attempted
+    assert not result.failed
