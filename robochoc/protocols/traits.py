@@ -45,6 +45,7 @@ class Traits:
         bears_loss: It goes on when messages are lost on their way (`Protocol.miss`, `Protocol.go_on`).
         allocates: It takes task allocations only: teams that share nothing but that some things are done by one robot
             at most, and in which each robot can do without (`solver/exclusions.py`).
+        congestion: Of those it also takes such in which several robots may do a task, each pair of them at a cost.
         privacy: The information that neighbours do not get.
         use_when: A short recommendation, for `robochoc protocols`.
     """
@@ -69,6 +70,7 @@ class Traits:
     arrays: bool = False
     bears_loss: bool = False
     allocates: bool = False
+    congestion: bool = False
     privacy: str = ""
     use_when: str = ""
 

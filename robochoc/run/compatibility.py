@@ -387,7 +387,7 @@ def _refuse_constraints(team: Team, name: str, traits: Traits) -> None:
         unmet = unmet_requirement(robot, traits, team.owner)
         if unmet:
             raise UnfitProtocolError(f"{unmet}, which {name} does not support")
-    if traits.allocates and (fault := allocation_fault(team)):
+    if traits.allocates and (fault := allocation_fault(team, congestion=traits.congestion)):
         raise UnfitProtocolError(f"{team.name} is no task allocation, and {name} takes nothing else: {fault}")
 
 

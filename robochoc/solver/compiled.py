@@ -361,11 +361,11 @@ class LocalProblem(LocalConstraints):
             combinations = constraint.declared(declared, MAX_BOUNDED_ROWS // max(1, len(self.values)))
             self.checks += constraint.evaluate(combinations) * len(self.values)
 
-    def tasks(self) -> tuple[Task, ...]:
+    def tasks(self, *, congestion: bool = False) -> tuple[Task, ...]:
         """Return what is done by one robot at most. Raises `UnsupportedError`. See `solver/exclusions.py`."""
         from robochoc.solver.exclusions import tasks_of  # noqa: PLC0415 - for auctions only
 
-        checks, tasks = tasks_of(self._part)
+        checks, tasks = tasks_of(self._part, congestion=congestion)
         self.checks += checks
         return tasks
 

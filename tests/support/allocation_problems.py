@@ -10,6 +10,7 @@ from typing import NamedTuple
 
 from robochoc.model.allocation import Job, Worker, assignment, several
 from robochoc.model.assembly import assemble
+from robochoc.model.constraint import Constraint, Relation, Semantics
 from robochoc.model.cost_units import PLAIN_COSTS, CostUnits
 from robochoc.model.costs import normalized
 from robochoc.model.problem import INFINITE, ProblemKind, Robot, Team
@@ -78,6 +79,43 @@ def random_allocation_team(chance: Random) -> Team:
 def simple_allocation_team(chance: Random) -> Team:
     """Return the same, where no robot needs a solver for its own constraints."""
     return plain(random_allocation(chance, simple=True).team)
+
+
+class Congestion(NamedTuple):
+    """A team whose robots do one task each: it gains `worth[robot][task]`, less `cost[task]` for each pair there."""
+
+    team: Team
+    worth: list[list[int]]
+    cost: list[float]
+
+
+def random_congestion(chance: Random, *, monotone: bool = False) -> Congestion:
+    """Return a random game of congestion: 2 to 5 robots, which all can do all tasks; pairs may exclude each other.
+
+    With `monotone` what a coalition gains never falls as robots join it.
+    """
+    robots, tasks, most = chance.randint(2, 5), chance.randint(1, 4), chance.choice((3, 20))
+    cost: list[float] = [
+        chance.choice((chance.randint(1, most), chance.randint(1, most), INFINITE)) for _ in range(tasks)
+    ]
+    if monotone:
+        cost = [chance.randint(1, most) for _ in range(tasks)]
+    least = [int(one) * (robots - 1) if monotone else -most // 2 for one in cost]
+    worth = [[low + chance.randint(0, 3 * most) for low in least] for _ in range(robots)]
+    workers = [Worker(f"R{at}", str(at), f"V{at}", dict(enumerate(own, 1))) for at, own in enumerate(worth)]
+    variables, constraints = assignment(workers)
+    made = [one for one in constraints if len(one.variables) == 1]
+    soft = {task: int(one) for task, one in enumerate(cost, 1) if one < INFINITE}
+    crowd = Relation(
+        "crowd", 2, Semantics.SOFT, tuple((task, task) for task in soft), tuple(-one for one in soft.values())
+    )
+    alone = tuple((task, task) for task, one in enumerate(cost, 1) if one == INFINITE)
+    for scope in itertools.combinations([f"V{at}" for at in range(robots)], 2):
+        made.append(Constraint("crowd", crowd, scope, scope))
+        made.append(Constraint("alone", Relation("alone", 2, Semantics.CONFLICTS, alone), scope, scope))
+    units = CostUnits(maximize=True)
+    team = assemble("congestion", variables, iter(made), kind=ProblemKind.DISWCSP, costs=units)
+    return Congestion(team, worth, cost)
 
 
 def plain(team: Team) -> Team:

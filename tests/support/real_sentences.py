@@ -5,6 +5,7 @@ from __future__ import annotations
 REAL = {
     ("ssi", "Bid"): "Robot4 says: I bid 92 for the next task that I want",
     ("ssi", "Won"): "Robot4 says: task V4 = 4 is mine, and I bid for nothing more",
+    ("grape", "Partition"): ("Robot2 says: after move 1, which was Robot2's, Robot2 does task V2 = 1"),
     ("cbaa", "WinningBids"): "Robot1 says: task V1 = 1 is Robot2's for 24 and task V1 = 2 is mine for 44",
     ("cbba", "Bundles"): (
         "Robot1 says: task V1 = 1 is yours for 24, task V1 = 2 is mine for 44, task V1 = 3 is nobody's and task V1 = 4"

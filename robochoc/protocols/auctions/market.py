@@ -1,4 +1,4 @@
-"""The common part of auctions: what is for sale, what it is worth to a robot, and the base of their protocols.
+"""The common part of task allocation: what is for sale, what it is worth to a robot, and the base of their protocols.
 
 A *task* is something that is done by one robot at most (`solver/exclusions.py`). A robot's *bundle* is the set of tasks
 that it takes; of the robot's values with the same tasks only the cheapest counts. A task is worth to a robot what its
@@ -42,17 +42,19 @@ class Market:
     Attributes:
         rivals: For each task the other robots that can do it, in priority order.
         shared: For each rival, the tasks that both can do.
+        congestion: For each task what each pair of robots that does it costs; infinite: one does it at most.
         idle: The place of the cheapest own value without a task. None: there is no value at all.
 
     Raises:
         UnsupportedError: when the robot's constraints allocate no tasks, or it cannot do without.
     """
 
-    def __init__(self, problem: LocalProblem) -> None:
-        self._tasks = problem.tasks()
+    def __init__(self, problem: LocalProblem, *, congestion: bool = False) -> None:
+        self._tasks = problem.tasks(congestion=congestion)
         self._charges = problem.charges
         self._places = self._cheapest(problem)
         self.rivals = [tuple(task.others) for task in self._tasks]
+        self.congestion = [task.cost for task in self._tasks]
         self.shared: dict[str, list[int]] = {}
         self._named: dict[tuple[str, Lot], int] = {}
         for number, task in enumerate(self._tasks):
@@ -62,7 +64,7 @@ class Market:
         self._lots = [self._lot(problem, number) for number in range(len(self._tasks))]
         self.idle = self._places.get(frozenset())
         if self.idle is None and self._places:
-            raise UnsupportedError(f"{problem.agent} has no value without a task, and in an auction it may get none")
+            raise UnsupportedError(f"{problem.agent} has no value without a task, and it may get none")
 
     def _cheapest(self, problem: LocalProblem) -> dict[frozenset[int], int]:
         """Return the place of the cheapest value for each set of tasks that the robot can do together."""
@@ -93,10 +95,19 @@ class Market:
         Raises:
             ValueError: when both can do no such task.
         """
-        number = self._named.get((robot, lot))
+        number = self.names(robot, lot)
         if number is None:
             raise ValueError(f"{robot} names a task that it does not share")
         return number
+
+    def score(self, task: int) -> int | None:
+        """Return what `task` is worth to a robot that does nothing else; None if it cannot do it."""
+        bundle = frozenset((task,))
+        return int(self._charge(frozenset()) - self._charge(bundle)) if bundle in self._places else None
+
+    def names(self, robot: str, lot: Lot) -> int | None:
+        """Return the task that `robot` names `lot`; None if this robot cannot do it."""
+        return self._named.get((robot, lot))
 
     def place(self, bundle: Collection[int]) -> int:
         """Return the place of the cheapest own value with the tasks of `bundle`, which there is."""
@@ -133,7 +144,7 @@ class Auction(Protocol):
 
     def __init__(self, problem: LocalProblem, order: PriorityOrder) -> None:
         super().__init__(problem, order)
-        self.market = Market(problem)
+        self.market = Market(problem, congestion=self.traits.congestion)
         self.bundle: list[int] = []
 
     @abstractmethod
