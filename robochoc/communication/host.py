@@ -34,8 +34,12 @@ _SIZE_OF_A_MESSAGE = 256
 """What a message takes besides its content, about."""
 
 
-class BadMessageError(Exception):
-    """The bytes of an envelope are no message of the protocol."""
+_UNUSABLE = (ArithmeticError, AssertionError, AttributeError, LookupError, TypeError, ValueError)
+"""What a protocol raises for a message that cannot be: a refusal of its own, or where it fails to compute with it."""
+
+
+class BadMessageError(ValueError):
+    """The bytes of an envelope are no message of the protocol, or its robot cannot use what they say."""
 
 
 class UnderWay:
@@ -147,6 +151,7 @@ class Host:
         """
         problem, order = LocalProblem(part), order or order_of(part)
         if isinstance(self.protocol, DynamicProtocol):
+            problem.allow_undeclared()  # until others have heard that a value is gone
             self.protocol.change(problem, order, invalidated)
             self._forget_said()
         else:
@@ -162,7 +167,7 @@ class Host:
     def handle(self, packet: Sequence[Envelope]) -> list[Envelope]:
         """Take in all waiting messages, let the protocol settle, and return what it says.
 
-        Raises `BadMessageError` when an envelope's content is no message of the protocol.
+        Raises `BadMessageError` when an envelope's content is no message of the protocol, or one that cannot be used.
         """
         for envelope in packet:
             self.take_in(envelope)
@@ -181,7 +186,10 @@ class Host:
             raise BadMessageError(f"{envelope.sender} sent {self.name} an invalid message: {error}") from error
         if envelope.clock > self.clock:  # noqa: PLR1730 - faster
             self.clock = envelope.clock
-        self.protocol.receive(envelope.sender, message)
+        try:
+            self.protocol.receive(envelope.sender, message)
+        except _UNUSABLE as error:
+            raise _refusal(f"{envelope.sender} sent {self.name} a message ({type(message).__name__})", error) from None
         self._tick()
         if self._observer:
             kind = type(message).__name__
@@ -203,8 +211,11 @@ class Host:
             self._stamps[place] += late
 
     def settle(self) -> list[Envelope]:
-        """Let the protocol settle after a whole packet, and return its messages."""
-        self.protocol.settle()
+        """Let the protocol settle after a whole packet, and return its messages. Raises `BadMessageError`."""
+        try:
+            self.protocol.settle()
+        except _UNUSABLE as error:
+            raise _refusal(f"{self.name} was sent something", error) from None
         return self._said()
 
     def miss(self, sender: str, many: int) -> None:
@@ -315,6 +326,16 @@ class Host:
         if bound is not None and self._bounded < bound < math.inf:
             self._bounded = bound
             observer(Bounded(t=self._now(), robot=self.name, bound=bound))
+
+
+def _refusal(what: str, error: Exception) -> BadMessageError:
+    """Return the error for `what` a robot cannot use, with the place where its protocol has raised `error`.
+
+    It is made here, in one place: protocols check a message where they use it, and no check is made twice. A mistake
+    of the protocol looks the same; the place tells.
+    """
+    text = f"{what} that cannot be used: {type(error).__name__}: {error}"
+    return BadMessageError(text).with_traceback(error.__traceback__)
 
 
 def may_be_shared(messages: object) -> bool:

@@ -82,6 +82,11 @@ class LocalConstraints:
         self._filtering = by_robot([*copies, *below, *parts_above])
         self._made_filters: Filters | None = None
 
+    def allow_undeclared(self) -> None:
+        """From now on evaluate constraints for whatever values others have: some may have lost a value since."""
+        for constraint in self._constraints:
+            constraint.allow_undeclared()
+
     def _known(self, view: Mapping[str, Value]) -> list[tuple[SharedConstraint, OtherValues]]:
         """Return each constraint whose other variables are all known, and their values. Count a check each."""
         known = [(c, others) for c in self._constraints if (others := c.other_values(view)) is not None]

@@ -8,7 +8,7 @@ from collections.abc import Container, Iterable, Iterator, Mapping, Sequence
 from typing import NamedTuple
 
 from robochoc.model.message import Value
-from robochoc.model.problem import INFINITE, Constraint
+from robochoc.model.problem import INFINITE, Constraint, Domain
 from robochoc.solver.agent_problem import TeamKnowledge
 from robochoc.solver.encoding import (
     MAX_TUPLES,
@@ -90,6 +90,8 @@ class SharedConstraint:
             (agent, place) for agent in self.agents for place, name in enumerate(interfaces[agent]) if name in scope
         ]
         self._names = [interfaces[agent][place] for agent, place in self._seen]
+        self._domains: list[Domain] | None = [known.domains[name] for name in self._names]
+        """Of what it sees; None: any value is evaluated."""
         self._widths = {agent: len(interfaces[agent]) for agent in self.agents}
         self._only = self._seen[0] if len(self._seen) == 1 else None
         self._looks: dict[int, int] = {}
@@ -114,6 +116,8 @@ class SharedConstraint:
             seen = [view[agent][place] for agent, place in self._seen]
         except KeyError:
             return None
+        except IndexError:
+            raise self._refusal_of_width(view) from None
         return None if None in seen else tuple(seen)  # type: ignore[arg-type]
 
     def combined(self, sets: Mapping[str, Sequence[Value]]) -> Iterator[OtherValues]:
@@ -129,8 +133,29 @@ class SharedConstraint:
         for parts in itertools.product(*columns):
             yield tuple(itertools.chain.from_iterable(parts))  # type: ignore[arg-type]  # no part is None
 
+    def allow_undeclared(self) -> None:
+        """From now on evaluate whatever values others have."""
+        self._domains = None
+
+    def _refuse_undeclared(self, others: OtherValues) -> None:
+        """Raise `ValueError` for a value that its robot, as its file declares it, cannot have: others say anything.
+
+        It is called when `others` is evaluated, and so once for each combination.
+        """
+        if self._domains is None:
+            return
+        for place, domain in enumerate(self._domains):
+            if others[place] not in domain:
+                raise ValueError(f"{self._names[place]} of {self._seen[place][0]} cannot be {others[place]}")
+
+    def _refusal_of_width(self, view: Mapping[str, Value]) -> ValueError:
+        """Return the error for a value in `view` that has too few parts."""
+        short = [agent for agent, width in self._widths.items() if agent in view and len(view[agent]) < width]
+        return ValueError(f"a value of {short[0]} has {self._widths[short[0]]} parts, not {len(view[short[0]])}")
+
     def holds(self, others: OtherValues) -> list[bool]:
-        """Return, for each code of own values, whether it is consistent with `others`."""
+        """Return, for each code of own values, whether it is consistent with `others`. Raises `ValueError`."""
+        self._refuse_undeclared(others)
         return [self._holds((*others, *own)) for own in self._distinct]
 
     def _holds(self, values: Sequence[int | None]) -> bool:
@@ -151,6 +176,7 @@ class SharedConstraint:
         """Return what each own value pays when the others are as `others` says."""
         prices = self._costs.get(others)
         if prices is None:
+            self._refuse_undeclared(others)
             paid: list[Cost] = [0 if None in own else self._price((*others, *own)) for own in self._distinct]  # type: ignore[arg-type]
             prices = self._costs[others] = [paid[code] for code in self.codes]
         return prices
@@ -162,7 +188,10 @@ class SharedConstraint:
             return None if others is None else self.costs(others)
         agent, place = self._only
         value = view.get(agent)
-        part = None if value is None else value[place]
+        try:
+            part = None if value is None else value[place]
+        except IndexError:
+            raise self._refusal_of_width(view) from None
         if part is None:
             return None
         prices = self._costs_by.get(part)
@@ -253,7 +282,10 @@ class SharedConstraint:
         value = view.get(agent)
         if value is None:
             return UNKNOWN
-        part = value[place]
+        try:
+            part = value[place]
+        except IndexError:
+            raise self._refusal_of_width(view) from None
         if part is None:
             return UNKNOWN
         mask = self._looks.get(part)

@@ -8,6 +8,7 @@ from random import Random
 
 import pytest
 
+from robochoc.communication.host import BadMessageError
 from robochoc.communication.run_result import RunResult
 from robochoc.communication.simulator.channel import ChannelModel
 from robochoc.communication.simulator.losses import Losses
@@ -159,7 +160,7 @@ def test_a_protocol_that_does_not_bear_loss_may_raise_anything_after_one() -> No
         def settle(self) -> None:
             raise KeyError(self.problem.agent)
 
-    with pytest.raises(KeyError):
+    with pytest.raises(BadMessageError, match="KeyError: 'Robot"):
         Simulation(queens3d(3), Broken, Concurrent(0), losses=_Sure()).search()
     assert Simulation(queens3d(3), Broken, Concurrent(0), losses=_Sure(0)).search().verdict is Verdict.UNKNOWN
 
