@@ -67,6 +67,15 @@ def nothing_left_behind(no_process_left: None) -> Iterator[None]:
 
 
 @pytest.fixture
+def quick_encryption(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Protocols that encrypt tables do so in a group in which no secret is safe, and whose elements are small."""
+    from robochoc.protocols.private.p2_dpop import P2DPOP  # noqa: PLC0415 - few tests need it
+    from tests.support.toy_group import ToyGroup  # noqa: PLC0415
+
+    monkeypatch.setattr(P2DPOP, "group", ToyGroup)
+
+
+@pytest.fixture
 def four(tmp_path: Path) -> Path:
     folder = tmp_path / "queens3d-4"
     write_team(queens3d(4), folder)

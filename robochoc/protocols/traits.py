@@ -38,6 +38,8 @@ class Traits:
             (`solver/exact_costs.py`).
         wide_tables: Its tables have a dimension for each robot of the pseudo-tree's width: where one such protocol is
             refused for memory, so are the others.
+        encrypted_tables: Its tables have a cipher for each cell and each cost. It takes small problems only, and is not
+            named as an alternative to other protocols.
         secret_keys: Its robots draw keys (`Protocol.secret`). A run across machines cannot be replayed then.
         needs: A module of an extra that it computes with, and how to install that. A run without it is refused.
         counts: Its robots also count the optima, or without costs the solutions (`--count`).
@@ -64,6 +66,7 @@ class Traits:
     concludes: tuple[Verdict, ...] = UNDECLARED
     tables: bool = False
     wide_tables: bool = False
+    encrypted_tables: bool = False
     secret_keys: bool = False
     needs: tuple[str, str] | None = None
     counts: bool = False

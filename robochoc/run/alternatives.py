@@ -19,7 +19,7 @@ def alternatives(
 ) -> str:
     """Return what would do instead of the protocol of `options`, as the end of a sentence that refuses it.
 
-    Every protocol is asked as if it had been chosen.
+    Every protocol is asked as if it had been chosen, but for those that take small problems only.
 
     Args:
         team: the team with its scenario.
@@ -35,6 +35,7 @@ def alternatives(
         and offer.name != options.protocol
         and offer.protocol.traits.complete >= complete
         and offer.protocol.traits.costs >= costs
+        and not offer.protocol.traits.encrypted_tables
         and not (narrow and offer.protocol.traits.wide_tables)
         and fits(team, replace(options, protocol=offer.name), offer.protocol.traits)
     ]

@@ -6,6 +6,8 @@ is looked up in one place, and its check is counted there.
 
 from __future__ import annotations
 
+import itertools
+import math
 from bisect import bisect_left
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
@@ -86,6 +88,21 @@ class LocalConstraints:
         """From now on evaluate constraints for whatever values others have: some may have lost a value since."""
         for constraint in self._constraints:
             constraint.allow_undeclared()
+
+    def declared_count(self, robot: str) -> int:
+        """Return how many values `declared` returns; nothing is allocated."""
+        domains = self._part.known.domains
+        shown = math.prod(len(domains[name]) for name in self._part.known.interfaces[robot])
+        return shown + (self._part.parameters.withdrawal_cost is not None)
+
+    def declared(self, robot: str) -> list[Value]:
+        """Return all values that the files declare for `robot`; the last is withdrawal where robots may withdraw.
+
+        It need not be able to take each: what its private constraints forbid is among them.
+        """
+        names = self._part.known.interfaces[robot]
+        values: list[Value] = [*itertools.product(*(self._part.known.domains[name] for name in names))]
+        return values if self._part.parameters.withdrawal_cost is None else [*values, (None,) * len(names)]
 
     def _known(self, view: Mapping[str, Value]) -> list[tuple[SharedConstraint, OtherValues]]:
         """Return each constraint whose other variables are all known, and their values. Count a check each."""

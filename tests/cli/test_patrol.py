@@ -13,6 +13,7 @@ from tests.support.allocation_problems import ANY_TEAM
 from tests.support.brute_force import least_cost
 from tests.support.program import ROOT
 
+pytestmark = pytest.mark.usefixtures("quick_encryption")
 PATROL = ROOT / "docs" / "examples" / "patrol"
 MINIMISING = [name for name in ANY_TEAM if protocol_named(name).traits.costs]
 BEST = {"lead": 3, "north": 2, "south": 1, "west": 2}

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import partial
 from random import Random
 
 import pytest
@@ -17,12 +18,14 @@ from robochoc.run.registry import protocol_named
 from robochoc.verification.checker import violations
 from tests.support.allocation_problems import ANY_TEAM
 from tests.support.brute_force import solutions
+from tests.support.encrypted_problems import affordable
 from tests.support.examples import examples
 from tests.support.limits import HANG_S
 from tests.support.loose_problems import any_order, loosened, minimum_cost
 from tests.support.problems import ON_ONE_MACHINE, random_team
 from tests.support.random_options import MAX_MESSAGES, random_options
 
+pytestmark = pytest.mark.usefixtures("quick_encryption")
 PER_BATCH, FIRST_BATCH = 300, 90
 BATCHES = [0, *(pytest.param(batch, marks=pytest.mark.slow) for batch in range(1, 10))]
 EVERY_PROTOCOL = pytest.mark.parametrize("protocol", ANY_TEAM)
@@ -60,7 +63,7 @@ def agrees(team: Team, options: Options) -> Verdict:
 
 def team_for(protocol: str, chance: Random) -> Team:
     """A random team that the protocol can take, half of them with links and variables that nobody needs."""
-    team = random_team(chance, n_ary=protocol_named(protocol).traits.n_ary)
+    team = affordable(protocol, partial(random_team, chance, n_ary=protocol_named(protocol).traits.n_ary))
     return loosened(team, chance) if chance.random() < 0.5 else team
 
 

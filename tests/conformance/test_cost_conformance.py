@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import replace
+from functools import partial
 from random import Random
 
 import pytest
@@ -16,11 +17,13 @@ from robochoc.solver.ace import AceProcess
 from robochoc.solver.encoding import UnsupportedError
 from tests.support.allocation_problems import ALLOCATING, simple_allocation_team
 from tests.support.cost_problems import minimum_withdrawal, random_complex_cost_team, random_cost_team
+from tests.support.encrypted_problems import affordable
 from tests.support.limits import HANG_S
 from tests.support.loose_problems import any_order, loosened, minimum_cost
 from tests.support.problems import ON_ONE_MACHINE, random_team
 from tests.support.random_options import MAX_MESSAGES, on_runtime, random_options
 
+pytestmark = pytest.mark.usefixtures("quick_encryption")
 MINIMISING = [name for name in protocol_names() if protocol_named(name).traits.costs]
 COMPLETE = [name for name in MINIMISING if protocol_named(name).traits.complete]
 INCOMPLETE = [name for name in MINIMISING if name not in COMPLETE]
@@ -35,8 +38,12 @@ def team_for(protocol: str, chance: Random) -> Team:
     n_ary = protocol_named(protocol).traits.n_ary
     if protocol in ALLOCATING:
         return loosened(simple_allocation_team(chance), chance)
-    complicated = n_ary and chance.random() < 0.2
-    team = random_complex_cost_team(chance) if complicated else random_cost_team(chance, n_ary=n_ary)
+
+    def draw() -> Team:
+        complicated = n_ary and chance.random() < 0.2
+        return random_complex_cost_team(chance) if complicated else random_cost_team(chance, n_ary=n_ary)
+
+    team = affordable(protocol, draw)
     return loosened(team, chance) if chance.random() < 0.5 else team
 
 
@@ -119,7 +126,7 @@ def test_as_few_as_possible_step_aside(protocol: str, teams: int) -> None:
     chance = Random(f"fewest {protocol}")
     aside = 0
     for _ in range(teams):
-        team = random_team(chance, n_ary=protocol_named(protocol).traits.n_ary)
+        team = affordable(protocol, partial(random_team, chance, n_ary=protocol_named(protocol).traits.n_ary))
         robots = tuple(replace(robot, weight=chance.choice((1, 1, 2, 3))) for robot in team.robots)
         team = replace(team, robots=robots)
         options = replace(random_options(team, protocol, chance), withdraw=Withdrawal.MINIMUM)

@@ -38,6 +38,8 @@ from tests.support.random_changes import random_changing_team, stages
 from tests.support.random_options import random_schedule
 from tests.support.small_teams import differ, pair
 
+pytestmark = pytest.mark.usefixtures("quick_encryption")
+
 SIMULATED = Options(runtime=Runtime.SIMULATOR, protocol="dynabt")
 
 

@@ -21,6 +21,7 @@ from tests.support.examples import count
 from tests.support.problems import random_team
 from tests.support.random_options import random_options
 
+pytestmark = pytest.mark.usefixtures("quick_encryption")
 PROTOCOLS = [name for name in protocol_names() if protocol_named(name).__module__.startswith("robochoc.")]
 TEAMS: dict[str, Callable[[Random, Traits], Team]] = {
     "plain": lambda chance, traits: random_team(chance, n_ary=traits.n_ary),

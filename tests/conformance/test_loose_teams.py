@@ -16,6 +16,7 @@ from tests.support.allocation_problems import ANY_TEAM
 from tests.support.loose_problems import check_against_brute_force, every_order, loose_team, turned_interface
 from tests.support.random_options import random_schedule
 
+pytestmark = pytest.mark.usefixtures("quick_encryption")
 EVERY_PROTOCOL = pytest.mark.parametrize("protocol", protocol_names())
 FIRST, MANY = 3, 2000
 IN_PROCESSES, ON_THE_NETWORK = 100, 20

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from random import Random
 
+import pytest
+
 from robochoc.generators.random_csp import random_csp
 from robochoc.model.outcome import Outcome, Verdict
 from robochoc.model.problem import INFINITE, Team
@@ -18,6 +20,7 @@ from tests.support.examples import count
 from tests.support.loose_problems import minimum_cost
 from tests.support.problems import random_team
 
+pytestmark = pytest.mark.usefixtures("quick_encryption")
 OURS = [name for name in protocol_names() if protocol_named(name).__module__.startswith("robochoc.")]
 BEARING = [name for name in OURS if protocol_named(name).traits.bears_loss]
 SCHEDULES = list(ScheduleName)

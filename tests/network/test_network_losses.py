@@ -30,6 +30,7 @@ from robochoc.solver.agent_problem import RunParameters
 from robochoc.solver.compiled_team import CompiledTeam
 from robochoc.verification.checker import violations
 from tests.support.complex_problems import complex_team
+from tests.support.encrypted_problems import affordable
 from tests.support.limits import HANG_S
 from tests.support.loose_problems import minimum_cost, untold_interface
 from tests.support.paused_abt import PausedABT
@@ -96,6 +97,7 @@ def test_whatever_the_protocol_the_verdict_is_true_for_those_who_are_left(protoc
     kind = protocol_named(protocol)
     costs, tightness = (9, 0.0) if kind.traits.costs else (None, 0.2)
     team = random_csp(6, 3, 0.5, tightness, seed=3, connected=True, max_cost=costs)
+    team = affordable(protocol, lambda: team, most=20_000)
     if kind.traits.allocates:
         team = normalized(tasks(6, 4, 3))
     options = Options(

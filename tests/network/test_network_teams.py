@@ -15,10 +15,13 @@ from robochoc.solver.agent_problem import RunParameters
 from tests.support.allocation_problems import simple_allocation_team
 from tests.support.brute_force import least_cost, solutions
 from tests.support.cost_problems import random_cost_team
+from tests.support.encrypted_problems import affordable
 from tests.support.in_memory_network import InMemoryNetwork
 from tests.support.lone_robot import chain_of_three
 from tests.support.pkc_problems import random_pkc_team
 from tests.support.problems import known_to_both, random_team
+
+pytestmark = pytest.mark.usefixtures("quick_encryption")
 
 
 @pytest.mark.parametrize("protocol", ["abt", "afc-ng", "awc", "agile-abt", "afc-tree"])
@@ -46,7 +49,8 @@ def test_nobody_is_doubted_who_is_honest(name: str) -> None:
     """By whatever protocol: the office refuses nothing, all counts agree, and so do both ends of each constraint."""
     protocol = protocol_named(name)
     chance = Random(4)
-    team = random_cost_team(chance, n_ary=False) if protocol.traits.costs else random_team(chance, n_ary=False)
+    draw = random_cost_team if protocol.traits.costs else random_team
+    team = affordable(name, lambda: draw(chance, n_ary=False))
     if protocol.traits.allocates:
         team = simple_allocation_team(chance)
     parameters = RunParameters(settings={"cycles": "5"} if hasattr(protocol.settings, "cycles") else {})

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from functools import partial
 from random import Random
 
 import pytest
@@ -18,7 +19,9 @@ from robochoc.run.registry import protocol_named
 from tests.support.allocation_problems import ANY_TEAM
 from tests.support.brute_force import least_cost
 from tests.support.cost_problems import random_complex_cost_team, random_cost_team
+from tests.support.encrypted_problems import affordable
 
+pytestmark = pytest.mark.usefixtures("quick_encryption")
 BOUNDING = (
     "syncabb",
     "atwb",
@@ -37,6 +40,7 @@ BOUNDING = (
     "mb-dpop",
     "rmb-dpop",
     "p-dpop",
+    "p2-dpop",
     "p32-dpop",
     "s-dpop",
     "o-dpop",
@@ -93,7 +97,8 @@ def _options(protocol: str, seed: int, runtime: Runtime = Runtime.SIMULATOR) -> 
 def test_that_the_optimum_is_between_the_bound_and_the_best_so_far(protocol: str, count: int) -> None:
     chance, early = Random(f"bounds {protocol} {count}"), 0
     for seed in range(count):
-        team = random_cost_team(chance) if seed % 4 else random_complex_cost_team(chance)
+        draw = random_cost_team if seed % 4 else random_complex_cost_team
+        team = affordable(protocol, partial(draw, chance))
         early += _held(team, _options(protocol, seed))
     assert early or "dpop" in protocol  # which knows nothing until it knows all
 
@@ -112,12 +117,16 @@ def test_that_nothing_is_told_by_protocols_that_prove_nothing(protocol: str) -> 
 def test_that_it_holds_among_processes(protocol: str) -> None:
     chance = Random(f"processes {protocol}")
     for seed in range(4):
-        _held(random_cost_team(chance), Options(protocol=protocol, seed=seed, bounds=True, cache=False))
+        _held(
+            affordable(protocol, partial(random_cost_team, chance)),
+            Options(protocol=protocol, seed=seed, bounds=True, cache=False),
+        )
 
 
 @pytest.mark.parametrize("protocol", BOUNDING)
 def test_that_a_journal_has_bounds_where_they_are_asked_for_and_is_the_same_otherwise(protocol: str) -> None:
-    team = random_cost_team(Random(5))
+    chance = Random(5)
+    team = affordable(protocol, partial(random_cost_team, chance))
 
     def journal(*, bounds: bool) -> bytes:
         options = Options(protocol=protocol, runtime=Runtime.SIMULATOR, bounds=bounds, cache=False)

@@ -40,6 +40,7 @@ from robochoc.run.registry import protocol_named, protocol_names
 from tests.support.agents import replies
 from tests.support.changing_costs import agrees_on_costs, changing_cost_team
 from tests.support.dpop_robots import PRODUCT, domain, products
+from tests.support.encrypted_problems import affordable
 from tests.support.examples import count
 from tests.support.limits import HANG_S
 from tests.support.loose_problems import loosened
@@ -210,13 +211,14 @@ def test_each_epoch_has_the_least_cost_in_every_runtime(runtime: Runtime, teams:
         agrees_on_costs(changing_cost_team(chance, 5), Options(protocol="s-dpop", runtime=runtime, timeout=HANG_S))
 
 
+@pytest.mark.usefixtures("quick_encryption")
 @pytest.mark.parametrize("protocol", MINIMISING)
 @count("teams", 1, 10)
 def test_every_protocol_that_proves_an_optimum_goes_through_costs_that_change(protocol: str, teams: int) -> None:
     chance = Random(f"costs anew {protocol}")
     binary = not protocol_named(protocol).traits.n_ary
     for _ in range(teams):
-        team = changing_cost_team(chance, 4, binary=binary)
+        team = affordable(protocol, lambda: changing_cost_team(chance, 4, binary=binary))
         agrees_on_costs(team, replace(random_schedule(chance), protocol=protocol))
 
 

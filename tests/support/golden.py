@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import cache
 
 from robochoc.formats import read_team
@@ -34,17 +35,29 @@ def odd_team(*, n_ary: bool = True) -> Team:
     return team_of(dict.fromkeys("ABCD", (1, 2, 3)), constraints, "odd")
 
 
+def prices_team() -> Team:
+    """Three robots in a row, of two values each: neighbours pay for the same one, and for two of them."""
+    rows = tuple((a, b) for a in (1, 2) for b in (1, 2))
+    price = Relation("price", 2, Semantics.SOFT, rows, (2, 0, 1, 2))
+    constraints = [Constraint("C", price, pair, pair) for pair in (("A", "B"), ("B", "C"))]
+    team = team_of(dict.fromkeys("ABC", (1, 2)), constraints, "prices")
+    return replace(team, robots=tuple(replace(robot, kind=ProblemKind.DISWCSP) for robot in team.robots))
+
+
 @cache
 def fixed_teams(protocol: str) -> dict[str, Team]:
     """Three small teams, by name; without the ternary constraint for a protocol that cannot take it.
 
     A protocol that goes on when the problem changes also has one that does; one that minimises, one with costs. One
-    that takes task allocations only has two of these instead.
+    that takes task allocations only has two of these instead; one that encrypts its tables has smaller teams.
     """
     traits = protocol_named(protocol).traits
     if traits.allocates:
         return {f"tasks-{model}": tasks(3, 4, 2, model=model) for model in TasksModel}
-    teams = {"queens3d-2": queens3d(2), "queens3d-3-full": queens3d(3, "full"), "odd": odd_team(n_ary=traits.n_ary)}
+    teams = {"queens3d-2": queens3d(2), "odd": odd_team(n_ary=traits.n_ary)}
+    if traits.encrypted_tables:
+        return {**teams, "prices": prices_team()}
+    teams["queens3d-3-full"] = queens3d(3, "full")
     if traits.costs:
         teams["patrol"] = read_team(PATROL)
     return {**teams, "rescue": read_team(RESCUE)} if traits.dynamic else teams

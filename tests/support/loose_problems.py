@@ -33,6 +33,7 @@ from tests.support.allocation_problems import simple_allocation_team
 from tests.support.brute_force import least_cost, solutions
 from tests.support.complex_problems import random_complex_team
 from tests.support.cost_problems import random_complex_cost_team, random_cost_team, softened
+from tests.support.encrypted_problems import affordable
 from tests.support.pkc_problems import random_pkc_team
 from tests.support.problems import random_team
 
@@ -94,15 +95,19 @@ def loose_team(protocol: str, chance: Random, *, costs: bool = False) -> Team:
     traits = protocol_named(protocol).traits
     if traits.allocates:
         return loosened(simple_allocation_team(chance), chance)
-    if costs and chance.random() < 0.2:
-        return loosened(softened(several_variables_team(chance, n_ary=traits.n_ary), chance), chance)
-    if costs:
-        return loosened(random_cost_team(chance, n_ary=traits.n_ary), chance)
-    if traits.partially_known and chance.random() < 0.3:
-        return loosened(random_pkc_team(chance), chance)
-    if chance.random() < 0.3:
-        return loosened(several_variables_team(chance, n_ary=traits.n_ary), chance)
-    return loosened(random_team(chance, n_ary=traits.n_ary), chance)
+
+    def draw() -> Team:
+        if costs and chance.random() < 0.2:
+            return softened(several_variables_team(chance, n_ary=traits.n_ary), chance)
+        if costs:
+            return random_cost_team(chance, n_ary=traits.n_ary)
+        if traits.partially_known and chance.random() < 0.3:
+            return random_pkc_team(chance)
+        if chance.random() < 0.3:
+            return several_variables_team(chance, n_ary=traits.n_ary)
+        return random_team(chance, n_ary=traits.n_ary)
+
+    return loosened(affordable(protocol, draw), chance)
 
 
 def check_against_brute_force(team: Team, options: Options, solver: AceProcess | None = None) -> Outcome:

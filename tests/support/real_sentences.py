@@ -122,6 +122,16 @@ REAL = {
     ("p32-dpop", "Vector"): "RX00 says: somebody's turns, encrypted (4860): shuffle it",
     ("p32-dpop", "Table"): "RX00 says: a table over 1 codename: 3 costs, hidden by keys, for turn 5",
     ("p32-dpop", "Next"): "RX00 says: the next turn begins",
+    ("p2-dpop", "CostSum"): (
+        "RX00 says: add to these two sums, which began with random numbers, how far your costs may go"
+    ),
+    ("p2-dpop", "CostRange"): "RX00 says: our costs add up to at least 0, and to at most 9 more",
+    ("p2-dpop", "Plan"): "RX00 says: in turn 1 there will be a table over 1 codename here, with 2 cells",
+    ("p2-dpop", "Ask"): "RX00 says: what are you called in turn 1, if you are still to come?",
+    ("p2-dpop", "Axis"): "RX00 says: in turn 2 call me 66d5; as declared, X00 is -3, -1 or 3",
+    ("p2-dpop", "Gone"): "RX00 says: in turn 1 I come before you",
+    ("p2-dpop", "EncryptedTable"): "RX00 says: the table of turn 1, encrypted: 1,280 bytes",
+    ("p2-dpop", "Opening"): "RX00 says: blind this cipher (083f), and take your share of the key off",
     ("mb-dpop", "DomainAtDepth"): "RX02 says: 1 robot above me in the tree; X02 is -3, 0, 1 or 3",
     ("mb-dpop", "Label"): (
         "RX03 says: my table has 16 cells over RX02 (4 values) and RX00 (4 values), and no cost above 19"

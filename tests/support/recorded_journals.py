@@ -14,6 +14,7 @@ from robochoc.run.registry import protocol_named
 from robochoc.sniffer.page_data import PageData
 from robochoc.sniffer.trace import Trace
 from tests.support.cost_problems import random_cost_team
+from tests.support.encrypted_problems import affordable
 
 
 def record(team: Team, options: Options) -> Journal:
@@ -29,9 +30,15 @@ def record(team: Team, options: Options) -> Journal:
 def recorded(protocol: str, n: int = 3, schedule: ScheduleName = ScheduleName.CONCURRENT) -> Journal:
     """A short run in the simulator: queens in space, or a few robots with costs or tasks where it is about these."""
     traits = protocol_named(protocol).traits
-    team = tasks(4, 4) if traits.allocates else random_cost_team(Random(5)) if traits.costs else queens3d(n)
+    team = tasks(4, 4) if traits.allocates else _priced(protocol) if traits.costs else queens3d(n)
     options = Options(protocol=protocol, runtime=Runtime.SIMULATOR, schedule=schedule, messages=2_000, cache=False)
     return record(team, options)
+
+
+def _priced(protocol: str) -> Team:
+    """A few robots with costs: as small as the protocol needs it."""
+    chance = Random(5)
+    return affordable(protocol, lambda: random_cost_team(chance))
 
 
 @cache

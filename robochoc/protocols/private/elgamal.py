@@ -5,7 +5,9 @@ element M is the pair (r G, M + r H), for a random r, the generator G and the te
 so that it cannot be told from others, and a robot takes its own share off. With all shares off, M is left. (Desmedt,
 Frankel: "Threshold cryptosystems", CRYPTO 1989.)
 
-Here M is a bit: the neutral element, or the generator.
+Here M is a bit: the neutral element, or the generator; or a sum of bits, which is 0 only if all are, as there are fewer
+of them than elements. A cipher of a sum is the sum of ciphers. Before a sum is opened it is blinded: multiplied by
+random scalars, so that nothing is read in it but whether it is 0.
 """
 
 from __future__ import annotations
@@ -31,15 +33,29 @@ class TeamKey:
         self._group.check(shares)
         return self._group.plus(shares, self.share)
 
+    @property
+    def nothing(self) -> tuple[bytes, bytes]:
+        """Return a cipher of 0 that anybody can read, until it is renewed."""
+        return self._group.zero, self._group.zero
+
     def encrypt(self, *, bit: bool) -> bytes:
         """Return a new cipher of a bit."""
-        return self.renewed((self._group.zero, self._group.one if bit else self._group.zero))
+        return self.renewed((self._group.zero, self._group.one) if bit else self.nothing)
 
     def renewed(self, pair: tuple[bytes, bytes]) -> bytes:
         """Return another cipher of the same element."""
         scalar = self._group.scalar(self._secret)
         pad = self._group.plus(pair[0], self._group.multiple(scalar))
         return pad + self._group.plus(pair[1], self._group.times(scalar, self.joint))
+
+    def added(self, first: tuple[bytes, bytes], second: tuple[bytes, bytes]) -> tuple[bytes, bytes]:
+        """Return a cipher of the sum of two elements. Of two bits it is 0 only if both are 0."""
+        return self._group.plus(first[0], second[0]), self._group.plus(first[1], second[1])
+
+    def blinded(self, pair: tuple[bytes, bytes]) -> tuple[bytes, bytes]:
+        """Return a cipher of 0 if `pair` is one; otherwise of a random other element."""
+        scalar = self._group.scalar(self._secret)
+        return self._group.times(scalar, pair[0]), self._group.times(scalar, pair[1])
 
     def stripped(self, pair: tuple[bytes, bytes]) -> bytes:
         """Return a cipher without the own share."""

@@ -28,6 +28,11 @@ class Ring:
         return self._parent
 
     @property
+    def neighbours(self) -> tuple[str, ...]:
+        """The neighbours above and below in the tree."""
+        return self.children if self._parent is None else (self._parent, *self.children)
+
+    @property
     def onward(self) -> str:
         """The neighbour through which the next robot is reached."""
         return self.children[0] if self.children else self.parent

@@ -20,14 +20,17 @@ from tests.support.asymmetric_problems import random_asymmetric_team, random_pkc
 from tests.support.examples import count
 from tests.support.replays import in_text, random_run, recorded
 
+pytestmark = pytest.mark.usefixtures("quick_encryption")
 WITH_RULES = (
     "a-dsa", "abt", "abt-do-retro", "abt-hyb", "acls", "adopt", "adopt-k", "afb", "afc", "afc-ng", "afc-tree",
     "agile-abt", "async-maxsum", "awc", "bnb-adopt", "bnb-adopt-fdac", "bounded-maxsum", "cocoa", "compapo",
     "count-dpop", "d-gibbs", "dba", "disfc", "dpop", "dsa", "dsa-sdp", "duct", "dynabt", "gca-mgm", "gdba",
     "hs-cai", "kopt", "lamdls", "maxsum", "maxsum-ad", "mb-dpop", "mcs-mgm", "mgm", "mgm2", "mixed-dsa", "ncbb",
-    "o-dpop", "p-dpop", "p32-dpop", "pt-fb", "rmb-dpop", "s-dpop", "sbt", "sfb", "syncabb", "syncbb",
+    "o-dpop", "p-dpop", "p2-dpop", "p32-dpop", "pt-fb", "rmb-dpop", "s-dpop", "sbt", "sfb", "syncabb", "syncbb",
 )  # fmt: skip
 """Protocols whose messages all have rules; in others losses are not known."""
+SILENT = {"p2-dpop"}
+"""Protocols of these whose messages prove nothing."""
 VARIANTS = {
     "adopt-k": {"heuristic": "dp", "k": "2"},
     "bnb-adopt": {"heuristic": "dp"},
@@ -76,7 +79,7 @@ def test_the_truth_is_never_excluded(protocol: str, number: int, warm: AceProces
                 continue
             assert all(0 <= (loss.by(one) or 0) <= 1 for loss in report.losses for one in Measure)
             learnt += sum(report.system_loss(kind, Measure.ENTROPY) or 0 for kind in Kind)
-    assert learnt > 0 or protocol not in WITH_RULES
+    assert (learnt > 0) is (protocol not in SILENT) or protocol not in WITH_RULES
 
 
 @pytest.mark.parametrize("protocol", [name for name in protocol_names() if protocol_named(name).traits.asymmetric])

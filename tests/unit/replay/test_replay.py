@@ -54,6 +54,8 @@ from tests.support.replays import (
     without_given,
 )
 
+pytestmark = pytest.mark.usefixtures("quick_encryption")
+
 FEW, MANY = 2, 100
 FOUR = Options(protocol="abt", runtime=Runtime.SIMULATOR, withdraw=Withdrawal.MINIMUM)
 

@@ -28,6 +28,8 @@ from tests.support.compiled import plain_python_only
 from tests.support.problems import random_team, team_of
 from tests.support.replays import in_text, random_run, recorded, with_events
 
+pytestmark = pytest.mark.usefixtures("quick_encryption")
+
 SIMULATED = Options(protocol="abt", runtime=Runtime.SIMULATOR)
 
 

@@ -49,6 +49,8 @@ from tests.support.cost_problems import random_cost_team
 from tests.support.examples import examples
 from tests.support.problems import random_team
 
+pytestmark = pytest.mark.usefixtures("quick_encryption")
+
 # Every message of every protocol
 
 

@@ -26,6 +26,8 @@ from robochoc.sniffer.trace import Trace
 from robochoc.solver.ace import AceProcess
 from tests.support.replays import random_run, recorded
 
+pytestmark = pytest.mark.usefixtures("quick_encryption")
+
 FEWEST = Options(protocol="abt", runtime=Runtime.SIMULATOR, withdraw=Withdrawal.MINIMUM)
 MAXIMAL = Options(protocol="abt", runtime=Runtime.SIMULATOR, withdraw=Withdrawal.MAXIMAL)
 
