@@ -42,6 +42,7 @@ COMMANDS = {
     "protocols": ("protocols", "List the installed protocols, or explain one."),
     "replay": ("replay", "Replay a journal, and compare it with the protocol of today."),
     "robot": ("robot", "Run one robot on this machine, in the run of a master."),
+    "serve": ("serve", "Decide for others on request: a service of ROS 2."),
     "sniff": ("sniff", "Show and explain the messages of a run on a page."),
     "solve": ("solve", "Solve teams, each robot in its own process."),
     "validate": ("validate", "Check teams, and print all errors with file and line."),

@@ -17,6 +17,7 @@ from typing import cast
 
 from robochoc.flight.layout import Point
 from robochoc.formats.diagnostics import on_one_line
+from robochoc.ros.service_types import SERVICE_TYPES
 from robochoc.ros.sink import Fields
 from robochoc.ros.waypoint import Waypoint
 from robochoc.system.installed import entry_point_names, entry_points_named, load_entry_point
@@ -93,7 +94,9 @@ def mapping_of(topic: str, robot: str, kind: str) -> WaypointMapping:
 
 
 def definition_of(kind: str) -> str:
-    """Return the definition of `kind` that an installed package brings; empty if none does."""
+    """Return the definition of `kind` that an installed package brings, or of a service; empty if there is none."""
+    if kind in SERVICE_TYPES:
+        return SERVICE_TYPES[kind]
     try:
         found = mapping_for(kind)
     except NoMappingError:

@@ -79,6 +79,12 @@ def _offered(group: str, kind: str, name: str, base: type, wrong: type[Exception
     return found.what
 
 
+def lacking_for(name: str) -> str:
+    """Return what to install before the sink `name` can be used; empty if nothing is missing."""
+    namesakes = entry_points_named(SINKS, name)
+    return on_one_line(_lacking(namesakes[0])) if namesakes else ""
+
+
 def _fault(found: object, base: type) -> str:
     return "" if isinstance(found, type) and issubclass(found, base) else f"is no {base.__name__}"
 

@@ -22,6 +22,7 @@ LOOPBACK_ALONE = (
     "<Peers><Peer address='127.0.0.1'/></Peers></Discovery></Domain></CycloneDDS>"
 )
 """A configuration of Cyclone DDS that finds others on this machine, and nobody else."""
+_CLIENT = Path(__file__).with_name("dds_client.py")
 _PEER = Path(__file__).with_name("dds_peer.py")
 _FIRST, _LAST = 1, 98
 """Domains whose ports are below those that the system gives to whoever connects."""
@@ -76,6 +77,40 @@ class Peer:
         """End it, and yield what it has said until then."""
         said, _ = self.process.communicate(timeout=HANG_S)
         return map(json.loads, said.splitlines())
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.process.kill()
+        self.process.communicate(timeout=HANG_S)
+
+
+class ServiceClient:
+    """A program at the other end of services, from when they are there until it is left."""
+
+    def __init__(self, domain: int, services: Mapping[str, str]) -> None:
+        words = [sys.executable, str(_CLIENT), str(domain), json.dumps({**services})]
+        self.process = subprocess.Popen(words, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
+
+    def __enter__(self) -> Self:
+        assert self.heard() == "ready"
+        return self
+
+    def heard(self) -> Any:  # noqa: ANN401 - JSON
+        """The next line that it says."""
+        assert self.process.stdout is not None
+        return json.loads(self.process.stdout.readline())
+
+    def begin(self, name: str, fields: object) -> None:
+        """Have it ask, and do not wait for the answer."""
+        assert self.process.stdin is not None
+        self.process.stdin.write(json.dumps([name, fields]) + "\n")
+        self.process.stdin.flush()
+
+    def ask(self, name: str, **fields: object) -> Any:  # noqa: ANN401 - JSON
+        """Have it ask; return the answer."""
+        self.begin(name, fields)
+        return self.heard()
 
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None

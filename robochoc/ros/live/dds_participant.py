@@ -6,10 +6,11 @@ A process has each domain once. A sink and a source of the same domain share it;
 from __future__ import annotations
 
 import os
+import secrets
 import threading
 import time
 from collections.abc import Callable, Iterable, Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from typing import Any
 
 from cyclonedds.core import DDSException, Policy, Qos
@@ -21,7 +22,7 @@ from cyclonedds.topic import Topic
 
 from robochoc.ros.live.dds_place import DdsPlace, Quality
 from robochoc.ros.live.dds_subscription import Subscription
-from robochoc.ros.live.dds_types import raw_type, topic_name
+from robochoc.ros.live.dds_types import raw_service_type, raw_type, topic_name
 from robochoc.ros.live.ros_master import Failed
 from robochoc.ros.recordings.types import UnknownTypeError, types_of
 
@@ -30,6 +31,8 @@ MESSAGE_BYTES_MAX = 256 * 1024
 """Longer messages are neither sent nor received: waypoints and reports are short."""
 BLOCKED_S = 0.2
 """The time after which a call that waits for others comes back, so that a signal is heard."""
+REQUESTS_MAX = 256
+"""Requests of a service, and answers of it, that are kept in DDS until they are read."""
 _SECOND_NS = 1_000_000_000
 _LIMIT = (
     "<CycloneDDS><Domain><Internal>"
@@ -106,6 +109,34 @@ class Participant:
             ]
             return Subscription(self._participant, readers, take)
 
+    def serve(self, name: str, kind: str) -> ServiceEnd:
+        """Return this end of a service of the type `kind`, such as `std_srvs/Trigger`."""
+        # Both of its topics have the same mark, by which clients know that they belong together.
+        mark = ".".join(f"{byte:x}" for byte in secrets.token_bytes(16))
+        quality = Qos(
+            Policy.Reliability.Reliable(round(BLOCKED_S * _SECOND_NS)),
+            Policy.Durability.Volatile,
+            Policy.History.KeepLast(REQUESTS_MAX),
+            Policy.DataRepresentation(use_cdrv0_representation=True),
+            Policy.Userdata(f"serviceid= {mark};".encode()),
+        )
+        with self._reported(f"the service {name} cannot be offered in DDS"):
+            request: Any = raw_service_type(f"{kind}_Request")
+            response: Any = raw_service_type(f"{kind}_Response")
+            asked: Any = Topic(self._participant, f"rq{name}Request", request)
+            told: Any = Topic(self._participant, f"rr{name}Reply", response)
+            partitions = _partitions(self._quality)
+            writer = DataWriter(Publisher(self._participant, qos=partitions), told, qos=quality)
+            # A request that came is never displaced by a later one: the writer waits until there is room.
+            others = Qos(
+                Policy.History.KeepAll,
+                Policy.ResourceLimits(REQUESTS_MAX, REQUESTS_MAX, REQUESTS_MAX),
+                Policy.TypeConsistency.AllowTypeCoercion(ignore_member_names=True),
+                base=quality,
+            )
+            reader = DataReader(Subscriber(self._participant, qos=partitions), asked, qos=others)
+        return ServiceEnd(self._participant, name, kind, reader, writer)
+
     def _topic(self, topic: str, kind: str) -> Any:  # noqa: ANN401 - types are made at run time
         return Topic(self._participant, topic_name(topic), raw_type(kind))
 
@@ -158,6 +189,40 @@ class Participant:
             raise self._failed(f"{what} (its configuration must be ASCII){hint}") from error
         except UnknownTypeError as error:
             raise self._failed(f"{what}: {error}") from error
+
+
+class ServiceEnd:
+    """The end of a service that answers: bytes of requests come, bytes of answers go."""
+
+    def __init__(self, participant: Any, name: str, kind: str, reader: Any, writer: Any) -> None:  # noqa: ANN401 - the library's
+        self._participant, self._name, self._kind = participant, name, kind
+        self._reader, self._writer = reader, writer
+        self._subscription: Subscription | None = None
+
+    def listen(self, take: Callable[[str, str, bytes], None]) -> None:
+        """Call `take` with the service's name, its type and the bytes of each request, in a thread of its own."""
+        self._subscription = Subscription(self._participant, [(self._reader, self._name, self._kind)], take)
+
+    def write(self, content: bytes) -> None:
+        """Send an answer. One that no client reads is lost."""
+        with suppress(DDSException):
+            self._writer.write(raw_service_type(f"{self._kind}_Response")(content))
+
+    def has_clients(self) -> bool:
+        """Return whether somebody listens for answers."""
+        return bool(self._writer.get_publication_matched_status().current_count)
+
+    def is_acknowledged(self) -> bool:
+        """Return whether all clients have their answers. Waits for it, up to `BLOCKED_S`."""
+        try:
+            return bool(self._writer.wait_for_acks(round(BLOCKED_S * _SECOND_NS)))
+        except (AttributeError, DDSException):  # cyclonedds 11.0.1 does not find its own constant when the time is over
+            return False
+
+    def stop(self) -> None:
+        """Take no more requests."""
+        if self._subscription is not None:
+            self._subscription.close()
 
 
 def _partitions(quality: Quality) -> Any:  # noqa: ANN401 - the library's
