@@ -58,6 +58,12 @@ class Conclusion(OfEpoch, frozen=True):
     verdict: str
 
 
+class WentOn(OfEpoch, frozen=True):
+    """The answer to `GoOn`: whether the robot has gone on without something that it had waited for."""
+
+    went: bool
+
+
 class Events(_Control, frozen=True):
     """Events for the observer, oldest first."""
 
@@ -129,6 +135,10 @@ class Wave(_Control, frozen=True):
     number: int
 
 
+class GoOn(_Control, frozen=True):
+    """The order to go on without the messages that a robot waits for: nothing is under way any more."""
+
+
 def sealed(part: AgentProblem, invalidated: Invalidated) -> bytes:
     """Return the content of a `Change`."""
     return pickle.dumps((part, invalidated))
@@ -143,7 +153,7 @@ def unsealed(change: bytes) -> tuple[AgentProblem, Invalidated]:
     return part, invalidated
 
 
-RobotMessage = Ready | Counters | Conclusion | Events
+RobotMessage = Ready | Counters | Conclusion | WentOn | Events
 """A robot's message to the runtime during a search, in every runtime. Runtimes differ in the report of the end."""
 FromRobot = RobotMessage | OpenQueues | Report | Failed
-FromParent = Begin | Pause | Change | QueuesTo | QueueFrom | Wave
+FromParent = Begin | Pause | Change | QueuesTo | QueueFrom | Wave | GoOn

@@ -14,6 +14,7 @@ from typing import Any, Self, cast, get_args
 
 import msgspec
 
+from robochoc.communication.dropped import Dropped
 from robochoc.journal.events import Bounded, Concluded, Decided, Heard, Observer, Received, Sent, Settled
 from robochoc.model.message import Envelope, Message, encode
 from robochoc.model.outcome import Metrics, Verdict
@@ -86,6 +87,8 @@ class Host:
         self.protocol = protocol
         self.name = protocol.problem.agent
         self._equip(parameters)
+        self.dropped = self._dropper(parameters)
+        """What is lost of what this robot receives; None: nothing is."""
         self.clock = 0
         self.sent: dict[str, int] = {}
         self.bytes = self.largest = 0
@@ -158,6 +161,7 @@ class Host:
             self.protocol = type(self.protocol)(problem, order)
             self._equip(part.parameters)
             self._begun = False
+        self.dropped = self._dropper(part.parameters)
         self.clock = self.bytes = self.largest = self.counted = self._step_began = 0
         self.sent = {}
         self._reported = (None, None)
@@ -229,7 +233,12 @@ class Host:
 
     def metrics(self) -> Metrics:
         """Return what this robot has sent and checked so far; `ncccs` is its own clock."""
-        return Metrics(dict(self.sent), self.bytes, self.clock, self.checks, largest=self.largest)
+        lost = 0 if self.dropped is None else self.dropped.many
+        return Metrics(dict(self.sent), self.bytes, self.clock, self.checks, largest=self.largest, lost_messages=lost)
+
+    def _dropper(self, parameters: RunParameters) -> Dropped | None:
+        loss = parameters.message_loss
+        return Dropped(loss, parameters.seed, self.name) if loss else None
 
     def _equip(self, parameters: RunParameters) -> None:
         """Give the protocol its settings and its random generator."""

@@ -10,7 +10,7 @@ import time
 from abc import ABC, abstractmethod
 from collections.abc import Callable
 
-from robochoc.communication.control import Wave
+from robochoc.communication.control import GoOn, Wave
 from robochoc.communication.kill_schedule import KillSchedule
 from robochoc.communication.run_result import Progress
 from robochoc.communication.search_state import SearchState
@@ -53,7 +53,7 @@ class MasterLoop(ABC):
         """Tell all robots to begin."""
 
     @abstractmethod
-    def _send_all(self, message: Wave, /) -> None:
+    def _send_all(self, message: Wave | GoOn, /) -> None:
         """Send a control message to all robots."""
 
     def schedule_kills(self, kills: KillSchedule, kill: Callable[[str], None]) -> None:
@@ -103,6 +103,8 @@ class MasterLoop(ABC):
         if self._progress and wanted:
             self._shown = now
             self._progress(Progress(self.state.counters.sent, time.monotonic() - self._began))
+        if self.state.begin_going_on():
+            self._send_all(GoOn())
         wave = self.state.next_wave(wanted=wanted)
         if wave is not None:
             self._send_all(Wave(wave))

@@ -10,7 +10,7 @@ import time
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
 
-from robochoc.communication.control import Conclusion, Counters, Events, Ready, RobotMessage
+from robochoc.communication.control import Conclusion, Counters, Events, Ready, RobotMessage, WentOn
 from robochoc.communication.host import Host
 from robochoc.journal.events import AnyEvent, Sent
 from robochoc.model.message import Envelope
@@ -28,7 +28,8 @@ class RobotLoop(ABC):
     """One robot in the search `epoch`; `observed` says whether its events are wanted, `bounds`, also lower bounds.
 
     A runtime calls `confirm` when the robot's host is there, `begin` when the master orders the start, `admit` for each
-    message and `take_in` for each packet of them, `report_idle` when nothing comes, and `pause` at the end.
+    message and `take_in` for each packet of them, `report_idle` when nothing comes, `go_on` when the master says that
+    nothing will, and `pause` at the end.
     """
 
     bundle_bytes: int
@@ -47,7 +48,7 @@ class RobotLoop(ABC):
         self._early: list[Envelope] = []
         self._sent = self._received = 0
         self._reported: tuple[int, int] | None = None
-        self._searching = self._concluded = self._paused = False
+        self._searching = self._concluded = self._paused = self._mute = False
 
     # What a runtime supplies
 
@@ -102,9 +103,41 @@ class RobotLoop(ABC):
         """Handle all messages that wait, and send the answers. Raises `BadMessageError`."""
         if packet and self._host and self._searching:
             self._received += len(packet)
-            self._send(self._host, self._host.handle(packet))
+            dropped = self._host.dropped
+            self._send(self._host, self._host.handle(packet) if dropped is None else self._lossy(self._host, packet))
         if len(self._events) > EVENTS_AT_ONCE:
             self.report_events()
+
+    def _lossy(self, host: Host, packet: Sequence[Envelope]) -> list[Envelope]:
+        """Handle what is not dropped of a packet, and tell the protocol what is missing before it.
+
+        A protocol that does not bear loss is told nothing. It may raise anything then, and is silent from then on.
+        """
+        dropped = host.dropped
+        if dropped is None or self._mute:
+            return []
+        bears = host.protocol.traits.bears_loss
+        try:
+            for envelope in packet:
+                if not dropped.takes(envelope.sender):
+                    missing = dropped.before(envelope.sender)
+                    if bears:
+                        host.miss(envelope.sender, missing)
+                    host.take_in(envelope)
+            return host.settle()
+        except Exception:
+            if bears or not dropped.many:
+                raise
+            self._mute = True
+            return []
+
+    def go_on(self) -> None:
+        """Go on without the messages that the protocol waits for, and tell the master whether it does."""
+        host = self._host
+        said = host.go_on() if host is not None and self._searching else None
+        if host is not None and said is not None:
+            self._send(host, said)
+        self._say(WentOn(self.epoch, said is not None))
 
     def pause(self) -> None:
         """Be silent, and report. What still arrives is lost."""

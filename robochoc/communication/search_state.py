@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 
-from robochoc.communication.control import Conclusion, Counters, OfEpoch, Ready, Report
+from robochoc.communication.control import Conclusion, Counters, OfEpoch, Ready, Report, WentOn
 from robochoc.communication.quiescence import Counts, FourCounters
 from robochoc.communication.run_result import RunResult
 from robochoc.model.outcome import Verdict
@@ -30,6 +30,7 @@ class SearchState:
         max_messages: The limit on messages, if there is one.
         ordered: The robots were told to begin.
         searching: They search now.
+        lossy: Messages are lost, and the protocol bears that: robots that wait go on without, until none does.
     """
 
     def __init__(
@@ -47,26 +48,32 @@ class SearchState:
         self._present = set(order)
         self._unready = set(order)
         self._reports: dict[str, Report] = {}
+        self.lossy = False
+        self._undecided: set[str] = set()
+        self._went = False
 
     def handle(self, name: str, message: OfEpoch) -> str:
         """Take in a control message of the robot `name`; return what is wrong with it, or an empty text.
 
         Late messages of another search, and those of lost robots, change nothing.
         """
+        fault = ""
         if message.epoch != self.epoch or name not in self._present:
-            return ""
+            return fault
         match message:
             case Ready():
                 self._unready.discard(name)
-                return ""
             case Counters(_, wave, sent, received):
-                return self._count(name, wave, Counts(sent, received))
+                fault = self._count(name, wave, Counts(sent, received))
             case Conclusion(_, verdict):
-                return self._conclude(name, verdict)
+                fault = self._conclude(name, verdict)
+            case WentOn(_, went):
+                fault = self._note_went_on(name, went=went)
             case Report():
-                return self._take_report(name, message)
+                fault = self._take_report(name, message)
             case _:
-                return "it is none for the master"
+                fault = "it is none for the master"
+        return fault
 
     def _count(self, name: str, wave: int, counts: Counts) -> str:
         self.counters.answer(name, wave, counts)
@@ -79,6 +86,25 @@ class SearchState:
             self.verdict, self.witness = Verdict(verdict), name
         return fault
 
+    def _note_went_on(self, name: str, *, went: bool) -> str:
+        """Note whether a robot has gone on; once all have answered and none has, the search is over."""
+        if name not in self._undecided:
+            return "it was not asked whether it goes on"
+        self._undecided.discard(name)
+        self._went = self._went or went
+        if not self._undecided and not self._went:
+            self.counters.quiescent = True
+            self.verdict = self.verdict or Verdict.SOLUTION
+        return ""
+
+    def begin_going_on(self) -> bool:
+        """Return whether all robots are to be told to go on: nothing is under way, and some may wait in vain."""
+        if not self.lossy or not self.counters.quiescent or self.ended:
+            return False
+        self.counters.quiescent = False
+        self._undecided, self._went = set(self._present), False
+        return True
+
     def _take_report(self, name: str, report: Report) -> str:
         self._reports[name] = report
         return ""
@@ -88,6 +114,7 @@ class SearchState:
         self.lost.setdefault(name, why)
         self._present.discard(name)
         self._unready.discard(name)
+        self._undecided.discard(name)
         self._reports.pop(name, None)
 
     @property
@@ -118,6 +145,8 @@ class SearchState:
         Args:
             wanted: Begin a wave unless one is under way, as the count of messages is wanted.
         """
+        if self._undecided:
+            return None
         if self.counters.quiescent:
             self.verdict = self.verdict or Verdict.SOLUTION
             return None

@@ -97,7 +97,7 @@ class Solvable(ABC):
             schedule: How the simulator orders events: `concurrent`, `one-by-one`, `cycles` or `random`.
             delay: The longest delay of a message in the simulator, in constraint checks.
             channel: A channel model: the simulator counts seconds of computing and radio.
-            message_loss: The probability that a message is lost in the simulator, for good.
+            message_loss: The probability that a message is lost, for good.
             on_loss: What the loss of a robot means: `fail` or `withdraw`. None: the run fails, unless there are
                 `spares`.
             spares: How many robots that are lost come back.

@@ -16,7 +16,7 @@ from robochoc.model.orders import Order
 from robochoc.model.problem import Team
 from robochoc.model.wording import counted
 from robochoc.run.alternatives import refuse_team
-from robochoc.run.choice_rules import LOSSY, RULES
+from robochoc.run.choice_rules import FEW_LOSSES, LOSSY, RULES
 from robochoc.run.context import RunContext
 from robochoc.run.defaults import AUTO, DEFAULT_COST_PROTOCOL, DEFAULT_PROTOCOL
 from robochoc.run.facts import LARGE, Facts, Sizes
@@ -102,11 +102,20 @@ def decided_unseen(team: Team, options: Options) -> Choice:
     """Return how to run a team whose constraints are known to its robots alone, who refuse what does not suit them."""
     if options.protocol != AUTO:
         return Choice(options)
-    if Facts(team).has_costs:
+    if options.message_loss:
+        name, why = _bearing_loss(options.message_loss, costs=Facts(team).has_costs)
+    elif Facts(team).has_costs:
         name, why = DEFAULT_COST_PROTOCOL, "there are costs; the robots keep their constraints, so no more is known"
     else:
         name, why = DEFAULT_PROTOCOL, "it takes all kinds of constraints, and the robots keep theirs"
     return Choice(replace(options, protocol=name, chosen={"protocol": why}))
+
+
+def _bearing_loss(loss: float, *, costs: bool) -> tuple[str, str]:
+    """Return a protocol that bears lost messages, for robots that keep their constraints, and why it is taken."""
+    without_costs = "gdba" if loss <= FEW_LOSSES else "dsa"
+    name = "regret-matching" if costs else without_costs
+    return name, "messages may be lost, and it bears that; the robots keep their constraints, so no more is known"
 
 
 def _others(*, bearing_loss: bool) -> list[str]:

@@ -52,7 +52,7 @@ class ThisMachine(Deployment):
             context.left_s,
             messages=options.messages,
             spares=options.spares,
-            parameters=RunParameters(options.seed, options.settings),
+            parameters=RunParameters(options.seed, options.settings, message_loss=options.dropped),
         )
 
     @property

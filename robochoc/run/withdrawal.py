@@ -47,7 +47,8 @@ def first_phase(options: Options, protocol: type[Protocol], withdrawal_cost: Cal
     """
     withdrawal = options.withdraw is Withdrawal.MINIMUM and protocol.traits.costs
     cost = withdrawal_cost() if withdrawal else None
-    return Phase(options.protocol, protocol, RunParameters(options.seed, options.settings, cost), withdrawal)
+    parameters = RunParameters(options.seed, options.settings, cost, options.dropped)
+    return Phase(options.protocol, protocol, parameters, withdrawal)
 
 
 def second_phase(options: Options, withdrawal_cost: Callable[[], float]) -> Phase:
@@ -58,4 +59,5 @@ def second_phase(options: Options, withdrawal_cost: Callable[[], float]) -> Phas
     name = DEFAULT_COST_PROTOCOL if options.withdraw is Withdrawal.MINIMUM else FIRST_FIT
     protocol = protocol_or_stage(name)
     cost = withdrawal_cost() if protocol.traits.costs else None
-    return Phase(name, protocol, RunParameters(options.seed, withdrawal_cost=cost), withdrawal=True, takes_over=True)
+    parameters = RunParameters(options.seed, withdrawal_cost=cost, message_loss=options.dropped)
+    return Phase(name, protocol, parameters, withdrawal=True, takes_over=True)

@@ -33,11 +33,13 @@ class RunParameters(NamedTuple):
         settings: The protocol's settings, as the user wrote them.
         withdrawal_cost: The cost of withdrawing a robot of weight 1. The constraints of a withdrawn robot, its private
             ones too, no longer apply. None: robots must not withdraw.
+        message_loss: The probability with which a robot drops a message that it receives, as if it had been lost.
     """
 
     seed: int = 0
     settings: Mapping[str, str] = _NO_SETTINGS
     withdrawal_cost: int | float | None = None
+    message_loss: float = 0.0
 
 
 DEFAULT_PARAMETERS = RunParameters()

@@ -40,7 +40,7 @@ _SECTIONS: Sections = {
         "--listen", "--robots", "--team", "--protocol", "--withdraw", "--timeout",
         "--json", "--journal", "--sniffable", "--help",
     ),
-    "Search": ("--set", "--seed", "--messages"),
+    "Search": ("--set", "--seed", "--messages", "--message-loss"),
     "Robots and losses": ("--host", "--authority", "--gather", "--patience", "--on-loss"),
     "Privacy and security": ("--private", "--filter"),
 }  # fmt: skip
@@ -81,6 +81,13 @@ _SECTIONS: Sections = {
 @click.option("--gather", "gather_s", type=float, metavar="SECONDS", help="Stop if the team is not complete by then.")
 @click.option("--timeout", type=float, metavar="SECONDS", help="Stop this long after the team is complete (status 3).")
 @messages_option
+@click.option(
+    "--message-loss",
+    type=click.FloatRange(0, 0.9),
+    default=0.0,
+    metavar="P",
+    help="Robots drop what they receive with this probability.",
+)
 @patience_option("Time without contact after which a robot is lost.", 10.0)
 @click.option(
     "--on-loss",

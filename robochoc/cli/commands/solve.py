@@ -134,7 +134,7 @@ _SECTIONS: Sections = {
     type=click.FloatRange(0, 0.9),
     default=0.0,
     metavar="P",
-    help="Simulator: lose each message with this probability.",
+    help="Lose each message with this probability, for good.",
 )
 @click.option(
     "--timeout",

@@ -37,6 +37,7 @@ class AuditedSearchState(SearchState):
 
     Attributes:
         stuck: Why the search can never end; empty if it can.
+        drops: Whether robots are to drop messages.
         duration_s: How long the search took, once `note_end` was called.
     """
 
@@ -49,6 +50,7 @@ class AuditedSearchState(SearchState):
     ) -> None:
         super().__init__(epoch, order, max_messages, declared.traits)
         self.stuck = ""
+        self.drops = False
         self.duration_s = 0.0
         self._declared = declared
         self._late: tuple[str, ...] = ()
@@ -97,7 +99,7 @@ class AuditedSearchState(SearchState):
         if not isinstance(report, DetailedReport):
             return "it is none for the master"
         counts = self.counters.latest(name) or Counts(0, 0)
-        course = FinishedSearch(self.order, counts, self.duration_s, self.by_quiescence)
+        course = FinishedSearch(self.order, counts, self.duration_s, self.by_quiescence, self.drops)
         fault = fault_of_account(name, report, self._declared, course)
         if not fault:
             self._accounts[name] = report

@@ -13,7 +13,19 @@ from typing import Annotated, NamedTuple
 
 import msgspec
 
-from robochoc.communication.control import Conclusion, Counters, Events, Failed, OfEpoch, Pause, Ready, Report, Wave
+from robochoc.communication.control import (
+    Conclusion,
+    Counters,
+    Events,
+    Failed,
+    GoOn,
+    OfEpoch,
+    Pause,
+    Ready,
+    Report,
+    Wave,
+    WentOn,
+)
 from robochoc.communication.network.profile import Profile, Ranges
 
 LATEST = 2**53
@@ -170,6 +182,7 @@ class Task(OfEpoch, frozen=True):
     settings: Mapping[str, str]
     aside: float | None
     cards: tuple[bytes, ...]
+    message_loss: float = 0.0
 
 
 class StartSearch(OfEpoch, frozen=True):
@@ -237,6 +250,7 @@ ToMaster = (
     | Ready
     | Counters
     | Conclusion
+    | WentOn
     | Events
     | DetailedReport
     | CheckResult
@@ -254,6 +268,7 @@ ToRobot = (
     | Task
     | StartSearch
     | Wave
+    | GoOn
     | Pause
     | CheckRequest
     | Revoked

@@ -166,6 +166,8 @@ class Master(MasterLoop):
         self._policy.open_ways(self.members.reach(writes_to_non_neighbours=traits.writes_to_non_neighbours))
         epoch, declared = self.state.epoch + 1, self.members.declared(traits)
         state = self.state = AuditedSearchState(epoch, self.members.order, messages, declared)
+        state.drops = parameters.message_loss > 0
+        state.lossy = state.drops and traits.bears_loss
         for name, task in self.members.tasks(epoch, protocol, traits, parameters).items():
             self._send(name, task)
         self._search_until(deadline)

@@ -298,6 +298,7 @@ class Members:
                 dict(parameters.settings),
                 parameters.withdrawal_cost,
                 cards,
+                parameters.message_loss,
             )
             for name in order
         }

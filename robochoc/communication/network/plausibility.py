@@ -68,13 +68,14 @@ class FinishedSearch(NamedTuple):
     """The master's knowledge of a finished search.
 
     `order` names its robots, `counts` holds the last counters of one of them, `duration_s` is how many seconds it
-    took, `by_quiescence` whether it ended by quiescence.
+    took, `by_quiescence` whether it ended by quiescence, `lossy` whether robots were to drop messages.
     """
 
     order: Collection[str]
     counts: Counts
     duration_s: float
     by_quiescence: bool
+    lossy: bool = False
 
 
 # Reports of one robot
@@ -97,6 +98,7 @@ def fault_of_account(name: str, account: DetailedReport, declared: Declarations,
     return (
         next(_faults_of_values(name, account, declared), "")
         or _fault_of_metrics(account, course.duration_s)
+        or _fault_of_drops(account, course)
         or _fault_of_exchange(name, account, course)
         or fault_of_findings(account.findings, course.order)
     )
@@ -160,8 +162,13 @@ def _fault_of_metrics(account: DetailedReport, duration_s: float) -> str:
         return (
             f"its clock is at {spent.ncccs:,}, and neither its own {spent.checks:,} checks nor others' bring it there"
         )
-    others = (spent.wall_s, spent.compile_s, spent.simulated_s, spent.lost_messages)
+    others = (spent.wall_s, spent.compile_s, spent.simulated_s)
     return "it has reported costs that are not its own" if any(others) or spent.memory > LARGEST_MEMORY else ""
+
+
+def _fault_of_drops(account: DetailedReport, course: FinishedSearch) -> str:
+    most = total_of(account).received if course.lossy else 0
+    return "" if 0 <= account.metrics.lost_messages <= most else "it has dropped more than it was to"
 
 
 def fault_of_findings(findings: Findings, order: Collection[str]) -> str:

@@ -161,7 +161,7 @@ class Searcher(RobotLoop):
             raise UnsupportedError(f"{self._robot.name} received invalid data: {bad}") from None
         self._learnt = {sender: [one.constraint for one in theirs] for sender, theirs in known.items()}
         copies = _sorted([one for theirs in known.values() for one in theirs], task.order)
-        parameters = RunParameters(task.seed, task.settings, task.aside)
+        parameters = RunParameters(task.seed, task.settings, task.aside, task.message_loss)
         everyone = TeamKnowledge(tuple(task.order), task.interfaces, domains, task.links)
         return AgentProblem(self._own, everyone, copies, task.secretive, parameters)
 

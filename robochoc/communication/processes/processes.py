@@ -99,7 +99,8 @@ class ProcessesRun(Session, MasterLoop):
         self._lossless = True
         self._deadline: float | None = None
         self._unstarted = Epoch(self.compiled, parameters=parameters).parts(protocol)
-        self.state = SearchState(0, self.compiled.team.order, traits=protocol.traits)
+        self._drops = parameters.message_loss > 0
+        self.state = self._new_state(0, self.compiled.team.order)
 
     @property
     def lossless(self) -> bool:
@@ -120,7 +121,7 @@ class ProcessesRun(Session, MasterLoop):
             self.state.max_messages = messages
             self._search_until(deadline)
             if self.state.ordered:
-                self._lossless = self.state.counters.quiescent and not self.state.broken_off
+                self._lossless = self.state.counters.quiescent and not self.state.broken_off and not self._drops
             return self._finish(began, late=over(deadline) or stop_requested())
         except RobotsLostError as lost:
             for name, why in lost.robots.items():
@@ -137,7 +138,7 @@ class ProcessesRun(Session, MasterLoop):
         left = sorted({*gone, *epoch.restarted, *before.lost})
         for name in gone:
             self._pool.dismiss(name)
-        self.state = SearchState(before.epoch + 1, epoch.team.order, traits=self._protocol.traits)
+        self.state = self._new_state(before.epoch + 1, epoch.team.order)
         self._unstarted = {}
         for name, part in parts.items():
             robot = self._pool.robots.get(name)
@@ -147,6 +148,12 @@ class ProcessesRun(Session, MasterLoop):
                 self._lose(name, robot.describe_end())
             else:
                 self._send(robot, Change(self.state.epoch, sealed(part, epoch.invalidated), left))
+
+    def _new_state(self, epoch: int, order: Sequence[str]) -> SearchState:
+        """Return the state of a search that begins."""
+        state = SearchState(epoch, order, traits=self._protocol.traits)
+        state.lossy = self._drops and self._protocol.traits.bears_loss
+        return state
 
     def kill(self, name: str) -> None:
         """Kill the robot's process, if it has one."""

@@ -16,6 +16,7 @@ from robochoc.communication.control import (
     Change,
     FromParent,
     FromRobot,
+    GoOn,
     OpenQueues,
     Pause,
     QueueFrom,
@@ -158,6 +159,8 @@ class QueueRobot(RobotLoop):
                 self._open_reader(robot, QueueReader(self._link.take_fd()))
             case Wave(number):
                 self.report_counters(number)
+            case GoOn():
+                self.go_on()
             case Pause():
                 self.pause()
             case Change():

@@ -60,6 +60,7 @@ class MasterPlan:
         gather_s: How many seconds to wait for the team (None: no limit).
         timeout: A limit in seconds, from when the team is complete (None: no limit).
         messages: A limit on the number of messages (None: no limit).
+        message_loss: The probability with which robots drop what they receive.
         conditions: The settings of the network.
     """
 
@@ -76,6 +77,7 @@ class MasterPlan:
     gather_s: float | None = None
     timeout: float | None = None
     messages: int | None = None
+    message_loss: float = 0.0
     conditions: NetworkSettings = NetworkSettings()
 
     def options(self, protocol: str) -> Options:
@@ -87,6 +89,7 @@ class MasterPlan:
             timeout=self.timeout,
             withdraw=self.withdraw,
             messages=self.messages,
+            message_loss=self.message_loss,
             on_loss=OnLoss.WITHDRAW if self.conditions.survive else OnLoss.FAIL,
             patience=self.conditions.patience_s,
             settings=self.settings,

@@ -194,7 +194,7 @@ def test_a_journal_of_lost_messages_is_not_replayed() -> None:
 @pytest.mark.parametrize(
     "options",
     [
-        replace(lossy("dsa"), runtime=Runtime.PROCESSES),
+        replace(lossy("dsa"), runtime=Runtime.ARRAYS),
         replace(lossy("dsa"), settings={"anytime": "yes"}),
         lossy("dsa", loss=0.95),
         lossy("central"),
