@@ -163,6 +163,12 @@ def test_a_run_that_fails_leaves_the_file_as_it_was(tmp_path: Path) -> None:
     assert place.read_text() == "of another run"
 
 
+def test_with_downwash_drones_keep_more_distance_above_each_other() -> None:
+    words = ("--situation", "flight", "--distance", "0.4")
+    assert "above each other" not in solved(HANGAR, *words).stdout
+    assert "; set: 0.40 m, 0.80 m above each other" in solved(HANGAR, *words, "--downwash", "2").stdout
+
+
 def test_what_cannot_be_published_at_last_is_told_all_the_same(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     def full(*_: object) -> None:
         raise OSError(28, "No space left on device")
@@ -204,6 +210,8 @@ def test_a_team_without_topics_has_nothing_to_publish(tmp_path: Path) -> None:
         (("--fail", "Fin"), "--fail is for the simulated flight"),
         (("--wind", "1,1,1", "--situation", "mcap:a"), "--wind is for the simulated flight"),
         (("--distance", "1"), "--distance is for the simulated flight"),
+        (("--downwash", "2"), "--downwash is for the simulated flight"),
+        (("--situation", "flight", "--downwash", "2", "--fail", "Fin"), "with downwash neither motors can fail"),
         (("--patience", "1", "--runtime", "simulator"), "--patience is for robots with processes"),
         (("--patience", "1", "--protocol", "central"), "--patience is for robots with processes"),
         (("--patience", "0"), "--patience"),

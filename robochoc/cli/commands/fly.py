@@ -11,12 +11,7 @@ import click
 from robochoc.cli.options.ground import ground_map, map_option
 from robochoc.cli.options.pages import html_option, serve_option
 from robochoc.cli.options.paths import InputPath, refuse_same_places
-from robochoc.cli.options.ros import (
-    FRAME,
-    downwash_option,
-    flight_options,
-    ros_options,
-)
+from robochoc.cli.options.ros import FRAME, flight_options, ros_options
 from robochoc.cli.options.ros_setup import conditions_of, open_sinks, publish_options, ros_errors_fail, sink_places
 from robochoc.cli.options.saved import saved_outcome, saved_team, team_option
 from robochoc.cli.options.sections import COMMON, SectionedCommand, Sections
@@ -40,7 +35,6 @@ _SECTIONS: Sections = {
 @map_option
 @ros_options
 @flight_options
-@downwash_option
 @click.option("--seed", type=click.IntRange(0), default=0, show_default=True, metavar="N", help="Seed of --gusts.")
 @html_option()
 @serve_option

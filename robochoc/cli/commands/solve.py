@@ -75,7 +75,9 @@ _SECTIONS: Sections = {
         "--ros", "--frame", "--scale", "--ros-type", "--tf", "--diagnostics", "--arm",
         "--situation", "--report-timeout", "--battery", "--use-sim-time",
     ),
-    "Simulated flight (--situation flight)": ("--fail", "--distance", "--wind", "--gusts", "--obstacle"),
+    "Simulated flight (--situation flight)": (
+        "--fail", "--distance", "--downwash", "--wind", "--gusts", "--obstacle",
+    ),
 }  # fmt: skip
 
 

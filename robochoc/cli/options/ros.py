@@ -65,17 +65,16 @@ flight_options = _optional(
         metavar="METRES",
         help="Distance that drones keep.  [default: 0.5 or less]",
     ),
+    click.option(
+        "--downwash",
+        type=Finite(1),
+        metavar="FACTOR",
+        help="Distances kept right above each other.  [default: 1]",
+    ),
     click.option("--wind", type=WindType(), metavar="X[,Y,Z]", help="Wind, in m/s."),
     click.option("--gusts", type=Finite(0), metavar="M/S", help="Strength of gusts, in m/s."),
 )
-"""`--fail`, `--distance`, `--wind`, `--gusts`."""
-
-downwash_option = click.option(
-    "--downwash",
-    type=Finite(1),
-    metavar="FACTOR",
-    help="Drones keep so many distances right above each other.  [default: 1]",
-)
+"""`--fail`, `--distance`, `--downwash`, `--wind`, `--gusts`."""
 
 arm_option = click.option(
     "--arm",
@@ -119,7 +118,13 @@ situation_options = _optional(
 )
 """`--situation`, `--patience`, `--report-timeout`, `--battery`, `--use-sim-time`, `--obstacle`."""
 
-CONDITIONS = {"failures": "--fail", "distance": "--distance", "wind": "--wind", "gusts": "--gusts"}
+CONDITIONS = {
+    "failures": "--fail",
+    "distance": "--distance",
+    "downwash": "--downwash",
+    "wind": "--wind",
+    "gusts": "--gusts",
+}
 _SIMULATED = {**CONDITIONS, "obstacles": "--obstacle"}
 _FROM_REPORTS = {"battery": "--battery", "report_timeout": "--report-timeout", "use_sim_time": "--use-sim-time"}
 IN_FRAME = {"frame": "--frame", "scale": "--scale"}

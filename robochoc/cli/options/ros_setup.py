@@ -107,7 +107,7 @@ def _flight_usage() -> Iterator[None]:
 
 def conditions_of(given: Mapping[str, Any], mission: Mission) -> FlightConditions:
     """Return the conditions that the options of `robochoc fly` ask for. Raises `click.UsageError`."""
-    asked = {name: given[name] for name in (*CONDITIONS, "downwash") if given[name] not in (None, ())}
+    asked = {name: given[name] for name in CONDITIONS if given[name] not in (None, ())}
     with _flight_usage():
         return flight_settings(asked, given["seed"]).conditions(mission.drones, mission.scale)
 

@@ -107,7 +107,7 @@ filter_option = click.option(
     "filters",
     multiple=True,
     metavar="NAME",
-    help="Network: pass all messages through this filter: signed, sealed or an installed one. Repeatable, in order.",
+    help="Network: filters: signed, sealed, others. Repeatable.",
 )
 
 
