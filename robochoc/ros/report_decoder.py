@@ -30,6 +30,8 @@ class ReportDecoder:
 
     topics: Mapping[str, str]
     """The topics of reports and their types, both by their ROS names."""
+    namespaces: Mapping[str, str]
+    """The namespace of each drone's topics, by the drone's name."""
     strange: dict[str, str]
     """Topics with places in another frame, and the last one of these frames."""
 
@@ -41,6 +43,7 @@ class ReportDecoder:
             for number, drone in enumerate(drones)
             for token in REPORTS
         }
+        self.namespaces = {drone.name: names.namespace(number) for number, drone in enumerate(drones)}
         self.topics = {topic: REPORTS[token] for topic, (_, token) in self._tokens.items()}
         self.strange = {}
 

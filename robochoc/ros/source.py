@@ -37,6 +37,14 @@ class Source(ABC):
         self.others: dict[str, str] = {}
         """Topics of a recording that are not wanted, with their types; the first of them."""
 
+    @property
+    def is_busy(self) -> bool:
+        """Return whether robots are still on their way: the wait for their reports begins when they are there."""
+        return False
+
+    def assign(self, namespaces: Mapping[str, str]) -> None:  # noqa: B027 - only who knows robots by name wants them
+        """Take the namespaces in which drones report, by the drones' names. Raises `SourceError`."""
+
     @abstractmethod
     def listen(self, topics: Mapping[str, str]) -> None:
         """Subscribe to these topics with these types, both by their ROS names. Raises `SourceError`.

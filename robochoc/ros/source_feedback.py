@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import time
 from collections import deque
 from dataclasses import replace
@@ -28,7 +29,8 @@ class SourceFeedback(Feedback):
     """Reports from `source`, decoded by `decoder`.
 
     After each decision a live source has `patience_s` seconds for a report that changes something; then the run is
-    over. A recording is read to its end, as fast as possible: the clock is that of its messages.
+    over. While it is busy, that time does not pass. A recording is read to its end, as fast as possible: the clock is
+    that of its messages.
 
     With `sim_time` decisions have the time that comes on `/clock`. Raises `SourceError` if none comes in `patience_s`.
     """
@@ -44,6 +46,9 @@ class SourceFeedback(Feedback):
         self._now_ns: int | None = None
         self._sim = SimClock() if sim_time else None
         self._early: deque[ReceivedMessage] = deque()
+        self._last = math.inf
+        self._idle_s = time.monotonic()
+        source.assign(decoder.namespaces)
         source.listen(with_clock(decoder.topics) if sim_time else decoder.topics)
         if not source.live:
             self._kept = self._pull(None)
@@ -95,15 +100,16 @@ class SourceFeedback(Feedback):
         """Take note of a decision: reports are awaited from now on."""
         limits = [left_s, self._patience_s if self._source.live else None]
         wait_s = min((limit for limit in limits if limit is not None), default=None)
-        self._deadline = None if wait_s is None else time.monotonic() + wait_s
+        now = time.monotonic()
+        self._deadline = None if wait_s is None else now + wait_s
+        self._last = math.inf if left_s is None else now + left_s
 
     def next(self, until_s: float | None) -> Report | None:
         """Return the next report; see `Feedback.next`."""
-        deadline = self._deadline
+        soon = None
         if until_s is not None and self._source.live:
             soon = time.monotonic() + min(max(until_s - time.time(), 0), TOGETHER_S)
-            deadline = soon if deadline is None else min(soon, deadline)
-        report, self._kept = self._kept or self._pull(deadline), None
+        report, self._kept = self._kept or self._pull(soon), None
         if report is not None and until_s is not None and report.at_s > until_s:
             self._kept = report
             return None
@@ -117,17 +123,32 @@ class SourceFeedback(Feedback):
         now_ns = self._sim.now_ns if self._sim else None
         return report if now_ns is None else replace(report, at_s=now_ns / 1e9)
 
-    def _pull(self, deadline: float | None) -> Report | None:
-        """Return the next report of the source before the deadline; None if there is none."""
+    def _ends(self, soon: float | None) -> float | None:
+        """Return until when reports are awaited: no longer than `soon`."""
+        if self._deadline is not None and self._source.is_busy:
+            self._deadline = min(time.monotonic() + self._patience_s, self._last)
+        return min((each for each in (self._deadline, soon) if each is not None), default=None)
+
+    def _idle_now_and_then(self, received: ReceivedMessage | None) -> None:
+        """Call `idle` where nothing was received, and now and then where messages come all the time."""
+        now = time.monotonic()
+        if received is None or now - self._idle_s >= _SLICE_S:
+            self._idle_s = now
+            self.idle()
+
+    def _pull(self, soon: float | None) -> Report | None:
+        """Return the next report of the source before `soon`, and before the wait is over; None if there is none."""
         while True:
+            deadline = self._ends(soon)
             left_s = _SLICE_S if deadline is None else min(_SLICE_S, deadline - time.monotonic())
             if left_s <= 0:
                 return None
             received = self._early.popleft() if self._early else self._source.next(left_s)
+            if self._source.live:
+                self._idle_now_and_then(received)
             if received is None:
                 if not self._source.live:
                     return None
-                self.idle()
                 continue
             self._now_ns = received.at_ns
             if self._sim is not None and self._sim.takes(received):

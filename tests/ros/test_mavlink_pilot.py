@@ -133,6 +133,28 @@ def test_who_is_to_land_flies_above_the_point_first(pilot: Pilot, played: Played
     assert steps(pilot, played).phase is Phase.LANDED
 
 
+def test_who_is_to_land_outside_of_the_fence_lands_where_it_is(pilot: Pilot, played: Played) -> None:
+    flying(pilot)
+    steps(pilot, played, 3)
+    pilot.fly(2, Target((50, 0, 0), lands=True))
+    assert steps(pilot, played).phase is Phase.LANDING
+    assert played.done[-1] == "land"
+
+
+def test_who_has_landed_is_not_commanded_at_the_end(pilot: Pilot, played: Played) -> None:
+    flying(pilot)
+    steps(pilot, played, 3)
+    pilot.fly(2, Target((8, 0, 0), lands=True))
+    steps(pilot, played, 2)
+    landed(played)
+    steps(pilot, played)
+    done = [*played.done]
+    pilot.end(AtEnd.LAND, waits=True)
+    steps(pilot, played)
+    assert is_over(pilot)
+    assert played.done == done
+
+
 def test_who_is_to_land_and_stands_on_the_ground_does_nothing(pilot: Pilot, played: Played) -> None:
     flying(pilot, Target((8, 0, 0), lands=True))
     assert steps(pilot, played).phase is Phase.LANDED

@@ -200,6 +200,11 @@ class Tape(Source):
         self.live = clock is not None
         self.clock = clock
         self.topics: Mapping[str, str] = {}
+        self.busy_s = 0.0
+
+    @property
+    def is_busy(self) -> bool:
+        return self.clock is not None and self.clock.waited_s < self.busy_s
 
     def listen(self, topics: Mapping[str, str]) -> None:
         self.topics = topics
@@ -311,9 +316,13 @@ def waited(monkeypatch: pytest.MonkeyPatch) -> WaitedClock:
     return clock
 
 
-def live(clock: WaitedClock, patience_s: float, *messages: ReceivedMessage) -> tuple[ClosedLoop, list[float]]:
+def live(
+    clock: WaitedClock, patience_s: float, *messages: ReceivedMessage, busy_s: float = 0.0
+) -> tuple[ClosedLoop, list[float]]:
     """A loop with a live source, and when it has said that it waits."""
-    feedback = SourceFeedback(Tape(*messages, clock=clock), ReportDecoder(drones_of(HANGAR), "map"), patience_s)
+    tape = Tape(*messages, clock=clock)
+    tape.busy_s = busy_s
+    feedback = SourceFeedback(tape, ReportDecoder(drones_of(HANGAR), "map"), patience_s)
     idle: list[float] = []
     feedback.idle = lambda: idle.append(clock.waited_s)
     return ClosedLoop(HANGAR, (), feedback), idle
@@ -325,6 +334,18 @@ def test_a_live_source_is_waited_for_and_somebody_told_so(waited: WaitedClock) -
     assert openings(outcome) == ["the start", "port without 3"]
     assert waited.waited_s == pytest.approx(60, abs=TOGETHER_S), "from the last decision on"
     assert len(idle) >= 60 / SLICE_S
+
+
+def test_the_wait_begins_when_robots_are_where_they_were_sent(waited: WaitedClock) -> None:
+    loop, _ = live(waited, 10, busy_s=45)
+    solve(HANGAR, SIMULATED, environment=loop)
+    assert waited.waited_s == pytest.approx(55, abs=2 * SLICE_S)
+
+
+def test_robots_on_their_way_are_waited_for_no_longer_than_all_may_take(waited: WaitedClock) -> None:
+    loop, _ = live(waited, 10, busy_s=10 * HANG_S)
+    solve(HANGAR, replace(SIMULATED, timeout=HANG_S), environment=loop)
+    assert 0 < waited.waited_s <= HANG_S + SLICE_S
 
 
 def test_waiting_is_bounded_by_the_time_for_all(waited: WaitedClock) -> None:

@@ -49,6 +49,8 @@ class Vehicle:
     at: tuple[float, float, float] = (0.0, 0.0, 0.0)
     speed: float = 20.0
     battery: float = 1.0
+    drain: float = 0.0
+    """The charge that it uses in a second of flight."""
     refuses: set[str] = field(default_factory=set)
     """Of "arm", "takeoff", "offboard", "land": commands that are denied."""
     silent: bool = False
@@ -117,6 +119,8 @@ class _Played:
     def live(self, now: float, passed: float) -> None:
         vehicle = self.vehicle
         self._move(vehicle, passed)
+        if vehicle.flies:
+            vehicle.battery = max(0.0, vehicle.battery - vehicle.drain * passed)
         if vehicle.mode == "offboard" and now - self._setpoint_at > OFFBOARD_LOSS_S:
             self._enter("land", "offboard lost")
         if vehicle.armed and not vehicle.flies:

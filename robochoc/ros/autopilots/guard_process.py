@@ -5,6 +5,7 @@ A sink and a source with the same fleet file share one guard; the last that leav
 
 from __future__ import annotations
 
+import math
 import os
 import subprocess
 import sys
@@ -58,6 +59,8 @@ class GuardProcess:
         self.observers: list[Callable[[State], None]] = []
         """Called with each state, in another thread."""
         self._order = 0
+        self._orders: dict[str, int] = {}
+        self._sent_s = -math.inf
         self._came = threading.Condition()
         self._problem = ""
         self._is_over = self._ends = self._has_ended = False
@@ -82,6 +85,8 @@ class GuardProcess:
     def fly(self, targets: Mapping[str, Target]) -> None:
         """Send vehicles to their targets, in place of earlier ones."""
         self._order += 1
+        self._orders |= dict.fromkeys(targets, self._order)
+        self._sent_s = time.monotonic()
         self._say(Fly(self._order, targets))
 
     def end(self, how: AtEnd, *, waits: bool) -> None:
@@ -123,10 +128,16 @@ class GuardProcess:
         if problem:
             raise GuardError(f"{problem}; vehicles in the air do what their own failsafe says (PX4: COM_OF_LOSS_T)")
 
+    @property
+    def is_flying(self) -> bool:
+        """Return whether vehicles are on the way to where they were sent, and still may be."""
+        in_time = time.monotonic() - self._sent_s < self.fleet.time_s
+        return in_time and not all(map(self.is_done, self._orders))
+
     def is_done(self, name: str) -> bool:
-        """Return whether a vehicle is through with the newest order: it is there, or out of order."""
+        """Return whether a vehicle is through with its newest order: it is there, or out of order."""
         state = self.states.get(name)
-        return state is not None and state.phase in _DONE and state.order == self._order
+        return state is not None and state.phase in _DONE and state.order == self._orders.get(name)
 
     def close(self) -> None:
         """End the process. Vehicles that were not brought to an end are, by itself, when it hears nothing more."""

@@ -165,10 +165,17 @@ class Pilot:
                 raise
 
     def _head_for(self, seen: Telemetry, order: int, target: Target) -> None:
-        """Fly to `target`. Who lands there flies at its present height until it is above it."""
+        """Fly to `target`. Who lands there flies at its present height until it is above it.
+
+        Who should land outside of the fence lands where it is.
+        """
         self._order, self._target, self._commanded = order, target, True
-        self._autopilot.go_to(self._above(seen, target))
-        self._enter(Phase.FLYING)
+        if target.lands and not self._fleet.fence.holds_above(target.at):
+            self._autopilot.land()
+            self._enter(Phase.LANDING)
+        else:
+            self._autopilot.go_to(self._above(seen, target))
+            self._enter(Phase.FLYING)
 
     def _above(self, seen: Telemetry, target: Target) -> Point:
         if not target.lands or seen.place is None:
@@ -239,7 +246,8 @@ class Pilot:
         if not math.isfinite(self._end_begun_s):
             self._end_begun_s = now
         passed_s = now - self._end_begun_s
-        if not self._commanded or self._hands_off:
+        lies = self._phase is Phase.LANDED and not seen.in_air
+        if not self._commanded or self._hands_off or lies:
             self.ended = True
         elif not self._obeyed:
             self._obeyed = self._is_brought_down(seen, how)

@@ -5,7 +5,6 @@ Without permission to arm it only observes: links, vehicles and the fence are ch
 
 from __future__ import annotations
 
-import importlib.util
 from collections import Counter
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager, suppress
@@ -15,12 +14,12 @@ from robochoc.flight.mission import Drone
 from robochoc.formats.diagnostics import on_one_line
 from robochoc.ros.autopilots.fleet import AtEnd, FleetError, point_text, read_fleet
 from robochoc.ros.autopilots.guard_process import GuardError, shared
+from robochoc.ros.autopilots.installed import require_mavsdk
 from robochoc.ros.autopilots.messages import Phase, State, Target
 from robochoc.ros.sink import Fields, Sink, SinkError
 from robochoc.ros.waypoint import Waypoint
 
-if importlib.util.find_spec("mavsdk") is None:  # the guard's process imports it, not this one
-    raise ModuleNotFoundError("No module named 'mavsdk'", name="mavsdk")
+require_mavsdk()
 
 _SPARE_S = 5.0
 """A vehicle that is not heard is told so by the guard, a moment after the time that the fleet file gives it."""
@@ -65,13 +64,14 @@ class MavlinkSink(Sink):
         self._await_vehicles()
 
     def decide(self, waypoints: Sequence[Waypoint]) -> None:
-        """Fly a decision. Nothing is armed if one of its places is outside of the fence."""
+        """Fly a decision. Nothing is armed if one of its places is outside of the fence.
+
+        Landing points may be: pilots land elsewhere then.
+        """
         fence = self._fleet.fence
         for one in waypoints:
-            inside = fence.holds_above(one.at) if one.lands else fence.holds(one.at)
-            if not inside:
-                what = "landing point" if one.lands else "waypoint"
-                problem = f"the {what} of {self._names[one.drone]}, {point_text(one.at)}, is outside of the fence"
+            if not one.lands and not fence.holds(one.at):
+                problem = f"the waypoint of {self._names[one.drone]}, {point_text(one.at)}, is outside of the fence"
                 raise self._wrong(problem, f"the fence is from {fence}; the decision is not flown")
         targets = {self._names[one.drone]: Target(one.at, one.lands) for one in waypoints}
         if not self._may_arm or not targets:
@@ -90,7 +90,7 @@ class MavlinkSink(Sink):
         try:
             with _reported():
                 if self._may_arm and self._guard.observers:
-                    self._guard.wait_for(lambda: all(map(self._is_through, self._flown)), self._fleet.time_s)
+                    self._guard.wait_for(lambda: not self._guard.is_flying, self._fleet.time_s)
             self._end(waits=True)
         finally:
             self._leave()
@@ -154,10 +154,6 @@ class MavlinkSink(Sink):
             state = self._guard.states.get(name)
             if state is not None and state.phase is Phase.OUT:
                 yield state
-
-    def _is_through(self, name: str) -> bool:
-        state = self._guard.states.get(name)
-        return self._guard.is_done(name) or (state is not None and state.phase in {Phase.LANDED, Phase.OUT})
 
     def _told(self) -> str:
         """Return what has become of the vehicles, in one line."""
