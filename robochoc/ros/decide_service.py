@@ -1,6 +1,6 @@
 """The service `decide`: a request names a team and changes of its problem; the answer is what the team decides.
 
-The definitions are those of `robochoc_msgs/srv/Decide` (docs/examples/ros2). Requests come from outside: whatever is
+The definitions are those of `robochoc_msgs/srv/Decide` (docs/ros2). Requests come from outside: whatever is
 wrong with one is answered in a sentence.
 """
 

@@ -1,0 +1,1 @@
+"""Launch files for robochoc: nothing is imported from here."""
