@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import doctest
 from collections import Counter
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from random import Random
 from types import ModuleType
@@ -14,7 +14,7 @@ import pytest
 import robochoc.protocols.auctions.cbaa
 import robochoc.protocols.auctions.cbba
 import robochoc.protocols.auctions.ssi
-from robochoc.generators.tasks import tasks
+from robochoc.generators.tasks import Skills, tasks
 from robochoc.model.allocation import Job, Worker, several
 from robochoc.model.assembly import assemble
 from robochoc.model.constraint import Constraint, Relation, Semantics
@@ -124,17 +124,40 @@ LIGHT = {1: -1, 2: -1, 3: -1, 4: -1}
 @pytest.mark.parametrize("protocol", ["cbaa", "cbba"])
 @count("runs", 60, 1000)
 def test_in_rounds_it_ends_after_as_many_as_tasks_times_the_diameter(protocol: str, runs: int) -> None:
-    """Choi et al., Theorem 1: rounds in which something is told. The network of robots that share tasks is a clique."""
-    chance, longest = Random(f"rounds {protocol}"), 0
+    """Choi et al., Theorem 1: rounds in which something is told, and one in which the last of it changes nothing."""
+    chance, longest, wide = Random(f"rounds {protocol}"), 0, 0
+    options = Options(protocol=protocol, runtime=Runtime.SIMULATOR, schedule=ScheduleName.CYCLES)
     for number in range(runs):
-        count_of = chance.randint(1, 6)
-        team = tasks(chance.randint(2, 6), count_of, number, model=chance.choice(["assignment", "several"]))
-        options = Options(protocol=protocol, runtime=Runtime.SIMULATOR, schedule=ScheduleName.CYCLES)
-        cycles = solve(team, options).metrics.cycles
-        assert cycles is not None
-        assert cycles <= count_of + 1, (number, cycles)
-        longest = max(longest, cycles)
+        robots, count_of = chance.randint(2, 6), chance.randint(3, 6)
+        team = any_tasks(robots, count_of, number, chance)
+        cycles = solve(team, options).metrics.cycles or 0
+        assert cycles <= count_of * diameter(team) + 1, (number, cycles)
+        longest, wide = max(longest, cycles), max(wide, diameter(team))
     assert longest > 2
+    assert wide > 1
+
+
+def any_tasks(robots: int, number: int, seed: int, chance: Random) -> Team:
+    """Return tasks of either model, which all robots can do, or those that have the skill if somebody has it."""
+    model, skilled = chance.choice(["assignment", "several"]), chance.random() < 0.5
+    try:
+        return tasks(robots, number, seed, model=model, skills=Skills(3, 2) if skilled else Skills())
+    except ValueError:
+        return tasks(robots, number, seed, model=model)
+
+
+def diameter(team: Team) -> int:
+    """Return the largest distance between robots that are connected by what they share."""
+    near = {robot.name: {one.name for one in (*robot.parents, *robot.children)} for robot in team.robots}
+    return max(len(layers(near, name)) - 1 for name in near)
+
+
+def layers(near: Mapping[str, set[str]], start: str) -> list[set[str]]:
+    """Return the robots at distance 0, 1, ... of `start`."""
+    found = [{start}]
+    while more := {other for name in found[-1] for other in near[name]}.difference(*found):
+        found.append(more)
+    return found
 
 
 @pytest.mark.parametrize("protocol", AUCTIONS)
