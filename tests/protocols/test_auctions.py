@@ -148,7 +148,7 @@ def any_tasks(robots: int, number: int, seed: int, chance: Random) -> Team:
 
 def diameter(team: Team) -> int:
     """Return the largest distance between robots that are connected by what they share."""
-    near = {robot.name: {one.name for one in (*robot.parents, *robot.children)} for robot in team.robots}
+    near = {one.name: {p.name for p in one.parents} | {c.name for c in one.children} for one in team.robots}
     return max(len(layers(near, name)) - 1 for name in near)
 
 
