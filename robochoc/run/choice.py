@@ -81,7 +81,7 @@ def _decided(team: Team, options: Options, *, environment: bool) -> Choice:
         team = normalized(team)
     except UnboundedCostError:  # the run refuses it
         return Choice(replace(options, protocol=DEFAULT_COST_PROTOCOL))
-    facts = Facts(team, environment, lambda: _compiled_sizes(team, options), options.message_loss)
+    facts = Facts(team, environment, lambda: _compiled_sizes(team, options), options.loss)
     rejected: dict[str, list[str]] = {}
     for rule in RULES:
         against = rule.unmet(facts) or refusal(rule.protocol, team, options)

@@ -98,7 +98,7 @@ OPTION_RULES = (
     OptionRule(lambda o: o.deadline and o.timeout, "--deadline and --timeout both limit the time: give one of them"),
     OptionRule(lambda o: not 0 <= o.message_loss <= MOST_LOSS, "--message-loss is a probability from 0 to 0.9"),
     OptionRule(
-        lambda o: o.message_loss and (o.runtime is Runtime.ARRAYS or o.preprocess or o.wants_anytime),
+        lambda o: o.loss and (o.runtime is Runtime.ARRAYS or o.preprocess or o.wants_anytime),
         "--message-loss goes with no --runtime arrays, --preprocess or --set anytime=yes",
     ),
     OptionRule(

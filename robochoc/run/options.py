@@ -105,7 +105,7 @@ class Options:
         patience: A robot whose process is stopped (on a network: that is out of reach) for so many seconds is lost
             (None: it is waited for; on a network 10 seconds).
         channel: A channel model: the simulator counts seconds of computing and radio.
-        message_loss: The probability that a message is lost, for good.
+        message_loss: The probability that a message is lost, for good (0: as the `channel` says). Ask for `loss`.
         settings: The protocol's settings, as text.
         kill: Robots whose processes are killed, and when.
         filters: The names of the channel filters that messages on a network go through, in this order.
@@ -148,6 +148,11 @@ class Options:
     def limit_s(self) -> float | None:
         """Return the limit on wall-clock time, in seconds, by whichever option; None: there is none."""
         return self.timeout if self.deadline is None else self.deadline
+
+    @property
+    def loss(self) -> float:
+        """Return the probability that a message is lost for good, by the option or by the channel model."""
+        return self.message_loss or (self.channel.message_loss if self.channel else 0.0)
 
     @property
     def dropped(self) -> float:

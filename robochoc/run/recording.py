@@ -37,6 +37,6 @@ def journal_header(team: Team, options: Options) -> Header:
         seed=options.seed,
         order=options.order or UNSET,
         channel=options.channel.name if options.channel else UNSET,
-        message_loss=options.message_loss or UNSET,
+        message_loss=options.loss or UNSET,
         version=BOUNDED if options.bounds else VERSION,
     )

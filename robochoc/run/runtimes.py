@@ -132,7 +132,7 @@ def open_simulator(request: SessionRequest) -> Session:
         limits=limits,
         deadline=request.deadline,
         bounds=options.bounds,
-        losses=Losses(options.message_loss, options.seed) if options.message_loss else None,
+        losses=Losses(options.loss, options.seed) if options.loss else None,
         **request.common,
     )
 

@@ -56,6 +56,7 @@ BAD = {
     "latency_ms = 5\nshared = 1": "shared: expected true or false, found an integer",
     "latency_ms = 5\ntimeout_ms = 500\nlongest_timeout_ms = 400": "longest_timeout_ms: expected at least timeout_ms",
     "latency_ms = 5\ncheck_ns = 1000000000000000000000000": "check_ns: ",
+    "latency_ms = 5\nmessage_loss = 0.95": "message_loss: ",
     f"latency_ms = 1{'0' * 400}": "latency_ms: ",
     f"latency_ms = 1{'0' * 5000}": "is no TOML file",
     f"latency_ms = {'[' * 20000}": "is no TOML file",

@@ -1,8 +1,9 @@
 """Channel models: how long a message takes by radio, and why.
 
 A message is cut into frames; each takes time on the air by its bytes, may be lost and is then sent again, and what is
-left is latency: queues, access to the medium, relays. Loss only delays: every message arrives, and none overtakes
-another of the same channel, as protocols require. Where the figures come from: docs/guides/channels.md.
+left is latency: queues, access to the medium, relays. The loss of a frame only delays: every message arrives, and none
+overtakes another of the same channel, as protocols require. Only where `message_loss` says so do whole messages not
+arrive. Where the figures come from: docs/guides/channels.md.
 """
 
 from __future__ import annotations
@@ -35,6 +36,7 @@ _RANGES = {
     "overhead_bytes": (0, 65_535),
     "frame_us": (0, 10**6),
     "loss": (0, 0.9),
+    "message_loss": (0, 0.9),
     "timeout_ms": (0, _MOST_MS),
     "backoff": (1, 10),
     "longest_timeout_ms": (0, _MOST_MS),
@@ -66,7 +68,8 @@ class ChannelModel(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fie
     transmission of a frame is lost with the probability `loss`; it is sent again after `timeout_ms`, which is
     multiplied by `backoff` each time up to `longest_timeout_ms`. If the medium is `shared`, one robot is on the air at
     a time; if not, each robot sends one message at a time, beside the others. `check_ns` is what one constraint check
-    takes a robot. Raises `ValueError` for what cannot be.
+    takes a robot. With the probability `message_loss` a message is lost for good: nobody sends it again. Raises
+    `ValueError` for what cannot be.
     """
 
     name: str
@@ -83,6 +86,7 @@ class ChannelModel(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fie
     longest_timeout_ms: float = 60_000.0
     shared: bool = False
     check_ns: int = 1000
+    message_loss: float = 0.0
 
     def __post_init__(self) -> None:
         """Refuse values out of range, values that are not numbers, and fields that contradict each other."""

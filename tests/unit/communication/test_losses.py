@@ -31,6 +31,7 @@ from robochoc.protocols.protocol import Protocol
 from robochoc.protocols.satisfaction.abt import ABT
 from robochoc.replay import CannotReplayError, replay
 from robochoc.run import Options, Runtime, solve
+from robochoc.run.choice import decided
 from robochoc.run.options import ScheduleName
 from robochoc.run.recording import journal_header
 from robochoc.solver.encoding import UnsupportedError
@@ -136,6 +137,19 @@ def test_a_lost_message_takes_its_time_on_the_air_and_silence_its_timeout() -> N
     assert list(schedule.get()) == []
     schedule.wait()
     assert schedule.time(0) == pytest.approx(8.001)
+
+
+def test_a_channel_model_can_lose_whole_messages_and_the_option_counts_before_it() -> None:
+    channel = ChannelModel(name="field", latency_ms=1, timeout_ms=10, message_loss=0.2)
+    options = Options(protocol="dsa", runtime=Runtime.SIMULATOR, channel=channel, seed=2)
+    outcome = solve(queens3d(3), options)
+    assert outcome.metrics.lost_messages > 0
+    assert outcome.metrics.lost_messages == solve(queens3d(3), replace(options, message_loss=0.2)).metrics.lost_messages
+    assert solve(queens3d(3), replace(options, message_loss=0.5)).metrics.lost_messages > outcome.metrics.lost_messages
+    assert journal_header(queens3d(3), options).message_loss == 0.2
+    assert decided(queens3d(3), replace(options, protocol="auto")).options.protocol == "dsa"
+    with pytest.raises(UnsupportedError, match="--message-loss"):
+        solve(queens3d(3), replace(options, settings={"anytime": "yes"}))
 
 
 def test_no_claim_stands_that_may_rest_on_a_lost_message() -> None:
