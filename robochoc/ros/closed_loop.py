@@ -134,6 +134,23 @@ class ClosedLoop:
         for leg in mission.legs:
             self._decide(leg)
 
+    def improve(self, outcome: Outcome, opened_by: str) -> None:
+        """Publish one decision of a run, which another may follow: for the same drones, in the same scale."""
+        robots = self._team.order
+        self(
+            self._team,
+            EpochOutcome(
+                outcome.verdict,
+                robots,
+                opened_by,
+                outcome.assignment,
+                outcome.cost,
+                verified=outcome.verified,
+                bound=outcome.bound,
+            ),
+            None,
+        )
+
     @property
     def team(self) -> Team:
         """Return the team with a scenario of all planned events, and all events from robots' reports."""

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import itertools
 import json
 import sys
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 from click.testing import CliRunner, Result
@@ -22,6 +24,7 @@ from tests.support.program import ROOT
 
 HANGAR = ROOT / "docs" / "examples" / "hangar"
 RESCUE = ROOT / "docs" / "examples" / "rescue"
+PATROL = ROOT / "docs" / "examples" / "patrol"
 SCOUTS = ROOT / "docs" / "examples" / "scouts"
 FOUR = ROOT / "instances" / "queens3d-4"
 MET = ("--situation", "flight", "--obstacle", "3,1,3", "--fail", "Fin@7")
@@ -163,6 +166,36 @@ def test_a_run_that_fails_leaves_the_file_as_it_was(tmp_path: Path) -> None:
     assert place.read_text() == "of another run"
 
 
+def test_better_decisions_are_published_after_the_deadline(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    clock = itertools.count()
+    monkeypatch.setattr("robochoc.run.improvement.time", SimpleNamespace(monotonic=lambda: float(next(clock))))
+    quick = (
+        "--runtime",
+        "simulator",
+        "--protocol",
+        "dsa",
+        "--set",
+        "cycles=1",
+        "--seed",
+        1,
+        "--deadline",
+        60,
+        "--json",
+    )
+    place = tmp_path / "run.mcap"
+    first = json.loads(ran("solve", PATROL, *quick, "--ros", f"mcap:{place}").stdout)
+    at_once = published(place, "/lead/waypoint")
+    told = ran("solve", PATROL, *quick, "--ros", f"mcap:{place}", "--improve", 12)
+    last = json.loads(told.stdout)
+    assert told.exit_code == 0
+    assert last["cost"] < first["cost"]
+    assert last["verified"]
+    times, places = zip(*published(place, "/lead/waypoint"), strict=True)
+    assert len(times) > 1
+    assert list(times) == sorted(times)
+    assert places[0] == at_once[0][1]
+
+
 def test_with_downwash_drones_keep_more_distance_above_each_other() -> None:
     words = ("--situation", "flight", "--distance", "0.4")
     assert "above each other" not in solved(HANGAR, *words).stdout
@@ -210,6 +243,9 @@ def test_a_team_without_topics_has_nothing_to_publish(tmp_path: Path) -> None:
         (("--fail", "Fin"), "--fail is for the simulated flight"),
         (("--wind", "1,1,1", "--situation", "mcap:a"), "--wind is for the simulated flight"),
         (("--distance", "1"), "--distance is for the simulated flight"),
+        (("--improve", "1"), "--improve publishes better decisions: add --ros SINK"),
+        (("--improve", "1", "--ros", "mcap:a"), "--improve goes on after --deadline SECONDS"),
+        (("--improve", "1", "--ros", "mcap:a", "--journal", "b"), "goes without --journal"),
         (("--downwash", "2"), "--downwash is for the simulated flight"),
         (("--situation", "flight", "--downwash", "2", "--fail", "Fin"), "with downwash neither motors can fail"),
         (("--patience", "1", "--runtime", "simulator"), "--patience is for robots with processes"),

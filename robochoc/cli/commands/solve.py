@@ -26,7 +26,7 @@ from robochoc.cli.options.ros import (
     situation_options,
     take_ros_options,
 )
-from robochoc.cli.options.ros_setup import closed_loop, sink_places, source_places
+from robochoc.cli.options.ros_setup import closed_loop, improved, sink_places, source_places
 from robochoc.cli.options.sections import COMMON, Sections
 from robochoc.cli.options.solve import (
     Products,
@@ -73,7 +73,7 @@ _SECTIONS: Sections = {
     "Output": ("--explain", "--bounds", "--serve", "--open"),
     "ROS (docs/guides/ros.md)": (
         "--ros", "--frame", "--scale", "--ros-type", "--tf", "--diagnostics", "--arm",
-        "--situation", "--report-timeout", "--battery", "--use-sim-time",
+        "--situation", "--report-timeout", "--battery", "--use-sim-time", "--improve",
     ),
     "Simulated flight (--situation flight)": (
         "--fail", "--distance", "--downwash", "--wind", "--gusts", "--obstacle",
@@ -115,7 +115,7 @@ _SECTIONS: Sections = {
     type=click.Choice(["concurrent", "cycles", "one-by-one", "random"]),
     default="concurrent",
     metavar="NAME",
-    help="Simulator: concurrent (default), one-by-one (messages), cycles (all in step), or random (channels).",
+    help="Simulator: concurrent, one-by-one, cycles or random.",
 )
 @click.option(
     "--delay",
@@ -313,18 +313,23 @@ def _recorded(folder: Path, options: Options, products: Products, wanted: Wanted
     order = order_for(team, wanted.order, problem.names)
     options = replace(options, order=order, kill=_called(options.kill, problem))
     from robochoc.run.choice import decided
+    from robochoc.run.improvement import refuse_to_improve
     from robochoc.run.recording import journal_header, objective_to_record
 
     choice = decided(team, options, environment=bool(wanted.ros.situation), ordered=not problem.foreign)
     options = choice.options
     header = partial(journal_header, team, options)
 
+    if wanted.ros.improve:
+        refuse_to_improve(team, options)
     objective = None if wanted.ros.situation else objective_to_record(team, options)
     with (
         closed_loop(wanted.ros, team, options.seed) as loop,
         recording(products.journal, header, objective, watch.begun()) as recorder,
     ):
         outcome = _run(team, options, recorder, loop)
+        if loop and wanted.ros.improve:
+            outcome = improved(loop, team, options, outcome, wanted.ros.improve)
         team = loop.team if loop else team
         _tell(problem._replace(team=team), outcome, wanted, choice)
         if loop and loop.mission is None:  # the run knew nothing of it
