@@ -263,11 +263,15 @@ def test_codenames_and_orders_of_values_are_new_in_each_turn() -> None:
 
 
 def test_no_cipher_comes_twice() -> None:
+    """Also none that the root has opened: the robot before it has made those of the last table."""
     pair = with_costs(team_of({"A": (1, 2), "B": (1, 2), "C": (1, 2)}, [soft(("A", "B"), {(1, 1): 1})] * 2))
-    size = 2 * P2DPOP.group.size
-    tables = {one.content["ciphers"] for one in sent(pair, 0, P2DPOP) if one.type == "EncryptedTable"}
-    halves = [table[at : at + size // 2] for table in tables for at in range(0, len(table), size // 2)]
+    size = P2DPOP.group.size
+    told = sent(pair, 0, P2DPOP)
+    tables = {one.content["ciphers"] for one in told if one.type == "EncryptedTable"}
+    opened = {one.content["cipher"] for one in told if one.type == "Opening"}
+    halves = [group[at : at + size] for group in (*tables, *opened) for at in range(0, len(group), size)]
     assert len(tables) == 2 * 2  # two robots are linked, and each has a turn
+    assert opened
     assert len({*halves}) == len(halves)
 
 

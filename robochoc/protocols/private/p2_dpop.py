@@ -30,7 +30,8 @@ the root reads a bit, and nobody else does. How many are opened depends on numbe
 
 - How far the costs of all may go, as a sum in which no robot stands alone, if there are three or more. With two robots
   it is what the other one has, as in every sum of two.
-- The optimum, and how many robots are connected, but for `spare`.
+- The optimum, and how many robots are connected, but for `spare`. The root also learns that no value declared before
+  its own attains the optimum.
 - Which neighbours come before a robot in a turn, so on which side of it the root is. A robot may guess more from the
   number of axes of a table. Axes have new codenames, and values another order, in each turn.
 - Neighbours are told the declared values, which they know. That private constraints forbid some is not told.

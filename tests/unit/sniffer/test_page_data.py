@@ -31,7 +31,6 @@ from robochoc.sniffer.page_data import (
 from robochoc.sniffer.trace import Trace
 from tests.support.recorded_journals import feed_of, recorded
 
-pytestmark = pytest.mark.usefixtures("quick_encryption")
 OURS = [name for name in protocol_names() if protocol_named(name).__module__.startswith("robochoc.")]
 HOSTILE = '</script>"); DROP\n\x1b[2J\N{RIGHT-TO-LEFT OVERRIDE}'
 
