@@ -239,7 +239,9 @@ def test_a_sink_whose_guard_is_gone_says_so(tmp_path: Path) -> None:
             sink.assign(drones_of(four_drones()))
             sink.allow_arming()
             sink._guard._process.kill()  # noqa: SLF001 - as the system might
-            with pytest.raises(SinkError, match="the guard process has ended; vehicles in the air do what their own"):
+            with pytest.raises(
+                SinkError, match="the guard process has ended; vehicles do what their own failsafe says"
+            ):
                 sink.decide(waypoints_of_four())
         finally:
             sink.discard()

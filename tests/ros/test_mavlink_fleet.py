@@ -8,6 +8,7 @@ import pytest
 
 from robochoc.ros.autopilots.fleet import BYTES_MAX, AtEnd, Fence, Fleet, FleetError, Link, read_fleet
 from robochoc.ros.autopilots.frames import GpsPlace
+from tests.support.program import ROOT
 
 LINK = "udpin://0.0.0.0:14540"
 FENCE = "fence: [[0, 0, 0], [6, 6, 6]]"
@@ -46,6 +47,12 @@ def test_a_fleet_file_that_says_all(tmp_path: Path) -> None:
 def test_the_origin_on_the_earth(tmp_path: Path) -> None:
     found = read(tmp_path, f"vehicles: {{Nose: {LINK}}}\n{FENCE}\norigin: [47.397742, 8.545594, 488]\n")
     assert found.origin == GpsPlace(47.397742, 8.545594, 488)
+
+
+def test_the_fleet_file_of_the_guide(tmp_path: Path) -> None:
+    page = (ROOT / "docs" / "guides" / "autopilots.md").read_text()
+    found = read(tmp_path, page.partition("```yaml\n")[2].partition("```")[0])
+    assert [*found.vehicles] == ["Nose", "Roof", "Fin"]
 
 
 GOOD = f"vehicles:\n  Nose: {LINK}\n{FENCE}\n"

@@ -301,3 +301,29 @@ def test_who_is_not_heard_in_time_is_out(pilot: Pilot, played: Played) -> None:
 def test_who_tells_no_place_is_out(pilot: Pilot, played: Played) -> None:
     played.seen = replace(GROUND, place=None)
     assert steps(pilot, played, 12, 1.0).why == "it has told no place on udpin://0.0.0.0:1 within 10 s"
+
+
+def test_what_another_guard_has_left_in_the_air_is_brought_down(pilot: Pilot, played: Played) -> None:
+    played.seen = replace(GROUND, armed=True, in_air=True, mode="HOLD", place=(1, 1, 3))
+    pilot.recover(AtEnd.LAND)
+    steps(pilot, played, 4)
+    assert is_over(pilot)
+    assert played.done == ["land"]
+
+
+@pytest.mark.parametrize("seen", [GROUND, replace(GROUND, armed=True, in_air=True, mode="POSCTL")])
+def test_who_stands_or_is_flown_by_a_person_is_left_alone(pilot: Pilot, played: Played, seen: Telemetry) -> None:
+    played.seen = seen
+    pilot.recover(AtEnd.LAND)
+    steps(pilot, played, 3)
+    assert not is_over(pilot)
+    steps(pilot, played, 2, MODE_S)
+    assert is_over(pilot)
+    assert played.done == []
+
+
+def test_who_is_not_heard_is_not_waited_for_for_ever(pilot: Pilot, played: Played) -> None:
+    played.connects = False
+    pilot.recover(AtEnd.LAND)
+    steps(pilot, played, 12, 1.0)
+    assert is_over(pilot)

@@ -30,6 +30,7 @@ from robochoc.ros.autopilots.messages import (
     Fly,
     FromGuard,
     Permit,
+    Recover,
     Setup,
     State,
     ToGuard,
@@ -98,6 +99,9 @@ class Guard:
                     self._flights[name].pilot.fly(order.order, target)
             case End():
                 self.end(order.how, waits=order.waits)
+            case Recover():
+                for flight in self._flights.values():
+                    flight.pilot.recover(order.how)
             case _:
                 pass
 

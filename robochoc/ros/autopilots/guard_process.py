@@ -26,6 +26,7 @@ from robochoc.ros.autopilots.messages import (
     FromGuard,
     Permit,
     Phase,
+    Recover,
     Setup,
     State,
     Target,
@@ -126,7 +127,7 @@ class GuardProcess:
         if not problem and time.monotonic() - self._heard_s > SILENT_S:
             problem = f"the guard process has said nothing for {SILENT_S:g} s"
         if problem:
-            raise GuardError(f"{problem}; vehicles in the air do what their own failsafe says (PX4: COM_OF_LOSS_T)")
+            raise GuardError(f"{problem}; vehicles do what their own failsafe says, until another guard reaches them")
 
     @property
     def is_flying(self) -> bool:
@@ -140,7 +141,26 @@ class GuardProcess:
         return state is not None and state.phase in _DONE and state.order == self._orders.get(name)
 
     def close(self) -> None:
-        """End the process. Vehicles that were not brought to an end are, by itself, when it hears nothing more."""
+        """End the process. Vehicles that were not brought to an end are, by itself, when it hears nothing more.
+
+        If it was lost, another guard does that.
+        """
+        self._shut()
+        if self._orders and not self._has_ended:
+            flown = {name: link for name, link in self.fleet.vehicles.items() if name in self._orders}
+            with suppress(GuardError):
+                _recover(msgspec.structs.replace(self.fleet, vehicles=flown))
+
+    def recover(self) -> None:
+        """Bring to an end what another guard has left armed, and wait for that."""
+        self._ends = True
+        self._say(Recover(self.fleet.end))
+        until = time.monotonic() + self.fleet.patience_s + END_S + _SPARE_S
+        with self._came:
+            while not self._is_over and time.monotonic() < until:
+                self._came.wait(_SLICE_S)
+
+    def _shut(self) -> None:
         if self._process.stdin:
             with suppress(OSError):
                 self._process.stdin.close()
@@ -191,6 +211,14 @@ class GuardProcess:
         if isinstance(message, State):
             for observer in self.observers:
                 observer(message)
+
+
+def _recover(fleet: Fleet) -> None:
+    guard = GuardProcess(fleet)
+    try:
+        guard.recover()
+    finally:
+        guard.close()
 
 
 def _environment() -> dict[str, str]:

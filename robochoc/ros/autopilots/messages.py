@@ -56,6 +56,12 @@ class End(msgspec.Struct, frozen=True, tag=True):
     waits: bool
 
 
+class Recover(msgspec.Struct, frozen=True, tag=True):
+    """To the guard: bring to an end what another guard, which was lost, has left armed."""
+
+    how: AtEnd
+
+
 class State(msgspec.Struct, frozen=True, tag=True):
     """From the guard: the state of a vehicle, several times a second."""
 
@@ -85,7 +91,7 @@ class Failed(msgspec.Struct, frozen=True, tag=True):
     why: str
 
 
-ToGuard = Setup | Permit | Fly | End
+ToGuard = Setup | Permit | Fly | End | Recover
 FromGuard = State | Ended | Failed
 LINE_MAX = 4096
 """Longer lines are not sent by the guard: a pipe takes shorter ones whole, or not at all (PIPE_BUF)."""

@@ -58,7 +58,7 @@ class Pilot:
         self._commanded = self._hands_off = False
         self._ending: tuple[AtEnd, bool] | None = None
         self._end_begun_s = self._retry_s = -math.inf
-        self._obeyed = self._was_armed = False
+        self._obeyed = self._was_armed = self._recovers = False
 
     def fly(self, order: int, target: Target) -> None:
         """Take note of an order, in place of the one before."""
@@ -68,12 +68,19 @@ class Pilot:
         """Take note that all is over. A second call may no longer wait."""
         self._ending = how, waits
 
+    def recover(self, how: AtEnd) -> None:
+        """Take note that another guard was lost: what it has left armed is to be brought to an end."""
+        self._recovers = True
+        self._ending = how, False
+
     def step(self) -> State:
         """Do what is next, and return the state of the vehicle."""
         seen = self._autopilot.look()
         self._was_armed = self._was_armed or (self._commanded and seen.armed)
         try:
-            if self._ending:
+            if self._recovers:
+                self._recover(seen)
+            elif self._ending:
                 self._end(seen, *self._ending)
             elif self._phase is Phase.CONNECTING:
                 self._connect(seen)
@@ -239,6 +246,19 @@ class Pilot:
             self._order = self._wanted[0]
         if self._commanded and not self._obeyed:
             self._obeyed = self._is_brought_down(seen, AtEnd.LAND)
+
+    def _recover(self, seen: Telemetry) -> None:
+        """Find out whether the vehicle was left armed, once it is heard. One that a person flies is left alone."""
+        waited_s = self._clock() - self._since_s
+        if self._phase is Phase.CONNECTING:
+            if self._autopilot.connect():
+                self._enter(Phase.READY)
+            else:
+                self.ended = waited_s > self._fleet.patience_s
+        elif seen.armed and seen.mode not in MANUAL:
+            self._commanded, self._recovers = True, False
+        else:
+            self.ended = waited_s > MODE_S
 
     def _end(self, seen: Telemetry, how: AtEnd, waits: bool) -> None:  # noqa: FBT001 - one of two
         """Bring the vehicle to an end: it lands or holds, or was never commanded."""
