@@ -91,9 +91,8 @@ class Cells:
         """The numbers of all free cells."""
         low, high, middle = zip(self._pixels(1), self._pixels(0), strict=True)
         height, width = self.grid.free.shape
-        whole = np.outer((low[0] >= 0) & (high[0] <= height), (low[1] >= 0) & (high[1] <= width))
-        sizes = np.outer(high[0] - low[0], high[1] - low[1])
-        found = whole & (_sums(self.grid.free, low, high) == sizes)
+        sizes = np.outer(high[0] - low[0], high[1] - low[1])  # pixels beside the map count, and are not free
+        found = _sums(self.grid.free, low, high) == sizes
         centres = np.ix_(middle[0].clip(0, height - 1), middle[1].clip(0, width - 1))
         return tuple(np.flatnonzero(found & self.passable[centres]).tolist())
 

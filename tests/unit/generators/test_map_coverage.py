@@ -117,6 +117,13 @@ def test_what_is_worth_nothing_does_not_bring_robots_together() -> None:
     assert best(team) == 0
 
 
+def test_no_two_robots_stand_in_one_cell() -> None:
+    team, _ = coverage(MapChoice(map=BUILDING, at="1.5,1.5 1.5,1.5", cell=0.5, within=4), worth=0)
+    found = best(team)
+    assert found is not None
+    assert found > 0  # one of them has to leave
+
+
 @pytest.mark.parametrize(
     ("make", "said"),
     [

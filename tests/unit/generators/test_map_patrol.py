@@ -143,6 +143,15 @@ def test_robots_that_are_far_apart_pay_nothing() -> None:
     }
 
 
+def test_each_leg_takes_no_longer_than_it_may() -> None:
+    """Both points are near enough to where the robot stands, and too far from each other."""
+    for within, wanted in ((7.0, None), (14.0, True)):
+        choice = MapChoice(map=BUILDING, at="2.5,4.5", cell=0.5, within=within)
+        team, _ = patrol(choice, visit="0.5,4.5 4.5,4.5", rounds=2)
+        assert [len(variable.domain) for variable in team.variables.values()] == [2, 2]
+        assert (best(team) is not None) is bool(wanted)
+
+
 @pytest.mark.parametrize(
     ("make", "said"),
     [

@@ -121,6 +121,12 @@ def spread(half: Fraction) -> list[Fraction]:
     return [half * step / 4 for step in range(-4, 5)]
 
 
+def test_a_cell_is_free_only_where_a_robot_fits_at_its_centre() -> None:
+    grid = grid_of(["....."] * 5, origin="[-0.25, -0.25, 0]")
+    assert len(cells_of(grid, Fraction(0), 100, Fraction(1, 2)).free) == 25
+    assert len(cells_of(grid, Fraction(1, 2), 100, Fraction(1, 2)).free) == 9
+
+
 def test_cells_are_as_small_as_their_number_allows() -> None:
     grid = grid_of(["." * 12] * 12, resolution="0.1", origin="[-0.05, -0.05, 0]")
     for most, side in ((144, "0.1"), (143, "0.2"), (25, "0.2"), (24, "0.3")):
@@ -205,6 +211,16 @@ def test_formations_take_as_little_time_as_can_be(shape: str, tmp_path: Path) ->
             assert cost == wanted == best(team)
             check_answer(team, reach, assignment)
         assert ground.scale == float(reach.cells.side)
+
+
+def test_waypoints_are_metres_in_the_frame_of_the_map(tmp_path: Path) -> None:
+    path = str(write_map(tmp_path, ROOMS, origin="[-7.3, 4.1, 0]"))
+    choice = MapChoice(map=path, agents=2, radius=0)
+    team, ground = formation(choice, 1)
+    reach = reach_of(choice, Random(1))
+    assert ground.first == reach.cells.first != (0, 0)
+    for protocol in ("dpop", "central"):
+        check_answer(team, reach, answers(team, protocol)[1])
 
 
 def test_slots_are_where_the_shape_is(tmp_path: Path) -> None:
