@@ -301,7 +301,7 @@ def test_a_signal_ends_it(how: signal.Signals, status: int) -> None:
 @pytest.mark.parametrize(
     ("words", "told"),
     [
-        (["--ros", "rospy"], "--ros rospy: services are offered by dds, as in dds:5"),
+        (["--ros", "rospy"], "--ros rospy: services are offered by dds, as in dds:5, and by rclpy"),
         (["--ros", "dds:x"], "'x' is no domain of DDS"),
         (["--timeout", "0"], "--timeout"),
     ],

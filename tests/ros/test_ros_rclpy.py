@@ -9,6 +9,7 @@ import json
 import subprocess
 import sys
 from collections.abc import Iterator
+from contextlib import ExitStack
 from pathlib import Path
 from typing import Any, Self
 
@@ -22,6 +23,7 @@ from robochoc.ros.live.rclpy_node import MESSAGE_BYTES_MAX, RclpyNode, RclpySink
 from robochoc.ros.sink import SinkError
 from robochoc.ros.source import ReceivedMessage, SourceError
 from tests.support import rclpy_stand_in
+from tests.support.dds import LOOPBACK_ALONE
 from tests.support.limits import HANG_S
 from tests.support.program import ROOT
 from tests.support.ros2_python import ros2_python
@@ -323,18 +325,27 @@ rclpy.shutdown()
 
 
 @pytest.mark.slow
-def test_a_node_of_ros_receives_every_waypoint() -> None:
+@pytest.mark.timeout(300)
+@pytest.mark.parametrize("sink", ["rclpy", "dds"])
+def test_a_node_of_ros_receives_every_waypoint(sink: str) -> None:
+    """`dds` is spoken by this Python, without a ROS: the node cannot tell."""
     python, env = ros2_python()
+    ours, place = (python, sink) if sink == "rclpy" else (sys.executable, f"dds:?wait={HANG_S:g}")
     topics = [f"/{name}/waypoint" for name in ("fin", "nose", "port", "roof", "starboard", "tail")]
-    with subprocess.Popen(
-        [python, "-c", LISTENER, *topics], env=env, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
-    ) as listener:
+    with (
+        subprocess.Popen(
+            [python, "-c", LISTENER, *topics], env=env, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+        ) as listener,
+        ExitStack() as stack,
+    ):
+        stack.callback(listener.kill)
         assert listener.stdout is not None
         assert listener.stdout.readline() == "ready\n"
-        words = ["-m", "robochoc", "solve", HANGAR, "--runtime", "simulator", "--protocol", "abt", "--ros", "rclpy"]
-        done = subprocess.run([python, *words], env=env, capture_output=True, text=True, timeout=HANG_S, check=False)
+        words = ["-m", "robochoc", "solve", HANGAR, "--runtime", "simulator", "--protocol", "abt", "--ros", place]
+        env["CYCLONEDDS_URI"] = LOOPBACK_ALONE
+        done = subprocess.run([ours, *words], env=env, capture_output=True, text=True, timeout=HANG_S, check=False)
         assert done.returncode == 0, done.stderr
-        assert "rclpy: 6 waypoints, 0 landings" in done.stderr
+        assert "6 waypoints, 0 landings" in done.stderr
         heard, errors = listener.communicate(timeout=HANG_S)
     assert errors == ""
     assert json.loads(heard).keys() == {*topics}

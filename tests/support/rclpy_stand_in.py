@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import json
 import os
+import queue
 import sys
 import threading
 from array import array
@@ -21,6 +22,7 @@ import numpy as np
 import pytest
 
 from robochoc.ros.recordings.types import FieldType, types_of
+from tests.support.limits import HANG_S
 
 PACKAGES = ("builtin_interfaces", "geometry_msgs", "sensor_msgs", "std_msgs")
 _SPELLING = {"float64": "double", "float32": "float", "bool": "boolean", "byte": "octet", "char": "uint8"}
@@ -146,6 +148,8 @@ class Node:
         self.name, self.context = name, context
         self.came = threading.Condition()
         self.subscriptions: list[Subscription] = []
+        self.services: dict[str, tuple[Any, Callable[[Any, Any], Any]]] = {}
+        self.calls: deque[Callable[[], None]] = deque()
         context.nodes.append(self)
 
     def create_publisher(self, kind: type, topic: str, quality: QoSProfile) -> Publisher:
@@ -168,6 +172,21 @@ class Node:
                 for content in publisher.kept:
                     made.put(content)
         return made
+
+    def create_service(self, kind: Any, name: str, callback: Callable[[Any, Any], Any]) -> None:  # noqa: ANN401 - rclpy is untyped
+        self.services[name] = (kind, callback)
+
+    def call(self, name: str, **fields: object) -> Any:  # noqa: ANN401 - rclpy is untyped
+        """What a client of another node does: ask, and wait for the answer."""
+        kind, callback = self.services[name]
+        request = kind.Request()
+        for field, value in fields.items():
+            setattr(request, field, value)
+        answer: queue.Queue[Any] = queue.Queue()
+        with self.came:
+            self.calls.append(lambda: answer.put(callback(request, kind.Response())))
+            self.came.notify()
+        return answer.get(timeout=HANG_S)
 
     def destroy_node(self) -> None:
         with _network.lock:
@@ -196,11 +215,15 @@ class SingleThreadedExecutor:
             raise RuntimeError("the context is not valid")
         with self.node.came:
             self.node.came.wait_for(
-                lambda: self.is_woken or any(one.waiting for one in self.node.subscriptions), timeout_sec
+                lambda: self.is_woken or self.node.calls or any(one.waiting for one in self.node.subscriptions),
+                timeout_sec,
             )
             ready = [(one, one.waiting.popleft()) for one in [*self.node.subscriptions] if one.waiting]
+            calls = [self.node.calls.popleft() for _ in range(min(1, len(self.node.calls)))]
         for one, content in ready:
             one.callback(content)
+        for call in calls:
+            call()
 
 
 def serialize_message(message: Any) -> bytes:  # noqa: ANN401 - messages are untyped
@@ -292,6 +315,20 @@ def message_class(kind: str) -> type:
     return _made[kind]
 
 
+class _Services(ModuleType):
+    """The module `std_srvs.srv` or the like."""
+
+    def __getattr__(self, name: str) -> type:
+        try:
+            halves = {
+                half: message_class(f"{self.__name__.partition('.')[0]}/{name}_{half}")
+                for half in ("Request", "Response")
+            }
+        except LookupError as missing:
+            raise AttributeError(name) from missing
+        return type(name, (), halves)
+
+
 class _Messages(ModuleType):
     """The module `geometry_msgs.msg` or the like."""
 
@@ -323,6 +360,13 @@ def install(monkeypatch: pytest.MonkeyPatch) -> None:
     for package in PACKAGES:
         monkeypatch.setitem(sys.modules, package, ModuleType(package))
         monkeypatch.setitem(sys.modules, f"{package}.msg", _Messages(f"{package}.msg"))
+
+
+def install_services(monkeypatch: pytest.MonkeyPatch, *packages: str) -> None:
+    """Have the services of these packages imported, too."""
+    for package in packages:
+        monkeypatch.setitem(sys.modules, package, ModuleType(package))
+        monkeypatch.setitem(sys.modules, f"{package}.srv", _Services(f"{package}.srv"))
 
 
 def subscribed(topic: str) -> list[Subscription]:

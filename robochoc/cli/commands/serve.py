@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -14,6 +14,8 @@ from robochoc.cli.reports.failures import USAGE, Failure, failures_told, invalid
 
 if TYPE_CHECKING:
     from robochoc.model.problem import Team
+    from robochoc.ros.live.dds_service import DdsServices
+    from robochoc.ros.live.rclpy_service import RclpyServices
 
 _SERVICE = "/robochoc/decide"
 _SLICE_S = 0.2
@@ -27,7 +29,7 @@ _SLICE_S = 0.2
     "place",
     default="dds",
     metavar="PLACE",
-    help="dds, or dds:DOMAIN?partition=NAME.  [default: dds, in the domain of ROS_DOMAIN_ID]",
+    help="dds, dds:DOMAIN?partition=NAME, or rclpy.  [default: dds, in the domain of ROS_DOMAIN_ID]",
 )
 @click.option("--protocol", default="auto", show_default=True, metavar="NAME", help="As for robochoc solve.")
 @click.option(
@@ -49,7 +51,7 @@ _SLICE_S = 0.2
 @click.option("--requests", type=click.IntRange(1), metavar="N", help="End after N answers.  [default: at Ctrl-C]")
 @invalid_input_fails
 def serve(paths: tuple[Path, ...], place: str, requests: int | None, **given: Any) -> None:  # noqa: ANN401 - how teams decide
-    """Decide for others: a service of ROS 2, for a behaviour tree or another node. No ROS has to be here.
+    """Decide for others: a service of ROS 2, for a behaviour tree or another node. With dds no ROS has to be here.
 
     /robochoc/decide (robochoc_msgs/srv/Decide) takes a team's name and changes of its problem. For each team there is
     also /robochoc/TEAM/decide (std_srvs/srv/Trigger). Requests are answered one after the other.
@@ -59,8 +61,8 @@ def serve(paths: tuple[Path, ...], place: str, requests: int | None, **given: An
     ros2 service call /robochoc/hangar/decide std_srvs/srv/Trigger
     """  # noqa: D301 - \\b is how click is told to leave the lines as they are
     kind, _, where = place.partition(":")
-    if kind != "dds":
-        raise click.UsageError(f"--ros {place}: services are offered by dds, as in dds:5")
+    if kind not in {"dds", "rclpy"}:
+        raise click.UsageError(f"--ros {place}: services are offered by dds, as in dds:5, and by rclpy")
     teams = _teams(paths)
     from robochoc.ros.decide_service import DECIDE, SERVICES, TRIGGER, DecideService, refusal
     from robochoc.ros.names import ros_name
@@ -68,23 +70,23 @@ def serve(paths: tuple[Path, ...], place: str, requests: int | None, **given: An
     from robochoc.run.options import Options, Runtime
     from robochoc.run.orchestrator import solve
 
-    lacking = lacking_for("dds")
+    lacking = lacking_for(kind)
     if lacking:
         raise Failure(USAGE, lacking)
-    from robochoc.ros.live.dds_service import DdsServices
-
     options = Options(given["protocol"], Runtime(given["runtime"]), given["seed"], given["timeout"])
     decider = DecideService(teams, solve, options)
     triggers = {f"/robochoc{ros_name(team.name)}/decide": team.name for team in teams}
     if len(triggers) < len(teams):
         raise Failure(USAGE, "two teams would have the same service in ROS: give one's folder another name")
     services = {_SERVICE: DECIDE, **dict.fromkeys(triggers, TRIGGER)}
-    with ros_errors_fail(), DdsServices(where, services, refusal) as offered:
+    with ros_errors_fail(), _offered(kind, where, services, refusal) as offered:
         for name, what in services.items():
-            click.echo(f"domain {offered.domain} of DDS: {name} ({SERVICES[what]})", err=True)
+            is_here = name not in offered.lacking
+            told = SERVICES[what] if is_here else f"not offered: {SERVICES[what]} is not built here"
+            click.echo(f"{offered.where}: {name} ({told})", err=True)
         answered = 0
         while answered != requests:
-            request = offered.next(_SLICE_S)
+            request: Any = offered.next(_SLICE_S)
             if request is None:
                 continue
             named = triggers.get(request.name)
@@ -92,6 +94,19 @@ def serve(paths: tuple[Path, ...], place: str, requests: int | None, **given: An
             offered.reply(request, answer)
             answered += 1
             click.echo(f"{request.name}: {answer['message']}", err=True)
+
+
+def _offered(
+    kind: str, place: str, services: Mapping[str, str], refuse: Callable[[str], Mapping[str, Any]]
+) -> DdsServices | RclpyServices:
+    """Return the services, by DDS or by rclpy. Raises `SinkError`."""
+    if kind == "dds":
+        from robochoc.ros.live.dds_service import DdsServices
+
+        return DdsServices(place, services, refuse)
+    from robochoc.ros.live.rclpy_service import RclpyServices
+
+    return RclpyServices(place, services, refuse)
 
 
 def _teams(paths: Sequence[Path]) -> list[Team]:

@@ -10,7 +10,7 @@ from __future__ import annotations
 import queue
 import struct
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Collection, Mapping
 from typing import Any, NamedTuple, Self
 
 from robochoc.ros.live.dds_participant import MESSAGE_BYTES_MAX, Participant, ServiceEnd
@@ -48,9 +48,13 @@ class DdsServices:
         refuse: Makes the fields of an answer that refuses, for a reason in words.
     """
 
+    lacking: Collection[str] = ()
+    """Services that are not offered: none."""
+
     def __init__(self, place: str, services: Mapping[str, str], refuse: Refuse) -> None:
         found = DdsPlace.of(place, Quality(reliable=True, latched=False, depth=WAITING_MAX), ("partition",), SinkError)
         self.domain = found.domain
+        self.where = f"domain {found.domain} of DDS"
         self._kinds = {**services}
         self._refuse = refuse
         self._waiting: queue.Queue[Request] = queue.Queue(WAITING_MAX)

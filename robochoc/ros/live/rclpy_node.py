@@ -1,8 +1,8 @@
 """rclpy: a node of ROS 2 in this process, where rclpy can be imported: it comes with a ROS 2, for that ROS's Python.
 
-rclpy is untyped; this module and `rclpy_messages` alone know it. Each sink and each source has a context and a node of
-its own, so that what else uses rclpy in this process is left alone. The domain, the middleware and its network are
-rclpy's own business: `ROS_DOMAIN_ID`, `RMW_IMPLEMENTATION` and the like.
+rclpy is untyped; this module, `rclpy_messages` and `rclpy_service` alone know it. Each sink and each source
+has a context and a node of its own, so that what else uses rclpy in this process is left alone. The domain, the
+middleware and its network are rclpy's own business: `ROS_DOMAIN_ID`, `RMW_IMPLEMENTATION` and the like.
 """
 
 from __future__ import annotations
