@@ -35,8 +35,8 @@ Choices that the papers leave open, and differences:
 
 - The tree takes the place of the papers' total order: costs are moved up branches.
 - In the papers a copy of the costs is kept consistent, and the search uses the given ones: consistency serves to delete
-  values while the search goes on. Here nothing is deleted, and the search uses the moved costs. Measured, that saves
-  more (docs/explanation/replications.md).
+  values while the search goes on. Here the search uses the moved costs, and nothing is deleted: measured, deletions
+  cost as many messages as they save then (docs/explanation/replications.md).
 - All binary constraints between two robots are one arc, also where robots have several variables. Constraints over more
   robots are not moved, nor are tables of more than 65,536 entries. The parent gets what every own value costs at least,
   even if there is no constraint.

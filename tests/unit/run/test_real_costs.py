@@ -37,7 +37,7 @@ from robochoc.verification.checker import RefutedError, check_told_cost
 from tests.support.examples import count
 from tests.support.real_costs import best_cost, random_costs_team
 
-PROTOCOLS = ("central", "adopt", "dpop", "syncbb", "bnb-adopt", "afb", "sfb")
+PROTOCOLS = ("central", "adopt", "dpop", "syncbb", "bnb-adopt", "bnb-adopt-fdac", "afb", "sfb")
 
 
 def in_simulator(protocol: str, *, verify: bool = False) -> Options:
