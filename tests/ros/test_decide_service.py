@@ -10,6 +10,7 @@ import subprocess
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from random import Random
 from typing import Any
 
 import pytest
@@ -23,7 +24,7 @@ from robochoc.model.problem import Team
 from robochoc.ros.decide_service import CHANGES_CHARACTERS_MAX, DECIDE, TRIGGER, DecideService, refusal
 from robochoc.ros.live import dds_service
 from robochoc.ros.live.dds_service import WAITING_MAX, DdsServices
-from robochoc.ros.recordings.types import types_of
+from robochoc.ros.recordings.types import FieldsError, types_of
 from robochoc.ros.sink import Fields, SinkError
 from robochoc.run import Options, Runtime, solve
 from tests.support.dds import LOOPBACK_ALONE, ServiceClient, free_domain
@@ -318,3 +319,24 @@ def test_two_teams_of_one_name_are_refused(tmp_path: Path) -> None:
     done = CliRunner().invoke(cli, words, catch_exceptions=False)
     assert done.exit_code == 2
     assert "two teams have the name 'hangar': give one's folder another name" in done.stderr
+
+
+def test_whatever_bytes_a_request_has_it_is_answered() -> None:
+    """Bytes of whole requests, spoiled: whatever can be decoded is answered, and whatever is answered can be sent."""
+    chance = Random(7)
+    changes = '[{"remove_value": {"variable": "port", "value": 3}}, {"remove_agent": {"name": "Nose"}}]'
+    whole = types_of(2).encode(f"{DECIDE}_Request", {"team": "hangar", "changes": changes, "timeout": 5.0})
+    decided = solve(pair(values=3), SIMULATED)
+    decider = DecideService([HANGAR], lambda *_: decided, SIMULATED)
+    answered = 0
+    for _ in range(2_000):
+        content = bytearray(whole)
+        for _ in range(chance.randint(1, 4)):
+            content[chance.randrange(4, len(content))] = chance.randrange(256)
+        try:
+            fields = types_of(2).decode(f"{DECIDE}_Request", bytes(content))
+        except FieldsError:
+            continue
+        assert types_of(2).encode(f"{DECIDE}_Response", decider.decide(fields))
+        answered += 1
+    assert answered > 300

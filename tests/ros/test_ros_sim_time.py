@@ -227,3 +227,17 @@ def test_all_that_can_be_published(tmp_path: Path) -> None:
     code, told = solved("--ros", f"mcap:{out}", "--ros-type", "sensor_msgs/Image")
     assert code != 0
     assert "has the type 'sensor_msgs/Image', and there is no mapping from waypoints to it" in told
+
+
+def test_a_flight_has_frames(tmp_path: Path) -> None:
+    result, out = tmp_path / "result.json", tmp_path / "flight.mcap"
+    words = ["solve", str(FOLDER), "--runtime", "simulator", "--json"]
+    result.write_text(CliRunner().invoke(cli, words, catch_exceptions=False).stdout, encoding="utf-8")
+    flown = ["fly", str(result), "--team", str(FOLDER), "--ros", f"mcap:{out}", "--tf"]
+    assert CliRunner().invoke(cli, flown, catch_exceptions=False).exit_code == 0
+    with open_source(f"mcap:{out}") as source:
+        source.listen({"/tf": "tf2_msgs/TFMessage"})
+        first = source.next(0)
+    assert first is not None
+    frames = [one["child_frame_id"] for one in first.fields["transforms"]]
+    assert frames == [f"{name}/base_link" for name in ("fin", "nose", "port", "roof", "starboard", "tail")]
