@@ -149,11 +149,11 @@ class Host:
     def change(self, part: AgentProblem, invalidated: Invalidated, order: PriorityOrder | None = None) -> None:
         """Enter a new epoch: the problem has changed to `part`, and counting begins again.
 
-        A protocol that can goes on with what it knows; any other is begun anew. `order` is as in `of`. Raises
-        `UnsupportedError`.
+        A protocol that can, and has begun, goes on with what it knows; any other is begun anew. `order` is as in `of`.
+        Raises `UnsupportedError`.
         """
         problem, order = LocalProblem(part), order or order_of(part)
-        if isinstance(self.protocol, DynamicProtocol):
+        if self._begun and isinstance(self.protocol, DynamicProtocol):
             problem.allow_undeclared()  # until others have heard that a value is gone
             self.protocol.change(problem, order, invalidated)
             self._forget_said()

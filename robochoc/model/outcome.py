@@ -149,7 +149,7 @@ class Optima(NamedTuple):
 
 @dataclass(frozen=True)
 class Preprocessing:
-    """The result of a preprocessing step, which robots took before the protocol began.
+    """The result of a preprocessing step, which robots took before the protocol began; of all epochs together.
 
     Attributes:
         name: What it is called: `ac`.

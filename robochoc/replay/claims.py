@@ -80,9 +80,25 @@ def contradicted_claims(journal: Journal, runs: Sequence[ReplayedRun], *, whole:
         names = _COUNTED_BEFORE if header.version == STAMPED_LATE else _COUNTED
         before = outcome.preprocessing.metrics if outcome.preprocessing else Metrics()
         yield from _differing("the outcome's ", before + outcome.metrics, metrics_of(journal.events), names)
-    for number, epoch in enumerate(outcome.epochs[: len(runs)]):
-        yield from _answers(f"epoch {number}'s ", epoch, runs[number].answer)
+    last = _last_runs(runs)
+    for number, epoch in enumerate(outcome.epochs):
+        if number in last:
+            yield from _answers(f"epoch {number}'s ", epoch, last[number].answer)
     yield from _answers("the outcome's ", outcome, runs[-1].answer)
+
+
+def _last_runs(runs: Sequence[ReplayedRun]) -> dict[int, ReplayedRun]:
+    """Return the last run of each epoch, by its number: what robots do before a search belongs to the epoch."""
+    found: dict[int, ReplayedRun] = {}
+    number = -1
+    for one in runs:
+        began = one.run.began
+        if began is None or began.protocol == DisAC.__name__:
+            number += 1
+        else:
+            number = began.epoch if isinstance(began.epoch, int) else 0
+        found[number] = one
+    return found
 
 
 def _beginning(header: Header, runs: Sequence[RecordedRun], placed_by: str | None) -> Iterator[Contradiction]:

@@ -112,7 +112,8 @@ class Rebuilder:
         self._options = options
         self._only = only
         self._reader = TeamReader(header.team if header else "")
-        self._hosts: dict[str, Host] = {}
+        self._hosts: dict[type[Protocol], dict[str, Host]] = {}
+        """Of each protocol's last run: before each epoch there may be one of another protocol."""
         self._before: Mapping[str, CompiledRobot] = {}
         self._lost: set[str] = set()
 
@@ -123,8 +124,9 @@ class Rebuilder:
             epoch = self._epoch(run, protocol)
             parts = epoch.parts(protocol)
             goes_on = run.began is not None and isinstance(run.began.epoch, int)
-            before = self._hosts if goes_on else {}
-            self._hosts = {name: _host(protocol, part, before.get(name), epoch) for name, part in parts.items()}
+            before = self._hosts.get(protocol, {}) if goes_on else {}
+            hosts = {name: _host(protocol, part, before.get(name), epoch) for name, part in parts.items()}
+            self._hosts[protocol] = hosts
         except GivenProblemError as why:
             raise CannotReplayError(str(why), broken=True) from why
         except _UNCOMPILED as why:
@@ -133,7 +135,7 @@ class Rebuilder:
         kept = issubclass(protocol, DynamicProtocol)
         continuing = [name for name in parts if kept and name in before and name not in epoch.restarted]
         lossless = run.given is None or run.given.quiet
-        return RebuiltRobots(protocol, self._hosts, parts, lossless, continuing, epoch.compiled)
+        return RebuiltRobots(protocol, hosts, parts, lossless, continuing, epoch.compiled)
 
     def _protocol(self, run: RecordedRun) -> type[Protocol]:
         """Return the class that the run names; a master's journal names it in the header."""

@@ -286,7 +286,6 @@ def _not_with_scenario(option: str, given: Callable[[Options], object]) -> TeamR
 TEAM_RULES = (
     _not_with_scenario("--withdraw", lambda o: o.withdraw is not None),
     _not_with_scenario("--count", lambda o: o.count),
-    _not_with_scenario("--preprocess", lambda o: o.preprocess),
     TeamRule(
         lambda c: c.options.preprocess and c.minimum_withdrawal and c.traits.costs,
         "--preprocess removes values that do not go with robots that may withdraw (--withdraw minimum, {protocol})",
@@ -294,7 +293,10 @@ TEAM_RULES = (
         other_protocol=True,
     ),
     TeamRule(
-        lambda c: c.options.preprocess and any(unmet_requirement(r, DisAC.traits, c.team.owner) for r in c.team.robots),
+        lambda c: (
+            c.options.preprocess
+            and any(unmet_requirement(robot, DisAC.traits, team.owner) for team in c.epochs for robot in team.robots)
+        ),
         "{team} has partially known constraints (PKC), which --preprocess does not support: drop it",
     ),
     _not_with_scenario("--runtime network", lambda o: o.protocol != CENTRAL and o.runtime is Runtime.NETWORK),

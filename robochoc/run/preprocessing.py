@@ -2,13 +2,19 @@
 
 It is a search of its own, whose findings are the values that are left. The team of the search that follows is the same
 with these values only: so journals and replays of it need nothing else. The answer is checked with the files.
+
+Where the problem changes, it is done anew before each epoch, from the domains of the files. Deletions that rest on what
+is gone come back that way, and to a protocol that goes on they are values that a change has added.
 """
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
+from functools import reduce
+from operator import add
 
+from robochoc.model.outcome import Preprocessing
 from robochoc.model.problem import Domain, Robot, Team
 from robochoc.protocols.findings import Findings
 from robochoc.run.defaults import PREPROCESSING
@@ -31,6 +37,14 @@ def removed_values(compiled: CompiledTeam, findings: Mapping[str, Findings]) -> 
         for name, robot in compiled.robots.items()
         if name in findings
     )
+
+
+def total_preprocessing(done: Sequence[Preprocessing]) -> Preprocessing | None:
+    """Return the sum of what was done before the epochs of a run; None if that is nothing."""
+    if not done:
+        return None
+    spent = reduce(add, [one.metrics for one in done])
+    return Preprocessing(done[0].name, spent, sum(one.removed for one in done), sum(one.values for one in done))
 
 
 def restricted(compiled: CompiledTeam, findings: Mapping[str, Findings]) -> Team:

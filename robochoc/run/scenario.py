@@ -39,6 +39,12 @@ from robochoc.solver.team_compiler import OutOfTimeError
 
 Compile = Callable[[Team], CompiledTeam]
 
+Prepare = Callable[[], tuple[CompiledTeam, RunResult | None]]
+"""What the robots do before each epoch's search: returns the team that they search with, as it is compiled.
+
+With a result, that is the epoch's, and there is no search.
+"""
+
 Environment = Callable[[Team, EpochOutcome, float | None], ScenarioEvent | None]
 """The robots' surroundings: a function that gets each epoch's answer, and returns the next change of the problem.
 
@@ -85,6 +91,7 @@ class ScenarioRun:
         team: the team as it is now, in the order of its files.
         withdrawn: the robots that were lost, and have not come back.
         failed_returns: why lost robots could not come back, a sentence each.
+        found: the result of the epoch that begins, if what the robots do before the search has settled it.
     """
 
     def __init__(
@@ -97,6 +104,7 @@ class ScenarioRun:
         messages: int | None = None,
         spares: int = 0,
         parameters: RunParameters = DEFAULT_PARAMETERS,
+        prepare: Prepare | None = None,
     ) -> None:
         """Begin with `team` as it is before the first event.
 
@@ -109,6 +117,7 @@ class ScenarioRun:
             spares: how many lost robots come back. Their files are read again, the events that have happened meanwhile
                 happen to them too, and they join at the end of the order.
             parameters: what all robots are given beside the problem.
+            prepare: what the robots do before each search (None: nothing).
         """
         self.team = self._full = team_after_events(team, events=0)
         self.withdrawn: list[str] = []
@@ -121,6 +130,9 @@ class ScenarioRun:
         self._messages = messages
         self._spares = spares
         self._parameters = parameters
+        self._prepare = prepare
+        self.found: RunResult | None = None
+        self._joining: set[str] = set()
         self._after_losses = False
         self._has_added_events = False
 
@@ -132,17 +144,25 @@ class ScenarioRun:
         """Return the team as the robots see it, compiled. Raises `OrderError`, and what compiling raises."""
         return self._compile(self.ordered_team())
 
+    def prepared(self) -> CompiledTeam:
+        """Return the team with which the robots search in the epoch that begins. Raises what `compiled` does."""
+        if self._prepare is None:
+            return self.compiled()
+        compiled, self.found = self._prepare()
+        return compiled
+
     def epochs(self, session: Session, on_start: Callable[[EpochStart], None]) -> Iterator[FinishedEpoch]:
         """Yield one epoch after the other. The verdict of the last one counts. A limit may end the run earlier.
 
         Args:
-            session: a session that was opened with the `compiled` team.
+            session: a session that was opened with the `prepared` team.
             on_start: is called before each epoch.
         """
         opened = "the start"
         epoch = Epoch(session.compiled, parameters=self._parameters)
         for number in count():
-            on_start(EpochStart(epoch, number, opened))
+            if self.found is None:
+                on_start(EpochStart(epoch, number, opened))
             result = self._search(session)
             yield FinishedEpoch(self.team, epoch, opened, result)
             if result.lost:
@@ -165,6 +185,8 @@ class ScenarioRun:
     def _search(self, session: Session) -> RunResult:
         if not self.team.robots:  # all have left, and others may come: no constraint is broken
             return RunResult.of(Verdict.SOLUTION, None, {}, (), 0)
+        if self.found is not None:
+            return self.found
         if self.is_over:
             return NOT_SEARCHED
         limits = [self._messages, self._next.after if self._next else None]
@@ -245,11 +267,18 @@ class ScenarioRun:
             self._order = (*stay, *(name for name in self.team.order if name not in stay))
 
     def _change(self, session: Session, joining: Collection[str]) -> Epoch:
-        """Let `session` work on the team as it is now; returns the epoch that begins."""
-        now = session.workable(self.ordered_team())
-        keys, agents = invalidated_by(session.compiled.team, now)
-        stale = Invalidated(keys, agents | set(joining))
-        epoch = Epoch(self._compile(now), stale, frozenset(joining), self._parameters)
+        """Let `session` work on the team as it is now; returns the epoch that begins.
+
+        If that needs no search, the session stays with what it has until one does.
+        """
+        compiled = self._compile(session.workable(self.ordered_team())) if self._prepare is None else self.prepared()
+        self._joining.update(joining)
+        if self.found is not None:
+            return Epoch(compiled, parameters=self._parameters)
+        anew = frozenset(name for name in self._joining if name in compiled.team)
+        self._joining.clear()
+        keys, agents = invalidated_by(session.compiled.team, compiled.team)
+        epoch = Epoch(compiled, Invalidated(keys, agents | anew), anew, self._parameters)
         session.change(epoch)
         return epoch
 

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import replace
 from functools import partial
 
-from robochoc.communication.run_result import RobotsLostError
+from robochoc.communication.run_result import RobotsLostError, RunResult
 from robochoc.communication.session import Epoch, Session
 from robochoc.model.cost_units import Cost
 from robochoc.model.costs import normalized_event, told_cost
@@ -16,7 +16,7 @@ from robochoc.model.problem import INFINITE, ProblemKind, Team
 from robochoc.run.context import RunContext
 from robochoc.run.distributed import Deployment
 from robochoc.run.evaluation import Answer, Search, check_with_files
-from robochoc.run.preprocessing import preprocessing_phase, removed_values, restricted
+from robochoc.run.preprocessing import preprocessing_phase, removed_values, restricted, total_preprocessing
 from robochoc.run.runtimes import SessionRequest, open_session
 from robochoc.run.scenario import Environment, EpochStart, FinishedEpoch, ScenarioRun
 from robochoc.run.start_events import StartEvents
@@ -53,7 +53,11 @@ class ThisMachine(Deployment):
             messages=options.messages,
             spares=options.spares,
             parameters=RunParameters(options.seed, options.settings, message_loss=options.dropped),
+            prepare=None if options.preprocess is None else self._preprocessed,
         )
+        self._done: list[Preprocessing] = []
+        self._cut_short = ""
+        """Why the robots could not end the last preprocessing."""
 
     @property
     def kind(self) -> ProblemKind:
@@ -136,12 +140,10 @@ class ThisMachine(Deployment):
         except NoLocalSolutionError as alone:
             answer = Answer(Verdict.NO_SOLUTION, witness=alone.robot, reason=str(alone))
             return answer.confirmed_as(self._confirmed(alone.robot))
-        done = None
         if self.options.preprocess is not None:
-            before, compiled = self._preprocessed()
-            if before.verdict is not Verdict.SOLUTION:
-                return before
-            done = before.preprocessing
+            compiled = scenario.prepared()
+            if scenario.found is not None and not self._dynamic:
+                return self._settled(phase, scenario.found)
         with self._session(phase, compiled) as session:
             for epoch in scenario.epochs(session, partial(self._start_events.report, phase.protocol, session=session)):
                 answer, lost = self._answer_of(phase, epoch), epoch.result.lost
@@ -150,26 +152,34 @@ class ThisMachine(Deployment):
         if lost:
             raise RobotsLostError(lost)
         answer = self._with_epochs(answer)
-        reasons = filter(None, [self.why_unknown(phase, answer), *scenario.failed_returns])
-        return replace(answer, reason="; ".join(reasons) or None, preprocessing=done)
+        why = self._cut_short or self.why_unknown(phase, answer)
+        reasons = filter(None, [why, *scenario.failed_returns])
+        return replace(answer, reason="; ".join(reasons) or None, preprocessing=total_preprocessing(self._done))
 
-    def _preprocessed(self) -> tuple[Answer, CompiledTeam]:
-        """Let the robots make their domains consistent; return what came of it, and the team that is left.
+    def _preprocessed(self) -> tuple[CompiledTeam, RunResult | None]:
+        """Let the robots make their domains consistent, and return the team that is left. See `scenario.Prepare`.
 
-        The verdict is `solution` where the search can begin; otherwise the answer is that of the run.
+        They begin with the domains of the files: what rests on a constraint that is gone comes back.
         """
+        self._cut_short = ""
+        if self.is_empty:
+            return self._scenario.compiled(), None
         phase = preprocessing_phase(self.options)
         result = self._search_without_losses(phase).result
         whole = self._scenario.compiled()
         values = sum(len(robot.domain.values) for robot in whole.robots.values())
-        done = Preprocessing(phase.name, result.metrics, removed_values(whole, result.findings), values)
-        answer = Answer(result.verdict, witness=result.witness, preprocessing=done)
-        if result.verdict is Verdict.NO_SOLUTION:
-            return answer.confirmed_as(self.confirm(phase, answer)), whole
+        self._done.append(Preprocessing(phase.name, result.metrics, removed_values(whole, result.findings), values))
+        if result.verdict is Verdict.SOLUTION:
+            return self._compile(restricted(whole, result.findings)), None
         if result.verdict is Verdict.UNKNOWN:
-            why = self.why_unknown(phase, replace(answer, metrics=result.metrics))
-            return replace(answer, reason=why), whole
-        return answer, self._compile(restricted(whole, result.findings))
+            self._cut_short = self.why_unknown(phase, Answer(result.verdict, result.metrics)) or ""
+        return whole, RunResult.of(result.verdict, result.witness, {}, (), 0)
+
+    def _settled(self, phase: Phase, found: RunResult) -> Answer:
+        """Return the answer of a run that has ended before the protocol began."""
+        before = total_preprocessing(self._done)
+        answer = Answer(found.verdict, witness=found.witness, reason=self._cut_short or None, preprocessing=before)
+        return answer.confirmed_as(self.confirm(phase, answer)) if found.verdict is Verdict.NO_SOLUTION else answer
 
     def _answer_of(self, phase: Phase, epoch: FinishedEpoch) -> Answer:
         """Return the answer of an epoch, checked with the files."""
