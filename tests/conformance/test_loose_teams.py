@@ -27,7 +27,7 @@ def solved(protocol: str, seed: str, kind: int, runtime: Runtime = Runtime.SIMUL
     chance = Random(seed)
     costs = protocol_named(protocol).traits.costs and chance.random() < 0.7
     team = loose_team(protocol, chance, costs=costs)
-    options = replace(random_schedule(chance), protocol=protocol, timeout=None)
+    options = replace(random_schedule(chance), protocol=protocol)
     if runtime is not Runtime.SIMULATOR:
         options = Options(protocol=protocol, runtime=runtime, seed=options.seed)
     orders = every_order(team, chance)

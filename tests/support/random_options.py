@@ -20,14 +20,16 @@ def random_options(team: Team, protocol: str, chance: Random) -> Options:
 
 
 def random_schedule(chance: Random) -> Options:
-    """Return options for a random schedule: any channel next, or time in checks with delays from none to long ones."""
+    """Return options for a random schedule: any channel next, or time in checks with delays from none to long ones.
+
+    Without a limit of time: on a busy machine it would end a run that is only long. One without an end is pytest's.
+    """
     schedule = chance.choice(list(ScheduleName))
     return Options(
         runtime=Runtime.SIMULATOR,
         schedule=schedule,
         delay=chance.choice((0, 3, 20, 200)) if schedule is ScheduleName.CONCURRENT else 0,
         seed=chance.getrandbits(32),
-        timeout=HANG_S,
     )
 
 
@@ -36,4 +38,4 @@ def on_runtime(options: Options, runtime: Runtime) -> Options:
     if runtime is Runtime.SIMULATOR:
         return options
     defaults = Options()
-    return replace(options, runtime=runtime, schedule=defaults.schedule, delay=defaults.delay)
+    return replace(options, runtime=runtime, schedule=defaults.schedule, delay=defaults.delay, timeout=HANG_S)
