@@ -78,7 +78,7 @@ def test_with_a_tenth_of_all_messages_lost_no_protocol_is_wrong(runs: int) -> No
     assert wrong == 0
 
 
-@count("runs", 4, 200)
+@count("runs", 4, 80)
 def test_what_bears_loss_ends_with_an_answer_wherever_there_is_one(runs: int) -> None:
     """Of the teams that have a solution nearly all get one; none of them is taken from those that have none."""
     solvable = solved = 0
