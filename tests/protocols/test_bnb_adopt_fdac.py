@@ -185,6 +185,16 @@ def test_of_a_robot_above_whose_value_is_unknown_only_what_was_put_in_is_missing
     assert list(informed().delta) == [1, 0]
 
 
+def test_with_a_value_above_with_which_nothing_goes_all_own_values_cost_infinity() -> None:
+    team = priced("AB", {"B": [4, 1], "AB": [5, INFINITE, INFINITE, INFINITE]})
+    robot = placed(BnBADOPTFDAC, team, "RB", "RA")
+    assert replies(robot, ("RA", DOMAIN)) == [("RA", Moved([9, INFINITE]))]
+    said = replies(robot, ("RA", Value((2,), 1)))
+    assert list(robot.delta) == [INFINITE, INFINITE]
+    assert said == [("RA", Cost(context(A=2), INFINITE, INFINITE))]
+    assert replies(robot, ("RA", Value((1,), 2))) == [("RA", Cost(context(A=(1, 2)), 0, 0))]
+
+
 def test_nothing_is_told_before_the_parent_has_a_value() -> None:
     robot = moved()
     assert replies(robot, ("RZ", Value((1,), 1))) == []
