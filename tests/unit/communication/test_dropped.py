@@ -120,7 +120,7 @@ def test_no_claim_of_a_protocol_that_needs_every_message_stands(runtime: Runtime
     assert outcome.reason.endswith("messages were lost, and abt needs every one")
 
 
-@count("runs", 2, 1000)
+@count("runs", 2, 60)
 def test_in_processes_no_verdict_is_wrong_where_a_tenth_is_lost(runs: int) -> None:
     names = ("dsa", "gdba", "maxsum", "async-maxsum", "sfb", "dpop", "adopt", "mgm2", "a-dsa", "lamdls", "maxsum-ad")
     for number in range(runs):
