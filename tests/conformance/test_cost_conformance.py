@@ -77,7 +77,7 @@ def test_the_least_cost_is_found_in_the_simulator(protocol: str, batch: int, war
     for _ in range(problems):
         team = team_for(protocol, chance)
         seen[agrees(team, random_options(team, protocol, chance), warm).verdict] += 1
-    assert seen[Verdict.NO_SOLUTION] > problems // 40
+    assert seen[Verdict.NO_SOLUTION] > problems // 100
     assert seen[Verdict.OPTIMAL] > problems // 2
 
 
