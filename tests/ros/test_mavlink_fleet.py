@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
 
 import pytest
@@ -61,12 +62,14 @@ GOOD = f"vehicles:\n  Nose: {LINK}\n{FENCE}\n"
 @pytest.mark.parametrize(
     ("text", "told"),
     [
-        ("", "is empty"),
+        ("", "is empty; see docs/guides/autopilots.md for what a fleet file has"),
         ("[1]", "fleet.yaml:1: a fleet file is no mapping"),
         ("a: {", "is not YAML"),
         ("a: !!python/object:os.system x", "the tag .* is not allowed"),
         (FENCE, "has no 'vehicles'"),
         (f"vehicles: {{Nose: {LINK}}}", "has no 'fence'"),
+        (f"{GOOD}fence: [[0, 0, 0], [60, 60, 60]]", "fleet.yaml:4: has 'fence' twice; keep one"),
+        (f"vehicles:\n  A: {LINK}\n  A: {LINK}0\n{FENCE}", "fleet.yaml:3: has 'A' twice; keep one"),
         (f"{GOOD}fance: 3", r"fleet.yaml:4: 'fance' does not belong in a fleet file; did you mean 'fence'\?"),
         (f"vehicles: [Nose]\n{FENCE}", "'vehicles' is no mapping"),
         (f"vehicles: {{}}\n{FENCE}", "0 vehicles; a fleet has 1 to 64"),
@@ -74,6 +77,7 @@ GOOD = f"vehicles:\n  Nose: {LINK}\n{FENCE}\n"
         (f"vehicles: {{Nose: 'udpin://0.0.0.0:70000'}}\n{FENCE}", "is none"),
         (f"vehicles: {{Nose: 'udpin://0.0.0.0:1 x'}}\n{FENCE}", "is none"),
         (f"vehicles: {{Nose: 'serial:///etc/passwd:57600'}}\n{FENCE}", "is none"),
+        (f"vehicles: {{Nose: 'serial:///dev/../etc/passwd:57600'}}\n{FENCE}", "is none"),
         (f"vehicles:\n  A: {LINK}\n  B: {LINK}\n{FENCE}", "fleet.yaml:3: B and A have the same link"),
         (f"vehicles: {{A: {{at: [0, 0, 0]}}}}\n{FENCE}", "vehicle A has no 'link'"),
         (f"vehicles: {{A: {{link: '{LINK}', at: [0, 0]}}}}\n{FENCE}", r"'at' is no place; expected \[x, y, z\]"),
@@ -120,3 +124,10 @@ def test_the_fence_holds_what_is_in_it_and_the_ground_below() -> None:
     assert not fence.holds_above((3, 3, 6.5))
     assert not fence.holds_above((-0.1, 3, 0))
     assert fence.holds((-0.5, 6.5, 6.5), margin_m=0.5)
+
+
+def test_a_pipe_is_refused_at_once(tmp_path: Path) -> None:
+    """To open it would be to wait for a writer."""
+    os.mkfifo(tmp_path / "fleet.yaml")
+    with pytest.raises(FleetError, match=r"fleet\.yaml: is no file; name a fleet file"):
+        read_fleet(tmp_path / "fleet.yaml")

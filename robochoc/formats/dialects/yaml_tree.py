@@ -70,10 +70,17 @@ class Document:
     repeated: tuple[tuple[int, str], ...]
 
 
-def read_yaml(text: str) -> Document:
-    """Return the one document in `text`. Raises `MistakeError`, with its line."""
+_PROBLEM = "a problem has a name, an objective, domains, variables and constraints"
+
+
+def read_yaml(text: str, expected: str = _PROBLEM) -> Document:
+    """Return the one document in `text`; `expected` says what such a file has.
+
+    Raises:
+        MistakeError: It is empty, or not such YAML. It has the line.
+    """
     try:
-        return _Composer().document(yaml.parse(text, Loader=getattr(yaml, "CSafeLoader", yaml.SafeLoader)))
+        return _Composer(expected).document(yaml.parse(text, Loader=getattr(yaml, "CSafeLoader", yaml.SafeLoader)))
     except yaml.MarkedYAMLError as error:
         line = error.problem_mark.line + 1 if error.problem_mark else 0
         raise MistakeError(f"is not YAML: {error.problem or error.context}", "mend it there", line) from None
@@ -84,7 +91,8 @@ def read_yaml(text: str) -> Document:
 class _Composer:
     """Makes the tree of events, with a stack of its own: nesting does not recurse."""
 
-    def __init__(self) -> None:
+    def __init__(self, expected: str) -> None:
+        self._expected = expected
         self._plain = yaml.SafeLoader("")
         self._anchors: dict[str, Node] = {}
         self._open: list[_Open] = []
@@ -111,7 +119,7 @@ class _Composer:
                 case _:
                     pass
         if self._root is None:
-            raise MistakeError("is empty", "a problem has a name, an objective, domains, variables and constraints")
+            raise MistakeError("is empty", self._expected)
         return Document(self._root, tuple(self._repeated))
 
     def _alias(self, anchor: str, line: int) -> Node:

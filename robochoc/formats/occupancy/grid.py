@@ -96,7 +96,7 @@ class _Description:
     """What the YAML file says. Raises `MistakeError` where it says something else, or not enough."""
 
     def __init__(self, text: str) -> None:
-        document = read_yaml(text)
+        document = read_yaml(text, f"a map has the keys {', '.join(_KEYS)}")
         if document.root.entries is None:
             raise MistakeError("is no map", f"expected the keys {', '.join(_KEYS)}", document.root.line)
         for line, key in document.repeated:
@@ -115,11 +115,12 @@ class _Description:
 
     def classified(self, pixels: Pixels, white: int) -> tuple[Flags, Flags]:
         """Return which pixels are free, and which are occupied; rows from the lowest y on. An image has it on top."""
-        shade = np.arange(white + 1)
-        share = shade if self._negate else white - shade  # the occupancy, in units of 1 / white
-        # In integers: a decimal threshold that a pixel meets exactly is met on every machine.
-        free = share * self._free.denominator < self._free.numerator * white
-        occupied = share * self._occupied.denominator > self._occupied.numerator * white
+        # The occupancy of each shade, in units of 1 / white. Thresholds are compared in Python's integers: one that a
+        # pixel meets exactly is met on every machine, and no number of decimal places overflows.
+        shares = range(white + 1) if self._negate else range(white, -1, -1)
+        free_below, occupied_above = self._free * white, self._occupied * white
+        free = np.array([share < free_below for share in shares])
+        occupied = np.array([share > occupied_above for share in shares])
         upright = pixels[::-1]
         return free[upright], occupied[upright]
 

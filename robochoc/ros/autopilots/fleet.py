@@ -22,7 +22,7 @@ BYTES_MAX = 64 * 1024
 VEHICLES_MAX = 64
 _LINK = re.compile(
     r"(?:udpin|udpout|tcpin|tcpout)://(?:[A-Za-z0-9._-]{1,253}|\[[0-9A-Fa-f:.]{2,45}\]):(?P<port>\d{1,5})"
-    r"|serial:///dev/[A-Za-z0-9._/-]{1,200}:\d{2,8}",
+    r"|serial:///dev/(?!.*\.\.)[A-Za-z0-9._/-]{1,200}:\d{2,8}",
     re.ASCII,
 )
 _PORTS = range(1, 65_536)
@@ -91,21 +91,33 @@ class Fleet(msgspec.Struct, frozen=True):
 def read_fleet(path: Path) -> Fleet:
     """Return the fleet in the file at `path`. Raises `FleetError`."""
     try:
-        with path.open("rb") as file:
-            content = file.read(BYTES_MAX + 1)
+        if path.is_fifo():  # to open it would be to wait for a writer
+            content = None
+        else:
+            with path.open("rb") as file:
+                content = file.read(BYTES_MAX + 1)
     except OSError as error:
         raise FleetError(
             on_one_line(f"{path}: {error.strerror}; name a fleet file, as in mavlink:fleet.yaml")
         ) from None
+    if content is None:
+        raise FleetError(on_one_line(f"{path}: is no file; name a fleet file, as in mavlink:fleet.yaml"))
     if len(content) > BYTES_MAX:
         raise FleetError(on_one_line(f"{path}: a fleet file has at most {BYTES_MAX:,} bytes"))
     try:
-        return _fleet(read_yaml(content.decode()).root)
+        return _fleet(_root(content.decode()))
     except UnicodeDecodeError:
         raise FleetError(on_one_line(f"{path}: is no text in UTF-8")) from None
     except MistakeError as mistake:
         where = f"{path}:{mistake.line}" if mistake.line else f"{path}"
         raise FleetError(on_one_line(f"{where}: {mistake.message}; {mistake.hint}")) from None
+
+
+def _root(text: str) -> Node:
+    document = read_yaml(text, "see docs/guides/autopilots.md for what a fleet file has")
+    for line, key in document.repeated:
+        raise MistakeError(f"has {shortened(key)!r} twice", "keep one", line)
+    return document.root
 
 
 def _fleet(root: Node) -> Fleet:

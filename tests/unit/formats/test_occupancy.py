@@ -77,7 +77,17 @@ def test_whatever_is_in_a_file_is_an_image_or_refused(content: bytes, begin: byt
 
 @pytest.mark.parametrize("negate", [False, True])
 @pytest.mark.parametrize(
-    "thresholds", [("0.65", "0.25"), ("0.6", "0.2"), ("0.65", "0.196"), ("1", "0"), ("0.2", "0.2")]
+    "thresholds",
+    [
+        ("0.65", "0.25"),
+        ("0.6", "0.2"),
+        ("0.65", "0.196"),
+        ("1", "0"),
+        ("0.2", "0.2"),
+        # As programs write doubles. In units of 1e-17 a shade does not fit into 64 bits.
+        ("0.6509803921568628", "0.19607843137254902"),
+        ("0.65", "1.0e-300"),
+    ],
 )
 def test_thresholds_are_those_of_map_server(tmp_path: Path, thresholds: tuple[str, str], *, negate: bool) -> None:
     """0.2 and 0.6 are exactly shades 204 and 102: what meets a threshold is neither more nor less."""
