@@ -108,10 +108,10 @@ def _verdict(team: Team, outcome: Outcome) -> str:
         case _ if outcome.count is not None:
             return _counted(outcome.count, outcome)
         case Verdict.SOLUTION | Verdict.OPTIMAL if not outcome.withdrawn_alive:
-            return f"{headline}{_not_proven(team, outcome)}, {_checked(outcome)}{confirmed}{_trusted(outcome)}"
+            return f"{headline}{_not_proven(team, outcome)}, {_checked(outcome)}{confirmed}{_trusted(team, outcome)}"
         case Verdict.SOLUTION | Verdict.OPTIMAL:
             whole = f"no solution{left or ' for the whole team'}{because}"
-            return f"{headline}; {whole}; {_checked(outcome)}{confirmed}{_trusted(outcome)}"
+            return f"{headline}; {whole}; {_checked(outcome)}{confirmed}{_trusted(team, outcome)}"
 
 
 def _counted(count: int, outcome: Outcome) -> str:
@@ -139,11 +139,11 @@ def _checked(outcome: Outcome) -> str:
     return f"checked; by their owner alone: {alone:,} of {total:,} constraint{'s' * (total != 1)}"
 
 
-def _trusted(outcome: Outcome) -> str:
+def _trusted(team: Team, outcome: Outcome) -> str:
     """Return which claim could not be checked, and rests on what all robots reported."""
     if outcome.claimed_by != ALL_ROBOTS or not outcome.verified or outcome.confirmed:
         return ""
-    what = "the minimum withdrawal" if outcome.withdrawn_alive else "the minimum cost"
+    what = "the minimum withdrawal" if outcome.withdrawn_alive else f"the {_best(team)} cost"
     return f"; {what} is what all robots report"
 
 
@@ -152,8 +152,22 @@ def _not_proven(team: Team, outcome: Outcome) -> str:
     by = "" if outcome.deadline is None else f" by the deadline of {outcome.deadline:g} s"
     if known:
         return by
-    bound = f"; lower bound {_number(outcome.bound)}" if by and outcome.bound else ""
-    return f"{by} (not proven to be the minimum{bound})"
+    bound = f"; {_side(team)} bound {_number(outcome.bound)}" if by and outcome.bound else ""
+    return f"{by} (not proven to be the {_best(team)}{bound})"
+
+
+def _maximizes(team: Team) -> bool:
+    """Return whether the team's costs are utilities. Those of a normalised team were, if they are told as such."""
+    return any(robot.costs.maximize or robot.told_in.maximize for robot in team.robots)
+
+
+def _best(team: Team) -> str:
+    return "maximum" if _maximizes(team) else "minimum"
+
+
+def _side(team: Team) -> str:
+    """Return on which side of the costs of all assignments a bound lies."""
+    return "upper" if _maximizes(team) else "lower"
 
 
 def _weight(team: Team, outcome: Outcome) -> str:
@@ -178,7 +192,7 @@ def _so_far(team: Team, outcome: Outcome) -> str:
         return ""
     known = [f"the best so far costs {_number(outcome.cost)}"] if outcome.assignment else []
     reported = ", as all robots report" if outcome.claimed_by else ""
-    known += [f"lower bound {_number(bound)}{reported}"] if bound else []
+    known += [f"{_side(team)} bound {_number(bound)}{reported}"] if bound else []
     return "; " + ", and ".join(known) if known else ""
 
 

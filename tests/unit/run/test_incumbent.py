@@ -14,6 +14,7 @@ from robochoc.cli.reports.pseudo_tree import tree_text
 from robochoc.communication.run_result import RunResult
 from robochoc.journal.events import AnyEvent, Decided, Heard, Improved
 from robochoc.journal.journal import improvements
+from robochoc.model.cost_units import CostUnits
 from robochoc.model.expression import Type, parse
 from robochoc.model.outcome import Metrics, Outcome, PseudoTreeNode, Verdict
 from robochoc.model.problem import INFINITE, Constraint, Predicate, Relation, Semantics, Team
@@ -206,6 +207,19 @@ def test_who_placed_the_robots_is_told_where_that_was_not_asked_for() -> None:
 def test_what_is_not_proven_says_so() -> None:
     outcome = Outcome("t", "dsa", "simulator", 0, Verdict.SOLUTION, {"A": 1, "B": 2}, 3, verified=True)
     assert "solution for all 2 robots, cost 3 (not proven to be the minimum), checked" in outcome_report(PAIR, outcome)
+
+
+def test_where_the_sum_is_maximised_the_best_is_a_maximum_and_bounds_are_upper_ones() -> None:
+    robots = tuple(replace(robot, costs=CostUnits(maximize=True)) for robot in PAIR.robots)
+    team = replace(PAIR, robots=robots)
+    found = Outcome("t", "dsa", "simulator", 0, Verdict.SOLUTION, {"A": 1, "B": 2}, 3, verified=True, bound=9)
+    assert "cost 3 (not proven to be the maximum), checked" in outcome_report(team, found)
+    timely = replace(found, deadline=2)
+    assert "by the deadline of 2 s (not proven to be the maximum; upper bound 9), checked" in outcome_report(
+        team, timely
+    )
+    stopped = replace(found, verdict=Verdict.UNKNOWN, reason="so")
+    assert "so; the best so far costs 3, and upper bound 9" in outcome_report(team, stopped)
 
 
 # Trees, explained
