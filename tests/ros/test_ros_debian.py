@@ -166,7 +166,7 @@ def test_one_that_stands_still_does_not_keep_us(core: Core, tmp_path: Path) -> N
     )
     assert listener.stdout is not None
     listener.stdout.readline()
-    publisher = core.program(str(ROOT / "tests" / "debian_ros.py"), "publish", "20000", "0")
+    publisher = core.program(str(ROOT / "tests" / "support" / "debian_ros.py"), "publish", "20000", "0")
     assert publisher.stdout is not None
     assert publisher.stdout.readline() == "began\n"
     listener.send_signal(signal.SIGSTOP)
@@ -175,11 +175,13 @@ def test_one_that_stands_still_does_not_keep_us(core: Core, tmp_path: Path) -> N
     assert "a subscriber has read nothing for 10 s; see `rostopic info` for who it is" in said
     assert (publisher.returncode, errors) == (0, "")
     assert time.monotonic() - began < 40
+    listener.kill()
+    listener.communicate()
 
 
 def test_the_master_dies(tmp_path: Path) -> None:
     with Core(tmp_path) as core:
-        publisher = core.program(str(ROOT / "tests" / "debian_ros.py"), "publish", "50", "0.1")
+        publisher = core.program(str(ROOT / "tests" / "support" / "debian_ros.py"), "publish", "50", "0.1")
         assert publisher.stdout is not None
         assert publisher.stdout.readline() == "began\n"
         core.end()
