@@ -12,6 +12,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from fractions import Fraction
+from functools import cached_property
 from pathlib import Path
 
 import numpy as np
@@ -30,6 +31,7 @@ _MODES = ("trinary", "scale")
 _KEYS = ("image", "resolution", "origin", "negate", "occupied_thresh", "free_thresh")
 
 Flags = npt.NDArray[np.bool_]
+Counts = npt.NDArray[np.int64]
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,6 +51,17 @@ class OccupancyGrid:
     origin: tuple[Fraction, Fraction]
     free: Flags
     occupied: Flags
+
+    @cached_property
+    def free_before(self) -> Counts:
+        """For each corner of a pixel, how many pixels with a smaller x and y are free (a summed-area table)."""
+        return before(self.free)
+
+
+def before(flags: Flags) -> Counts:
+    """Return for each corner of a pixel how many flags with a smaller x and y are set (a summed-area table)."""
+    counts: Counts = np.cumsum(np.cumsum(np.pad(flags, ((1, 0), (1, 0))), axis=0, dtype=np.int64), axis=1)
+    return counts
 
 
 def read_occupancy_grid(path: Path) -> OccupancyGrid:
@@ -166,4 +179,4 @@ def _number(node: Node, key: str, least: Fraction, most: Fraction) -> Fraction:
     raise MistakeError(f"has a wrong {key}", expected, node.line)
 
 
-__all__ = ["Flags", "InvalidInputError", "OccupancyGrid", "read_occupancy_grid"]
+__all__ = ["Counts", "Flags", "InvalidInputError", "OccupancyGrid", "before", "read_occupancy_grid"]

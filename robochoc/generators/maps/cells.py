@@ -17,7 +17,7 @@ from math import ceil, floor, isqrt
 import numpy as np
 import numpy.typing as npt
 
-from robochoc.formats.occupancy.grid import Flags, OccupancyGrid
+from robochoc.formats.occupancy.grid import Counts, Flags, OccupancyGrid, before
 
 MAX_SIDE = 1000
 """The maximum number of columns, and of rows, of cells."""
@@ -92,7 +92,7 @@ class Cells:
         low, high, middle = zip(self._pixels(1), self._pixels(0), strict=True)
         height, width = self.grid.free.shape
         sizes = np.outer(high[0] - low[0], high[1] - low[1])  # pixels beside the map count, and are not free
-        found = _sums(self.grid.free, low, high) == sizes
+        found = _sums(self.grid.free_before, low, high) == sizes
         centres = np.ix_(middle[0].clip(0, height - 1), middle[1].clip(0, width - 1))
         return tuple(np.flatnonzero(found & self.passable[centres]).tolist())
 
@@ -100,7 +100,7 @@ class Cells:
     def blocked(self) -> tuple[int, ...]:
         """The numbers of all cells with an occupied pixel."""
         low, high, _ = zip(self._pixels(1), self._pixels(0), strict=True)
-        return tuple(np.flatnonzero(_sums(self.grid.occupied, low, high)).tolist())
+        return tuple(np.flatnonzero(_sums(before(self.grid.occupied), low, high)).tolist())
 
     def x_and_y(self, cell: int) -> tuple[int, int]:
         """Return the x and the y of a cell's centre, in sides of a cell."""
@@ -144,15 +144,19 @@ class Cells:
         return tuple(np.array(found, dtype=np.int64).T)
 
 
-def _sums(
-    flags: Flags, low: tuple[npt.NDArray[np.int64], ...], high: tuple[npt.NDArray[np.int64], ...]
-) -> npt.NDArray[np.int64]:
-    """Return how many flags are set in each rectangle of rows `low[0]` to `high[0]` and columns likewise."""
-    sums = np.cumsum(np.cumsum(np.pad(flags, ((1, 0), (1, 0))), axis=0, dtype=np.int64), axis=1)
-    bottom, top = (ends[0].clip(0, flags.shape[0]) for ends in (low, high))
-    left, right = (ends[1].clip(0, flags.shape[1]) for ends in (low, high))
-    found: npt.NDArray[np.int64] = (
-        sums[np.ix_(top, right)] - sums[np.ix_(bottom, right)] - sums[np.ix_(top, left)] + sums[np.ix_(bottom, left)]
+def _sums(table: Counts, low: tuple[npt.NDArray[np.int64], ...], high: tuple[npt.NDArray[np.int64], ...]) -> Counts:
+    """Return how many flags are set in each rectangle of rows `low[0]` to `high[0]` and columns likewise.
+
+    `table` is what `before` returns for the flags.
+    """
+    height, width = table.shape
+    bottom, top = (ends[0].clip(0, height - 1) for ends in (low, high))
+    left, right = (ends[1].clip(0, width - 1) for ends in (low, high))
+    found: Counts = (
+        table[np.ix_(top, right)]
+        - table[np.ix_(bottom, right)]
+        - table[np.ix_(top, left)]
+        + table[np.ix_(bottom, left)]
     )
     return found
 

@@ -16,7 +16,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from robochoc.formats import InvalidInputError, check_team, read_team, write_team
-from robochoc.formats.occupancy.grid import OccupancyGrid, read_occupancy_grid
+from robochoc.formats.occupancy.grid import OccupancyGrid, before, read_occupancy_grid
 from robochoc.generators.maps.cells import Cells, cells_of, passable
 from robochoc.generators.maps.formation import formation
 from robochoc.generators.maps.reach import MapChoice, Reach, reach_of
@@ -135,6 +135,20 @@ def test_cells_are_as_small_as_their_number_allows() -> None:
         assert len(cells.free) <= most
     with pytest.raises(ValueError, match=r"49 cells of 0.2 m are free, more than 9"):
         cells_of(grid_of(["." * 14] * 14, resolution="0.1", origin="[-0.1, -0.1, 0]"), Fraction(0), 9, Fraction("0.2"))
+
+
+def test_pixels_are_summed_once_for_all_sides_of_cells(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A map may have 4,000,000 pixels, and cells hundreds of pixels as sides."""
+    grid = grid_of(["." * 40] * 40)
+    sizes = []
+
+    def counted(flags: np.ndarray) -> np.ndarray:
+        sizes.append(flags.shape)
+        return before(flags)
+
+    monkeypatch.setattr("robochoc.formats.occupancy.grid.before", counted)
+    assert cells_of(grid, Fraction(0), 4).side == 6  # of twelve pixels
+    assert sizes == [(40, 40)]
 
 
 def reached(rows: list[str], start: Pixel, radius: Fraction, seconds_a_pixel: Fraction) -> dict[Pixel, int]:
