@@ -1,10 +1,11 @@
-"""Part `rotorpy`: the simulated flight beside RotorPy's, an independent simulator, under the same controller."""
+"""Parts `rotorpy` and `mujoco`: the simulated flight beside independent simulators, under the same controller."""
 
 from __future__ import annotations
 
 import json
 import os
 import subprocess
+import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -22,8 +23,6 @@ from robochoc.flight.routes.timetable import plan_routes
 from robochoc.formats.team import read_team
 from robochoc.model.outcome import Outcome, Verdict
 
-PYTHON_OF_ROTORPY = "ROBOCHOC_BENCH_ROTORPY"
-"""The environment variable that names a Python in which RotorPy is installed."""
 HERE = Path(__file__).parent
 HANGAR = HERE.parent / "docs" / "examples" / "hangar"
 _HANGAR_LEVELS = {"fin": 2, "nose": 2, "port": 3, "roof": 1, "starboard": 3, "tail": 1}
@@ -31,10 +30,46 @@ _HANGAR_LEVELS = {"fin": 2, "nose": 2, "port": 3, "roof": 1, "starboard": 3, "ta
 _THRUST_PER_SPEED_SQUARED = 8.54858e-6
 _HOVER = HUMMINGBIRD.mass * GRAVITY / ROTORS
 _HOVER_SPEED = float(np.sqrt(_HOVER / _THRUST_PER_SPEED_SQUARED))
-_SPEED_STEPS = 3
 _MANY = 121
 
 Setpoints = Callable[[float], Array]
+
+
+class Simulator(NamedTuple):
+    """Another simulator.
+
+    Attributes:
+        name: Its name.
+        python: The environment variable that names a Python in which it is installed.
+        program: The file that drives it.
+        speed_steps: The number of steps that its speed is measured over.
+        notes: What it has of its own.
+    """
+
+    name: str
+    python: str
+    program: str
+    speed_steps: int
+    notes: str
+
+
+ROTORPY = Simulator(
+    "RotorPy",
+    "ROBOCHOC_BENCH_ROTORPY",
+    "rotorpy_once.py",
+    3,
+    "RotorPy 3.0 has rotors that lag in speed with one time constant (here of 19 ms, the mean of ours up and down), "
+    "drag that grows with the rotors' speed and acts at them, and adaptive Runge-Kutta steps (tolerance 1e-6).",
+)
+MUJOCO = Simulator(
+    "MuJoCo",
+    "ROBOCHOC_BENCH_MUJOCO",
+    "mujoco_once.py",
+    2000,
+    "MuJoCo 4.0 has rigid bodies and actuators, and no rotorcraft: rotors are forces that lag in thrust with one time "
+    "constant (here of 19 ms, the mean of ours up and down), and the linear drag is ours, computed outside. It makes "
+    "ten semi-implicit Euler steps in one of ours; one, where its speed is measured.",
+)
 
 
 class Case(NamedTuple):
@@ -57,19 +92,27 @@ class Difference(NamedTuple):
     end_m: float
 
 
-def measured() -> Section:
+def rotorpy() -> Section:
     """The differences of all cases, and RotorPy's speed."""
+    return _measured(ROTORPY)
+
+
+def mujoco() -> Section:
+    """The differences of all cases, and MuJoCo's speed."""
+    return _measured(MUJOCO)
+
+
+def _measured(other: Simulator) -> Section:
     notes = (
-        "The same Hummingbird (mass, inertia, arms, thrust and drag per rotor speed, highest speed) in RotorPy 3.0 "
-        "and here, each flown by a controller of ours that sees its own drones, from hovering in calm air. Of its own "
-        "RotorPy has: rotors that lag in speed with one time constant (here of 19 ms, the mean of ours up and down), "
-        "drag that grows with the rotors' speed and acts at them, and adaptive Runge-Kutta steps (tolerance 1e-6)."
-        " `same thrusts`: RotorPy is given the thrusts that were commanded here, and nothing corrects it. "
+        "The same Hummingbird (mass, inertia, arms, thrust and drag per rotor speed, highest speed) there and here, "
+        "each flown by a controller of ours that sees its own drones, from hovering in calm air. "
+        f"{other.notes} `same thrusts`: it is given the thrusts that were commanded here, and nothing corrects it. "
         f"Positions are compared at each step of 1/{1 / DT:.0f} s."
     )
     _, _, routes = cases()
-    tables = [_rows([*map(closed_loop, cases()), open_loop(routes, 2.0)]), _speed()]
-    return Section("rotorpy", "The flight beside RotorPy's", notes, tuple(tables), ("Differences", "RotorPy's speed"))
+    rows = _rows([*(closed_loop(case, other) for case in cases()), open_loop(routes, 2.0, other)])
+    titles = ("Differences", f"{other.name}'s speed")
+    return Section(other.name.lower(), f"The flight beside {other.name}'s", notes, (rows, _speed(other)), titles)
 
 
 def cases() -> list[Case]:
@@ -89,25 +132,25 @@ def cases() -> list[Case]:
     ]
 
 
-def closed_loop(case: Case) -> Difference:
-    """Fly a case here and in RotorPy, each under a controller that sees its own drones."""
+def closed_loop(case: Case, other: Simulator) -> Difference:
+    """Fly a case here and in another simulator, each under a controller that sees its own drones."""
     ours, _ = _flown_here(case)
     theirs = []
     number = len(case.starts)
     control = Controller(number, HUMMINGBIRD, DT)
     seen = RigidBodies(case.starts, -1.0, HUMMINGBIRD, DT)
-    with _rotorpy(case.starts) as step:
+    with _driven(other, case.starts) as step:
         for at in range(round(case.seconds / DT)):
             _show(step(control.command(seen, case.setpoints(at * DT), np.zeros(number, dtype=np.bool_))), seen)
             theirs.append(seen.state[:3].copy())
     return _difference(case, case.name, ours, np.array(theirs))
 
 
-def open_loop(case: Case, seconds: float) -> Difference:
-    """Fly a case here, and its thrusts in RotorPy."""
+def open_loop(case: Case, seconds: float, other: Simulator) -> Difference:
+    """Fly a case here, and its thrusts in another simulator."""
     case = case._replace(seconds=seconds)
     ours, thrusts = _flown_here(case)
-    with _rotorpy(case.starts) as step:
+    with _driven(other, case.starts) as step:
         theirs = np.array([[drone[0] for drone in step(command)] for command in thrusts]).transpose(0, 2, 1)
     return _difference(case, f"{case.name}, same thrusts", ours, theirs)
 
@@ -129,7 +172,7 @@ def _flown_here(case: Case) -> tuple[Array, list[Array]]:
 
 
 def _show(told: list[Any], bodies: RigidBodies) -> None:
-    """Show RotorPy's drones to a controller, as it sees ours."""
+    """Show the other simulator's drones to a controller, as it sees ours."""
     parts = np.array(told).transpose(1, 2, 0)
     bodies.state[:3], bodies.state[3:], bodies.rates[:] = parts[:3]
     bodies.wrapped_axes[:3] = parts[3:]
@@ -157,10 +200,9 @@ def _hangar() -> tuple[Array, Array]:
 
 
 @contextmanager
-def _rotorpy(places: Array, **more: object) -> Iterator[Callable[[Array], Any]]:
-    """Yield what advances RotorPy's drones by a step of thrusts (4, N), and returns their states."""
-    python = os.environ[PYTHON_OF_ROTORPY]
-    command = [python, str(HERE / "rotorpy_once.py")]
+def _driven(other: Simulator, places: Array, **more: object) -> Iterator[Callable[[Array], Any]]:
+    """Yield what advances the other simulator's drones by a step of thrusts (4, N), and returns their states."""
+    command = [os.environ[other.python], str(HERE / other.program)]
     with subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True) as process:
         say, hear = process.stdin, process.stdout
         if say is None or hear is None:
@@ -214,9 +256,18 @@ def _rows(found: list[Difference]) -> list[Row]:
     return rows
 
 
-def _speed() -> list[Row]:
+def _speed(other: Simulator) -> list[Row]:
+    """Return the speed of both simulators' bodies, which hover."""
     places = np.array([[3.0 * number, 0.0, 5.0] for number in range(_MANY)])
-    with _rotorpy(places, speed=_SPEED_STEPS) as answer:
-        seconds = float(answer(places))
-    rate = _SPEED_STEPS * DT / seconds
-    return [("drones", "simulated s a wall s, bodies alone"), (str(_MANY), f"{rate:.2g}")]
+    with _driven(other, places, speed=other.speed_steps) as answer:
+        theirs = float(answer(places)) / other.speed_steps
+    bodies = RigidBodies(places, -1.0, HUMMINGBIRD, DT)
+    bodies.stands[:] = False
+    bodies.thrusts[:] = _HOVER
+    command, air = np.full((ROTORS, _MANY), _HOVER), np.zeros((3, 1))
+    began = time.perf_counter()
+    for _ in range(MUJOCO.speed_steps):
+        bodies.step(command, air)
+    ours = (time.perf_counter() - began) / MUJOCO.speed_steps
+    rates = [f"{DT / seconds:.2g}" for seconds in (theirs, ours)]
+    return [("drones", f"{other.name}: simulated s a wall s, bodies alone", "ours"), (str(_MANY), *rates)]

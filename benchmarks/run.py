@@ -50,7 +50,8 @@ LONG: dict[str, Callable[[], Section]] = {
     "network": network.measured,
     "sniffer": sniffer.measured,
     "app": app_pages.measured,
-    "rotorpy": other_flight.measured,
+    "mujoco": other_flight.mujoco,
+    "rotorpy": other_flight.rotorpy,
 }
 """Parts that take longer than all others together, measured only when they are named."""
 ALL = {**PARTS, **LONG}
