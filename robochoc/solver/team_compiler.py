@@ -65,7 +65,7 @@ class TeamCompiler:
         def compile_robot(robot: Robot) -> CompiledDomain:
             nonlocal solved
             self._stage(f"compiling {robot.name} ({next(number)} of {len(team.robots)})")
-            late = OutOfTimeError(f"the time (--timeout) was over while {robot.name} was compiled")
+            late = OutOfTimeError(f"the time was over while {robot.name} was compiled")
             if self._deadline is not None and time.monotonic() >= self._deadline:
                 raise late
             try:

@@ -299,7 +299,7 @@ def told(strike: Strike, errors: str) -> bool:
     if strike.given_up:
         whys = {
             "robot": tuple(f"{strike.robot} was lost: {why}" for why in STOPPED),
-            "solver": ("the time (--timeout) was over", "the time was over"),
+            "solver": ("the time was over",),
             "router": ("was lost: it has not been there for", "router"),
         }[strike.target]
     else:

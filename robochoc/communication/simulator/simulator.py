@@ -152,7 +152,7 @@ class Simulation(Session):
     def _check_time(self, name: str) -> None:
         """Raise `OutOfTimeError` if the time was over before the robot `name` could be set up."""
         if over(self._deadline):
-            raise OutOfTimeError(f"the time (--timeout) was over before {name} knew its problem")
+            raise OutOfTimeError(f"the time was over before {name} knew its problem")
 
     def _host(self, part: AgentProblem) -> Host:
         self._check_time(part.robot.name)
