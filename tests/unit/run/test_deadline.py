@@ -73,8 +73,8 @@ def by_its_deadline(protocol: str, runtime: Runtime, by_s: float) -> None:
 
 
 def test_without_a_solution_by_then_nothing_is_said() -> None:
-    """A team that has no solution, most likely, and where `sbt` would take long to find that out."""
-    team = random_csp(30, 10, 0.5, 0.5, seed=1)
+    """A team that has no solution, and where `sbt` takes more than 300,000 messages to find that out."""
+    team = random_csp(40, 10, 0.5, 0.35, seed=1)
     outcome = solve(team, Options(protocol="sbt", runtime=Runtime.SIMULATOR, deadline=BY_S))
     assert (outcome.verdict, outcome.assignment, outcome.deadline) == (Verdict.UNKNOWN, {}, None)
     assert outcome.reason == "by the deadline (--deadline 0.4) nothing had satisfied all hard constraints"
