@@ -202,6 +202,11 @@ class ScenarioRun:
         return self._files.scenario[self._happened] if self._happened < len(self._files.scenario) else None
 
     @property
+    def events_left(self) -> int:
+        """How many events have not happened."""
+        return len(self._files.scenario) - self._happened
+
+    @property
     def is_over(self) -> bool:
         """Return whether the time is over, or all messages have been sent."""
         return self._left_s() == 0 or (self._messages is not None and self._messages <= 0)

@@ -17,7 +17,7 @@ from robochoc.formats.result import read_result, result_json
 from robochoc.generators.queens3d import queens3d
 from robochoc.generators.random_csp import random_csp
 from robochoc.model.outcome import Verdict
-from robochoc.model.problem import INFINITE, Team
+from robochoc.model.problem import INFINITE, RemoveValue, ScenarioEvent, Team
 from robochoc.protocols.findings import Findings
 from robochoc.run import Options, Runtime, solve
 from robochoc.run.evaluation import Search, check_with_files, evaluate_search
@@ -78,6 +78,19 @@ def test_without_a_solution_by_then_nothing_is_said() -> None:
     outcome = solve(team, Options(protocol="sbt", runtime=Runtime.SIMULATOR, deadline=BY_S))
     assert (outcome.verdict, outcome.assignment, outcome.deadline) == (Verdict.UNKNOWN, {}, None)
     assert outcome.reason == "by the deadline (--deadline 0.4) nothing had satisfied all hard constraints"
+
+
+@pytest.mark.usefixtures("a_second_a_look")
+def test_before_all_events_have_happened_nothing_is_decided() -> None:
+    """The answer to an earlier problem is none to the last one: its epoch has it, the run does not."""
+    team = random_csp(6, 3, 0.6, 0.0, seed=1, max_cost=9)
+    event = ScenarioEvent((RemoveValue(team.robots[0].variables[0].name, 2),))
+    options = Options(protocol="dsa", runtime=Runtime.SIMULATOR, deadline=100, settings={"cycles": "1000000"})
+    alone, outcome = solve(team, options), solve(replace(team, scenario=(event,)), options)
+    assert (alone.verdict, alone.deadline) == (Verdict.SOLUTION, 100)
+    assert [epoch.verdict for epoch in outcome.epochs] == [Verdict.SOLUTION]
+    assert (outcome.verdict, outcome.deadline) == (Verdict.UNKNOWN, None)
+    assert outcome.reason == "by the deadline (--deadline 100) 1 event had not happened"
 
 
 def test_who_is_done_before_has_the_same_answer_as_without_a_deadline() -> None:
