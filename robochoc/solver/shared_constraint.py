@@ -67,6 +67,11 @@ class OwnValues:
         return tuple([part if place in places else None for place, part in enumerate(self._values[index])])
 
 
+def _plain(domain: Domain) -> Domain | range:
+    """Return the range that `domain` is, if it is a single one: that is asked faster."""
+    return domain.ranges[0] if len(domain.ranges) == 1 else domain
+
+
 class SharedConstraint:
     """A constraint on the own compiled variable and those of `agents` (in priority order).
 
@@ -90,7 +95,7 @@ class SharedConstraint:
             (agent, place) for agent in self.agents for place, name in enumerate(interfaces[agent]) if name in scope
         ]
         self._names = [interfaces[agent][place] for agent, place in self._seen]
-        self._domains: list[Domain] | None = [known.domains[name] for name in self._names]
+        self._domains: list[Domain | range] | None = [_plain(known.domains[name]) for name in self._names]
         """Of what it sees; None: any value is evaluated."""
         self._widths = {agent: len(interfaces[agent]) for agent in self.agents}
         self._only = self._seen[0] if len(self._seen) == 1 else None
