@@ -57,6 +57,7 @@ def test_constraints_come_as_they_were_sent(make: Callable[[Random], Team], seed
     for robot in make(Random(seed)).robots:
         for known in chain(held_above(robot), (part for _, part in held_below(robot))):
             assert sent(known) == known
+            assert repr(sent(known)) == repr(known)  # an integer stays one
 
 
 @pytest.mark.parametrize("model", ["planar", "full"])

@@ -27,6 +27,7 @@ from robochoc.communication.control import (
     WentOn,
 )
 from robochoc.communication.network.profile import Profile, Ranges
+from robochoc.solver.encoding import Cost
 
 LATEST = 2**53
 """The largest clock of constraint checks. A robot reports its own, and must not overflow another's."""
@@ -180,7 +181,7 @@ class Task(OfEpoch, frozen=True):
     secretive: tuple[str, ...]
     seed: int
     settings: Mapping[str, str]
-    aside: float | None
+    aside: Cost | None
     cards: tuple[bytes, ...]
     message_loss: float = 0.0
 

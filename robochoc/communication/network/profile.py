@@ -19,7 +19,7 @@ from robochoc.model.cost_units import MAX_PLACES, CostUnits
 from robochoc.model.costs import flat_units
 from robochoc.model.priorities import CycleError, priority_order
 from robochoc.model.problem import Child, Constraint, Domain, Parent, ProblemKind, Robot, Team, Variable
-from robochoc.solver.encoding import max_cost
+from robochoc.solver.encoding import Cost, max_cost
 
 Ranges = tuple[tuple[int, int], ...]
 """A domain: first and last value of each range, ascending."""
@@ -60,7 +60,7 @@ class Profile(msgspec.Struct, frozen=True, array_like=True):
     variables: dict[str, Ranges]
     looks_at: dict[str, tuple[str, ...]]
     weight: int
-    max_cost: float
+    max_cost: Cost
     topics: tuple[str, ...]
     wants: tuple[str, ...] = ()
     told_in: tuple[bool, int, int] = (False, 0, 0)

@@ -22,6 +22,7 @@ from robochoc.model.problem import (
     Semantics,
     Term,
 )
+from robochoc.solver.encoding import Cost
 from robochoc.solver.explanation import KeyedConstraint
 
 MOST_TERMS = 1000
@@ -39,8 +40,8 @@ class RelationRecord(msgspec.Struct, frozen=True, tag=True, array_like=True):
     arity: int
     semantics: Semantics
     tuples: tuple[tuple[int, ...], ...]
-    costs: tuple[float, ...]
-    default_cost: float
+    costs: tuple[Cost, ...]
+    default_cost: Cost
 
 
 class PredicateRecord(msgspec.Struct, frozen=True, tag=True, array_like=True):
@@ -71,7 +72,7 @@ class SharedRecord(msgspec.Struct, frozen=True, array_like=True):
     scope: tuple[Term, ...]
     parameters: tuple[Term, ...]
     model: ConstraintModel | None
-    cost: float
+    cost: Cost
 
 
 def record_of(known: KeyedConstraint) -> SharedRecord:
