@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import threading
 from collections.abc import Iterator
 from contextlib import closing, contextmanager
 from functools import partial
@@ -199,20 +200,19 @@ def _led(plan: MasterPlan, recorder: JournalRecorder | None, publication: Public
     with progress_line(plan.name) as show:
         progress = shown_and_flushed(recorder, show)
 
+        teller = _Teller(plan.place)
+
         def observe(event: AnyEvent) -> None:
-            _tell_event(event)
+            teller.tell(event)
             if recorder:
                 recorder(event)
-
-        def listening() -> None:
-            print_above(f"listening at {plan.place}; start robots with --master {_address(plan.place)}")
 
         return run_master(
             plan,
             observer=observe,
             watched=recorder is not None,
             progress=progress,
-            listening=listening,
+            listening=teller.listening,
             publication=publication,
             concluded=partial(_close_journal, recorder, publication),
         )
@@ -245,6 +245,31 @@ def _header(plan: MasterPlan) -> Header:
 
     name = DEFAULT_PROTOCOL if plan.protocol in {None, AUTO} else plan.protocol
     return Header(team=plan.name, protocol=name, runtime="network", seed=plan.seed)
+
+
+class _Teller:
+    """Tells the master's operator first that robots can come to `place`, and then who does: some are quicker."""
+
+    def __init__(self, place: Address) -> None:
+        self._place = place
+        self._early: list[AnyEvent] | None = []
+        self._lock = threading.Lock()
+
+    def listening(self) -> None:
+        """Print that robots can come, and what has happened so far."""
+        with self._lock:
+            print_above(f"listening at {self._place}; start robots with --master {_address(self._place)}")
+            for event in self._early or ():
+                _tell_event(event)
+            self._early = None
+
+    def tell(self, event: AnyEvent) -> None:
+        """Print an event, now or as soon as robots can come. Events come from several threads."""
+        with self._lock:
+            if self._early is None:
+                _tell_event(event)
+            else:
+                self._early.append(event)
 
 
 def _tell_event(event: AnyEvent) -> None:
