@@ -17,7 +17,7 @@ from robochoc.protocols.private.elgamal import TeamKey
 from robochoc.protocols.private.encrypted_costs import CostCipher, Pair
 from robochoc.protocols.private.linear_order import OwnAxis, own_places
 from robochoc.protocols.private.messages.p2_dpop import (
-    Ask,
+    AskAxis,
     Axis,
     CostRange,
     CostSum,
@@ -178,8 +178,8 @@ CODENAME = "0" * 32
         (Plan(1, {}), "not under way"),
         (Plan(0, {CODENAME: 0}), "plan that cannot be"),
         (Plan(0, dict.fromkeys(map(str, range(1_001)), 2)), "plan that cannot be"),
-        (Ask(2), "cannot ask"),
-        (Ask(-1), "cannot ask"),
+        (AskAxis(2), "cannot ask"),
+        (AskAxis(-1), "cannot ask"),
         (Gone(0), "was not asked"),
         (Axis(0, CODENAME, [(1,), (2,)]), "was not asked"),
         (EncryptedTable(0, b""), "not under way"),

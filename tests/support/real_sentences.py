@@ -127,7 +127,7 @@ REAL = {
     ),
     ("p2-dpop", "CostRange"): "RX00 says: our costs add up to at least 0, and to at most 9 more",
     ("p2-dpop", "Plan"): "RX00 says: in turn 1 there will be a table over 1 codename here, with 2 cells",
-    ("p2-dpop", "Ask"): "RX00 says: what are you called in turn 1, if you are still to come?",
+    ("p2-dpop", "AskAxis"): "RX00 says: what are you called in turn 1, if you are still to come?",
     ("p2-dpop", "Axis"): "RX00 says: in turn 2 call me 66d5; as declared, X00 is -3, -1 or 3",
     ("p2-dpop", "Gone"): "RX00 says: in turn 1 I come before you",
     ("p2-dpop", "EncryptedTable"): "RX00 says: the table of turn 1, encrypted: 1,280 bytes",

@@ -15,7 +15,7 @@ from robochoc.protocols.key_stream import shuffled
 from robochoc.protocols.order import PriorityOrder
 from robochoc.protocols.private.encrypted_costs import CostCipher
 from robochoc.protocols.private.linear_order import OwnAxis, Place, place_after
-from robochoc.protocols.private.messages.p2_dpop import Ask, Axis, CostRange, CostSum, Gone, Plan
+from robochoc.protocols.private.messages.p2_dpop import AskAxis, Axis, CostRange, CostSum, Gone, Plan
 from robochoc.protocols.private.messages.p32_dpop import Next
 from robochoc.protocols.private.rerooting import RerootingProtocol
 from robochoc.protocols.private.ring import Ring
@@ -217,7 +217,7 @@ class LinearOrderProtocol(RerootingProtocol):
         self._pending = plan
         self._answers = {}
         for name in self.problem.neighbours:
-            self.send(name, Ask(self.turn))
+            self.send(name, AskAxis(self.turn))
 
     def answer(self, sender: str, turn: int) -> None:
         """Tell a neighbour the own axis, or that this robot comes before it."""

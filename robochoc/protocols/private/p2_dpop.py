@@ -81,7 +81,7 @@ from robochoc.protocols.private.linear_order import costs_to_add, own_costs, own
 from robochoc.protocols.private.linear_plans import LinearOrderProtocol
 from robochoc.protocols.private.messages.anonymous_dfs import AnonymousTreeMessage
 from robochoc.protocols.private.messages.p2_dpop import (
-    Ask,
+    AskAxis,
     Axis,
     CostRange,
     CostSum,
@@ -141,7 +141,7 @@ class P2DPOP(LinearOrderProtocol):
                 self.reroot(sender, before)
             case CostRange() as costs:
                 self.learn_costs(sender, costs)
-            case Ask(turn):
+            case AskAxis(turn):
                 self.answer(sender, turn)
             case Axis() | Gone() as answer:
                 self.take_answer(sender, answer)

@@ -63,7 +63,7 @@ class Plan(Message, frozen=True):
         return NOTHING
 
 
-class Ask(Message, frozen=True):
+class AskAxis(Message, frozen=True):
     """Asks a neighbour for its axis in this turn, if it has not planned its own table yet."""
 
     turn: int
@@ -149,5 +149,5 @@ class Opening(Message, frozen=True):
         return NOTHING
 
 
-LinearMessage = CostSum | CostRange | Plan | Ask | Axis | Gone | EncryptedTable | Opening
+LinearMessage = CostSum | CostRange | Plan | AskAxis | Axis | Gone | EncryptedTable | Opening
 """The messages of the linear orders, one for each turn."""
