@@ -66,7 +66,7 @@ def test_what_still_goes_with_the_view_is_kept_and_sent_only_when_it_has_changed
 
 
 def test_an_empty_intersection_is_a_nogood_over_aggregates_to_the_lowest_robot() -> None:
-    team = team_of({"A": (1, 2), "B": (1, 2), "C": (3,)}, [differ("A", "B"), differ("A", "C"), differ("B", "C")])
+    team = team_of({"A": (1, 2), "B": (1, 3), "C": (3,)}, [differ("A", "B"), differ("A", "C"), differ("B", "C")])
     assert replies(agent(team, "RC"), ("RA", ok(1, 2)), ("RB", ok(3))) == [("RB", Nogood({}, ((3,),)))]
 
 

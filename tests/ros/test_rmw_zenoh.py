@@ -165,9 +165,11 @@ def test_others_see_the_node_and_its_topics_until_it_ends(router: Router, sessio
 
 
 def test_a_late_comer_receives_the_last_message_alone(router: Router, session: zenoh.Session) -> None:
+    early = Heard(session, f"0/late/waypoint/{POSE_KEY}")
     with RmwZenohSink(router.place) as sink:
         for number in range(5):
             sink.publish("/late/waypoint", POSE, pose(number), STAMP)
+        early.wait_for(5)  # nothing is under way any more
         late = Heard(session, f"0/late/waypoint/{POSE_KEY}", late=True)
         assert late.wait_for(1)[0].payload.to_bytes() == types_of(2).encode(POSE, pose(4))
         sink.publish("/late/waypoint", POSE, pose(5), STAMP)
