@@ -36,7 +36,7 @@ _SIZE_OF_A_MESSAGE = 256
 
 
 _UNUSABLE = (ArithmeticError, AssertionError, AttributeError, LookupError, TypeError, ValueError)
-"""What a protocol raises for a message that cannot be: a refusal of its own, or where it fails to compute with it."""
+"""Errors that a protocol raises for a message it cannot use: its own refusals, and failures to compute with it."""
 
 
 class BadMessageError(ValueError):
@@ -88,7 +88,7 @@ class Host:
         self.name = protocol.problem.agent
         self._equip(parameters)
         self.dropped = self._dropper(parameters)
-        """What is lost of what this robot receives; None: nothing is."""
+        """Decides which messages to this robot are lost, and counts them; None: none is."""
         self.clock = 0
         self.sent: dict[str, int] = {}
         self.bytes = self.largest = 0

@@ -106,7 +106,7 @@ def _content(path: Path, most: int) -> bytes:
 
 
 class _Description:
-    """What the YAML file says. Raises `MistakeError` where it says something else, or not enough."""
+    """The description of a map in its YAML file. Raises `MistakeError` where something is wrong or missing."""
 
     def __init__(self, text: str) -> None:
         document = read_yaml(text, f"a map has the keys {', '.join(_KEYS)}")

@@ -1,4 +1,4 @@
-"""How far it is from a pixel to all others, around obstacles.
+"""Lengths of the shortest ways from a pixel to all others, around obstacles.
 
 Dijkstra's algorithm (1959) on the pixels with eight neighbours, in integers: a step across an edge counts 5 and a
 diagonal one 7. The ratio is the one of the chamfer distance in Borgefors, "Distance transformations in digital

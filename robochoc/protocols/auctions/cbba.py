@@ -55,7 +55,7 @@ from robochoc.solver.compiled import LocalProblem
 
 
 class Action(Enum):
-    """What a receiver does about a task (Table I)."""
+    """An action of Table I: how a receiver changes its standing of a task."""
 
     UPDATE = "update"
     LEAVE = "leave"
@@ -63,7 +63,7 @@ class Action(Enum):
 
 
 class Standing(NamedTuple):
-    """Who has a task, and at what bid; empty: nobody."""
+    """The winner of a task and its bid; an empty name: nobody has it."""
 
     winner: str = ""
     amount: int = 0

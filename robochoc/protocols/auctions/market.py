@@ -29,7 +29,7 @@ NO_LIMIT = 2**63 - 1
 
 
 class Offer(NamedTuple):
-    """What a robot bids: `amount` for `task`, whose marginal score is `score`."""
+    """A bid: `amount` for `task`. `score` is the marginal score, before the bid is warped."""
 
     task: int
     amount: int

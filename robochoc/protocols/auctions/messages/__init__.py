@@ -1,1 +1,1 @@
-"""What these protocols send: the messages of `ssi.py` are in `messages/ssi.py`."""
+"""The messages that these protocols send. Those of `ssi.py` are in `messages/ssi.py`."""

@@ -1,1 +1,1 @@
-"""What these protocols send: the messages of `dpop.py` are in `messages/dpop.py`."""
+"""The messages that these protocols send. Those of `dpop.py` are in `messages/dpop.py`."""

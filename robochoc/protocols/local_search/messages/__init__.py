@@ -1,1 +1,1 @@
-"""What these protocols send: the messages of `mgm.py` are in `messages/mgm.py`."""
+"""The messages that these protocols send. Those of `mgm.py` are in `messages/mgm.py`."""

@@ -1,1 +1,1 @@
-"""What these protocols send: the messages of `adopt.py` are in `messages/adopt.py`."""
+"""The messages that these protocols send. Those of `adopt.py` are in `messages/adopt.py`."""

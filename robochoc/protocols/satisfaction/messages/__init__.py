@@ -1,1 +1,1 @@
-"""What these protocols send: the messages of `abt.py` are in `messages/abt.py`."""
+"""The messages that these protocols send. Those of `abt.py` are in `messages/abt.py`."""
