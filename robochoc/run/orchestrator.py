@@ -123,14 +123,14 @@ def _solve_distributed(team: Team, context: RunContext, environment: Environment
     deployment = ThisMachine(team, context, environment)
     header = _header(team, options)
     try:
-        return solve_distributed(deployment, protocol, header)
+        outcome = solve_distributed(deployment, protocol, header)
     except TooLargeError as refused:
         others = _alternatives(team, options, complete=True, costs=True, narrow=protocol.traits.wide_tables)
         raise UnsupportedError(f"{refused}{others}") from None
     except (TooManySolutionsError, CompileTimeoutError, OutOfTimeError) as limit:
-        return deployment.outcome(header, deployment.limit_reached(str(limit)))
-    finally:
-        context.kills.warn_of_pending()
+        outcome = deployment.outcome(header, deployment.limit_reached(str(limit)))
+    context.kills.warn_of_pending()
+    return outcome
 
 
 def _alternatives(team: Team, options: Options, *, complete: bool, costs: bool = False, narrow: bool = False) -> str:

@@ -52,6 +52,9 @@ def command_line(runtime: str, killed: list[str], chance: Random) -> list[str]:
     words += [f"--withdraw={chance.choice(('minimum', 'maximal'))}"] if chance.random() < 0.2 else []
     words += some(chance, 0.1, "--messages", 5, 100)
     words += ["--verify"] if chance.random() < 0.1 else []
+    words += some(chance, 0.15, "--preprocess", "ac")
+    words += some(chance, 0.15, "--message-loss", 0.05, 0.5)
+    words += some(chance, 0.15, "--deadline", 0.01, 0.5, 5)
     return [*words, *some(chance, 0.3, "--seed", 0, 7), "--json", "--no-cache"]
 
 
@@ -60,7 +63,8 @@ def check(team: Team, words: list[str], done: CompletedProcess[str], what: str) 
     found = json.loads(done.stdout)
     verdict, gone = found["verdict"], set(found["withdrawn"])
     if verdict == "unknown":
-        assert "--messages" in words or "has come to its end" in found["reason"], what
+        limits = {"--messages", "--message-loss", "--deadline"} & {*words}
+        assert limits or "has come to its end" in found["reason"], what
         return
     lost = {name for epoch in (found, *found["epochs"]) for name in epoch.get("lost", ())}
     if "--withdraw=minimum" in words:

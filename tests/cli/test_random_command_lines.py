@@ -42,6 +42,10 @@ def command_line(folder: Path, chance: Random) -> list[str]:
     words += some(chance, 0.05, "--channel", "wlan", "wwan")
     words += some(chance, 0.08, "--set", *SETTINGS)
     words += some(chance, 0.05, "--spare", 1)
+    words += some(chance, 0.15, "--preprocess", "ac")
+    words += some(chance, 0.15, "--message-loss", 0, 0.05, 0.5)
+    words += some(chance, 0.1, "--deadline", 0.0001, 0.05, 5)
+    words += ["--verify"] if chance.random() < 0.1 else []
     words += some(chance, 0.08, "--local-solutions", 1, 5)
     words += some(chance, 0.08, "--journal", folder / "run.journal")
     words += [f"--withdraw={chance.choice(('minimum', 'maximal'))}"] if chance.random() < 0.15 else []

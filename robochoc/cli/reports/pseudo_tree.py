@@ -5,21 +5,32 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 
 from robochoc.formats import on_one_line
-from robochoc.model.outcome import Outcome, PseudoTreeNode
+from robochoc.model.outcome import Outcome, PseudoTreeNode, Verdict
 from robochoc.model.priorities import natural_key
+from robochoc.run.options import CENTRAL
+from robochoc.run.registry import protocol_named
 
 
 def tree_text(outcome: Outcome) -> str:
-    """Return the tree, one robot per line, with its depth and its induced width; or that there is none."""
+    """Return the tree, one robot per line, with its depth and its induced width; or that there is none.
+
+    A run may end while robots still build it. Who knows its place then has no root yet: roots are the last to know.
+    """
     nodes = outcome.tree
-    if not nodes:
+    if not nodes and (outcome.verdict is not Verdict.UNKNOWN or not _works_on_tree(outcome.protocol)):
         return f"  {outcome.protocol} builds no pseudo-tree"
+    if not nodes or any(node.parent not in nodes for node in nodes.values() if node.parent is not None):
+        return "  the run ended before the robots had built a pseudo-tree"
     below = _children(nodes)
     roots = below.get(None, [])
     known = f"depth {_depth(nodes, below)}, induced width {_width(nodes, below)}"
     count = f", {len(roots)} roots" if len(roots) > 1 else ""
     head = f"  pseudo-tree, built by the robots: {known}{count} ([neighbours further up])"
     return "\n".join([head, *(line for root in roots for line in _drawn(root, nodes, below))])
+
+
+def _works_on_tree(protocol: str) -> bool:
+    return protocol != CENTRAL and protocol_named(protocol).traits.tree
 
 
 def _children(nodes: Mapping[str, PseudoTreeNode]) -> dict[str | None, list[str]]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from random import Random
 
 import pytest
 
@@ -14,6 +15,7 @@ from robochoc.model.problem import Team
 from robochoc.run.options import OnLoss, Options, Runtime
 from robochoc.run.orchestrator import solve
 from robochoc.solver.encoding import UnsupportedError
+from tests.support.pkc_problems import random_pkc_team
 from tests.support.problems import team_of
 
 TEAM = team_of({"A": (1, 2), "B": (1, 2)}, [])
@@ -58,6 +60,13 @@ def test_a_run_reports_it(caplog: pytest.LogCaptureFixture) -> None:
     assert solve(TEAM, Options(kill=(Kill("RA", 60),))).verdict is Verdict.SOLUTION
     (text,) = caplog.messages
     assert text.startswith("RA was to be killed after 60 s; the search took ")
+
+
+def test_a_refused_run_has_one_reason(caplog: pytest.LogCaptureFixture) -> None:
+    team = random_pkc_team(Random(2))
+    with pytest.raises(UnsupportedError, match="such links are not turned"):
+        solve(team, Options(kill=(Kill(team.order[0], 60),), order=tuple(reversed(team.order))))
+    assert caplog.messages == []
 
 
 @pytest.mark.parametrize(

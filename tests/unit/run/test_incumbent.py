@@ -245,5 +245,12 @@ def test_a_tree_is_drawn_with_its_depth_and_width() -> None:
     ]
 
 
+@pytest.mark.parametrize("places", [{}, {"R2": PseudoTreeNode("R1"), "R3": PseudoTreeNode("R2")}])
+def test_a_tree_that_is_not_finished_is_not_drawn(places: dict[str, PseudoTreeNode]) -> None:
+    outcome = Outcome("team", "dpop", "simulator", 0, Verdict.UNKNOWN, tree=places)
+    assert tree_text(outcome) == "  the run ended before the robots had built a pseudo-tree"
+
+
 def test_who_builds_no_tree_says_so() -> None:
-    assert tree_text(Outcome("team", "abt", "simulator", 0, Verdict.SOLUTION)) == "  abt builds no pseudo-tree"
+    for name, verdict in (("abt", Verdict.SOLUTION), ("abt", Verdict.UNKNOWN), ("central", Verdict.UNKNOWN)):
+        assert tree_text(Outcome("team", name, "simulator", 0, verdict)) == f"  {name} builds no pseudo-tree"
