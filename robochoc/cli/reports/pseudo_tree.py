@@ -7,6 +7,7 @@ from collections.abc import Iterator, Mapping
 from robochoc.formats import on_one_line
 from robochoc.model.outcome import Outcome, PseudoTreeNode, Verdict
 from robochoc.model.priorities import natural_key
+from robochoc.protocols.shared.dfs import TreeProtocol
 from robochoc.run.options import CENTRAL
 from robochoc.run.registry import protocol_named
 
@@ -17,7 +18,7 @@ def tree_text(outcome: Outcome) -> str:
     A run may end while robots still build it. Who knows its place then has no root yet: roots are the last to know.
     """
     nodes = outcome.tree
-    if not nodes and (outcome.verdict is not Verdict.UNKNOWN or not _works_on_tree(outcome.protocol)):
+    if not nodes and (outcome.verdict is not Verdict.UNKNOWN or not _builds_tree(outcome.protocol)):
         return f"  {outcome.protocol} builds no pseudo-tree"
     if not nodes or any(node.parent not in nodes for node in nodes.values() if node.parent is not None):
         return "  the run ended before the robots had built a pseudo-tree"
@@ -29,8 +30,8 @@ def tree_text(outcome: Outcome) -> str:
     return "\n".join([head, *(line for root in roots for line in _drawn(root, nodes, below))])
 
 
-def _works_on_tree(protocol: str) -> bool:
-    return protocol != CENTRAL and protocol_named(protocol).traits.tree
+def _builds_tree(protocol: str) -> bool:
+    return protocol != CENTRAL and issubclass(protocol_named(protocol), TreeProtocol)
 
 
 def _children(nodes: Mapping[str, PseudoTreeNode]) -> dict[str | None, list[str]]:
