@@ -10,6 +10,8 @@ from __future__ import annotations
 import random
 from collections import Counter
 
+from robochoc.model.message import Envelope
+
 
 class Dropped:
     """Draws which messages of a robot are dropped. `many` counts them."""
@@ -31,3 +33,14 @@ class Dropped:
     def before(self, sender: str) -> int:
         """Return how many messages of `sender` were dropped right before the one that has arrived. Ask once."""
         return self._missing.pop(sender, 0)
+
+    def missing(self, envelope: Envelope) -> int | None:
+        """Return how many messages were dropped right before `envelope`, which arrives; None: it is dropped, too."""
+        return None if self.takes(envelope.sender) else self.before(envelope.sender)
+
+    def refuse(self) -> None:
+        """Count the message that the robot's protocol could not use, if it is the first one that gets lost here.
+
+        So nobody relies on what a search has found in which a robot could not go on, wherever the loss was.
+        """
+        self.many = max(self.many, 1)

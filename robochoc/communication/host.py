@@ -222,10 +222,39 @@ class Host:
             raise _refusal(f"{self.name} was sent something", error) from None
         return self._said()
 
-    def miss(self, sender: str, many: int) -> None:
-        """Tell the protocol that so `many` messages of `sender` were lost, before its next one is taken in."""
-        for _ in range(many):
-            self.protocol.miss(sender)
+    def handle_lossy(
+        self, packet: Sequence[Envelope], missing: Callable[[Envelope], int | None], *, lost: bool
+    ) -> list[Envelope] | None:
+        """Handle a packet, as `handle` does, in a search in which messages get lost, and return what the robot says.
+
+        A protocol that bears loss is told what is missing. One that does not is told nothing. It may raise anything
+        once a message is lost, and cannot go on then.
+
+        Args:
+            packet: The messages that have arrived.
+            missing: Returns how many messages of its sender were lost right before a message; None: it is lost as well.
+            lost: Whether a message of the search is or may be lost, to this robot or to others.
+
+        Returns:
+            The messages. None: the protocol cannot go on.
+
+        Raises:
+            BadMessageError: as `handle` does, where no loss is an excuse.
+        """
+        bears = self.protocol.traits.bears_loss
+        try:
+            for envelope in packet:
+                many = missing(envelope)
+                if many is None:
+                    continue
+                for _ in range(many if bears else 0):
+                    self.protocol.miss(envelope.sender)
+                self.take_in(envelope)
+            return self.settle()
+        except Exception:
+            if bears or not lost:
+                raise
+            return None
 
     def go_on(self) -> list[Envelope] | None:
         """Let the protocol continue without what it waits for; return its messages. None: it does not continue."""

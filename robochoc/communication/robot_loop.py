@@ -11,6 +11,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Sequence
 
 from robochoc.communication.control import Conclusion, Counters, Events, Ready, RobotMessage, WentOn
+from robochoc.communication.dropped import Dropped
 from robochoc.communication.host import Host
 from robochoc.journal.events import AnyEvent, Sent
 from robochoc.model.message import Envelope
@@ -104,32 +105,23 @@ class RobotLoop(ABC):
         if packet and self._host and self._searching:
             self._received += len(packet)
             dropped = self._host.dropped
-            self._send(self._host, self._host.handle(packet) if dropped is None else self._lossy(self._host, packet))
+            self._send(self._host, self._host.handle(packet) if dropped is None else self._lossy(packet, dropped))
         if len(self._events) > EVENTS_AT_ONCE:
             self.report_events()
 
-    def _lossy(self, host: Host, packet: Sequence[Envelope]) -> list[Envelope]:
-        """Handle what is not dropped of a packet, and tell the protocol what is missing before it.
+    def _lossy(self, packet: Sequence[Envelope], dropped: Dropped) -> list[Envelope]:
+        """Handle what is not dropped of a packet; return what the robot says.
 
-        A protocol that does not bear loss is told nothing. It may raise anything then, and is silent from then on.
+        Where its protocol cannot go on without what is missing, here or at another robot, it is silent from then on.
         """
-        dropped = host.dropped
-        if dropped is None or self._mute:
+        if self._host is None or self._mute:
             return []
-        bears = host.protocol.traits.bears_loss
-        try:
-            for envelope in packet:
-                if not dropped.takes(envelope.sender):
-                    missing = dropped.before(envelope.sender)
-                    if bears:
-                        host.miss(envelope.sender, missing)
-                    host.take_in(envelope)
-            return host.settle()
-        except Exception:
-            if bears or not dropped.many:
-                raise
+        said = self._host.handle_lossy(packet, dropped.missing, lost=True)
+        if said is None:
             self._mute = True
+            dropped.refuse()
             return []
+        return said
 
     def go_on(self) -> None:
         """Go on without the messages that the protocol waits for, and tell the master whether it does."""

@@ -15,7 +15,7 @@ from robochoc.model.cost_units import Cost
 from robochoc.model.outcome import Metrics, Outcome, Verdict
 from robochoc.model.problem import ProblemKind
 from robochoc.protocols.protocol import Protocol
-from robochoc.run.evaluation import Answer, Search, evaluate_search
+from robochoc.run.evaluation import Answer, Search, evaluate_search, why_spoiled
 from robochoc.run.options import Options
 from robochoc.run.withdrawal import Phase, first_phase, second_phase
 from robochoc.system.stopping import stop_requested
@@ -109,9 +109,8 @@ class Deployment(ABC):
             return None
         if answer.witness is not None:
             return f"{answer.witness} {GAVE_UP}"
-        lost = answer.metrics.lost_messages
-        if lost and not phase.traits.bears_loss:
-            return f"{lost:,} messages were lost, and {phase.name} needs every one"
+        if answer.metrics.lost_messages and not phase.traits.bears_loss:
+            return why_spoiled(phase, answer.metrics)
         if answer.ended:
             return f"{phase.name} {FOUND_NOTHING}"
         return "; ".join(filter(None, [self._limit_reached(answer.metrics), self.unsettled]))

@@ -161,7 +161,7 @@ def evaluate_search(
         RefutedError: when the check refutes what the protocol claims.
     """
     if is_spoiled(phase, search.result):
-        return _evaluate_spoiled(search)
+        return _evaluate_spoiled(phase, search, kind)
     result = search.result
     ended = result.verdict is Verdict.SOLUTION
     cut = deadline is not None and result.verdict is Verdict.UNKNOWN and result.witness is None
@@ -199,13 +199,25 @@ def is_spoiled(phase: Phase, result: RunResult) -> bool:
     return result.metrics.lost_messages > 0 and not phase.traits.bears_loss
 
 
-def _evaluate_spoiled(search: Search) -> Answer:
-    """Return the answer of a search that is spoiled: a solution that passes the check, or that nothing is known."""
+def why_spoiled(phase: Phase, metrics: Metrics) -> str:
+    """Return why nothing that the protocol of a spoiled search claims holds."""
+    many = metrics.lost_messages
+    return f"{many:,} message{'s were' if many != 1 else ' was'} lost, and {phase.name} needs every one"
+
+
+def _evaluate_spoiled(phase: Phase, search: Search, kind: ProblemKind) -> Answer:
+    """Return the answer of a search that is spoiled: a solution that passes the check, or that nothing is known.
+
+    Where there are costs, a reason goes with a solution: it is what the robots had when they could not go on, not what
+    the protocol ends with. An auction may have sold nothing by then.
+    """
     answer = Answer(Verdict.UNKNOWN, search.result.metrics)
     found = search.check()
     if found is None:
         return answer
     sure = found.verified and not found.withdrawn
+    had = "this is the best that the robots had, and may be what they began with"
+    unfinished = f"{why_spoiled(phase, search.result.metrics)}: {had}" if kind is ProblemKind.DISWCSP else None
     return replace(
         answer,
         verdict=Verdict.SOLUTION if sure else Verdict.UNKNOWN,
@@ -214,7 +226,7 @@ def _evaluate_spoiled(search: Search) -> Answer:
         withdrawn=found.withdrawn,
         verified=found.verified,
         checked=found.check_counts,
-        reason=found.reason,
+        reason=unfinished if sure else found.reason,
     )
 
 

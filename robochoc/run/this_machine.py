@@ -152,7 +152,7 @@ class ThisMachine(Deployment):
         if lost:
             raise RobotsLostError(lost)
         answer = self._with_epochs(answer)
-        why = self._cut_short or self._events_missed(answer) or self.why_unknown(phase, answer)
+        why = self._cut_short or self._events_missed(answer) or self.why_unknown(phase, answer) or answer.reason
         if answer.deadline is not None and scenario.events_left:  # an answer to a problem that was to change
             answer = replace(answer, verdict=Verdict.UNKNOWN, deadline=None)
         reasons = filter(None, [why, *scenario.failed_returns])

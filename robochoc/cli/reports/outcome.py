@@ -108,10 +108,17 @@ def _verdict(team: Team, outcome: Outcome) -> str:
         case _ if outcome.count is not None:
             return _counted(outcome.count, outcome)
         case Verdict.SOLUTION | Verdict.OPTIMAL if not outcome.withdrawn_alive:
-            return f"{headline}{_not_proven(team, outcome)}, {_checked(outcome)}{confirmed}{_trusted(team, outcome)}"
+            unfinished = f"; {outcome.reason}" * _is_unfinished(outcome)
+            proof = f"{_not_proven(team, outcome)}, {_checked(outcome)}{confirmed}{_trusted(team, outcome)}"
+            return f"{headline}{proof}{unfinished}"
         case Verdict.SOLUTION | Verdict.OPTIMAL:
             whole = f"no solution{left or ' for the whole team'}{because}"
             return f"{headline}; {whole}; {_checked(outcome)}{confirmed}{_trusted(team, outcome)}"
+
+
+def _is_unfinished(outcome: Outcome) -> bool:
+    """Return whether a solution, which holds, is what robots had when a lost message kept them from going on."""
+    return outcome.verified and outcome.reason is not None and outcome.metrics.lost_messages > 0
 
 
 def _counted(count: int, outcome: Outcome) -> str:
@@ -190,7 +197,8 @@ def _so_far(team: Team, outcome: Outcome) -> str:
         return f"; in the best answer so far {len(outcome.withdrawn_alive)} {withdraw}{_weight(team, outcome)}{lower}"
     if team.kind is ProblemKind.DISCSP:
         return ""
-    known = [f"the best so far costs {_number(outcome.cost)}"] if outcome.assignment else []
+    verb = "is worth" if _maximizes(team) else "costs"
+    known = [f"the best so far {verb} {_number(outcome.cost)}"] if outcome.assignment else []
     reported = ", as all robots report" if outcome.claimed_by else ""
     known += [f"{_side(team)} bound {_number(bound)}{reported}"] if bound else []
     return "; " + ", and ".join(known) if known else ""

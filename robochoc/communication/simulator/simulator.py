@@ -200,23 +200,15 @@ class Simulation(Session):
                 self._verdict, self._lossless = Verdict.SOLUTION, self._losses is None or not self._losses.lost
 
     def _handle(self, host: Host, packet: Sequence[Envelope], losses: Losses) -> list[Envelope]:
-        """Let `host` take in a packet, and tell it what is missing before it; return what it says.
+        """Let `host` handle a packet, before which messages may be missing; return what it says.
 
-        A protocol that does not bear loss is told nothing. It may raise anything then, and that ends the search.
+        Where its protocol cannot go on without these, the search is over.
         """
-        bears = self._protocol.traits.bears_loss
-        try:
-            for envelope in packet:
-                missing = losses.before(envelope)
-                if bears and missing:
-                    host.miss(envelope.sender, missing)
-                host.take_in(envelope)
-            return host.settle()
-        except Exception:
-            if bears or not losses.lost:
-                raise
+        said = host.handle_lossy(packet, losses.before, lost=losses.lost > 0)
+        if said is None:
             self._verdict = Verdict.UNKNOWN
             return []
+        return said
 
     def _go_on(self) -> bool:
         """Let all robots continue without what they wait for; return whether one does."""

@@ -2,24 +2,34 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 from random import Random
 
 import pytest
 
-from robochoc.communication.control import Counters, WentOn
+from robochoc.communication.control import Counters, RobotMessage, WentOn
 from robochoc.communication.dropped import Dropped
+from robochoc.communication.host import BadMessageError, Host
 from robochoc.communication.kill_schedule import Kill
+from robochoc.communication.robot_loop import RobotLoop
 from robochoc.communication.search_state import SearchState
+from robochoc.communication.session import Epoch
 from robochoc.formats import read_team, write_team
 from robochoc.generators.queens3d import queens3d
 from robochoc.generators.random_csp import random_csp
+from robochoc.model.message import Envelope, Message
 from robochoc.model.outcome import Verdict
 from robochoc.model.problem import Team
+from robochoc.protocols.local_search.dsa import DSA
+from robochoc.protocols.protocol import Protocol
+from robochoc.protocols.satisfaction.abt import ABT
 from robochoc.run import Options, Runtime, solve
 from robochoc.run.choice import decided_unseen
 from robochoc.run.registry import protocol_named
+from robochoc.solver.agent_problem import RunParameters
+from robochoc.solver.compiled_team import ensure_compiled
 from tests.support.brute_force import least_cost
 from tests.support.cost_problems import random_cost_team
 from tests.support.examples import count
@@ -58,6 +68,66 @@ def test_the_same_seed_drops_the_same_and_each_robot_others() -> None:
     assert drawn(1, "A") == drawn(1, "A")
     assert drawn(1, "A") != drawn(2, "A")
     assert drawn(1, "A") != drawn(1, "C")
+
+
+class Recorded(RobotLoop):
+    """A robot whose messages and reports go into lists."""
+
+    bundle_bytes = 1000
+
+    def __init__(self) -> None:
+        super().__init__(0, observed=False)
+        self.said: list[RobotMessage] = []
+        self.transmitted: list[Envelope] = []
+
+    def _say(self, message: RobotMessage) -> None:
+        self.said.append(message)
+
+    def _transmit(self, envelopes: Sequence[Envelope]) -> None:
+        self.transmitted += envelopes
+
+    def _report_end(self) -> None:
+        """Nobody asks."""
+
+
+class Refusing(ABT):
+    """Cannot use what it is sent, as happens where another robot has lost a message."""
+
+    def receive(self, sender: str, message: Message) -> None:
+        raise ValueError(sender, message)
+
+
+class RefusingDSA(DSA):
+    """The same, of a protocol that bears loss: there it is a mistake of the protocol."""
+
+    def receive(self, sender: str, message: Message) -> None:
+        raise ValueError(sender, message)
+
+
+def sent_what_it_refuses(protocol: type[Protocol]) -> tuple[Recorded, Host, list[Envelope]]:
+    """A robot that drops next to nothing, and what another one has sent it."""
+    parts = Epoch(ensure_compiled(queens3d(2)), parameters=RunParameters(message_loss=1e-12)).parts(protocol)
+    first, second = (Host.of(protocol, part) for part in list(parts.values())[:2])
+    robot = Recorded()
+    robot.confirm(second)
+    robot.begin(0.0)
+    return robot, second, [one for one in first.start() if one.receiver == second.name]
+
+
+def test_what_a_robot_cannot_use_as_others_have_lost_messages_counts_as_lost() -> None:
+    robot, host, packet = sent_what_it_refuses(Refusing)
+    before = len(robot.transmitted)
+    assert packet
+    for _ in range(2):
+        robot.take_in(packet)
+    assert len(robot.transmitted) == before
+    assert host.metrics().lost_messages == 1
+
+
+def test_what_bears_loss_may_not_refuse_anything() -> None:
+    robot, _, packet = sent_what_it_refuses(RefusingDSA)
+    with pytest.raises(BadMessageError):
+        robot.take_in(packet)
 
 
 def test_where_nothing_is_under_way_all_are_told_to_go_on_and_the_search_ends_when_none_does() -> None:

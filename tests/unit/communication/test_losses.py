@@ -8,6 +8,7 @@ from random import Random
 
 import pytest
 
+from robochoc.cli.reports.outcome import outcome_report
 from robochoc.communication.host import BadMessageError
 from robochoc.communication.run_result import RunResult
 from robochoc.communication.simulator.channel import ChannelModel
@@ -17,6 +18,7 @@ from robochoc.communication.simulator.simulator import Simulation
 from robochoc.communication.simulator.timed import Timed
 from robochoc.formats.result import read_result, result_json
 from robochoc.generators.queens3d import queens3d
+from robochoc.generators.tasks import tasks
 from robochoc.journal.events import AnyEvent, Received, Sent
 from robochoc.model.message import Envelope
 from robochoc.model.orders import constraint_graph
@@ -36,6 +38,7 @@ from robochoc.run.options import ScheduleName
 from robochoc.run.recording import journal_header
 from robochoc.solver.encoding import UnsupportedError
 from tests.support.cost_problems import random_cost_team
+from tests.support.problems import random_team
 from tests.support.replays import recorded
 
 
@@ -177,6 +180,27 @@ def test_a_protocol_that_does_not_bear_loss_may_raise_anything_after_one() -> No
     with pytest.raises(BadMessageError, match="KeyError: 'Robot"):
         Simulation(queens3d(3), Broken, Concurrent(0), losses=_Sure()).search()
     assert Simulation(queens3d(3), Broken, Concurrent(0), losses=_Sure(0)).search().verdict is Verdict.UNKNOWN
+
+
+def test_an_auction_that_could_not_end_says_so_also_where_nobody_does_anything() -> None:
+    """Nothing forbids that all robots stay idle, so that is a solution; but not what the auction ends with."""
+    team = tasks(4, 4)
+    whole = solve(team, lossy("ssi", 0))
+    assert (whole.reason, whole.verdict) == (None, Verdict.SOLUTION)
+    spoiled = [solve(team, lossy("ssi", 0.3, seed)) for seed in range(20)]
+    assert any(not any(one.assignment.values()) for one in spoiled)
+    for one in spoiled:
+        many = one.metrics.lost_messages
+        lost = f"{many:,} message{'s were' if many > 1 else ' was'} lost, and ssi needs every one: this is the best"
+        assert (one.verdict, bool(one.reason)) == (Verdict.SOLUTION, many > 0)
+        assert not many or f"checked against every constraint; {lost}" in outcome_report(team, one)
+        assert read_result(result_json(one)).reason == one.reason
+
+
+def test_a_solution_without_costs_is_one_whatever_was_lost() -> None:
+    spoiled = [solve(random_team(Random(seed), n_ary=False), lossy("abt", 0.05, seed)) for seed in range(40)]
+    solved = [one for one in spoiled if one.verdict is Verdict.SOLUTION and one.metrics.lost_messages]
+    assert {(one.reason, one.verified) for one in solved} == {(None, True)}
 
 
 def test_what_bears_loss_may_not_raise() -> None:

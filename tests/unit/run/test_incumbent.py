@@ -219,7 +219,7 @@ def test_where_the_sum_is_maximised_the_best_is_a_maximum_and_bounds_are_upper_o
         team, timely
     )
     stopped = replace(found, verdict=Verdict.UNKNOWN, reason="so")
-    assert "so; the best so far costs 3, and upper bound 9" in outcome_report(team, stopped)
+    assert "so; the best so far is worth 3, and upper bound 9" in outcome_report(team, stopped)
 
 
 # Trees, explained

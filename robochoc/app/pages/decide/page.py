@@ -232,7 +232,8 @@ class _Page:
             now = "foreign.worth-now" if shown.record.maximised else "decide.best-now"
             facts.append(say(now, cost=cost_shown(live.costs[-1][1])))
         if running and live.bound is not None:
-            facts.append(say("decide.bound", bound=cost_shown(live.bound)))
+            most = "foreign.worth-bound" if shown.record.maximised else "decide.bound"
+            facts.append(say(most, bound=cost_shown(live.bound)))
         self._facts.set_text(" · ".join(facts))
 
     def _show_answer(self, shown: Run | None, sketch: Sketch, *, changed: bool) -> None:
