@@ -152,18 +152,22 @@ class ThisMachine(Deployment):
         if lost:
             raise RobotsLostError(lost)
         answer = self._with_epochs(answer)
-        why = self._cut_short or self._events_missed(answer) or self.why_unknown(phase, answer) or answer.reason
-        if answer.deadline is not None and scenario.events_left:  # an answer to a problem that was to change
+        missed = self._events_missed(answer)
+        why = self._cut_short or missed or self.why_unknown(phase, answer)
+        if missed:  # an answer to a problem that was to change
             answer = replace(answer, verdict=Verdict.UNKNOWN, deadline=None)
         reasons = filter(None, [why, *scenario.failed_returns])
         return replace(answer, reason="; ".join(reasons) or None, preprocessing=total_preprocessing(self._done))
 
     def _events_missed(self, answer: Answer) -> str:
-        """Return in words that the deadline came before all events; empty: it did not."""
+        """Return in words that a limit came before all events, with an answer; empty: it did not."""
         left = self._scenario.events_left
-        if answer.deadline is None or not left:
+        if not left or answer.verdict is Verdict.UNKNOWN:
             return ""
-        return f"by the deadline (--deadline {answer.deadline:g}) {left} event{'s' * (left != 1)} had not happened"
+        missed = f"{left} event{'s' * (left != 1)} had not happened"
+        if answer.deadline is not None:
+            return f"by the deadline (--deadline {answer.deadline:g}) {missed}"
+        return f"{self._limit_reached(answer.metrics)}, and {missed}"
 
     def _preprocessed(self) -> tuple[CompiledTeam, RunResult | None]:
         """Let the robots make their domains consistent, and return the team that is left. See `scenario.Prepare`.

@@ -93,6 +93,16 @@ def test_before_all_events_have_happened_nothing_is_decided() -> None:
     assert outcome.reason == "by the deadline (--deadline 100) 1 event had not happened"
 
 
+def test_before_all_events_a_limit_on_messages_decides_nothing_either() -> None:
+    team = random_csp(6, 3, 0.6, 0.1, seed=1)
+    event = ScenarioEvent((RemoveValue(team.robots[0].variables[0].name, 2),))
+    options = Options(protocol="maxsum", runtime=Runtime.SIMULATOR, messages=600)
+    outcome = solve(replace(team, scenario=(event,)), options)
+    assert [epoch.verdict for epoch in outcome.epochs] == [Verdict.SOLUTION]
+    assert (outcome.verdict, outcome.deadline) == (Verdict.UNKNOWN, None)
+    assert outcome.reason == "so many messages have been sent (--messages 600), and 1 event had not happened"
+
+
 def test_who_is_done_before_has_the_same_answer_as_without_a_deadline() -> None:
     for seed in range(20):
         team = random_cost_team(Random(seed))
