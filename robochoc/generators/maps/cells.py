@@ -3,8 +3,8 @@
 The centre of a cell lies at whole multiples of its side in the map's frame. So the waypoint of a cell is a pair of
 integers, and the side is the scale: integers x scale are metres in the map's frame, exactly.
 
-A cell is free if all of its pixels are free, and a robot fits at its centre. Cells are where robots go; how they get
-there is found on the pixels (`travel.py`), so that a door narrower than a cell is still a way.
+A cell is free if all pixels that it touches are free, and a robot fits at its centre. Cells are where robots go; how
+they get there is found on the pixels (`travel.py`), so that a door narrower than a cell is still a way.
 """
 
 from __future__ import annotations
@@ -18,14 +18,14 @@ import numpy as np
 import numpy.typing as npt
 
 from robochoc.formats.occupancy.grid import Counts, Flags, OccupancyGrid, before
+from robochoc.formats.occupancy.turn import Place as Place  # noqa: PLC0414 - from here, too
+from robochoc.generators.maps.turned import TurnedSquares
 
 MAX_SIDE = 1000
 """The maximum number of columns, and of rows, of cells."""
 MAX_RADIUS = 100
 """The maximum radius of a robot, in pixels."""
 
-Place = tuple[Fraction, Fraction]
-"""The x and the y of a place, in metres."""
 _HALF = Fraction(1, 2)
 
 
@@ -73,7 +73,7 @@ class Cells:
     @cached_property
     def first(self) -> tuple[int, int]:
         """The x and the y of cell 0, in sides of a cell."""
-        x, y = (floor(corner / self.side + _HALF) for corner in self.grid.origin)
+        x, y = (floor(min(ends) / self.side + _HALF) for ends in zip(*self.grid.corners, strict=True))
         return x, y
 
     @cached_property
@@ -89,16 +89,19 @@ class Cells:
     @cached_property
     def free(self) -> tuple[int, ...]:
         """The numbers of all free cells."""
+        if not self.grid.turn.is_none:
+            touched, flagged = self._turned.counts(self.grid.free)
+            return self._numbers(touched == flagged, self._turned.centres())
         low, high, middle = zip(self._pixels(1), self._pixels(0), strict=True)
-        height, width = self.grid.free.shape
         sizes = np.outer(high[0] - low[0], high[1] - low[1])  # pixels beside the map count, and are not free
         found = _sums(self.grid.free_before, low, high) == sizes
-        centres = np.ix_(middle[0].clip(0, height - 1), middle[1].clip(0, width - 1))
-        return tuple(np.flatnonzero(found & self.passable[centres]).tolist())
+        return self._numbers(found, np.ix_(*middle))
 
     @cached_property
     def blocked(self) -> tuple[int, ...]:
         """The numbers of all cells with an occupied pixel."""
+        if not self.grid.turn.is_none:
+            return tuple(np.flatnonzero(self._turned.counts(self.grid.occupied)[1]).tolist())
         low, high, _ = zip(self._pixels(1), self._pixels(0), strict=True)
         return tuple(np.flatnonzero(_sums(before(self.grid.occupied), low, high)).tolist())
 
@@ -114,9 +117,7 @@ class Cells:
 
     def pixel(self, place: Place) -> tuple[int, int] | None:
         """Return the row and the column of the pixel of a place; None: it is not on the map."""
-        x, y = (
-            floor((one - corner) / self.grid.resolution) for one, corner in zip(place, self.grid.origin, strict=True)
-        )
+        x, y = map(floor, self.grid.in_pixels(place))
         rows, columns = self.grid.free.shape
         return (y, x) if 0 <= y < rows and 0 <= x < columns else None
 
@@ -126,9 +127,18 @@ class Cells:
         return x - self.first[0], y - self.first[1]
 
     def _count(self, axis: int) -> int:
-        size = self.grid.free.shape[1 - axis] * self.grid.resolution
-        behind: int = ceil((self.grid.origin[axis] + size) / self.side + _HALF)
+        behind: int = ceil(max(corner[axis] for corner in self.grid.corners) / self.side + _HALF)
         return behind - self.first[axis]
+
+    @cached_property
+    def _turned(self) -> TurnedSquares:
+        return TurnedSquares(self.grid, self.side, self.first, (self.rows, self.columns))
+
+    def _numbers(self, found: Flags, centres: tuple[npt.NDArray[np.int64], ...]) -> tuple[int, ...]:
+        """Return the numbers of the cells that are found, where a robot fits on the pixel of the centre."""
+        height, width = self.passable.shape
+        fits = self.passable[centres[0].clip(0, height - 1), centres[1].clip(0, width - 1)]
+        return tuple(np.flatnonzero(found & fits).tolist())
 
     def _pixels(self, axis: int) -> tuple[npt.NDArray[np.int64], ...]:
         """Return for each column (`axis` 0) or row its first pixel, the one behind its last, and that of its centre."""

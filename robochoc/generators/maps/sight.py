@@ -83,11 +83,7 @@ class Sight:
 
     def _in_pixels(self, cell: int) -> tuple[Fraction, Fraction]:
         """Return the place of a cell's centre, in pixels from the lower left corner of the map."""
-        grid = self._cells.grid
-        x, y = (
-            (one - corner) / grid.resolution for one, corner in zip(self._cells.centre(cell), grid.origin, strict=True)
-        )
-        return x, y
+        return self._cells.grid.in_pixels(self._cells.centre(cell))
 
 
 def _first_touched(place: int, size: int) -> int:

@@ -47,7 +47,7 @@ def map_options(command: Command) -> Command:
                 type=InputPath(),
                 required=True,
                 metavar="FILE",
-                help="Map as ROS's map_server reads it: YAML, which names a PGM image.",
+                help="Map as ROS's map_server reads it: YAML, which names an image.",
             ),
             click.option(
                 "--agents",

@@ -1,0 +1,111 @@
+"""Images of maps, as map_saver writes them: PGM, PNG and BMP.
+
+map_server takes the mean of a pixel's channels. Here a pixel is their sum, and white is the sum of a white pixel's: so
+nothing is rounded.
+"""
+
+from __future__ import annotations
+
+import io
+import struct
+import warnings
+import zlib
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+from PIL import Image as Pillow
+from PIL import UnidentifiedImageError
+
+from robochoc.formats.diagnostics import MistakeError, shortened
+from robochoc.formats.occupancy.pgm import MAX_PIXELS, Pixels, read_pgm
+
+_PGM = (b"P2", b"P5")
+_OTHERS = {b"\x89PNG\r\n\x1a\n": "PNG", b"BM": "BMP"}
+_WIDE = 65_535
+_ONE_BYTE = 255
+_BROKEN = (OSError, SyntaxError, ValueError, EOFError, IndexError, KeyError, TypeError, OverflowError, struct.error)
+
+
+@dataclass(frozen=True, eq=False)
+class Image:
+    """An image of a map.
+
+    Attributes:
+        pixels: The sum of each pixel's channels, rows from the top.
+        white: That sum of a white pixel. 0 is black.
+        opaque: Which pixels are opaque. None: all of them.
+    """
+
+    pixels: Pixels
+    white: int
+    opaque: npt.NDArray[np.bool_] | None = None
+
+
+def read_image(content: bytes, *, adds_alpha: bool) -> Image:
+    """Return the image that a file has.
+
+    Args:
+        content: What the file has.
+        adds_alpha: Alpha is one channel more, as in map_server's mode trinary.
+
+    Raises:
+        MistakeError: It is no image in one of the formats, is broken, or has more than `MAX_PIXELS`.
+    """
+    if content[:2] in _PGM:
+        return Image(*read_pgm(content))
+    for magic, name in _OTHERS.items():
+        if content.startswith(magic):
+            return _read_other(content, name, adds_alpha=adds_alpha)
+    raise MistakeError("is no PGM, PNG or BMP image", "convert it to one of these, which map_saver writes")
+
+
+def _read_other(content: bytes, name: str, *, adds_alpha: bool) -> Image:
+    """Return an image that Pillow decodes. Its size is looked at before its pixels."""
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")  # Pillow's own bound on pixels is above ours
+            with Pillow.open(io.BytesIO(content), formats=(name,)) as opened:
+                width, height = opened.size
+                if width * height > MAX_PIXELS or min(width, height) < 1:
+                    raise MistakeError(
+                        f"has {width} x {height} pixels", f"at most {MAX_PIXELS:,} are read; take a coarser map"
+                    )
+                return _summed(opened, adds_alpha=adds_alpha)
+    except Pillow.DecompressionBombError:
+        hint = f"at most {MAX_PIXELS:,} are read; take a coarser map"
+        raise MistakeError("has too many pixels", hint) from None
+    except (*_BROKEN, zlib.error) as error:
+        told = "" if isinstance(error, UnidentifiedImageError) else f": {shortened(str(error))}"
+        raise MistakeError(f"is a broken {name} image{told}", "the image is not complete, or damaged") from None
+
+
+def _summed(opened: Pillow.Image, *, adds_alpha: bool) -> Image:
+    """Return the sums of channels."""
+    if opened.mode.startswith("I"):
+        return _wide(opened)
+    if not opened.has_transparency_data:
+        grey = opened.mode in {"1", "L"}
+        channels = np.asarray(opened.convert("L" if grey else "RGB"))
+        return Image(_sum(channels) if channels.ndim > 2 else channels.astype(np.int64), _white(channels))  # noqa: PLR2004
+    channels = np.asarray(opened.convert("RGBA"))
+    if adds_alpha:
+        return Image(_sum(channels), _white(channels))
+    return Image(_sum(channels[..., :3]), 3 * _ONE_BYTE, channels[..., 3] == _ONE_BYTE)
+
+
+def _wide(opened: Pillow.Image) -> Image:
+    """Return an image whose shades of grey have two bytes."""
+    pixels = np.asarray(opened).astype(np.int64)
+    if not 0 <= pixels.min() <= pixels.max() <= _WIDE:
+        raise MistakeError("has shades of grey of more than two bytes", "convert it to one byte a pixel")
+    return Image(pixels, _WIDE)
+
+
+def _sum(channels: npt.NDArray[np.uint8]) -> Pixels:
+    found: Pixels = channels.sum(axis=2, dtype=np.int64)
+    return found
+
+
+def _white(channels: npt.NDArray[np.uint8]) -> int:
+    return _ONE_BYTE * (channels.shape[2] if channels.ndim > 2 else 1)  # noqa: PLR2004 - rows, columns, channels

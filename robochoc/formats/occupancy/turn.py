@@ -1,0 +1,69 @@
+"""Turned maps: the yaw of a map's origin, as a number of quarter turns and the sine and cosine of what is left.
+
+Sines are computed in integers, to 40 decimal places: so cells of turned maps are the same on every machine.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from fractions import Fraction
+
+_ONE = 10**50
+_PLACES = 10**40
+_HALF_PI = Fraction(1_570796_326794_896619_231321_691639_751442_098584_699687_552910_487, 10**57)
+_TERMS = 45
+"""The last term of the series, for an angle of less than 1, is below 10**-50."""
+
+Place = tuple[Fraction, Fraction]
+"""The x and the y of a place, in metres or in pixels."""
+
+
+@dataclass(frozen=True)
+class Turn:
+    """A counterclockwise turn around the origin by less than an eighth of a circle."""
+
+    cosine: Fraction = Fraction(1)
+    sine: Fraction = Fraction(0)
+
+    @property
+    def is_none(self) -> bool:
+        """Return whether nothing is turned."""
+        return not self.sine
+
+    def turned(self, place: Place) -> Place:
+        """Return where a place gets to."""
+        x, y = place
+        return (self.cosine * x - self.sine * y, self.sine * x + self.cosine * y) if self.sine else place
+
+    def back(self, place: Place) -> Place:
+        """Return where a place has come from."""
+        x, y = place
+        return (self.cosine * x + self.sine * y, self.cosine * y - self.sine * x) if self.sine else place
+
+
+UNTURNED = Turn()
+
+
+def turn_of(yaw: Fraction, reach: Fraction) -> tuple[int, Turn]:
+    """Return the quarter turns of a yaw, 0 to 3, and the turn that is left, between eighths of a circle.
+
+    Args:
+        yaw: The angle in radians. A quarter turn is written with some decimal places only.
+        reach: What is left of the angle is nothing if it moves nothing within this radius by more than 1/100.
+    """
+    quarters = round(yaw / _HALF_PI)
+    rest = yaw - quarters * _HALF_PI
+    if abs(rest) * reach * 100 <= 1:
+        return quarters % 4, UNTURNED
+    return quarters % 4, Turn(*_cosine_and_sine(rest))
+
+
+def _cosine_and_sine(angle: Fraction) -> tuple[Fraction, Fraction]:
+    """Return the cosine and the sine, by their Taylor series."""
+    x = round(angle * _ONE)
+    sums, term = [0, 0], _ONE
+    for power in range(_TERMS):
+        sums[power % 2] += term if power % 4 < 2 else -term  # noqa: PLR2004 - signs are + + - -
+        term = term * x // (_ONE * (power + 1))
+    cosine, sine = (Fraction(round(Fraction(total * _PLACES, _ONE)), _PLACES) for total in sums)
+    return cosine, sine
