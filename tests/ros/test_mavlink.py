@@ -13,8 +13,8 @@ pytest.importorskip("mavsdk")
 
 from robochoc.ros.autopilots.fleet import read_fleet
 from robochoc.ros.autopilots.guard_process import GuardError, GuardProcess
+from robochoc.ros.autopilots.mavlink import MavlinkSink
 from robochoc.ros.autopilots.messages import Phase, Target
-from robochoc.ros.autopilots.sink import MavlinkSink
 from robochoc.ros.closed_loop import drones_of
 from robochoc.ros.sink import SinkError
 from robochoc.ros.waypoint import Waypoint
@@ -143,8 +143,11 @@ def test_drones_and_vehicles_match(tmp_path: Path, names: list[str], told: str) 
 @pytest.mark.parametrize(
     ("words", "told"),
     [
-        (["--arm"], "--arm is for robots that are commanded: add --ros mavlink:FILE"),
-        (["--arm", "--ros", "mcap:run.mcap"], "--arm is for --ros mavlink:FILE; mcap:run.mcap arms nothing"),
+        (["--arm"], "--arm is for robots that are commanded: add --ros mavlink:FILE, or crazyflie:FILE"),
+        (
+            ["--arm", "--ros", "mcap:run.mcap"],
+            "--arm is for --ros mavlink:FILE or crazyflie:FILE; mcap:run.mcap arms nothing",
+        ),
         (["--ros", "mavlink:nowhere.yaml"], "nowhere.yaml: No such file or directory; name a fleet file"),
     ],
 )

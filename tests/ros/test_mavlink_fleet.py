@@ -9,6 +9,7 @@ import pytest
 
 from robochoc.ros.autopilots.fleet import BYTES_MAX, AtEnd, Fence, Fleet, FleetError, Link, read_fleet
 from robochoc.ros.autopilots.frames import GpsPlace
+from robochoc.ros.autopilots.kinds import Kind
 from tests.support.program import ROOT
 
 LINK = "udpin://0.0.0.0:14540"
@@ -70,7 +71,10 @@ GOOD = f"vehicles:\n  Nose: {LINK}\n{FENCE}\n"
         (f"vehicles: {{Nose: {LINK}}}", "has no 'fence'"),
         (f"{GOOD}fence: [[0, 0, 0], [60, 60, 60]]", "fleet.yaml:4: has 'fence' twice; keep one"),
         (f"vehicles:\n  A: {LINK}\n  A: {LINK}0\n{FENCE}", "fleet.yaml:3: has 'A' twice; keep one"),
-        (f"{GOOD}fance: 3", r"fleet.yaml:4: 'fance' does not belong in a fleet file; did you mean 'fence'\?"),
+        (
+            f"{GOOD}fance: 3",
+            r"fleet.yaml:4: 'fance' does not belong in a fleet file of mavlink; did you mean 'fence'",
+        ),
         (f"vehicles: [Nose]\n{FENCE}", "'vehicles' is no mapping"),
         (f"vehicles: {{}}\n{FENCE}", "0 vehicles; a fleet has 1 to 64"),
         (f"vehicles: {{Nose: 3}}\n{FENCE}", r"the link of Nose, '3', is none; expected udpin://0.0.0.0:14540"),
@@ -106,6 +110,67 @@ def test_what_is_wrong_is_said_in_one_line(tmp_path: Path, text: str, told: str)
     with pytest.raises(FleetError, match=told) as caught:
         read(tmp_path, text)
     assert "\n" not in str(caught.value)
+
+
+def test_the_fleet_file_of_the_guide_for_crazyflies(tmp_path: Path) -> None:
+    page = (ROOT / "docs" / "guides" / "autopilots.md").read_text().partition("## Crazyflies")[2]
+    found = read_crazyflies(tmp_path, page.partition("```yaml\n")[2].partition("```")[0])
+    assert sorted(found.vehicles) == sorted(file.stem for file in (ROOT / "docs" / "examples" / "hangar").glob("*.xml"))
+
+
+URI = "radio://0/80/2M/E7E7E7E701"
+
+
+def read_crazyflies(folder: Path, text: str) -> Fleet:
+    file = folder / "fleet.yaml"
+    file.write_text(text)
+    return read_fleet(file, Kind.CRAZYFLIE)
+
+
+def test_a_fleet_of_crazyflies_and_what_its_file_leaves_out(tmp_path: Path) -> None:
+    found = read_crazyflies(tmp_path, f"vehicles:\n  Nose: {URI}\n{FENCE}\n")
+    assert found == Fleet({"Nose": Link(URI)}, BOX, takeoff_m=0.5, near_m=0.1, kind=Kind.CRAZYFLIE)
+    assert (found.speed_ms, found.patience_s, found.connect_s) == (1, 10, 60)
+
+
+@pytest.mark.parametrize(
+    "uri", [URI, "radio://12/125/250K/e7e7e7e7e7", "radio://0123456789/0/1M/0000000000", "udp://127.0.0.1:19850"]
+)
+def test_links_to_crazyflies(tmp_path: Path, uri: str) -> None:
+    found = read_crazyflies(tmp_path, f"vehicles: {{Nose: {{link: '{uri}', at: [1, 2, 0]}}}}\n{FENCE}\nspeed: 0.5\n")
+    assert found.vehicles == {"Nose": Link(uri, (1, 2, 0))}
+    assert found.speed_ms == 0.5
+
+
+@pytest.mark.parametrize(
+    ("text", "told"),
+    [
+        *(
+            (f"vehicles: {{Nose: '{uri}'}}\n{FENCE}", "is none; expected radio://0/80/2M/E7E7E7E701")
+            for uri in (
+                *("radio://0/126/2M/E7E7E7E701", "radio://0/80/3M/E7E7E7E701", "radio://0/80/2M/E7E7E7E7"),
+                *("radio://0/80/2M", "udp://127.0.0.1:0", "tcp://127.0.0.1:5000", "usb://0", LINK),
+                *("radio://0/80/2M/E7E7E7E701?rate_limit=1", "udp://127.0.0.1:19850/x"),
+            )
+        ),
+        (f"vehicles: {{A: {{at: [0, 0, 0]}}}}\n{FENCE}", "vehicle A has no 'link'; as in link: radio://0/80"),
+        (
+            f"vehicles: {{A: {URI}}}\n{FENCE}\norigin: [1, 2, 3]",
+            "'origin' does not belong in a fleet file of crazyflie",
+        ),
+        (f"vehicles: {{A: {URI}}}\n{FENCE}\nspeed: 6", "'speed' is '6'; expected 0.1 to 5"),
+        (f"vehicles: {{A: {URI}}}\n{FENCE}\ntakeoff: 0.1", "'takeoff' is '0.1'; expected 0.2 to 100"),
+    ],
+)
+def test_what_is_wrong_with_a_fleet_of_crazyflies(tmp_path: Path, text: str, told: str) -> None:
+    with pytest.raises(FleetError, match=told) as caught:
+        read_crazyflies(tmp_path, text)
+    assert "\n" not in str(caught.value)
+
+
+def test_speed_is_no_entry_for_vehicles_that_have_their_own(tmp_path: Path) -> None:
+    with pytest.raises(FleetError, match="'speed' does not belong in a fleet file of mavlink"):
+        read(tmp_path, f"{GOOD}speed: 1\n")
 
 
 def test_files_that_are_none(tmp_path: Path) -> None:

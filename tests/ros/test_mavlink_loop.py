@@ -14,7 +14,7 @@ import pytest
 pytest.importorskip("mavsdk")
 
 from robochoc.ros.autopilots.guard_process import shared
-from robochoc.ros.autopilots.source import MavlinkSource
+from robochoc.ros.autopilots.mavlink import MavlinkSource
 from robochoc.ros.closed_loop import drones_of
 from robochoc.ros.report_decoder import ReportDecoder
 from robochoc.ros.source import ReceivedMessage, SourceError

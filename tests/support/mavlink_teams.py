@@ -55,10 +55,10 @@ def udp_ports(count: int) -> list[int]:
             return ports
 
 
-def fleet_file(folder: Path, ports: Mapping[str, int], **settings: object) -> Path:
-    """Write a fleet file for vehicles that send to these ports, by the drones' names."""
+def fleet_file(folder: Path, ports: Mapping[str, int], *, scheme: object = "udpin", **settings: object) -> Path:
+    """Write a fleet file for vehicles that send to these ports, or hear there, by the drones' names."""
     entries = {"fence": FENCE, "patience": 5, "near": 0.1, "takeoff": 1.4, **settings}
-    links = "".join(f"  {name}: udpin://{LOOPBACK}:{port}\n" for name, port in ports.items())
+    links = "".join(f"  {name}: {scheme}://{LOOPBACK}:{port}\n" for name, port in ports.items())
     path = folder / "fleet.yaml"
     path.write_text(f"vehicles:\n{links}" + "".join(f"{name}: {value}\n" for name, value in entries.items()))
     return path

@@ -34,7 +34,7 @@ ros_options = _optional(
         metavar="SINK",
         help=(
             "Publish waypoints: mcap:FILE, rosbag:FILE, dds, rmw_zenoh, rclpy, rospy, rosbridge://HOST:PORT"
-            ", mavlink:FILE, installed ones. Repeatable."
+            ", mavlink:FILE, crazyflie:FILE, others. Repeatable."
         ),
     ),
     click.option("--frame", type=FrameType(), metavar="NAME", help=f"Frame of all positions.  [default: {FRAME}]"),
@@ -79,7 +79,7 @@ flight_options = _optional(
 arm_option = click.option(
     "--arm",
     is_flag=True,
-    help="With --ros mavlink:FILE: let vehicles fly.",
+    help="Let vehicles of mavlink: and crazyflie: fly.",
 )
 
 situation_options = _optional(
@@ -176,7 +176,7 @@ def take_ros_options(settings: dict[str, Any]) -> RosOptions:
     if not sinks:
         refuse(PUBLISHED, asked, NOT_PUBLISHED)
     if arm and not sinks:
-        raise click.UsageError("--arm is for robots that are commanded: add --ros mavlink:FILE")
+        raise click.UsageError("--arm is for robots that are commanded: add --ros mavlink:FILE, or crazyflie:FILE")
     if improve is not None and (not sinks or situation):
         raise click.UsageError("--improve publishes better decisions: add --ros SINK, and no --situation")
     flight = {name: given[name] for name in _SIMULATED if name in asked}

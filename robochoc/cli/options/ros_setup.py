@@ -82,7 +82,7 @@ def _allow_arming(texts: Sequence[str], sinks: Sequence[Sink]) -> None:
     """Let those of `sinks` arm that can. Raises `click.UsageError` if none can, and `SinkError`."""
     able = [sink for sink in sinks if sink.arms]
     if not able:
-        raise click.UsageError(f"--arm is for --ros mavlink:FILE; {', '.join(texts)} arms nothing")
+        raise click.UsageError(f"--arm is for --ros mavlink:FILE or crazyflie:FILE; {', '.join(texts)} arms nothing")
     for sink in able:
         sink.allow_arming()
 

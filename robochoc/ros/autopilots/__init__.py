@@ -1,1 +1,1 @@
-"""Vehicles whose autopilots speak MAVLink, such as PX4: decisions are flown, and telemetry becomes reports."""
+"""Vehicles with autopilots of their own, by MAVLink or cflib: decisions are flown, and telemetry becomes reports."""

@@ -27,6 +27,10 @@ class Telemetry:
     armed: bool = False
     in_air: bool = False
     healthy: bool = False
+    problem: str = ""
+    """Why the autopilot is not healthy, if it tells that."""
+    connecting: bool = False
+    """Whether it is heard, and has not told all yet that it has to tell before it can fly."""
     silent_s: float = 0.0
     """The time since the last heartbeat, in seconds."""
 

@@ -1,11 +1,11 @@
 """The fleet file: which vehicle each drone is, by which link it is reached, and how it may fly.
 
-The place of `mavlink:FILE` is such a file, in YAML (docs/guides/autopilots.md). All of it is checked when it is read.
+The place of `mavlink:FILE`, and of `crazyflie:FILE`, is such a file, in YAML (docs/guides/autopilots.md). All of it is
+checked when it is read.
 """
 
 from __future__ import annotations
 
-import re
 from collections.abc import Collection, Mapping
 from enum import StrEnum
 from fractions import Fraction
@@ -17,16 +17,12 @@ from robochoc.flight.layout import Point
 from robochoc.formats.diagnostics import MistakeError, on_one_line, shortened, suggestion
 from robochoc.formats.dialects.yaml_tree import Node, read_yaml, shown
 from robochoc.ros.autopilots.frames import FAR_M, LATITUDE_MAX, GpsPlace
+from robochoc.ros.autopilots.kinds import Kind
 
 BYTES_MAX = 64 * 1024
 VEHICLES_MAX = 64
-_LINK = re.compile(
-    r"(?:udpin|udpout|tcpin|tcpout)://(?:[A-Za-z0-9._-]{1,253}|\[[0-9A-Fa-f:.]{2,45}\]):(?P<port>\d{1,5})"
-    r"|serial:///dev/(?!.*\.\.)[A-Za-z0-9._/-]{1,200}:\d{2,8}",
-    re.ASCII,
-)
 _PORTS = range(1, 65_536)
-_KNOWN = ("vehicles", "fence", "origin", "takeoff", "near", "end", "patience", "time")
+_KNOWN = ("vehicles", "fence", "takeoff", "near", "end", "patience", "time")
 _CORNERS, _AXES = 2, 3
 _LARGE = 10**9
 
@@ -63,7 +59,7 @@ class Fence(msgspec.Struct, frozen=True):
 
 
 class Link(msgspec.Struct, frozen=True):
-    """The link to a vehicle, as MAVSDK names it, and where the vehicle's own origin lies in the team's frame."""
+    """The link to a vehicle, as its library names it, and where the vehicle's own origin lies in the team's frame."""
 
     url: str
     at: Point = (0.0, 0.0, 0.0)
@@ -86,10 +82,19 @@ class Fleet(msgspec.Struct, frozen=True):
     """A vehicle whose link is silent for so long is lost."""
     time_s: float = 120.0
     """The longest time that a decision may take to be flown."""
+    kind: Kind = Kind.MAVLINK
+    speed_ms: float = 1.0
+    """The highest speed on the way, of a kind that has to be told, in metres a second."""
+
+    @property
+    def connect_s(self) -> float:
+        """Return how long a vehicle that is heard may take until it has told all, in seconds."""
+        return max(self.patience_s, self.kind.rules.connect_s)
 
 
-def read_fleet(path: Path) -> Fleet:
+def read_fleet(path: Path, kind: Kind = Kind.MAVLINK) -> Fleet:
     """Return the fleet in the file at `path`. Raises `FleetError`."""
+    hint = f"name a fleet file, as in {kind}:fleet.yaml"
     try:
         if path.is_fifo():  # to open it would be to wait for a writer
             content = None
@@ -97,15 +102,13 @@ def read_fleet(path: Path) -> Fleet:
             with path.open("rb") as file:
                 content = file.read(BYTES_MAX + 1)
     except OSError as error:
-        raise FleetError(
-            on_one_line(f"{path}: {error.strerror}; name a fleet file, as in mavlink:fleet.yaml")
-        ) from None
+        raise FleetError(on_one_line(f"{path}: {error.strerror}; {hint}")) from None
     if content is None:
-        raise FleetError(on_one_line(f"{path}: is no file; name a fleet file, as in mavlink:fleet.yaml"))
+        raise FleetError(on_one_line(f"{path}: is no file; {hint}"))
     if len(content) > BYTES_MAX:
         raise FleetError(on_one_line(f"{path}: a fleet file has at most {BYTES_MAX:,} bytes"))
     try:
-        return _fleet(_root(content.decode()))
+        return _fleet(_root(content.decode()), kind)
     except UnicodeDecodeError:
         raise FleetError(on_one_line(f"{path}: is no text in UTF-8")) from None
     except MistakeError as mistake:
@@ -120,21 +123,24 @@ def _root(text: str) -> Node:
     return document.root
 
 
-def _fleet(root: Node) -> Fleet:
-    entries = _mapping(root, "a fleet file", _KNOWN)
+def _fleet(root: Node, kind: Kind) -> Fleet:
+    rules = kind.rules
+    entries = _mapping(root, "a fleet file", (*_KNOWN, *rules.entries), f" of {kind}")
     for name in ("vehicles", "fence"):
         if name not in entries:
             raise MistakeError(f"has no '{name}'", "see docs/guides/autopilots.md for what a fleet file has", root.line)
     origin = _origin(entries["origin"]) if "origin" in entries else None
     fleet = Fleet(
-        _vehicles(entries["vehicles"], origin),
+        _vehicles(entries["vehicles"], kind, origin),
         _fence(entries["fence"]),
         origin,
-        takeoff_m=_number(entries, "takeoff", 2.5, 0.5, 100),
-        near_m=_number(entries, "near", 0.5, 0.05, 10),
+        takeoff_m=_number(entries, "takeoff", rules.takeoff_m, rules.least_takeoff_m, 100),
+        near_m=_number(entries, "near", rules.near_m, 0.05, 10),
         end=_end(entries["end"]) if "end" in entries else AtEnd.LAND,
         patience_s=_number(entries, "patience", 10, 1, 600),
         time_s=_number(entries, "time", 120, 1, 3_600),
+        kind=kind,
+        speed_ms=_number(entries, "speed", 1.0, 0.1, 5),
     )
     low, high = fleet.fence.low[2], fleet.fence.high[2]
     if fleet.takeoff_m > high - low:
@@ -147,11 +153,11 @@ def _fleet(root: Node) -> Fleet:
     return fleet
 
 
-def _vehicles(node: Node, origin: GpsPlace | None) -> dict[str, Link]:
+def _vehicles(node: Node, kind: Kind, origin: GpsPlace | None) -> dict[str, Link]:
     found: dict[str, Link] = {}
     urls: dict[str, str] = {}
     for name, entry in _mapping(node, "'vehicles'").items():
-        link = _link(entry, name, origin)
+        link = _link(entry, name, kind, origin)
         if link.url in urls:
             problem = f"{shortened(name)} and {shortened(urls[link.url])} have the same link"
             raise MistakeError(problem, "a vehicle has a link of its own", entry.line)
@@ -162,27 +168,27 @@ def _vehicles(node: Node, origin: GpsPlace | None) -> dict[str, Link]:
     return found
 
 
-def _link(node: Node, name: str, origin: GpsPlace | None) -> Link:
+def _link(node: Node, name: str, kind: Kind, origin: GpsPlace | None) -> Link:
     if node.entries is None:
-        return Link(_url(node, name))
+        return Link(_url(node, name, kind))
     entries = _mapping(node, f"vehicle {shortened(name)}", ("link", "at"))
     if "link" not in entries:
-        raise MistakeError(f"vehicle {shortened(name)} has no 'link'", "as in link: udpin://0.0.0.0:14540", node.line)
+        raise MistakeError(f"vehicle {shortened(name)} has no 'link'", f"as in link: {kind.rules.example}", node.line)
     if "at" not in entries:
-        return Link(_url(entries["link"], name))
+        return Link(_url(entries["link"], name, kind))
     if origin:
         raise MistakeError("'at' is for vehicles without GPS", "delete it, or 'origin'", entries["at"].line)
-    return Link(_url(entries["link"], name), _point(entries["at"], "'at'"))
+    return Link(_url(entries["link"], name, kind), _point(entries["at"], "'at'"))
 
 
-def _url(node: Node, name: str) -> str:
+def _url(node: Node, name: str, kind: Kind) -> str:
     text = node.scalar
-    found = _LINK.fullmatch(text) if isinstance(text, str) else None
+    found = kind.rules.link.fullmatch(text) if isinstance(text, str) else None
     if isinstance(text, str) and found and (found["port"] is None or int(found["port"]) in _PORTS):
         return text
     raise MistakeError(
         f"the link of {shortened(name)}, {shortened(shown(text))!r}, is none",
-        "expected udpin://0.0.0.0:14540, or udpout, tcpin, tcpout, or serial:///dev/ttyUSB0:57600",
+        f"expected {kind.rules.links}",
         node.line,
     )
 
@@ -241,14 +247,16 @@ def _decimal(node: Node) -> float | None:
     return float(value) if -_LARGE <= value <= _LARGE else None
 
 
-def _mapping(node: Node, what: str, known: Collection[str] = ()) -> dict[str, Node]:
+def _mapping(node: Node, what: str, known: Collection[str] = (), kind: str = "") -> dict[str, Node]:
     if node.entries is None:
         raise MistakeError(f"{what} is no mapping", "expected lines of NAME: VALUE", node.line)
     found = {shown(key): entry for key, entry in node.entries.items()}
     for name in found if known else ():
         if name not in known:
             hint = suggestion(name, known, "entries") or f"known are {', '.join(known)}"
-            raise MistakeError(f"{shortened(name)!r} does not belong in {what}", hint, node.keys.get(name, node.line))
+            raise MistakeError(
+                f"{shortened(name)!r} does not belong in {what}{kind}", hint, node.keys.get(name, node.line)
+            )
     return found
 
 

@@ -22,6 +22,7 @@ import msgspec
 
 from robochoc.ros.autopilots.autopilot import Autopilot
 from robochoc.ros.autopilots.fleet import AtEnd, Fleet
+from robochoc.ros.autopilots.kinds import Kind
 from robochoc.ros.autopilots.messages import (
     LINE_MAX,
     End,
@@ -143,7 +144,7 @@ class _Orders:
 
 
 class _Outlet:
-    """Writes lines to what was standard output; MAVSDK writes a log there, which nobody reads.
+    """Writes lines to what was standard output; MAVSDK writes a log there, which nobody reads, and cflib its warnings.
 
     It never waits for a parent that does not read: states are dropped then.
     """
@@ -192,9 +193,16 @@ def _begun(orders: _Orders, tell: Tell) -> Guard | None:
 
 
 def _guard_of(fleet: Fleet, tell: Tell) -> Guard:
-    from robochoc.ros.autopilots.mavsdk_autopilot import MavsdkAutopilot  # noqa: PLC0415 - its library may be broken
+    # Imported here: a library may be broken, and the parent says so.
+    match fleet.kind:
+        case Kind.MAVLINK:
+            from robochoc.ros.autopilots.mavsdk_autopilot import MavsdkAutopilot  # noqa: PLC0415
 
-    return Guard(fleet, lambda name: MavsdkAutopilot(fleet.vehicles[name], fleet.origin), tell)
+            return Guard(fleet, lambda name: MavsdkAutopilot(fleet.vehicles[name], fleet.origin), tell)
+        case Kind.CRAZYFLIE:
+            from robochoc.ros.autopilots.cflib_autopilot import CflibAutopilot  # noqa: PLC0415
+
+            return Guard(fleet, lambda name: CflibAutopilot(fleet.vehicles[name], fleet.speed_ms), tell)
 
 
 def _watch(guard: Guard, orders: _Orders, told_to_end: threading.Event) -> None:

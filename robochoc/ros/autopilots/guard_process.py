@@ -18,6 +18,7 @@ from pathlib import Path
 import msgspec
 
 from robochoc.ros.autopilots.fleet import AtEnd, Fleet
+from robochoc.ros.autopilots.kinds import Kind
 from robochoc.ros.autopilots.messages import (
     End,
     Ended,
@@ -72,7 +73,7 @@ class GuardProcess:
                 stdin=subprocess.PIPE,
                 stdout=subprocess.PIPE,
                 stderr=subprocess.DEVNULL,
-                env=_environment(),
+                env=_environment(fleet.kind),
                 start_new_session=True,  # neither Ctrl-C nor the end of a terminal reaches it
             )
         self._reader = threading.Thread(target=self._read, daemon=True, name="hears the guard")
@@ -127,7 +128,7 @@ class GuardProcess:
         if not problem and time.monotonic() - self._heard_s > SILENT_S:
             problem = f"the guard process has said nothing for {SILENT_S:g} s"
         if problem:
-            raise GuardError(f"{problem}; vehicles do what their own failsafe says, until another guard reaches them")
+            raise GuardError(f"{problem}; {self.fleet.kind.rules.alone}, until another guard reaches them")
 
     @property
     def is_flying(self) -> bool:
@@ -155,7 +156,7 @@ class GuardProcess:
         """Bring to an end what another guard has left armed, and wait for that."""
         self._ends = True
         self._say(Recover(self.fleet.end))
-        until = time.monotonic() + self.fleet.patience_s + END_S + _SPARE_S
+        until = time.monotonic() + self.fleet.connect_s + END_S + _SPARE_S
         with self._came:
             while not self._is_over and time.monotonic() < until:
                 self._came.wait(_SLICE_S)
@@ -221,13 +222,14 @@ def _recover(fleet: Fleet) -> None:
         guard.close()
 
 
-def _environment() -> dict[str, str]:
+def _environment(kind: Kind) -> dict[str, str]:
     """Return the environment of the guard. MAVSDK's files, which it would leave behind when killed, have no place.
 
     They are descriptions of cameras and the like. MAVSDK goes on without them where no folder can be made; it ends
     where the temporary folder does not exist, or so it does in 4.1.
     """
-    nowhere = {"TMPDIR": _UNWRITABLE, "XDG_CACHE_HOME": _UNWRITABLE} if Path(_UNWRITABLE).is_dir() else {}
+    leaves_files = kind is Kind.MAVLINK and Path(_UNWRITABLE).is_dir()
+    nowhere = {"TMPDIR": _UNWRITABLE, "XDG_CACHE_HOME": _UNWRITABLE} if leaves_files else {}
     return {**os.environ, **nowhere}
 
 

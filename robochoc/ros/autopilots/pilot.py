@@ -108,9 +108,11 @@ class Pilot:
         waited_s = self._clock() - self._begun_s
         if self._autopilot.connect() and seen.place is not None:
             self._enter(Phase.READY)
-        elif waited_s > self._fleet.patience_s:
-            missing = "has told no place" if seen.mode else "is not heard"
-            self._out(f"it {missing} on {self._autopilot.url} within {self._fleet.patience_s:g} s")
+            return
+        limit_s = self._fleet.connect_s if seen.connecting else self._fleet.patience_s
+        if waited_s > limit_s:
+            missing = "has told no place" if seen.mode or seen.connecting else "is not heard"
+            self._out(f"it {missing} on {self._autopilot.url} within {limit_s:g} s")
 
     def _go_on(self, seen: Telemetry) -> None:
         if trouble := self._trouble(seen):
@@ -154,7 +156,7 @@ class Pilot:
     def _not_ready(self, seen: Telemetry) -> str:
         """Return why the vehicle cannot take off; empty if it can."""
         if not seen.healthy:
-            return "its autopilot is not ready to arm"
+            return seen.problem or "its autopilot is not ready to arm"
         if seen.place is None or not self._fleet.fence.holds_above(seen.place):
             where = point_text(seen.place) if seen.place else "nowhere"
             return f"it stands at {where}, outside of the fence ({self._fleet.fence})"
@@ -254,7 +256,7 @@ class Pilot:
             if self._autopilot.connect():
                 self._enter(Phase.READY)
             else:
-                self.ended = waited_s > self._fleet.patience_s
+                self.ended = waited_s > (self._fleet.connect_s if seen.connecting else self._fleet.patience_s)
         elif seen.armed and seen.mode not in MANUAL:
             self._commanded, self._recovers = True, False
         else:

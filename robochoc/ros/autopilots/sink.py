@@ -1,4 +1,4 @@
-"""The sink `mavlink:FILE`: decisions are flown by vehicles whose autopilots speak MAVLink.
+"""The sinks `mavlink:FILE` and `crazyflie:FILE`: decisions are flown by the vehicles of a fleet file.
 
 Without permission to arm it only observes: links, vehicles and the fence are checked, and no command is sent.
 """
@@ -9,32 +9,33 @@ from collections import Counter
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from pathlib import Path
+from typing import ClassVar
 
 from robochoc.flight.mission import Drone
 from robochoc.formats.diagnostics import on_one_line
 from robochoc.ros.autopilots.fleet import AtEnd, FleetError, point_text, read_fleet
 from robochoc.ros.autopilots.guard_process import GuardError, shared
-from robochoc.ros.autopilots.installed import require_mavsdk
+from robochoc.ros.autopilots.kinds import Kind
 from robochoc.ros.autopilots.messages import Phase, State, Target
 from robochoc.ros.sink import Fields, Sink, SinkError
 from robochoc.ros.waypoint import Waypoint
-
-require_mavsdk()
 
 _SPARE_S = 5.0
 """A vehicle that is not heard is told so by the guard, a moment after the time that the fleet file gives it."""
 
 
-class MavlinkSink(Sink):
+class FleetSink(Sink):
     """Flies decisions. After each it waits until the vehicles are there, unless a source has their reports."""
 
+    kind: ClassVar[Kind]
+    """Of subclasses: whose vehicles these are."""
     arms = True
 
     def __init__(self, place: str) -> None:
         super().__init__(place)
         self._path = Path(place)
         with _reported():
-            self._fleet = read_fleet(self._path)
+            self._fleet = read_fleet(self._path, self.kind)
             self._guard = shared.enter(self._path, self._fleet)
         self._names: dict[int, str] = {}
         self._may_arm = self._is_closed = False
@@ -124,11 +125,11 @@ class MavlinkSink(Sink):
             return name in guard.states and guard.states[name].phase is not Phase.CONNECTING
 
         with _reported():
-            guard.wait_for(lambda: all(map(is_known, names)), self._fleet.patience_s + _SPARE_S)
+            guard.wait_for(lambda: all(map(is_known, names)), self._fleet.connect_s + _SPARE_S)
         for name in names:
             state = guard.states.get(name)
-            why = state.why if state else "nothing is known of it"
-            if state is None or state.phase is Phase.OUT:
+            why = state.why if state and state.why else "nothing is known of it"
+            if state is None or state.phase in {Phase.OUT, Phase.CONNECTING}:
                 raise self._wrong(f"{name} cannot be flown: {why}", "nothing was armed")
             if self._may_arm and state.place and not state.in_air and not self._fleet.fence.holds_above(state.place):
                 where = f"{name} stands at {point_text(state.place)}, outside of the fence"

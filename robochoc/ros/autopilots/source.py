@@ -1,4 +1,4 @@
-"""The source `mavlink:FILE`: what the autopilots of a fleet tell becomes reports of the drones.
+"""The sources `mavlink:FILE` and `crazyflie:FILE`: what the autopilots of a fleet tell becomes reports of the drones.
 
 Places and batteries are reported as they come. A vehicle that is out of order, for whatever reason, reports that.
 """
@@ -8,32 +8,34 @@ from __future__ import annotations
 import time
 from collections.abc import Mapping
 from pathlib import Path
+from typing import ClassVar
 
 from robochoc.formats.diagnostics import on_one_line
 from robochoc.ros.autopilots.fleet import FleetError, read_fleet
 from robochoc.ros.autopilots.guard_process import GuardError, shared
-from robochoc.ros.autopilots.installed import require_mavsdk
+from robochoc.ros.autopilots.kinds import Kind
 from robochoc.ros.autopilots.messages import Phase, State
 from robochoc.ros.live.inbox import RosInbox
 from robochoc.ros.names import REPORTS
 from robochoc.ros.sink import Fields
 from robochoc.ros.source import ReceivedMessage, Source, SourceError
 
-require_mavsdk()
-
 _SLICE_S = 0.2
 _CHARGE = 0.01
 """A charge that differs less from the one that was reported is not reported again."""
 
 
-class MavlinkSource(Source):
+class FleetSource(Source):
     """Reports of the vehicles in a fleet file. With a sink of the same file it shares their links."""
+
+    kind: ClassVar[Kind]
+    """Of subclasses: whose vehicles these are."""
 
     def __init__(self, place: str) -> None:
         super().__init__(place)
         self._path = Path(place)
         try:
-            self._fleet = read_fleet(self._path)
+            self._fleet = read_fleet(self._path, self.kind)
             self._guard = shared.enter(self._path, self._fleet)
         except (FleetError, GuardError) as error:
             raise SourceError(str(error)) from error

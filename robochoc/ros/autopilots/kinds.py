@@ -1,0 +1,74 @@
+"""The kinds of vehicles that a fleet may have: how their links are written, and what fits their size."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+from enum import StrEnum
+
+_HOST = r"(?:[A-Za-z0-9._-]{1,253}|\[[0-9A-Fa-f:.]{2,45}\]):(?P<port>\d{1,5})"
+
+
+@dataclass(frozen=True)
+class _Rules:
+    """What a fleet file of one kind may say, and what is taken where it says nothing."""
+
+    link: re.Pattern[str]
+    links: str
+    """What is expected in the place of a link that is none."""
+    example: str
+    entries: tuple[str, ...]
+    """Names of entries that other kinds do not have."""
+    takeoff_m: float
+    least_takeoff_m: float
+    near_m: float
+    connect_s: float
+    """A vehicle that is heard may take so long until it has told all; 0: not longer than a silent one."""
+    alone: str
+    """What vehicles do that nobody talks to."""
+
+
+class Kind(StrEnum):
+    """A kind of vehicle, by the name of its sink."""
+
+    MAVLINK = "mavlink"
+    CRAZYFLIE = "crazyflie"
+
+    @property
+    def rules(self) -> _Rules:
+        """Return the rules for fleets of this kind."""
+        return _RULES[self]
+
+
+_RULES = {
+    Kind.MAVLINK: _Rules(
+        link=re.compile(
+            rf"(?:udpin|udpout|tcpin|tcpout)://{_HOST}|serial:///dev/(?!.*\.\.)[A-Za-z0-9._/-]{{1,200}}:\d{{2,8}}",
+            re.ASCII,
+        ),
+        links="udpin://0.0.0.0:14540, or udpout, tcpin, tcpout, or serial:///dev/ttyUSB0:57600",
+        example="udpin://0.0.0.0:14540",
+        entries=("origin",),
+        takeoff_m=2.5,
+        least_takeoff_m=0.5,
+        near_m=0.5,
+        connect_s=0.0,
+        alone="vehicles do what their own failsafe says",
+    ),
+    # A channel is 0 to 125, that is 2,400 to 2,525 MHz.
+    Kind.CRAZYFLIE: _Rules(
+        link=re.compile(
+            r"radio://(?:\d{1,2}|[0-9A-Fa-f]{10})/(?:\d{1,2}|1[01]\d|12[0-5])/(?:250K|1M|2M)/[0-9A-Fa-f]{10}"
+            r"|udp://[A-Za-z0-9._-]{1,253}:(?P<port>\d{1,5})",
+            re.ASCII,
+        ),
+        links="radio://0/80/2M/E7E7E7E701 (dongle, channel, rate, address), or udp://127.0.0.1:19850",
+        example="radio://0/80/2M/E7E7E7E701",
+        entries=("speed",),
+        takeoff_m=0.5,
+        least_takeoff_m=0.2,
+        near_m=0.1,
+        connect_s=60.0,
+        alone="vehicles fly to where they were sent, and hover there",
+    ),
+}

@@ -1,0 +1,181 @@
+"""One Crazyflie, as its pilot sees it: what is told, what is refused, and what no command may do to it."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+
+import pytest
+
+pytest.importorskip("cflib")
+
+from robochoc.ros.autopilots.autopilot import OFFBOARD, RefusedError, Telemetry
+from robochoc.ros.autopilots.cflib_autopilot import PEAK, CflibAutopilot
+from robochoc.ros.autopilots.fleet import Link
+from robochoc.ros.autopilots.supervisor import (
+    ARMS_ITSELF,
+    CAN_ARM,
+    CAN_FLY,
+    COMMANDS,
+    CRASHED,
+    DECK_FAULT,
+    FLIES,
+    IS_ARMED,
+    LOCKED,
+    TUMBLED,
+    Supervisor,
+)
+from tests.support.crazyflies import Crazyflies, Crazyfly, Place
+from tests.support.limits import wait_until
+from tests.support.mavlink_teams import udp_ports
+
+SPEED_MS = 2.0
+
+
+@contextmanager
+def linked(at: Place = (0.0, 0.0, 0.0), **what: object) -> Iterator[tuple[Crazyfly, CflibAutopilot]]:
+    """A Crazyflie, and an autopilot that hears it."""
+    (port,) = udp_ports(1)
+    vehicle = Crazyfly(port)
+    for name, value in what.items():
+        setattr(vehicle, name, value)
+    before = {*threading.enumerate()}
+    with Crazyflies([vehicle]) as vehicles:
+        autopilot = CflibAutopilot(Link(f"udp://127.0.0.1:{port}", at), SPEED_MS)
+        try:
+            wait_until(autopilot.connect, "it is not heard")
+            yield vehicle, autopilot
+        finally:
+            autopilot.close()
+        assert "fell" not in vehicle.log, vehicles.state()
+    wait_until(lambda: {*threading.enumerate()} <= before, "threads are left")
+
+
+def seen(autopilot: CflibAutopilot, condition: Callable[[Telemetry], bool]) -> None:
+    wait_until(lambda: condition(autopilot.look()), lambda: str(autopilot.look()))
+
+
+def fly(vehicle: Crazyfly, autopilot: CflibAutopilot, height_m: float = 1.0) -> None:
+    """Take off, and wait until that is done."""
+    autopilot.arm()
+    autopilot.take_off(height_m)
+    seen(autopilot, lambda told: told.place is not None and told.place[2] == pytest.approx(height_m))
+    wait_until(lambda: vehicle.at[2] == pytest.approx(height_m), "it does not rise")
+
+
+def going(autopilot: CflibAutopilot, to: Place) -> Callable[[], bool]:
+    def went() -> bool:
+        try:
+            autopilot.go_to(to)
+        except RefusedError:
+            return False
+        return True
+
+    return went
+
+
+def test_what_is_told_is_in_the_frame_of_the_team() -> None:
+    with linked(at=(3.0, 1.0, 0.5), battery=0.42) as (_, autopilot):
+        told = autopilot.look()
+        assert told.place == pytest.approx((3, 1, 0.5))
+        assert told.battery == pytest.approx(0.42)
+        assert told.healthy
+        assert not told.armed
+        assert not told.in_air
+
+
+def test_on_its_way_it_is_sent_elsewhere_in_a_straight_line() -> None:
+    with linked(haste=4.0) as (vehicle, autopilot):
+        fly(vehicle, autopilot)
+        wait_until(going(autopilot, (4, 0, 1)), vehicle.log.__str__)
+        _, lasts, straight = vehicle.paths[-1]
+        assert lasts == pytest.approx(PEAK * 4 / SPEED_MS, rel=0.01)
+        assert not straight
+        seen(autopilot, lambda told: told.place is not None and told.place[0] > 0.5)
+        autopilot.go_to((0, 0, 1))
+        to, lasts, straight = vehicle.paths[-1]
+        assert (to, straight) == ((0, 0, 1), True)
+        assert lasts < PEAK * 4 / SPEED_MS / 2
+        autopilot.hold()
+        assert vehicle.log[-1] == "hold"
+        assert autopilot.look().mode == OFFBOARD
+
+
+def test_in_the_air_it_is_never_disarmed() -> None:
+    with linked() as (vehicle, autopilot):
+        autopilot.arm()
+        autopilot.take_off(1)
+        with pytest.raises(RefusedError, match="it may be in the air"):
+            autopilot.disarm()  # though what it has told is from before the take-off
+        wait_until(lambda: vehicle.flies, "it does not rise")
+        with pytest.raises(RefusedError, match="it may be in the air"):
+            autopilot.disarm()
+        assert vehicle.armed
+
+
+def test_closing_the_link_in_the_air_lets_it_hover() -> None:
+    with linked() as (vehicle, autopilot):
+        fly(vehicle, autopilot)
+        autopilot.close()
+        assert vehicle.flies
+        assert vehicle.planner == "flying"
+        assert "low-level set point" not in vehicle.log
+
+
+def test_on_the_ground_it_is_disarmed_and_does_not_land() -> None:
+    with linked() as (vehicle, autopilot):
+        autopilot.arm()
+        vehicle.refuses = {"takeoff"}
+        with pytest.raises(RefusedError, match=r"it did not take off \(command denied\)"):
+            autopilot.take_off(1)
+        with pytest.raises(RefusedError, match="it is on the ground"):
+            autopilot.land()
+        autopilot.disarm()
+        assert vehicle.log == ["armed", "refused takeoff", "disarmed"]
+
+
+def test_a_take_off_whose_answer_is_lost_is_none_that_was_refused() -> None:
+    with linked(deaf={"takeoff"}) as (vehicle, autopilot):
+        autopilot.arm()
+        autopilot.take_off(1)
+        autopilot.land()
+        assert vehicle.log[-1] == "land"
+
+
+@pytest.mark.slow
+def test_who_is_not_heard_gets_no_command() -> None:
+    with linked() as (vehicle, autopilot):
+        vehicle.silent = True
+        seen(autopilot, lambda told: told.silent_s > 1)
+        with pytest.raises(RefusedError, match="it cannot arm: it is not heard"):
+            autopilot.arm()
+
+
+def test_a_landing_that_is_under_way_is_no_refusal() -> None:
+    with linked(haste=4.0) as (vehicle, autopilot):
+        fly(vehicle, autopilot)
+        autopilot.land()
+        autopilot.land()
+        assert vehicle.log.count("land") == 1
+
+
+@pytest.mark.parametrize(
+    ("bits", "armed", "mode", "problem"),
+    [
+        (CAN_ARM, False, "STANDBY", ""),
+        (IS_ARMED | CAN_FLY, True, "STANDBY", ""),
+        (IS_ARMED | ARMS_ITSELF | CAN_FLY, False, "STANDBY", ""),
+        (IS_ARMED | ARMS_ITSELF | CAN_FLY | COMMANDS, True, OFFBOARD, ""),
+        (IS_ARMED | CAN_FLY | FLIES | COMMANDS, True, OFFBOARD, ""),
+        (IS_ARMED | CAN_FLY | FLIES, True, "MANUAL", ""),
+        (CAN_ARM | LOCKED, False, "STANDBY", "it is locked: restart it"),
+        (CRASHED, False, "STANDBY", "it has crashed: put it on its feet and restart it"),
+        (TUMBLED, False, "STANDBY", "it does not stand upright"),
+        (CAN_ARM | DECK_FAULT, False, "STANDBY", "a deck of it has a fault"),
+        (0, False, "STANDBY", "its autopilot is not ready to arm"),
+    ],
+)
+def test_what_the_bits_of_the_supervisor_mean(bits: int, armed: bool, mode: str, problem: str) -> None:  # noqa: FBT001
+    told = Supervisor(bits)
+    assert (told.armed, told.mode, told.problem) == (armed, mode, problem)
