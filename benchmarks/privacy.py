@@ -5,17 +5,20 @@
 First all meetings have to take place (a DisCSP), so that protocols for satisfaction and for costs solve the same
 problems; then what meetings are worth is maximised, by complete and by incomplete protocols. The latter need not tell
 their last values, so their loss of decisions is not known. P2-DPOP is among the first only: with costs it would compute
-for hours.
+for hours. The last table is of auctions, on tasks, one for each robot.
 """
 
 from __future__ import annotations
 
 import sys
+from collections.abc import Callable
 from statistics import mean
 
 from robochoc.generators.meetings import meetings
+from robochoc.generators.tasks import tasks
 from robochoc.journal.journal import Header, JournalRecorder, read_journal
 from robochoc.model.outcome import Verdict
+from robochoc.model.problem import Team
 from robochoc.privacy import Kind, Measure, PrivacyReport, privacy_of
 from robochoc.run import Options, Runtime, solve
 
@@ -29,15 +32,34 @@ MINIMISING = (
     "hs-cai", "adopt",
 )  # fmt: skip
 INCOMPLETE = ("dsa", "mgm", "mgm2", "kopt", "cocoa", "d-gibbs", "duct", "maxsum")
+ALLOCATING = ("ssi", "cbaa", "cbba", "grape", "dsa", "mgm", "sfb", "dpop")
 MAX_VALUE = 10
 
 
-def reports(protocol: str, problems: int, max_value: int | None) -> list[PrivacyReport]:
+def planned(seed: int) -> Team:
+    """Return meetings that all have to take place."""
+    return meetings(6, 6, 2, 4, seed, model="eav")
+
+
+def valued(seed: int) -> Team:
+    """Return meetings whose value is maximised."""
+    return meetings(6, 6, 2, 4, seed, max_value=MAX_VALUE, model="eav")
+
+
+def allocated(seed: int) -> Team:
+    """Return tasks, one for each robot."""
+    return tasks(5, 5, seed=seed)
+
+
+TABLES = ((SATISFYING, planned), (MINIMISING, valued), (INCOMPLETE, valued), (ALLOCATING, allocated))
+
+
+def reports(protocol: str, problems: int, problem: Callable[[int], Team]) -> list[PrivacyReport]:
     """Return the privacy loss in each run that finds a solution."""
     found: list[PrivacyReport] = []
     seed = 0
     while len(found) < problems:
-        team = meetings(6, 6, 2, 4, seed, max_value=max_value, model="eav")
+        team = problem(seed)
         recorder = JournalRecorder(Header(team=team.name, protocol=protocol, runtime="simulator", seed=seed))
         options = Options(protocol=protocol, runtime=Runtime.SIMULATOR, seed=seed, cache=False)
         recorder.outcome = solve(team, options, observer=recorder)
@@ -47,9 +69,9 @@ def reports(protocol: str, problems: int, max_value: int | None) -> list[Privacy
     return found
 
 
-def row(protocol: str, problems: int, max_value: int | None) -> str:
+def row(protocol: str, problems: int, problem: Callable[[int], Team]) -> str:
     """Return a protocol's row of the table."""
-    measured = reports(protocol, problems, max_value)
+    measured = reports(protocol, problems, problem)
     cells = []
     for kind in Kind:
         losses = [loss for one in measured if (loss := one.system_loss(kind, Measure.ENTROPY)) is not None]
@@ -60,11 +82,11 @@ def row(protocol: str, problems: int, max_value: int | None) -> str:
 def main() -> None:
     """Print the tables."""
     problems = int(sys.argv[1]) if sys.argv[1:] else PROBLEMS
-    for protocols, max_value in ((SATISFYING, None), (MINIMISING, MAX_VALUE), (INCOMPLETE, MAX_VALUE)):
+    for protocols, problem in TABLES:
         print(f"| protocol | {' | '.join(Kind)} |")
         print(f"| --- |{' --- |' * len(Kind)}")
         for protocol in protocols:
-            print(row(protocol, problems, max_value), flush=True)
+            print(row(protocol, problems, problem), flush=True)
         print()
 
 

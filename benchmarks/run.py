@@ -14,6 +14,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 import app_pages
+import auctions
 import command_time
 import crowd
 import flagship
@@ -50,6 +51,7 @@ LONG: dict[str, Callable[[], Section]] = {
     "network": network.measured,
     "sniffer": sniffer.measured,
     "app": app_pages.measured,
+    "auctions": auctions.measured,
     "mujoco": other_flight.mujoco,
     "rotorpy": other_flight.rotorpy,
 }

@@ -127,6 +127,7 @@ class Hearing(ABC):
         branch: The robots whose values a partial assignment of the sender holds, the highest first.
         fixed_holders: Each constraint is checked by the lowest robot of its scope, and the order does not change.
         minimises: Something is minimised, costs or robots that withdraw.
+        max_cost: No finite cost of a secret is higher.
     """
 
     sender: str
@@ -135,6 +136,7 @@ class Hearing(ABC):
     branch: Sequence[str]
     fixed_holders: bool
     minimises: bool
+    max_cost: float
 
     @abstractmethod
     def neighbours(self, robot: str) -> Collection[str]:
@@ -143,6 +145,10 @@ class Hearing(ABC):
     @abstractmethod
     def values(self, robot: str) -> Sequence[Value] | None:
         """Return the values that `robot` can take, in its own order, if the observer knows them by now."""
+
+    @abstractmethod
+    def width(self, robot: str) -> int:
+        """Return the number of variables that `robot` shows its neighbours."""
 
     @abstractmethod
     def last(self, kind: type[M], sender: str, receiver: str) -> M | None:

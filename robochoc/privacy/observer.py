@@ -229,6 +229,8 @@ class _Heard(Hearing):
         self.branch = scene.branches[sender]
         self.fixed_holders = scene.fixed_holders
         self.minimises = scene.minimises
+        self.max_cost = scene.secrets.most
+        self._declared = scene.secrets.declared
         self._neighbours = scene.secrets.neighbours
         self._values, self._last = values, last
 
@@ -237,6 +239,9 @@ class _Heard(Hearing):
 
     def values(self, robot: str) -> Sequence[Value] | None:
         return self._values.get(robot)
+
+    def width(self, robot: str) -> int:
+        return len(self._declared[robot][0])
 
     def last(self, kind: type[M], sender: str, receiver: str) -> M | None:
         found = self._last.get((kind, sender, receiver))

@@ -16,9 +16,8 @@ A robot needs its own constraints alone to know its tasks, and who else can do t
 
 from __future__ import annotations
 
-import itertools
 from collections import defaultdict
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Mapping
 from typing import NamedTuple
 
 from robochoc.model.problem import INFINITE, Constraint, ConstraintModel, Domain, Team
@@ -30,6 +29,8 @@ Choice = tuple[int, int]
 """A variable's place among those that its robot shows, and one of its values."""
 Pair = tuple[int, int]
 """Values of two variables."""
+Column = tuple[int, ...]
+"""The values of a variable."""
 Partners = dict[tuple[str, Choice], Cost]
 """Choices of other robots, and what they cost together with one of this robot."""
 
@@ -63,28 +64,34 @@ def tasks_of(part: AgentProblem, *, congestion: bool = False) -> tuple[int, tupl
     known, own = part.known, part.robot.name
     place = {name: at for names in known.interfaces.values() for at, name in enumerate(names)}
     excluded: dict[Choice, Partners] = defaultdict(dict)
+    choices: dict[Choice, Choice] = {}
     exclusions = _Exclusions(known.owners, known.domains, congestion=congestion)
     for constraint in (one.constraint for one in (*held_above(part.robot), *part.copies)):
         one, other = exclusions.scope(constraint, own)
         if known.owners[other] == own:
             one, other = other, one
+        robot, here, there = known.owners[other], place[one], place[other]
         for (value, theirs), cost in exclusions.pairs(constraint, one, other):
-            partner = known.owners[other], (place[other], theirs)
-            own_choice = excluded[place[one], value]
+            choice = there, theirs
+            partner = robot, choices.setdefault(choice, choice)
+            own_choice = excluded[here, value]
             own_choice[partner] = cost + own_choice.get(partner, 0)
     together: dict[frozenset[tuple[tuple[str, Choice], Cost]], list[Choice]] = {}
     for choice in sorted(excluded):
-        together.setdefault(frozenset(excluded[choice].items()), []).append(choice)
-    return exclusions.checks, tuple(_task(choices, dict(partners), part) for partners, choices in together.items())
+        together.setdefault(frozenset(excluded.pop(choice).items()), []).append(choice)
+    same: dict[frozenset[Choice], frozenset[Choice]] = {}
+    return exclusions.checks, tuple(_task(own, dict(partners), part, same) for partners, own in together.items())
 
 
-def _task(choices: list[Choice], partners: Partners, part: AgentProblem) -> Task:
+def _task(
+    choices: list[Choice], partners: Partners, part: AgentProblem, same: dict[frozenset[Choice], frozenset[Choice]]
+) -> Task:
     costs = {*partners.values()}
     if len(costs) > 1:
         raise UnsupportedError(
             f"{part.robot.name} shares a task that costs {min(costs)} with one robot, and {max(costs)} with another"
         )
-    return Task(tuple(choices), _by_robot(partners, part.known.rank), costs.pop())
+    return Task(tuple(choices), _by_robot(partners, part.known.rank, same), costs.pop())
 
 
 def allocation_fault(team: Team, *, congestion: bool = False) -> str:
@@ -134,13 +141,18 @@ def _scattered(excluded: Mapping[tuple[str, int], Mapping[tuple[str, int], Cost]
 
 
 class _Exclusions:
-    """Finds what constraints forbid, and counts the checks. Constraints that say the same are evaluated once."""
+    """Finds what constraints forbid, and counts the checks. Constraints that say the same are evaluated once.
+
+    So they are in a process: robots whose files say the same evaluate it once together. Each counts its own checks.
+    """
 
     def __init__(self, owners: Mapping[str, str], domains: Mapping[str, Domain], *, congestion: bool) -> None:
         self.checks = 0
         self._congestion = congestion
         self._owners = owners
         self._domains = domains
+        self._columns: dict[str, Column] = {}
+        self._same: dict[Column, Column] = {}
         self._found: dict[tuple[object, ...], tuple[tuple[Pair, Cost], ...]] = {}
 
     def scope(self, constraint: Constraint, robot: str) -> tuple[str, str]:
@@ -157,37 +169,103 @@ class _Exclusions:
         Raises:
             UnsupportedError: where there must be no congestion, or there are too many pairs.
         """
-        columns = tuple(self._domains[one]), tuple(self._domains[other])
+        columns = self._column(one), self._column(other)
         size = len(columns[0]) * len(columns[1])
         self.checks += size
         if size > MAX_TUPLES:
             raise UnsupportedError(f"{constraint.name!r} has {size:,} pairs of values, more than {MAX_TUPLES:,}")
         place = {one: 0, other: 1}
         terms = tuple([place[term] if isinstance(term, str) else (term,) for term in constraint.parameters])
-        key = id(constraint.definition), constraint.cost, terms, columns
+        key = id(constraint.definition), constraint.cost, terms, id(columns[0]), id(columns[1])
         if key not in self._found:
-            pairs = itertools.product(*columns)
-            self._found[key] = tuple(_costly(constraint, (one, other), pairs, congestion=self._congestion))
+            costs = _EVALUATIONS.costs(constraint, (one, other), terms, columns)
+            self._refuse_costs(constraint, (one, other), costs)
+            self._found[key] = costs
         return self._found[key]
 
+    def _column(self, name: str) -> Column:
+        """Return the values of a variable: the same object for variables of the same values."""
+        if name not in self._columns:
+            column = tuple(self._domains[name])
+            self._columns[name] = self._same.setdefault(column, column)
+        return self._columns[name]
 
-def _costly(
-    constraint: Constraint, names: tuple[str, str], pairs: Iterable[Pair], *, congestion: bool
-) -> Iterator[tuple[Pair, Cost]]:
-    cost_of = cost_function(constraint, names)
-    for pair in pairs:
-        cost = cost_of(pair)
-        if cost == INFINITE or (cost and congestion):
-            yield pair, cost
-        elif cost:
+    def _refuse_costs(self, constraint: Constraint, names: tuple[str, str], costs: Iterable[tuple[Pair, Cost]]) -> None:
+        finite = [one for one in costs if one[1] != INFINITE]
+        if finite and not self._congestion:
+            (value, theirs), cost = min(finite)
             raise UnsupportedError(
-                f"{constraint.name!r} costs {cost} for {names[0]} = {pair[0]} and {names[1]} = {pair[1]}: it is more"
-                " than an exclusion"
+                f"{constraint.name!r} costs {cost} for {names[0]} = {value} and {names[1]} = {theirs}: it is more than"
+                " an exclusion"
             )
 
 
-def _by_robot(partners: Iterable[tuple[str, Choice]], rank: Mapping[str, int]) -> dict[str, frozenset[Choice]]:
+class _Row(NamedTuple):
+    """What one value of a variable costs with values of another one, as far as that was evaluated.
+
+    Attributes:
+        columns: The numbers of the columns whose values were all evaluated.
+        evaluated: The values that were.
+        costs: What they cost, if they cost something.
+    """
+
+    columns: set[int]
+    evaluated: set[int]
+    costs: dict[int, Cost]
+
+
+class Evaluations:
+    """What definitions cost, kept for the robots of a process: the same constraint stands in many files.
+
+    Args:
+        most: Of more pairs of values nothing is kept.
+    """
+
+    def __init__(self, most: int) -> None:
+        self._most = most
+        self._size = 0
+        self._rows: dict[tuple[object, ...], dict[int, _Row]] = {}
+        self._columns: dict[Column, int] = {}
+
+    def costs(
+        self,
+        constraint: Constraint,
+        names: tuple[str, str],
+        terms: tuple[object, ...],
+        columns: tuple[Column, Column],
+    ) -> tuple[tuple[Pair, Cost], ...]:
+        """Return the pairs of values of `columns` that cost something, and how much."""
+        rows = self._rows.setdefault((constraint.definition, constraint.cost, terms), {})
+        others, cost_of = columns[1], cost_function(constraint, names)
+        number, wanted = self._columns.setdefault(others, len(self._columns)), frozenset(others)
+        found: list[tuple[Pair, Cost]] = []
+        for one in columns[0]:
+            row = rows.setdefault(one, _Row(set(), set(), {}))
+            if number not in row.columns:
+                new = wanted - row.evaluated
+                row.costs.update({other: cost for other in sorted(new) if (cost := cost_of((one, other)))})
+                row.evaluated.update(new)
+                row.columns.add(number)
+                self._size += len(new)
+            found += [((one, other), cost) for other, cost in row.costs.items() if other in wanted]
+        if self._size > self._most:
+            self._size = 0
+            self._rows.clear()
+            self._columns.clear()
+        return tuple(found)
+
+
+_EVALUATIONS = Evaluations(most=1 << 20)
+
+
+def _by_robot(
+    partners: Iterable[tuple[str, Choice]],
+    rank: Mapping[str, int],
+    same: dict[frozenset[Choice], frozenset[Choice]],
+) -> dict[str, frozenset[Choice]]:
+    """Return the choices by robot, in priority order. Sets of the same choices are the same object."""
     found: dict[str, set[Choice]] = {}
-    for robot, choice in sorted(partners, key=lambda one: (rank[one[0]], one[1])):
+    for robot, choice in partners:
         found.setdefault(robot, set()).add(choice)
-    return {robot: frozenset(choices) for robot, choices in found.items()}
+    sets = {robot: frozenset(found[robot]) for robot in sorted(found, key=rank.__getitem__)}
+    return {robot: same.setdefault(choices, choices) for robot, choices in sets.items()}

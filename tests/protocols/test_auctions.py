@@ -259,10 +259,10 @@ def test_a_lie_is_refused(protocol: str) -> None:
             WinningBids([((0, 1), third, 0)]),
         ],
         "cbba": [
-            Bundles([((0, 9), second, 1)], {}),
-            Bundles([((0, task), "X", 1) for task in (1, 2, 3)], {}),
-            Bundles([((0, task), third, -1) for task in (1, 2, 3)], {}),
-            Bundles([((0, 1), second, 1)], {}),
+            Bundles([((0, 9), second, 1)], [0, 1, 0]),
+            Bundles([((0, 1), "X", 1)], [0, 1, 0]),
+            Bundles([((0, 2), third, -1)], [0, 1, 0]),
+            Bundles([((0, 3), "", 1)], [0, 1, 0]),
         ],
     }
     for lie in lies[protocol]:

@@ -38,10 +38,15 @@ def after(
     `mine` and `theirs` say how new each robot's information was (s_i and s_k).
     """
     robot = robot_of(CBBA, team_of_four(), "I")
-    robot.standings[0] = known
+    robot.know(0, known)
     robot.s.update(mine or {})
-    robot.receive("K", Bundles([(TASK, *told)], {"K": 5, **(theirs or {})}))
+    robot.receive("K", Bundles([(TASK, *told)], stamps_of("IKMN", {"K": 5, **(theirs or {})})))
     return robot.standings[0]
+
+
+def stamps_of(robots: str, numbers: dict[str, int]) -> list[int]:
+    """The numbers of `robots`, which stand in priority order; 0: nothing was heard of it."""
+    return [numbers.get(name, 0) for name in robots]
 
 
 OLD, NEW = {"M": 1, "N": 1}, {"M": 2, "N": 2}
@@ -147,8 +152,32 @@ def test_sender_nobody_receiver_nobody_leaves() -> None:
 def test_information_is_as_new_as_the_newest_that_was_heard() -> None:
     robot = robot_of(CBBA, team_of_four(), "I")
     robot.s.update({"M": 4, "N": 1})
-    robot.receive("K", Bundles([(TASK, *NOBODY)], {"K": 1, "M": 3, "N": 2, "I": 9}))
-    assert robot.s == {"K": 1, "M": 4, "N": 2}
+    robot.receive("K", Bundles([(TASK, *NOBODY)], [9, 1, 3, 2]))
+    assert robot.s == {"I": 0, "K": 1, "M": 4, "N": 2}
+
+
+def test_what_is_not_said_again_is_as_the_sender_said_it_before() -> None:
+    """K has said that M has the task. It does so still when it has newer information of M."""
+    robot = robot_of(CBBA, team_of_four(), "I")
+    robot.know(0, M9)
+    robot.s.update(NEW)
+    robot.receive("K", Bundles([(TASK, *M5)], [0, 1, 2, 2]))
+    assert robot.standings[0] == M9
+    robot.receive("K", Bundles([], [0, 2, 3, 2]))
+    assert robot.standings[0] == M5
+
+
+def test_what_both_ends_say_is_changed_by_no_row_of_the_table() -> None:
+    for same in (I4, K5, M9, NOBODY):
+        for mine, theirs in ((OLD, NEW), (NEW, OLD), (NEW, NEW)):
+            assert after(same, same, mine, theirs) == same
+
+
+@pytest.mark.parametrize("stamps", [[], [0, 1, 0], [0, 1, 0, 0, 0]])
+def test_a_message_that_does_not_number_all_robots_is_refused(stamps: list[int]) -> None:
+    robot = robot_of(CBBA, team_of_four(), "I")
+    with pytest.raises(ValueError, match="K does not say how new its information of each robot is"):
+        robot.receive("K", Bundles([(TASK, *K3)], stamps))
 
 
 # Bundles
@@ -160,8 +189,10 @@ def two_robots(**worth: tuple[int, ...]) -> Team:
     return allocation(several(workers, {task: Job(str(task)) for task in (1, 2, 3)}))
 
 
-def bundles(*standings: tuple[str, int], **stamps: int) -> Bundles:
-    return Bundles([((place, 1), *one) for place, one in enumerate(standings)], stamps)
+def bundles(*standings: tuple[str, int] | None, **stamps: int) -> Bundles:
+    """Return what is said of the first, second and third task; None: nothing is."""
+    said = [((place, 1), *one) for place, one in enumerate(standings) if one is not None]
+    return Bundles(said, stamps_of("IK", stamps))
 
 
 def test_a_bundle_is_built_from_the_best_task_on() -> None:
@@ -174,7 +205,7 @@ def test_what_was_added_after_a_task_that_is_lost_is_released_and_may_be_added_a
     robot = robot_of(CBBA, two_robots(I=(3, 9, 5), K=(1, 1, 1)), "I")
     started(robot)
     assert replies(robot, ("K", bundles(("", 0), ("K", 10), ("", 0), K=1))) == [
-        ("K", bundles(("I", 3), ("K", 10), ("I", 5), K=1, I=2))
+        ("K", bundles(None, ("K", 10), None, K=1, I=2))
     ]
     assert robot.bundle == [2, 0]
 
@@ -189,9 +220,9 @@ def test_who_says_something_wrong_of_this_robot_is_told_again() -> None:
     """K has reset the task that I has: nothing is new to I, and K must know."""
     robot = robot_of(CBBA, team_of_four(I=4), "I")
     (first, *_) = started(robot)
-    assert first == ("K", Bundles([(TASK, "I", 4)], {"I": 1}))
-    assert replies(robot, ("K", Bundles([(TASK, *NOBODY)], {"K": 1, "I": 1}))) == [
-        ("K", Bundles([(TASK, "I", 4)], {"K": 1, "I": 2}))
+    assert first == ("K", Bundles([(TASK, "I", 4)], [1, 0, 0, 0]))
+    assert replies(robot, ("K", Bundles([(TASK, *NOBODY)], [1, 1, 0, 0]))) == [
+        ("K", Bundles([(TASK, "I", 4)], [2, 1, 0, 0]))
     ]
 
 
@@ -199,7 +230,7 @@ def test_nobody_is_told_twice_what_is_under_way() -> None:
     """K had not heard of I's message when it sent its own."""
     robot = robot_of(CBBA, team_of_four(I=4), "I")
     started(robot)
-    assert replies(robot, ("K", Bundles([(TASK, "K", 1)], {"K": 1}))) == []
+    assert replies(robot, ("K", Bundles([(TASK, "K", 1)], [0, 1, 0, 0]))) == []
 
 
 def test_a_task_that_is_worth_nothing_is_not_bid_for() -> None:

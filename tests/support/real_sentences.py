@@ -8,8 +8,7 @@ REAL = {
     ("grape", "Partition"): ("Robot2 says: after move 1, which was Robot2's, Robot2 does task V2 = 1"),
     ("cbaa", "WinningBids"): "Robot1 says: task V1 = 1 is Robot2's for 24 and task V1 = 2 is mine for 44",
     ("cbba", "Bundles"): (
-        "Robot1 says: task V1 = 1 is yours for 24, task V1 = 2 is mine for 44, task V1 = 3 is nobody's and task V1 = 4"
-        " is Robot4's for 92"
+        "Robot1 says: task V1 = 1 is Robot2's for 24, task V1 = 2 is mine for 44 and task V1 = 4 is Robot4's for 92"
     ),
     ("aas", "Ok"): "Robot1.1 says: V1.1 is 1, 2 or 3 from now on",
     ("aas", "Nogood"): "Robot2.1 says: as long as V1.1 is 1, it cannot be that V1.2 is 3",

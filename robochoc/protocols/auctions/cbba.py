@@ -23,6 +23,9 @@ Choices that the paper leaves open, and differences:
 
 - A robot does both phases when messages come, not at fixed times. So it tells something only if it is new; and to a
   robot that is wrong about what this one has, as that has reset it (Table I).
+- The paper's messages hold all of `y` and `z`. Here they hold what the receiver has not been told yet, and the receiver
+  keeps what was said of the rest: Table I is applied to all tasks at each message. Where both ends say the same of a
+  task, none of its rows changes anything; so only those are looked at where they do not.
 - There is no clock: `s` counts each robot's messages. What a later message says of its sender is newer.
 - A robot builds its bundle anew from the first task on. The paper's robots keep what stands before a task that is lost,
   and append to it. Where a task comes free that they would have added earlier, their outcome depends on delays.
@@ -43,6 +46,8 @@ Choices that the paper leaves open, and differences:
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from enum import Enum
 from typing import NamedTuple, assert_never, cast
 
@@ -72,6 +77,35 @@ class Standing(NamedTuple):
 NOBODY = Standing()
 
 
+@dataclass(frozen=True)
+class Rivalry:
+    """The rivals that share the same tasks with this robot. They are told the same.
+
+    Attributes:
+        tasks: These tasks.
+        near: All robots that can do one of them, in priority order, this one among them: their numbers `s` are told.
+        place: The place of each of these robots in `near`.
+        told: What these rivals know that this robot says of each task. What is not here is nobody's.
+    """
+
+    tasks: frozenset[int]
+    near: tuple[str, ...]
+    place: Mapping[str, int]
+    told: dict[int, Standing]
+
+
+@dataclass(frozen=True)
+class Stamps:
+    """The numbers `s` of a message, by robot."""
+
+    place: Mapping[str, int]
+    numbers: Sequence[int]
+
+    def __getitem__(self, robot: str) -> int:
+        """Return the number of `robot`'s last message that the sender has taken in, directly or through others."""
+        return self.numbers[self.place[robot]]
+
+
 class CBBA(Auction):
     """One agent of CBBA.
 
@@ -94,13 +128,35 @@ class CBBA(Auction):
 
     def __init__(self, problem: LocalProblem, order: PriorityOrder) -> None:
         super().__init__(problem, order)
-        self.standings = [NOBODY] * len(self.market.rivals)
-        self.s: dict[str, int] = {}
-        self._heard: dict[str, tuple[list[Standing], int]] = {}
-        """By rival what its last message has said of the tasks that are shared with it, if that came in this step; and
-        the number of the last message of this robot that it knew of."""
-        self._told = {rival: ([NOBODY] * len(tasks), 0) for rival, tasks in self.market.shared.items()}
-        """By rival what it was told last of these tasks, and the number of that message."""
+        rivals = self.market.rivals
+        self.standings = [NOBODY] * len(rivals)
+        self.rivalries = self._rivalries()
+        self.s = dict.fromkeys([name for one in self.rivalries.values() for name in one.near], 0)
+        seats = {names: {name: seat for seat, name in enumerate(names)} for names in rivals}
+        self._seats = [seats[names] for names in rivals]
+        """By task the place of each rival among those of the task."""
+        self._said = [[NOBODY] * len(names) for names in rivals]
+        """By task what each rival has said last of it."""
+        self._differing: dict[str, set[int]] = {rival: set() for rival in self.rivalries}
+        """By rival the tasks of which it has said something else than this robot would say now."""
+        self._credited: dict[str, set[int]] = {rival: set() for rival in self.rivalries}
+        """By rival the tasks that this robot has, as the rival has said last."""
+        self._heard: dict[str, int] = {}
+        """By rival whose message came in this step, the number of the last message of this robot that it knew of."""
+        self._numbers = dict.fromkeys(self.rivalries, 0)
+        """By rival the number of the last message to it."""
+        self._news: set[int] = set()
+        """The tasks of which something may have changed since the last step."""
+
+    def _rivalries(self) -> dict[str, Rivalry]:
+        """Return by rival what it shares with this robot."""
+        found: dict[frozenset[int], Rivalry] = {}
+        for tasks in map(frozenset, self.market.shared.values()):
+            if tasks not in found:
+                names = {self.problem.agent}.union(*(self.market.rivals[task] for task in tasks))
+                near = tuple(sorted(names, key=self.order.rank.__getitem__))
+                found[tasks] = Rivalry(tasks, near, {name: place for place, name in enumerate(near)}, {})
+        return {rival: found[frozenset(tasks)] for rival, tasks in self.market.shared.items()}
 
     def begin(self) -> None:
         """Build a first bundle."""
@@ -110,20 +166,51 @@ class CBBA(Auction):
     def receive(self, sender: str, message: Message) -> None:
         """Resolve conflicts with the sender, task by task (phase 2)."""
         bundles = cast("Bundles", message)
-        heard = {self.market.task(sender, lot): Standing(winner, amount) for lot, winner, amount in bundles.standings}
-        if {*heard} != {*self.market.shared.get(sender, ())}:
-            raise ValueError(f"{sender} does not speak of all tasks that are shared with it")
-        for task, told in heard.items():
-            if told != NOBODY:
-                self.refuse_winner(task, *told)
-            self._apply(self._action(sender, task, told, bundles.stamps), task, told)
-        for robot, number in bundles.stamps.items():
-            if robot != self.problem.agent:
-                self.s[robot] = max(number, self.s.get(robot, 0))
-        seen = bundles.stamps.get(self.problem.agent, 0)
-        self._heard[sender] = [heard[task] for task in self.market.shared[sender]], seen
+        rivalry = self.rivalries.get(sender)
+        if rivalry is None or len(bundles.stamps) != len(rivalry.near):
+            raise ValueError(f"{sender} does not say how new its information of each robot is")
+        for lot, winner, amount in bundles.standings:
+            self._listen(sender, self.market.task(sender, lot), winner, amount)
+        stamps = Stamps(rivalry.place, bundles.stamps)
+        for task in [*self._differing[sender]]:
+            told = self._said[task][self._seats[task][sender]]
+            self._apply(self._action(sender, task, told, stamps), task, told)
+        own, s = self.problem.agent, self.s
+        before = s[own]
+        for name, number in zip(rivalry.near, bundles.stamps, strict=True):
+            if number > s[name]:  # noqa: PLR1730 - faster
+                s[name] = number
+        s[own] = before
+        self._heard[sender] = stamps[own]
 
-    def _action(self, sender: str, task: int, told: Standing, stamps: dict[str, int]) -> Action:
+    def _listen(self, sender: str, task: int, winner: str, amount: int) -> None:
+        """Keep what a rival says of a task."""
+        told = self.standings[task]
+        if told == (winner, amount):
+            self._differing[sender].discard(task)
+        else:
+            told = Standing(winner, amount)
+            if told != NOBODY:
+                self.refuse_winner(task, winner, amount)
+            self._differing[sender].add(task)
+        self._said[task][self._seats[task][sender]] = told
+        if winner == self.problem.agent:
+            self._credited[sender].add(task)
+        else:
+            self._credited[sender].discard(task)
+
+    def know(self, task: int, standing: Standing) -> None:
+        """Change what this robot knows of a task."""
+        if standing != self.standings[task]:
+            self.standings[task] = standing
+            self._news.add(task)
+            for rival, said in zip(self.market.rivals[task], self._said[task], strict=True):
+                if said == standing:
+                    self._differing[rival].discard(task)
+                else:
+                    self._differing[rival].add(task)
+
+    def _action(self, sender: str, task: int, told: Standing, stamps: Stamps) -> Action:
         """Return what Table I says, where `sender` is the paper's agent k, and this robot is agent i."""
         match told.winner:
             case self.problem.agent:
@@ -135,16 +222,16 @@ class CBBA(Auction):
             case _:
                 return self._sender_says_another(sender, task, told, stamps)
 
-    def _is_newer(self, robot: str, stamps: dict[str, int]) -> bool:
+    def _is_newer(self, robot: str, stamps: Stamps) -> bool:
         """Return whether the sender has newer information of `robot` than this one (s_k > s_i)."""
-        return stamps.get(robot, 0) > self.s.get(robot, 0)
+        return stamps[robot] > self.s[robot]
 
     def _is_higher(self, told: Standing, task: int) -> bool:
         """Return whether a bid that was told is above the one that is known (y_k > y_i)."""
         known = self.standings[task]
         return self.outbids(told.winner, told.amount, known.winner or None, known.amount)
 
-    def _sender_says_sender(self, sender: str, task: int, told: Standing, stamps: dict[str, int]) -> Action:
+    def _sender_says_sender(self, sender: str, task: int, told: Standing, stamps: Stamps) -> Action:
         known = self.standings[task].winner
         if known == self.problem.agent:
             return Action.UPDATE if self._is_higher(told, task) else Action.LEAVE
@@ -152,13 +239,13 @@ class CBBA(Auction):
             return Action.UPDATE
         return Action.UPDATE if self._is_newer(known, stamps) or self._is_higher(told, task) else Action.LEAVE
 
-    def _sender_says_receiver(self, sender: str, task: int, stamps: dict[str, int]) -> Action:
+    def _sender_says_receiver(self, sender: str, task: int, stamps: Stamps) -> Action:
         known = self.standings[task].winner
         if known in {self.problem.agent, ""}:
             return Action.LEAVE
         return Action.RESET if known == sender or self._is_newer(known, stamps) else Action.LEAVE
 
-    def _sender_says_another(self, sender: str, task: int, told: Standing, stamps: dict[str, int]) -> Action:
+    def _sender_says_another(self, sender: str, task: int, told: Standing, stamps: Stamps) -> Action:
         known, winner = self.standings[task].winner, told.winner
         is_newer = self._is_newer(winner, stamps)
         if known == self.problem.agent:
@@ -170,9 +257,9 @@ class CBBA(Auction):
         known_is_older = self._is_newer(known, stamps)
         if is_newer and (known_is_older or self._is_higher(told, task)):
             return Action.UPDATE
-        return Action.RESET if known_is_older and stamps.get(winner, 0) < self.s.get(winner, 0) else Action.LEAVE
+        return Action.RESET if known_is_older and stamps[winner] < self.s[winner] else Action.LEAVE
 
-    def _sender_says_nobody(self, sender: str, task: int, stamps: dict[str, int]) -> Action:
+    def _sender_says_nobody(self, sender: str, task: int, stamps: Stamps) -> Action:
         known = self.standings[task].winner
         if known in {self.problem.agent, ""}:
             return Action.LEAVE
@@ -181,9 +268,9 @@ class CBBA(Auction):
     def _apply(self, action: Action, task: int, told: Standing) -> None:
         match action:
             case Action.UPDATE:
-                self.standings[task] = told
+                self.know(task, told)
             case Action.RESET:
-                self.standings[task] = NOBODY
+                self.know(task, NOBODY)
             case Action.LEAVE:
                 pass
             case never:
@@ -198,47 +285,71 @@ class CBBA(Auction):
     def _build(self) -> None:
         """Add tasks to the bundle, the best first, as long as there is one where the own bid is the highest."""
         own = self.problem.agent
-        self._release()
-        limit = NO_LIMIT
-        while offer := self.market.best(
-            self.bundle, limit, lambda task, amount: self._is_higher(Standing(own, amount), task)
-        ):
+        released = self._released()
+        limit, bids = NO_LIMIT, dict[int, Standing]()
+
+        def is_highest(task: int, amount: int) -> bool:
+            known = NOBODY if task in released else self.standings[task]
+            return self.outbids(own, amount, known.winner or None, known.amount)
+
+        self.bundle.clear()
+        while offer := self.market.best(self.bundle, limit, is_highest):
             limit = offer.amount
             self.bundle.append(offer.task)
-            self.standings[offer.task] = Standing(own, limit)
+            bids[offer.task] = Standing(own, limit)
+        for task in released - bids.keys():
+            self.know(task, NOBODY)
+        for task, bid in bids.items():
+            self.know(task, bid)
         self.take()
 
-    def _release(self) -> None:
-        """Give up the bundle: what nobody else has won comes into it again, unless bids counted on what is lost."""
-        for task in self.bundle:
-            if self.standings[task].winner == self.problem.agent:
-                self.standings[task] = NOBODY
-        self.bundle.clear()
+    def _released(self) -> set[int]:
+        """Return the tasks that are given up: all of the bundle that nobody else has won.
+
+        They come into it again, unless bids counted on what is lost.
+        """
+        return {task for task in self.bundle if self.standings[task].winner == self.problem.agent}
 
     def _tell(self) -> None:
         """Tell each rival what is new; and what is so still, if the rival is wrong about what this robot has."""
         own = self.problem.agent
-        number = self.s.get(own, 0) + 1
-        for rival, tasks in self.market.shared.items():
-            news = [self.standings[task] for task in tasks]
-            told, _ = self._told[rival]
-            if news != told or self._is_wrong(rival, news):
-                near = {rival}.union(*(self.market.rivals[task] for task in tasks))
-                stamps = {name: heard for name, heard in self.s.items() if name in near}
-                self.s[own] = stamps[own] = number
-                self._told[rival] = news, number
-                lots = map(self.market.lot, tasks)
-                self.send(rival, Bundles([(lot, *one) for lot, one in zip(lots, news, strict=True)], stamps))
+        number = self.s[own] + 1
+        said: dict[int, Bundles | None] = {}
+        for rival, rivalry in self.rivalries.items():
+            key = id(rivalry)
+            if key not in said:
+                said[key] = self._message(rivalry, self._unknown(rivalry), number)
+            message = said[key]
+            if message is None and rival in self._heard:
+                message = self._message(rivalry, self._mistaken(rival), number)
+            if message is not None:
+                self.s[own] = self._numbers[rival] = number
+                self.send(rival, message)
+        self._news.clear()
         self._heard.clear()
 
-    def _is_wrong(self, rival: str, standings: list[Standing]) -> bool:
-        """Return whether the rival, in a message of this step, says something wrong of what this robot has.
+    def _unknown(self, rivalry: Rivalry) -> list[int]:
+        """Return the tasks of which these rivals have not been told what this robot knows; they will be."""
+        told = rivalry.told
+        tasks = [task for task in self._news & rivalry.tasks if self.standings[task] != told.get(task, NOBODY)]
+        told.update({task: self.standings[task] for task in tasks})
+        return tasks
 
-        Not if a message is under way to it that says so already.
+    def _mistaken(self, rival: str) -> list[int]:
+        """Return the tasks of which the rival, in a message of this step, says something wrong of what this robot has.
+
+        None if a message is under way to it that says so already.
         """
-        own = self.problem.agent
-        heard, seen = self._heard.get(rival, (standings, 0))
-        return seen >= self._told[rival][1] and any(
-            (theirs.winner == own) != (ours.winner == own) or (theirs.winner == own and theirs != ours)
-            for theirs, ours in zip(heard, standings, strict=True)
-        )
+        if self._heard[rival] < self._numbers[rival]:
+            return []
+        claimed = self.rivalries[rival].tasks.intersection(self.bundle)
+        return [*(self._credited[rival] | claimed) & self._differing[rival]]
+
+    def _message(self, rivalry: Rivalry, tasks: list[int], number: int) -> Bundles | None:
+        """Return what is said of `tasks`, with the number of this message; None if there are none."""
+        if not tasks:
+            return None
+        standings = [(self.market.lot(task), *self.standings[task]) for task in sorted(tasks)]
+        stamps = [self.s[name] for name in rivalry.near]
+        stamps[rivalry.place[self.problem.agent]] = number
+        return Bundles(standings, stamps)

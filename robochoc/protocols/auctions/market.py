@@ -14,7 +14,7 @@ changes nothing.
 from __future__ import annotations
 
 from abc import abstractmethod
-from collections.abc import Callable, Collection
+from collections.abc import Callable, Collection, Mapping
 from typing import NamedTuple
 
 from robochoc.model.outcome import Verdict
@@ -26,6 +26,7 @@ from robochoc.solver.compiled import LocalProblem
 from robochoc.solver.encoding import Cost, UnsupportedError
 
 NO_LIMIT = 2**63 - 1
+_NONE: Mapping[Lot, int] = {}
 
 
 class Offer(NamedTuple):
@@ -50,25 +51,31 @@ class Market:
     """
 
     def __init__(self, problem: LocalProblem, *, congestion: bool = False) -> None:
-        self._tasks = problem.tasks(congestion=congestion)
+        tasks = problem.tasks(congestion=congestion)
+        self._own = [task.own for task in tasks]
         self._charges = problem.charges
         self._places = self._cheapest(problem)
-        self.rivals = [tuple(task.others) for task in self._tasks]
-        self.congestion = [task.cost for task in self._tasks]
+        self._scored: dict[frozenset[int], list[tuple[int, int]]] = {}
+        same: dict[tuple[str, ...], tuple[str, ...]] = {}
+        names = [tuple(task.others) for task in tasks]
+        self.rivals = [same.setdefault(one, one) for one in names]
+        self.congestion = [task.cost for task in tasks]
         self.shared: dict[str, list[int]] = {}
-        self._named: dict[tuple[str, Lot], int] = {}
-        for number, task in enumerate(self._tasks):
+        named: dict[str, dict[Lot, int]] = {}
+        for number, task in enumerate(tasks):
             for robot, choices in task.others.items():
                 self.shared.setdefault(robot, []).append(number)
-                self._named.update({(robot, choice): number for choice in choices})
-        self._lots = [self._lot(problem, number) for number in range(len(self._tasks))]
+                named.setdefault(robot, {}).update(dict.fromkeys(choices, number))
+        alike: dict[tuple[tuple[Lot, int], ...], dict[Lot, int]] = {}
+        self._named = {robot: alike.setdefault(tuple(numbers.items()), numbers) for robot, numbers in named.items()}
+        self._lots = [self._lot(problem, number) for number in range(len(self._own))]
         self.idle = self._places.get(frozenset())
         if self.idle is None and self._places:
             raise UnsupportedError(f"{problem.agent} has no value without a task, and it may get none")
 
     def _cheapest(self, problem: LocalProblem) -> dict[frozenset[int], int]:
         """Return the place of the cheapest value for each set of tasks that the robot can do together."""
-        task_of = {choice: number for number, task in enumerate(self._tasks) for choice in task.own}
+        task_of = {choice: number for number, own in enumerate(self._own) for choice in own}
         found: dict[frozenset[int], int] = {}
         for index, value in enumerate(problem.values):
             chosen = [task_of.get((place, part)) for place, part in enumerate(value) if part is not None]
@@ -82,7 +89,7 @@ class Market:
         """Return how this robot does `task` if it does nothing else; if it cannot, the first way."""
         index = self._places.get(frozenset((task,)))
         value = () if index is None else problem.values[index]
-        own = self._tasks[task].own
+        own = self._own[task]
         return next((choice for choice in own if choice[0] < len(value) and value[choice[0]] == choice[1]), own[0])
 
     def lot(self, task: int) -> Lot:
@@ -107,7 +114,7 @@ class Market:
 
     def names(self, robot: str, lot: Lot) -> int | None:
         """Return the task that `robot` names `lot`; None if this robot cannot do it."""
-        return self._named.get((robot, lot))
+        return self._named.get(robot, _NONE).get(lot)
 
     def place(self, bundle: Collection[int]) -> int:
         """Return the place of the cheapest own value with the tasks of `bundle`, which there is."""
@@ -121,19 +128,20 @@ class Market:
             limit: No bid is higher.
             admits: Whether a bid of so much for a task will do.
         """
-        had = frozenset(bundle)
-        before = self._charge(had)
-        best: Offer | None = None
-        for task in range(len(self._tasks)):
-            more = had | {task}
-            if task in had or more not in self._places:
-                continue
-            score = int(before - self._charge(more))
-            offer = Offer(task, min(score, limit), score)
-            is_better = best is None or offer[1:] > best[1:]
-            if offer.amount > 0 and is_better and admits(task, offer.amount):
-                best = offer
-        return best
+        for task, score in self._scores(frozenset(bundle)):
+            amount = min(score, limit)
+            if amount > 0 and admits(task, amount):
+                return Offer(task, amount, score)
+        return None
+
+    def _scores(self, bundle: frozenset[int]) -> list[tuple[int, int]]:
+        """Return the tasks that can be added to `bundle` and what they are worth then, the best first."""
+        if bundle not in self._scored:
+            before = self._charge(bundle)
+            more = [(task, bundle | {task}) for task in range(len(self._own)) if task not in bundle]
+            scores = [(task, int(before - self._charge(both))) for task, both in more if both in self._places]
+            self._scored[bundle] = sorted([one for one in scores if one[1] > 0], key=lambda one: -one[1])
+        return self._scored[bundle]
 
     def _charge(self, bundle: frozenset[int]) -> Cost:
         return self._charges[self._places[bundle]]

@@ -23,10 +23,11 @@ from tests.support.replays import in_text, random_run, recorded
 pytestmark = pytest.mark.usefixtures("quick_encryption")
 WITH_RULES = (
     "a-dsa", "abt", "abt-do-retro", "abt-hyb", "acls", "adopt", "adopt-k", "afb", "afc", "afc-ng", "afc-tree",
-    "agile-abt", "async-maxsum", "awc", "bnb-adopt", "bnb-adopt-fdac", "bounded-maxsum", "cocoa", "compapo",
-    "count-dpop", "d-gibbs", "dba", "disfc", "dpop", "dsa", "dsa-sdp", "duct", "dynabt", "gca-mgm", "gdba",
-    "hs-cai", "kopt", "lamdls", "maxsum", "maxsum-ad", "mb-dpop", "mcs-mgm", "mgm", "mgm2", "mixed-dsa", "ncbb",
-    "o-dpop", "p-dpop", "p2-dpop", "p32-dpop", "pt-fb", "rmb-dpop", "s-dpop", "sbt", "sfb", "syncabb", "syncbb",
+    "agile-abt", "async-maxsum", "awc", "bnb-adopt", "bnb-adopt-fdac", "bounded-maxsum", "cbaa", "cbba", "cocoa",
+    "compapo", "count-dpop", "d-gibbs", "dba", "disfc", "dpop", "dsa", "dsa-sdp", "duct", "dynabt", "gca-mgm", "gdba",
+    "grape", "hs-cai", "kopt", "lamdls", "maxsum", "maxsum-ad", "mb-dpop", "mcs-mgm", "mgm", "mgm2", "mixed-dsa",
+    "ncbb", "o-dpop", "p-dpop", "p2-dpop", "p32-dpop", "pt-fb", "rmb-dpop", "s-dpop", "sbt", "sfb", "ssi", "syncabb",
+    "syncbb",
 )  # fmt: skip
 """Protocols whose messages all have rules; in others losses are not known."""
 SILENT = {"p2-dpop"}

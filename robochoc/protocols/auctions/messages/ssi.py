@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 from robochoc.model import message as wire
 from robochoc.model.communicative_acts import Act, Performative
+from robochoc.model.disclosure import Hearing, Proof
 from robochoc.model.wording import Wording, listed
-from robochoc.protocols.auctions.messages.lots import Lot, lot_in_words
+from robochoc.protocols.auctions.messages.lots import Lot, does_proves, lot_in_words, next_proves
 
 
 def _next_in_words(amount: int) -> str:
@@ -23,6 +26,10 @@ class Bid(wire.Message, frozen=True):
         """Return what the sender says."""
         return _next_in_words(self.amount)
 
+    def proves(self, hearing: Hearing) -> Sequence[Proof]:
+        """Return what the message proves to its receiver."""
+        return next_proves(hearing.sender, self.amount, hearing)
+
 
 class Won(wire.Message, frozen=True):
     """The sender has won the tasks that it calls `lots`; its highest bid for what is left is `amount`."""
@@ -36,3 +43,8 @@ class Won(wire.Message, frozen=True):
         """Return what the sender says."""
         lots = listed([lot_in_words(words, words.sender, lot) for lot in self.lots])
         return f"{lots} {'is' if len(self.lots) == 1 else 'are'} mine, and {_next_in_words(self.amount)}"
+
+    def proves(self, hearing: Hearing) -> Sequence[Proof]:
+        """Return what the message proves to its receiver: the sender can do the tasks. What it bid may not be told."""
+        won = [proof for lot in self.lots for proof in does_proves(hearing.sender, lot, hearing)]
+        return [*won, *next_proves(hearing.sender, self.amount, hearing)]
