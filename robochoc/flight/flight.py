@@ -70,6 +70,7 @@ class Flight:
         conditions: Distance, wind, failures and obstacles.
         progress: Called with what is being done, in words, at every simulated moment that is logged.
         rises: Whether drones leave the ground, and land, straight up and down where they can.
+        ground: The height of the ground. None: the lowest home stands on it.
 
     Raises:
         ValueError: There are no drones, or too many (`quadrotor/bounds.py`); the conditions name others; or homes are
@@ -84,6 +85,7 @@ class Flight:
         progress: Callable[[str], None] | None = None,
         *,
         rises: bool = False,
+        ground: float | None = None,
     ) -> None:
         self._rises = rises
         homes = np.array(homes, dtype=np.float64).reshape(-1, 3)
@@ -94,7 +96,8 @@ class Flight:
         self._progress = progress or (lambda _: None)
         self._origin = origin_of(homes)
         self._homes = homes - self._origin
-        self._ground = float(self._homes[:, 2].min())
+        lowest = float(self._homes[:, 2].min())
+        self._ground = lowest if ground is None else min(lowest, ground - float(self._origin[2]))
         self._downwash = conditions.downwash
         self._distance = conditions.distance or _distance([self._homes], self._downwash)
         places: dict[int, Point] = {number: (x, y, z) for number, (x, y, z) in enumerate(homes)}
@@ -349,9 +352,11 @@ def fly(
         for leg, places in zip(mission.legs, goals, strict=True):
             check_near([names[number] for number in leg.goals], places)
         conditions = replace(conditions, distance=_distance([homes, *goals], conditions.downwash))
-    flight = Flight(names, homes, conditions, progress, rises=mission.rises)
+    ground = mission.ground if mission.has_volume else None
+    flight = Flight(names, homes, conditions, progress, rises=mission.rises, ground=ground)
+    blocks = [block for block in mission.blocks if not block.is_cube]
     for number, leg in enumerate(mission.legs):
-        flight.fly(leg.opened_by, leg.goals, blocks=[block.at for block in mission.blocks if block.leg <= number])
+        flight.fly(leg.opened_by, leg.goals, blocks=[block.at for block in blocks if block.leg <= number])
     return flight.flown()
 
 

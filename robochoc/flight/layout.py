@@ -131,7 +131,8 @@ class Layout:
 def layout_of(crafts: Sequence[Craft], others: Iterable[Craft] = (), ground: GroundMap | None = None) -> Layout:
     """Return the layout for `crafts`. Its axes also hold `others`: where crafts may be at another time.
 
-    With a map of the `ground`, they hold all of it, and robots of one craft have their homes where they stand on it.
+    With a map of the `ground`, they hold all of it, and robots of one craft have their homes where they stand on it; if
+    it is three-dimensional, where they are in the air.
     """
     others = [*others]
     cells = _cells(crafts)
@@ -139,13 +140,17 @@ def layout_of(crafts: Sequence[Craft], others: Iterable[Craft] = (), ground: Gro
     if ground is not None:
         cells = _standing(crafts, cells, ground)
         held += [*cells, ground.first, ground.x_and_y(ground.columns, ground.rows)]
-    axes = _axes(crafts, others, held, max(ground.columns, ground.rows) if ground else 0)
+    volume = ground.volume if ground else None
+    heights = [volume.z(1), volume.z(volume.levels)] if volume else []
+    axes = _axes(crafts, others, held, max(ground.columns, ground.rows) if ground else 0, heights)
     rows, columns, levels = axes
     beside = _lines(rows.low, rows.cells, columns.high + _GAP, 1)
     homes: list[Point] = []
     taken = _Taken()
-    for x, y in cells:
-        home = (rows.at(x), columns.at(y), levels.ground)
+    for craft, (x, y) in zip(crafts, cells, strict=True):
+        level = volume.starts.get(craft.robot) if volume else None
+        z = levels.ground if volume is None or level is None else levels.at(volume.z(level))
+        home = (rows.at(x), columns.at(y), z)
         homes.append((*next(beside), levels.ground) if taken.is_near(home) else home)
         taken.add(homes[-1])
     return Layout(axes, tuple(homes))
@@ -173,7 +178,7 @@ def _standing(crafts: Sequence[Craft], cells: Sequence[Cell], ground: GroundMap)
 
 
 def _axes(
-    crafts: Sequence[Craft], others: Sequence[Craft], cells: Sequence[Cell], side_of_map: int
+    crafts: Sequence[Craft], others: Sequence[Craft], cells: Sequence[Cell], side_of_map: int, heights: Sequence[int]
 ) -> tuple[Axis, Axis, Axis]:
     most = max(_LEVELS[-1], 3 * math.ceil(math.sqrt(len(crafts))), side_of_map)
     names = _axis_names(crafts)
@@ -181,10 +186,12 @@ def _axes(
     columns = Axis.over(names[1], (y for _, y in cells), most=most, scaled=most)
     side = max(rows.cells, columns.cells)
     values = [craft.level for craft in (*crafts, *others) if craft.level is not None]
+    values += heights
     if names[2] == "level" and all(1 <= value <= side for value in values):
         return rows, columns, Axis(names[2], 1, side, 1, side)
     scaled = min(max(side, _LEVELS[0]), _LEVELS[-1])
-    return rows, columns, Axis.over(names[2], values, most=max(_TALL, 2 * side), scaled=scaled)
+    tall = max(_TALL, 2 * side, *heights) - min(0, *heights) if heights else max(_TALL, 2 * side)
+    return rows, columns, Axis.over(names[2], values, most=tall, scaled=scaled)
 
 
 def _axis_names(crafts: Sequence[Craft]) -> tuple[str, str, str]:

@@ -69,6 +69,8 @@ class Block:
 
     at: Point
     leg: int = 0
+    is_cube: bool = False
+    """Whether it is a cell of a three-dimensional map, whose middle is `at`. No route keeps away from it."""
 
 
 @dataclass(frozen=True)
@@ -76,7 +78,7 @@ class Mission:
     """All legs of a run, and the drones that fly them. `axes` are the sides of the box around all places.
 
     With a map of the ground, drones rise from where they stand before they fly elsewhere (`rises`), and there are
-    `blocks` to be avoided.
+    `blocks` to be avoided. With a three-dimensional one (`has_volume`), they are in the air in the beginning.
     """
 
     team: str
@@ -86,6 +88,7 @@ class Mission:
     scale: float
     rises: bool = False
     blocks: tuple[Block, ...] = ()
+    has_volume: bool = False
 
     @property
     def ground(self) -> float:
@@ -154,16 +157,31 @@ class MissionBuilder:
     def mission(self, team: str, legs: Iterable[Leg]) -> Mission:
         """Return the mission with these legs."""
         blocks = tuple(self._blocks())
-        return Mission(team, self.drones, tuple(legs), self.layout.axes, self.scale, self._ground is not None, blocks)
+        ground = self._ground
+        return Mission(
+            team,
+            self.drones,
+            tuple(legs),
+            self.layout.axes,
+            self.scale,
+            rises=ground is not None,
+            blocks=blocks,
+            has_volume=ground is not None and ground.volume is not None,
+        )
 
     def _blocks(self) -> Iterator[Block]:
         if self._ground is None:
             return
-        rows, columns, _ = self.layout.axes
+        rows, columns, levels = self.layout.axes
         for cell in self._ground.blocked:
             x, y = self._ground.x_and_y(cell.x, cell.y)
             spot = rows.at(x), columns.at(y), self.layout.ground + _BLOCK_HIGH
             yield Block(self._metres(spot), cell.epoch)
+        volume = self._ground.volume
+        for column, row, level in volume.blocked if volume else ():
+            x, y = self._ground.x_and_y(column, row)
+            z = volume.z(level) if volume else 0
+            yield Block(self._metres((rows.at(x), columns.at(y), levels.at(z))), is_cube=True)
 
     def _crafts(self, values: Assignment, here: Container[str] | None = None) -> Iterator[Craft]:
         """Yield the crafts of all robots, or of those that are `here`."""

@@ -28,6 +28,28 @@ class BlockedCell(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     epoch: Annotated[int, msgspec.Meta(ge=0)] = 0
 
 
+class Volume(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """What a three-dimensional map has besides. Levels are numbered from 1, the lowest first.
+
+    Attributes:
+        levels: The number of levels.
+        first: The z of topics in the first level.
+        starts: The levels at which robots are in the beginning, by their names. All others stand on the ground.
+        blocked: The cells that are blocked: column, row and level.
+    """
+
+    levels: _Coordinate
+    first: _First = 1
+    starts: dict[str, _Coordinate] = {}
+    blocked: Annotated[
+        tuple[tuple[_Coordinate, _Coordinate, _Coordinate], ...], msgspec.Meta(max_length=MAX_BLOCKED)
+    ] = ()
+
+    def z(self, level: int) -> int:
+        """Return the z of topics at a level."""
+        return self.first + level - 1
+
+
 class GroundMap(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """A map. Columns and rows are numbered from 1; unless `first` says otherwise, they are the x and y of topics.
 
@@ -38,6 +60,7 @@ class GroundMap(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
         blocked: The cells that are blocked.
         first: The x and y of topics in the first column and row.
         scale: Metres a unit of topics; None: the map does not say.
+        volume: The third dimension, if the map has one.
     """
 
     columns: _Coordinate
@@ -46,6 +69,7 @@ class GroundMap(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     blocked: Annotated[tuple[BlockedCell, ...], msgspec.Meta(max_length=MAX_BLOCKED)] = ()
     first: tuple[_First, _First] = (1, 1)
     scale: Annotated[float, msgspec.Meta(gt=0, le=_SIDE_MAX)] | None = None
+    volume: Volume | None = None
 
     def x_and_y(self, column: int, row: int) -> tuple[int, int]:
         """Return the x and y of topics in a column and a row."""
@@ -72,4 +96,16 @@ def read_ground_map(content: bytes) -> GroundMap:
     for what, (x, y) in (*found.starts.items(), *(("a blocked cell", (cell.x, cell.y)) for cell in found.blocked)):
         if x > found.columns or y > found.rows:
             raise ValueError(f"{what} is at ({x}, {y}), beside the map of {found.columns} x {found.rows} cells")
+    if found.volume:
+        _check_volume(found, found.volume)
     return found
+
+
+def _check_volume(ground: GroundMap, volume: Volume) -> None:
+    sides = (ground.columns, ground.rows, volume.levels)
+    for cell in volume.blocked:
+        if any(at > side for at, side in zip(cell, sides, strict=True)):
+            raise ValueError(f"a blocked cell is at {cell}, beside the map of {' x '.join(map(str, sides))} cells")
+    for name, level in volume.starts.items():
+        if level > volume.levels:
+            raise ValueError(f"{name} is at level {level}, above the map's {volume.levels}")

@@ -19,6 +19,7 @@ from robochoc.view.palette import GREY, RED, STONE, Colour, colours
 from robochoc.view.playback import DroneState, Playback
 from robochoc.view.quadrotor import HUB, Shape, box, disc, joined_shapes, quadrotor
 from robochoc.view.scene import DrawnDrone, Scene
+from robochoc.view.walls import walls_of
 
 _Corners = npt.NDArray[np.float64]
 """The lowest and the highest x, y and z, a row each."""
@@ -103,6 +104,9 @@ def _drawn(scene: Scene, points: Sequence[Point]) -> MeshcatCommands:
     _draw_box(meshcat, scene.axes)
     for since_s, shape in _blocks(scene).items():
         meshcat.mesh(f"blocks/{since_s:g} s", shape, STONE, _BLOCK_OPACITY)
+    walls = _walls(scene)
+    if walls:
+        meshcat.mesh("walls", walls, STONE, one_sided=True)
     _label_axes(meshcat, scene.axes, _TEXT * radius)
     _draw_drones(meshcat, scene.drones, points, radius)
     return meshcat
@@ -237,11 +241,18 @@ def _draw_obstacles(meshcat: MeshcatCommands, obstacles: Sequence[Point]) -> Non
 def _blocks(scene: Scene) -> dict[float, Shape]:
     """Return the blocks of blocked cells, those that appear at the same time as one shape, by that time."""
     found: dict[float, list[Shape]] = {}
-    for block in scene.blocks:
+    for block in (block for block in scene.blocks if not block.is_cube):
         x, y, top = block.top
         shape = box((x, y, (top + scene.ground) / 2), (_BLOCK, _BLOCK, top - scene.ground))
         found.setdefault(block.since_s, []).append(shape)
     return {since_s: joined_shapes(shapes) for since_s, shapes in found.items()}
+
+
+def _walls(scene: Scene) -> Shape | None:
+    """Return the walls of a three-dimensional map."""
+    cubes = np.array([block.top for block in scene.blocks if block.is_cube]).reshape(-1, 3)
+    low, high = np.array([axis.low for axis in scene.axes]), np.array([axis.high for axis in scene.axes])
+    return walls_of(np.rint(cubes).astype(np.int64), low, high, _BLOCK)
 
 
 def _animate(meshcat: MeshcatCommands, scene: Scene, playback: Playback) -> None:

@@ -35,6 +35,10 @@ class _Command(Protocol):
     def lower(self) -> dict[str, Any]: ...
 
 
+_FRONT, _BOTH = 0, 2
+"""Sides of faces that are drawn, as three.js numbers them."""
+
+
 class MeshcatCommands:
     """Draws by meshcat into `commands`: the packed messages that make its viewer show the same, in order.
 
@@ -51,8 +55,11 @@ class MeshcatCommands:
         """Keep what meshcat would send to its server. meshcat calls this."""
         self._keep(command.lower())
 
-    def mesh(self, path: str, shape: Shape, colour: Colour, opacity: float = 1) -> None:
-        """Draw a solid at `path`. Its faces are flat, its colours are its shades times `colour`."""
+    def mesh(self, path: str, shape: Shape, colour: Colour, opacity: float = 1, *, one_sided: bool = False) -> None:
+        """Draw a solid at `path`. Its faces are flat, its colours are its shades times `colour`.
+
+        If it is `one_sided`, a face is seen from where its corners lie counterclockwise.
+        """
         three = self._meshcat.geometry
         geometry = three.TriangularMeshGeometry(shape.vertices, shape.faces)
         # Bytes where they do: half the size, times every drone.
@@ -60,7 +67,12 @@ class MeshcatCommands:
         if len(shape.vertices) <= np.iinfo(np.uint8).max:
             geometry.faces = shape.faces.astype(np.uint8)
         material = three.MeshPhongMaterial(
-            color=_hex(colour), opacity=opacity, vertexColors=True, flatShading=True, depthWrite=opacity == 1
+            color=_hex(colour),
+            opacity=opacity,
+            vertexColors=True,
+            flatShading=True,
+            depthWrite=opacity == 1,
+            side=_FRONT if one_sided else _BOTH,
         )
         drawing = self._drawing(path, three.Mesh(geometry, material))
         drawing["object"]["geometries"][0]["data"]["attributes"]["color"]["normalized"] = True  # 255 means 1

@@ -42,10 +42,14 @@ class DrawnDrone:
 
 @dataclass(frozen=True)
 class DrawnBlock:
-    """A blocked cell, from second `since_s` on: a block on the ground whose top has its middle at `top`."""
+    """A blocked cell, from second `since_s` on: a block on the ground whose top has its middle at `top`.
+
+    Of a three-dimensional map it is a cube around `top`.
+    """
 
     top: Point
     since_s: float = 0.0
+    is_cube: bool = False
 
 
 @dataclass(frozen=True)
@@ -125,7 +129,7 @@ def _blocks(mission: Mission, flown: FlightLog | None) -> Iterator[DrawnBlock]:
     """Yield each block. Those of a later leg appear when it begins; of a leg that is not flown, never."""
     for block in mission.blocks:
         if flown is None or not block.leg:
-            yield DrawnBlock(_cell(mission, block.at))
+            yield DrawnBlock(_cell(mission, block.at), is_cube=block.is_cube)
         elif block.leg < len(flown.legs):
             yield DrawnBlock(_cell(mission, block.at), flown.legs[block.leg].begins_s)
 

@@ -13,11 +13,13 @@ from robochoc.cli.options.generated import next_step
 from robochoc.cli.reports.failures import INVALID
 from robochoc.formats import read_team
 from robochoc.formats.occupancy.grid import read_occupancy_grid
+from robochoc.formats.octomap.voxels import read_voxels
 from robochoc.generators.coloring import coloring_of
 from robochoc.generators.graphs import grid, scale_free, small_world, tree
 from robochoc.generators.ising import ising
 from robochoc.generators.maps.cells import Cells
 from robochoc.generators.maps.coverage import coverage
+from robochoc.generators.maps.cubes import Cubes
 from robochoc.generators.maps.formation import formation
 from robochoc.generators.maps.patrol import patrol
 from robochoc.generators.maps.reach import MapChoice
@@ -33,6 +35,7 @@ from tests.support.evaluation import best
 from tests.support.program import ROOT, robochoc_within
 
 BUILDING = str(ROOT / "docs/examples/building/building.yaml")
+HOUSE = str(ROOT / "docs/examples/house/house.bt")
 FAMILIES: dict[str, Callable[[], Team]] = {
     "random --agents 6 --domain 3 --graph scale-free --links 3 --max-cost 9 --places 2 --maximize": lambda: random_on(
         scale_free(6, 3), 3, 0, max_cost=9, costs=CostUnits(maximize=True, places=2)
@@ -56,6 +59,9 @@ FAMILIES: dict[str, Callable[[], Team]] = {
     "tracking --agents 3 --targets 4 --side 5": lambda: tracking(3, 4, 5),
     f"coverage --map {BUILDING} --agents 2 --cells 16 --sensing 2 --worth 3.5": lambda: coverage(
         MapChoice(map=BUILDING, agents=2, cells=16), sensing=2, worth=3.5
+    )[0],
+    f"formation --map {HOUSE} --agents 3 --anchor 2,4.5,3.5 --cells 300 --cell 0.75": lambda: formation(
+        MapChoice(map=HOUSE, agents=3, cell=0.75, cells=300), anchor="2,4.5,3.5"
     )[0],
     f"patrol --map {BUILDING} --agents 2 --points 5 --idle 30 --rounds 2 --apart 4": lambda: patrol(
         MapChoice(map=BUILDING, agents=2), points=5, idle=30, rounds=2, apart=4
@@ -111,6 +117,7 @@ def test_a_family_is_written_under_its_name(words: str, tmp_path: Path) -> None:
         ("sensors --sensors 3 --targets 2 --visibility 0", "no sensor sees target 1"),
         ("tasks --agents 3 --tasks 2 --skilled 2", "skilled is 2"),
         (f"formation --map {BUILDING}", "agents is missing (without at)"),
+        (f"formation --map {HOUSE} --at 4.8,1", "at has '4.8,1'; expected X,Y,Z on a three-dimensional map"),
         (f"formation --map {BUILDING} --at 4.8,1", "robot 1 at 4.8,1 stands where it does not fit"),
     ],
 )
@@ -141,6 +148,33 @@ def test_a_map_is_written_beside_the_team_and_flown_over(tmp_path: Path) -> None
     for drone in found["drones"]:
         place = cells.centre(values[drone["name"].replace("Robot", "V")])
         assert drone["at"][:2] == pytest.approx([float(one) for one in place], abs=0.05)
+
+
+@pytest.mark.usefixtures("in_a_folder")
+def test_a_house_is_flown_in(tmp_path: Path) -> None:
+    words = ("--map", HOUSE, "--at", "2,2,1 6,4,3.5", "--anchor", "2,4.5,3.5", "-o", "team")
+    done = robochoc_within("generate", "formation", *words)
+    assert done.stdout.endswith("team/map.json: cells of 1 m; fly and animate take it with --map\n")
+    solved = robochoc_within("solve", "team", "--runtime", "simulator", "--json")
+    (tmp_path / "result.json").write_text(solved.stdout)
+    flown = robochoc_within("fly", "result.json", "--team", "team", "--map", "team/map.json", "--json")
+    assert flown.returncode == 0, flown.stderr
+    ends = {drone["name"]: drone["at"] for drone in json.loads(flown.stdout)["drones"]}
+    values = json.loads(solved.stdout)["assignment"]
+    grid = read_voxels(Path(HOUSE))
+    cells = Cubes(grid, Fraction(1), grid.free)
+    for name, end in ends.items():
+        place = cells.centre(values[name.replace("Robot", "V")])
+        assert end == pytest.approx([float(one) for one in place], abs=0.05)
+
+
+@pytest.mark.usefixtures("in_a_folder")
+def test_a_broken_octomap_is_said_with_its_file_and_place(tmp_path: Path) -> None:
+    (tmp_path / "plan.bt").write_bytes(Path(HOUSE).read_bytes()[:1000])
+    done = robochoc_within("generate", "coverage", "--map", "plan.bt", "--agents", "3")
+    assert (done.returncode, done.stdout) == (INVALID, "")
+    assert done.stderr.startswith("plan.bt: ends after ")
+    assert len(done.stderr.splitlines()) == 1
 
 
 @pytest.mark.usefixtures("in_a_folder")

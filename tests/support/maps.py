@@ -56,7 +56,7 @@ def fitting(rows: Sequence[str], radius: Fraction) -> set[Pixel]:
 
 
 def ways(start: Pixel, among: set[Pixel]) -> Mapping[Pixel, int]:
-    """Return the lengths of the shortest ways from a pixel: 5 along an edge, 7 across a corner that is not cut."""
+    """Return the lengths of the shortest ways from a pixel: 15 along an edge, 21 across a corner that is not cut."""
     done: dict[Pixel, int] = {}
     queue = [(0, start)]
     while queue:
@@ -68,7 +68,7 @@ def ways(start: Pixel, among: set[Pixel]) -> Mapping[Pixel, int]:
             for up in (-1, 0, 1):
                 beside = {(x + right, y), (x, y + up), (x + right, y + up)}
                 if (right or up) and beside <= among:
-                    heapq.heappush(queue, (length + (7 if right and up else 5), (x + right, y + up)))
+                    heapq.heappush(queue, (length + (21 if right and up else 15), (x + right, y + up)))
     return done
 
 

@@ -8,9 +8,7 @@ with `negate` the other way round. In the mode `raw`, shades from 0 to 100 of 25
 
 from __future__ import annotations
 
-import stat
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from functools import cached_property
@@ -20,8 +18,9 @@ from pathlib import Path
 import numpy as np
 import numpy.typing as npt
 
-from robochoc.formats.diagnostics import InvalidInputError, MistakeError, invalid_input, shortened
+from robochoc.formats.diagnostics import InvalidInputError, MistakeError, shortened
 from robochoc.formats.dialects.yaml_tree import Node, Scalar, read_yaml
+from robochoc.formats.occupancy.content import content_of, told
 from robochoc.formats.occupancy.images import Image, read_image
 from robochoc.formats.occupancy.pgm import MAX_BYTES
 from robochoc.formats.occupancy.turn import UNTURNED, Place, Turn, turn_of
@@ -95,16 +94,16 @@ def read_occupancy_grid(path: Path) -> OccupancyGrid:
     Raises:
         InvalidInputError: One of the files cannot be read, is no such file, or is too large.
     """
-    with _told(path):
-        content = _content(path, MAX_YAML)
+    with told(path):
+        content = content_of(path, MAX_YAML)
         try:
             text = content.decode()
         except UnicodeDecodeError:
             raise MistakeError("is not text in UTF-8", "name the YAML file of the map, not its image") from None
         described = _Description(text)
     image = path.parent / described.image
-    with _told(image):
-        shades = read_image(_content(image, MAX_BYTES), adds_alpha=described.mode == "trinary")
+    with told(image):
+        shades = read_image(content_of(image, MAX_BYTES), adds_alpha=described.mode == "trinary")
     free, occupied = described.classified(shades)
     return _upright(OccupancyGrid(path.stem, described.resolution, described.origin, free, occupied), described.yaw)
 
@@ -122,27 +121,6 @@ def _upright(grid: OccupancyGrid, yaw: Fraction) -> OccupancyGrid:
         free, occupied = free.T[:, ::-1], occupied.T[:, ::-1]
     right, up = turn.turned((corner[0] * grid.resolution, corner[1] * grid.resolution))
     return replace(grid, origin=(x + right, y + up), free=free, occupied=occupied, turn=turn)
-
-
-@contextmanager
-def _told(path: Path) -> Iterator[None]:
-    """Raise `InvalidInputError`, with the file's name, for what is wrong in it."""
-    try:
-        yield
-    except OSError as error:
-        raise invalid_input(path, error.strerror or str(error), "name a file that can be read") from None
-    except MistakeError as mistake:
-        raise invalid_input(path, mistake.message, mistake.hint, mistake.line) from None
-
-
-def _content(path: Path, most: int) -> bytes:
-    if path.exists() and not stat.S_ISREG(path.stat().st_mode):
-        raise MistakeError("is no file", "name a file")
-    with path.open("rb") as file:
-        content = file.read(most + 1)
-    if len(content) > most:
-        raise MistakeError("is too large", f"it may have {most:,} bytes")
-    return content
 
 
 class _Description:

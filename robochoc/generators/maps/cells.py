@@ -12,7 +12,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from fractions import Fraction
 from functools import cached_property
-from math import ceil, floor, isqrt
+from math import ceil, floor
 
 import numpy as np
 import numpy.typing as npt
@@ -21,37 +21,7 @@ from robochoc.formats.occupancy.grid import Counts, Flags, OccupancyGrid, before
 from robochoc.formats.occupancy.turn import Place as Place  # noqa: PLC0414 - from here, too
 from robochoc.generators.maps.turned import TurnedSquares
 
-MAX_SIDE = 1000
-"""The maximum number of columns, and of rows, of cells."""
-MAX_RADIUS = 100
-"""The maximum radius of a robot, in pixels."""
-
 _HALF = Fraction(1, 2)
-
-
-def passable(grid: OccupancyGrid, radius: Fraction) -> Flags:
-    """Return the pixels where the centre of a robot can be: no pixel that is not free is nearer than its radius.
-
-    Obstacles are inflated, as costmap_2d does with the inscribed radius. Distances are between centres of pixels.
-    What lies outside of the map is not free.
-
-    Raises:
-        ValueError: The radius has more than `MAX_RADIUS` pixels.
-    """
-    limit = (radius / grid.resolution) ** 2
-    reach = isqrt(floor(limit))
-    if reach > MAX_RADIUS:
-        raise ValueError(f"radius is {float(radius):g} m, more than {MAX_RADIUS} pixels of this map")
-    rows, columns = grid.free.shape
-    solid = np.pad(~grid.free, reach, constant_values=True)
-    near = np.zeros_like(grid.free)
-    for step in range(-reach, reach + 1):
-        half = isqrt(floor(limit - step * step))
-        line = solid[reach + step : reach + step + rows]
-        sums = np.cumsum(np.pad(line, ((0, 0), (1, 0))), axis=1, dtype=np.int32)
-        first = reach - half
-        near |= sums[:, first + 2 * half + 1 : first + 2 * half + 1 + columns] > sums[:, first : first + columns]
-    return ~near
 
 
 @dataclass(frozen=True, eq=False)
@@ -105,26 +75,31 @@ class Cells:
         low, high, _ = zip(self._pixels(1), self._pixels(0), strict=True)
         return tuple(np.flatnonzero(_sums(before(self.grid.occupied), low, high)).tolist())
 
-    def x_and_y(self, cell: int) -> tuple[int, int]:
+    @property
+    def counts(self) -> tuple[int, int]:
+        """The number of columns and of rows."""
+        return self.columns, self.rows
+
+    def coordinates(self, cell: int) -> tuple[int, int]:
         """Return the x and the y of a cell's centre, in sides of a cell."""
         row, column = divmod(cell, self.columns)
         return self.first[0] + column, self.first[1] + row
 
     def centre(self, cell: int) -> Place:
         """Return the place of a cell's centre."""
-        x, y = self.x_and_y(cell)
+        x, y = self.coordinates(cell)
         return x * self.side, y * self.side
 
-    def pixel(self, place: Place) -> tuple[int, int] | None:
+    def pixel(self, place: tuple[Fraction, ...]) -> tuple[int, int] | None:
         """Return the row and the column of the pixel of a place; None: it is not on the map."""
-        x, y = map(floor, self.grid.in_pixels(place))
+        x, y = map(floor, self.grid.in_pixels((place[0], place[1])))
         rows, columns = self.grid.free.shape
         return (y, x) if 0 <= y < rows and 0 <= x < columns else None
 
-    def column_and_row(self, place: Place) -> tuple[int, int]:
-        """Return the column and the row of the cell in which a place lies, both from 0."""
+    def containing(self, place: tuple[Fraction, ...]) -> tuple[int, int]:
+        """Return the x and the y, in sides of a cell, of the cell in which a place lies."""
         x, y = (floor(one / self.side + _HALF) for one in place)
-        return x - self.first[0], y - self.first[1]
+        return x, y
 
     def _count(self, axis: int) -> int:
         behind: int = ceil(max(corner[axis] for corner in self.grid.corners) / self.side + _HALF)
@@ -169,39 +144,3 @@ def _sums(table: Counts, low: tuple[npt.NDArray[np.int64], ...], high: tuple[npt
         + table[np.ix_(bottom, left)]
     )
     return found
-
-
-def cells_of(grid: OccupancyGrid, radius: Fraction, most: int, side: Fraction | None = None) -> Cells:
-    """Return the cells of a map for robots of a radius, at most so many free ones.
-
-    Args:
-        grid: The map.
-        radius: The robots' radius in metres.
-        most: The maximum number of free cells.
-        side: The side of a cell. None: the smallest multiple of a pixel's side that makes no more free cells than that.
-
-    Raises:
-        ValueError: There is no free cell, or there are too many of them.
-    """
-    fits = passable(grid, radius)
-    if not fits.any():
-        raise ValueError(f"no pixel is free for a robot of the radius {float(radius):g} m; take a smaller radius")
-    if side is not None:
-        return _checked(Cells(grid, side, fits), most)
-    step = 1
-    while True:
-        cells = Cells(grid, step * grid.resolution, fits)
-        if max(cells.columns, cells.rows) <= MAX_SIDE and len(cells.free) <= most:
-            return _checked(cells, most)
-        step += 1
-
-
-def _checked(cells: Cells, most: int) -> Cells:
-    side = f"{float(cells.side):g} m"
-    if max(cells.columns, cells.rows) > MAX_SIDE:
-        raise ValueError(f"cells of {side} make {cells.columns} columns and {cells.rows} rows; {MAX_SIDE} are allowed")
-    if len(cells.free) > most:
-        raise ValueError(f"{len(cells.free):,} cells of {side} are free, more than {most}: take larger cells, or more")
-    if not cells.free:
-        raise ValueError(f"no cell of {side} is free: take smaller cells, or a smaller radius")
-    return cells

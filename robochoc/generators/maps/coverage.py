@@ -30,7 +30,7 @@ from robochoc.generators.maps.reach import (
     label_of,
     reach_of,
 )
-from robochoc.generators.maps.sight import Sight
+from robochoc.generators.maps.sight import sight_on
 from robochoc.model.assembly import assemble
 from robochoc.model.constraint import Constraint, Relation, Semantics
 from robochoc.model.cost_units import CostUnits
@@ -52,7 +52,7 @@ def coverage(choice: MapChoice, seed: int = 0, *, sensing: float = 3.0, worth: f
         choice: The map and the robots.
         seed: The same seed draws the same places of robots on every machine.
         sensing: How far robots see, in metres.
-        worth: The travel time that a square metre is worth, in seconds.
+        worth: The travel time that a square metre is worth, or on a three-dimensional map a cubic metre, in seconds.
 
     Raises:
         InvalidInputError: The files hold no map.
@@ -63,7 +63,7 @@ def coverage(choice: MapChoice, seed: int = 0, *, sensing: float = 3.0, worth: f
     for number, own in enumerate(reach.seconds, 1):
         if not own:
             raise ValueError(f"robot {number} can get to no cell; take smaller cells, or allow more time")
-    seen = Sight(reach.cells).seen(range_m)
+    seen = sight_on(reach.cells).seen(range_m)
     a_cell = worth_of_a_cell(reach, seconds)
     most = [max(len(seen[cell]) for cell in own) for own in reach.seconds]
     gains = (
@@ -82,8 +82,8 @@ def coverage(choice: MapChoice, seed: int = 0, *, sensing: float = 3.0, worth: f
 
 
 def worth_of_a_cell(reach: Reach, seconds: Fraction) -> int:
-    """Return what it is worth to see a cell, in the unit of costs, if a square metre is worth so many seconds."""
-    exactly: Fraction = reach.cells.side**2 * seconds * 10**PLACES
+    """Return what it is worth to see a cell, in the unit of costs, if a square or cubic metre is worth so much."""
+    exactly: Fraction = reach.cells.side ** len(reach.cells.first) * seconds * 10**PLACES
     return floor(exactly + Fraction(1, 2))
 
 

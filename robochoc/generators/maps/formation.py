@@ -22,7 +22,6 @@ from pathlib import Path
 from robochoc.formats.diagnostics import invalid_input, shortened
 from robochoc.formats.ground_map import GroundMap
 from robochoc.generators.draws import bounded, check_bounds, seeded
-from robochoc.generators.maps.cells import Place
 from robochoc.generators.maps.reach import (
     MAX_ROBOTS,
     PLACES,
@@ -30,10 +29,12 @@ from robochoc.generators.maps.reach import (
     Reach,
     all_different,
     charged,
+    check_dimensions,
     label_of,
     places_in,
     reach_of,
 )
+from robochoc.generators.maps.sizes import Place
 from robochoc.model.assembly import assemble
 from robochoc.model.cost_units import CostUnits
 from robochoc.model.problem import ProblemKind, Team
@@ -81,7 +82,7 @@ def formation(
         shape: One of `SHAPES`, or the path of a file with offsets in metres: `ahead,left` in each line.
         spacing: Metres between neighbours in the shape.
         heading: Where the formation looks, in degrees counterclockwise from the x axis.
-        anchor: The middle of the shape, `X,Y`. Empty: the mean of all robots' places.
+        anchor: The middle of the shape, `X,Y` or `X,Y,Z`; it is level there. Empty: the mean of all robots.
 
     Raises:
         InvalidInputError: A file cannot be read as what it should be.
@@ -92,6 +93,7 @@ def formation(
     if len(middle) > 1:
         raise ValueError("anchor is one place")
     reach = reach_of(choice, seeded(seed))
+    check_dimensions(middle, reach.cells, "anchor")
     agents = len(reach.starts)
     offsets = _offsets(shape, agents, spacing)
     slots = slots_of(reach, offsets, middle[0] if middle else _mean(reach.starts), heading)
@@ -128,7 +130,7 @@ def slots_of(reach: Reach, offsets: Sequence[Offset], anchor: Place, heading: fl
         raise ValueError(f"robots can get to {len(left)} cells, fewer than {len(offsets)} slots; take smaller cells")
     slots = []
     for x, y in _turned(offsets, heading):
-        slots.append(reach.nearest((anchor[0] + x, anchor[1] + y), left))
+        slots.append(reach.nearest((anchor[0] + x, anchor[1] + y, *anchor[2:]), left))
         left.remove(slots[-1])
     return slots
 
@@ -190,4 +192,4 @@ def _read_offsets(name: str, agents: int) -> list[Offset]:
 
 
 def _mean(places: Sequence[Place]) -> Place:
-    return sum(x for x, _ in places) / Fraction(len(places)), sum(y for _, y in places) / Fraction(len(places))
+    return tuple(sum(parts) / Fraction(len(places)) for parts in zip(*places, strict=True))

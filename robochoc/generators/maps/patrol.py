@@ -30,11 +30,14 @@ from robochoc.generators.maps.reach import (
     MapChoice,
     Reach,
     charged,
+    check_dimensions,
     exact,
     label_of,
     places_in,
     reach_of,
+    squared,
 )
+from robochoc.generators.maps.sizes import Place
 from robochoc.model.assembly import assemble
 from robochoc.model.constraint import Constraint, Domain, Relation, Semantics, Variable
 from robochoc.model.cost_units import CostUnits
@@ -72,7 +75,8 @@ def patrol(
         choice: The map and the robots. Each leg takes a robot at most the time of `within`.
         seed: The same seed makes the same problem on every machine.
         points: The number of points that are drawn.
-        visit: The points, `X,Y X,Y`, in metres; each is the nearest cell that a robot can get to. Empty: drawn.
+        visit: The points, `X,Y X,Y` or `X,Y,Z X,Y,Z`, in metres; each is the nearest cell that a robot can get
+            to. Empty: drawn.
         idle: Points are idle for 0 to so many seconds, each number as likely as any other.
         rounds: The number of visits that each robot plans.
         apart: How far apart robots should be, in metres.
@@ -87,6 +91,7 @@ def patrol(
     check_bounds({"points": (count, 1, MAX_POINTS), "rounds": (rounds, 1, MAX_ROUNDS), "idle": (idle, 0, MAX_IDLE)})
     metres = exact("apart", apart, 0, 1000)
     reach = reach_of(choice, chance)
+    check_dimensions(given, reach.cells, "visit")
     agents = len(reach.starts)
     if agents * rounds > count:
         raise ValueError(
@@ -123,10 +128,10 @@ def drawn_points(reach: Reach, count: int, chance: Random) -> list[int]:
     found = [cells[uniform(chance, 0, len(cells) - 1)]]
     away = dict.fromkeys(cells, MAX_IDLE**2)
     while len(found) < count:
-        x, y = reach.cells.x_and_y(found[-1])
+        last = reach.cells.coordinates(found[-1])
         for cell in cells:
-            right, up = reach.cells.x_and_y(cell)
-            away[cell] = min(away[cell], (x - right) ** 2 + (y - up) ** 2)
+            here = reach.cells.coordinates(cell)
+            away[cell] = min(away[cell], sum((one - other) ** 2 for one, other in zip(last, here, strict=True)))
         found.append(max(cells, key=lambda cell: (away[cell], -cell)))
     return sorted(found)
 
@@ -194,7 +199,7 @@ def _between(plans: Sequence[_Plan], crowding: Mapping[tuple[int, int], int]) ->
                 yield Constraint("near", relation, scope, scope)
 
 
-def _nearest(reach: Reach, places: Sequence[tuple[Fraction, Fraction]]) -> list[int]:
+def _nearest(reach: Reach, places: Sequence[Place]) -> list[int]:
     """Return the cells of given points; no two have the same."""
     left, found = set(reach.reached), []
     for place in places:
@@ -216,8 +221,7 @@ def _crowding(reach: Reach, points: Sequence[int], apart: Fraction, speed: float
     """Return the time that it takes to drive the metres that two points are too near to each other."""
     found = {}
     for one, other in combinations(points, 2):
-        (a, b), (c, d) = reach.cells.centre(one), reach.cells.centre(other)
-        square = (a - c) ** 2 + (b - d) ** 2
+        square = squared(reach.cells.centre(one), reach.cells.centre(other))
         if square < apart**2:
             missing = apart - Fraction(isqrt(floor(square * _MM**2)), _MM)
             exactly: Fraction = missing / Fraction(str(speed)) * 10**PLACES

@@ -11,11 +11,14 @@ from math import floor
 from pathlib import Path
 from random import Random
 
+import msgspec
+
 from robochoc.formats import PREDEFINED
-from robochoc.formats.ground_map import MAX_BLOCKED, BlockedCell, GroundMap
-from robochoc.formats.occupancy.grid import read_occupancy_grid
+from robochoc.formats.ground_map import MAX_BLOCKED, BlockedCell, GroundMap, Volume
+from robochoc.formats.maps import read_map
 from robochoc.generators.draws import check_bounds, some
-from robochoc.generators.maps.cells import Cells, Place, cells_of
+from robochoc.generators.maps.cubes import Cubes
+from robochoc.generators.maps.sizes import AnyCells, Place, cells_of
 from robochoc.generators.maps.travel import STRAIGHT, UNREACHED, lengths_from
 from robochoc.model.assembly import Extras
 from robochoc.model.constraint import Constraint, Domain, Relation, Semantics, Variable
@@ -28,8 +31,8 @@ USUAL_CELLS = 100
 PLACES = 1
 """Decimal places of costs: they are seconds."""
 HEIGHT = 1
-"""The z of waypoints, in sides of a cell: drones fly so high above the floor."""
-_POINT = re.compile(r"([+-]?\d{1,7}(?:\.\d{1,6})?),([+-]?\d{1,7}(?:\.\d{1,6})?)")
+"""The z of waypoints on a map of the ground, in sides of a cell: drones fly so high above the floor."""
+_PART = re.compile(r"[+-]?\d{1,7}(?:\.\d{1,6})?")
 _HALF = Fraction(1, 2)
 
 
@@ -38,9 +41,10 @@ class MapChoice:
     """A map, and the robots on it. Lengths are in metres, places in the map's frame.
 
     Attributes:
-        map: The path of the map's YAML file.
+        map: The path of the map's YAML file, or of an OctoMap.
         agents: The number of robots. None: as many as `at` has places.
-        at: Where the robots are: `X,Y X,Y`. Empty: drawn from the free cells, each choice as likely as any other.
+        at: Where the robots are: `X,Y X,Y`, on an OctoMap `X,Y,Z X,Y,Z`. Empty: drawn from the free cells,
+            each choice as likely as any other.
         radius: The radius of a robot.
         speed: Metres a second.
         within: A robot gets to the cells that it reaches in so many seconds. None: in any time.
@@ -70,7 +74,7 @@ class Reach:
         seconds: For each robot the time to each cell that it can get to, in units of 10**-`PLACES` seconds.
     """
 
-    cells: Cells
+    cells: AnyCells
     starts: tuple[Place, ...]
     unit: Fraction
     longest: int | None
@@ -106,13 +110,12 @@ class Reach:
         """Return the cell whose centre is nearest to a place; of several the one of the lowest number."""
 
         def distance(cell: int) -> tuple[Fraction, int]:
-            x, y = self.cells.centre(cell)
-            return (x - place[0]) ** 2 + (y - place[1]) ** 2, cell
+            return squared(self.cells.centre(cell), place), cell
 
         return min(among, key=distance)
 
-    def seconds_from(self, pixel: tuple[int, int]) -> dict[int, int]:
-        """Return the time from a passable pixel to each free cell to which a way leads."""
+    def seconds_from(self, pixel: tuple[int, ...]) -> dict[int, int]:
+        """Return the time from a passable pixel, or voxel, to each free cell to which a way leads."""
         lengths = lengths_from(pixel, self.cells.passable, self.longest)
         found = {}
         for cell in self.cells.free:
@@ -128,29 +131,47 @@ class Reach:
         Raises:
             ValueError: Too many cells are blocked.
         """
-        columns, rows = self.cells.columns, self.cells.rows
-        if len(self.cells.blocked) > MAX_BLOCKED:
-            raise ValueError(
-                f"{len(self.cells.blocked):,} cells are blocked, more than {MAX_BLOCKED:,}; take larger cells"
-            )
-        blocked = (divmod(cell, columns) for cell in self.cells.blocked)
-        standing = (self.cells.column_and_row(start) for start in self.starts)
-        return GroundMap(
-            columns,
-            rows,
-            {name: (column + 1, row + 1) for name, (column, row) in zip(self.names, standing, strict=True)},
-            tuple(BlockedCell(column + 1, row + 1) for row, column in blocked),
-            self.cells.first,
-            float(self.cells.side),
+        cells = self.cells
+        if len(cells.blocked) > MAX_BLOCKED:
+            raise ValueError(f"{len(cells.blocked):,} cells are blocked, more than {MAX_BLOCKED:,}; take larger cells")
+        # From 1 on along each axis, as maps of the ground have it.
+        blocked = [self._places_from_1(cells.coordinates(cell)) for cell in cells.blocked]
+        standing = {
+            name: self._places_from_1(cells.containing(start))
+            for name, start in zip(self.names, self.starts, strict=True)
+        }
+        first = cells.first
+        ground = GroundMap(
+            cells.columns,
+            cells.rows,
+            {name: (at[0], at[1]) for name, at in standing.items()},
+            first=(first[0], first[1]),
+            scale=float(cells.side),
         )
+        if isinstance(cells, Cubes):
+            heights = {name: at[2] for name, at in standing.items()}
+            cubes = tuple((at[0], at[1], at[2]) for at in blocked)
+            return msgspec.structs.replace(ground, volume=Volume(cells.counts[2], cells.first[2], heights, cubes))
+        return msgspec.structs.replace(ground, blocked=tuple(BlockedCell(at[0], at[1]) for at in blocked))
+
+    def _places_from_1(self, coordinates: tuple[int, ...]) -> tuple[int, ...]:
+        return tuple(one - first + 1 for one, first in zip(coordinates, self.cells.first, strict=True))
 
     def _waypoint(self, name: str, variable: str) -> Topic:
-        columns = Constant(self.cells.columns)
-        x, y = (
-            _moved(Apply(function, (Name(variable), columns)), by)
-            for function, by in zip(("mod", "div"), self.cells.first, strict=True)
-        )
-        return Topic(f"/{name.lower()}/waypoint", x=x, y=y, z=Constant(HEIGHT))
+        columns, rows = Constant(self.cells.columns), Constant(self.cells.rows)
+        number = Name(variable)
+        parts: list[Expression] = [Apply("mod", (number, columns)), Apply("div", (number, columns))]
+        if isinstance(self.cells, Cubes):
+            level = Constant(self.cells.columns * self.cells.rows)
+            parts[1:] = [Apply("mod", (parts[1], rows)), Apply("div", (number, level))]
+        found = [_moved(part, by) for part, by in zip(parts, self.cells.first, strict=True)]
+        x, y, z = found if len(found) > 2 else (*found, Constant(HEIGHT))  # noqa: PLR2004 - x and y
+        return Topic(f"/{name.lower()}/waypoint", x=x, y=y, z=z)
+
+
+def squared(one: Place, other: Place) -> Fraction:
+    """Return the square of the distance between two places."""
+    return sum(((a - b) ** 2 for a, b in zip(one, other, strict=True)), Fraction(0))
 
 
 def _moved(expression: Expression, by: int) -> Expression:
@@ -171,7 +192,8 @@ def reach_of(choice: MapChoice, chance: Random) -> Reach:
     most = choice.cells or (USUAL_CELLS if side is None else MAX_CELLS)
     check_bounds({"cells": (most, 1, MAX_CELLS)})
     within = None if choice.within is None else exact("within", choice.within, 0, 1_000_000)
-    cells = cells_of(read_occupancy_grid(Path(choice.map)), radius, most, side)
+    cells = cells_of(read_map(Path(choice.map)), radius, most, side)
+    check_dimensions(places, cells, "at")
     if not places:
         if agents > len(cells.free):
             raise ValueError(f"{agents} robots do not fit on {len(cells.free)} free cells; take smaller cells")
@@ -185,14 +207,24 @@ def reach_of(choice: MapChoice, chance: Random) -> Reach:
 
 
 def places_in(text: str, name: str) -> list[Place]:
-    """Return the places in a text, `X,Y X,Y`, in metres. Raises `ValueError`."""
+    """Return the places in a text, `X,Y X,Y` or `X,Y,Z X,Y,Z`, in metres. Raises `ValueError`."""
     found = []
     for word in text.split():
-        matched = _POINT.fullmatch(word)
-        if not matched:
+        parts = word.split(",")
+        if not (2 <= len(parts) <= 3 and all(map(_PART.fullmatch, parts))):  # noqa: PLR2004 - x, y and maybe z
             raise ValueError(f"{name} has {word[:50]!r}; expected places in metres, such as '1.5,2 3,-0.5'")
-        found.append((Fraction(matched[1]), Fraction(matched[2])))
+        found.append(tuple(map(Fraction, parts)))
     return found
+
+
+def check_dimensions(places: Iterable[Place], cells: AnyCells, name: str) -> None:
+    """Raise `ValueError` unless all places have as many coordinates as the map."""
+    wanted = len(cells.first)
+    for place in places:
+        if len(place) != wanted:
+            told = ",".join(f"{float(part):g}" for part in place)
+            expected = "X,Y,Z on a three-dimensional map" if wanted > len(place) else "X,Y on a map of the ground"
+            raise ValueError(f"{name} has '{told}'; expected {expected}")
 
 
 def all_different(values: Sequence[Iterable[int]]) -> Iterator[Constraint]:
@@ -238,10 +270,10 @@ def _agents(agents: int | None, places: Sequence[Place]) -> int:
     return found
 
 
-def _standing(cells: Cells, number: int, place: Place) -> tuple[int, int]:
-    """Return the pixel on which a robot stands."""
+def _standing(cells: AnyCells, number: int, place: Place) -> tuple[int, ...]:
+    """Return the pixel on which a robot stands, or the voxel in which it is."""
     pixel = cells.pixel(place)
-    told = f"robot {number} at {float(place[0]):g},{float(place[1]):g}"
+    told = f"robot {number} at {','.join(f'{float(part):g}' for part in place)}"
     if pixel is None:
         raise ValueError(f"{told} is not on the map")
     if not cells.passable[pixel]:

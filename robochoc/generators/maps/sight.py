@@ -1,4 +1,4 @@
-"""Which cells can be seen from which, along straight lines that touch nothing but free pixels.
+"""Which cells can be seen from which, along straight lines that touch nothing but free pixels, or voxels.
 
 All is exact: places are integers in a unit of which a pixel has a whole number. So what sees is seen, and a line that
 just touches the corner of a wall is blocked on every machine.
@@ -6,6 +6,8 @@ just touches the corner of a wall is blocked on every machine.
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
+from collections.abc import Iterator
 from fractions import Fraction
 from functools import cached_property
 from itertools import combinations
@@ -15,24 +17,35 @@ import numpy as np
 import numpy.typing as npt
 
 from robochoc.generators.maps.cells import Cells
+from robochoc.generators.maps.cubes import Cubes
+from robochoc.generators.maps.sizes import AnyCells, Place
 
 MAX_PAIRS = 100_000
 """The maximum number of pairs of cells within the sensing range."""
 
-Point = tuple[int, int]
+Point = tuple[int, ...]
 
 
-class Sight:
+class Sight(ABC):
     """Lines of sight between the free cells of a map."""
 
-    def __init__(self, cells: Cells) -> None:
+    def __init__(self, cells: AnyCells) -> None:
         self._cells = cells
         places = [self._in_pixels(cell) for cell in cells.free]
         self._unit = lcm(1, *(part.denominator for place in places for part in place))
         """The length of a pixel's side."""
         self._points: dict[int, Point] = {
-            cell: (int(x * self._unit), int(y * self._unit)) for cell, (x, y) in zip(cells.free, places, strict=True)
+            cell: tuple(int(part * self._unit) for part in place)
+            for cell, place in zip(cells.free, places, strict=True)
         }
+
+    @abstractmethod
+    def is_clear(self, one: int, other: int) -> bool:
+        """Return whether the straight line between two free cells touches free pixels only."""
+
+    @abstractmethod
+    def _in_pixels(self, cell: int) -> Place:
+        """Return the place of a cell's centre, in pixels from the lower left corner of the map."""
 
     def seen(self, sensing: Fraction) -> dict[int, frozenset[int]]:
         """Return the cells that are seen from each free cell: those within a range in metres, itself among them.
@@ -43,8 +56,8 @@ class Sight:
         reach = (sensing / self._cells.grid.resolution * self._unit) ** 2
         near = [
             (one, other)
-            for (one, (a, b)), (other, (c, d)) in combinations(self._points.items(), 2)
-            if (a - c) ** 2 + (b - d) ** 2 <= reach
+            for (one, here), (other, there) in combinations(self._points.items(), 2)
+            if sum((a - b) ** 2 for a, b in zip(here, there, strict=True)) <= reach
         ]
         if len(near) > MAX_PAIRS:
             raise ValueError(
@@ -58,8 +71,15 @@ class Sight:
                 found[other].add(one)
         return {cell: frozenset(others) for cell, others in found.items()}
 
+
+class _SightOnGround(Sight):
+    """Lines of sight on a map of the ground."""
+
+    def __init__(self, cells: Cells) -> None:
+        self._grid = cells.grid
+        super().__init__(cells)
+
     def is_clear(self, one: int, other: int) -> bool:
-        """Return whether the straight line between two free cells touches free pixels only."""
         (x, y), (right, end) = sorted((self._points[one], self._points[other]))
         unit, across, up = self._unit, right - x, end - y
         solid = self._solid
@@ -79,11 +99,64 @@ class Sight:
     @cached_property
     def _solid(self) -> npt.NDArray[np.int64]:
         """The number of pixels that are not free below each row, by column."""
-        return np.cumsum(np.pad(~self._cells.grid.free, ((1, 0), (0, 0))), axis=0, dtype=np.int64)
+        return np.cumsum(np.pad(~self._grid.free, ((1, 0), (0, 0))), axis=0, dtype=np.int64)
 
-    def _in_pixels(self, cell: int) -> tuple[Fraction, Fraction]:
-        """Return the place of a cell's centre, in pixels from the lower left corner of the map."""
-        return self._cells.grid.in_pixels(self._cells.centre(cell))
+    def _in_pixels(self, cell: int) -> Place:
+        x, y = self._cells.centre(cell)
+        return self._grid.in_pixels((x, y))
+
+
+class _SightInSpace(Sight):
+    """Lines of sight on a three-dimensional map: through layers of voxels along x, and in each through rows along y."""
+
+    def __init__(self, cells: Cubes) -> None:
+        self._grid = cells.grid
+        super().__init__(cells)
+
+    def is_clear(self, one: int, other: int) -> bool:
+        (x, y, z), (right, back, top) = sorted((self._points[one], self._points[other]))
+        across, along, up = right - x, back - y, top - z
+        whole = (across or 1) * (abs(along) or 1)
+        """How far it is from end to end: a number that the borders of all layers and rows divide into integers."""
+        size, solid = self._unit * whole, self._solid
+        for column, begin, end in _crossed(x, across, (0, whole), whole, self._unit):
+            for row, first, last in _crossed(y, along, (begin, end), whole, self._unit):
+                low, high = sorted((z * whole + up * first, z * whole + up * last))
+                if solid[high // size + 1, row, column] > solid[_first_touched(low, size), row, column]:
+                    return False
+        return True
+
+    @cached_property
+    def _solid(self) -> npt.NDArray[np.int32]:
+        """The number of voxels that are not free below each voxel."""
+        return np.cumsum(np.pad(~self._grid.free, ((1, 0), (0, 0), (0, 0))), axis=0, dtype=np.int32)
+
+    def _in_pixels(self, cell: int) -> Place:
+        return self._grid.in_voxels(self._cells.centre(cell))
+
+
+def sight_on(cells: AnyCells) -> Sight:
+    """Return the lines of sight on a map."""
+    return _SightInSpace(cells) if isinstance(cells, Cubes) else _SightOnGround(cells)
+
+
+def _crossed(place: int, moved: int, part: tuple[int, int], whole: int, unit: int) -> Iterator[tuple[int, int, int]]:
+    """Yield the layers that a part of a line touches along an axis, and how far along the line it enters and leaves.
+
+    Args:
+        place: Where the line begins on the axis.
+        moved: How far it leads along it.
+        part: The part of the line that is looked at, of `whole`.
+        whole: The length of the line. What is moved divides it.
+        unit: The height of a layer.
+    """
+    ends = sorted(place * whole + moved * at for at in part)
+    for layer in range(_first_touched(ends[0], unit * whole), ends[1] // (unit * whole) + 1):
+        if moved:
+            borders = sorted((border * unit - place) * (whole // moved) for border in (layer, layer + 1))
+            yield layer, max(borders[0], part[0]), min(borders[1], part[1])
+        else:
+            yield layer, *part
 
 
 def _first_touched(place: int, size: int) -> int:

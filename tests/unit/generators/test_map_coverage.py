@@ -18,7 +18,7 @@ from robochoc.formats.occupancy.grid import read_occupancy_grid
 from robochoc.generators.maps.cells import Cells
 from robochoc.generators.maps.coverage import coverage, worth_of_a_cell
 from robochoc.generators.maps.reach import MapChoice, reach_of
-from robochoc.generators.maps.sight import Sight
+from robochoc.generators.maps.sight import sight_on
 from robochoc.run.options import Options, Runtime
 from robochoc.run.orchestrator import solve
 from tests.support.evaluation import best, digest
@@ -64,13 +64,14 @@ def test_walls_are_in_the_way(columns: int, rows: int, seed: int, corner: str, s
     with TemporaryDirectory() as folder:
         grid = read_occupancy_grid(write_map(Path(folder), drawn, origin=f"[{corner}, -0.25, 0]"))
     cells = Cells(grid, Fraction(side), grid.free)
-    assert Sight(cells).seen(Fraction(sensing)) == seen_on(drawn, cells, Fraction(sensing))
+    assert sight_on(cells).seen(Fraction(sensing)) == seen_on(drawn, cells, Fraction(sensing))
 
 
 def least(choice: MapChoice, seed: int, sensing: Fraction, worth: Fraction) -> tuple[Fraction, Fraction]:
     """Return the least cost in pairs, and the least one if the union counted: by trying all, seen pixel by pixel."""
     reach = reach_of(choice, Random(seed))
     rows = ["".join(".#"[not free] for free in row) for row in reach.cells.grid.free[::-1]]
+    assert isinstance(reach.cells, Cells)
     seen = seen_on(rows, reach.cells, sensing)
     a_cell = worth_of_a_cell(reach, worth)
     pairs, unions = [], []

@@ -42,16 +42,16 @@ def least(reach: Reach, idleness: dict[int, int], rounds: int, apart: int, withi
     rows = ["".join(".#"[not free] for free in row) for row in grid.free[::-1]]
     fits = fitting(rows, RADIUS / grid.resolution)
 
-    def pixel(place: tuple[Fraction, Fraction]) -> Pixel:
+    def pixel(place: tuple[Fraction, ...]) -> Pixel:
         x, y = (floor((one - corner) / grid.resolution) for one, corner in zip(place, grid.origin, strict=True))
         return x, y
 
-    def times(place: tuple[Fraction, Fraction]) -> dict[int, int]:
+    def times(place: tuple[Fraction, ...]) -> dict[int, int]:
         found = ways(pixel(place), fits)
         seconds = {}
         for point in idleness:
             length = found.get(pixel(reach.cells.centre(point)))
-            exactly = None if length is None else length * grid.resolution / 5 / SPEED
+            exactly = None if length is None else length * grid.resolution / 15 / SPEED
             if exactly is not None and (within is None or exactly <= within):
                 seconds[point] = floor(exactly * 10 + Fraction(1, 2))
         return seconds
@@ -104,7 +104,7 @@ def test_patrols_cost_as_little_as_can_be(
                 (topic,) = robot.topics
                 assert topic.x is not None
                 first = robot.variables[0].name
-                assert evaluate(topic.x, found.assignment) == reach.cells.x_and_y(found.assignment[first])[0]
+                assert evaluate(topic.x, found.assignment) == reach.cells.coordinates(found.assignment[first])[0]
         assert ground.starts.keys() == {robot.name for robot in team.robots}
 
 

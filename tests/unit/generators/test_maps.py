@@ -17,9 +17,11 @@ from hypothesis import strategies as st
 
 from robochoc.formats import InvalidInputError, check_team, read_team, write_team
 from robochoc.formats.occupancy.grid import OccupancyGrid, before, read_occupancy_grid
-from robochoc.generators.maps.cells import Cells, cells_of, passable
+from robochoc.generators.maps.cells import Cells
+from robochoc.generators.maps.clearance import passable
 from robochoc.generators.maps.formation import formation
 from robochoc.generators.maps.reach import MapChoice, Reach, reach_of
+from robochoc.generators.maps.sizes import cells_of
 from robochoc.generators.maps.travel import UNREACHED, lengths_from
 from robochoc.model.expression import evaluate
 from robochoc.model.problem import Team
@@ -72,11 +74,11 @@ def test_a_seed_is_one_problem_everywhere() -> None:
 @examples(60)
 def test_a_robot_keeps_its_radius_from_all_that_is_not_free(columns: int, rows: int, seed: int, radius: str) -> None:
     drawn = drawn_rows(Random(seed), columns, rows)
-    found = pixels(passable(grid_of(drawn, resolution="0.4"), Fraction(radius)))
+    found = pixels(passable(grid_of(drawn).free, Fraction("0.4"), Fraction(radius)))
     assert found == fitting(drawn, Fraction(radius) / Fraction("0.4"))
 
 
-@given(st.integers(1, 12), st.integers(1, 12), st.integers(0, 2**32), st.none() | st.integers(0, 60))
+@given(st.integers(1, 12), st.integers(1, 12), st.integers(0, 2**32), st.none() | st.integers(0, 180))
 @examples(60)
 def test_ways_are_the_shortest_and_cut_no_corner(columns: int, rows: int, seed: int, longest: int | None) -> None:
     drawn = drawn_rows(Random(seed), columns, rows, 0.35)
@@ -154,7 +156,7 @@ def test_pixels_are_summed_once_for_all_sides_of_cells(monkeypatch: pytest.Monke
 def reached(rows: list[str], start: Pixel, radius: Fraction, seconds_a_pixel: Fraction) -> dict[Pixel, int]:
     """Return the tenths of seconds to each pixel that a robot can get to."""
     found = ways(start, fitting(rows, radius))
-    return {pixel: floor(length * seconds_a_pixel * 2 + Fraction(1, 2)) for pixel, length in found.items()}
+    return {pixel: floor(length * seconds_a_pixel * Fraction(2, 3) + Fraction(1, 2)) for pixel, length in found.items()}
 
 
 @given(st.integers(3, 9), st.integers(3, 9), st.integers(0, 2**32), st.integers(1, 3))
@@ -176,7 +178,7 @@ def test_robots_reach_what_lies_in_no_other_room(columns: int, rows: int, seed: 
         start = int(x * 2), int(y * 2)
         assert start in free
         wanted = reached(drawn, start, Fraction("0.4"), Fraction("0.5") / Fraction("0.4"))
-        assert {reach.cells.x_and_y(cell): time for cell, time in seconds.items()} == wanted
+        assert {reach.cells.coordinates(cell): time for cell, time in seconds.items()} == wanted
 
 
 def test_who_has_little_time_gets_less_far(rooms: str) -> None:

@@ -20,7 +20,7 @@ from robochoc.generators.maps.coverage import coverage
 from robochoc.generators.maps.formation import formation
 from robochoc.generators.maps.patrol import patrol
 from robochoc.generators.maps.reach import MapChoice, reach_of
-from robochoc.generators.maps.sight import Sight
+from robochoc.generators.maps.sight import sight_on
 from robochoc.model.expression import evaluate
 from robochoc.run.options import Options, Runtime
 from robochoc.run.orchestrator import solve
@@ -117,6 +117,7 @@ def test_quarter_turns_are_those_of_the_image(tmp_path: Path, yaw: str) -> None:
         reach_of(MapChoice(map=str(tmp_path / name / "plan.yaml"), agents=2, radius=0, cell=0.25), Random(1))
         for name in ("turned", "drawn")
     )
+    assert isinstance(one.cells, Cells)
     assert one.cells.grid.turn.is_none
     assert one.seconds == other.seconds
     assert one.seconds[0]
@@ -161,13 +162,13 @@ def test_ways_on_turned_maps_take_the_time_of_the_image(
             return
     cells = reach.cells
 
-    def pixel(place: tuple[Fraction, Fraction]) -> Pixel:
+    def pixel(place: tuple[Fraction, ...]) -> Pixel:
         x, y = in_pixels((float(place[0]), float(place[1])), origin, float(f"{yaw:.12f}"), 0.5)
         return floor(x), floor(y)
 
     times = ways(pixel(reach.starts[0]), fits)
     wanted = {
-        cell: floor(times[at] * Fraction("0.5") / Fraction("0.4") * 2 + Fraction(1, 2))
+        cell: floor(times[at] * Fraction("0.5") / Fraction("0.4") * Fraction(2, 3) + Fraction(1, 2))
         for cell in cells.free
         if (at := pixel(cells.centre(cell))) in times
     }
@@ -179,7 +180,7 @@ def test_lines_of_sight_on_a_turned_map_are_those_of_the_image() -> None:
     yaw = 0.4
     grid = grid_of(rows, origin=f"[0, 0, {yaw}]")
     cells = Cells(grid, Fraction(1, 2), grid.free)
-    sight = Sight(cells)
+    sight = sight_on(cells)
     found = sight.seen(Fraction(4))
     through = 0
     for one in cells.free:

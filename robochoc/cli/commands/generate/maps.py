@@ -47,7 +47,7 @@ def map_options(command: Command) -> Command:
                 type=InputPath(),
                 required=True,
                 metavar="FILE",
-                help="Map as ROS's map_server reads it: YAML, which names an image.",
+                help="Map of ROS's map_server (YAML, which names an image), or an OctoMap (.bt, .ot).",
             ),
             click.option(
                 "--agents",
@@ -56,7 +56,7 @@ def map_options(command: Command) -> Command:
                 help="Number of robots.  [default: as many as --at has]",
             ),
             click.option(
-                "--at", default="", metavar="'X,Y X,Y'", help="Where robots are, in metres.  [default: on free cells]"
+                "--at", default="", metavar="'X,Y X,Y'", help="Where robots are, in metres.  [default: in free cells]"
             ),
             metres("--radius", "Radius of a robot: it keeps so far from all that is not free.", 0.2),
             metres("--speed", "Metres a second.", 0.5, "M/S"),
@@ -116,7 +116,8 @@ def formation(**problem: Any) -> TeamOnMap:  # noqa: ANN401 - `formation`'s own
     """Formations on a map: each robot takes a slot, and the sum of their travel times is minimised.
 
     A robot's values are the slots that it can get to, around walls and inflated obstacles. No two take the same. Slots
-    in walls move to the nearest free cell. Waypoints are in cells; map.json beside the robots is for fly --map.
+    in walls move to the nearest free cell. Waypoints are in cells; map.json beside the robots is for fly --map. On an
+    OctoMap all places have a Z: cells are cubes, and drones fly through free ones.
 
     \b
     robochoc generate formation --map docs/examples/building/building.yaml --agents 4 --shape wedge --anchor 3,2
@@ -138,7 +139,7 @@ def formation(**problem: Any) -> TeamOnMap:  # noqa: ANN401 - `formation`'s own
 )
 @map_options
 @metres("--sensing", "How far robots see, along free lines.", 3.0)
-@metres("--worth", "Travel time that it is worth to see a square metre.", 10.0, "SECONDS")
+@metres("--worth", "Travel time that it is worth to see a square metre, or a cubic one.", 10.0, "SECONDS")
 @seed_option
 @team_written("coverage-MAP-AGENTS-SEED")
 def coverage(**problem: Any) -> TeamOnMap:  # noqa: ANN401 - `coverage`'s own

@@ -1,0 +1,1 @@
+"""OctoMap: three-dimensional maps as octrees, in files `.bt` and `.ot`."""

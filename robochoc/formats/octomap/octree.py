@@ -1,0 +1,257 @@
+"""The leaves of OctoMap's octrees, as its files `.bt` and `.ot` have them.
+
+OctoMap: Hornung, Wurm, Bennewitz, Stachniss and Burgard, "OctoMap: an efficient probabilistic 3D mapping framework
+based on octrees", Autonomous Robots 34 (2013). An octree of 16 levels is over the cube of 65,536 voxels a side, whose
+middle is the origin of the frame. A file has a header of text, and the nodes in depth-first order:
+
+- `.bt`: two bytes for each inner node, two bits for each of its eight children: 1 is a free leaf, 2 an occupied one, 3
+  an inner node, and 0 is not known.
+- `.ot`: for each node the logarithm of its odds as a float, in trees with colours three bytes for the colour, and a
+  byte with a bit for each child that there is. A leaf is occupied from even odds on, as OctoMap has it by default.
+
+The bits 0, 1 and 2 of a child's number say whether it lies in the upper half along x, y and z.
+
+Nodes are not walked one by one. Where a subtree ends follows from how many children are still to come before each node
+(the Lukasiewicz path of the tree), by one sorting; then each level of the tree is read at once.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+from dataclasses import dataclass
+from fractions import Fraction
+
+import numpy as np
+import numpy.typing as npt
+
+from robochoc.formats.diagnostics import MistakeError, shortened
+
+DEPTH = 16
+"""Levels below the root. A leaf of the last one is a voxel."""
+MAX_BYTES = 32 * 1024 * 1024
+MAX_NODES = 4_000_000
+"""The maximum of nodes that a file stores: with `.bt` these are the inner ones."""
+_BINARY, _FULL = b"# Octomap OcTree binary file", b"# Octomap OcTree file"
+_HEADER_MAX = 64 * 1024
+_SIDE_MIN_M, _SIDE_MAX_M = Fraction(1, 1000), Fraction(100)
+_NUMBER = re.compile(r"[0-9]{1,20}(?:\.[0-9]{1,30})?(?:e[+-]?[0-9]{1,2})?")
+_COUNT = re.compile(r"[0-9]{1,10}")
+_BYTES_OF_NODE = {"OcTree": 5, "1": 5, "OcTreeStamped": 5, "ColorOcTree": 8}
+"""The types of trees that say what is occupied, and the bytes of a node in `.ot`."""
+_FREE, _OCCUPIED, _INNER = 1, 2, 3
+
+Integers = npt.NDArray[np.int64]
+
+
+@dataclass(frozen=True, eq=False)
+class Leaves:
+    """Leaves of one size. A side has 2 ** `exponent` voxels.
+
+    Attributes:
+        exponent: The size.
+        corners: The lowest corner of each leaf, x, y and z in sides of a leaf from the lowest corner of the tree.
+        occupied: Which are occupied. The others are free.
+    """
+
+    exponent: int
+    corners: Integers
+    occupied: npt.NDArray[np.bool_]
+
+
+@dataclass(frozen=True, eq=False)
+class Octree:
+    """An octree: the side of a voxel in metres, and the leaves that are known, largest first."""
+
+    resolution: Fraction
+    leaves: tuple[Leaves, ...]
+
+
+def is_octomap(begin: bytes) -> bool:
+    """Return whether a file that begins so is one of OctoMap's."""
+    return begin.startswith((_BINARY, _FULL))
+
+
+def read_octree(content: bytes) -> Octree:
+    """Return the octree of a file.
+
+    Raises:
+        MistakeError: It is no such file, is not complete, or has more than `MAX_NODES`.
+    """
+    header = _Header(content)
+    if not header.size:
+        return Octree(header.resolution, ())
+    nodes = _BinaryNodes(content, header) if content.startswith(_BINARY) else _FullNodes(content, header)
+    return Octree(header.resolution, tuple(nodes.leaves()))
+
+
+class _Header:
+    """The header of a file: lines with a keyword and its value, up to `data`."""
+
+    def __init__(self, content: bytes) -> None:
+        if not is_octomap(content):
+            raise MistakeError("is no OctoMap file", f"it begins with '{_BINARY.decode()}' or '{_FULL.decode()}'")
+        found: dict[str, tuple[int, str]] = {}
+        self.end = number = 0
+        while True:
+            number += 1
+            end = content.find(b"\n", self.end, _HEADER_MAX)
+            if end < 0:
+                raise MistakeError("has a header without end", "a line 'data' ends it, and the nodes follow", number)
+            line = content[self.end : end].decode("ascii", "replace").split(None, 1)
+            self.end = end + 1
+            if line == ["data"]:
+                break
+            if line and not line[0].startswith("#"):
+                found[line[0]] = (number, line[1].strip() if len(line) > 1 else "")
+        for key in ("id", "size", "res"):
+            if key not in found:
+                raise MistakeError(f"has no {key} in its header", "it has the lines id, size, res and data", number)
+        self.type = self._type(*found["id"])
+        self.size = self._size(*found["size"])
+        self.resolution = self._number("res", *found["res"], _SIDE_MIN_M, _SIDE_MAX_M)
+
+    @staticmethod
+    def _type(line: int, name: str) -> str:
+        if name not in _BYTES_OF_NODE:
+            hint = "read are OcTree, ColorOcTree and OcTreeStamped"
+            raise MistakeError(f"has a tree of the type {shortened(name)}", hint, line)
+        return name
+
+    @staticmethod
+    def _size(line: int, text: str) -> int:
+        if not _COUNT.fullmatch(text):
+            raise MistakeError("has a wrong size", "expected the number of nodes", line)
+        return int(text)
+
+    @staticmethod
+    def _number(key: str, line: int, text: str, least: Fraction, most: Fraction) -> Fraction:
+        if _NUMBER.fullmatch(text) and least <= Fraction(text) <= most:
+            return Fraction(text)
+        expected = f"expected a number from {float(least):g} to {float(most):g}"
+        raise MistakeError(f"has a wrong {key}", expected, line)
+
+
+class _Nodes:
+    """The nodes of a file, in depth-first order.
+
+    Args:
+        begin: The byte at which they begin.
+        size: The bytes of a node.
+        children: For each node that the file could have, the number of its children that the file has, too.
+    """
+
+    def __init__(self, begin: int, size: int, children: Integers) -> None:
+        self._begin, self._size = begin, size
+        left = np.cumsum(children - 1) + 1  # nodes that are still to come, behind each
+        ends = np.flatnonzero(left == 0)
+        if not ends.size:
+            known = f"ends after {len(children):,} nodes"
+            if len(children) >= MAX_NODES:
+                raise MistakeError(f"has more than {MAX_NODES:,} nodes", "take a coarser map")
+            raise MistakeError(f"{known}, and has more", "the file is not complete")
+        self.count = int(ends[0]) + 1
+        self.children = children[: self.count]
+        self._end = self._ends(left)
+
+    def _ends(self, left: Integers) -> Integers:
+        """Return for each node the one behind its subtree: the first one before which fewer nodes are to come."""
+        count = self.count
+        before = np.concatenate(([1], left[:count]))
+        keys = before * (count + 1) + np.arange(count + 1)
+        order = np.sort(keys)
+        found: Integers = order[np.searchsorted(order, keys[:-1] - (count + 1), side="right")] % (count + 1)
+        return found
+
+    def place(self, node: int) -> str:
+        """Return where a node stands in the file."""
+        return f"byte {self._begin + node * self._size}"
+
+    def behind(self, nodes: Integers) -> Integers:
+        """Return the nodes behind subtrees."""
+        return self._end[nodes]
+
+    def check_depth(self, exponent: int, nodes: Integers) -> None:
+        """Raise `MistakeError` where there are inner nodes below the last level."""
+        if exponent < 1 and nodes.size:
+            raise MistakeError(f"has a node below level {DEPTH} at {self.place(int(nodes[0]))}", "the file is damaged")
+
+
+class _BinaryNodes(_Nodes):
+    """The inner nodes of a file `.bt`."""
+
+    def __init__(self, content: bytes, header: _Header) -> None:
+        count = min((len(content) - header.end) // 2, MAX_NODES)
+        self._words = np.frombuffer(content, dtype="<u2", count=count, offset=header.end).astype(np.int64)
+        children = np.zeros(count, dtype=np.int64)
+        for child in range(8):
+            children += self._kind(self._words, child) == _INNER
+        super().__init__(header.end, 2, children)
+        self._expected = header.size
+
+    def leaves(self) -> Iterator[Leaves]:
+        """Yield the known leaves, level by level."""
+        nodes, corners = np.zeros(1, dtype=np.int64), np.zeros((1, 3), dtype=np.int64)
+        found, exponent = 1, DEPTH
+        while nodes.size:
+            self.check_depth(exponent, nodes)
+            exponent -= 1
+            words, following = self._words[nodes], nodes + 1
+            empty = nodes[words == 0]
+            if empty.size:
+                raise MistakeError(f"has a node without children at {self.place(int(empty[0]))}", "the file is damaged")
+            inner: list[tuple[Integers, Integers]] = []
+            known: list[tuple[Integers, npt.NDArray[np.bool_]]] = []
+            for child in range(8):
+                kinds, places = self._kind(words, child), _below(corners, child)
+                deeper, leaf = kinds == _INNER, (kinds == _FREE) | (kinds == _OCCUPIED)
+                inner.append((following[deeper], places[deeper]))
+                following[deeper] = self.behind(following[deeper])
+                known.append((places[leaf], kinds[leaf] == _OCCUPIED))
+            nodes, corners = (np.concatenate(parts) for parts in zip(*inner, strict=True))
+            places, occupied = (np.concatenate(parts) for parts in zip(*known, strict=True))
+            found += len(nodes) + len(places)
+            yield Leaves(exponent, places, occupied)
+        if found != self._expected:
+            raise MistakeError(f"has {found:,} nodes, and its header says {self._expected:,}", "the file is damaged")
+
+    @staticmethod
+    def _kind(words: Integers, child: int) -> Integers:
+        return (words >> (2 * child)) & 3
+
+
+class _FullNodes(_Nodes):
+    """The nodes of a file `.ot`, leaves among them."""
+
+    def __init__(self, content: bytes, header: _Header) -> None:
+        size = _BYTES_OF_NODE[header.type]
+        count = min((len(content) - header.end) // size, MAX_NODES)
+        rows = np.frombuffer(content, dtype=np.uint8, count=count * size, offset=header.end).reshape(count, size)
+        self._odds = np.ascontiguousarray(rows[:, :4]).view("<f4").ravel()
+        self._bits = rows[:, -1]
+        super().__init__(header.end, size, np.bitwise_count(self._bits).astype(np.int64))
+
+    def leaves(self) -> Iterator[Leaves]:
+        """Yield the known leaves, level by level. A leaf whose odds are no number is not known."""
+        nodes, corners = np.zeros(1, dtype=np.int64), np.zeros((1, 3), dtype=np.int64)
+        exponent = DEPTH
+        while nodes.size:
+            is_leaf = self.children[nodes] == 0
+            known = is_leaf & ~np.isnan(self._odds[nodes])
+            yield Leaves(exponent, corners[known], self._odds[nodes[known]] >= 0)
+            nodes, corners = nodes[~is_leaf], corners[~is_leaf]
+            self.check_depth(exponent, nodes)
+            exponent -= 1
+            following = nodes + 1
+            inner: list[tuple[Integers, Integers]] = []
+            for child in range(8):
+                there = (self._bits[nodes] >> child) & 1 == 1
+                inner.append((following[there], _below(corners, child)[there]))
+                following[there] = self.behind(following[there])
+            nodes, corners = (np.concatenate(parts) for parts in zip(*inner, strict=True))
+
+
+def _below(corners: Integers, child: int) -> Integers:
+    """Return the corners of children with a number, in sides of a child."""
+    upper: Integers = np.array([child & 1, child >> 1 & 1, child >> 2 & 1], dtype=np.int64)
+    return 2 * corners + upper

@@ -1,0 +1,47 @@
+"""The walls of a three-dimensional map, as seen from within.
+
+A blocked cell has a face towards each cell of the map that is not blocked. Each is drawn from that side alone: whoever
+looks from outside sees through the nearer walls, and the ceiling, onto the further ones and the floor.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import numpy.typing as npt
+
+from robochoc.view.quadrotor import Shape
+
+_Cells = npt.NDArray[np.int64]
+
+
+def walls_of(blocked: _Cells, low: _Cells, high: _Cells, width: float) -> Shape | None:
+    """Return the faces of blocked cells, in cells; None: there are none.
+
+    Args:
+        blocked: The cells: x, y and z of each in a row.
+        low: The x, y and z of the first cell of the map.
+        high: Those of the last one.
+        width: The width of a face: with less than 1, one is told from the next.
+    """
+    taken = {*map(tuple, blocked.tolist())}
+    corners = []
+    for axis in range(3):
+        across = [(axis + 1) % 3, (axis + 2) % 3]
+        for side in (-1, 1):
+            beside = blocked.copy()
+            beside[:, axis] += side
+            inside = ((beside >= low) & (beside <= high)).all(axis=1)
+            shown = inside & np.array([tuple(cell) not in taken for cell in beside.tolist()], dtype=np.bool_)
+            face = np.zeros((4, 3))
+            face[:, axis] = side / 2
+            turn = [(-1, -1), (1, -1), (1, 1), (-1, 1)][::side]  # counterclockwise, seen from the other cell
+            face[:, across] = np.array(turn) * width / 2
+            corners.append((blocked[shown][:, None, :] + face).reshape(-1, 3))
+    vertices = np.concatenate(corners)
+    if not vertices.size:
+        return None
+    first = np.arange(0, len(vertices), 4)
+    faces = np.concatenate(
+        [np.column_stack([first, first + 1, first + 2]), np.column_stack([first, first + 2, first + 3])]
+    )
+    return Shape(vertices, faces, np.ones_like(vertices))
