@@ -250,7 +250,7 @@ def improvements(events: Iterable[AnyEvent], objective: Objective) -> Iterator[A
             case Heard():
                 cost, now = event.cost, objective.shown(event.values)
             case Given():
-                objective.interfaces = _interfaces(reader, event)
+                objective.interfaces = interfaces_given(reader, event)
                 continue
             case _:
                 continue
@@ -260,7 +260,7 @@ def improvements(events: Iterable[AnyEvent], objective: Objective) -> Iterator[A
             yield Improved(t=event.t, cost=objective.told(best), assignment=values)
 
 
-def _interfaces(reader: TeamReader, given: Given) -> dict[str, tuple[str, ...]]:
+def interfaces_given(reader: TeamReader, given: Given) -> dict[str, tuple[str, ...]]:
     """Return the variables that the robots in `given` show; of none, if it cannot be read."""
     try:
         return {robot.name: robot.interface for robot in reader.team(given).robots}

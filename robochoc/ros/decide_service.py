@@ -7,6 +7,7 @@ wrong with one is answered in a sentence.
 from __future__ import annotations
 
 import math
+import reprlib
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from typing import Any
@@ -27,6 +28,8 @@ DECIDE, TRIGGER = "robochoc_msgs/Decide", "std_srvs/Trigger"
 """The types of services that are offered."""
 CHANGES_MAX = 1_000
 CHANGES_CHARACTERS_MAX = 64 * 1024
+REFUSAL_CHARACTERS_MAX = 1_000
+"""A refusal may repeat what was asked, which may be long."""
 RESULT_CHARACTERS_MAX = 128 * 1024
 """A longer result is left out of the answer."""
 
@@ -69,9 +72,9 @@ class DecideService:
     def decide(self, fields: Fields) -> dict[str, Any]:
         """Return the answer to a request `robochoc_msgs/Decide_Request`. Only `SystemExit` is raised."""
         try:
-            team = self._team(str(fields.get("team", "")))
+            team = self._team(_text(fields, "team"))
             options = replace(self._options, timeout=self._timeout_s(fields.get("timeout", 0.0)))
-            changed = apply_changes(team, _changes(str(fields.get("changes", ""))))
+            changed = apply_changes(team, _changes(_text(fields, "changes")))
             return _answer(self._solve(changed, options))
         except (RequestError, ChangeError) as wrong:
             return refusal(str(wrong))
@@ -96,14 +99,37 @@ class DecideService:
         return self._teams[name]
 
     def _timeout_s(self, asked: object) -> float | None:
-        if not isinstance(asked, int | float) or not math.isfinite(asked) or asked < 0:
-            raise RequestError(f"timeout must be seconds, or 0 for the longest, is {asked!r}")
+        if isinstance(asked, bool) or not isinstance(asked, int | float) or not 0 <= asked < math.inf:
+            raise RequestError(f"timeout must be seconds, or 0 for the longest, is {_shown(asked)}")
         return min((one for one in (asked, self._options.timeout) if one), default=None)
+
+
+def _text(fields: Fields, name: str) -> str:
+    """Return the text of a field; empty if it is not given. Raises `RequestError`."""
+    value = fields.get(name, "")
+    if not isinstance(value, str):
+        raise RequestError(f"{name} must be text, is {_shown(value)}")
+    try:
+        value.encode()
+    except UnicodeEncodeError as error:
+        half = f"character {error.start + 1:,} is half of a pair (U+{ord(value[error.start]):04X})"
+        raise RequestError(f"{name} must be text that UTF-8 can hold, and {half}") from None
+    return value
+
+
+def _shown(value: object) -> str:
+    """Return a value that is wrong, short enough for a message."""
+    try:
+        return shortened(reprlib.repr(value))
+    except Exception:  # noqa: BLE001 - a whole number may have too many digits to be written
+        return f"a {type(value).__name__}"
 
 
 def refusal(why: str) -> dict[str, Any]:
     """Return the answer that nothing was decided, and why."""
-    return {"success": False, "message": on_one_line(why)}
+    told = on_one_line(why)
+    most = REFUSAL_CHARACTERS_MAX
+    return {"success": False, "message": told if len(told) <= most else f"{told[: most - 3]}..."}
 
 
 def _answer(outcome: Outcome) -> dict[str, Any]:

@@ -23,9 +23,12 @@ class _Request:
 
 @contextmanager
 def stop_heard() -> Iterator[None]:
-    """Let the signal `STOP` ask for it, meanwhile. Elsewhere than in the main thread nothing is heard."""
+    """Let the signal `STOP` ask for it, meanwhile. Elsewhere than in the main thread no signal is heard."""
     if threading.current_thread() is not threading.main_thread():
-        yield
+        try:
+            yield
+        finally:
+            _Request.made = False
         return
 
     def hear(*_: object) -> None:
@@ -39,6 +42,11 @@ def stop_heard() -> Iterator[None]:
         signal.pthread_sigmask(signal.SIG_SETMASK, mask)
         signal.signal(STOP, before)
         _Request.made = False
+
+
+def request_stop() -> None:
+    """Ask for it, as the signal does. It holds until `stop_heard` is left."""
+    _Request.made = True
 
 
 def stop_requested() -> bool:

@@ -27,7 +27,7 @@ from robochoc.ros.live.dds_service import WAITING_MAX, DdsServices
 from robochoc.ros.recordings.types import FieldsError, types_of
 from robochoc.ros.sink import Fields, SinkError
 from robochoc.run import Options, Runtime, solve
-from tests.support.dds import LOOPBACK_ALONE, ServiceClient, free_domain
+from tests.support.dds import LOOPBACK_ALONE, ServiceClient, free_domain, subscriber
 from tests.support.limits import HANG_S, wait_until
 from tests.support.program import PROGRAM, ROOT
 from tests.support.small_teams import pair
@@ -174,6 +174,32 @@ def test_a_client_is_answered_with_its_own_number(offered: DdsServices) -> None:
         assert client.heard() == {"guid": GUID, "seq": 1, "success": False, "message": "b"}
 
 
+def test_a_service_at_once_does_not_wait_for_its_turn(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(dds_service, "END_S", 0.0)  # clients are killed
+    kinds = {SERVICE: DECIDE, "/robochoc/cancel": TRIGGER}
+    at_once = {"/robochoc/cancel": lambda _: refusal("nothing")}
+    with (
+        DdsServices(str(free_domain()), kinds, refusal, at_once) as offered,
+        ServiceClient(offered.domain, {SERVICE: "Decide", "/robochoc/cancel": "Trigger"}) as client,
+    ):
+        client.begin(SERVICE, {"team": "hangar"})
+        request = offered.next(HANG_S)
+        assert request is not None
+        client.begin("/robochoc/cancel", {})
+        offered.reply(request, {"success": True, "message": "a"})
+        assert client.heard()["message"] == "a", "the client waits for one answer after the other"
+        assert client.heard()["message"] == "nothing"
+        assert offered.next(0.001) is None
+
+
+def test_feedback_is_published(offered: DdsServices) -> None:
+    with subscriber(offered.domain, {"/robochoc/feedback": "String"}) as peer:
+        offered.announce("/robochoc/feedback", "std_msgs/String")
+        wait_until(lambda: offered._participant.subscribers(["/robochoc/feedback"]) == [1], "nobody listens")  # noqa: SLF001
+        offered.publish("/robochoc/feedback", "std_msgs/String", {"data": "{}"})
+        assert "{}" in str(peer.heard())
+
+
 @pytest.mark.parametrize("raw", ["", "ff", "ffffffff61626364", "00000000" * 5, "05000000616200"])
 def test_bytes_that_are_no_request_are_answered(
     offered: DdsServices, monkeypatch: pytest.MonkeyPatch, raw: str
@@ -302,7 +328,7 @@ def test_a_signal_ends_it(how: signal.Signals, status: int) -> None:
 @pytest.mark.parametrize(
     ("words", "told"),
     [
-        (["--ros", "rospy"], "--ros rospy: services are offered by dds, as in dds:5, and by rclpy"),
+        (["--ros", "rospy"], "--ros rospy: services are offered by dds, rclpy, rmw_zenoh, rosbridge; as in dds:5"),
         (["--ros", "dds:x"], "'x' is no domain of DDS"),
         (["--timeout", "0"], "--timeout"),
     ],

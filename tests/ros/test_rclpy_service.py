@@ -17,7 +17,7 @@ from robochoc.ros.decide_service import DECIDE, TRIGGER, refusal
 from robochoc.ros.live.rclpy_service import RclpyServices
 from robochoc.ros.sink import SinkError
 from tests.support import rclpy_stand_in
-from tests.support.limits import HANG_S
+from tests.support.limits import HANG_S, wait_until
 from tests.support.program import ROOT
 from tests.support.ros2_python import ros2_python
 
@@ -57,6 +57,31 @@ def test_each_request_is_answered(offered: RclpyServices) -> None:
     (answer,) = answers
     assert (answer.success, answer.message, list(answer.values)) == (True, "a", [1, 2])  # type: ignore[attr-defined]
     assert offered.next(0) is None
+
+
+def test_a_service_at_once_does_not_wait_for_its_turn() -> None:
+    kinds = {**SERVICES, "/robochoc/cancel": TRIGGER}
+    with RclpyServices("", kinds, refusal, {"/robochoc/cancel": lambda _: refusal("nothing")}) as offered:
+        client, answers = asked(offered, "/robochoc/decide")
+        request = offered.next(HANG_S)
+        assert request is not None
+        (other,) = offered._ros._others  # noqa: SLF001 - the stand-in's
+        assert other.call("/robochoc/cancel").message == "nothing"
+        assert not answers
+        offered.reply(request, {"success": True, "message": "a"})
+        client.join(HANG_S)
+
+
+def test_feedback_is_published(offered: RclpyServices) -> None:
+    heard: list[bytes] = []
+    text = rclpy_stand_in.message_class("std_msgs/String")
+    with RclpyServices("", {}, refusal) as listener:
+        node, quality = listener._ros.node, listener._ros.for_services()  # noqa: SLF001 - the stand-in's
+        node.create_subscription(text, "/robochoc/feedback", heard.append, quality, raw=True)
+        offered.announce("/robochoc/feedback", "std_msgs/String")
+        offered.publish("/robochoc/feedback", "std_msgs/String", {"data": "{}"})
+        wait_until(lambda: bool(heard), "feedback does not come")
+    assert json.loads(heard[0]) == {"data": "{}"}
 
 
 def test_who_waits_when_it_ends_is_told(offered: RclpyServices) -> None:

@@ -54,6 +54,10 @@ class Server:
     """The operations, one after the other."""
     port: int = 0
     handlers: list[Handler] = field(default_factory=list)
+    offered: dict[str, tuple[str, Handler]] = field(default_factory=dict)
+    """The services that clients offer: the types, and who offers."""
+    calls: dict[str, tuple[str, Handler]] = field(default_factory=dict)
+    """The calls of these that are not answered yet: how the caller has numbered them, and who calls."""
 
     def __enter__(self) -> Self:
         self._loop = asyncio.new_event_loop()
@@ -130,6 +134,9 @@ class Handler(WebSocketHandler):
         with self.server.changed:
             if self in self.server.handlers:
                 self.server.handlers.remove(self)
+            for name, (_, provider) in [*self.server.offered.items()]:
+                if provider is self:
+                    del self.server.offered[name]
             self.server.log.append("closed")
             self.server.changed.notify_all()
 
@@ -159,6 +166,7 @@ class Handler(WebSocketHandler):
                 if message["topic"] not in server.advertised:
                     server.wrong.append(f"not advertised: {message}")
                 server.published.append((message["topic"], message["msg"]))
+                server._say(message["topic"], message["msg"])  # noqa: SLF001 - in its own loop
                 if len(server.published) == manner.dies_after:
                     self.break_off()
             case "subscribe":
@@ -167,6 +175,20 @@ class Handler(WebSocketHandler):
                     self.send(garbage)
             case "unsubscribe":
                 del self.subscribed[message["topic"]]
+            case "advertise_service":
+                server.offered[message["service"]] = message["type"], self
+                if manner.complains:
+                    self.send(json.dumps({"op": "status", "level": "error", "msg": manner.complains}))
+            case "unadvertise_service":
+                del server.offered[message["service"]]
+            case "call_service" if message["service"] in server.offered:
+                number = f"service_request:{message['service']}:{len(server.log)}"
+                server.calls[number] = message["id"], self
+                passed = {"op": "call_service", "id": number, "service": message["service"]}
+                server.offered[message["service"]][1].send(json.dumps({**passed, "args": message["args"]}))
+            case "service_response":
+                number, caller = server.calls.pop(message["id"])
+                caller.send(json.dumps({**message, "id": number}))
             case "call_service" if manner.answers_services:
                 answer = {"op": "service_response", "id": message["id"], "service": message["service"]}
                 self.send(json.dumps({**answer, "values": "there is no such service", "result": False}))

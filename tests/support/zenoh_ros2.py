@@ -89,9 +89,17 @@ class FarEnd(_Program):
 
     def ask(self, name: str, **given: object) -> Any:  # noqa: ANN401 - JSON
         """Give a command; return the answer."""
+        self.begin(name, **given)
+        return self.answer()
+
+    def begin(self, name: str, **given: object) -> None:
+        """Give a command, and do not wait for the answer."""
         assert self.process.stdin is not None
         self.process.stdin.write(json.dumps([name, given]) + "\n")
         self.process.stdin.flush()
+
+    def answer(self) -> Any:  # noqa: ANN401 - JSON
+        """Return the oldest answer that was not taken yet."""
         return self._answers.get(timeout=HANG_S)
 
     def wait_for(self, number: int) -> list[tuple[str, dict[str, Any]]]:

@@ -15,8 +15,8 @@ from collections.abc import Callable
 from typing import Any
 
 import numpy as np
-from zenoh_ros2_sdk import ROS2Publisher, ROS2Subscriber
-from zenoh_ros2_sdk.discovery import get_topic_info, get_topic_names_and_types
+from zenoh_ros2_sdk import ROS2Publisher, ROS2ServiceClient, ROS2Subscriber
+from zenoh_ros2_sdk.discovery import get_service_names_and_types, get_topic_info, get_topic_names_and_types
 from zenoh_ros2_sdk.qos import QosDurability, QosProfile
 from zenoh_ros2_sdk.utils import get_type_hash
 
@@ -39,6 +39,16 @@ KINDS = {
     + "float32 design_capacity\nfloat32 percentage\n"
     + "".join(f"uint8 power_supply_{name}\n" for name in ("status", "health", "technology"))
     + "bool present\nfloat32[] cell_voltage\nfloat32[] cell_temperature\nstring location\nstring serial_number\n",
+}
+SERVICES = {
+    "std_srvs/srv/Trigger": ("uint8 structure_needs_at_least_one_member\n", "bool success\nstring message\n"),
+    "robochoc_msgs/srv/Decide": (
+        "string team\nstring changes\nfloat64 timeout\n",
+        (
+            "bool success\nstring message\nstring verdict\nstring cost\nstring[] variables\nint64[] values\n"
+            "string[] withdrawn\nstring result\n"
+        ),
+    ),
 }
 
 
@@ -114,6 +124,28 @@ class End:
             serial_number="A1",
         )
         self.say(["", "published"])
+
+    def call(self, service: str, kind: str, fields: dict[str, Any], timeout: float) -> None:
+        """Ask a service, in a thread of its own; the answer is null if none came."""
+
+        def ask() -> None:
+            request, response = SERVICES[kind]
+            client = ROS2ServiceClient(
+                service,
+                kind,
+                request_definition=request,
+                response_definition=response,
+                router_port=self.port,
+                timeout=timeout,
+            )
+            answer = client.call(**fields)
+            self.say(["", [service, plain(answer) if answer is not None else None]])
+            client.close()
+
+        threading.Thread(target=ask, daemon=True).start()
+
+    def services(self) -> None:
+        self.say(["", get_service_names_and_types(router_port=self.port)])
 
     def hashes(self) -> None:
         self.say(["", {kind: hash_of(kind) for kind in KINDS}])

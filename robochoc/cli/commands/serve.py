@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import suppress
+from importlib import import_module
 from pathlib import Path
+from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
 import click
@@ -14,10 +17,19 @@ from robochoc.cli.reports.failures import USAGE, Failure, failures_told, invalid
 
 if TYPE_CHECKING:
     from robochoc.model.problem import Team
-    from robochoc.ros.live.dds_service import DdsServices
-    from robochoc.ros.live.rclpy_service import RclpyServices
+    from robochoc.ros.live.services import AtOnce, Refuse, Request, Services
 
-_SERVICE = "/robochoc/decide"
+_SERVICE, _CANCEL, _FEEDBACK = "/robochoc/decide", "/robochoc/cancel", "/robochoc/feedback"
+_TEXT = "std_msgs/String"
+_OFFERED: Mapping[str, tuple[str, str]] = MappingProxyType(
+    {
+        "dds": ("dds_service", "DdsServices"),
+        "rclpy": ("rclpy_service", "RclpyServices"),
+        "rmw_zenoh": ("rmw_zenoh_service", "RmwZenohServices"),
+        "rosbridge": ("rosbridge_service", "RosbridgeServices"),
+    }
+)
+"""The modules in `robochoc.ros.live`, and the classes there."""
 _SLICE_S = 0.2
 """The interval at which signals are heard, in seconds."""
 
@@ -29,7 +41,8 @@ _SLICE_S = 0.2
     "place",
     default="dds",
     metavar="PLACE",
-    help="dds, dds:DOMAIN?partition=NAME, or rclpy.  [default: dds, in the domain of ROS_DOMAIN_ID]",
+    help="dds, dds:DOMAIN?partition=NAME, rclpy, rmw_zenoh://HOST:PORT or rosbridge://HOST:PORT.  "
+    "[default: dds, in the domain of ROS_DOMAIN_ID]",
 )
 @click.option("--protocol", default="auto", show_default=True, metavar="NAME", help="As for robochoc solve.")
 @click.option(
@@ -48,65 +61,83 @@ _SLICE_S = 0.2
     help="The longest time for one request; a request may ask for less.",
 )
 @click.option("--seed", type=click.IntRange(0), default=0, show_default=True, metavar="N", help="Seed of all chance.")
+@click.option("--feedback", is_flag=True, help="While a team decides, tell on /robochoc/feedback how far it is.")
 @click.option("--requests", type=click.IntRange(1), metavar="N", help="End after N answers.  [default: at Ctrl-C]")
 @invalid_input_fails
-def serve(paths: tuple[Path, ...], place: str, requests: int | None, **given: Any) -> None:  # noqa: ANN401 - how teams decide
-    """Decide for others: a service of ROS 2, for a behaviour tree or another node. With dds no ROS has to be here.
+def serve(
+    paths: tuple[Path, ...],
+    place: str,
+    requests: int | None,
+    *,
+    feedback: bool,
+    **given: Any,  # noqa: ANN401 - how teams decide
+) -> None:
+    """Decide for others: a service of ROS, for a behaviour tree or another node. Only rclpy needs a ROS here.
 
     /robochoc/decide (robochoc_msgs/srv/Decide) takes a team's name and changes of its problem. For each team there is
-    also /robochoc/TEAM/decide (std_srvs/srv/Trigger). Requests are answered one after the other.
+    also /robochoc/TEAM/decide (std_srvs/srv/Trigger). Requests are answered one after the other; /robochoc/cancel
+    (std_srvs/srv/Trigger) ends the decision that is being made.
 
     \b
     robochoc serve docs/examples/hangar
     ros2 service call /robochoc/hangar/decide std_srvs/srv/Trigger
     """  # noqa: D301 - \\b is how click is told to leave the lines as they are
     kind, _, where = place.partition(":")
-    if kind not in {"dds", "rclpy"}:
-        raise click.UsageError(f"--ros {place}: services are offered by dds, as in dds:5, and by rclpy")
+    if kind not in _OFFERED:
+        raise click.UsageError(f"--ros {place}: services are offered by {', '.join(_OFFERED)}; as in dds:5")
     teams = _teams(paths)
     from robochoc.ros.decide_service import DECIDE, SERVICES, TRIGGER, DecideService, refusal
+    from robochoc.ros.decision import FollowedDecision
     from robochoc.ros.names import ros_name
     from robochoc.ros.sinks import lacking_for
     from robochoc.run.options import Options, Runtime
-    from robochoc.run.orchestrator import solve
 
     lacking = lacking_for(kind)
     if lacking:
         raise Failure(USAGE, lacking)
     options = Options(given["protocol"], Runtime(given["runtime"]), given["seed"], given["timeout"])
-    decider = DecideService(teams, solve, options)
     triggers = {f"/robochoc{ros_name(team.name)}/decide": team.name for team in teams}
     if len(triggers) < len(teams):
         raise Failure(USAGE, "two teams would have the same service in ROS: give one's folder another name")
-    services = {_SERVICE: DECIDE, **dict.fromkeys(triggers, TRIGGER)}
-    with ros_errors_fail(), _offered(kind, where, services, refusal) as offered:
+    services = {_SERVICE: DECIDE, **dict.fromkeys((*triggers, _CANCEL), TRIGGER)}
+
+    def tell(text: str) -> None:
+        with suppress(Exception):  # no decision fails because nobody hears of it
+            offered.publish(_FEEDBACK, _TEXT, {"data": text})
+
+    decision = FollowedDecision(tell if feedback else None)
+    decider = DecideService(teams, decision, options)
+    with ros_errors_fail(), _opened(kind, where, services, refusal, {_CANCEL: decision.cancel}) as offered:
+        if feedback:
+            offered.announce(_FEEDBACK, _TEXT)
         for name, what in services.items():
             is_here = name not in offered.lacking
             told = SERVICES[what] if is_here else f"not offered: {SERVICES[what]} is not built here"
             click.echo(f"{offered.where}: {name} ({told})", err=True)
-        answered = 0
-        while answered != requests:
-            request: Any = offered.next(_SLICE_S)
-            if request is None:
-                continue
+        for request in _requests(offered, requests):
             named = triggers.get(request.name)
             answer = decider.decide(request.fields) if named is None else decider.trigger(named)
             offered.reply(request, answer)
-            answered += 1
             click.echo(f"{request.name}: {answer['message']}", err=True)
 
 
-def _offered(
-    kind: str, place: str, services: Mapping[str, str], refuse: Callable[[str], Mapping[str, Any]]
-) -> DdsServices | RclpyServices:
-    """Return the services, by DDS or by rclpy. Raises `SinkError`."""
-    if kind == "dds":
-        from robochoc.ros.live.dds_service import DdsServices
+def _requests(offered: Services, most: int | None) -> Iterator[Request]:
+    """Yield requests as they come, at most so many."""
+    yielded = 0
+    while yielded != most:
+        request = offered.next(_SLICE_S)
+        if request is not None:
+            yield request
+            yielded += 1
 
-        return DdsServices(place, services, refuse)
-    from robochoc.ros.live.rclpy_service import RclpyServices
 
-    return RclpyServices(place, services, refuse)
+def _opened(kind: str, place: str, services: Mapping[str, str], refuse: Refuse, at_once: AtOnce) -> Services:
+    """Return the services, offered by the middleware `kind`. Raises `SinkError`."""
+    module, name = _OFFERED[kind]
+    made: Callable[[str, Mapping[str, str], Refuse, AtOnce], Services] = getattr(
+        import_module(f"robochoc.ros.live.{module}"), name
+    )
+    return made(place, services, refuse, at_once)
 
 
 def _teams(paths: Sequence[Path]) -> list[Team]:

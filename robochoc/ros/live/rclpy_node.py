@@ -70,16 +70,12 @@ class RclpyNode:
             why = shortened(on_one_line(str(missing)))
             raise failed(f"rclpy cannot be imported ({why}); {_advice()}") from missing
         self.context: Any = made
+        self._name = f"robochoc_{secrets.token_hex(4)}"
+        self._others: list[Any] = []
         try:
             # Neither its signals nor its log, which would be a file.
             made.init([], initialize_logging=False)
-            self.node: Any = node(
-                f"robochoc_{secrets.token_hex(4)}",
-                context=made,
-                use_global_arguments=False,
-                enable_rosout=False,
-                start_parameter_services=False,
-            )
+            self.node: Any = self._made(node, self._name)
         except Exception as error:
             made.try_shutdown()
             raise failed(f"rclpy cannot make a node ({_said(error)}); see ROS_DOMAIN_ID, RMW_IMPLEMENTATION") from error
@@ -95,6 +91,29 @@ class RclpyNode:
             durability=latched.TRANSIENT_LOCAL if waypoints else latched.VOLATILE,
         )
 
+    def for_services(self) -> Any:  # noqa: ANN401 - rclpy is untyped
+        """Return the quality of service of what is told while it happens: reliable, not latched."""
+        return self._qos.QoSProfile(
+            history=self._qos.HistoryPolicy.KEEP_LAST,
+            depth=PER_TOPIC_MAX,
+            reliability=self._qos.ReliabilityPolicy.RELIABLE,
+            durability=self._qos.DurabilityPolicy.VOLATILE,
+        )
+
+    def another_node(self, what: str) -> Any:  # noqa: ANN401 - rclpy is untyped
+        """Return another node in the same context, whose name ends with `what`. It is closed with the first."""
+        self._others.append(self._made(importlib.import_module("rclpy.node").Node, f"{self._name}_{what}"))
+        return self._others[-1]
+
+    def _made(self, node: Any, name: str) -> Any:  # noqa: ANN401 - rclpy is untyped
+        return node(
+            name,
+            context=self.context,
+            use_global_arguments=False,
+            enable_rosout=False,
+            start_parameter_services=False,
+        )
+
     def check(self) -> None:
         """Raise `failed` if the context was shut down, by whoever else is in this process."""
         if not self.context.ok():
@@ -102,8 +121,9 @@ class RclpyNode:
 
     def close(self) -> None:
         """Leave ROS. A second call does nothing."""
-        with suppress(Exception):  # it may be shut down already
-            self.node.destroy_node()
+        for node in (*self._others, self.node):
+            with suppress(Exception):  # it may be shut down already
+                node.destroy_node()
         self.context.try_shutdown()
 
 

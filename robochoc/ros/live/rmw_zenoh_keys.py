@@ -2,7 +2,8 @@
 
 A topic's messages travel on `DOMAIN/TOPIC/TYPE/HASH`. Whoever publishes or subscribes says so by a liveliness token,
 `@ros2_lv/DOMAIN/SESSION/NODE/ENTITY/KIND/...`: from these `ros2 topic list` and `ros2 node list` know us. Each message
-has an attachment. Pure: texts and bytes.
+has an attachment. A service is a queryable with such a key, and its requests are queries with a payload and an
+attachment. Pure: texts and bytes.
 """
 
 from __future__ import annotations
@@ -21,11 +22,14 @@ LATCHED = "1:1:1,1:,:,:,,"
 What equals the defaults may be left out, but versions of rmw_zenoh differ in these.
 """
 
+SERVICES_QOS = "1:2:1,10:,:,:,,"
+"""The same for services: reliable, volatile, keep the last 10."""
+
 _ATTACHMENT = struct.Struct("<qqB16s")
 _GID_SIZE = 16
 
-EntityKind = Literal["MP", "MS"]
-"""A publisher or a subscription."""
+EntityKind = Literal["MP", "MS", "SS"]
+"""A publisher, a subscription, or a service that answers."""
 
 
 class RosNode(NamedTuple):
@@ -45,8 +49,9 @@ class RosNode(NamedTuple):
         return self._token(0, "NN")
 
     def entity_token(self, number: int, kind: EntityKind, topic: Topic) -> str:
-        """Return the token of a publisher or a subscription, which has a number of its own in this node."""
-        return f"{self._token(number, kind)}/{topic.name.replace('/', '%')}/{topic.type}/{topic.hash}/{LATCHED}"
+        """Return the token of an entity, which has a number of its own in this node."""
+        quality = SERVICES_QOS if kind == "SS" else LATCHED
+        return f"{self._token(number, kind)}/{topic.name.replace('/', '%')}/{topic.type}/{topic.hash}/{quality}"
 
     def _token(self, number: int, kind: str) -> str:
         # The first % is the enclave, the second the namespace: that of all, "/".
@@ -65,6 +70,11 @@ class Topic(NamedTuple):
         """Return the topic of that name and ROS type."""
         return cls(name, dds_type_name(kind), type_hash)
 
+    @classmethod
+    def of_service(cls, name: str, kind: str, type_hash: str) -> Topic:
+        """Return the same for a service, whose type is such as `std_srvs/Trigger`."""
+        return cls(name, dds_type_name(kind).replace("::msg::", "::srv::"), type_hash)
+
     def key(self, domain: int) -> str:
         """Return the key of the topic's messages."""
         return f"{domain}/{self.name.strip('/')}/{self.type}/{self.hash}"
@@ -82,3 +92,11 @@ def gid_of(token: str) -> bytes:
 def attachment(number: int, at_ns: int, gid: bytes) -> bytes:
     """Return what goes with a publisher's message: its number, from 1, the time in nanoseconds, and who publishes."""
     return _ATTACHMENT.pack(number, at_ns, _GID_SIZE, gid)
+
+
+def sender(attached: bytes) -> tuple[int, bytes] | None:
+    """Return the number of a request and 16 bytes that stand for its client; None if `attached` is no attachment."""
+    if len(attached) != _ATTACHMENT.size:
+        return None
+    number, _, size, gid = _ATTACHMENT.unpack(attached)
+    return (number, gid) if size == _GID_SIZE and number >= 0 else None

@@ -12,6 +12,7 @@ import socket
 import threading
 import time
 from collections.abc import Callable
+from contextlib import suppress
 from pathlib import Path
 from typing import NamedTuple
 from urllib.parse import urlsplit
@@ -22,7 +23,7 @@ import zenoh.ext
 from robochoc.communication.network.zenoh_config import config
 from robochoc.formats.diagnostics import on_one_line, shortened
 from robochoc.ros.live.in_time import succeeds_in_time
-from robochoc.ros.live.rmw_zenoh_keys import RosNode, Topic, attachment, gid_of
+from robochoc.ros.live.rmw_zenoh_keys import RosNode, Topic, attachment, gid_of, sender
 from robochoc.ros.live.ros2_names import domain_id
 from robochoc.ros.live.ros_master import Failed
 
@@ -44,6 +45,8 @@ _START = "start one: `ros2 run rmw_zenoh_cpp rmw_zenohd`"
 
 Receive = Callable[[str, bytes], None]
 """Called by zenoh's threads with the key of a message and its bytes."""
+ReceiveQuery = Callable[[bytes, "RosQuery"], None]
+"""Called by zenoh's threads with the bytes of a request, and that by which it is answered."""
 
 
 class RouterAddress(NamedTuple):
@@ -95,6 +98,20 @@ class RosPublisher:
         self._publisher.put(content, attachment=attachment(self._published, at_ns, self._gid))
 
 
+class RosQuery:
+    """A request of a service's client, which is answered once. A client that is gone is no error."""
+
+    def __init__(self, query: zenoh.Query, key: str, number: int, gid: bytes) -> None:
+        self._query, self._key, self._number, self._gid = query, key, number, gid
+
+    def reply(self, content: bytes) -> None:
+        """Answer it. The attachment says which request of which client this answers."""
+        attached = attachment(self._number, time.time_ns(), self._gid)
+        with suppress(zenoh.ZError):
+            self._query.reply(self._key, content, attachment=attached)
+        self._query.drop()  # type: ignore[no-untyped-call]  # zenoh's stubs
+
+
 class RosSession:
     """A node of ROS 2 by the router at `place`. Raises `failed` where there is none, or when it is gone."""
 
@@ -137,6 +154,26 @@ class RosSession:
         )
         token = self._session.liveliness().declare_token(self._node.entity_token(self._entities, "MS", topic))
         self._declared += [subscriber, token]
+
+    def serve(self, service: Topic, receive: ReceiveQuery) -> None:
+        """Offer `service`, and pass its requests to `receive`. One that does not say whose it is gets an error."""
+        self._entities += 1
+        key = service.key(self._node.domain)
+
+        def take(query: zenoh.Query) -> None:
+            attached, payload = query.attachment, query.payload
+            known = sender(attached.to_bytes()) if attached is not None else None
+            if known is None or payload is None:
+                with suppress(zenoh.ZError):
+                    query.reply_err(b"a request of rmw_zenoh has a payload and an attachment")
+                query.drop()  # type: ignore[no-untyped-call]  # zenoh's stubs
+                return
+            receive(payload.to_bytes(), RosQuery(query, key, *known))
+
+        handler = zenoh.handlers.Callback(take, indirect=False)
+        queryable = self._session.declare_queryable(key, handler, complete=True)
+        token = self._session.liveliness().declare_token(self._node.entity_token(self._entities, "SS", service))
+        self._declared += [queryable, token]
 
     def check(self) -> None:
         """Raise `failed` if the router has been out of reach for `GONE_S`."""

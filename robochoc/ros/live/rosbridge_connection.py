@@ -10,7 +10,7 @@ import logging
 import socket
 import threading
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from concurrent.futures import Future
 from functools import partial
 from typing import Any, NamedTuple
@@ -107,6 +107,27 @@ class Connection:
     def topic(self, name: str, kind: str) -> Any:  # noqa: ANN401 - roslibpy is untyped
         """Return a topic to publish on, latched, or to listen to. Bridges of both ROS know types without a `/msg/`."""
         return self.roslibpy.Topic(self.ros, name, kind.replace("/msg/", "/"), latch=True, reconnect_on_close=False)
+
+    def serve(self, name: str, kind: str, take: Callable[[object], None]) -> None:
+        """Offer the service `name` of the type `kind`; `take` gets each call, in the connection's thread.
+
+        roslibpy's own services answer before they return; ours are answered when a team has decided.
+        """
+        self.ros.on(name, take)
+        self._say(op="advertise_service", type=kind, service=name)
+
+    def respond(self, name: str, number: str | int, values: Mapping[str, object]) -> None:
+        """Answer the call of the service `name` that has this number. Whoever is gone needs no answer."""
+        self._say(op="service_response", service=name, id=number, values=dict(values), result=True)
+
+    def stop_serving(self, names: Iterable[str]) -> None:
+        """Take services back."""
+        for name in names:
+            self._say(op="unadvertise_service", service=name)
+
+    def _say(self, **words: object) -> None:
+        if not self.over.is_set():
+            self.ros.send_on_ready(self.roslibpy.Message(words))
 
     def check(self) -> None:
         """Raise `failed` if the connection is lost."""
