@@ -23,7 +23,8 @@ from robochoc.model.outcome import Outcome
 from robochoc.model.problem import Team
 from robochoc.ros.decide_service import CHANGES_CHARACTERS_MAX, DECIDE, TRIGGER, DecideService, refusal
 from robochoc.ros.live import dds_service
-from robochoc.ros.live.dds_service import WAITING_MAX, DdsServices
+from robochoc.ros.live.dds_service import DdsServices
+from robochoc.ros.live.services import WAITING_MAX
 from robochoc.ros.recordings.types import FieldsError, types_of
 from robochoc.ros.sink import Fields, SinkError
 from robochoc.run import Options, Runtime, solve

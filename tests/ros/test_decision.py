@@ -57,7 +57,7 @@ def test_feedback_tells_how_far_it_is(monkeypatch: pytest.MonkeyPatch, runtime: 
         assert costs == sorted(costs, reverse=True)
         for one in told:
             if "cost" in one:
-                assert float(one["cost"]) == cost_of(one["assignment"], team.constraints())
+                assert float(one["cost"]) == cost_of(one["assignment"], [*team.constraints()])
         if runtime is Runtime.SIMULATOR and outcome.verdict is Verdict.OPTIMAL:
             assert costs[-1] == outcome.cost
 

@@ -204,8 +204,8 @@ def test_the_answer_names_the_request(offered: RmwZenohServices, session: zenoh.
     for one in taken:
         assert one is not None
         offered.reply(one, {"success": True, "message": "a"})
-    for number, one in zip((7, 8), asked, strict=True):
-        fields, attached = one.fields()
+    for number, client in zip((7, 8), asked, strict=True):
+        fields, attached = client.fields()
         assert fields["success"] is True
         assert sender(attached) == (number, GID)
 
