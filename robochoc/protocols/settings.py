@@ -15,6 +15,10 @@ class SettingsError(ValueError):
     """A setting that the protocol does not have, or a value that it does not accept."""
 
 
+MOST = 10**12
+"""No number of a setting is higher."""
+
+
 def equip(protocol: Protocol, given: Mapping[str, str]) -> None:
     """Give one robot's protocol the settings that are `given`. Raises `SettingsError`."""
     if given:
@@ -31,6 +35,11 @@ def settings_of(protocol: type[Protocol], given: Mapping[str, str]) -> Settings:
             there = f"it has {', '.join(names)}" if names else "it has no settings"
             raise SettingsError(f"{name!r} is no setting of this protocol: {there}")
     try:
-        return msgspec.convert(dict(given), known, strict=False)
+        settings = msgspec.convert(dict(given), known, strict=False)
     except msgspec.ValidationError as error:
         raise SettingsError(describe_decode_error(error, known)) from None
+    for name in given:
+        value = getattr(settings, name)
+        if isinstance(value, int | float) and not -MOST <= value <= MOST:
+            raise SettingsError(f"{name} is a number up to {MOST:,}, not {given[name][:40]}")
+    return settings

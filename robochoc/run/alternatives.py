@@ -2,16 +2,24 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 
+from robochoc.model.costs import UnboundedCostError, normalized
 from robochoc.model.problem import Team
 from robochoc.protocols.traits import Traits
+from robochoc.run.choice_rules import RULES
 from robochoc.run.compatibility import CENTRAL_TRAITS, max_total, refuse_options, refuse_unfit
+from robochoc.run.facts import Facts
 from robochoc.run.options import CENTRAL, Options, Runtime
-from robochoc.run.registry import installed_protocols
+from robochoc.run.registry import InstalledProtocol, installed_protocols
 from robochoc.solver.encoding import UnsupportedError
 from robochoc.solver.exact_costs import EXACT, check_exact
 from robochoc.solver.weighted import MAX_TOTAL_COST
+
+MOST_NAMED = 3
+"""So many protocols are named in a refusal. Which of them suits whom, a guide says."""
+GUIDE = "docs/guides/which-protocol.md"
 
 
 def alternatives(
@@ -19,7 +27,8 @@ def alternatives(
 ) -> str:
     """Return what would do instead of the protocol of `options`, as the end of a sentence that refuses it.
 
-    Every protocol is asked as if it had been chosen, but for those that take small problems only.
+    Every protocol is asked as if it had been chosen, but for those that take small problems only. The three that suit
+    best are named.
 
     Args:
         team: the team with its scenario.
@@ -40,11 +49,41 @@ def alternatives(
         and fits(team, replace(options, protocol=offer.name), offer.protocol.traits)
     ]
     if names:
-        return f"; these do: {', '.join(names)} (--protocol)"
+        named = _suited(names, team, options)[:MOST_NAMED]
+        others = f", and {len(names) - len(named)} more: {GUIDE}" if len(names) > len(named) else ""
+        return f"; these do: {', '.join(named)} (--protocol){others}"
     if _central_solver_fits(team, options):
         return f"; no protocol does, but the central solver (--protocol {CENTRAL})"
     too_high = max_total(team, options) >= EXACT
     return f"; no protocol that is installed does{' (scale the costs down)' if too_high else ''}"
+
+
+def _suited(names: Sequence[str], team: Team, options: Options) -> list[str]:
+    """Return `names`, the most suitable first.
+
+    That is the protocol which would be chosen for the team; then those of the same room as the one that was refused,
+    those that are chosen for some teams, and complete ones.
+    """
+    try:
+        facts = Facts(normalized(team), loss=options.message_loss)
+    except UnboundedCostError:
+        chosen = []
+    else:
+        chosen = [rule.protocol for rule in RULES if rule.protocol in names and not rule.unmet(facts)]
+    rooms = {one.name: _room(one) for one in installed_protocols()}
+    complete = {one.name for one in installed_protocols() if one.protocol and one.protocol.traits.complete}
+    usual = {rule.protocol for rule in RULES}
+
+    def rank(name: str) -> tuple[bool, bool, bool, bool, str]:
+        is_kin = rooms[name] == rooms.get(options.protocol)
+        return name not in chosen[:1], not is_kin, name not in usual, name not in complete, name
+
+    return sorted(names, key=rank)
+
+
+def _room(one: InstalledProtocol) -> str:
+    """Return the package in which a protocol stands with others of its kind."""
+    return one.protocol.__module__.rpartition(".")[0] if one.protocol else ""
 
 
 def fits(team: Team, options: Options, traits: Traits) -> bool:

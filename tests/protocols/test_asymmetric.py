@@ -12,7 +12,7 @@ from robochoc.generators.random_csp import random_csp
 from robochoc.model.outcome import Verdict
 from robochoc.model.problem import INFINITE
 from robochoc.run import Options, Runtime, Withdrawal, solve
-from robochoc.run.choice import decided
+from robochoc.run.choice import accepts, decided
 from robochoc.run.registry import protocol_named, protocol_names
 from tests.support.asymmetric_bytes import costs_changed, watched_costs
 from tests.support.asymmetric_problems import check_asymmetric, random_asymmetric_team, random_pkc_options
@@ -87,10 +87,12 @@ def test_what_is_not_proven_is_no_better_than_the_least(protocol: str, teams: in
 
 
 @pytest.mark.parametrize("protocol", ASYMMETRIC)
-def test_it_is_chosen_by_name_and_refusals_name_it(protocol: str) -> None:
+def test_it_accepts_such_teams_and_refusals_name_one_that_does(protocol: str) -> None:
     team = random_asymmetric_team(Random(1))
-    with pytest.raises(Exception, match=rf"which dpop does not support; these do: .*\b{protocol}\b"):
-        solve(team, Options(protocol="dpop", runtime=Runtime.SIMULATOR))
+    options = Options(protocol="dpop", runtime=Runtime.SIMULATOR)
+    assert accepts(protocol, team, options)
+    with pytest.raises(Exception, match="which dpop does not support; these do: asym-pt-fb, "):
+        solve(team, options)
 
 
 def test_auto_takes_a_complete_one() -> None:

@@ -15,6 +15,7 @@ from robochoc.journal.journal import JournalRecorder
 from robochoc.journal.reader import read_journal
 from robochoc.model.problem import Constraint, ConstraintModel, ProblemKind, Relation, Semantics, Team
 from robochoc.run import alternatives, solve
+from robochoc.run.alternatives import MOST_NAMED
 from robochoc.run.compatibility import refuse_options
 from robochoc.run.options import OnLoss, Options, Runtime, ScheduleName, Withdrawal
 from robochoc.run.registry import InstalledProtocol, installed_protocols
@@ -22,6 +23,7 @@ from robochoc.solver.encoding import UnsupportedError
 from robochoc.solver.exact_costs import EXACT
 from tests.support.cost_problems import with_costs
 from tests.support.problems import team_of
+from tests.support.program import ROOT
 
 
 def dear(cost: int, pairs: str = "AB BC") -> Team:
@@ -67,10 +69,17 @@ def test_whoever_is_named_takes_costs_that_tables_do_not_hold(name: str, withdra
     team = dear(EXACT)
     said = refused(team, options_for(name, withdraw))
     assert "costs could add up to 2^53 or more" in said
-    assert {"adopt", "afb", "bnb-adopt", "syncbb"} <= set(named(said))
+    assert len(named(said)) == MOST_NAMED
     assert not {"dpop", "sfb"} & set(named(said))
     for other in named(said):
         assert solve(team, options_for(other, withdraw)).cost == 2
+
+
+def test_a_refusal_names_three_protocols_and_where_to_read_of_the_others() -> None:
+    said = refused(partly_known(3), options_for("dpop"))
+    assert named(said)[0] == "asym-pt-fb"
+    assert re.search(r"\(--protocol\), and \d+ more: docs/guides/which-protocol\.md$", said)
+    assert (ROOT / alternatives.GUIDE).is_file()
 
 
 def test_what_both_refuse_is_told_of_by_both(monkeypatch: pytest.MonkeyPatch) -> None:

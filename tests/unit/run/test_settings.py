@@ -1,0 +1,36 @@
+"""Numbers of settings have limits, for all protocols."""
+
+from __future__ import annotations
+
+import pytest
+
+from robochoc.protocols.settings import MOST, SettingsError, settings_of
+from robochoc.run.registry import protocol_named, protocol_names
+
+NUMBERS = [
+    (name, field)
+    for name in protocol_names()
+    for field in protocol_named(name).settings.__struct_fields__
+    if isinstance(getattr(protocol_named(name).settings, field), int | float)
+]
+
+
+@pytest.mark.parametrize(("protocol", "field"), NUMBERS)
+def test_no_number_is_beyond_the_limit(protocol: str, field: str) -> None:
+    for value in (str(MOST + 1), "9" * 60, str(-MOST - 1), "1e400", "nan"):
+        with pytest.raises(SettingsError, match=field):
+            settings_of(protocol_named(protocol), {field: value})
+
+
+def test_the_limit_is_told_and_a_long_number_cut() -> None:
+    with pytest.raises(SettingsError, match=r"^cycles is a number up to 1,000,000,000,000, not 9{40}$"):
+        settings_of(protocol_named("dsa"), {"cycles": "9" * 60})
+    assert getattr(settings_of(protocol_named("dsa"), {"cycles": str(MOST)}), "cycles") == MOST  # noqa: B009 - of a subclass
+
+
+@pytest.mark.parametrize(("protocol", "field", "most"), [("p2-dpop", "ciphers", 10**6), ("p-dpop", "cells", 10**8)])
+def test_tables_that_no_machine_holds_cannot_be_asked_for(protocol: str, field: str, most: int) -> None:
+    assert getattr(settings_of(protocol_named(protocol), {field: str(most)}), field) == most
+    for wrong in (0, most + 1):
+        with pytest.raises(SettingsError, match=f"{field} is a number of {field} from 1 to {most:,}, not {wrong}"):
+            settings_of(protocol_named(protocol), {field: str(wrong)})
