@@ -5,9 +5,11 @@ from __future__ import annotations
 import re
 import sys
 from collections.abc import Callable
+from select import select
 
 import pytest
 
+from robochoc.communication.processes import processes
 from robochoc.communication.processes.processes import ProcessesRun
 from robochoc.communication.processes.robot_link import RobotLink
 from robochoc.communication.run_result import RobotsLostError
@@ -106,6 +108,18 @@ class ReadsOneReportAtATime(ProcessesRun):
 def test_reports_that_only_wait_to_be_read_are_waited_for(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(RobotLink, "is_computing", False)
     assert ReadsOneReportAtATime(TEAM, Speaks).run().verdict is Verdict.SOLUTION
+
+
+def test_who_reports_while_it_is_looked_at_is_heard(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The parent may lose the processor between its wait and its look: a robot is idle then as its report is there."""
+
+    def idle_with_its_report(robot: RobotLink) -> bool:
+        select([robot.control], [], [], HANG_S)
+        return False
+
+    monkeypatch.setattr(processes, "REPORTS_S", 0.0)
+    monkeypatch.setattr(RobotLink, "is_computing", property(idle_with_its_report))
+    assert ProcessesRun(TEAM, Speaks).run().verdict is Verdict.SOLUTION
 
 
 @count("runs", 5, 50)

@@ -42,9 +42,9 @@ def process_status(pid: int | None) -> ProcessStatus:
 
 
 def is_computing(pid: int | None) -> bool:
-    """Return whether a process uses the processor, or waits for its turn (Linux)."""
+    """Return whether a process uses the processor, or waits for its turn, or for the disk (Linux)."""
     fields = read_text(f"/proc/{pid}/stat").rpartition(")")[2].split()
-    return fields[:1] == ["R"]
+    return fields[:1] in (["R"], ["D"])
 
 
 def describe_end(process: ChildProcess) -> str:

@@ -304,12 +304,13 @@ class ProcessesRun(Session, MasterLoop):
 
         A robot that computes while there is no verdict is waited for until the time is over.
         So is a robot that is stopped, until patience is over. With a verdict the limit is `BUSY_REPORTS_S`.
+        Robots are looked at twice: one that has just reported computes no more either.
         """
         began = time.monotonic()
-        before = len(self._silent())
+        before, idle = len(self._silent()), False
         while True:
             now = time.monotonic()
-            until = now + (LATE_REPORTS_S if late else REPORTS_S)
+            until = now + (LATE_REPORTS_S if late or idle else REPORTS_S)
             if self._deadline is not None:
                 until = min(until, max(self._deadline, now + LATE_REPORTS_S))
             self._serve_until(lambda: not self._silent(), until)
@@ -317,10 +318,11 @@ class ProcessesRun(Session, MasterLoop):
             if late or over(self._deadline):
                 return
             if len(silent) < before or any(robot.status is ProcessStatus.STOPPED for robot in silent):
-                before = len(silent)
+                before, idle = len(silent), False
                 continue
             enough = self.state.verdict is not None and time.monotonic() - began > BUSY_REPORTS_S
-            if enough or not any(robot.is_computing for robot in silent):
+            was_idle, idle = idle, not any(robot.is_computing for robot in silent)
+            if enough or (was_idle and idle):
                 return
 
     def _silent(self) -> list[str]:
