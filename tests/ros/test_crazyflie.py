@@ -15,7 +15,7 @@ from robochoc.ros.autopilots.kinds import Kind
 from robochoc.ros.autopilots.messages import Phase, Target
 from tests.support.crazyflie_teams import crazyflie_field, solve
 from tests.support.crazyflies import Crazyfly
-from tests.support.limits import HANG_S
+from tests.support.limits import HANG_S, wait_until
 
 
 def reached(vehicle: Crazyfly) -> list[str]:
@@ -190,16 +190,18 @@ def test_who_loses_its_link_hovers_and_the_others_land(tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
-def test_who_is_heard_again_lands(tmp_path: Path) -> None:
+@pytest.mark.parametrize("lost", ["silent", "gone"])
+def test_who_is_heard_again_lands(tmp_path: Path, lost: str) -> None:
     with crazyflie_field(tmp_path, patience=1) as (vehicles, fleet):
         guard = GuardProcess(read_fleet(fleet, Kind.CRAZYFLIE))
         try:
             guard.permit()
-            vehicles[1].silent_above = 0.5
             guard.fly({"RB": Target((2, 0, 2))})
+            wait_until(lambda: vehicles[1].flies, vehicles.state)
+            setattr(vehicles[1], lost, True)
             assert guard.wait_for(lambda: "RB" in guard.states and guard.states["RB"].phase is Phase.OUT, HANG_S)
             assert vehicles[1].flies
-            vehicles[1].silent = False
+            setattr(vehicles[1], lost, False)
             vehicles.wait_until_landed()
         finally:
             guard.close()

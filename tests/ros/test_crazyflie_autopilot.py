@@ -123,6 +123,14 @@ def test_closing_the_link_in_the_air_lets_it_hover() -> None:
         assert "low-level set point" not in vehicle.log
 
 
+def test_an_error_of_the_link_that_passes_is_none_of_ours() -> None:
+    with linked() as (vehicle, autopilot):
+        fly(vehicle, autopilot)
+        autopilot._crazyflie.link.link_error_callback("could not send")  # noqa: SLF001 - as its driver does
+        autopilot.hold()
+        assert vehicle.log[-1] == "hold"
+
+
 def test_on_the_ground_it_is_disarmed_and_does_not_land() -> None:
     with linked() as (vehicle, autopilot):
         autopilot.arm()

@@ -67,6 +67,8 @@ class Crazyfly:
     """True: neither sends nor hears, as without radio."""
     silent_above: float = math.inf
     """The height from which on it is silent, in metres."""
+    gone: bool = False
+    """True: nobody is at its port, as when a simulator has ended."""
     tumbled: bool = False
     flown_by_hand: bool = False
     """Somebody else sends it set points."""
@@ -100,14 +102,19 @@ class Crazyfly:
         return "fell" not in self.log and (self.is_down or (self.planner in {"flying", "landing"}))
 
 
+def _bound(port: int) -> socket.socket:
+    found = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+    found.bind((LOOPBACK, port))
+    found.setblocking(False)
+    return found
+
+
 class _Played:
     """The machinery of one Crazyflie."""
 
     def __init__(self, vehicle: Crazyfly) -> None:
         self.vehicle = vehicle
-        self.socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
-        self.socket.bind((LOOPBACK, vehicle.port))
-        self.socket.setblocking(False)
+        self.socket = _bound(vehicle.port)
         self._peer: tuple[str, int] | None = None
         self._parameters = [("hlCommander.vtoff", 6, struct.pack("<f", 0.5)), ("stabilizer.stop", 8, b"\0")]
         self._blocks: dict[int, list[int]] = {}
@@ -118,6 +125,16 @@ class _Played:
         self._straight = False
         self._thrust_at = -math.inf
         self._begun_at = time.monotonic()
+
+    def come_and_go(self, selector: selectors.BaseSelector) -> None:
+        """Leave the port, or take it again."""
+        is_gone = self.socket.fileno() < 0
+        if self.vehicle.gone and not is_gone:
+            selector.unregister(self.socket)
+            self.socket.close()
+        elif is_gone and not self.vehicle.gone:
+            self.socket = _bound(self.vehicle.port)
+            selector.register(self.socket, selectors.EVENT_READ, self)
 
     @property
     def _variables(self) -> list[tuple[str, int]]:
@@ -427,3 +444,4 @@ class Crazyflies:
                     passed, before = now - before, now
                     for played in self._played:
                         played.live(now, passed)
+                        played.come_and_go(selector)

@@ -37,6 +37,7 @@ LAND_MS = 0.5
 _SHORTEST_S = 0.5
 _PERIOD_MS = 100
 _TRIES, _ANSWER_S = 3, 0.5
+_JOIN_S = 3.0
 SPIN_UP_S = 4.0
 """Motors that have to be armed may take so long to spin up, in seconds; the firmware gives them 2."""
 SETTLED_S = 0.3
@@ -46,7 +47,7 @@ STALE_S = 1.0
 _ATTEMPT_S = 2.0
 """An attempt to open a link ends when nothing is heard for so long, in seconds."""
 _REOPEN_S = 5.0
-"""A link is opened anew when nothing is heard for so long, in seconds."""
+"""A link is opened anew when nothing is told for so long, in seconds."""
 _NO_DRIVER = "Couldn't load link driver:"
 """So begins what cflib says where a dongle, or a host, is not there."""
 _TAKE_OFF, _LAND, _GO_TO = 7, 8, 12
@@ -197,9 +198,10 @@ class CflibAutopilot(Autopilot):
         crazyflie, self._crazyflie = self._crazyflie, None
         if crazyflie is None:
             return
+        crazyflie.link_statistics.stop()
         if crazyflie.incoming.is_alive():
             crazyflie.incoming.stop()
-            crazyflie.incoming.join()
+            crazyflie.incoming.join(_JOIN_S)
         # Without a link there is nothing by which `close_link` could send its set point without thrust.
         driver, crazyflie.link = crazyflie.link, None
         if driver is not None:
@@ -211,11 +213,12 @@ class CflibAutopilot(Autopilot):
     def _keep_link(self) -> None:
         """Open the link, or open it anew if it was lost."""
         now = time.monotonic()
-        silent_s = now - max(self._heard_at, self._opened_at)
-        if self._crazyflie is not None and self._block is not None:
-            broken = self._is_lost or silent_s > _REOPEN_S
+        if self._crazyflie is None:
+            broken = True
+        elif self._block is not None:  # an error may pass by itself
+            broken = now - max(self._told_at, self._opened_at) > _REOPEN_S
         else:
-            broken = self._crazyflie is None or self._is_lost or silent_s > _ATTEMPT_S
+            broken = self._is_lost or now - max(self._heard_at, self._opened_at) > _ATTEMPT_S
         if broken and now - self._opened_at > _ATTEMPT_S:
             self._open(now)
 
@@ -227,8 +230,10 @@ class CflibAutopilot(Autopilot):
         crazyflie = self._crazyflie = Crazyflie()
         crazyflie.packet_received.add_callback(self._heard)
         crazyflie.connected.add_callback(self._connected)
-        for event in (crazyflie.connection_failed, crazyflie.connection_lost, crazyflie.disconnected_link_error):
-            event.add_callback(self._lost)
+        crazyflie.connection_failed.add_callback(self._lost)
+        # Cflib's own way with an error waits for threads, in a thread that may hold the lock by which those send; then
+        # no command would get through any more. Here it is noted, and the link opened anew by the pilot's thread.
+        crazyflie._link_error_cb = self._broken  # noqa: SLF001
         crazyflie.add_port_callback(CRTPPort.SETPOINT_HL, self._answered)
         crazyflie.add_port_callback(CRTPPort.SUPERVISOR, self._armed)
         crazyflie.open_link(self.url)
@@ -257,6 +262,9 @@ class CflibAutopilot(Autopilot):
         self._is_lost = True
         if why.startswith(_NO_DRIVER):
             self._fault = shortened(on_one_line(why.removeprefix(_NO_DRIVER).partition("\n")[0].strip()))
+
+    def _broken(self, _why: str) -> None:
+        self._is_lost = True
 
     def _told_values(self, _time_ms: int, values: dict[str, float], _block: object) -> None:
         if all(map(math.isfinite, values.values())):
