@@ -64,6 +64,15 @@ class WentOn(OfEpoch, frozen=True):
     went: bool
 
 
+class Snapshot(OfEpoch, frozen=True):
+    """The answer to `TakeSnapshot`: what the robot has, and how many messages it has dropped; the search goes on."""
+
+    number: int
+    assignment: dict[str, int]
+    lost: int
+    findings: Findings
+
+
 class Events(_Control, frozen=True):
     """Events for the observer, oldest first."""
 
@@ -135,6 +144,12 @@ class Wave(_Control, frozen=True):
     number: int
 
 
+class TakeSnapshot(_Control, frozen=True):
+    """The order to tell what the robot has, and to search on. The answer has the same `number`."""
+
+    number: int
+
+
 class GoOn(_Control, frozen=True):
     """The order to go on without the messages that a robot waits for: nothing is under way any more."""
 
@@ -153,7 +168,7 @@ def unsealed(change: bytes) -> tuple[AgentProblem, Invalidated]:
     return part, invalidated
 
 
-RobotMessage = Ready | Counters | Conclusion | WentOn | Events
+RobotMessage = Ready | Counters | Conclusion | WentOn | Snapshot | Events
 """A robot's message to the runtime during a search, in every runtime. Runtimes differ in the report of the end."""
 FromRobot = RobotMessage | OpenQueues | Report | Failed
-FromParent = Begin | Pause | Change | QueuesTo | QueueFrom | Wave | GoOn
+FromParent = Begin | Pause | Change | QueuesTo | QueueFrom | Wave | TakeSnapshot | GoOn

@@ -10,10 +10,11 @@ import time
 from abc import ABC, abstractmethod
 from collections.abc import Callable
 
-from robochoc.communication.control import GoOn, Wave
+from robochoc.communication.control import GoOn, TakeSnapshot, Wave
 from robochoc.communication.kill_schedule import KillSchedule
 from robochoc.communication.run_result import Progress
 from robochoc.communication.search_state import SearchState
+from robochoc.communication.search_watch import SearchWatch
 from robochoc.communication.session import over
 from robochoc.system.stopping import stop_requested
 
@@ -22,9 +23,13 @@ TICK_S = 0.2
 
 
 class MasterLoop(ABC):
-    """The loop of a master whose search is in `state`. `progress` receives the count of messages now and then."""
+    """The loop of a master whose search is in `state`. `progress` receives the count of messages now and then.
+
+    `watch` gets snapshots of the search while it goes on (None: nobody watches).
+    """
 
     state: SearchState
+    watch: SearchWatch | None = None
     check_s: float = TICK_S
     """Seconds between two checks of which robots are still there."""
 
@@ -53,7 +58,7 @@ class MasterLoop(ABC):
         """Tell all robots to begin."""
 
     @abstractmethod
-    def _send_all(self, message: Wave | GoOn, /) -> None:
+    def _send_all(self, message: Wave | GoOn | TakeSnapshot, /) -> None:
         """Send a control message to all robots."""
 
     def schedule_kills(self, kills: KillSchedule, kill: Callable[[str], None]) -> None:
@@ -73,9 +78,14 @@ class MasterLoop(ABC):
         self._order_start()
         self._kills.begin(time.monotonic())
         state.ordered = state.searching = True
-        self._serve_until(lambda: state.ended or stop_requested(), deadline)
+        self._serve_until(lambda: state.ended or self.is_to_stop, deadline)
         state.searching = False
         self._kills.end(time.monotonic())
+
+    @property
+    def is_to_stop(self) -> bool:
+        """Return whether somebody has asked to stop, or the search need not go on."""
+        return stop_requested() or (self.watch is not None and self.watch.satisfied)
 
     def _serve_until(self, done: Callable[[], bool], deadline: float | None) -> None:
         """Serve the robots until `done()`, or until the deadline on the monotonic clock. Raises as `_serve`."""
@@ -84,13 +94,27 @@ class MasterLoop(ABC):
             if over(deadline):
                 return
             waits = (TICK_S, None if deadline is None else deadline - now, self._kills.wait_s(now))
-            self._serve(min(wait for wait in waits if wait is not None), deadline)
+            watch = self.watch if self.state.searching else None
+            soon = TICK_S if watch is None else watch.wait_s(now)
+            self._serve(min(soon, *(wait for wait in waits if wait is not None)), deadline)
             if now - self._checked >= self.check_s:
                 self._checked = now
                 self._check_robots(now)
             if self.state.searching:
                 self._detect_end(now)
                 self._kill_due()
+            if watch is not None:
+                self._take_snapshots(watch)
+
+    def _take_snapshots(self, watch: SearchWatch) -> None:
+        """Give `watch` the snapshot that all robots have answered, and ask for the next one when it is wanted."""
+        snapshot = self.state.end_snapshot()
+        if snapshot is not None:
+            watch.take(snapshot)
+        if watch.wants_snapshot(time.monotonic()):
+            number = self.state.begin_snapshot()
+            if number is not None:
+                self._send_all(TakeSnapshot(number))
 
     def _kill_due(self) -> None:
         if self._kill is not None:

@@ -10,11 +10,12 @@ import time
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
 
-from robochoc.communication.control import Conclusion, Counters, Events, Ready, RobotMessage, WentOn
+from robochoc.communication.control import Conclusion, Counters, Events, Ready, RobotMessage, Snapshot, WentOn
 from robochoc.communication.dropped import Dropped
 from robochoc.communication.host import Host
 from robochoc.journal.events import AnyEvent, Sent
 from robochoc.model.message import Envelope
+from robochoc.protocols.findings import Findings
 
 IDLE_S = 0.002
 """Seconds without a message after which a robot reports its counters.
@@ -161,6 +162,18 @@ class RobotLoop(ABC):
         """Tell the master how many messages were sent and received: in answer to `wave`, or (0) unasked."""
         self._reported = (self._sent, self._received)
         self._say(Counters(self.epoch, wave, *self._reported))
+
+    def report_snapshot(self, number: int) -> None:
+        """Tell the master what the robot has, in answer to `TakeSnapshot`. The search goes on."""
+        host = self._host
+        if host is not None:
+            assignment, findings = self._known_to_master(host)
+            lost = 0 if host.dropped is None else host.dropped.many
+            self._say(Snapshot(self.epoch, number, assignment, lost, findings))
+
+    def _known_to_master(self, host: Host) -> tuple[dict[str, int], Findings]:
+        """Return what the master may know: the own values, and what is known of the whole search."""
+        return host.protocol.assignment, host.protocol.findings
 
     def report_idle(self) -> None:
         """Send the master all reports that are due, as the robot is idle."""

@@ -10,9 +10,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 
-from robochoc.communication.control import Conclusion, Counters, OfEpoch, Ready, Report, WentOn
+from robochoc.communication.control import Conclusion, Counters, OfEpoch, Ready, Report, Snapshot, WentOn
 from robochoc.communication.quiescence import Counts, FourCounters
 from robochoc.communication.run_result import RunResult
+from robochoc.communication.search_watch import SnapshotRound
 from robochoc.model.outcome import Verdict
 from robochoc.protocols.traits import Traits
 
@@ -51,6 +52,7 @@ class SearchState:
         self.lossy = False
         self._undecided: set[str] = set()
         self._went = False
+        self._snapshots = SnapshotRound()
 
     def handle(self, name: str, message: OfEpoch) -> str:
         """Take in a control message of the robot `name`; return what is wrong with it, or an empty text.
@@ -69,6 +71,8 @@ class SearchState:
                 fault = self._conclude(name, verdict)
             case WentOn(_, went):
                 fault = self._note_went_on(name, went=went)
+            case Snapshot():
+                fault = self._take_snapshot(name, message)
             case Report():
                 fault = self._take_report(name, message)
             case _:
@@ -96,6 +100,17 @@ class SearchState:
             self.counters.quiescent = True
             self.verdict = self.verdict or Verdict.SOLUTION
         return ""
+
+    def _take_snapshot(self, name: str, snapshot: Snapshot) -> str:
+        return self._snapshots.add(name, snapshot)
+
+    def begin_snapshot(self) -> int | None:
+        """Return the number of a snapshot that all robots are to be asked for; None while one is under way."""
+        return self._snapshots.begin()
+
+    def end_snapshot(self) -> RunResult | None:
+        """Return the snapshot that was asked for, once all robots have answered; None before, and afterwards."""
+        return self._snapshots.end(self._present)
 
     def begin_going_on(self) -> bool:
         """Return whether all robots are to be told to go on: nothing is under way, and some may wait in vain."""

@@ -8,6 +8,7 @@ from types import TracebackType
 from typing import NamedTuple, Self
 
 from robochoc.communication.run_result import RunResult
+from robochoc.communication.search_watch import SearchWatch
 from robochoc.model.problem import Team
 from robochoc.protocols.protocol import Protocol
 from robochoc.solver.agent_problem import DEFAULT_PARAMETERS, AgentProblem, RunParameters, agent_problems
@@ -48,10 +49,11 @@ class Session(ABC):
 
     `compiled` is what its robots work on: the `team` that it was opened with (compiled without a solver, where that was
     not done before), and after each `change` that epoch's. `anew`: robots know nothing of the epoch before, whatever
-    their protocol could have kept.
+    their protocol could have kept. `watch` gets snapshots of a search while it goes on (None: nobody watches).
     """
 
     anew: bool = False
+    watch: SearchWatch | None = None
 
     def __init__(self, team: Team | CompiledTeam) -> None:
         self.compiled = ensure_compiled(team)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from decimal import Decimal
 from types import MappingProxyType
 from typing import Any
@@ -13,6 +13,7 @@ from msgspec import UNSET, UnsetType
 from robochoc.model.outcome import (
     CheckCounts,
     EpochOutcome,
+    Improvement,
     Metrics,
     Optima,
     Outcome,
@@ -42,6 +43,13 @@ class _MetricsForm(msgspec.Struct):
     lost_messages: int = 0
 
 
+class _ImprovementForm(msgspec.Struct, omit_defaults=True):
+    seconds: float
+    verdict: Verdict
+    cost: int | Decimal | None
+    withdrawn: list[str] = []
+
+
 class _EpochForm(msgspec.Struct, omit_defaults=True):
     verdict: Verdict
     opened_by: str
@@ -59,6 +67,7 @@ class _EpochForm(msgspec.Struct, omit_defaults=True):
     simulated_s: float | UnsetType = UNSET
     cycles: int | UnsetType = UNSET
     lost_messages: int | UnsetType = UNSET
+    improvements: list[_ImprovementForm] = []
 
 
 class _CheckedForm(msgspec.Struct):
@@ -106,6 +115,7 @@ class _Form(msgspec.Struct, omit_defaults=True):
     preprocessing: _PreprocessingForm | None = None
     optima: _OptimaForm | None = None
     deadline: float | None = None
+    improvements: list[_ImprovementForm] = []
 
 
 _SAME = (
@@ -138,8 +148,17 @@ def result_json(outcome: Outcome, names: Mapping[str, str] = MappingProxyType({}
         names=dict(names),
         preprocessing=_preprocessing(outcome.preprocessing),
         optima=_optima(outcome),
+        improvements=_improvements(outcome.improvements),
     )
     return _ENCODER.encode(form)
+
+
+def _improvements(found: Sequence[Improvement]) -> list[_ImprovementForm]:
+    return [_ImprovementForm(round(one.at_s, 6), one.verdict, one.cost, list(one.withdrawn)) for one in found]
+
+
+def _improvements_of(forms: Sequence[_ImprovementForm]) -> tuple[Improvement, ...]:
+    return tuple([Improvement(one.seconds, one.verdict, one.cost, tuple(one.withdrawn)) for one in forms])
 
 
 def _optima(outcome: Outcome) -> _OptimaForm | None:
@@ -188,6 +207,7 @@ def _epoch(epoch: EpochOutcome, outcome: Outcome) -> _EpochForm:
         simulated_s=spent.simulated_s or UNSET,
         cycles=spent.cycles or UNSET,
         lost_messages=spent.lost_messages or UNSET,
+        improvements=_improvements(epoch.improvements),
     )
 
 
@@ -228,6 +248,7 @@ def _epoch_of(form: _EpochForm, symbols: _Symbols) -> EpochOutcome:
         verified=form.verified,
         lost=tuple(form.lost),
         confirmed=form.confirmed,
+        improvements=_improvements_of(form.improvements),
     )
 
 
@@ -259,6 +280,7 @@ def read_result(content: bytes) -> Outcome:
         checked=CheckCounts(form.checked.by_both, form.checked.by_owner) if form.checked else None,
         preprocessing=_preprocessing_of(form.preprocessing),
         optima=listed,
+        improvements=_improvements_of(form.improvements),
     )
 
 

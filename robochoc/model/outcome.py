@@ -84,6 +84,22 @@ class PseudoTreeNode:
     pseudo_parents: tuple[str, ...] = ()
 
 
+class Improvement(NamedTuple):
+    """An answer that was published while the search went on: it is better than all before.
+
+    Attributes:
+        at_s: The seconds since the run, or the epoch, began.
+        verdict: What was known of it then: `SOLUTION`, or `OPTIMAL`.
+        cost: What it costs, in the user's numbers.
+        withdrawn: The robots that do not fly.
+    """
+
+    at_s: float
+    verdict: Verdict
+    cost: Cost | None
+    withdrawn: tuple[str, ...] = ()
+
+
 @dataclass(frozen=True)
 class EpochOutcome:
     """The outcome of one epoch of a problem that changes over time, or whose robots were lost.
@@ -115,6 +131,7 @@ class EpochOutcome:
     bound: Cost | None = None
     tree: dict[str, PseudoTreeNode] = field(default_factory=dict)
     confirmed: bool = False
+    improvements: tuple[Improvement, ...] = ()
 
 
 CENTRAL_SOLVER = "the central solver"
@@ -202,7 +219,9 @@ class Outcome:
         chosen: Why the `protocol`, or the `order`, was chosen, where nobody asked for it.
         preprocessing: What the robots have done before, if that was asked for.
         optima: The optima, or solutions, if the protocol lists them.
-        deadline: The seconds after which the search was ended, if the answer is the best that was known by then.
+        deadline: The seconds after which an answer was due, if the search was ended by the time and the answer is the
+            best that was known by then.
+        improvements: The answers that were published while the search went on, the first of them at the deadline.
     """
 
     team: str
@@ -235,6 +254,7 @@ class Outcome:
     preprocessing: Preprocessing | None = None
     optima: Optima | None = None
     deadline: float | None = None
+    improvements: tuple[Improvement, ...] = ()
 
     def labelled(self, assignment: Mapping[str, int]) -> dict[str, int | str]:
         """Return `assignment`, of this outcome or of one of its epochs, with symbols by their names."""

@@ -10,12 +10,13 @@ import time
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from typing import NamedTuple
 
 from robochoc.flight.crafts import crafts_of
-from robochoc.flight.mission import VAST_M, Drone, Leg, Mission, MissionBuilder, all_robots, mission_of
+from robochoc.flight.mission import VAST_M, Drone, Goal, Leg, Mission, MissionBuilder, all_robots, mission_of
 from robochoc.flight.reports import Report
 from robochoc.model.change import apply_possible_changes
-from robochoc.model.outcome import EpochOutcome, Outcome
+from robochoc.model.outcome import EpochOutcome, Outcome, Verdict
 from robochoc.model.problem import Assignment, Change, Robot, ScenarioEvent, Team
 from robochoc.ros.sink import Sink
 from robochoc.ros.sink_publisher import SinkPublisher
@@ -24,6 +25,16 @@ from robochoc.ros.team_topics import WAYPOINTS_ALONE, PublishOptions
 
 TOGETHER_S = 0.5
 """Reports within this number of seconds after one that changes the problem belong to the same event."""
+
+
+_FLOWN = frozenset({Verdict.SOLUTION, Verdict.OPTIMAL})
+
+
+class News(NamedTuple):
+    """Changes that were reported while the team searched on. What comes until `until_s` belongs to the same event."""
+
+    changes: list[Change]
+    until_s: float
 
 
 class Feedback(ABC):
@@ -52,6 +63,10 @@ class Feedback(ABC):
     @abstractmethod
     def next(self, until_s: float | None) -> Report | None:
         """Return the next report, with `until_s` one that comes no later than that; None if no more comes."""
+
+    def poll(self) -> Report | None:
+        """Return a report that has come, without waiting; None where time stands still while the team decides."""
+        return None
 
 
 class ClosedLoop:
@@ -100,6 +115,10 @@ class ClosedLoop:
         self._builder: MissionBuilder | None = None
         self._situation: Situation | None = None
         self._legs: list[Leg] = []
+        self._goals: dict[int, Goal] = {}
+        self._improved: Leg | None = None
+        """What was published last of the epoch that goes on."""
+        self._news: News | None = None
         self._happened = 0
         self._lost = True
         self.events = []
@@ -114,15 +133,19 @@ class ClosedLoop:
         self._happened += not self._lost
         self._lost = bool(epoch.lost)
         builder = self._builder = self._builder or self._new_builder(epoch.assignment)
-        leg = builder.leg(epoch)
-        self._legs.append(leg)
-        self._decide(leg)
+        leg, self._improved = self._improved, None
+        if leg is None or epoch.verdict not in _FLOWN:
+            leg = builder.leg(epoch)
+            self._legs.append(leg)
+            self._decide(leg)
+        elif self.feedback is not None:
+            self._legs.append(leg)
         if self.feedback is None:
             return None
         self.feedback.on_decision(builder, leg, left_s)
         if epoch.lost or left_s == 0:
             return None
-        event = self._sensed(self.feedback, self._coming(team), builder)
+        event = self._sensed(self.feedback, self._coming(team, self._happened), builder)
         if event:
             self.events.append(event)
         return event
@@ -134,22 +157,30 @@ class ClosedLoop:
         for leg in mission.legs:
             self._decide(leg)
 
-    def improve(self, outcome: Outcome, opened_by: str) -> None:
-        """Publish one decision of a run, which another may follow: for the same drones, in the same scale."""
-        robots = self._team.order
-        self(
-            self._team,
-            EpochOutcome(
-                outcome.verdict,
-                robots,
-                opened_by,
-                outcome.assignment,
-                outcome.cost,
-                verified=outcome.verified,
-                bound=outcome.bound,
-            ),
-            None,
-        )
+    def improve(self, epoch: EpochOutcome, withdrawn: Sequence[str]) -> None:
+        """Publish what is decided while the team searches on: waypoints of drones alone that are to go elsewhere now.
+
+        What is flown in a simulation is the last decision of an epoch: time does not go by while the team decides.
+        """
+        builder = self._builder = self._builder or self._new_builder(epoch.assignment)
+        leg = builder.leg(epoch, withdrawn)
+        goals = {number: goal for number, goal in leg.goals.items() if goal != self._goals.get(number)}
+        self._improved = leg
+        if self.feedback is None:
+            self._legs.append(leg)
+        self._decide(replace(leg, goals=goals))
+
+    def has_news(self, team: Team) -> bool:
+        """Return whether a report that has come changes the problem of `team`: it opens the next epoch."""
+        feedback, builder = self.feedback, self._builder
+        if feedback is None or builder is None or self._improved is None:
+            return False
+        team = self._coming(team, self._happened + (not self._lost))
+        while self._news is None and (report := feedback.poll()) is not None:
+            changes = self._situation_of(builder).changes(team, report)
+            if changes:
+                self._news = News([*changes], report.at_s + TOGETHER_S)
+        return self._news is not None
 
     @property
     def team(self) -> Team:
@@ -179,30 +210,39 @@ class ClosedLoop:
 
     def _decide(self, leg: Leg) -> None:
         at_ns = self.feedback.now_ns() if self.feedback else time.time_ns()
+        self._goals |= leg.goals
         for publisher in self.publishers:
             publisher.decide(leg, at_ns)
 
     # The situation
 
-    def _coming(self, team: Team) -> Team:
-        """Return `team` after all events that are already known."""
-        for event in self.team.scenario[self._happened :]:
+    def _coming(self, team: Team, happened: int) -> Team:
+        """Return `team` after all events that are already known, of which so many have `happened`."""
+        for event in self.team.scenario[happened:]:
             team, _ = apply_possible_changes(team, event.changes)
         return team
 
     def _sensed(self, feedback: Feedback, team: Team, builder: MissionBuilder) -> ScenarioEvent | None:
         """Return the event of the first reports that change `team`; None if there is no such report."""
-        if self._situation is None:
-            self._situation = Situation(builder.drones, builder.scale, self._battery)
+        situation = self._situation_of(builder)
         changes: list[Change] = []
         until_s = None
+        news, self._news = self._news, None
+        if news is not None:
+            changes, until_s = news
+            team, _ = apply_possible_changes(team, changes)
         while (report := feedback.next(until_s)) is not None:
-            found = self._situation.changes(team, report)
+            found = situation.changes(team, report)
             if found:
                 changes += found
                 team, _ = apply_possible_changes(team, found)
                 until_s = report.at_s + TOGETHER_S if until_s is None else until_s
         return ScenarioEvent(tuple(changes)) if changes else None
+
+    def _situation_of(self, builder: MissionBuilder) -> Situation:
+        if self._situation is None:
+            self._situation = Situation(builder.drones, builder.scale, self._battery)
+        return self._situation
 
 
 def drones_of(team: Team) -> tuple[Drone, ...]:

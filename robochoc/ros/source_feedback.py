@@ -113,10 +113,22 @@ class SourceFeedback(Feedback):
         if report is not None and until_s is not None and report.at_s > until_s:
             self._kept = report
             return None
+        self._published(report)
+        return report
+
+    def poll(self) -> Report | None:
+        """Return a report of a live source that has come; see `Feedback.poll`."""
+        if self._kept is None and self._source.live:
+            self._kept = self._pull(None, wait=False)
+        report, self._kept = (self._kept, None) if self._source.live else (None, self._kept)
+        self._published(report)
+        return report
+
+    def _published(self, report: Report | None) -> None:
+        """Publish a report where it is to be."""
         if report is not None:
             for publisher in self.publishers:
                 publisher.report(self._stamped(report))
-        return report
 
     def _stamped(self, report: Report) -> Report:
         """Return `report` with the time of the simulation, if there is one."""
@@ -136,15 +148,20 @@ class SourceFeedback(Feedback):
             self._idle_s = now
             self.idle()
 
-    def _pull(self, soon: float | None) -> Report | None:
-        """Return the next report of the source before `soon`, and before the wait is over; None if there is none."""
+    def _pull(self, soon: float | None, *, wait: bool = True) -> Report | None:
+        """Return the next report of the source before `soon`, and before the wait is over; None if there is none.
+
+        Without `wait`, return None as soon as nothing has come.
+        """
         while True:
-            deadline = self._ends(soon)
+            deadline = self._ends(soon) if wait else None
             left_s = _SLICE_S if deadline is None else min(_SLICE_S, deadline - time.monotonic())
             if left_s <= 0:
                 return None
-            received = self._early.popleft() if self._early else self._source.next(left_s)
-            if self._source.live:
+            received = self._early.popleft() if self._early else self._source.next(left_s if wait else 0)
+            if received is None and not wait:
+                return None
+            if self._source.live and wait:
                 self._idle_now_and_then(received)
             if received is None:
                 if not self._source.live:

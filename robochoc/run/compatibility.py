@@ -96,6 +96,7 @@ OPTION_RULES = (
         "--delay is for --schedule concurrent: in a random one any message may take any time, in cycles each takes one",
     ),
     OptionRule(lambda o: o.deadline and o.timeout, "--deadline and --timeout both limit the time: give one of them"),
+    OptionRule(lambda o: o.improve and not o.deadline, "--improve goes on after --deadline SECONDS: add it"),
     OptionRule(lambda o: not 0 <= o.message_loss <= MOST_LOSS, "--message-loss is a probability from 0 to 0.9"),
     OptionRule(
         lambda o: o.loss and (o.runtime is Runtime.ARRAYS or o.preprocess or o.wants_anytime),

@@ -40,8 +40,13 @@ class RunContext:
         self.solver = solver
         self.cache = SolutionCache() if options.cache else None
         self.kills = KillSchedule(options.kill)
-        self._began = time.monotonic()
-        self.deadline = None if options.limit_s is None else self._began + options.limit_s
+        self.restart()
+
+    def restart(self) -> None:
+        """Let the time begin again."""
+        self.began = time.monotonic()
+        limit_s = self.options.limit_s
+        self.deadline = None if limit_s is None else self.began + limit_s
 
     def left_s(self) -> float | None:
         """Return how many seconds are left; None without a limit."""
@@ -50,7 +55,7 @@ class RunContext:
     def show_stage(self, stage: str) -> None:
         """Report what is done besides searching."""
         if self.progress:
-            self.progress(Progress(0, time.monotonic() - self._began, stage))
+            self.progress(Progress(0, time.monotonic() - self.began, stage))
 
     def team_compiler(self) -> TeamCompiler:
         """Return a compiler of the robots' domains."""

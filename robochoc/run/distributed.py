@@ -96,11 +96,15 @@ class Deployment(ABC):
     def evaluated(self, phase: Phase, search: Search) -> Answer:
         """Return the answer of `search`, confirmed by the central solver if that is asked for."""
         deadline = self.options.deadline if self.left_s() == 0 else None
-        answer = evaluate_search(phase, search, self.kind, self.told, deadline)
+        answer = self.concluded(phase, search, evaluate_search(phase, search, self.kind, self.told, deadline))
         if answer.verdict is Verdict.NO_SOLUTION:
             return answer.confirmed_as(self.confirm(phase, answer))
         if answer.verdict is Verdict.OPTIMAL:
             return answer.confirmed_as(self.confirm(phase, answer))
+        return answer
+
+    def concluded(self, phase: Phase, search: Search, answer: Answer) -> Answer:  # noqa: ARG002 - as `confirm`
+        """Return the answer of `search`, or a better one that was found while it went on."""
         return answer
 
     def why_unknown(self, phase: Phase, answer: Answer) -> str | None:
@@ -128,7 +132,10 @@ class Deployment(ABC):
             if options.cycles is not None and spent.cycles >= options.cycles:
                 return f"so many cycles are over (--cycles {options.cycles})"
         if options.deadline is not None:
-            return f"by the deadline (--deadline {options.deadline:g}) nothing had satisfied all hard constraints"
+            improve = "" if options.improve is None else f", --improve {options.improve:g}"
+            return (
+                f"by the deadline (--deadline {options.deadline:g}{improve}) nothing had satisfied all hard constraints"
+            )
         return "the time was over" if options.timeout is None else f"the time was over (--timeout {options.timeout:g})"
 
     def outcome(self, header: Outcome, answer: Answer) -> Outcome:

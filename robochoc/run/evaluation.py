@@ -16,6 +16,7 @@ from robochoc.model.costs import told_cost
 from robochoc.model.outcome import (
     CheckCounts,
     EpochOutcome,
+    Improvement,
     Metrics,
     Optima,
     Outcome,
@@ -87,6 +88,7 @@ class Answer:
     count: int | None = None
     optima: Optima | None = None
     deadline: float | None = None
+    improvements: tuple[Improvement, ...] = ()
 
     def confirmed_as(self, solvers: tuple[str, ...]) -> Answer:
         """Return this answer, with which central `solvers` agree: that there is no solution, nothing else shows."""
@@ -120,6 +122,7 @@ class Answer:
             bound=self.bound,
             tree=self.tree,
             confirmed=self.confirmed,
+            improvements=self.improvements,
         )
 
     def as_outcome(self, header: Outcome, lost: tuple[str, ...]) -> Outcome:
@@ -145,6 +148,7 @@ class Answer:
             count=self.count,
             optima=self.optima,
             deadline=self.deadline,
+            improvements=self.improvements,
         )
 
 
@@ -175,7 +179,7 @@ def evaluate_search(
     if found is None:
         return replace(answer, verdict=Verdict.UNKNOWN, bound=bound)
     verdict = _verdict_of(phase, result, kind, found)
-    if cut and found.verified and not found.withdrawn:
+    if cut and found.verified:
         verdict, answer = Verdict.SOLUTION, replace(answer, deadline=deadline)
     if _meets_bound(result, found, told) and verdict is Verdict.SOLUTION and kind is ProblemKind.DISWCSP:
         verdict, bound = Verdict.OPTIMAL, None

@@ -1,80 +1,219 @@
-"""Better decisions after the deadline: the team searches again while there is time, and each one that is better counts.
+"""Answers while a search goes on: the best by the deadline is published, and what is better until the time is over.
 
-A search that a deadline has cut short cannot go on, as what was under way is lost. So the robots begin anew, with
-another seed: local searches start elsewhere, and complete ones have all the time that is left.
+The robots search on. At times they tell what they have (`communication/search_watch.py`); that is checked with the
+files as any answer is. What is published only gets better, and satisfies all hard constraints.
 """
 
 from __future__ import annotations
 
-import itertools
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Sequence
 from dataclasses import replace
+from typing import Protocol
 
-from robochoc.communication.run_result import Progress
-from robochoc.model.outcome import Outcome, Verdict
-from robochoc.model.problem import ProblemKind, Team
-from robochoc.run.options import CENTRAL, Options
-from robochoc.run.orchestrator import solve
-from robochoc.solver.encoding import UnsupportedError
-from robochoc.system.stopping import stop_requested
+from robochoc.communication.run_result import RunResult
+from robochoc.communication.search_watch import SearchWatch
+from robochoc.model.cost_units import Cost
+from robochoc.model.outcome import EpochOutcome, Improvement, Verdict
+from robochoc.model.problem import Team
+from robochoc.run.evaluation import Answer
+from robochoc.verification.checker import RefutedError
 
-_SEEDS = 2**62
+PERIOD_S = 0.1
+"""The shortest time between two snapshots. Where they take long, there are fewer: see `_SHARE`."""
+_SHARE = 10
+"""After a snapshot the search goes on for so many times as long as it took, at least."""
 _FOUND = frozenset({Verdict.SOLUTION, Verdict.OPTIMAL})
 
 
-def refuse_to_improve(team: Team, options: Options) -> None:
-    """Raise `UnsupportedError` where a search of `team` cannot be followed by others that improve its answer."""
-    if options.deadline is None:
-        raise UnsupportedError("--improve goes on after --deadline SECONDS, by which the first decision is made")
-    if options.withdraw is not None or options.protocol == CENTRAL or team.dynamic or options.kill:
-        raise UnsupportedError(
-            "--improve is for robots that stay, in problems that do not change: drop --withdraw, --kill, the scenario,"
-            " and --protocol central"
-        )
+class Audience(Protocol):
+    """Those who are told of each answer while a search goes on."""
+
+    def improve(self, team: Team, /, epoch: EpochOutcome, withdrawn: Sequence[str]) -> None:
+        """Take in an answer that is better than all before in its epoch. The robots `withdrawn` do not fly.
+
+        `epoch` is the epoch as if it had ended now, `team` its team as the files have it.
+        """
+
+    def has_news(self, team: Team) -> bool:
+        """Return whether the problem has changed, so that nothing better is to be searched for."""
 
 
-def improvements(
-    team: Team,
-    options: Options,
-    first: Outcome,
-    seconds: float,
-    progress: Callable[[Progress], None] | None = None,
-) -> Iterator[Outcome]:
-    """Yield each outcome that is better than all before; the `first` is known.
+class Rank:
+    """The order of answers: first by the weight of the robots that withdraw, then by the cost."""
+
+    def __init__(self, team: Team, told: Callable[[float], Cost]) -> None:
+        self._weights = {robot.name: robot.weight for robot in team.robots}
+        self._sign = -1 if told(1) < told(0) else 1
+
+    def of(self, answer: Answer) -> tuple[int, Cost]:
+        """Return the rank of `answer`, which has an assignment: the lower, the better."""
+        return sum(self._weights[name] for name in answer.withdrawn), self._signed(answer.cost or 0)
+
+    def tightest(self, bounds: Sequence[Cost | None]) -> Cost | None:
+        """Return the bound that says the most; None if there is none."""
+        return max((bound for bound in bounds if bound is not None), key=self._signed, default=None)
+
+    def meets(self, answer: Answer, bound: Cost | None) -> bool:
+        """Return whether `answer`, by all robots, is as good as `bound` says that anything is."""
+        return bound is not None and not answer.withdrawn and self._signed(answer.cost or 0) <= self._signed(bound)
+
+    def _signed(self, cost: Cost) -> Cost:
+        return self._sign * cost
+
+
+class Improvements(SearchWatch):
+    """The answers of one search, published from its deadline on.
 
     Args:
-        team: The team as its files have it.
-        options: How `first` was found.
-        first: The answer by the deadline.
-        seconds: How long to search.
-        progress: Receives the number of messages of each search, now and then.
+        began: When the time of the deadline began, on the monotonic clock.
+        deadline: When the first answer is due, on the same.
+        evaluate: Returns the checked answer of a snapshot.
+        rank: The order of answers.
+        has_costs: Whether there are costs. Without them a solution by all robots is as good as any other.
+        bounded: Whether bounds are of costs. (Where robots may withdraw, they are of weights.)
+        publish: Publishes an answer.
+        has_news: Returns whether the problem has changed.
+        earlier: What was published before, where this is not the first search of an epoch.
     """
-    until = time.monotonic() + seconds
-    best = first
-    for number in itertools.count(1):
-        left = until - time.monotonic()
-        if left <= 0 or stop_requested() or _is_final(team, best):
+
+    def __init__(  # noqa: PLR0913 - what differs between runs, by names
+        self,
+        *,
+        began: float,
+        deadline: float,
+        evaluate: Callable[[RunResult], Answer],
+        rank: Rank,
+        has_costs: bool,
+        bounded: bool,
+        publish: Callable[[Answer, tuple[Improvement, ...]], None],
+        has_news: Callable[[], bool],
+        earlier: Sequence[Improvement] = (),
+    ) -> None:
+        self._began = began
+        self._deadline = deadline
+        self._evaluate = evaluate
+        self._rank = rank
+        self._has_costs = has_costs
+        self._bounded = bounded
+        self._publish = publish
+        self._has_news = has_news
+        self._published: Answer | None = None
+        self._best: Answer | None = None
+        self._bound: Cost | None = None
+        self._asked = self._polled = began
+        self._due = min(began + PERIOD_S, deadline)
+        self._over = self._outdated = False
+        self.improvements = [*earlier]
+
+    @property
+    def satisfied(self) -> bool:
+        """See `SearchWatch`: nothing can be better than what is published, or the problem has changed."""
+        return self._over or self._outdated
+
+    def wait_s(self, now: float) -> float:
+        """See `SearchWatch`."""
+        due = (self._due, self._polled + PERIOD_S) if now >= self._deadline else (self._due, self._deadline)
+        return max(0.0, min(due) - now)
+
+    def wants_snapshot(self, now: float) -> bool:
+        """See `SearchWatch`: publish what is due."""
+        first = self._published is None and self._best is not None
+        if now < self._due and (now < self._deadline or not (first or now - self._polled >= PERIOD_S)):
+            return False
+        self._publish_if_due(now)
+        if self._published is not None and now - self._polled >= PERIOD_S:
+            self._outdated = self._outdated or self._has_news()
+        self._polled = now
+        if now < self._due:
+            return False
+        self._asked, self._due = now, float("inf")
+        return True
+
+    def take(self, snapshot: RunResult) -> None:
+        """See `SearchWatch`: check it, and publish it if it is better."""
+        came = time.monotonic()
+        self._note(self._evaluate(snapshot))
+        now = time.monotonic()
+        self._publish_if_due(now)
+        self._due = now + max(PERIOD_S, came - self._asked, _SHARE * (now - came))
+        if now < self._deadline - PERIOD_S:
+            self._due = min(self._due, self._deadline - PERIOD_S)  # so that the answer is there at the deadline
+
+    def _note(self, answer: Answer) -> None:
+        """Keep `answer` if it is the best so far, and what is proven of the costs of all."""
+        if self._bounded:
+            self._bound = self._rank.tightest([self._bound, answer.bound])
+        if _is_found(answer) and (self._best is None or self._rank.of(answer) < self._rank.of(self._best)):
+            self._best = answer
+        best = self._best
+        if best is not None and (self._has_costs or best.withdrawn) and self._is_proven(best, answer):
+            self._best = replace(best, verdict=Verdict.OPTIMAL, bound=None, deadline=None)
+
+    def _is_proven(self, best: Answer, answer: Answer) -> bool:
+        """Return whether nothing is better than the `best`, as `answer` says, or the bound."""
+        optimal = answer.verdict is Verdict.OPTIMAL and self._rank.of(answer) == self._rank.of(best)
+        return optimal or self._rank.meets(best, self._bound)
+
+    def _publish_if_due(self, now: float) -> None:
+        if now >= self._deadline and self._best is not None:
+            self._tell(self._best, now)
+            final = self._best.verdict is Verdict.OPTIMAL or not (self._has_costs or self._best.withdrawn)
+            self._over = self._over or final
+
+    def _tell(self, best: Answer, now: float) -> None:
+        """Publish the `best`, if that is a gain: robots under way are not sent elsewhere for nothing."""
+        before = self._published
+        if self._outdated or (before is not None and not self._rank.of(best) < self._rank.of(before)):
             return
-        seed = (options.seed + number) % _SEEDS
-        found = solve(team, replace(options, seed=seed, deadline=left), progress=progress)
-        if is_better(team, found, best):
-            best = found
-            yield found
+        self._published = best
+        if now >= self._deadline:
+            self.improvements.append(Improvement(now - self._began, best.verdict, best.cost, best.withdrawn))
+        self._publish(best, tuple(self.improvements))
+
+    def concluded(self, final: Answer, *, lost: bool) -> Answer:
+        """Return the answer of the search, which has ended with `final`: that, or what is better of those before.
+
+        It is published if nothing as good is, and the problem has not changed. If robots were `lost`, what was
+        published is no answer for the others.
+
+        Raises:
+            RefutedError: when the protocol claims what an answer refutes.
+        """
+        if lost:
+            return replace(final, improvements=tuple(self.improvements))
+        self._refuse_false_claims(final)
+        self._note(final)
+        best, now = self._best, time.monotonic()
+        if best is None or (now < self._deadline and not _is_found(final)):
+            return replace(final, improvements=tuple(self.improvements))
+        self._tell(best, now)
+        best = self._published or best
+        proven = self._best is not None and self._best.verdict is Verdict.OPTIMAL and not self._outdated
+        return replace(
+            final,
+            verdict=Verdict.OPTIMAL if proven else Verdict.SOLUTION,
+            assignment=best.assignment,
+            cost=best.cost,
+            withdrawn=best.withdrawn,
+            verified=best.verified,
+            bound=None if proven else self._bound if self._bounded and not _is_found(final) else final.bound,
+            deadline=None if proven or final.ended else best.deadline,
+            reason=final.reason if _is_found(final) else None,
+            optima=final.optima,
+            improvements=tuple(self.improvements),
+        )
+
+    def _refuse_false_claims(self, final: Answer) -> None:
+        best = self._best
+        if best is None:
+            return
+        if final.verdict is Verdict.NO_SOLUTION:
+            raise RefutedError(f"the protocol says that there is no solution, and one of cost {best.cost} was found")
+        if final.verdict is Verdict.OPTIMAL and self._rank.of(best) < self._rank.of(final):
+            raise RefutedError(f"the protocol says that {final.cost} is optimal, and {best.cost} was found before")
 
 
-def is_better(team: Team, found: Outcome, best: Outcome) -> bool:
-    """Return whether `found` is a checked solution that costs less than `best`, or where `best` is none."""
-    if found.verdict not in _FOUND or not found.verified or found.withdrawn or found.cost is None:
-        return found.verdict is Verdict.NO_SOLUTION and best.verdict is Verdict.UNKNOWN
-    if best.verdict not in _FOUND or best.cost is None:
-        return True
-    maximised = any(robot.costs.maximize for robot in team.robots)
-    return found.cost > best.cost if maximised else found.cost < best.cost
-
-
-def _is_final(team: Team, best: Outcome) -> bool:
-    """Return whether nothing can be better."""
-    if best.verdict in {Verdict.OPTIMAL, Verdict.NO_SOLUTION}:
-        return True
-    return team.kind is ProblemKind.DISCSP and best.verdict in _FOUND
+def _is_found(answer: Answer) -> bool:
+    """Return whether `answer` is one that was checked."""
+    return answer.verdict in _FOUND and answer.verified and answer.cost is not None

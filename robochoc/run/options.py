@@ -87,6 +87,7 @@ class Options:
         seed: The seed of the simulator, of `Order.RANDOM`, and of protocols that draw lots.
         timeout: A limit on wall-clock time, in seconds (None: no limit).
         deadline: The same, when the best assignment that is known counts as an answer (None: there is none).
+        improve: For how many seconds after the deadline the robots search on for what is better (None: not at all).
         withdraw: Which robots withdraw when the team has no solution (None: none).
         schedule: How the simulator orders events.
         delay: The longest delay of a message in the simulator, in constraint checks.
@@ -120,6 +121,7 @@ class Options:
     seed: int = 0
     timeout: float | None = None
     deadline: float | None = None
+    improve: float | None = None
     withdraw: Withdrawal | None = None
     schedule: ScheduleName = ScheduleName.CONCURRENT
     delay: int = 0
@@ -147,7 +149,7 @@ class Options:
     @property
     def limit_s(self) -> float | None:
         """Return the limit on wall-clock time, in seconds, by whichever option; None: there is none."""
-        return self.timeout if self.deadline is None else self.deadline
+        return self.timeout if self.deadline is None else self.deadline + (self.improve or 0)
 
     @property
     def loss(self) -> float:

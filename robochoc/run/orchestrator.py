@@ -23,6 +23,7 @@ from robochoc.run.compatibility import (
 )
 from robochoc.run.context import RunContext
 from robochoc.run.distributed import solve_distributed
+from robochoc.run.improvement import Audience
 from robochoc.run.options import CENTRAL, Options
 from robochoc.run.protocol_settings import refuse_settings
 from robochoc.run.registry import protocol_named
@@ -46,6 +47,7 @@ def solve(
     progress: Callable[[Progress], None] | None = None,
     solver: AceProcess | None = None,
     environment: Environment | None = None,
+    audience: Audience | None = None,
 ) -> Outcome:
     """Let `team` solve its problem, epoch by epoch if it changes, and check each answer against every constraint.
 
@@ -56,6 +58,7 @@ def solve(
         progress: gets the number of messages so far, now and then.
         solver: a constraint solver that is running already: a program that solves many teams saves time with it.
         environment: gets each epoch's answer, and returns the next change of the problem.
+        audience: with `Options.improve`, gets each answer while the search goes on.
 
     Returns:
         The outcome. When a limit was reached, its verdict is `unknown`.
@@ -80,7 +83,7 @@ def solve(
         if options.protocol == CENTRAL:
             outcome = _solve_centrally(counted, context)
         else:
-            outcome = _solve_distributed(counted, context, environment)
+            outcome = _solve_distributed(counted, context, environment, audience)
     except (OrderError, UnboundedCostError) as refused:
         raise UnsupportedError(str(refused)) from None
     if counted is not team and environment is None:
@@ -111,7 +114,9 @@ def _solve_centrally(team: Team, context: RunContext) -> Outcome:
     return solve_centrally(team, context, _header(team, context.options))
 
 
-def _solve_distributed(team: Team, context: RunContext, environment: Environment | None) -> Outcome:
+def _solve_distributed(
+    team: Team, context: RunContext, environment: Environment | None, audience: Audience | None
+) -> Outcome:
     """Let the robots solve their problem together. See `run/distributed.py`."""
     options = context.options
     protocol = protocol_named(options.protocol)
@@ -120,7 +125,7 @@ def _solve_distributed(team: Team, context: RunContext, environment: Environment
         refuse_unfit(team, options, protocol.traits)
     except UnfitProtocolError as unfit:
         raise UnsupportedError(f"{unfit}{_alternatives(team, options, complete=unfit.complete)}") from None
-    deployment = ThisMachine(team, context, environment)
+    deployment = ThisMachine(team, context, environment, audience)
     header = _header(team, options)
     try:
         outcome = solve_distributed(deployment, protocol, header)

@@ -11,11 +11,12 @@ from robochoc.communication.session import Epoch, Session
 from robochoc.model.cost_units import Cost
 from robochoc.model.costs import normalized_event, told_cost
 from robochoc.model.orders import Order, compute_order, with_dom_deg_order
-from robochoc.model.outcome import EpochOutcome, Metrics, Preprocessing, Verdict
+from robochoc.model.outcome import EpochOutcome, Improvement, Metrics, Preprocessing, Verdict
 from robochoc.model.problem import INFINITE, ProblemKind, Team
 from robochoc.run.context import RunContext
 from robochoc.run.distributed import Deployment
-from robochoc.run.evaluation import Answer, Search, check_with_files
+from robochoc.run.evaluation import Answer, Search, check_with_files, evaluate_search
+from robochoc.run.improvement import Audience, Improvements, Rank
 from robochoc.run.preprocessing import preprocessing_phase, removed_values, restricted, total_preprocessing
 from robochoc.run.runtimes import SessionRequest, open_session
 from robochoc.run.scenario import Environment, EpochStart, FinishedEpoch, ScenarioRun
@@ -33,7 +34,9 @@ class ThisMachine(Deployment):
     `epochs` are those that are over; the list grows while the run goes on.
     """
 
-    def __init__(self, team: Team, context: RunContext, environment: Environment | None) -> None:
+    def __init__(
+        self, team: Team, context: RunContext, environment: Environment | None, audience: Audience | None
+    ) -> None:
         """Prepare the run of `team`. Raises `OrderError`."""
         options = context.options
         self.options = options
@@ -41,6 +44,8 @@ class ThisMachine(Deployment):
         self._team = team
         self._context = context
         self._environment = environment
+        self._audience = audience
+        self._improvements: Improvements | None = None
         self._dynamic = team.dynamic or environment is not None
         self._compiler = context.team_compiler()
         self._start_events = StartEvents(context.observer)
@@ -109,6 +114,7 @@ class ThisMachine(Deployment):
         epoch = Epoch(self._compiler.compile(team, every=True), parameters=phase.parameters)
         self._start_events.report(phase.protocol, EpochStart(epoch))
         with self._session(phase, epoch.compiled) as session:
+            self._watch(phase, EpochStart(epoch), session)
             result = session.search(self.left_s(), self.options.messages)
         return Search(result, partial(check_with_files, phase, result, self._scenario.team, epoch.compiled))
 
@@ -145,10 +151,13 @@ class ThisMachine(Deployment):
             if scenario.found is not None and not self._dynamic:
                 return self._settled(phase, scenario.found)
         with self._session(phase, compiled) as session:
-            for epoch in scenario.epochs(session, partial(self._start_events.report, phase.protocol, session=session)):
+            for epoch in scenario.epochs(session, partial(self._begin, phase, session)):
                 answer, lost = self._answer_of(phase, epoch), epoch.result.lost
                 self.epochs.append(answer.as_epoch(epoch.team.order, epoch.opened_by, tuple(lost)))
-                self._ask_environment()
+                if self._dynamic or lost:
+                    self._restart()
+                    self._ask_environment()
+                    self._restart()
         if lost:
             raise RobotsLostError(lost)
         answer = self._with_epochs(answer)
@@ -165,9 +174,55 @@ class ThisMachine(Deployment):
         if not left or answer.verdict is Verdict.UNKNOWN:
             return ""
         missed = f"{left} event{'s' * (left != 1)} had not happened"
-        if answer.deadline is not None:
-            return f"by the deadline (--deadline {answer.deadline:g}) {missed}"
         return f"{self._limit_reached(answer.metrics)}, and {missed}"
+
+    def _begin(self, phase: Phase, session: Session, start: EpochStart) -> None:
+        """Report that an epoch begins, and watch it."""
+        self._start_events.report(phase.protocol, start, session)
+        self._watch(phase, start, session)
+
+    def _restart(self) -> None:
+        """Let the time begin again, where there is a deadline: each epoch has its own."""
+        if self.options.deadline is not None:
+            self._context.restart()
+            self._compiler.deadline = self._context.deadline
+
+    def _watch(self, phase: Phase, start: EpochStart, session: Session) -> None:
+        """Have what is found in the epoch that starts published while the search goes on, if that is asked for."""
+        before, self._improvements = self._improvements, None
+        options, audience = self.options, self._audience
+        if options.deadline is None or options.improve is None:
+            return
+        team, compiled, began = self._scenario.team, start.epoch.compiled, self._context.began
+
+        def evaluate(snapshot: RunResult) -> Answer:
+            if options.loss and not phase.traits.bears_loss:  # as robots tell one after the other
+                lost = max(1, snapshot.metrics.lost_messages)
+                snapshot = replace(snapshot, metrics=replace(snapshot.metrics, lost_messages=lost))
+            search = Search(snapshot, partial(check_with_files, phase, snapshot, team, compiled))
+            return evaluate_search(phase, search, team.kind, self.told, options.deadline)
+
+        def publish(answer: Answer, improvements: tuple[Improvement, ...]) -> None:
+            if audience is not None:
+                now = replace(answer, improvements=improvements)
+                audience.improve(team, now.as_epoch(team.order, start.opened_by or "the start"), answer.withdrawn)
+
+        session.watch = self._improvements = Improvements(
+            began=began,
+            deadline=began + options.deadline,
+            evaluate=evaluate,
+            rank=Rank(team, self.told),
+            has_costs=team.kind is ProblemKind.DISWCSP,
+            bounded=phase.parameters.withdrawal_cost is None,
+            publish=publish,
+            has_news=lambda: audience is not None and audience.has_news(team),
+            earlier=before.improvements if before else (),
+        )
+
+    def concluded(self, phase: Phase, search: Search, answer: Answer) -> Answer:  # noqa: ARG002 - see `Deployment`
+        """See `Deployment.concluded`. What was published for robots that are now lost is no answer."""
+        improvements = self._improvements
+        return improvements.concluded(answer, lost=bool(search.result.lost)) if improvements else answer
 
     def _preprocessed(self) -> tuple[CompiledTeam, RunResult | None]:
         """Let the robots make their domains consistent, and return the team that is left. See `scenario.Prepare`.
@@ -197,13 +252,15 @@ class ThisMachine(Deployment):
     def _answer_of(self, phase: Phase, epoch: FinishedEpoch) -> Answer:
         """Return the answer of an epoch, checked with the files."""
         check = partial(check_with_files, phase, epoch.result, epoch.team, epoch.epoch.compiled)
-        return self.evaluated(phase, Search(epoch.result, check))
+        answer = self.evaluated(phase, Search(epoch.result, check))
+        self._improvements = None
+        return answer
 
     def _ask_environment(self) -> None:
         """Give the environment, if there is one, the last epoch's answer; it may add an event."""
         if self._environment is None:
             return
-        left_s = 0 if self._scenario.is_over else self.left_s()
+        left_s = 0 if self._scenario.is_over else None if self.options.deadline is not None else self.left_s()
         event = self._environment(self._scenario.team, self.epochs[-1], left_s)
         if event:
             self._scenario.add_event(normalized_event(self._scenario.team, event))
@@ -235,7 +292,7 @@ class ThisMachine(Deployment):
             context.observer,
             context.progress,
             context.kills,
-            context.deadline,
+            None if self._dynamic and self.options.deadline is not None else context.deadline,
         )
         return open_session(request)
 

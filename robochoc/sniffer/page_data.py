@@ -230,7 +230,8 @@ def _ending(trace: Trace, outcome: Outcome) -> str:
     if outcome.withdrawn_alive:
         witness = f", as {outcome.ruled_out}" if outcome.ruled_out else ""
         headline = describe_outcome(outcome, len(trace.robots))
-        return f"{headline}: no solution for all{witness}; withdrawn: {_cut(outcome.withdrawn_alive)}{out}."
+        why = f": no solution for all{witness}" if outcome.deadline is None else ", by the deadline"
+        return f"{headline}{why}; withdrawn: {_cut(outcome.withdrawn_alive)}{out}."
     said = _said(outcome.verdict)
     cost = f", of cost {cost_shown(outcome.cost)}" if outcome.cost else ""
     return f"{said[0].upper()}{said[1:]}{cost}{_by(outcome)}{reason}{out}."

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
-from functools import partial
 from itertools import count
 from typing import TYPE_CHECKING
 
@@ -34,8 +33,8 @@ class OutOfTimeError(Exception):
 class TeamCompiler:
     """Compiles teams of one run. `seconds` is how long solvers took for it; no solver, no time.
 
-    `deadline` is on the monotonic clock. `stage` is called with a few words on the progress. For the others see
-    `Compiler`.
+    `deadline` is on the monotonic clock, and may be changed. `stage` is called with a few words on the progress. For
+    the others see `Compiler`.
     """
 
     seconds: float = 0.0
@@ -48,8 +47,8 @@ class TeamCompiler:
         solver: AceProcess | None,
         stage: Callable[[str], None],
     ) -> None:
-        self._compiler = partial(Compiler, limits, cache, deadline, solver)
-        self._deadline = deadline
+        self._limits, self._cache, self._solver = limits, cache, solver
+        self.deadline = deadline
         self._stage = stage
 
     def compile(self, team: Team, *, every: bool = False) -> CompiledTeam:
@@ -66,7 +65,7 @@ class TeamCompiler:
             nonlocal solved
             self._stage(f"compiling {robot.name} ({next(number)} of {len(team.robots)})")
             late = OutOfTimeError(f"the time was over while {robot.name} was compiled")
-            if self._deadline is not None and time.monotonic() >= self._deadline:
+            if self.deadline is not None and time.monotonic() >= self.deadline:
                 raise late
             try:
                 compilation = compiler.compile(robot)
@@ -78,7 +77,7 @@ class TeamCompiler:
             return compilation.domain
 
         try:
-            with self._compiler() as compiler:
+            with Compiler(self._limits, self._cache, self.deadline, self._solver) as compiler:
                 return CompiledTeam(team, compile_robot)
         finally:
             if solved:

@@ -158,7 +158,8 @@ def _facts(outcome: Outcome, mission: Mission) -> tuple[tuple[str, str], ...]:
     checked = ", checked" if outcome.verified else ""
     facts = [("verdict", f"{outcome.verdict}{checked}"), ("protocol", outcome.protocols)]
     if outcome.withdrawn_alive:
-        facts[0] = ("verdict", f"no solution for all {len(mission.drones)}{checked}")
+        known = f"no solution for all {len(mission.drones)}" if outcome.deadline is None else outcome.verdict
+        facts[0] = ("verdict", f"{known}{checked}")
         facts.append(("withdrawn", f"{len(outcome.withdrawn_alive)}"))
     if outcome.lost:
         facts.append(("lost", ", ".join(outcome.lost)))

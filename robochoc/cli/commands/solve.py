@@ -26,7 +26,7 @@ from robochoc.cli.options.ros import (
     situation_options,
     take_ros_options,
 )
-from robochoc.cli.options.ros_setup import closed_loop, improved, sink_places, source_places
+from robochoc.cli.options.ros_setup import closed_loop, sink_places, source_places
 from robochoc.cli.options.sections import COMMON, Sections
 from robochoc.cli.options.solve import (
     Products,
@@ -57,6 +57,7 @@ if TYPE_CHECKING:
     from robochoc.model.problem import Team
     from robochoc.ros.closed_loop import ClosedLoop
     from robochoc.run.choice import Choice
+    from robochoc.run.improvement import Audience
     from robochoc.run.options import Options
 
 
@@ -312,33 +313,38 @@ def _recorded(folder: Path, options: Options, products: Products, wanted: Wanted
     check_chosen(products.watching, team)
     order = order_for(team, wanted.order, problem.names)
     options = replace(options, order=order, kill=_called(options.kill, problem))
+    from robochoc.cli.reports.improvements import ImprovementsTold
     from robochoc.run.choice import decided
-    from robochoc.run.improvement import refuse_to_improve
     from robochoc.run.recording import journal_header, objective_to_record
 
     choice = decided(team, options, environment=bool(wanted.ros.situation), ordered=not problem.foreign)
     options = choice.options
     header = partial(journal_header, team, options)
 
-    if wanted.ros.improve:
-        refuse_to_improve(team, options)
     objective = None if wanted.ros.situation else objective_to_record(team, options)
     with (
         closed_loop(wanted.ros, team, options.seed) as loop,
         recording(products.journal, header, objective, watch.begun()) as recorder,
     ):
-        outcome = _run(team, options, recorder, loop)
-        if loop and wanted.ros.improve:
-            outcome = improved(loop, team, options, outcome, wanted.ros.improve)
+        audience = ImprovementsTold(team, loop, quiet=wanted.as_json) if options.improve else None
+        outcome = _run(team, options, recorder, loop, audience)
         team = loop.team if loop else team
         _tell(problem._replace(team=team), outcome, wanted, choice)
         if loop and loop.mission is None:  # the run knew nothing of it
             loop.publish(outcome)
         flight = flight_told(loop, wanted.ros, quiet=wanted.as_json)
+        if audience and (products.html or products.serve) and flight.mission is None:
+            flight = flight._replace(mission=audience.mission(outcome, team))
     return _RecordedRun(team, outcome, loop, flight)
 
 
-def _run(team: Team, options: Options, recorder: JournalRecorder | None, loop: ClosedLoop | None) -> Outcome:
+def _run(
+    team: Team,
+    options: Options,
+    recorder: JournalRecorder | None,
+    loop: ClosedLoop | None,
+    audience: Audience | None,
+) -> Outcome:
     """Run with the requested observers: the page, a journal, the progress line, and the ROS sinks."""
     from robochoc.cli.reports.choice import OrderNote
     from robochoc.cli.reports.progress import progress_line, waiting
@@ -351,7 +357,8 @@ def _run(team: Team, options: Options, recorder: JournalRecorder | None, loop: C
         show = shown_and_flushed(recorder, note.watching(progress))
         if loop and loop.feedback and show:
             loop.feedback.idle = waiting(show)
-        outcome = run(team, options, observer=recorder, progress=show, environment=loop if told else None)
+        environment = loop if told else None
+        outcome = run(team, options, observer=recorder, progress=show, environment=environment, audience=audience)
     note.tell_if_late(outcome.metrics.wall_s)
     if recorder:
         recorder.outcome = outcome

@@ -110,7 +110,7 @@ situation_options = _optional(
         "--improve",
         type=Finite(0, min_open=True),
         metavar="SECONDS",
-        help="After --deadline: publish what is better.",
+        help="After --deadline: search on, publish better.",
     ),
     click.option("--use-sim-time", is_flag=True, help="Stamps are the time on /clock of --situation."),
     click.option(
@@ -155,7 +155,6 @@ class RosOptions:
     published: Mapping[str, Any]
     flight: Mapping[str, Any]
     arm: bool = False
-    improve: float | None = None
 
     def __bool__(self) -> bool:
         return bool(self.sinks or self.situation)
@@ -164,7 +163,6 @@ class RosOptions:
 def take_ros_options(settings: dict[str, Any]) -> RosOptions:
     """Take the options of this file out of `settings`. Raises `click.UsageError` for one that would be ignored."""
     sinks, situation, arm = settings.pop("sinks"), settings.pop("situation"), settings.pop("arm")
-    improve = settings.pop("improve")
     given = {name: settings.pop(name) for name in (*_SIMULATED, *_FROM_REPORTS, *IN_FRAME, *PUBLISHED)}
     asked = given_names(given)
     if situation != FLIGHT:
@@ -177,8 +175,6 @@ def take_ros_options(settings: dict[str, Any]) -> RosOptions:
         refuse(PUBLISHED, asked, NOT_PUBLISHED)
     if arm and not sinks:
         raise click.UsageError("--arm is for robots that are commanded: add --ros mavlink:FILE, or crazyflie:FILE")
-    if improve is not None and (not sinks or situation):
-        raise click.UsageError("--improve publishes better decisions: add --ros SINK, and no --situation")
     flight = {name: given[name] for name in _SIMULATED if name in asked}
     frame = given["frame"] or FRAME
     return RosOptions(
@@ -192,7 +188,6 @@ def take_ros_options(settings: dict[str, Any]) -> RosOptions:
         {name: given[name] for name in PUBLISHED},
         flight,
         arm,
-        improve,
     )
 
 

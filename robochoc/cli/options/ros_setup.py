@@ -26,13 +26,11 @@ from robochoc.cli.reports.failures import INVALID, USAGE, Failure
 if TYPE_CHECKING:
     from robochoc.flight.mission import Drone, Mission
     from robochoc.flight.quadrotor.conditions import FlightConditions
-    from robochoc.model.outcome import Outcome
     from robochoc.model.problem import Assignment, Robot, Team
     from robochoc.ros.closed_loop import ClosedLoop, Feedback
     from robochoc.ros.simulated_feedback import FlightSettings
     from robochoc.ros.sink import Sink
     from robochoc.ros.team_topics import PublishOptions
-    from robochoc.run.options import Options
 
 
 @contextmanager
@@ -143,23 +141,6 @@ def closed_loop(ros: RosOptions, team: Team, seed: int) -> Iterator[ClosedLoop |
             battery=battery,
             publish=publish_options(ros.published),
         )
-
-
-def improved(loop: ClosedLoop, team: Team, options: Options, first: Outcome, seconds: float) -> Outcome:
-    """Publish `first` if it can be flown, then each better decision of so many `seconds`; return the last one."""
-    from robochoc.cli.reports.progress import progress_line
-    from robochoc.model.outcome import Verdict
-    from robochoc.run.improvement import improvements
-
-    best = first
-    if first.verdict in {Verdict.SOLUTION, Verdict.OPTIMAL}:
-        loop.improve(first, "the start")
-    with progress_line(team.name) as progress:
-        for better in improvements(team, options, first, seconds, progress):
-            best = better
-            if better.verdict is not Verdict.NO_SOLUTION:
-                loop.improve(better, "a better decision")
-    return best
 
 
 def _feedback(ros: RosOptions, drones: Sequence[Drone], seed: int, stack: ExitStack) -> Feedback:

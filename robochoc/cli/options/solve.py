@@ -113,7 +113,7 @@ filter_option = click.option(
 
 _SAME_NAMES = (
     "seed", "timeout", "delay", "count", "verify", "messages", "ncccs", "cycles", "spares", "patience", "filters",
-    "kill", "bounds", "message_loss", "deadline",
+    "kill", "bounds", "message_loss", "deadline", "improve",
 )  # fmt: skip
 """Arguments of `robochoc solve` that are called as in `robochoc.run.Options`."""
 
@@ -274,7 +274,5 @@ def check_products(products: Products, wanted: Wanted, options: Options, *, team
         raise click.UsageError("--serve and --sniff both stay until Ctrl-C; the page of --sniff shows the scene, too")
     if wanted.ros and teams > 1:
         raise click.UsageError(f"--ros and --situation are for one team; {teams} were found")
-    if wanted.ros.improve and products:
-        raise click.UsageError("--improve searches again and again: it goes without --journal, --html and --sniff")
     if products and teams > 1:
         raise click.UsageError(f"--html, --journal, --serve and --sniff are for one team; {teams} were found")

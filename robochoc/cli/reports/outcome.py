@@ -112,7 +112,12 @@ def _verdict(team: Team, outcome: Outcome) -> str:
             proof = f"{_not_proven(team, outcome)}, {_checked(outcome)}{confirmed}{_trusted(team, outcome)}"
             return f"{headline}{proof}{unfinished}"
         case Verdict.SOLUTION | Verdict.OPTIMAL:
-            whole = f"no solution{left or ' for the whole team'}{because}"
+            by = _by_the_deadline(outcome)
+            whole = (
+                f"{by.strip()}, nobody has proven more"
+                if by
+                else f"no solution{left or ' for the whole team'}{because}"
+            )
             return f"{headline}; {whole}; {_checked(outcome)}{confirmed}{_trusted(team, outcome)}"
 
 
@@ -156,11 +161,20 @@ def _trusted(team: Team, outcome: Outcome) -> str:
 
 def _not_proven(team: Team, outcome: Outcome) -> str:
     known = team.kind is ProblemKind.DISCSP or outcome.verdict is Verdict.OPTIMAL
-    by = "" if outcome.deadline is None else f" by the deadline of {outcome.deadline:g} s"
+    by = _by_the_deadline(outcome)
     if known:
         return by
     bound = f"; {_side(team)} bound {_number(outcome.bound)}" if by and outcome.bound else ""
     return f"{by} (not proven to be the {_best(team)}{bound})"
+
+
+def _by_the_deadline(outcome: Outcome) -> str:
+    """Return when the answer was found, if the time has ended the search."""
+    if outcome.deadline is None:
+        return ""
+    by = f" by the deadline of {outcome.deadline:g} s"
+    better = [f"{one.at_s:.1f} s" for one in outcome.improvements[1:]]
+    return f"{by}, improved after {better[-1]}" if better else by
 
 
 def _maximizes(team: Team) -> bool:

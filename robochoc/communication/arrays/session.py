@@ -12,6 +12,7 @@ from robochoc.communication.arrays.description import described
 from robochoc.communication.arrays.forms import form_of
 from robochoc.communication.arrays.layout import Layout
 from robochoc.communication.run_result import Progress, RunResult
+from robochoc.communication.search_watch import snapshot_of
 from robochoc.communication.session import Epoch, Session
 from robochoc.journal.events import Concluded, Decided, Observer
 from robochoc.model.outcome import Verdict
@@ -73,8 +74,9 @@ class ArraysRun(Session):
         for _ in walk(run):
             elapsed_s = time.monotonic() - began
             self._report(elapsed_s)
+            self._watched()
             if not run.over and (
-                stop_requested()
+                self._is_to_stop
                 or (timeout is not None and elapsed_s > timeout)
                 or (messages is not None and self._sent >= messages)
             ):
@@ -87,6 +89,15 @@ class ArraysRun(Session):
         return RunResult(
             verdict, witness, self._assignments(), run.metrics(time.monotonic() - began), findings=self._findings()
         )
+
+    def _watched(self) -> None:
+        """Give those who watch a snapshot, if they want one."""
+        if self.watch is not None and self.watch.wants_snapshot(time.monotonic()):
+            self.watch.take(snapshot_of(self._assignments(), self._findings()))
+
+    @property
+    def _is_to_stop(self) -> bool:
+        return stop_requested() or (self.watch is not None and self.watch.satisfied)
 
     def change(self, epoch: Epoch) -> None:  # noqa: ARG002 - of `Session`
         """Refuse: see `robochoc.run.compatibility`."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from itertools import islice
 
-from robochoc.communication.control import OfEpoch, Report
+from robochoc.communication.control import OfEpoch, Report, Snapshot
 from robochoc.communication.network.control_messages import CheckResult, DetailedReport
 from robochoc.communication.network.plausibility import (
     NOTHING_DECLARED,
@@ -18,6 +18,7 @@ from robochoc.communication.network.plausibility import (
     fault_of_account,
     fault_of_check,
     fault_of_counters,
+    fault_of_snapshot,
     objections,
     thoroughness,
     total_of,
@@ -105,6 +106,9 @@ class AuditedSearchState(SearchState):
             self._accounts[name] = report
             super()._take_report(name, report)
         return fault
+
+    def _take_snapshot(self, name: str, snapshot: Snapshot) -> str:
+        return fault_of_snapshot(name, snapshot, self._declared, self.order) or super()._take_snapshot(name, snapshot)
 
     def _take_check(self, name: str, check: CheckResult) -> str:
         fault = fault_of_check(name, check, self._declared, self.order)

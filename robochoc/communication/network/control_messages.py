@@ -23,6 +23,8 @@ from robochoc.communication.control import (
     Pause,
     Ready,
     Report,
+    Snapshot,
+    TakeSnapshot,
     Wave,
     WentOn,
 )
@@ -252,6 +254,7 @@ ToMaster = (
     | Counters
     | Conclusion
     | WentOn
+    | Snapshot
     | Events
     | DetailedReport
     | CheckResult
@@ -269,6 +272,7 @@ ToRobot = (
     | Task
     | StartSearch
     | Wave
+    | TakeSnapshot
     | GoOn
     | Pause
     | CheckRequest

@@ -153,6 +153,7 @@ class LocalNetwork(Session):
                 awaited = ", ".join(sorted(self._master.members.awaited)[:5])
                 raise UnsupportedError(f"robots did not register within {START_S:g} s: {awaited}")
         left = None if deadline is None else max(0.0, deadline - time.monotonic())
+        self._master.watch = self.watch
         return self._master.search(self._protocol.__name__, self._protocol.traits, self._parameters, left, messages)
 
     def workable(self, team: Team) -> Team:

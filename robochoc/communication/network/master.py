@@ -56,7 +56,6 @@ from robochoc.protocols.traits import Traits
 from robochoc.solver.agent_problem import RunParameters
 from robochoc.solver.encoding import TooLargeError, UnsupportedError
 from robochoc.system.plain_text import LONGEST_REASON, on_one_line
-from robochoc.system.stopping import stop_requested
 
 REGISTRY_S = 0.5
 """The interval at which the Authority's registry is read for new enrolments and revocations, in seconds."""
@@ -171,7 +170,7 @@ class Master(MasterLoop):
         for name, task in self.members.tasks(epoch, protocol, traits, parameters).items():
             self._send(name, task)
         self._search_until(deadline)
-        state.note_end(time.monotonic() - began, in_time=not (over(deadline) or stop_requested()))
+        state.note_end(time.monotonic() - began, in_time=not (over(deadline) or self.is_to_stop))
         self._collect()
         return state.result(state.duration_s)
 

@@ -15,6 +15,7 @@ from itertools import chain
 from types import MappingProxyType
 from typing import NamedTuple
 
+from robochoc.communication.control import Snapshot
 from robochoc.communication.network.control_messages import Charge, CheckResult, DetailedReport, Exchanged
 from robochoc.communication.network.framing import LARGEST_FRAME
 from robochoc.communication.network.profile import LONGEST_NAME, MOST_VARIABLES
@@ -96,7 +97,7 @@ def fault_of_counters(counts: Counts, before: Counts | None) -> str:
 def fault_of_account(name: str, account: DetailedReport, declared: Declarations, course: FinishedSearch) -> str:
     """Return why the robot `name` cannot report `account`; empty if it can."""
     return (
-        next(_faults_of_values(name, account, declared), "")
+        next(_faults_of_values(name, account.assignment, declared, assigned=account.assigned), "")
         or _fault_of_metrics(account, course.duration_s)
         or _fault_of_drops(account, course)
         or _fault_of_exchange(name, account, course)
@@ -104,9 +105,20 @@ def fault_of_account(name: str, account: DetailedReport, declared: Declarations,
     )
 
 
-def _faults_of_values(name: str, account: DetailedReport, declared: Declarations) -> Iterator[str]:
-    values, own = account.assignment, declared.shown.get(name, {})
-    if values and not account.assigned:
+def fault_of_snapshot(name: str, snapshot: Snapshot, declared: Declarations, order: Collection[str]) -> str:
+    """Return why the robot `name` cannot have what it says in `snapshot`; empty if it can."""
+    if not 0 <= snapshot.lost <= LARGEST_COUNT:
+        return "it has reported counts that cannot be"
+    return next(_faults_of_values(name, snapshot.assignment, declared), "") or fault_of_findings(
+        snapshot.findings, order
+    )
+
+
+def _faults_of_values(
+    name: str, values: Mapping[str, int], declared: Declarations, *, assigned: bool = True
+) -> Iterator[str]:
+    own = declared.shown.get(name, {})
+    if values and not assigned:
         yield "it has reported values, and that it has none"
     if len(values) > MOST_VARIABLES:
         yield f"it has reported more than {MOST_VARIABLES:,} variables"

@@ -16,7 +16,7 @@ from typing import NamedTuple
 
 from robochoc.authority.identity import Identity
 from robochoc.authority.keyring import UnknownPeerError
-from robochoc.communication.control import Failed, GoOn, Pause, Wave
+from robochoc.communication.control import Failed, GoOn, Pause, TakeSnapshot, Wave
 from robochoc.communication.filters import NotGenuineError
 from robochoc.communication.host import BadMessageError
 from robochoc.communication.network.control_messages import (
@@ -270,6 +270,8 @@ class NetworkRobot:
                 searcher.begin(time.monotonic())
             case Wave(number) if searcher:
                 searcher.report_counters(number)
+            case TakeSnapshot(number) if searcher:
+                searcher.report_snapshot(number)
             case GoOn() if searcher:
                 searcher.go_on()
             case Pause() if searcher:

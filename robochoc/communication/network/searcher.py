@@ -224,12 +224,15 @@ class Searcher(RobotLoop):
         if self._host is None:  # others have not told which constraints they hold, and perhaps never will
             self._context.say(DetailedReport(self.epoch, {}, Metrics(), NOTHING, assigned=False))
             return
-        protocol = self._host.protocol
         metrics = self._host.metrics()
         metrics = replace(metrics, ncccs=min(metrics.ncccs, LATEST), memory=own_memory())
-        assigned = bool(protocol.assignment)  # a withdrawn robot has a value, and none of its variables has
-        values, findings = ({}, NOTHING) if self._context.private else (protocol.assignment, self._findings(protocol))
+        assigned = bool(self.assignment)  # a withdrawn robot has a value, and none of its variables has
+        values, findings = self._known_to_master(self._host)
         self._context.say(DetailedReport(self.epoch, values, metrics, findings, assigned, self._exchanged()))
+
+    def _known_to_master(self, host: Host) -> tuple[dict[str, int], Findings]:
+        """See `RobotLoop`. In private runs that is nothing."""
+        return ({}, NOTHING) if self._context.private else (host.protocol.assignment, self._findings(host.protocol))
 
     def _findings(self, protocol: Protocol) -> Findings:
         """Return the findings, some of which come from others; nothing if one of those cannot be true."""

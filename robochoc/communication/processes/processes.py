@@ -45,7 +45,6 @@ from robochoc.protocols.protocol import Protocol
 from robochoc.solver.agent_problem import DEFAULT_PARAMETERS, AgentProblem, RunParameters
 from robochoc.solver.compiled_team import CompiledTeam
 from robochoc.solver.encoding import TooLargeError, UnsupportedError
-from robochoc.system.stopping import stop_requested
 
 CHECK_S = 0.001
 """The time between two checks of which processes are there, for each robot: so they take a small part of it."""
@@ -122,7 +121,7 @@ class ProcessesRun(Session, MasterLoop):
             self._search_until(deadline)
             if self.state.ordered:
                 self._lossless = self.state.counters.quiescent and not self.state.broken_off and not self._drops
-            return self._finish(began, late=over(deadline) or stop_requested())
+            return self._finish(began, late=over(deadline) or self.is_to_stop)
         except RobotsLostError as lost:
             for name, why in lost.robots.items():
                 self._observe(Lost(t=self._now(), robot=name, why=why))

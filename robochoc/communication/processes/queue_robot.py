@@ -22,6 +22,7 @@ from robochoc.communication.control import (
     QueueFrom,
     QueuesTo,
     Report,
+    TakeSnapshot,
     Wave,
     unsealed,
 )
@@ -159,6 +160,8 @@ class QueueRobot(RobotLoop):
                 self._open_reader(robot, QueueReader(self._link.take_fd()))
             case Wave(number):
                 self.report_counters(number)
+            case TakeSnapshot(number):
+                self.report_snapshot(number)
             case GoOn():
                 self.go_on()
             case Pause():
@@ -170,11 +173,11 @@ class QueueRobot(RobotLoop):
 
     def _report_end(self) -> None:
         if self._host is not None:
-            protocol = self._host.protocol
+            assignment, findings = self._known_to_master(self._host)
             metrics = self._host.metrics()
             if self._measured:
                 metrics = replace(metrics, memory=own_memory())
-            self._say(Report(self.epoch, protocol.assignment, metrics, protocol.findings))
+            self._say(Report(self.epoch, assignment, metrics, findings))
 
     def _change(self, order: Change) -> None:
         """Enter the next epoch, with a changed problem and no message under way."""

@@ -13,6 +13,7 @@ from dataclasses import dataclass, replace
 from robochoc.communication.host import Host, UnderWay, may_be_shared, order_of
 from robochoc.communication.resources import garbage_frozen
 from robochoc.communication.run_result import Progress, RunResult
+from robochoc.communication.search_watch import SearchWatch, snapshot_of
 from robochoc.communication.session import Epoch, Session, over
 from robochoc.communication.simulator.losses import Losses
 from robochoc.communication.simulator.schedule import Schedule
@@ -175,12 +176,17 @@ class Simulation(Session):
             self._checks = host.checks
             self._send(host, host.start(lossless=lossless))
         packets, told_s = 0, 0.0
-        schedule, hosts = self._schedule, self._hosts
+        schedule, hosts, watch = self._schedule, self._hosts, self.watch
         most_ncccs, most_cycles = self._limits.ncccs, self._limits.cycles
         while self._verdict is None:
             answer_signals()
             elapsed_s = time.monotonic() - began
-            if (timeout is not None and elapsed_s > timeout) or (messages is not None and self._sent >= messages):
+            late = timeout is not None and elapsed_s > timeout
+            if (
+                late
+                or (messages is not None and self._sent >= messages)
+                or (watch is not None and self._watched(watch))
+            ):
                 return
             if most_ncccs is not None and self._ncccs >= most_ncccs:
                 return
@@ -229,6 +235,19 @@ class Simulation(Session):
         if self._progress:
             self._progress(Progress(self._sent, elapsed_s))
         return stop_requested()
+
+    def _watched(self, watch: SearchWatch) -> bool:
+        """Let `watch` have a snapshot if it wants one; return whether the search need not go on."""
+        if watch.wants_snapshot(time.monotonic()):
+            hosts, losses = self._hosts, self._losses
+            watch.take(
+                snapshot_of(
+                    {name: host.protocol.assignment for name, host in hosts.items()},
+                    {name: host.protocol.findings for name, host in hosts.items()},
+                    0 if losses is None else losses.lost,
+                )
+            )
+        return watch.satisfied
 
     def _send(self, host: Host, envelopes: Sequence[Envelope]) -> None:
         """Send what `host` has said in its step on its way."""

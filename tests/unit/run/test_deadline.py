@@ -19,7 +19,7 @@ from robochoc.generators.random_csp import random_csp
 from robochoc.model.outcome import Verdict
 from robochoc.model.problem import INFINITE, RemoveValue, ScenarioEvent, Team
 from robochoc.protocols.findings import Findings
-from robochoc.run import Options, Runtime, solve
+from robochoc.run import Options, Runtime, Withdrawal, solve
 from robochoc.run.evaluation import Search, check_with_files, evaluate_search
 from robochoc.run.registry import protocol_named, protocol_names
 from robochoc.run.withdrawal import first_phase
@@ -81,16 +81,45 @@ def test_without_a_solution_by_then_nothing_is_said() -> None:
 
 
 @pytest.mark.usefixtures("a_second_a_look")
-def test_before_all_events_have_happened_nothing_is_decided() -> None:
-    """The answer to an earlier problem is none to the last one: its epoch has it, the run does not."""
+def test_each_epoch_has_the_same_time() -> None:
+    """A scenario's epoch that the deadline ends has an answer, and the next event comes."""
     team = random_csp(6, 3, 0.6, 0.0, seed=1, max_cost=9)
     event = ScenarioEvent((RemoveValue(team.robots[0].variables[0].name, 2),))
     options = Options(protocol="dsa", runtime=Runtime.SIMULATOR, deadline=100, settings={"cycles": "1000000"})
     alone, outcome = solve(team, options), solve(replace(team, scenario=(event,)), options)
     assert (alone.verdict, alone.deadline) == (Verdict.SOLUTION, 100)
-    assert [epoch.verdict for epoch in outcome.epochs] == [Verdict.SOLUTION]
-    assert (outcome.verdict, outcome.deadline) == (Verdict.UNKNOWN, None)
-    assert outcome.reason == "by the deadline (--deadline 100) 1 event had not happened"
+    assert [epoch.verdict for epoch in outcome.epochs] == [Verdict.SOLUTION, Verdict.SOLUTION]
+    assert (outcome.verdict, outcome.deadline, outcome.reason) == (Verdict.SOLUTION, 100, None)
+    assert (outcome.assignment, outcome.cost) == (outcome.epochs[1].assignment, outcome.epochs[1].cost)
+    assert outcome.assignment[team.robots[0].variables[0].name] != 2
+
+
+@pytest.mark.usefixtures("a_second_a_look")
+def test_an_answer_to_a_problem_that_was_to_change_is_none() -> None:
+    """Where all messages have been sent before the last event, its epoch has the answer, the run does not."""
+    team = random_csp(6, 3, 0.6, 0.0, seed=1, max_cost=9)
+    event = ScenarioEvent((RemoveValue(team.robots[0].variables[0].name, 2),))
+    options = Options(
+        protocol="dsa", runtime=Runtime.SIMULATOR, deadline=100, settings={"cycles": "1000000"}, messages=100_000
+    )
+    for messages in (20, 60):
+        outcome = solve(replace(team, scenario=(event,)), replace(options, messages=messages))
+        assert len(outcome.epochs) == 1 or outcome.events == 1
+        assert (outcome.verdict, outcome.deadline) == (Verdict.UNKNOWN, None)
+
+
+@pytest.mark.usefixtures("a_second_a_look")
+def test_robots_that_withdraw_by_then_leave_an_answer_for_the_others() -> None:
+    """Nobody has proven that the whole team has no solution, nor that no fewer could withdraw: that is said."""
+    team = queens3d(3)
+    options = Options(protocol="bnb-adopt", runtime=Runtime.SIMULATOR, deadline=200, withdraw=Withdrawal.MINIMUM)
+    outcome = solve(team, options)
+    assert (outcome.verdict, outcome.deadline) == (Verdict.SOLUTION, 200)
+    assert outcome.withdrawn
+    assert list(violations(team, outcome.assignment, outcome.withdrawn)) == []
+    report = outcome_report(team, outcome)
+    assert "by the deadline of 200 s, nobody has proven more" in report
+    assert "no solution" not in report
 
 
 def test_before_all_events_a_limit_on_messages_decides_nothing_either() -> None:

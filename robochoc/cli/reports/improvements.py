@@ -1,0 +1,60 @@
+"""`--improve`: each better answer is published, and told on standard error, while the search goes on."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+from robochoc.cli.reports.progress import print_above
+
+if TYPE_CHECKING:
+    from robochoc.flight.mission import Mission
+    from robochoc.model.outcome import EpochOutcome, Outcome
+    from robochoc.model.problem import Team
+    from robochoc.ros.closed_loop import ClosedLoop
+
+
+class ImprovementsTold:
+    """The audience of a run of `team` (`robochoc.run.improvement.Audience`): prints a line unless `quiet`.
+
+    What is better is published by the closed `loop`, if there is one.
+    """
+
+    def __init__(self, team: Team, loop: ClosedLoop | None, *, quiet: bool) -> None:
+        self._name = team.name
+        self._loop = loop
+        self._quiet = quiet
+        self._epochs: list[EpochOutcome] = []
+
+    def improve(self, _team: Team, epoch: EpochOutcome, withdrawn: Sequence[str]) -> None:
+        """Publish an answer, and print when it came, and what it costs."""
+        if len(epoch.improvements) > 1:
+            epoch = replace(epoch, opened_by="a better decision")
+        self._epochs.append(epoch)
+        if self._loop is not None:
+            self._loop.improve(epoch, withdrawn)
+        if epoch.improvements and not self._quiet:
+            print_above(self._line(epoch))
+
+    def has_news(self, team: Team) -> bool:
+        """Return whether robots have reported what changes the problem."""
+        return self._loop is not None and self._loop.has_news(team)
+
+    def mission(self, outcome: Outcome, team: Team) -> Mission | None:
+        """Return what all answers, one after the other, ask of the drones; None if there was one, or several epochs."""
+        if len(self._epochs) <= 1 or outcome.epochs:
+            return None
+        from robochoc.flight.mission import mission_of
+
+        return mission_of(replace(outcome, epochs=tuple(self._epochs)), team)
+
+    def _line(self, epoch: EpochOutcome) -> str:
+        from robochoc.formats import on_one_line
+        from robochoc.model.cost_units import cost_shown
+
+        last = epoch.improvements[-1]
+        what = "an optimum" if last.verdict == "optimal" else "a solution"
+        cost = "" if last.cost is None else f" of cost {cost_shown(last.cost)}"
+        without = f", {len(last.withdrawn)} withdrawn" if last.withdrawn else ""
+        return on_one_line(f"{self._name}: {what}{cost}{without} after {last.at_s:.1f} s")
