@@ -199,7 +199,7 @@ class Improvements(SearchWatch):
             verified=best.verified,
             bound=None if proven else self._bound if self._bounded and not _is_found(final) else final.bound,
             deadline=None if proven or final.ended else best.deadline,
-            reason=final.reason if _is_found(final) else None,
+            reason=final.reason if _is_found(final) else best.reason,
             optima=final.optima,
             improvements=tuple(self.improvements),
         )
