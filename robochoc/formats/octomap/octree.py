@@ -42,6 +42,8 @@ _BYTES_OF_NODE = {"OcTree": 5, "1": 5, "OcTreeStamped": 5, "ColorOcTree": 8}
 _FREE, _OCCUPIED, _INNER = 1, 2, 3
 
 Integers = npt.NDArray[np.int64]
+Corners = npt.NDArray[np.uint16]
+"""Places in the tree, which has no more than 2 ** 16 along each axis: there may be millions of them."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,7 +57,7 @@ class Leaves:
     """
 
     exponent: int
-    corners: Integers
+    corners: Corners
     occupied: npt.NDArray[np.bool_]
 
 
@@ -201,17 +203,17 @@ class _BinaryNodes(_Nodes):
             if empty.size:
                 raise MistakeError(f"has a node without children at {self.place(int(empty[0]))}", "the file is damaged")
             inner: list[tuple[Integers, Integers]] = []
-            known: list[tuple[Integers, npt.NDArray[np.bool_]]] = []
+            known: list[tuple[Corners, npt.NDArray[np.bool_]]] = []
             for child in range(8):
                 kinds, places = self._kind(words, child), _below(corners, child)
                 deeper, leaf = kinds == _INNER, (kinds == _FREE) | (kinds == _OCCUPIED)
                 inner.append((following[deeper], places[deeper]))
                 following[deeper] = self.behind(following[deeper])
-                known.append((places[leaf], kinds[leaf] == _OCCUPIED))
+                known.append((places[leaf].astype(np.uint16), kinds[leaf] == _OCCUPIED))
             nodes, corners = (np.concatenate(parts) for parts in zip(*inner, strict=True))
-            places, occupied = (np.concatenate(parts) for parts in zip(*known, strict=True))
-            found += len(nodes) + len(places)
-            yield Leaves(exponent, places, occupied)
+            leaves, occupied = (np.concatenate(parts) for parts in zip(*known, strict=True))
+            found += len(nodes) + len(leaves)
+            yield Leaves(exponent, leaves, occupied)
         if found != self._expected:
             raise MistakeError(f"has {found:,} nodes, and its header says {self._expected:,}", "the file is damaged")
 
@@ -238,7 +240,7 @@ class _FullNodes(_Nodes):
         while nodes.size:
             is_leaf = self.children[nodes] == 0
             known = is_leaf & ~np.isnan(self._odds[nodes])
-            yield Leaves(exponent, corners[known], self._odds[nodes[known]] >= 0)
+            yield Leaves(exponent, corners[known].astype(np.uint16), self._odds[nodes[known]] >= 0)
             nodes, corners = nodes[~is_leaf], corners[~is_leaf]
             self.check_depth(exponent, nodes)
             exponent -= 1

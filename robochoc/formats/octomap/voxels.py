@@ -15,7 +15,7 @@ import numpy.typing as npt
 from robochoc.formats.diagnostics import MistakeError
 from robochoc.formats.occupancy.content import content_of, told
 from robochoc.formats.occupancy.grid import Flags
-from robochoc.formats.octomap.octree import DEPTH, MAX_BYTES, Integers, Leaves, Octree, read_octree
+from robochoc.formats.octomap.octree import DEPTH, MAX_BYTES, Corners, Integers, Leaves, Octree, read_octree
 
 MAX_VOXELS = 16_000_000
 """The maximum number of voxels around all that is free. A larger map is read coarser."""
@@ -96,8 +96,9 @@ def _around_free(leaves: Sequence[Leaves], exponent: int) -> tuple[Integers, Int
     for some in leaves:
         corners = some.corners[~some.occupied]
         if corners.size:
-            lows.append((corners.min(axis=0) << some.exponent) >> exponent)
-            highs.append((((corners.max(axis=0) + 1) << some.exponent) - 1 >> exponent) + 1)
+            first, last = (end.astype(np.int64) for end in (corners.min(axis=0), corners.max(axis=0)))
+            lows.append((first << some.exponent) >> exponent)
+            highs.append(((((last + 1) << some.exponent) - 1) >> exponent) + 1)
     most = 1 << (DEPTH - exponent)
     return (np.min(lows, axis=0) - 1).clip(0), (np.max(highs, axis=0) + 1).clip(None, most)
 
@@ -121,33 +122,30 @@ def _states(leaves: Sequence[Leaves], exponent: int, low: Integers, high: Intege
         if size in by_size:
             some = by_size[size]
             inside = ((some.corners >= begin) & (some.corners < end)).all(axis=1)
-            places = _places(some.corners[inside] - begin)
-            states[places] = np.where(some.occupied[inside], _OCCUPIED, _FREE)
-    _join([some for some in leaves if some.exponent < exponent], exponent, states, low, high)
+            states[_places(some.corners[inside], begin)] = np.where(some.occupied[inside], _OCCUPIED, _FREE)
+    if exponent:
+        _join([some for some in leaves if some.exponent < exponent], exponent, states, low, high)
     return states
 
 
 def _join(leaves: Sequence[Leaves], exponent: int, states: States, low: Integers, high: Integers) -> None:
     """Write into the states what leaves that are smaller than a voxel make of it."""
-    size, flat = states.shape, states.reshape(-1)
-    free: list[tuple[Integers, Integers]] = []
+    free = np.zeros(states.size, dtype=np.int64)
+    """How much of each voxel is free."""
     for some in leaves:
-        corners = some.corners >> (exponent - some.exponent)
+        corners: Corners = some.corners >> np.uint16(exponent - some.exponent)
         inside = ((corners >= low) & (corners < high)).all(axis=1)
-        places = np.ravel_multi_index(_places(corners - low), size, mode="clip")
-        flat[places[inside & some.occupied]] = _OCCUPIED
-        kept = places[inside & ~some.occupied]
-        free.append((kept, np.full(len(kept), 8**some.exponent)))
-    if free:
-        places, volumes = (np.concatenate(parts) for parts in zip(*free, strict=True))
-        voxels, which = np.unique(places, return_inverse=True)
-        whole = np.bincount(which, weights=volumes, minlength=len(voxels)) == 8**exponent
-        flat[voxels[whole]] = _FREE
+        states[_places(corners[inside & some.occupied], low)] = _OCCUPIED
+        z, y, x = _places(corners[inside & ~some.occupied], low)
+        kept = (z * states.shape[1] + y) * states.shape[2] + x
+        free += np.bincount(kept, minlength=states.size) * 8**some.exponent
+    states[(free == 8**exponent).reshape(states.shape)] = _FREE
 
 
-def _places(corners: Integers) -> tuple[Integers, Integers, Integers]:
-    """Return the places of voxels in an array by z, y and x."""
-    return corners[:, 2], corners[:, 1], corners[:, 0]
+def _places(corners: Corners, first: Integers) -> tuple[Sums, Sums, Sums]:
+    """Return the places of voxels in an array by z, y and x that begins with a first one."""
+    z, y, x = (corners[:, axis].astype(np.int32) - np.int32(first[axis]) for axis in (2, 1, 0))
+    return z, y, x
 
 
 def _before(flags: Flags) -> Sums:
