@@ -57,6 +57,9 @@ class Worker:
         capacity: The room that it has; None: for any load.
         most: The number of tasks that it does at most; None: any.
         together: What pairs of tasks bring besides when it does both.
+        tours: The length of the tour of each set of tasks that it can do together, by their numbers. With tours,
+            `profit` has no ways in it; tasks that are in none have no place.
+        hurries: Whether it can do no other sets of these tasks, as they have deadlines.
     """
 
     name: str
@@ -66,6 +69,8 @@ class Worker:
     capacity: int | None = None
     most: int | None = None
     together: Mapping[tuple[int, int], int] = field(default_factory=dict)
+    tours: Mapping[tuple[int, ...], int] = field(default_factory=dict)
+    hurries: bool = False
 
 
 @dataclass(frozen=True)
@@ -118,6 +123,7 @@ def several(workers: Sequence[Worker], jobs: Mapping[int, Job]) -> Parts:
             for task, worth in one.profit.items():
                 yield _worth(f"{one.label}.{jobs[task].name}", _does(one, jobs[task]), {1: worth})
             yield from _limits(one, jobs)
+            yield from _tours(one, jobs)
             for (first, second), worth in one.together.items():
                 scope = (_does(one, jobs[first]), _does(one, jobs[second]))
                 relation = Relation(f"S{'.'.join(scope)}", 2, Semantics.SOFT, ((1, 1),), (worth,))
@@ -155,6 +161,20 @@ def _limits(one: Worker, jobs: Mapping[int, Job]) -> Iterator[Constraint]:
         yield Constraint("room", _at_most(f"room{one.label}", loads, one.capacity), scope, scope)
     if one.most is not None and one.most < len(scope):
         yield Constraint("most", _at_most(f"most{one.label}", [1] * len(scope), one.most), scope, scope)
+
+
+def _tours(one: Worker, jobs: Mapping[int, Job]) -> Iterator[Constraint]:
+    """Yield what tours cost, and which sets of tasks a robot has time for."""
+    placed = [task for task in one.profit if (task,) in one.tours]
+    scope = tuple(_does(one, jobs[task]) for task in placed)
+    if not scope:
+        return
+    rows = {tuple([int(task in tour) for task in placed]): -length for tour, length in one.tours.items()}
+    cost = Relation(f"tour{one.label}", len(scope), Semantics.SOFT, tuple(rows), tuple(rows.values()))
+    yield Constraint("tour", cost, scope, scope)
+    if one.hurries:
+        able = ((0,) * len(scope), *rows)
+        yield Constraint("time", Relation(f"time{one.label}", len(scope), Semantics.SUPPORTS, able), scope, scope)
 
 
 def _at_most(name: str, loads: Sequence[int], most: int) -> Predicate:

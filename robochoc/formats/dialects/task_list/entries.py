@@ -114,6 +114,15 @@ class Entry:
             raise self._mistake(key, node, f"write a whole number from {least} on")
         return node.scalar
 
+    def flag(self, key: str) -> bool:
+        """Return whether `key` says yes; no where there is none."""
+        node = self._entries.get(key)
+        if node is None:
+            return False
+        if not isinstance(node.scalar, bool):
+            raise self._mistake(key, node, f"write {key}: yes, or {key}: no")
+        return node.scalar
+
     def words(self, key: str) -> tuple[str, ...]:
         """Return a list of words; a single word is a list of one."""
         node = self._entries.get(key)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import itertools
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from pathlib import Path
@@ -25,6 +25,7 @@ from robochoc.formats.dialects.task_list.entries import (
     read_synergies,
     read_tasks,
 )
+from robochoc.formats.dialects.task_list.tours import Tasks, Trip, rounded
 from robochoc.formats.dialects.yaml_tree import read_yaml
 from robochoc.formats.symbols import check_symbol
 from robochoc.model.allocation import Distance, Job, TasksModel, Worker, assignment, several, way
@@ -42,7 +43,7 @@ NONE = "none"
 """The value of a robot that does no task."""
 _ONLY = "task"
 """The last part of the name of a robot's only variable."""
-_KEYS = ("name", "model", "distance", "places", "robots", "tasks", "synergies")
+_KEYS = ("name", "model", "distance", "places", "tours", "robots", "tasks", "synergies")
 
 
 def read(paths: Sequence[Path], options: ImportOptions) -> Imported:
@@ -80,6 +81,7 @@ class _List:
     robots: Mapping[str, RobotEntry]
     tasks: Mapping[str, TaskEntry]
     synergies: Sequence[Synergy]
+    tours: bool
 
 
 def _read(text: str, stem: str, mistakes: DiagnosticCollector) -> _List:
@@ -97,10 +99,11 @@ def _read(text: str, stem: str, mistakes: DiagnosticCollector) -> _List:
     places = head.whole("places", 0) or 0
     if places > MAX_PLACES:
         raise MistakeError(f"has {places} places", f"costs have at most {MAX_PLACES} decimal places")
+    tours = head.flag("tours") and model is not TasksModel.ASSIGNMENT
     name = " ".join(head.words("name")) or stem
     _check_points([*robots.values(), *tasks.values()], mistakes)
     mistakes.finish()
-    read = _List(name, TasksModel(model), Distance(distance), places, robots, tasks, synergies)
+    read = _List(name, TasksModel(model), Distance(distance), places, robots, tasks, synergies, tours)
     _check_model(read, mistakes)
     return read
 
@@ -159,6 +162,7 @@ class _Maker:
         self._read = read
         self._number = {name: number for number, name in enumerate(read.tasks, start=1)}
         self._notes: list[Note] = []
+        self._sets = 0
         self._robot_names, self._task_names = Names(), Names()
         amounts = [one.worth for one in read.tasks.values()] + [one.worth for one in read.synergies]
         self._scale = Scale([*amounts, Fraction(1, 10**read.places)])
@@ -205,7 +209,20 @@ class _Maker:
             return Worker(own, own, f"{own}.{_ONLY}", profit)
         if not profit:
             self._notes.append(Note("left out", f"the robot {shortened(name)}, which can do none of the tasks"))
-        return Worker(own, own, own, profit, robot.capacity, robot.most, together)
+        return Worker(own, own, own, profit, robot.capacity, robot.most, together, *self._tours(name, robot, profit))
+
+    def _tours(self, name: str, robot: RobotEntry, able: Collection[int]) -> tuple[dict[Tasks, int], bool]:
+        """Return the lengths of the robot's tours, and whether deadlines leave it no others."""
+        if not self._read.tours:
+            return {}, False
+        numbered = enumerate(self._read.tasks.values(), start=1)
+        placed = {number: entry for number, entry in numbered if number in able and entry.at}
+        lengths = Trip(name, robot, placed, lambda start, end: self._way(start, end, MAX_PLACES)).lengths()
+        self._sets += len(lengths)
+        if self._sets > MAX_CONSTRAINTS:
+            raise MistakeError(f"makes more than {MAX_CONSTRAINTS:,} tours", "write fewer robots, or smaller most:")
+        hurries = any(entry.deadline is not None for entry in placed.values())
+        return {tasks: rounded(length, self._scale.places) for tasks, length in lengths.items()}, hurries
 
     def _job(self, name: str, task: TaskEntry, workers: Sequence[Worker]) -> Job:
         able = sum(self._number[name] in one.profit for one in workers)
@@ -246,7 +263,8 @@ class _Maker:
         if worth % entry.robots:
             what = f"the task '{shortened(task)}' is worth {entry.worth}, which {entry.robots} robots cannot share"
             raise MistakeError(what, "write a multiple of their number, or more places", entry.line)
-        return int(worth) // entry.robots - self._way(robot.at, entry.at, self._scale.places)
+        way = 0 if self._read.tours else self._way(robot.at, entry.at, self._scale.places)
+        return int(worth) // entry.robots - way
 
     def _way(self, start: Point, end: Point, places: int) -> int:
         return way(start, end, self._read.distance, places) if start and end else 0

@@ -75,6 +75,26 @@ def is_able(robot: dict[str, Any], task: dict[str, Any], told: dict[str, Any]) -
     return bool(sum(part**2 for part in parts) <= limit**2)
 
 
+def ways(robot: dict[str, Any], tasks: tuple[str, ...], told: dict[str, Any]) -> Fraction:
+    """Return the length of the ways to all tasks, each from where the robot stands."""
+    places = [told["tasks"][task].get("at", []) for task in tasks]
+    return sum((length(robot.get("at", []), place, told) for place in places), Fraction())
+
+
+def tour(robot: dict[str, Any], tasks: list[dict[str, Any]], told: dict[str, Any]) -> Fraction | None:
+    """Return the length of the shortest tour of the tasks in time, of all orders; None: there is none."""
+    exact = {**told, "places": 9}
+    found = []
+    for order in itertools.permutations([task for task in tasks if task.get("at")]):
+        stops = [robot["at"], *(task["at"] for task in order)]
+        legs = [length(start, end, exact) for start, end in itertools.pairwise(stops)]
+        times = list(itertools.accumulate(legs))
+        if all(time <= task.get("deadline", 10**9) * robot["speed"] for time, task in zip(times, order, strict=True)):
+            found.append(sum(legs, Fraction()))
+    unit = 10 ** told["places"]
+    return Fraction(int(2 * min(found) * unit + 1) // 2, unit) if found else None
+
+
 def brings(told: dict[str, Any], doers: dict[str, tuple[str, ...]]) -> Fraction | None:
     """Return what it brings if robots do tasks so; None: it is not allowed."""
     total = Fraction(0)
@@ -84,9 +104,10 @@ def brings(told: dict[str, Any], doers: dict[str, tuple[str, ...]]) -> Fraction 
             return None
         if not all(is_able(robot, told["tasks"][task], told) for task in tasks):
             return None
-        total -= sum(
-            (length(robot.get("at", []), told["tasks"][task].get("at", []), told) for task in tasks), Fraction()
-        )
+        way = tour(robot, [told["tasks"][task] for task in tasks], told) if told["tours"] else ways(robot, tasks, told)
+        if way is None:
+            return None
+        total -= way
         total += sum(one["worth"] for one in told["synergies"] if set(one["tasks"]) <= set(tasks))
     for name, task in told["tasks"].items():
         crew = sum(name in tasks for tasks in doers.values())
@@ -106,8 +127,8 @@ def best(told: dict[str, Any]) -> Fraction:
     return max(one for share in shares if (one := brings(told, share)) is not None)
 
 
-def random_list(chance: Random, *, alone: bool) -> dict[str, Any]:
-    """A list of two or three robots and three tasks; `alone`: of one task each."""
+def random_list(chance: Random, *, alone: bool, tours: bool = False) -> dict[str, Any]:
+    """A list of two or three robots and three tasks; `alone`: of one task each; `tours`: of tours."""
     skills = ["arm", "eye"]
 
     def point() -> list[int]:
@@ -138,18 +159,19 @@ def random_list(chance: Random, *, alone: bool) -> dict[str, Any]:
         if chance.random() < 0.3:
             task["deadline"] = chance.randrange(1, 12)
     synergies = [] if alone else [{"tasks": ["t1", "t2"], "worth": chance.randrange(-5, 6)}] * chance.choice((0, 1, 2))
-    shown = {"distance": chance.choice(("streets", "straight")), "places": chance.choice((0, 2))}
+    shown = {"distance": chance.choice(("streets", "straight")), "places": chance.choice((0, 2)), "tours": tours}
     return {**shown, "robots": robots, "tasks": tasks, "synergies": synergies}
 
 
-@pytest.mark.parametrize("alone", [True, False])
+@pytest.mark.parametrize("kind", ["alone", "several", "tours"])
 @pytest.mark.parametrize("batch", [0, pytest.param(1, marks=pytest.mark.slow)])
-def test_the_optimum_brings_what_the_list_says(tmp_path: Path, alone: bool, batch: int, warm_ace: None) -> None:  # noqa: FBT001
+def test_the_optimum_brings_what_the_list_says(tmp_path: Path, kind: str, batch: int, warm_ace: None) -> None:
     del warm_ace
-    chance = Random(f"tasks {alone} {batch}")
+    alone = kind == "alone"
+    chance = Random(f"tasks {kind} {batch}")
     checked = 0
     for _ in range(60 if batch else 6):
-        told = random_list(chance, alone=alone)
+        told = random_list(chance, alone=alone, tours=kind == "tours")
         able = any(is_able(r, t, told) for r in told["robots"].values() for t in told["tasks"].values())
         text = yaml.safe_dump(told)
         if not able and not alone:
@@ -162,6 +184,75 @@ def test_the_optimum_brings_what_the_list_says(tmp_path: Path, alone: bool, batc
         assert Fraction(outcome.cost) == best(told), text
         checked += 1
     assert checked > 3
+
+
+TOURS = """distance: streets
+tours: yes
+robots:
+  ann: {at: [0, 0]}
+  bob: {at: [9, 9], most: 1}
+tasks:
+  near: {at: [4, 0], worth: 5}
+  far: {at: [6, 0], worth: 5}
+  late: {at: [6, 1], worth: 5, deadline: 6}
+  radio: {worth: 1}
+"""
+
+
+def cost_of(text: str, folder: Path, protocol: str = "dpop") -> Any:  # noqa: ANN401 - an exact number
+    return solve(imported(text, folder).team, Options(protocol=protocol, runtime=Runtime.SIMULATOR)).cost
+
+
+def test_the_way_to_a_task_begins_where_the_one_before_it_is(tmp_path: Path, warm_ace: None) -> None:
+    """The robot ann does near, far and radio, 6 away; a way of its own pays not for far. There is no time for late."""
+    del warm_ace
+    assert cost_of(TOURS, tmp_path) == 5 + 5 + 1 - 6
+    assert cost_of(TOURS.replace("tours: yes\n", ""), tmp_path) == 1 + 1
+    assert cost_of(TOURS.replace("deadline: 6", "deadline: 7"), tmp_path) == 15 + 1 - 7
+    assert cost_of(TOURS.replace("deadline: 6", "deadline: 3.5").replace("0, 0]", "0, 0], speed: 2"), tmp_path) == 9
+
+
+def test_where_a_deadline_asks_for_it_the_tour_is_longer(tmp_path: Path, warm_ace: None) -> None:
+    del warm_ace
+    text = """tours: yes
+robots:
+  ann: {at: [5, 0]}
+tasks:
+  left: {at: [1, 0], worth: 100}
+  right: {at: [8, 0], worth: 100, deadline: DEADLINE}
+"""
+    assert cost_of(text.replace("DEADLINE", "99"), tmp_path) == 200 - (3 + 7)
+    assert cost_of(text.replace("8, 0]", "10, 0]").replace("DEADLINE", "99"), tmp_path) == 200 - (4 + 9)
+    assert cost_of(text.replace("8, 0]", "10, 0]").replace("DEADLINE", "12"), tmp_path) == 200 - (5 + 9)
+
+
+@pytest.mark.parametrize("protocol", ["ssi", "cbba"])
+def test_auctions_bid_what_a_task_adds_to_the_tour(protocol: str, tmp_path: Path, warm_ace: None) -> None:
+    del warm_ace
+    assert cost_of(TOURS, tmp_path, protocol) == 5
+
+
+def test_of_one_task_each_a_tour_is_the_way_there(tmp_path: Path) -> None:
+    text = TOURS.replace("{at: [0, 0]}", "{at: [0, 0], most: 1}")
+    assert imported(text, tmp_path).team == imported(text.replace("tours: yes\n", ""), tmp_path).team
+
+
+def test_too_many_sets_of_tasks_are_refused_at_once(tmp_path: Path) -> None:
+    tasks = "".join(f"  t{place}: {{at: [{place}, 0], worth: 1}}\n" for place in range(40))
+    text = f"tours: yes\nrobots:\n  ann: {{at: [0, 0], most: MOST}}\ntasks:\n{tasks}"
+    said = mistakes(text.replace("MOST", "40"), tmp_path)
+    assert "the robot 'ann' has time and room for more than 4,096 sets of tasks (write most:" in said
+    assert said.startswith("3: ")
+    assert len(imported(text.replace("MOST", "2"), tmp_path).team["ann"].variables) == 40
+    hurried = text.replace("MOST", "40").replace("worth: 1", "worth: 1, deadline: 0.5")
+    assert imported(hurried, tmp_path).team["ann"].variables
+
+
+def test_tours_are_yes_or_no(tmp_path: Path) -> None:
+    assert "the tours 'often', which it cannot have (write tours: yes, or tours: no)" in mistakes(
+        TOURS.replace("tours: yes", "tours: often"), tmp_path
+    )
+    assert cost_of(TOURS.replace("tours: yes", "tours: no"), tmp_path) == 2
 
 
 def test_both_models_solve_alike_from_a_folder(tmp_path: Path) -> None:

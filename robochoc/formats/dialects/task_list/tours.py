@@ -1,0 +1,104 @@
+"""The shortest tours of a robot: from where it stands to each set of tasks, in an order that meets all deadlines.
+
+By dynamic programming over sets and their last tasks (Held and Karp, SIAM J. 10, 1962): whoever comes to a task earlier
+is never worse off later. A tour does not lead back.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass
+from fractions import Fraction
+
+from robochoc.formats.diagnostics import MistakeError, shortened
+from robochoc.formats.dialects.task_list.entries import MAX_PLACES, Point, RobotEntry, TaskEntry
+
+MAX_SETS = 4096
+"""The maximum number of sets of tasks that a robot may have time and room for."""
+Tasks = tuple[int, ...]
+"""Numbers of tasks, in ascending order."""
+
+
+@dataclass(frozen=True)
+class Trip:
+    """What the tours of one robot depend on.
+
+    Attributes:
+        name: The robot's name.
+        robot: What the list says of it.
+        tasks: The tasks with a place that it can do, by number.
+        way: The length of the way between two places, in units of 10**-MAX_PLACES.
+    """
+
+    name: str
+    robot: RobotEntry
+    tasks: Mapping[int, TaskEntry]
+    way: Callable[[Point, Point], int]
+
+    def lengths(self) -> dict[Tasks, int]:
+        """Return the length of the shortest tour of each set of tasks that the robot has time and room for.
+
+        Raises:
+            MistakeError: where there are too many.
+        """
+        ends: dict[Tasks, dict[int, int]] = {(): {}}
+        level: list[Tasks] = [()]
+        legs = {
+            (one, other): self.way(self.tasks[one].at, self.tasks[other].at)
+            for one in self.tasks
+            for other in self.tasks
+            if one != other
+        }
+        first = {task: self.way(self.robot.at, entry.at) for task, entry in self.tasks.items()}
+        while level:
+            larger = []
+            for tasks in level:
+                for more in self._larger(tasks):
+                    found = dict(self._ends(more, ends, first, legs))
+                    if found:
+                        ends[more] = found
+                        larger.append(more)
+                        self._refuse(len(ends))
+            level = larger
+        return {tasks: min(found.values()) for tasks, found in ends.items() if tasks}
+
+    def _larger(self, tasks: Tasks) -> Iterator[Tasks]:
+        """Yield the sets with one more task, of a higher number, that the robot has room for."""
+        if self.robot.most is not None and len(tasks) >= self.robot.most:
+            return
+        load = sum(self.tasks[task].load for task in tasks)
+        for task in self.tasks:
+            room = self.robot.capacity
+            if (not tasks or task > tasks[-1]) and (room is None or load + self.tasks[task].load <= room):
+                yield (*tasks, task)
+
+    def _ends(
+        self,
+        tasks: Tasks,
+        ends: Mapping[Tasks, Mapping[int, int]],
+        first: Mapping[int, int],
+        legs: Mapping[tuple[int, int], int],
+    ) -> Iterator[tuple[int, int]]:
+        """Yield the tasks that can be the last of a tour of `tasks`, and how long the shortest of these tours is."""
+        for last in tasks:
+            before = ends.get(tuple([task for task in tasks if task != last]))
+            if before is None:
+                continue
+            length = min((way + legs[task, last] for task, way in before.items()), default=first[last])
+            deadline = self.tasks[last].deadline
+            if deadline is None or not self.robot.at or length <= deadline * self.robot.speed * 10**MAX_PLACES:
+                yield last, length
+
+    def _refuse(self, sets: int) -> None:
+        if sets > MAX_SETS:
+            raise MistakeError(
+                f"the robot '{shortened(self.name)}' has time and room for more than {MAX_SETS:,} sets of tasks",
+                "write most: or a smaller capacity:, or leave out tours:",
+                self.robot.line,
+            )
+
+
+def rounded(length: int, places: int) -> int:
+    """Return a length in units of 10**-MAX_PLACES in units of 10**-places, halves up."""
+    unit = Fraction(10**places, 10**MAX_PLACES)
+    return int(2 * length * unit + 1) // 2
