@@ -8,11 +8,14 @@ import pytest
 
 from robochoc.flight.layout import Point
 from robochoc.ros.autopilots.autopilot import OFFBOARD, Autopilot, RefusedError, Telemetry
-from robochoc.ros.autopilots.fleet import AtEnd, Fence, Fleet, Link
+from robochoc.ros.autopilots.fleet import AtEnd, Fence, Fleet, Link, point_text
+from robochoc.ros.autopilots.limits import CLIMB_S, END_S, LANDING_S, MODE_S, SILENCE_S
 from robochoc.ros.autopilots.messages import Phase, State, Target
-from robochoc.ros.autopilots.pilot import CLIMB_S, END_S, LANDING_S, MODE_S, Pilot
+from robochoc.ros.autopilots.pilot import Pilot
+from robochoc.ros.autopilots.traffic import Traffic
 
-FLEET = Fleet({"A": Link("udpin://0.0.0.0:1")}, Fence((-1, -1, 0), (9, 9, 9)))
+FLEET = Fleet({"A": Link("udpin://0.0.0.0:1")}, Fence((-1, -1, 0), (9, 9, 9)), distance_m=2)
+"""With such a distance set points are far ahead: at the places themselves."""
 GROUND = Telemetry((0, 0, 0), 1.0, "HOLD", healthy=True)
 THERE = Target((3, 1, 2))
 
@@ -51,7 +54,7 @@ class Played(Autopilot):
         self.take(f"rise {height_m:g}", in_air=True, mode="TAKEOFF", place=(0.0, 0.0, height_m))
 
     def go_to(self, place: Point) -> None:
-        self.take(f"go {place}", mode=OFFBOARD, place=place)
+        self.take(f"go ({point_text(place)})", mode=OFFBOARD, place=place)
 
     def hold(self) -> None:
         self.take("hold", mode="HOLD")
@@ -68,9 +71,26 @@ def played() -> Played:
     return Played()
 
 
+class Ordered(Pilot):
+    """A pilot who gets orders as the guard gives them: ways are planned first."""
+
+    def __init__(self, played: Played) -> None:
+        self.traffic = Traffic(FLEET, lambda: played.now)
+        super().__init__("A", played, FLEET, self.traffic, lambda: played.now)
+
+    def fly(self, order: int, target: Target) -> None:
+        self.traffic.fly({"A": target})
+        super().fly(order, target)
+
+    def end(self, how: AtEnd, *, waits: bool) -> None:
+        if how is AtEnd.LAND:
+            self.traffic.bring_down()
+        super().end(how, waits=waits)
+
+
 @pytest.fixture
 def pilot(played: Played) -> Pilot:
-    return Pilot("A", played, FLEET, lambda: played.now)
+    return Ordered(played)
 
 
 def steps(pilot: Pilot, played: Played, count: int = 1, each_s: float = 0.1) -> State:
@@ -117,18 +137,18 @@ def test_a_vehicle_without_an_order_is_never_commanded(pilot: Pilot, played: Pla
 def test_a_new_order_takes_the_place_of_the_one_before(pilot: Pilot, played: Played) -> None:
     flying(pilot)
     steps(pilot, played, 2)
-    pilot.fly(2, Target((5, 5, 5)))
+    pilot.fly(2, Target((4, 2, 4)))
     assert steps(pilot, played).order == 2
-    assert played.done[-1] == "go (5, 5, 5)"
+    assert played.done[-1] == "go (4, 2, 4)"
     assert steps(pilot, played).phase is Phase.ARRIVED
 
 
 def test_who_is_to_land_flies_above_the_point_first(pilot: Pilot, played: Played) -> None:
     flying(pilot)
     steps(pilot, played, 3)
-    pilot.fly(2, Target((8, 0, 0), lands=True))
+    pilot.fly(2, Target((6, 0, 0), lands=True))
     assert steps(pilot, played, 2).phase is Phase.LANDING
-    assert played.done[-2:] == ["go (8, 0, 2)", "land"]
+    assert played.done[-2:] == ["go (6, 0, 2)", "land"]
     landed(played)
     assert steps(pilot, played).phase is Phase.LANDED
 
@@ -144,7 +164,7 @@ def test_who_is_to_land_outside_of_the_fence_lands_where_it_is(pilot: Pilot, pla
 def test_who_has_landed_is_not_commanded_at_the_end(pilot: Pilot, played: Played) -> None:
     flying(pilot)
     steps(pilot, played, 3)
-    pilot.fly(2, Target((8, 0, 0), lands=True))
+    pilot.fly(2, Target((6, 0, 0), lands=True))
     steps(pilot, played, 2)
     landed(played)
     steps(pilot, played)
@@ -156,13 +176,13 @@ def test_who_has_landed_is_not_commanded_at_the_end(pilot: Pilot, played: Played
 
 
 def test_who_is_to_land_and_stands_on_the_ground_does_nothing(pilot: Pilot, played: Played) -> None:
-    flying(pilot, Target((8, 0, 0), lands=True))
+    flying(pilot, Target((6, 0, 0), lands=True))
     assert steps(pilot, played).phase is Phase.LANDED
     assert played.done == []
 
 
 def test_who_has_landed_takes_off_again(pilot: Pilot, played: Played) -> None:
-    flying(pilot, Target((8, 0, 0), lands=True))
+    flying(pilot, Target((6, 0, 0), lands=True))
     steps(pilot, played)
     pilot.fly(2, THERE)
     assert steps(pilot, played, 3).phase is Phase.ARRIVED
@@ -220,7 +240,10 @@ def test_a_take_off_that_never_ends(pilot: Pilot, played: Played) -> None:
         ({"place": (3.0, 11.0, 2.0)}, "it has left the fence, at 3, 11, 2"),
         ({"place": (3.0, 1.0, 10.5)}, "it has left the fence, at 3, 1, 10.5"),
         ({"armed": False}, "its motors have stopped"),
-        ({"mode": "RETURN_TO_LAUNCH"}, "it no longer follows set points: its mode is return_to_launch"),
+        (
+            {"mode": "HOLD", "silent_s": SILENCE_S + 1},
+            "it no longer follows set points: its mode is hold",
+        ),
     ],
 )
 def test_who_does_not_fly_as_told_is_out_and_lands(
@@ -234,23 +257,78 @@ def test_who_does_not_fly_as_told_is_out_and_lands(
     steps(pilot, played, 3)
     assert played.done[-1] == "land"
     assert played.done.count("land") == 1
-    pilot.fly(2, Target((5, 5, 5)))
+    pilot.fly(2, Target((4, 2, 4)))
     assert steps(pilot, played, 3).phase is Phase.OUT
     assert played.done[-1] == "land"
 
 
 @pytest.mark.parametrize("within", [1, 3])
-def test_whom_a_person_has_taken_over_gets_no_command_any_more(pilot: Pilot, played: Played, within: int) -> None:
+@pytest.mark.parametrize(
+    ("mode", "told"),
+    [
+        ("POSCTL", "posctl (a person flies it)"),
+        ("RETURN_TO_LAUNCH", "return to launch (a person flies it, or its own failsafe)"),
+    ],
+)
+def test_whom_a_person_has_taken_over_gets_no_command_any_more(
+    pilot: Pilot, played: Played, within: int, mode: str, told: str
+) -> None:
     flying(pilot)
     steps(pilot, played, within)
-    played.seen = replace(played.seen, mode="POSCTL", place=(0, 0, 1))
+    played.seen = replace(played.seen, mode=mode, place=(0, 0, 1))
     done = [*played.done]
-    assert steps(pilot, played, 1, 2 * MODE_S).why == "it no longer follows set points: its mode is posctl"
+    assert steps(pilot, played, 1, 2 * MODE_S).why == f"it no longer follows set points: its mode is {told}"
+    played.seen = replace(played.seen, mode=OFFBOARD)
     steps(pilot, played, 3)
     pilot.end(AtEnd.LAND, waits=True)
     steps(pilot, played)
     assert is_over(pilot)
     assert played.done == done
+
+
+def test_a_take_over_counts_at_once_when_the_vehicle_has_obeyed_before(pilot: Pilot, played: Played) -> None:
+    flying(pilot)
+    steps(pilot, played, 2)
+    played.seen = replace(played.seen, mode="ALTCTL")
+    done = [*played.done]
+    assert steps(pilot, played).phase is Phase.OUT
+    steps(pilot, played, 100)
+    assert played.done == done
+
+
+@pytest.mark.parametrize("mode", ["HOLD", "LAND"])
+def test_who_leaves_our_mode_with_a_good_link_is_left_alone(pilot: Pilot, played: Played, mode: str) -> None:
+    flying(pilot)
+    steps(pilot, played, 3)
+    played.seen = replace(played.seen, mode=mode)
+    done = [*played.done]
+    told = f"its mode is {mode.lower()} (a person flies it, or its own failsafe)"
+    assert told in steps(pilot, played, 1, 2 * MODE_S).why
+    steps(pilot, played, 100)
+    assert played.done == done
+
+
+def test_a_person_who_takes_over_while_it_lands_at_the_end_is_not_fought(pilot: Pilot, played: Played) -> None:
+    flying(pilot)
+    steps(pilot, played, 3)
+    played.refuses = {"land"}
+    pilot.end(AtEnd.LAND, waits=True)
+    steps(pilot, played)
+    played.seen = replace(played.seen, mode="POSCTL")
+    done = [*played.done]
+    steps(pilot, played, 20)
+    assert played.done == done
+    assert is_over(pilot)
+
+
+def test_whom_a_person_flies_is_not_taken_from_him(pilot: Pilot, played: Played) -> None:
+    played.seen = replace(GROUND, armed=True, in_air=True, mode="POSCTL", place=(1, 1, 3))
+    flying(pilot)
+    assert steps(pilot, played).why == "its mode is posctl (a person flies it)"
+    pilot.end(AtEnd.LAND, waits=True)
+    steps(pilot, played)
+    assert is_over(pilot)
+    assert played.done == []
 
 
 def test_a_mode_that_was_told_before_is_no_reason(pilot: Pilot, played: Played) -> None:

@@ -16,6 +16,8 @@ import time
 from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field
+from itertools import combinations
+from random import Random
 from types import TracebackType
 from typing import Any, Self
 
@@ -29,6 +31,9 @@ OFFBOARD_LOSS_S = 1.0
 """PX4's COM_OF_LOSS_T: after so long without a set point it leaves the offboard mode."""
 DISARM_S = 3.0
 """PX4's COM_DISARM_PRFLT, shortened: who is armed and does not take off is disarmed."""
+GUST_S = 0.5
+_SPEEDS_MS = 1.0, 8.0
+_CHANGE_S, _STALL_S = 0.5, 1.0
 TICK_S = 0.02
 _HEARTBEAT_S, _TELEMETRY_S = 0.2, 0.05
 _NEAR_M = 0.05
@@ -58,6 +63,12 @@ class Vehicle:
     silent_from: str = ""
     """The mode from whose beginning on it is silent."""
     healthy: bool = True
+    stalls: bool = False
+    """True: it stays where it is, whatever it is told."""
+    chance: Random | None = None
+    """With it the vehicle flies at random speeds, and stands still at times."""
+    blown_ms: float = 0.0
+    """With `chance`, gusts blow it aside at that speed, for `GUST_S` each."""
     mode: str = "hold"
     armed: bool = False
     log: list[str] = field(default_factory=list)
@@ -93,6 +104,8 @@ class _Played:
         self._begun = time.monotonic()
         self._heartbeat_at = self._telemetry_at = self._armed_at = 0.0
         self._setpoint_at = -math.inf
+        self._disturbed_until = self._stalled_until = self._gust_until = -math.inf
+        self._gust_angle = 0.0
         self._wanted: tuple[float, float, float] | None = None
 
     def write(self, content: bytes) -> None:
@@ -148,7 +161,9 @@ class _Played:
             vehicle.target = (vehicle.at[0], vehicle.at[1], 0.0)
         elif vehicle.mode == "offboard":
             vehicle.target = self._wanted
-        if vehicle.target is None:
+        if vehicle.chance and vehicle.flies and self._is_disturbed(vehicle, vehicle.chance, passed):
+            return
+        if vehicle.target is None or vehicle.stalls:
             return
         left = math.dist(vehicle.at, vehicle.target)
         step = vehicle.speed * passed
@@ -161,6 +176,21 @@ class _Played:
             return
         e, n, u = (here + (there - here) * step / left for here, there in zip(vehicle.at, vehicle.target, strict=True))
         vehicle.at = (e, n, u)
+
+    def _is_disturbed(self, vehicle: Vehicle, chance: Random, passed: float) -> bool:
+        """Change its speed at times, and blow it aside. Return whether it stands still."""
+        now = time.monotonic()
+        if now > self._disturbed_until:
+            self._disturbed_until = now + chance.uniform(0, _CHANGE_S)
+            vehicle.speed = chance.uniform(*_SPEEDS_MS)
+            if chance.random() < 0.1:
+                self._stalled_until = now + chance.uniform(0, _STALL_S)
+            if chance.random() < 0.2 and vehicle.mode == "offboard":
+                self._gust_until, self._gust_angle = now + GUST_S, chance.uniform(0, 2 * math.pi)
+        if now < self._gust_until:
+            step, (east, north, up) = vehicle.blown_ms * passed, vehicle.at
+            vehicle.at = east + step * math.cos(self._gust_angle), north + step * math.sin(self._gust_angle), up
+        return now < self._stalled_until
 
     def _enter(self, mode: str, why: str = "") -> None:
         if why:
@@ -280,6 +310,8 @@ class Vehicles:
 
     def __init__(self, vehicles: Sequence[Vehicle]) -> None:
         self.vehicles = [*vehicles]
+        self.nearest_m = math.inf
+        """The smallest distance that two of them have had, if all share one frame."""
         self._played: list[_Played] = []
         self._over = threading.Event()
         self._thread = threading.Thread(target=self._play, name="played vehicles")
@@ -327,3 +359,5 @@ class Vehicles:
                     passed, before = now - before, now
                     for played in self._played:
                         played.live(now, passed)
+                    apart = (math.dist(one.at, other.at) for one, other in combinations(self.vehicles, 2))
+                    self.nearest_m = min(self.nearest_m, *apart, math.inf)

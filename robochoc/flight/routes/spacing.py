@@ -49,6 +49,30 @@ def segment_distances(origins: Array, ends: Array, points: Array) -> Array:
     return norms(apart)
 
 
+def line_distances(first: tuple[Array, Array], second: tuple[Array, Array]) -> Array:
+    """Return the distances of straight lines from others: each pair is of origins and ends (..., 3), which broadcast.
+
+    Source: C. Ericson, "Real-Time Collision Detection", 2005, section 5.1.9.
+    """
+    along, other = first[1] - first[0], second[1] - second[0]
+    apart = first[0] - second[0]
+    a, e = _dot(along, along), _dot(other, other)
+    b, c, f = _dot(along, other), _dot(along, apart), _dot(other, apart)
+    parallel, is_point = a * e - b * b, e == 0
+    a, e = np.where(a == 0, 1, a), np.where(e == 0, 1, e)
+    share = np.where(parallel > 0, np.clip((b * f - c * e) / np.where(parallel > 0, parallel, 1), 0, 1), 0)
+    across = (b * share + f) / e
+    share = np.where(across > 1, np.clip((b - c) / a, 0, 1), share)
+    share = np.where((across < 0) | is_point, np.clip(-c / a, 0, 1), share)
+    across = np.clip(across, 0, 1)
+    return norms(apart + share[..., None] * along - across[..., None] * other)
+
+
+def _dot(first: Array, second: Array) -> Array:
+    product: Array = np.einsum("...c,...c->...", *np.broadcast_arrays(first, second))
+    return product
+
+
 def norms(vectors: Array) -> Array:
     """Return the lengths of vectors, which are the last axis."""
     lengths: Array = np.sqrt(np.einsum("...c,...c->...", vectors, vectors))

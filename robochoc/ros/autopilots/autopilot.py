@@ -11,6 +11,8 @@ OFFBOARD = "OFFBOARD"
 """The mode in which an autopilot follows our set points."""
 MANUAL = frozenset({"MANUAL", "ALTCTL", "POSCTL", "ACRO", "STABILIZED", "RATTITUDE"})
 """Modes in which a person flies, by remote control."""
+AWAY = frozenset({"RETURN_TO_LAUNCH", "MISSION", "FOLLOW_ME"})
+"""Modes in which an autopilot flies on its own, and which we never ask for: a person did, or its failsafe."""
 
 
 class RefusedError(Exception):
@@ -33,6 +35,22 @@ class Telemetry:
     """Whether it is heard, and has not told all yet that it has to tell before it can fly."""
     silent_s: float = 0.0
     """The time since the last heartbeat, in seconds."""
+
+    @property
+    def is_flown_by_others(self) -> bool:
+        """Return whether a person flies the vehicle, or its autopilot on its own."""
+        return self.armed and self.mode in MANUAL | AWAY
+
+    @property
+    def mode_and_who(self) -> str:
+        """Return the mode of a vehicle that others fly, and who that may be, in words."""
+        who = "a person flies it" if self.mode in MANUAL else "a person flies it, or its own failsafe"
+        return f"{self.mode_in_words} ({who})"
+
+    @property
+    def mode_in_words(self) -> str:
+        """Return the mode in small letters."""
+        return self.mode.lower().replace("_", " ")
 
 
 class Autopilot(ABC):
@@ -63,7 +81,10 @@ class Autopilot(ABC):
 
     @abstractmethod
     def go_to(self, place: Point) -> None:
-        """Fly straight to `place`, by set points that are repeated until another command comes."""
+        """Fly straight to `place`, by set points that are repeated until another command comes.
+
+        Waits after another command only: it is called again and again on the way.
+        """
 
     @abstractmethod
     def hold(self) -> None:

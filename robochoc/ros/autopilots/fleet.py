@@ -22,7 +22,7 @@ from robochoc.ros.autopilots.kinds import Kind
 BYTES_MAX = 64 * 1024
 VEHICLES_MAX = 64
 _PORTS = range(1, 65_536)
-_KNOWN = ("vehicles", "fence", "takeoff", "near", "end", "patience", "time")
+_KNOWN = ("vehicles", "fence", "takeoff", "near", "end", "patience", "time", "distance", "downwash")
 _CORNERS, _AXES = 2, 3
 _LARGE = 10**9
 
@@ -90,6 +90,15 @@ class Fleet(msgspec.Struct, frozen=True):
     def connect_s(self) -> float:
         """Return how long a vehicle that is heard may take until it has told all, in seconds."""
         return max(self.patience_s, self.kind.rules.connect_s)
+    distance_m: float = 1.0
+    """The distance that vehicles keep from each other, between their centres."""
+    downwash: float = 1.0
+    """So many distances are kept right above each other."""
+
+    @property
+    def tolerance_m(self) -> float:
+        """Return how far beside its way a vehicle still counts as on it."""
+        return min(self.near_m, self.distance_m / 4)
 
 
 def read_fleet(path: Path, kind: Kind = Kind.MAVLINK) -> Fleet:
@@ -141,6 +150,8 @@ def _fleet(root: Node, kind: Kind) -> Fleet:
         time_s=_number(entries, "time", 120, 1, 3_600),
         kind=kind,
         speed_ms=_number(entries, "speed", 1.0, 0.1, 5),
+        distance_m=_number(entries, "distance", rules.distance_m, 0.1, 100),
+        downwash=_number(entries, "downwash", 1, 1, 10),
     )
     low, high = fleet.fence.low[2], fleet.fence.high[2]
     if fleet.takeoff_m > high - low:

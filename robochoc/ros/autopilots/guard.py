@@ -30,6 +30,7 @@ from robochoc.ros.autopilots.messages import (
     Failed,
     Fly,
     FromGuard,
+    NoWays,
     Permit,
     Recover,
     Setup,
@@ -38,6 +39,8 @@ from robochoc.ros.autopilots.messages import (
     line_of,
 )
 from robochoc.ros.autopilots.pilot import Pilot
+from robochoc.ros.autopilots.traffic import Traffic
+from robochoc.ros.autopilots.ways import NoWayError
 
 STEP_S = 0.1
 """The time between two steps of a pilot, in seconds."""
@@ -50,9 +53,9 @@ Tell = Callable[[FromGuard], None]
 class _Flight(threading.Thread):
     """A thread in which one pilot flies."""
 
-    def __init__(self, name: str, autopilot: Autopilot, fleet: Fleet, tell: Tell) -> None:
+    def __init__(self, name: str, autopilot: Autopilot, fleet: Fleet, traffic: Traffic, tell: Tell) -> None:
         super().__init__(name=f"pilot of {name}", daemon=True)
-        self.pilot = Pilot(name, autopilot, fleet)
+        self.pilot = Pilot(name, autopilot, fleet, traffic)
         self._autopilot = autopilot
         self._tell = tell
 
@@ -74,7 +77,7 @@ class _Flight(threading.Thread):
 
     @staticmethod
     def _news(state: State) -> tuple[object, ...]:
-        return state.phase, state.order, state.why
+        return state.phase, state.order, state.why, state.waits_for
 
 
 class Guard:
@@ -84,7 +87,10 @@ class Guard:
         self.at_end = fleet.end
         self._tell = tell
         self._permitted = False
-        self._flights = {name: _Flight(name, open_autopilot(name), fleet, tell) for name in fleet.vehicles}
+        self._traffic = Traffic(fleet)
+        self._flights = {
+            name: _Flight(name, open_autopilot(name), fleet, self._traffic, tell) for name in fleet.vehicles
+        }
         for flight in self._flights.values():
             flight.start()
 
@@ -96,8 +102,7 @@ class Guard:
             case Fly() if not self._permitted:
                 self._tell(Failed("nothing may be armed: an order to fly came without a permit"))
             case Fly():
-                for name, target in order.targets.items():
-                    self._flights[name].pilot.fly(order.order, target)
+                self._fly(order)
             case End():
                 self.end(order.how, waits=order.waits)
             case Recover():
@@ -106,8 +111,19 @@ class Guard:
             case _:
                 pass
 
+    def _fly(self, order: Fly) -> None:
+        try:
+            self._traffic.fly(order.targets)
+        except NoWayError as error:
+            self._tell(NoWays(str(error)))
+            return
+        for name, target in order.targets.items():
+            self._flights[name].pilot.fly(order.order, target)
+
     def end(self, how: AtEnd, *, waits: bool) -> None:
         """Bring all vehicles to an end."""
+        if how is AtEnd.LAND:
+            self._traffic.bring_down()
         for flight in self._flights.values():
             flight.pilot.end(how, waits=waits)
 

@@ -19,12 +19,14 @@ import msgspec
 
 from robochoc.ros.autopilots.fleet import AtEnd, Fleet
 from robochoc.ros.autopilots.kinds import Kind
+from robochoc.ros.autopilots.limits import END_S, LANDING_S, TURN_S
 from robochoc.ros.autopilots.messages import (
     End,
     Ended,
     Failed,
     Fly,
     FromGuard,
+    NoWays,
     Permit,
     Phase,
     Recover,
@@ -34,7 +36,6 @@ from robochoc.ros.autopilots.messages import (
     ToGuard,
     line_of,
 )
-from robochoc.ros.autopilots.pilot import END_S, LANDING_S
 from robochoc.system.files import resolved
 from robochoc.system.signals import signals_held
 
@@ -64,7 +65,7 @@ class GuardProcess:
         self._orders: dict[str, int] = {}
         self._sent_s = -math.inf
         self._came = threading.Condition()
-        self._problem = ""
+        self._problem = self._no_ways = ""
         self._is_over = self._ends = self._has_ended = False
         self._heard_s = time.monotonic()
         with signals_held():
@@ -94,12 +95,14 @@ class GuardProcess:
     def end(self, how: AtEnd, *, waits: bool) -> None:
         """Bring all vehicles to an end, and wait until each has obeyed; with `waits`, until those that land are down.
 
+        Those that land one after the other, as one is above another's place, are waited for.
+
         Raises `GuardError` if the guard was lost before: vehicles then do what their own failsafe says.
         """
         self._ends = True
         with suppress(GuardError):
             self._say(End(how, waits))
-        until = time.monotonic() + END_S + _SPARE_S + (LANDING_S if waits else 0.0)
+        until = time.monotonic() + TURN_S + END_S + _SPARE_S + (LANDING_S if waits else 0.0)
         with self._came:
             while not self._is_over and time.monotonic() < until:
                 self._came.wait(_SLICE_S)
@@ -122,6 +125,8 @@ class GuardProcess:
 
     def check(self) -> None:
         """Raise `GuardError` if the guard is gone, or hangs."""
+        if self._no_ways:
+            raise GuardError(f"the decision is not flown: {self._no_ways}")
         problem = self._problem
         if not problem and self._is_over and not self._ends:
             problem = "the guard process has ended"
@@ -166,7 +171,7 @@ class GuardProcess:
             with suppress(OSError):
                 self._process.stdin.close()
         try:
-            self._process.wait(END_S + _SPARE_S)
+            self._process.wait(TURN_S + END_S + _SPARE_S)
         except subprocess.TimeoutExpired:
             self._process.kill()
             self._process.wait()
@@ -204,6 +209,8 @@ class GuardProcess:
             match message:
                 case State():
                     self.states[message.vehicle] = message
+                case NoWays(why=why):
+                    self._no_ways = self._no_ways or why
                 case Failed(why=why):
                     self._problem = self._problem or f"the guard process failed: {why}"
                 case Ended():

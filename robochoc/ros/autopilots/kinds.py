@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 from dataclasses import dataclass
 from enum import StrEnum
@@ -22,6 +23,9 @@ class _Rules:
     takeoff_m: float
     least_takeoff_m: float
     near_m: float
+    distance_m: float
+    renews_m: float
+    """A vehicle gets a new set point on its line when it is so near to the one before."""
     connect_s: float
     """A vehicle that is heard may take so long until it has told all; 0: not longer than a silent one."""
     alone: str
@@ -52,6 +56,8 @@ _RULES = {
         takeoff_m=2.5,
         least_takeoff_m=0.5,
         near_m=0.5,
+        distance_m=1.0,
+        renews_m=math.inf,
         connect_s=0.0,
         alone="vehicles do what their own failsafe says",
     ),
@@ -68,6 +74,8 @@ _RULES = {
         takeoff_m=0.5,
         least_takeoff_m=0.2,
         near_m=0.1,
+        distance_m=0.4,
+        renews_m=0.3,  # each is a command by radio, and a new trajectory
         connect_s=60.0,
         alone="vehicles fly to where they were sent, and hover there",
     ),

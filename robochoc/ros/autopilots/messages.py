@@ -79,10 +79,18 @@ class State(msgspec.Struct, frozen=True, tag=True):
     commanded: bool = False
     """Whether it was ever commanded."""
     why: str = ""
+    waits_for: str = ""
+    """Another vehicle, which has to be out of the way first."""
 
 
 class Ended(msgspec.Struct, frozen=True, tag=True):
     """From the guard, last of all: every vehicle has been brought to an end."""
+
+
+class NoWays(msgspec.Struct, frozen=True, tag=True):
+    """From the guard: an order is not flown, as no ways were found that keep vehicles apart."""
+
+    why: str
 
 
 class Failed(msgspec.Struct, frozen=True, tag=True):
@@ -92,7 +100,7 @@ class Failed(msgspec.Struct, frozen=True, tag=True):
 
 
 ToGuard = Setup | Permit | Fly | End | Recover
-FromGuard = State | Ended | Failed
+FromGuard = State | NoWays | Ended | Failed
 LINE_MAX = 4096
 """Longer lines are not sent by the guard: a pipe takes shorter ones whole, or not at all (PIPE_BUF)."""
 

@@ -2,7 +2,8 @@
 
 Pure but for its clock: an `Autopilot` takes the commands, and `step` is called several times a second. A vehicle that
 does not do what it is told is `OUT`, for good: it lands where it is, and no further order is taken up. One that a
-person has taken over by remote control gets no command any more, not even at the end.
+person has taken over, or its own failsafe, gets no command any more, not even at the end. `Traffic` says when it may
+take off, which set points it may fly to, and when it may land, so that vehicles keep their distance.
 """
 
 from __future__ import annotations
@@ -11,25 +12,24 @@ import math
 import time
 from collections.abc import Callable
 
-from robochoc.flight.layout import Point
-from robochoc.ros.autopilots.autopilot import MANUAL, OFFBOARD, Autopilot, RefusedError, Telemetry
+from robochoc.ros.autopilots.autopilot import OFFBOARD, Autopilot, RefusedError, Telemetry
 from robochoc.ros.autopilots.fleet import AtEnd, Fleet, point_text
+from robochoc.ros.autopilots.limits import (
+    CLIMB_S,
+    CLIMBED,
+    END_S,
+    GIVE_WAY_S,
+    LANDING_S,
+    MODE_S,
+    OUTSIDE_M,
+    RETRY_S,
+    SILENCE_S,
+    TURN_S,
+)
 from robochoc.ros.autopilots.messages import Phase, State, Target
+from robochoc.ros.autopilots.traffic import Clearance, Traffic
 
-CLIMB_S = 30.0
-"""The longest time of a take-off, in seconds."""
-MODE_S = 3.0
-"""The time within which a vehicle tells that it has changed its mode, in seconds: heartbeats come once a second."""
-OUTSIDE_M = 1.0
-"""A vehicle in the air may be that far out of the fence before it is made to land."""
-RETRY_S = 0.5
-"""The interval after which a command of the end is repeated that was refused, in seconds."""
-END_S = 10.0
-"""For so long commands of the end are repeated."""
-LANDING_S = 90.0
-"""The longest time of a landing that somebody waits for."""
-_CLIMBED = 0.9
-"""The part of a take-off's height from which on the vehicle is sent elsewhere."""
+_NOT_OURS = "it no longer follows set points: its mode is"
 
 
 class Pilot:
@@ -42,11 +42,17 @@ class Pilot:
     """True when the vehicle has been brought to an end: nothing more comes."""
 
     def __init__(
-        self, name: str, autopilot: Autopilot, fleet: Fleet, clock: Callable[[], float] = time.monotonic
+        self,
+        name: str,
+        autopilot: Autopilot,
+        fleet: Fleet,
+        traffic: Traffic,
+        clock: Callable[[], float] = time.monotonic,
     ) -> None:
         self.name = name
         self._autopilot = autopilot
         self._fleet = fleet
+        self._traffic = traffic
         self._clock = clock
         self._begun_s = self._since_s = clock()
         self._phase = Phase.CONNECTING
@@ -57,8 +63,13 @@ class Pilot:
         self._climb_to = -math.inf
         self._commanded = self._hands_off = False
         self._ending: tuple[AtEnd, bool] | None = None
-        self._end_begun_s = self._retry_s = -math.inf
+        self._end_begun_s = self._turn_s = self._retry_s = -math.inf
         self._obeyed = self._was_armed = self._recovers = False
+        self._is_due = self._was_ours = False
+        self._commanded_s = math.inf
+        self._silence_s = 0.0
+        self._clearance = Clearance()
+        self._sent: Clearance | None = None
 
     def fly(self, order: int, target: Target) -> None:
         """Take note of an order, in place of the one before."""
@@ -76,7 +87,7 @@ class Pilot:
     def step(self) -> State:
         """Do what is next, and return the state of the vehicle."""
         seen = self._autopilot.look()
-        self._was_armed = self._was_armed or (self._commanded and seen.armed)
+        self._note(seen)
         try:
             if self._recovers:
                 self._recover(seen)
@@ -90,6 +101,8 @@ class Pilot:
                 self._go_on(seen)
         except RefusedError as refused:
             self._out(str(refused))
+        if self._commanded:
+            self._commanded_s = min(self._commanded_s, self._clock())
         return State(
             self.name,
             self._phase,
@@ -100,7 +113,16 @@ class Pilot:
             seen.in_air,
             self._commanded,
             self._why,
+            self._clearance.waits_for,
         )
+
+    def _note(self, seen: Telemetry) -> None:
+        """Take note of what a vehicle tells."""
+        self._was_armed = self._was_armed or (self._commanded and seen.armed)
+        if self._commanded:
+            self._was_ours = self._was_ours or (seen.armed and not seen.is_flown_by_others)
+            self._silence_s = max(self._silence_s, seen.silent_s)
+        self._traffic.see(self.name, seen.place, in_air=seen.in_air)
 
     # On the way
 
@@ -124,31 +146,45 @@ class Pilot:
         match self._phase:
             case Phase.READY | Phase.LANDED if new and wanted:
                 self._set_out(seen, *wanted)
+            case Phase.READY if self._is_due:
+                self._rise(seen)
             case Phase.FLYING | Phase.ARRIVED if new and wanted:
-                self._head_for(seen, *wanted)
+                self._head_for(*wanted)
             case Phase.CLIMBING if seen.place and seen.place[2] >= self._climb_to:
-                self._climbed(seen, passed_s)
+                self._climbed(passed_s)
             case Phase.CLIMBING if passed_s > CLIMB_S:
                 self._out(f"it has not reached the height of its take-off within {CLIMB_S:g} s")
-            case Phase.FLYING if self._is_there(seen):
-                self._arrive()
+            case Phase.FLYING | Phase.ARRIVED:
+                self._follow()
+                self._arrive(seen)
             case Phase.LANDING if self._has_landed(seen):
-                self._enter(Phase.LANDED)
+                self._touch_down()
             case _:
                 pass
 
     def _set_out(self, seen: Telemetry, order: int, target: Target) -> None:
         """Take up an order on the ground, or of a vehicle that is in the air already."""
         self._order, self._target = order, target
-        if seen.in_air:
-            self._head_for(seen, order, target)
+        if seen.is_flown_by_others:
+            self._out(f"its mode is {seen.mode_and_who}")
+        elif seen.in_air:
+            self._head_for(order, target)
         elif target.lands:
             self._enter(Phase.LANDED)
         elif problem := self._not_ready(seen):
             self._out(problem)
-        elif seen.place is not None:
-            self._commanded = True
-            self._climb_to = seen.place[2] + _CLIMBED * self._fleet.takeoff_m
+        else:
+            self._is_due = True
+            self._enter(Phase.READY)
+            self._rise(seen)
+
+    def _rise(self, seen: Telemetry) -> None:
+        """Take off as soon as nobody is in the way."""
+        self._clearance = self._traffic.clearance(self.name)
+        if self._clearance.climbs and seen.place is not None:
+            self._commanded, self._is_due = True, False
+            self._climb_to = seen.place[2] + CLIMBED * self._fleet.takeoff_m
+            self._traffic.climbing(self.name)
             self._autopilot.arm()
             self._autopilot.take_off(self._fleet.takeoff_m)
             self._enter(Phase.CLIMBING)
@@ -162,69 +198,89 @@ class Pilot:
             return f"it stands at {where}, outside of the fence ({self._fleet.fence})"
         return ""
 
-    def _climbed(self, seen: Telemetry, passed_s: float) -> None:
+    def _climbed(self, passed_s: float) -> None:
         """Go on from the take-off. Some autopilots refuse that at first."""
         order, target = self._wanted or (self._order, self._target)
         if target is None:
             return
+        self._traffic.climbed(self.name)
         try:
-            self._head_for(seen, order, target)
+            self._head_for(order, target)
         except RefusedError:
             if passed_s > CLIMB_S:
                 raise
 
-    def _head_for(self, seen: Telemetry, order: int, target: Target) -> None:
-        """Fly to `target`. Who lands there flies at its present height until it is above it.
-
-        Who should land outside of the fence lands where it is.
-        """
+    def _head_for(self, order: int, target: Target) -> None:
+        """Set out for `target`. Who should land outside of the fence lands where it is."""
         self._order, self._target, self._commanded = order, target, True
-        if target.lands and not self._fleet.fence.holds_above(target.at):
-            self._autopilot.land()
-            self._enter(Phase.LANDING)
-        else:
-            self._autopilot.go_to(self._above(seen, target))
+        self._follow()
+        if self._phase is not Phase.LANDING:
             self._enter(Phase.FLYING)
 
-    def _above(self, seen: Telemetry, target: Target) -> Point:
-        if not target.lands or seen.place is None:
-            return target.at
-        fence = self._fleet.fence
-        return (*target.at[:2], min(max(seen.place[2], fence.low[2]), fence.high[2]))
-
-    def _is_there(self, seen: Telemetry) -> bool:
-        if seen.place is None or self._target is None:
-            return False
-        at, place = self._target.at, seen.place
-        if self._target.lands:
-            at, place = (*at[:2], 0.0), (*place[:2], 0.0)
-        return math.dist(at, place) <= self._fleet.near_m
-
-    def _arrive(self) -> None:
-        if self._target and self._target.lands:
+    def _follow(self) -> None:
+        """Send the set point that is due, or land where the way ends with that."""
+        self._clearance = clearance = self._traffic.clearance(self.name)
+        if clearance.lands:
+            self._traffic.landing(self.name)
             self._autopilot.land()
             self._enter(Phase.LANDING)
-        else:
+        elif clearance.to and (self._sent is None or clearance.to != self._sent.to):
+            self._autopilot.go_to(clearance.to)
+            self._sent = clearance
+
+    def _arrive(self, seen: Telemetry) -> None:
+        """Take note that a vehicle is there, or that it has to make room once more."""
+        if self._phase is Phase.ARRIVED and not self._clearance.rests:
+            self._enter(Phase.FLYING)
+        elif self._phase is Phase.FLYING and self._clearance.rests and self._is_there(seen):
             self._enter(Phase.ARRIVED)
+
+    def _is_there(self, seen: Telemetry) -> bool:
+        if seen.place is None or self._target is None or self._target.lands:
+            return False
+        return math.dist(self._target.at, seen.place) <= self._fleet.near_m
+
+    def _touch_down(self) -> None:
+        self._traffic.landed(self.name)
+        self._enter(Phase.LANDED)
 
     def _trouble(self, seen: Telemetry) -> str:
         """Return what speaks against going on; empty if nothing does."""
         if seen.silent_s > self._fleet.patience_s:
             return f"its link has been silent for {self._fleet.patience_s:g} s"
-        if self._phase in {Phase.READY, Phase.LANDED, Phase.LANDING}:
+        if self._phase in {Phase.READY, Phase.LANDED}:
+            return ""
+        if self._is_taken_over(seen):
+            return f"{_NOT_OURS} {seen.mode_and_who}"
+        if self._phase is Phase.LANDING:
             return ""
         if seen.place and seen.in_air and not self._fleet.fence.holds_above(seen.place, OUTSIDE_M):
             return f"it has left the fence, at {point_text(seen.place)}"
         return self._mode_trouble(seen) if self._clock() - self._since_s > MODE_S else ""
 
     def _mode_trouble(self, seen: Telemetry) -> str:
-        """Return what a vehicle does that should be in the air and follow us; empty if it does."""
+        """Return what a vehicle does that should be in the air and follow us; empty if it does.
+
+        Who leaves our mode while its link is good was told to by a person, or by its own failsafe: neither is fought.
+        """
         if not seen.armed:
             return "its motors have stopped"
-        self._hands_off = seen.mode in MANUAL
-        if self._hands_off or (self._phase is not Phase.CLIMBING and seen.mode != OFFBOARD):
-            return f"it no longer follows set points: its mode is {seen.mode.lower()}"
-        return ""
+        if self._phase is Phase.CLIMBING or seen.mode == OFFBOARD:
+            return ""
+        if self._silence_s <= SILENCE_S:
+            self._hands_off = True
+            return f"{_NOT_OURS} {seen.mode_and_who}"
+        return f"{_NOT_OURS} {seen.mode_in_words}"
+
+    def _is_taken_over(self, seen: Telemetry) -> bool:
+        """Return whether a person flies the vehicle, or its autopilot on its own. For good: it gets no command again.
+
+        Before it has obeyed once its mode may be that of before.
+        """
+        told = self._was_ours or self._clock() - self._commanded_s > MODE_S
+        if self._commanded and told and seen.is_flown_by_others:
+            self._hands_off = True
+        return self._hands_off
 
     def _has_landed(self, seen: Telemetry) -> bool:
         """Return whether the vehicle lies on the ground. One that was armed a moment ago may not have told it yet."""
@@ -238,7 +294,9 @@ class Pilot:
         self._why = why
         if self._wanted:
             self._order = self._wanted[0]
+        self._clearance = Clearance()
         self._enter(Phase.OUT)
+        self._traffic.lose(self.name)
 
     # The end
 
@@ -246,8 +304,12 @@ class Pilot:
         """Make a vehicle land that is out of order, as soon as it hears."""
         if self._wanted:
             self._order = self._wanted[0]
-        if self._commanded and not self._obeyed:
+        if self._commanded and not self._obeyed and self._may_fall():
             self._obeyed = self._is_brought_down(seen, AtEnd.LAND)
+
+    def _may_fall(self) -> bool:
+        """Return whether a vehicle that is out of order may land where it is: nobody is right below, or long enough."""
+        return self._clock() - self._since_s > GIVE_WAY_S or self._traffic.is_clear_below(self.name)
 
     def _recover(self, seen: Telemetry) -> None:
         """Find out whether the vehicle was left armed, once it is heard. One that a person flies is left alone."""
@@ -257,7 +319,7 @@ class Pilot:
                 self._enter(Phase.READY)
             else:
                 self.ended = waited_s > (self._fleet.connect_s if seen.connecting else self._fleet.patience_s)
-        elif seen.armed and seen.mode not in MANUAL:
+        elif seen.armed and not seen.is_flown_by_others:
             self._commanded, self._recovers = True, False
         else:
             self.ended = waited_s > MODE_S
@@ -266,34 +328,58 @@ class Pilot:
         """Bring the vehicle to an end: it lands or holds, or was never commanded."""
         now = self._clock()
         if not math.isfinite(self._end_begun_s):
-            self._end_begun_s = now
-        passed_s = now - self._end_begun_s
+            self._end_begun_s = self._turn_s = now
         lies = self._phase is Phase.LANDED and not seen.in_air
-        if not self._commanded or self._hands_off or lies:
+        if not self._commanded or self._is_taken_over(seen) or lies:
             self.ended = True
-        elif not self._obeyed:
-            self._obeyed = self._is_brought_down(seen, how)
-            if not self._obeyed and passed_s > END_S:
-                self._why = self._why or f"it has not answered at the end, for {END_S:g} s"
-                self._enter(Phase.OUT)
-                self.ended = True
-            elif self._obeyed and self._phase is not Phase.OUT:
-                self._enter(Phase.LANDING if how is AtEnd.LAND else self._phase)
-        elif how is AtEnd.HOLD or not waits:
+        elif self._obeyed:
+            self._await_landing(seen, now, waits=waits and how is AtEnd.LAND)
+        elif how is AtEnd.LAND and not self._is_my_turn(seen):
+            self._end_begun_s = now
+        elif self._is_brought_down(seen, how):
+            self._obeyed = True
+            if how is AtEnd.LAND:
+                self._traffic.landing(self.name)
+                self._enter(self._phase if self._phase is Phase.OUT else Phase.LANDING)
+        elif now - self._end_begun_s > END_S:
+            self._end_out(f"it has not answered at the end, for {END_S:g} s")
+
+    def _await_landing(self, seen: Telemetry, now: float, *, waits: bool) -> None:
+        if not waits:
             self.ended = True
         elif self._has_landed(seen):
             if self._phase is not Phase.OUT:
-                self._enter(Phase.LANDED)
+                self._touch_down()
             self.ended = True
-        elif passed_s > LANDING_S:
-            self._why = self._why or f"it has not landed within {LANDING_S:g} s"
-            self._enter(Phase.OUT)
-            self.ended = True
+        elif now - self._end_begun_s > LANDING_S:
+            self._end_out(f"it has not landed within {LANDING_S:g} s")
+
+    def _end_out(self, why: str) -> None:
+        self._why = self._why or why
+        self._enter(Phase.OUT)
+        self.ended = True
+
+    def _is_my_turn(self, seen: Telemetry) -> bool:
+        """Return whether a vehicle may land now at the end; if not, go on to where it may."""
+        if not seen.in_air or self._phase is Phase.LANDING or self._clock() - self._turn_s > TURN_S:
+            return True
+        if self._phase is Phase.OUT:
+            return self._may_fall()
+        self._clearance = self._traffic.clearance(self.name)
+        if self._clearance.lands or self._clearance.to is None:
+            return True
+        if self._sent is None or self._clearance.to != self._sent.to:
+            try:
+                self._autopilot.go_to(self._clearance.to)
+            except RefusedError:
+                return True
+            self._sent = self._clearance
+        return False
 
     def _is_brought_down(self, seen: Telemetry, how: AtEnd) -> bool:
         """Return whether the vehicle has obeyed: it lands, holds, or is disarmed. A refused command is repeated."""
         now = self._clock()
-        if self._hands_off:
+        if self._is_taken_over(seen):
             return True
         if now - self._retry_s < RETRY_S:
             return False

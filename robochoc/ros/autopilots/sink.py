@@ -8,15 +8,18 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager, suppress
+from itertools import combinations
 from pathlib import Path
 from typing import ClassVar
 
 from robochoc.flight.mission import Drone
+from robochoc.flight.routes.spacing import SLACK_M
 from robochoc.formats.diagnostics import on_one_line
 from robochoc.ros.autopilots.fleet import AtEnd, FleetError, point_text, read_fleet
 from robochoc.ros.autopilots.guard_process import GuardError, shared
 from robochoc.ros.autopilots.kinds import Kind
 from robochoc.ros.autopilots.messages import Phase, State, Target
+from robochoc.ros.autopilots.ways import spacing
 from robochoc.ros.sink import Fields, Sink, SinkError
 from robochoc.ros.waypoint import Waypoint
 
@@ -65,15 +68,16 @@ class FleetSink(Sink):
         self._await_vehicles()
 
     def decide(self, waypoints: Sequence[Waypoint]) -> None:
-        """Fly a decision. Nothing is armed if one of its places is outside of the fence.
+        """Fly a decision. Nothing is armed if one of its places is outside of the fence, or two are too near.
 
-        Landing points may be: pilots land elsewhere then.
+        Landing points may be outside: pilots land elsewhere then.
         """
         fence = self._fleet.fence
         for one in waypoints:
             if not one.lands and not fence.holds(one.at):
                 problem = f"the waypoint of {self._names[one.drone]}, {point_text(one.at)}, is outside of the fence"
                 raise self._wrong(problem, f"the fence is from {fence}; the decision is not flown")
+        self._check_distances([one for one in waypoints if not one.lands])
         targets = {self._names[one.drone]: Target(one.at, one.lands) for one in waypoints}
         if not self._may_arm or not targets:
             return
@@ -82,6 +86,16 @@ class FleetSink(Sink):
             self._guard.fly(targets)
             if not self._guard.observers:
                 self._await_arrival(targets)
+
+    def _check_distances(self, waypoints: Sequence[Waypoint]) -> None:
+        least, downwash = self._fleet.distance_m, self._fleet.downwash
+        for first, second in combinations(waypoints, 2):
+            near = spacing([first.at, second.at], downwash)
+            if near < least - SLACK_M:
+                names = f"{self._names[first.drone]} and {self._names[second.drone]}"
+                flat = f", heights divided by {downwash:g}" if downwash != 1 else ""
+                problem = f"the waypoints of {names} are {near:.2f} m apart{flat}"
+                raise self._wrong(problem, f"'distance' is {least:g} m; the decision is not flown")
 
     def publish(self, topic: str, kind: str, fields: Fields, at_ns: int) -> None:
         """Do nothing: waypoints are flown by `decide`, and vehicles report by themselves."""
@@ -146,9 +160,10 @@ class FleetSink(Sink):
             raise self._wrong(f"{fallen[0].vehicle} is out of order: {fallen[0].why}", "the others are brought down")
         late = [name for name in sent if not self._guard.is_done(name)]
         if late:
-            raise self._wrong(
-                f"{late[0]} is not there after {self._fleet.time_s:g} s", "'time' says how long it may take"
-            )
+            state = self._guard.states.get(late[0])
+            waits = f"; it waits for {state.waits_for}" if state and state.waits_for else ""
+            problem = f"{late[0]} is not there after {self._fleet.time_s:g} s{waits}"
+            raise self._wrong(problem, "'time' says how long it may take")
 
     def _fell_out(self, names: Iterable[str]) -> Iterator[State]:
         for name in names:
