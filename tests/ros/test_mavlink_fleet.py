@@ -29,6 +29,7 @@ def test_a_fleet_file_and_what_it_leaves_out(tmp_path: Path) -> None:
     assert (found.takeoff_m, found.near_m, found.end, found.patience_s, found.time_s) == (
         (2.5, 0.5, AtEnd.LAND, 10, 120)
     )
+    assert (found.distance_m, found.downwash, found.tolerance_m) == (1, 1, 0.25)
 
 
 def test_a_fleet_file_that_says_all(tmp_path: Path) -> None:
@@ -36,13 +37,16 @@ def test_a_fleet_file_that_says_all(tmp_path: Path) -> None:
         "vehicles:\n  Nose: {link: udpout://10.0.0.7:14550, at: [1, -2.5, 0]}\n"
         "  3: serial:///dev/ttyUSB0:57600\n  Fin: tcpout://[::1]:5760\n"
         "fence: [[6, 0, 9], [0, 6.5, -1]]\ntakeoff: 3\nnear: 0.25\nend: hold\npatience: 4\ntime: 60\n"
+        "distance: 1.5\ndownwash: 2\n"
     )
     links = {
         "Nose": Link("udpout://10.0.0.7:14550", (1, -2.5, 0)),
         "3": Link("serial:///dev/ttyUSB0:57600"),
         "Fin": Link("tcpout://[::1]:5760"),
     }
-    expected = Fleet(links, Fence((0, 0, -1), (6, 6.5, 9)), None, 3, 0.25, AtEnd.HOLD, 4, 60)
+    expected = Fleet(
+        links, Fence((0, 0, -1), (6, 6.5, 9)), None, 3, 0.25, AtEnd.HOLD, 4, 60, distance_m=1.5, downwash=2
+    )
     assert read(tmp_path, text) == expected
 
 
@@ -101,6 +105,8 @@ GOOD = f"vehicles:\n  Nose: {LINK}\n{FENCE}\n"
         (f"{GOOD}origin: [80, 8, 0]", "'origin' is too far off; expected latitudes within 75"),
         (f"{GOOD}takeoff: 0", "'takeoff' is '0'; expected 0.5 to 100"),
         (f"{GOOD}takeoff: high", "'takeoff' is 'high'"),
+        (f"{GOOD}distance: 0", "'distance' is '0'; expected 0.1 to 100"),
+        (f"{GOOD}downwash: 0.5", "'downwash' is '0.5'; expected 1 to 10"),
         (f"{GOOD}patience: .inf", "'patience' is 'inf'"),
         (f"{GOOD}end: fly", "'end' is 'fly'; expected land or hold"),
         ("#" * (BYTES_MAX + 1), "has at most 65,536 bytes"),
@@ -118,6 +124,33 @@ def test_the_fleet_file_of_the_guide_for_crazyflies(tmp_path: Path) -> None:
     assert sorted(found.vehicles) == sorted(file.stem for file in (ROOT / "docs" / "examples" / "hangar").glob("*.xml"))
 
 
+@pytest.mark.parametrize(
+    ("first", "second"),
+    [
+        ("udpin://0.0.0.0:14540", "udpin://127.0.0.1:14540"),
+        ("udpin://localhost:14540", "udpin://127.0.0.1:14540"),
+        ("tcpin://[::]:5760", "tcpin://10.0.0.7:5760"),
+    ],
+)
+def test_two_links_that_receive_at_one_port(tmp_path: Path, first: str, second: str) -> None:
+    told = r"fleet\.yaml:3: Fin and Nose both receive at port \d+ of this machine; only one of them would be heard"
+    with pytest.raises(FleetError, match=told):
+        read(tmp_path, f"vehicles:\n  Nose: {first}\n  Fin: {second}\n{FENCE}\n")
+
+
+@pytest.mark.parametrize(
+    ("first", "second"),
+    [
+        ("udpin://127.0.0.1:14540", "udpin://10.0.0.7:14540"),
+        ("udpin://0.0.0.0:14540", "tcpin://0.0.0.0:14540"),
+        ("udpout://10.0.0.7:14540", "udpout://10.0.0.8:14540"),
+    ],
+)
+def test_links_at_ports_of_their_own(tmp_path: Path, first: str, second: str) -> None:
+    found = read(tmp_path, f"vehicles:\n  Nose: {first}\n  Fin: {second}\n{FENCE}\n")
+    assert [link.url for link in found.vehicles.values()] == [first, second]
+
+
 URI = "radio://0/80/2M/E7E7E7E701"
 
 
@@ -129,7 +162,7 @@ def read_crazyflies(folder: Path, text: str) -> Fleet:
 
 def test_a_fleet_of_crazyflies_and_what_its_file_leaves_out(tmp_path: Path) -> None:
     found = read_crazyflies(tmp_path, f"vehicles:\n  Nose: {URI}\n{FENCE}\n")
-    assert found == Fleet({"Nose": Link(URI)}, BOX, takeoff_m=0.5, near_m=0.1, kind=Kind.CRAZYFLIE)
+    assert found == Fleet({"Nose": Link(URI)}, BOX, takeoff_m=0.5, near_m=0.1, kind=Kind.CRAZYFLIE, distance_m=0.4)
     assert (found.speed_ms, found.patience_s, found.connect_s) == (1, 10, 60)
 
 

@@ -321,6 +321,19 @@ def test_a_person_who_takes_over_while_it_lands_at_the_end_is_not_fought(pilot: 
     assert is_over(pilot)
 
 
+def test_a_person_who_takes_over_while_it_lands_on_the_way_is_told(pilot: Pilot, played: Played) -> None:
+    flying(pilot)
+    steps(pilot, played, 3)
+    pilot.fly(2, Target((6, 0, 0), lands=True))
+    assert steps(pilot, played, 2).phase is Phase.LANDING
+    played.seen = replace(played.seen, mode="POSCTL")
+    assert steps(pilot, played).phase is Phase.LANDING
+    assert (
+        steps(pilot, played, 2, MODE_S).why == "it no longer follows set points: its mode is posctl (a person flies it)"
+    )
+    assert played.done[-1] == "land"
+
+
 def test_whom_a_person_flies_is_not_taken_from_him(pilot: Pilot, played: Played) -> None:
     played.seen = replace(GROUND, armed=True, in_air=True, mode="POSCTL", place=(1, 1, 3))
     flying(pilot)

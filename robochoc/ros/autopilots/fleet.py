@@ -17,7 +17,7 @@ from robochoc.flight.layout import Point
 from robochoc.formats.diagnostics import MistakeError, on_one_line, shortened, suggestion
 from robochoc.formats.dialects.yaml_tree import Node, read_yaml, shown
 from robochoc.ros.autopilots.frames import FAR_M, LATITUDE_MAX, GpsPlace
-from robochoc.ros.autopilots.kinds import Kind
+from robochoc.ros.autopilots.kinds import Kind, shared_port
 
 BYTES_MAX = 64 * 1024
 VEHICLES_MAX = 64
@@ -90,6 +90,7 @@ class Fleet(msgspec.Struct, frozen=True):
     def connect_s(self) -> float:
         """Return how long a vehicle that is heard may take until it has told all, in seconds."""
         return max(self.patience_s, self.kind.rules.connect_s)
+
     distance_m: float = 1.0
     """The distance that vehicles keep from each other, between their centres."""
     downwash: float = 1.0
@@ -172,6 +173,10 @@ def _vehicles(node: Node, kind: Kind, origin: GpsPlace | None) -> dict[str, Link
         if link.url in urls:
             problem = f"{shortened(name)} and {shortened(urls[link.url])} have the same link"
             raise MistakeError(problem, "a vehicle has a link of its own", entry.line)
+        for url, other in urls.items():
+            if port := shared_port(link.url, url):
+                problem = f"{shortened(name)} and {shortened(other)} both receive at port {port} of this machine"
+                raise MistakeError(problem, "only one of them would be heard: give each a port of its own", entry.line)
         urls[link.url] = name
         found[name] = link
     if not 0 < len(found) <= VEHICLES_MAX:

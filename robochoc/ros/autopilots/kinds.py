@@ -80,3 +80,23 @@ _RULES = {
         alone="vehicles fly to where they were sent, and hover there",
     ),
 }
+
+
+_RECEIVES = re.compile(r"(?P<transport>udp|tcp)in://(?P<host>.+):(?P<port>\d+)", re.ASCII)
+_ALL_HOSTS = frozenset({"0.0.0.0", "[::]"})  # noqa: S104 - as it stands in links
+_OWN_HOSTS = frozenset({"127.0.0.1", "localhost", "[::1]"})
+
+
+def shared_port(url: str, other: str) -> str:
+    """Return the port at which two links would both receive on this machine; empty if there is none.
+
+    >>> shared_port("udpin://0.0.0.0:14540", "udpin://127.0.0.1:14540")
+    '14540'
+    """
+    first, second = _RECEIVES.fullmatch(url), _RECEIVES.fullmatch(other)
+    if not first or not second:
+        return ""
+    if (first["transport"], int(first["port"])) != (second["transport"], int(second["port"])):
+        return ""
+    hosts = {first["host"].lower(), second["host"].lower()}
+    return first["port"] if len(hosts) == 1 or hosts & _ALL_HOSTS or hosts <= _OWN_HOSTS else ""

@@ -13,6 +13,7 @@ import time
 from collections.abc import Callable
 
 from robochoc.ros.autopilots.autopilot import OFFBOARD, Autopilot, RefusedError, Telemetry
+from robochoc.ros.autopilots.craft import Clearance
 from robochoc.ros.autopilots.fleet import AtEnd, Fleet, point_text
 from robochoc.ros.autopilots.limits import (
     CLIMB_S,
@@ -27,7 +28,7 @@ from robochoc.ros.autopilots.limits import (
     TURN_S,
 )
 from robochoc.ros.autopilots.messages import Phase, State, Target
-from robochoc.ros.autopilots.traffic import Clearance, Traffic
+from robochoc.ros.autopilots.traffic import Traffic
 
 _NOT_OURS = "it no longer follows set points: its mode is"
 
@@ -66,7 +67,7 @@ class Pilot:
         self._end_begun_s = self._turn_s = self._retry_s = -math.inf
         self._obeyed = self._was_armed = self._recovers = False
         self._is_due = self._was_ours = False
-        self._commanded_s = math.inf
+        self._commanded_s = self._foreign_s = math.inf
         self._silence_s = 0.0
         self._clearance = Clearance()
         self._sent: Clearance | None = None
@@ -103,24 +104,15 @@ class Pilot:
             self._out(str(refused))
         if self._commanded:
             self._commanded_s = min(self._commanded_s, self._clock())
-        return State(
-            self.name,
-            self._phase,
-            self._order,
-            seen.place,
-            seen.battery,
-            seen.healthy,
-            seen.in_air,
-            self._commanded,
-            self._why,
-            self._clearance.waits_for,
-        )
+        told = seen.place, seen.battery, seen.healthy, seen.in_air
+        return State(self.name, self._phase, self._order, *told, self._commanded, self._why, self._clearance.waits_for)
 
     def _note(self, seen: Telemetry) -> None:
         """Take note of what a vehicle tells."""
         self._was_armed = self._was_armed or (self._commanded and seen.armed)
         if self._commanded:
             self._was_ours = self._was_ours or (seen.armed and not seen.is_flown_by_others)
+            self._foreign_s = min(self._foreign_s, self._clock()) if seen.is_flown_by_others else math.inf
             self._silence_s = max(self._silence_s, seen.silent_s)
         self._traffic.see(self.name, seen.place, in_air=seen.in_air)
 
@@ -250,9 +242,11 @@ class Pilot:
             return f"its link has been silent for {self._fleet.patience_s:g} s"
         if self._phase in {Phase.READY, Phase.LANDED}:
             return ""
-        if self._is_taken_over(seen):
+        # Some tell another mode for a moment after they have landed.
+        lands = self._phase is Phase.LANDING
+        if (not lands or self._clock() - self._foreign_s > MODE_S) and self._is_taken_over(seen):
             return f"{_NOT_OURS} {seen.mode_and_who}"
-        if self._phase is Phase.LANDING:
+        if lands:
             return ""
         if seen.place and seen.in_air and not self._fleet.fence.holds_above(seen.place, OUTSIDE_M):
             return f"it has left the fence, at {point_text(seen.place)}"
@@ -330,10 +324,10 @@ class Pilot:
         if not math.isfinite(self._end_begun_s):
             self._end_begun_s = self._turn_s = now
         lies = self._phase is Phase.LANDED and not seen.in_air
-        if not self._commanded or self._is_taken_over(seen) or lies:
-            self.ended = True
-        elif self._obeyed:
+        if self._obeyed and not self._hands_off:
             self._await_landing(seen, now, waits=waits and how is AtEnd.LAND)
+        elif not self._commanded or self._is_taken_over(seen) or lies:
+            self.ended = True
         elif how is AtEnd.LAND and not self._is_my_turn(seen):
             self._end_begun_s = now
         elif self._is_brought_down(seen, how):

@@ -17,12 +17,12 @@ import math
 import threading
 import time
 from collections.abc import Callable, Iterable, Iterator, Mapping
-from dataclasses import dataclass, field
 
 import numpy as np
 
 from robochoc.flight.layout import Point
 from robochoc.flight.routes.spacing import SLACK_M, line_distances, squashed
+from robochoc.ros.autopilots.craft import Clearance, Craft
 from robochoc.ros.autopilots.fleet import Fleet
 from robochoc.ros.autopilots.messages import Target
 from robochoc.ros.autopilots.steps import Does, Step, length_along, on_line, steps_of
@@ -38,55 +38,6 @@ _ALL_BUT = 0.999
 Line = tuple[Point, Point]
 
 
-@dataclass(frozen=True)
-class Clearance:
-    """What a vehicle may do now."""
-
-    to: Point | None = None
-    """Its set point; None before it has one."""
-    climbs: bool = False
-    lands: bool = False
-    rests: bool = False
-    """Whether it is where it was sent, as far as there is a way."""
-    waits_for: str = ""
-    """The name of another vehicle; empty if it need not wait."""
-
-
-@dataclass
-class _Craft:
-    """A vehicle."""
-
-    name: str
-    rank: int
-    place: Point | None = None
-    in_air: bool = False
-    ground_m: float = 0.0
-    """The height at which it was last on the ground."""
-    flies: bool = False
-    """Whether it is in the air by our command."""
-    lands: bool = False
-    """Whether its autopilot lands it."""
-    gone: bool = False
-    target: Target | None = None
-    setpoint: Point | None = None
-    steps: list[Step] = field(default_factory=list)
-    done: int = 0
-    released: int = 0
-    blocked_s: float | None = None
-
-    @property
-    def step(self) -> Step | None:
-        return self.steps[self.done] if self.done < len(self.steps) else None
-
-    @property
-    def rest(self) -> Point:
-        """Where it is bound for, by its newest set point."""
-        return self.setpoint or self.place or (math.nan,) * 3
-
-    def ground(self, at: Point) -> Point:
-        return (*at[:2], min(self.ground_m, at[2]))
-
-
 class Traffic:
     """Keeps the vehicles of `fleet` apart. Its methods may be called by several threads."""
 
@@ -94,7 +45,7 @@ class Traffic:
         self._fleet = fleet
         self._clock = clock
         self._lock = threading.RLock()
-        self._crafts = {name: _Craft(name, rank) for rank, name in enumerate(fleet.vehicles)}
+        self._crafts = {name: Craft(name, rank) for rank, name in enumerate(fleet.vehicles)}
         self._planned_s = -math.inf
         self._ahead_m = max(_AHEAD_M, 2 * fleet.distance_m)
         self._keep_m = fleet.distance_m - 2 * fleet.tolerance_m - SLACK_M
@@ -188,7 +139,7 @@ class Traffic:
                 craft.setpoint = wanted
             return Clearance(craft.setpoint, climbs=step.does is Does.CLIMB, lands=step.does is Does.LAND)
 
-    def _is_due(self, craft: _Craft, step: Step) -> bool:
+    def _is_due(self, craft: Craft, step: Step) -> bool:
         """Return whether a vehicle is to get a new set point: the one before is near, or not on its line."""
         before, place = craft.setpoint, craft.place
         if before is None or place is None or math.dist(place, before) <= self._fleet.kind.rules.renews_m:
@@ -208,7 +159,7 @@ class Traffic:
             others = (one for one in self._crafts.values() if one is not craft and one.flies and one.place)
             return all(self._apart(column, (one.place or one.rest,) * 2) >= self._keep_m for one in others)
 
-    def _advance(self, craft: _Craft) -> None:
+    def _advance(self, craft: Craft) -> None:
         """Count the steps that a vehicle has done, and those that it may do."""
         while (step := craft.step) and step.does is Does.FLY:
             if craft.done == craft.released:
@@ -235,7 +186,7 @@ class Traffic:
         reached = length_along(step.begin, step.end, place)
         return reached >= length and math.dist(place, on_line(step.begin, step.end, reached)) <= near
 
-    def _ahead(self, craft: _Craft) -> Point:
+    def _ahead(self, craft: Craft) -> Point:
         """Return the point on its line that a vehicle may head for."""
         step, place = craft.step, craft.place
         if step is None or place is None or craft.released <= craft.done:
@@ -254,7 +205,7 @@ class Traffic:
                 return name
         return ""
 
-    def _stopped(self, craft: _Craft, blocked: str) -> Clearance:
+    def _stopped(self, craft: Craft, blocked: str) -> Clearance:
         """Return that a vehicle stays where it is. If that lasts, plan anew."""
         now = self._clock()
         if craft.blocked_s is None:
@@ -265,7 +216,7 @@ class Traffic:
             self._replan()
         return Clearance(craft.setpoint, waits_for=blocked)
 
-    def _in_the_way(self, craft: _Craft, to: Point) -> str:
+    def _in_the_way(self, craft: Craft, to: Point) -> str:
         """Return the name of a vehicle to which the way would lead too near, from where both are; empty if none."""
         if craft.place is None:
             return ""
@@ -281,7 +232,7 @@ class Traffic:
                         return other.name
         return ""
 
-    def _lines(self, other: _Craft, craft: _Craft) -> Iterator[tuple[Line, bool]]:
+    def _lines(self, other: Craft, craft: Craft) -> Iterator[tuple[Line, bool]]:
         """Yield where another vehicle may be, and whether `craft` has to mind it."""
         place = other.place or other.rest
         yield (place, place), True
@@ -291,7 +242,7 @@ class Traffic:
             strays = self._strays(other) or self._strays(craft)
             yield (place, other.setpoint), strays and other.rank < craft.rank
 
-    def _strays(self, craft: _Craft) -> bool:
+    def _strays(self, craft: Craft) -> bool:
         """Return whether a vehicle is off its way."""
         if craft.place is None or craft.setpoint is None:
             return False
@@ -344,7 +295,7 @@ class Traffic:
                 craft.steps, craft.done, craft.released = steps.get(craft.name, []), 0, 0
                 craft.blocked_s = None
 
-    def _moves(self, craft: _Craft) -> bool:
+    def _moves(self, craft: Craft) -> bool:
         """Return whether a vehicle has a part in a plan. Others stay, or land by themselves."""
         if craft.gone or craft.lands:
             return False
@@ -352,11 +303,11 @@ class Traffic:
             return True
         return craft.target is not None and (craft.in_air or not craft.target.lands)
 
-    def _standing(self, craft: _Craft) -> Point:
+    def _standing(self, craft: Craft) -> Point:
         at = craft.place or craft.rest
         return craft.ground(at) if craft.in_air and (craft.gone or craft.lands) else at
 
-    def _goals(self, moving: list[_Craft]) -> dict[str, Point]:
+    def _goals(self, moving: list[Craft]) -> dict[str, Point]:
         """Return where vehicles are to go: not below one that comes down by itself, as long as it does."""
         found = {one.name: self._goal(one) for one in moving}
         falling = [one.place for one in self._crafts.values() if one.gone and one.in_air and one.place]
@@ -367,7 +318,7 @@ class Traffic:
                 found[name] = Ways(self._fleet, {}, self._fleet.distance_m).spot(goal, [*falling, *others]) or goal
         return found
 
-    def _goal(self, craft: _Craft) -> Point:
+    def _goal(self, craft: Craft) -> Point:
         target = craft.target
         if target is None:
             return craft.rest
