@@ -225,7 +225,7 @@ def _in_words(facts: Facts) -> Iterator[str]:
     if facts.changes:
         yield "the problem changes"
     if facts.loss:
-        yield f"messages are lost with a probability of {facts.loss:g}"
+        yield f"messages are lost with a probability of {facts.loss:g} at most"
     yield f"{counted(facts.values, 'value')} in all, {facts.largest_domain:,} of a robot at most"
     if facts.has_costs and facts.tree.cells <= LARGE:
         yield f"a pseudo-tree of induced width {facts.tree.width}, tables of {facts.tree.cells:,.0f} entries at most"

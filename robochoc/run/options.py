@@ -153,8 +153,11 @@ class Options:
 
     @property
     def loss(self) -> float:
-        """Return the probability that a message is lost for good, by the option or by the channel model."""
-        return self.message_loss or (self.channel.message_loss if self.channel else 0.0)
+        """Return the probability that a message is lost for good, by the option or by the channel model.
+
+        Where it depends on the link, this is the largest one.
+        """
+        return self.message_loss or (self.channel.most_loss if self.channel else 0.0)
 
     @property
     def dropped(self) -> float:

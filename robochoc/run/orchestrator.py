@@ -125,6 +125,10 @@ def _solve_distributed(
         refuse_unfit(team, options, protocol.traits)
     except UnfitProtocolError as unfit:
         raise UnsupportedError(f"{unfit}{_alternatives(team, options, complete=unfit.complete)}") from None
+    if options.channel is not None:
+        from robochoc.run.radio import refuse_channel  # noqa: PLC0415 - start-up: seldom asked for
+
+        refuse_channel(team, options)
     deployment = ThisMachine(team, context, environment, audience)
     header = _header(team, options)
     try:

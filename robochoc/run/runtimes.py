@@ -25,6 +25,7 @@ from robochoc.solver.compiled_team import CompiledTeam
 from robochoc.solver.encoding import UnsupportedError
 
 if TYPE_CHECKING:
+    from robochoc.communication.simulator.losses import Losses
     from robochoc.communication.simulator.schedule import Schedule
 
 
@@ -117,7 +118,6 @@ def _import_tables(request: SessionRequest) -> None:
 
 def open_simulator(request: SessionRequest) -> Session:
     """Open a session in which all robots live in one thread."""
-    from robochoc.communication.simulator.losses import Losses  # noqa: PLC0415 - one runtime is enough
     from robochoc.communication.simulator.simulator import (  # noqa: PLC0415 - as above
         EffortLimits,
         Simulation,
@@ -132,9 +132,18 @@ def open_simulator(request: SessionRequest) -> Session:
         limits=limits,
         deadline=request.deadline,
         bounds=options.bounds,
-        losses=Losses(options.loss, options.seed) if options.loss else None,
+        losses=_losses_of(options),
         **request.common,
     )
+
+
+def _losses_of(options: Options) -> Losses | None:
+    """Return what decides which messages are lost: by the option, or else by the channel model. None: none is."""
+    from robochoc.communication.simulator.losses import LinkLosses, Losses  # noqa: PLC0415 - one runtime is enough
+
+    if options.message_loss or not options.loss or options.channel is None:
+        return Losses(options.loss, options.seed) if options.loss else None
+    return LinkLosses(options.channel, options.seed)
 
 
 def open_arrays(request: SessionRequest) -> Session:

@@ -10,24 +10,62 @@ import msgspec
 import pytest
 
 from robochoc.communication.simulator.channel import CHANNELS, LARGEST_FILE, ChannelModel, read_channel
+from robochoc.communication.simulator.link_loss import Bursts, NamedLink, PathLoss
 from robochoc.formats import InvalidInputError
 from tests.support.journal_entries import entries_of
 from tests.support.program import ROOT, robochoc_within
 
+BY_LINK = """
+[path_loss]
+power_dbm = 15
+sensitivity_dbm = -85
+exponent = 3
+shadowing_db = 6
+
+[positions]
+Base = [0, 0]
+Roof = [1.5, 2, 3]
+
+[bursts]
+begin = 0.02
+end = 0.3
+loss = 0.8
+
+[[links]]
+between = ["Base", "Roof"]
+loss = 0
+
+[[links]]
+between = ["Roof", "A"]
+loss = 1
+one_way = true
+"""
+
 
 def test_a_file_has_all_fields(tmp_path: Path) -> None:
     fields = {**msgspec.structs.asdict(CHANNELS["wpan"]), "name": "mesh"}
+    plain = {field: value for field, value in fields.items() if isinstance(value, str | int | float)}
     path = tmp_path / "any.toml"
-    path.write_text("".join(f"{field} = {json.dumps(value)}\n" for field, value in fields.items()))
-    assert read_channel(path) == msgspec.structs.replace(CHANNELS["wpan"], name="mesh")
+    path.write_text("".join(f"{field} = {json.dumps(value)}\n" for field, value in plain.items()) + BY_LINK)
+    read = read_channel(path)
+    assert read == ChannelModel(
+        **plain,  # type: ignore[arg-type]
+        path_loss=PathLoss(power_dbm=15, sensitivity_dbm=-85, exponent=3, shadowing_db=6),
+        positions={"Base": (0, 0), "Roof": (1.5, 2, 3)},
+        bursts=Bursts(begin=0.02, end=0.3, loss=0.8),
+        links=(NamedLink(between=("Base", "Roof"), loss=0), NamedLink(between=("Roof", "A"), loss=1, one_way=True)),
+    )
+    assert {*plain, "path_loss", "distance_loss", "positions", "bursts", "links"} == {*ChannelModel.__struct_fields__}
 
 
 def test_the_example_in_the_manual_is_a_channel(tmp_path: Path) -> None:
     text = (ROOT / "docs" / "guides" / "channels.md").read_text()
-    path = tmp_path / "mesh.toml"
-    path.write_text(text.split('```toml title="mesh.toml"\n')[1].split("```")[0])
-    assert read_channel(path).name == "mesh"
-    assert all(f"`{field}`" in text for field in ChannelModel.__struct_fields__)
+    for name in ("mesh", "valley"):
+        path = tmp_path / f"{name}.toml"
+        path.write_text(text.split(f'```toml title="{name}.toml"\n')[1].split("```")[0])
+        assert read_channel(path).name == name
+    kinds = (ChannelModel, PathLoss, Bursts, NamedLink)
+    assert all(f"`{field}`" in text for kind in kinds for field in kind.__struct_fields__)
 
 
 def test_a_file_needs_a_latency_only(tmp_path: Path) -> None:
@@ -65,6 +103,38 @@ BAD = {
     "latency_ms = 5\nname = ['wlan']": "name: expected a text, found a list",
     "[channel]\nlatency_ms = 5": "channel: a channel has no such field",
     f"#{'x' * LARGEST_FILE}": "is too large",
+    "latency_ms = 5\npath_loss = 3": "path_loss: expected an object or null, found an integer",
+    "latency_ms = 5\n[path_loss]\npower_dbm = 10": "path_loss: the field 'sensitivity_dbm' is missing",
+    "latency_ms = 5\n[path_loss]\npower_dbm = 10\nsensitivity_dbm = -80\nexponent = 0": (
+        "path_loss: exponent: expected a number from 1 to 10, got 0"
+    ),
+    "latency_ms = 5\n[path_loss]\npower_dbm = nan\nsensitivity_dbm = -80": "path_loss: power_dbm: expected a number",
+    "latency_ms = 5\n[path_loss]\npower_dbm = 1\nsensitivity_dbm = -80\npower = 3": (
+        "path_loss: there is no field 'power'; allowed: power_dbm, sensitivity_dbm"
+    ),
+    "latency_ms = 5\ndistance_loss = [[0, 0.1], [0, 0.2]]": "distance_loss: expected growing distances, got 0 after 0",
+    "latency_ms = 5\ndistance_loss = [[0, 1.1]]": "distance_loss: expected a number from 0 to 1, got 1.1",
+    "latency_ms = 5\ndistance_loss = [[-1, 1]]": "distance_loss: expected a number from 0 to 1,000,000,000, got -1",
+    "latency_ms = 5\ndistance_loss = [[inf, 1]]": "distance_loss: expected a number",
+    "latency_ms = 5\ndistance_loss = [[1, 0.5, 2]]": "distance_loss[0]: expected a list of length 2",
+    "latency_ms = 5\ndistance_loss = [0, 1]": "distance_loss[0]: expected a list, found an integer",
+    f"latency_ms = 5\ndistance_loss = [{','.join(f'[{place}, 0]' for place in range(1001))}]": "up to 1,000 pairs",
+    "latency_ms = 5\ndistance_loss = [[1, 0.5]]\n[path_loss]\npower_dbm = 1\nsensitivity_dbm = -80": (
+        "distance_loss: path_loss says already what is lost by distance"
+    ),
+    "latency_ms = 5\nunit_m = 0": "unit_m: expected a number from 0.001 to",
+    "latency_ms = 5\n[positions]\nA = [0, 0]": "positions: nothing is lost by distance; add path_loss or",
+    "latency_ms = 5\ndistance_loss = [[1, 0.5]]\n[positions]\nA = [0]": "positions: A: expected [x, y] or [x, y, z]",
+    "latency_ms = 5\ndistance_loss = [[1, 0.5]]\n[positions]\nA = [0, nan]": "positions: A: expected [x, y]",
+    "latency_ms = 5\ndistance_loss = [[1, 0.5]]\n[positions]\nA = [0, 1e10]": "positions: A: expected [x, y]",
+    "latency_ms = 5\ndistance_loss = [[1, 0.5]]\n[positions]\nA = 'here'": "expected a list, found a text",
+    f"latency_ms = 5\ndistance_loss = [[1, 0.5]]\n[positions]\n'{'A' * 500}' = [1]": "positions: AAA",
+    "latency_ms = 5\n[bursts]\nbegin = 0.1\nend = 0\nloss = 1": "bursts: end: expected a number from 0.001 to 1, got 0",
+    "latency_ms = 5\n[bursts]\nbegin = 0.1\nend = 0.5": "bursts: the field 'loss' is missing",
+    "latency_ms = 5\n[[links]]\nbetween = ['A', 'A']\nloss = 1": "links[0]: between: expected two robots, got A twice",
+    "latency_ms = 5\n[[links]]\nbetween = ['A']\nloss = 1": "links[0].between: expected a list of length 2",
+    "latency_ms = 5\n[[links]]\nbetween = ['A', 'B']\nloss = -1": "links[0]: loss: expected a number from 0 to 1",
+    "latency_ms = 5\n[links]\nA = 0.5": "links: expected a list, found an object",
 }
 
 
@@ -106,6 +176,18 @@ def test_the_command_line_simulates_seconds(tmp_path: Path) -> None:
     outcome = json.loads(robochoc_within(*run, tmp_path / "own.toml", "--json").stdout)
     assert outcome["channel"] == "own"
     assert outcome["metrics"]["simulated_s"] > 1
+
+
+def test_what_is_lost_depends_on_where_robots_are(tmp_path: Path) -> None:
+    radio = tmp_path / "radio.toml"
+    run = ("solve", ROOT / "docs" / "examples" / "scouts", "--runtime", "simulator", "--protocol", "dsa", "--json")
+    radio.write_text("latency_ms = 1\ndistance_loss = [[0, 0], [10, 1]]\n[positions]\nBase = [50, 0]\n")
+    outcome = json.loads(robochoc_within(*run, "--channel", radio).stdout)
+    assert 0 < outcome["metrics"]["lost_messages"] <= outcome["metrics"]["messages"]
+    radio.write_text(radio.read_text().replace("Base", "Bose"))
+    refused = robochoc_within(*run, "--channel", radio)
+    assert (refused.returncode, refused.stdout) == (2, "")
+    assert "--channel radio: positions: there is no robot Bose (did you mean 'Base'?)" in refused.stderr
 
 
 @pytest.mark.parametrize(

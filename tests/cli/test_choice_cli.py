@@ -48,7 +48,7 @@ def test_who_refuses_the_options_is_told_with_the_reason(four: Path) -> None:
 def test_where_messages_are_lost_the_choice_says_so(four: Path) -> None:
     said = robochoc_within("solve", four, "--runtime", "simulator", "--message-loss", "0.2", "--explain").stdout
     assert "  chosen: dsa, as many messages may be lost: " in said
-    assert "; messages are lost with a probability of 0.2; " in said
+    assert "; messages are lost with a probability of 0.2 at most; " in said
     assert "  not gdba: more than 10% of the messages are lost\n" in said
 
 

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from math import log10
 from random import Random
 
 import pytest
 
+from robochoc.communication.simulator.channel import ChannelModel
+from robochoc.communication.simulator.link_loss import Bursts, NamedLink, PathLoss, Point
 from robochoc.generators.random_csp import random_csp
 from robochoc.model.outcome import Outcome, Verdict
 from robochoc.model.problem import INFINITE, Team
@@ -26,14 +29,15 @@ BEARING = [name for name in OURS if protocol_named(name).traits.bears_loss]
 SCHEDULES = list(ScheduleName)
 
 
-def run(name: str, team: Team, number: int, loss: float = 0.1) -> Outcome | None:
+def run(name: str, team: Team, number: int, loss: float = 0.1, radio: ChannelModel | None = None) -> Outcome | None:
     """The outcome of `team` by the protocol called `name`; None: it does not take this team."""
     options = Options(
         protocol=name,
         runtime=Runtime.SIMULATOR,
         seed=number,
-        schedule=SCHEDULES[number % len(SCHEDULES)],
+        schedule=ScheduleName.CONCURRENT if radio else SCHEDULES[number % len(SCHEDULES)],
         message_loss=loss,
+        channel=radio,
     )
     try:
         return solve(team, options)
@@ -71,6 +75,43 @@ def test_with_a_tenth_of_all_messages_lost_no_protocol_is_wrong(runs: int) -> No
         kind = random_cost_team if protocol_named(name).traits.costs and number % 3 else random_team
         team = kind(chance, n_ary=protocol_named(name).traits.n_ary)
         outcome = run(name, team, number)
+        if outcome is not None:
+            lost += outcome.metrics.lost_messages
+            wrong += not is_true(team, outcome)
+    assert lost > runs
+    assert wrong == 0
+
+
+def random_radio(chance: Random, team: Team) -> ChannelModel:
+    """A radio that loses messages by distance, in bursts, and all of one link, by chance each."""
+    places: dict[str, Point] = {name: (chance.uniform(0, 100), chance.uniform(0, 100)) for name in team.order}
+    far = chance.uniform(30, 150)
+    path_loss = PathLoss(power_dbm=0, sensitivity_dbm=-40 - 20 * log10(far), shadowing_db=chance.choice((0, 6)))
+    table = ((far / 2, 0.0), (far, chance.uniform(0, 1)))
+    by_distance = chance.choice(("path_loss", "distance_loss", ""))
+    pair = chance.sample(team.order, 2)
+    return ChannelModel(
+        name="radio",
+        latency_ms=1,
+        sigma=0.5,
+        timeout_ms=10,
+        message_loss=chance.choice((0, 0.05)),
+        path_loss=path_loss if by_distance == "path_loss" else None,
+        distance_loss=table if by_distance == "distance_loss" else (),
+        positions=places if by_distance else {},
+        bursts=Bursts(begin=0.05, end=0.3, loss=0.9) if chance.random() < 0.5 else None,
+        links=(NamedLink(between=(pair[0], pair[1]), loss=1),) if chance.random() < 0.3 else (),
+    )
+
+
+@count("runs", 60, 1000)
+def test_whatever_a_radio_loses_by_link_no_protocol_is_wrong(runs: int) -> None:
+    lost = wrong = 0
+    for number in range(runs):
+        name = OURS[number % len(OURS)]
+        chance = Random(number + 5000)
+        team = team_for(name, number // len(OURS))
+        outcome = run(name, team, number, 0, random_radio(chance, team))
         if outcome is not None:
             lost += outcome.metrics.lost_messages
             wrong += not is_true(team, outcome)

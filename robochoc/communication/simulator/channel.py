@@ -2,8 +2,8 @@
 
 A message is cut into frames; each takes time on the air by its bytes, may be lost and is then sent again, and what is
 left is latency: queues, access to the medium, relays. The loss of a frame only delays: every message arrives, and none
-overtakes another of the same channel, as protocols require. Only where `message_loss` says so do whole messages not
-arrive. Where the figures come from: docs/guides/channels.md.
+overtakes another of the same channel, as protocols require. Only where `message_loss` or a link says so do whole
+messages not arrive (`link_loss.py`). Where the figures come from: docs/guides/channels.md.
 """
 
 from __future__ import annotations
@@ -19,6 +19,17 @@ from typing import NamedTuple
 
 import msgspec
 
+from robochoc.communication.simulator.link_loss import (
+    Bursts,
+    NamedLink,
+    PathLoss,
+    Point,
+    either,
+    loss_by_table,
+    refuse_beyond,
+    refuse_positions,
+    refuse_table,
+)
 from robochoc.formats.diagnostics import Diagnostic, InvalidInputError, shortened, suggestion
 from robochoc.system.decode_errors import describe_decode_error
 
@@ -41,6 +52,7 @@ _RANGES = {
     "backoff": (1, 10),
     "longest_timeout_ms": (0, _MOST_MS),
     "check_ns": (0, NS_PER_S),
+    "unit_m": (0.001, 10**6),
 }
 """The accepted range of each value. Other values are certainly mistakes, and a run might not end with them."""
 _NAME = re.compile(r"[\w.+-]{1,40}")
@@ -68,8 +80,12 @@ class ChannelModel(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fie
     transmission of a frame is lost with the probability `loss`; it is sent again after `timeout_ms`, which is
     multiplied by `backoff` each time up to `longest_timeout_ms`. If the medium is `shared`, one robot is on the air at
     a time; if not, each robot sends one message at a time, beside the others. `check_ns` is what one constraint check
-    takes a robot. With the probability `message_loss` a message is lost for good: nobody sends it again. Raises
-    `ValueError` for what cannot be.
+    takes a robot.
+
+    With the probability `message_loss` a message is lost for good: nobody sends it again. On top of that, messages are
+    lost by the distance of sender and receiver, in units of `unit_m` metres: by `path_loss`, or by `distance_loss`,
+    pairs of a distance in metres and a probability. `positions` say where robots stand. Some are lost in `bursts`.
+    `links` are those with a probability of their own. Raises `ValueError` for what cannot be.
     """
 
     name: str
@@ -87,6 +103,12 @@ class ChannelModel(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fie
     shared: bool = False
     check_ns: int = 1000
     message_loss: float = 0.0
+    path_loss: PathLoss | None = None
+    distance_loss: tuple[tuple[float, float], ...] = ()
+    unit_m: float = 1.0
+    positions: dict[str, Point] = {}
+    bursts: Bursts | None = None
+    links: tuple[NamedLink, ...] = ()
 
     def __post_init__(self) -> None:
         """Refuse values out of range, values that are not numbers, and fields that contradict each other."""
@@ -94,12 +116,36 @@ class ChannelModel(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fie
             raise ValueError("name: expected up to 40 letters, digits and '.+-_'; write a line such as name = \"mesh\"")
         for field, (least, most) in _RANGES.items():
             value = getattr(self, field)
-            if value is not None and not least <= value <= most:
-                raise ValueError(f"{field}: expected a number from {least:,} to {most:,}, got {value:g}")
+            if value is not None:
+                refuse_beyond(field, value, least, most)
         if self.minimum_ms > self.latency_ms:
             raise ValueError(f"minimum_ms: expected at most latency_ms, the median, which is {self.latency_ms:g}")
         if self.longest_timeout_ms < self.timeout_ms:
             raise ValueError(f"longest_timeout_ms: expected at least timeout_ms, which is {self.timeout_ms:g}")
+        refuse_table(self.distance_loss)
+        refuse_positions(self.positions)
+        if self.path_loss and self.distance_loss:
+            raise ValueError("distance_loss: path_loss says already what is lost by distance; give one of them")
+        if self.positions and not self.by_distance:
+            raise ValueError("positions: nothing is lost by distance; add path_loss or distance_loss")
+
+    @property
+    def by_distance(self) -> bool:
+        """Return whether it depends on the distance of two robots what is lost between them."""
+        return self.path_loss is not None or bool(self.distance_loss)
+
+    def loss_at(self, distance: float) -> float:
+        """Return the probability that a message is lost because of this distance, in units of coordinates."""
+        if self.path_loss is not None:
+            return self.path_loss.loss_at(distance * self.unit_m)
+        return loss_by_table(self.distance_loss, distance * self.unit_m) if self.distance_loss else 0.0
+
+    @property
+    def most_loss(self) -> float:
+        """Return the largest probability, in the long run, with which a message of any link is lost for good."""
+        far = 1.0 if self.path_loss else max([loss for _, loss in self.distance_loss], default=0.0)
+        usual = either(either(self.message_loss, far), self.bursts.mean if self.bursts else 0.0)
+        return max([usual, *[link.loss for link in self.links]])
 
     def crossing(self, size: int, chance: Random) -> Crossing:
         """Return what a message of `size` bytes needs this time; an empty one has a frame, too."""

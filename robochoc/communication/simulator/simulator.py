@@ -104,6 +104,8 @@ class Simulation(Session):
         with collection_paused():
             parts = Epoch(self.compiled, parameters=parameters).parts(protocol)
             self._hosts = {name: self._host(part) for name, part in parts.items()}
+        if losses is not None:
+            losses.follow(self.compiled.team, self._values_of)
 
     @property
     def lossless(self) -> bool:
@@ -146,6 +148,8 @@ class Simulation(Session):
                 self._note_verdict(before[name])
             else:
                 self._hosts[name] = self._host(part)
+        if self._losses is not None:
+            self._losses.follow(self.compiled.team, self._values_of)
 
     def close(self) -> None:
         """Do nothing: there is nothing to release."""
@@ -264,6 +268,10 @@ class Simulation(Session):
         if clock > self._ncccs:  # noqa: PLR1730 - faster
             self._ncccs = clock
         self._note_verdict(host)
+
+    def _values_of(self, name: str) -> dict[str, int]:
+        """Return the values that a robot has now; none as long as it has not decided."""
+        return self._hosts[name].protocol.assignment
 
     def _time(self, checks: int) -> float:
         """Return the time at which the working robot had done this number of checks."""

@@ -1,0 +1,47 @@
+"""What a channel model says of robots by name or by place, held against the team."""
+
+from __future__ import annotations
+
+from robochoc.communication.simulator.channel import ChannelModel
+from robochoc.communication.simulator.link_loss import has_place
+from robochoc.formats.diagnostics import shortened, suggestion
+from robochoc.model.change import team_after_events
+from robochoc.model.problem import Robot, Team
+from robochoc.run.options import Options
+from robochoc.solver.encoding import UnsupportedError
+
+
+def refuse_channel(team: Team, options: Options) -> None:
+    """Refuse a channel model that does not fit the team.
+
+    Robots that the scenario brings are looked at too.
+
+    Raises:
+        UnsupportedError: when it names a robot that is in the team at no time, or if what is lost depends on distance
+            and it is not known where a robot is.
+    """
+    channel = options.channel
+    if channel is None or options.message_loss:
+        return
+    epochs = [team_after_events(team, events) for events in range(len(team.scenario) + 1)]
+    robots = {robot.name: robot for epoch in epochs for robot in epoch.robots}
+    _refuse_unknown(channel, robots)
+    if channel.by_distance:
+        _refuse_nowhere(channel, robots)
+
+
+def _refuse_unknown(channel: ChannelModel, robots: dict[str, Robot]) -> None:
+    named = {"positions": channel.positions, "links": [name for link in channel.links for name in link.between]}
+    for field, names in named.items():
+        for name in names:
+            if name not in robots:
+                why = f"--channel {channel.name}: {field}: there is no robot {shortened(name)}"
+                raise UnsupportedError(f"{why} ({suggestion(name, robots, 'robots')})")
+
+
+def _refuse_nowhere(channel: ChannelModel, robots: dict[str, Robot]) -> None:
+    nowhere = [name for name, robot in robots.items() if name not in channel.positions and not has_place(robot)]
+    if nowhere:
+        many = f"{', '.join(nowhere[:3])}{', ...' * (len(nowhere) > 3)}"  # noqa: PLR2004 - as many as fit a line
+        why = f"--channel {channel.name} loses messages by distance, and it is not known where {many} is"
+        raise UnsupportedError(f"{why}; give positions in its file, or topics with x and y in robots' files")
