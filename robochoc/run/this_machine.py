@@ -162,7 +162,7 @@ class ThisMachine(Deployment):
             raise RobotsLostError(lost)
         answer = self._with_epochs(answer)
         missed = self._events_missed(answer)
-        why = self._cut_short or missed or self.why_unknown(phase, answer)
+        why = self._cut_short or missed or self.why_unknown(phase, answer) or answer.reason
         if missed:  # an answer to a problem that was to change
             answer = replace(answer, verdict=Verdict.UNKNOWN, deadline=None)
         reasons = filter(None, [why, *scenario.failed_returns])
