@@ -12,7 +12,7 @@ from dataclasses import dataclass, field, replace
 
 from robochoc.flight.crafts import Craft, craft_of_variable, crafts_of, possible_crafts, row_and_column
 from robochoc.flight.layout import Axis, Layout, Point, layout_of
-from robochoc.formats.ground_map import GroundMap
+from robochoc.formats.ground_map import ALL_SIDES, GroundMap
 from robochoc.model.cost_units import Cost
 from robochoc.model.outcome import EpochOutcome, Outcome, Verdict
 from robochoc.model.priorities import natural_key
@@ -71,6 +71,8 @@ class Block:
     leg: int = 0
     is_cube: bool = False
     """Whether it is a cell of a three-dimensional map, whose middle is `at`. No route keeps away from it."""
+    sides: int = ALL_SIDES
+    """From which sides a cube is seen, as `Volume.sides` has them."""
 
 
 @dataclass(frozen=True)
@@ -178,10 +180,13 @@ class MissionBuilder:
             spot = rows.at(x), columns.at(y), self.layout.ground + _BLOCK_HIGH
             yield Block(self._metres(spot), cell.epoch)
         volume = self._ground.volume
-        for column, row, level in volume.blocked if volume else ():
+        if volume is None:
+            return
+        all_sides = volume.sides or (ALL_SIDES,) * len(volume.blocked)
+        for (column, row, level), sides in zip(volume.blocked, all_sides, strict=True):
             x, y = self._ground.x_and_y(column, row)
-            z = volume.z(level) if volume else 0
-            yield Block(self._metres((rows.at(x), columns.at(y), levels.at(z))), is_cube=True)
+            at = self._metres((rows.at(x), columns.at(y), levels.at(volume.z(level))))
+            yield Block(at, is_cube=True, sides=sides)
 
     def _crafts(self, values: Assignment, here: Container[str] | None = None) -> Iterator[Craft]:
         """Yield the crafts of all robots, or of those that are `here`."""

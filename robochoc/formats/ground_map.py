@@ -13,6 +13,8 @@ import msgspec
 MAX_BYTES = 4 << 20
 MAX_BLOCKED = 10_000
 """Blocked cells of a map: each is a block to draw, and a point that routes avoid."""
+ALL_SIDES = 0b111111
+"""The sides of a cube, from which it is seen."""
 _SIDE_MAX = 1_000
 _FAR = 1_000_000
 
@@ -36,6 +38,8 @@ class Volume(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
         first: The z of topics in the first level.
         starts: The levels at which robots are in the beginning, by their names. All others stand on the ground.
         blocked: The cells that are blocked: column, row and level.
+        sides: From which sides each blocked cell is seen: 1 from a lower x, 2 from a higher one, 4 and 8 for y, 16 and
+            32 for z, added up. Empty: from all.
     """
 
     levels: _Coordinate
@@ -43,6 +47,9 @@ class Volume(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     starts: dict[str, _Coordinate] = {}
     blocked: Annotated[
         tuple[tuple[_Coordinate, _Coordinate, _Coordinate], ...], msgspec.Meta(max_length=MAX_BLOCKED)
+    ] = ()
+    sides: Annotated[
+        tuple[Annotated[int, msgspec.Meta(ge=0, le=ALL_SIDES)], ...], msgspec.Meta(max_length=MAX_BLOCKED)
     ] = ()
 
     def z(self, level: int) -> int:
@@ -106,6 +113,8 @@ def _check_volume(ground: GroundMap, volume: Volume) -> None:
     for cell in volume.blocked:
         if any(at > side for at, side in zip(cell, sides, strict=True)):
             raise ValueError(f"a blocked cell is at {cell}, beside the map of {' x '.join(map(str, sides))} cells")
+    if volume.sides and len(volume.sides) != len(volume.blocked):
+        raise ValueError(f"it has sides of {len(volume.sides)} blocked cells, and {len(volume.blocked)} of these")
     for name, level in volume.starts.items():
         if level > volume.levels:
             raise ValueError(f"{name} is at level {level}, above the map's {volume.levels}")

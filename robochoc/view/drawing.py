@@ -250,9 +250,11 @@ def _blocks(scene: Scene) -> dict[float, Shape]:
 
 def _walls(scene: Scene) -> Shape | None:
     """Return the walls of a three-dimensional map."""
-    cubes = np.array([block.top for block in scene.blocks if block.is_cube]).reshape(-1, 3)
+    cubes = [block for block in scene.blocks if block.is_cube]
+    places = np.rint(np.array([cube.top for cube in cubes]).reshape(-1, 3)).astype(np.int64)
+    sides = np.array([cube.sides for cube in cubes], dtype=np.int64)
     low, high = np.array([axis.low for axis in scene.axes]), np.array([axis.high for axis in scene.axes])
-    return walls_of(np.rint(cubes).astype(np.int64), low, high, _BLOCK)
+    return walls_of(places, sides, low, high, _BLOCK)
 
 
 def _animate(meshcat: MeshcatCommands, scene: Scene, playback: Playback) -> None:

@@ -14,6 +14,7 @@ from robochoc.flight.cells import in_cells
 from robochoc.flight.layout import Axis, Point
 from robochoc.flight.log import FlightLog
 from robochoc.flight.mission import Goal, Mission
+from robochoc.formats.ground_map import ALL_SIDES
 from robochoc.model.cost_units import cost_shown
 from robochoc.model.headline import describe_outcome
 from robochoc.model.outcome import Outcome
@@ -44,12 +45,13 @@ class DrawnDrone:
 class DrawnBlock:
     """A blocked cell, from second `since_s` on: a block on the ground whose top has its middle at `top`.
 
-    Of a three-dimensional map it is a cube around `top`.
+    Of a three-dimensional map it is a cube around `top`, seen from some `sides`, as `Volume` has them.
     """
 
     top: Point
     since_s: float = 0.0
     is_cube: bool = False
+    sides: int = ALL_SIDES
 
 
 @dataclass(frozen=True)
@@ -129,7 +131,7 @@ def _blocks(mission: Mission, flown: FlightLog | None) -> Iterator[DrawnBlock]:
     """Yield each block. Those of a later leg appear when it begins; of a leg that is not flown, never."""
     for block in mission.blocks:
         if flown is None or not block.leg:
-            yield DrawnBlock(_cell(mission, block.at), is_cube=block.is_cube)
+            yield DrawnBlock(_cell(mission, block.at), is_cube=block.is_cube, sides=block.sides)
         elif block.leg < len(flown.legs):
             yield DrawnBlock(_cell(mission, block.at), flown.legs[block.leg].begins_s)
 

@@ -79,8 +79,26 @@ class Cubes:
     @cached_property
     def blocked(self) -> tuple[int, ...]:
         """The numbers of all cells with an occupied voxel."""
+        return tuple(np.flatnonzero(self._counted(self.grid.occupied_before)).tolist())
+
+    @property
+    def sides(self) -> tuple[int, ...]:
+        """For each blocked cell the sides beyond which a cell has free voxels, and none that is occupied.
+
+        Bits: 1 towards a lower x and 2 towards a higher one, 4 and 8 for y, 16 and 32 for z.
+        """
+        occupied = self._counted(self.grid.occupied_before)
+        opened = np.pad((occupied == 0) & (self._counted(self.grid.free_before) > 0), 1)
+        found = np.zeros(occupied.shape, dtype=np.int64)
+        for bit, (axis, step) in enumerate((axis, step) for axis in (2, 1, 0) for step in (-1, 1)):
+            beside = np.roll(opened, -step, axis=axis)[1:-1, 1:-1, 1:-1]
+            found |= beside.astype(np.int64) << bit
+        return tuple(found[occupied > 0].tolist())
+
+    def _counted(self, table: _Sums) -> _Sums:
+        """Return how many voxels of each cell have a flag."""
         (x, xs, _), (y, ys, _), (z, zs, _) = (self._voxels(axis) for axis in range(3))
-        return tuple(np.flatnonzero(_sums(self.grid.occupied_before, (z, y, x), (zs, ys, xs))).tolist())
+        return _sums(table, (z, y, x), (zs, ys, xs))
 
     def coordinates(self, cell: int) -> tuple[int, int, int]:
         """Return the x, y and z of a cell's centre, in sides of a cell."""

@@ -151,7 +151,8 @@ class Reach:
         if isinstance(cells, Cubes):
             heights = {name: at[2] for name, at in standing.items()}
             cubes = tuple((at[0], at[1], at[2]) for at in blocked)
-            return msgspec.structs.replace(ground, volume=Volume(cells.counts[2], cells.first[2], heights, cubes))
+            volume = Volume(cells.counts[2], cells.first[2], heights, cubes, cells.sides)
+            return msgspec.structs.replace(ground, volume=volume)
         return msgspec.structs.replace(ground, blocked=tuple(BlockedCell(at[0], at[1]) for at in blocked))
 
     def _places_from_1(self, coordinates: tuple[int, ...]) -> tuple[int, ...]:

@@ -78,12 +78,15 @@ def test_a_wall_has_a_face_towards_each_free_cell_of_the_map() -> None:
     low, high = np.array([-1, 0, 2]), np.array([3, 4, 5])
     cells = [*product(range(-1, 4), range(5), range(2, 6))]
     for _ in range(20):
-        taken = {cell for cell in cells if chance.random() < 0.4}
-        shape = walls_of(np.array(sorted(taken)), low, high, 0.9)
+        taken = sorted(cell for cell in cells if chance.random() < 0.4)
+        sides = chance.integers(0, 64, len(taken))
+        shape = walls_of(np.array(taken), sides, low, high, 0.9)
         assert shape is not None
         wanted = set()
-        for x, y, z in taken:
-            for move in ((1, 0, 0), (-1, 0, 0), (0, 1, 0), (0, -1, 0), (0, 0, 1), (0, 0, -1)):
+        for (x, y, z), seen in zip(taken, sides.tolist(), strict=True):
+            for bit, move in enumerate(((-1, 0, 0), (1, 0, 0), (0, -1, 0), (0, 1, 0), (0, 0, -1), (0, 0, 1))):
+                if not seen & 1 << bit:
+                    continue
                 if (other := (x + move[0], y + move[1], z + move[2])) in cells and other not in taken:
                     wanted.add(((x, y, z), move))
         found = set()
@@ -94,15 +97,15 @@ def test_a_wall_has_a_face_towards_each_free_cell_of_the_map() -> None:
             found.add((tuple(wall.tolist()), tuple(move.tolist())))
         assert found == wanted
         assert len(shape.faces) == 2 * len(wanted)
-    assert walls_of(np.array(cells), low, high, 0.9) is None
-    assert walls_of(np.zeros((0, 3), dtype=np.int64), low, high, 0.9) is None
+    assert walls_of(np.array(cells), np.full(len(cells), 63), low, high, 0.9) is None
+    assert walls_of(np.zeros((0, 3), dtype=np.int64), np.zeros(0, dtype=np.int64), low, high, 0.9) is None
 
 
 def test_a_volume_is_read_and_a_wrong_one_told() -> None:
     assert read_ground_map(ground_map_json(GROUND)) == GROUND
-    volume = {"levels": 6, "first": -3, "starts": {"A": 6}, "blocked": [[6, 4, 6]]}
+    volume = {"levels": 6, "first": -3, "starts": {"A": 6}, "blocked": [[6, 4, 6]], "sides": [5]}
     whole = {"columns": 6, "rows": 4, "volume": volume}
-    assert read_ground_map(json.dumps(whole).encode()).volume == Volume(6, -3, {"A": 6}, ((6, 4, 6),))
+    assert read_ground_map(json.dumps(whole).encode()).volume == Volume(6, -3, {"A": 6}, ((6, 4, 6),), (5,))
     for wrong, why in (
         ({"levels": 0}, "levels"),
         ({"levels": 1001}, "levels"),
@@ -111,6 +114,8 @@ def test_a_volume_is_read_and_a_wrong_one_told() -> None:
         ({"blocked": [[1, 1]]}, "length"),
         ({"blocked": [[1, 1, 1]] * 10_001}, "length"),
         ({"last": 3}, "last"),
+        ({"sides": [64]}, "sides"),
+        ({"sides": [1, 2]}, "it has sides of 2 blocked cells, and 1 of these"),
     ):
         with pytest.raises(ValueError, match=why):
             read_ground_map(json.dumps({**whole, "volume": {**volume, **wrong}}).encode())

@@ -339,6 +339,15 @@ def test_the_flight_reads_the_same_map() -> None:
     wanted = {cells.coordinates(cell) for cell in cells.blocked}
     assert {(*ground.x_and_y(x, y), volume.z(z)) for x, y, z in volume.blocked} == wanted
     assert ground.blocked == ()
+    free, blocked = voxels_of(grid, grid.free), set(cells.blocked)
+    moves = ((-1, 0, 0), (1, 0, 0), (0, -1, 0), (0, 1, 0), (0, 0, -1), (0, 0, 1))
+    numbers = {cells.coordinates(cell): cell for cell in range(cells.columns * cells.rows * cells.counts[2])}
+    for cell, sides in zip(cells.blocked, volume.sides, strict=True):
+        x, y, z = cells.coordinates(cell)
+        for bit, (right, back, up) in enumerate(moves):
+            beside = numbers.get((x + right, y + back, z + up))
+            is_open = beside is not None and beside not in blocked and bool(touched_by(cells, beside) & free)
+            assert bool(sides & 1 << bit) is is_open
 
 
 @pytest.mark.parametrize(
