@@ -179,7 +179,7 @@ def evaluate_search(
     if found is None:
         return replace(answer, verdict=Verdict.UNKNOWN, bound=bound)
     verdict = _verdict_of(phase, result, kind, found)
-    if cut and found.verified:
+    if cut and found.verified and (found.assignment or not found.withdrawn):  # of nobody it is none
         verdict, answer = Verdict.SOLUTION, replace(answer, deadline=deadline)
     if _meets_bound(result, found, told) and verdict is Verdict.SOLUTION and kind is ProblemKind.DISWCSP:
         verdict, bound = Verdict.OPTIMAL, None

@@ -209,11 +209,12 @@ class Improvements(SearchWatch):
         if best is None:
             return
         if final.verdict is Verdict.NO_SOLUTION:
-            raise RefutedError(f"the protocol says that there is no solution, and one of cost {best.cost} was found")
+            raise RefutedError(f"the protocol says that there is no solution, and one ({best.cost}) was found")
         if final.verdict is Verdict.OPTIMAL and self._rank.of(best) < self._rank.of(final):
             raise RefutedError(f"the protocol says that {final.cost} is optimal, and {best.cost} was found before")
 
 
 def _is_found(answer: Answer) -> bool:
-    """Return whether `answer` is one that was checked."""
-    return answer.verdict in _FOUND and answer.verified and answer.cost is not None
+    """Return whether `answer` is one that was checked. That nobody flies is none, unless nothing else is possible."""
+    flown = bool(answer.assignment) or not answer.withdrawn or answer.verdict is Verdict.OPTIMAL
+    return flown and answer.verdict in _FOUND and answer.verified and answer.cost is not None

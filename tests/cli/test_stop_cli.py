@@ -14,6 +14,7 @@ from robochoc.journal.reader import Follower
 from robochoc.system.stopping import STOP, stop_heard, stop_requested
 from tests.support.faults import PROGRAM, running
 from tests.support.limits import wait_until
+from tests.support.program import ROOT
 from tests.support.slot_sketches import slots
 
 
@@ -37,6 +38,24 @@ def test_that_it_tells_the_best_so_far(tmp_path: Path, runtime: str) -> None:
     assert result["reason"] == "somebody has asked to stop"
     assert result["cost"] == sum(range(1, 15))
     assert len(result["assignment"]) == 14
+
+
+@pytest.mark.parametrize(
+    ("signum", "status"), [(STOP, 0), (signal.SIGTERM, 143), (signal.SIGINT, 130), (signal.SIGKILL, -9)]
+)
+def test_while_better_answers_are_searched_for(tmp_path: Path, signum: signal.Signals, status: int) -> None:
+    """Whatever ends the run then, no process and no half-written file is left."""
+    team, place = ROOT / "docs" / "examples" / "patrol", tmp_path / "run.mcap"
+    words = ["--protocol", "dsa", "--set", "cycles=1000000", "--deadline", "0.3", "--improve", "600"]
+    with running([PROGRAM, "solve", str(team), *words, "--ros", f"mcap:{place}"], tmp_path) as run:
+        wait_until(lambda: "a solution of cost" in run.errors(), "nothing was published")
+        run.strike(signum)
+        run.end()
+        assert run.status() == status, run.errors()
+        assert run.left_behind() == []
+    assert place.exists() == (signum is STOP)
+    if signum is STOP:
+        assert "by the deadline of 0.3 s" in (tmp_path / "stdout").read_text()
 
 
 def test_that_it_is_heard_meanwhile_only() -> None:

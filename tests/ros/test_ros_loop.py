@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import itertools
 import os
 import signal
 import sys
-from collections.abc import Mapping
+import time
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from types import SimpleNamespace
 
 import pytest
 
@@ -30,6 +33,7 @@ from tests.support.program import ROOT
 from tests.support.small_teams import pair
 
 HANGAR = read_team(ROOT / "docs" / "examples" / "hangar")
+PATROL = read_team(ROOT / "docs" / "examples" / "patrol")
 SIMULATED = Options(protocol="dynabt", runtime=Runtime.SIMULATOR)
 SECOND = 1_000_000_000
 SLICE_S = 1.0
@@ -334,6 +338,51 @@ def test_a_live_source_is_waited_for_and_somebody_told_so(waited: WaitedClock) -
     assert openings(outcome) == ["the start", "port without 3"]
     assert waited.waited_s == pytest.approx(60, abs=TOGETHER_S), "from the last decision on"
     assert len(idle) >= 60 / SLICE_S
+
+
+class Audience:
+    """Passes on to a closed loop what is found while the team searches on."""
+
+    def __init__(self, loop: ClosedLoop) -> None:
+        self.loop = loop
+        self.shown: list[EpochOutcome] = []
+
+    def improve(self, _team: Team, /, epoch: EpochOutcome, withdrawn: Sequence[str]) -> None:
+        self.shown.append(epoch)
+        self.loop.improve(epoch, withdrawn)
+
+    def has_news(self, team: Team) -> bool:
+        return self.loop.has_news(team)
+
+
+def test_a_report_while_the_team_searches_on_opens_the_next_epoch(
+    waited: WaitedClock, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """What would be better is of no use any more: the next epoch begins, and has a deadline of its own."""
+    clock = itertools.count(time.monotonic())
+    for module in ("communication.simulator.simulator", "run.context", "run.improvement"):
+        monkeypatch.setattr(f"robochoc.{module}.time", SimpleNamespace(monotonic=lambda: next(clock)))
+    sink = Kept()
+    kind = ReportDecoder(drones_of(PATROL), "map").topics["/west/out_of_order"]
+
+    class Late(Tape):
+        def next(self, wait_s: float) -> ReceivedMessage | None:
+            return super().next(wait_s) if sink.messages else None
+
+    tape = Late(ReceivedMessage("/west/out_of_order", kind, {"data": "a motor"}, 0), clock=waited)
+    loop = ClosedLoop(PATROL, [sink], SourceFeedback(tape, ReportDecoder(drones_of(PATROL), "map"), 5.0))
+    audience = Audience(loop)
+    options = replace(SIMULATED, protocol="dsa", settings={"cycles": "1000000"}, deadline=5, improve=2000)
+    outcome = solve(PATROL, options, environment=loop, audience=audience)
+    assert openings(outcome) == ["the start", "-West"]
+    first, second = outcome.epochs
+    assert [len(first.improvements) < 9, len(second.improvements) >= 1] == [True, True]
+    assert first.improvements[-1].at_s < 500
+    assert [epoch.opened_by for epoch in audience.shown] == sorted(
+        [epoch.opened_by for epoch in audience.shown], key=["the start", "-West"].index
+    )
+    assert audience.shown[-1].assignment == second.assignment == outcome.assignment
+    assert "west" not in outcome.assignment
 
 
 def test_the_wait_begins_when_robots_are_where_they_were_sent(waited: WaitedClock) -> None:

@@ -27,7 +27,7 @@ class ImprovementsTold:
         self._quiet = quiet
         self._epochs: list[EpochOutcome] = []
 
-    def improve(self, _team: Team, epoch: EpochOutcome, withdrawn: Sequence[str]) -> None:
+    def improve(self, team: Team, /, epoch: EpochOutcome, withdrawn: Sequence[str]) -> None:
         """Publish an answer, and print when it came, and what it costs."""
         if len(epoch.improvements) > 1:
             epoch = replace(epoch, opened_by="a better decision")
@@ -35,7 +35,7 @@ class ImprovementsTold:
         if self._loop is not None:
             self._loop.improve(epoch, withdrawn)
         if epoch.improvements and not self._quiet:
-            print_above(self._line(epoch))
+            print_above(self._line(team, epoch))
 
     def has_news(self, team: Team) -> bool:
         """Return whether robots have reported what changes the problem."""
@@ -49,12 +49,15 @@ class ImprovementsTold:
 
         return mission_of(replace(outcome, epochs=tuple(self._epochs)), team)
 
-    def _line(self, epoch: EpochOutcome) -> str:
+    def _line(self, team: Team, epoch: EpochOutcome) -> str:
         from robochoc.formats import on_one_line
         from robochoc.model.cost_units import cost_shown
+        from robochoc.model.problem import ProblemKind
 
         last = epoch.improvements[-1]
         what = "an optimum" if last.verdict == "optimal" else "a solution"
-        cost = "" if last.cost is None else f" of cost {cost_shown(last.cost)}"
-        without = f", {len(last.withdrawn)} withdrawn" if last.withdrawn else ""
+        shown = "" if last.cost is None or team.kind is ProblemKind.DISCSP else cost_shown(last.cost)
+        maximised = any(robot.costs.maximize or robot.told_in.maximize for robot in team.robots)
+        cost = shown and f" {'worth' if maximised else 'of cost'} {shown}"
+        without = f", {len(last.withdrawn)} of {len(team.robots)} withdrawn" if last.withdrawn else ""
         return on_one_line(f"{self._name}: {what}{cost}{without} after {last.at_s:.1f} s")
