@@ -35,10 +35,13 @@ from robochoc.flight.quadrotor.rigid_bodies import Mask
 from robochoc.flight.quadrotor.simulation import DT, QuadrotorSimulation
 from robochoc.flight.quadrotor.trajectory import STOP_S, Trajectory
 from robochoc.flight.reports import Blocked, OutOfOrder, Report
+from robochoc.flight.routes.floor_plan import FloorPlan
 from robochoc.flight.routes.motion import MotionLimits, RoutePlan
 from robochoc.flight.routes.moves import NoRouteError
 from robochoc.flight.routes.spacing import TooCloseError, squashed
 from robochoc.flight.routes.timetable import plan_routes
+from robochoc.flight.wall_watch import WallWatch
+from robochoc.flight.walls import Walls
 
 DISTANCE_M = 0.5
 """The default distance between drones' centres."""
@@ -71,10 +74,11 @@ class Flight:
         progress: Called with what is being done, in words, at every simulated moment that is logged.
         rises: Whether drones leave the ground, and land, straight up and down where they can.
         ground: The height of the ground. None: the lowest home stands on it.
+        walls: Walls that drones fly around, as slowly as the team was told.
 
     Raises:
         ValueError: There are no drones, or too many (`quadrotor/bounds.py`); the conditions name others; or homes are
-            nearer to each other than the distance.
+            nearer to each other than the distance, or in a wall.
     """
 
     def __init__(
@@ -86,6 +90,7 @@ class Flight:
         *,
         rises: bool = False,
         ground: float | None = None,
+        walls: Walls | None = None,
     ) -> None:
         self._rises = rises
         homes = np.array(homes, dtype=np.float64).reshape(-1, 3)
@@ -110,6 +115,10 @@ class Flight:
         self._asked: dict[int, Goal] = {}
         self._legs: list[LegTimes] = []
         self._wall_s = 0.0
+        self._watch = WallWatch(walls.moved(-self._origin), self.names) if walls else None
+        self._limits = self._watch.limits(LIMITS) if self._watch else LIMITS
+        if self._watch:
+            self._watch.floor_plan(self._homes)
         self._simulation = QuadrotorSimulation(self.names, self._homes, self._ground, conditions)
         self._hovers = False
 
@@ -169,6 +178,7 @@ class Flight:
             obstacles=self.conditions.obstacles,
             seen_s=tuple(self._seen_s),
             wall_s=self._wall_s,
+            nearest_wall=self._watch.nearest(positions, simulation.failures) if self._watch else None,
         )
 
     def _errors(self) -> Array:
@@ -228,9 +238,10 @@ class Flight:
         ends = np.array([goal.at for goal in leg_goals.goals.values()]).reshape(-1, 3)
         known = self._known | (nearest_distances(self._obstacles, ends) >= keep)
         hazards = self._hazards(known, keep, np.vstack((starts, leg_goals.places)))
-        for drone, what in leg_goals.give_way(hazards, preferred, self._ground):
+        floor_plan = self._watch.floor_plan(np.vstack((starts, leg_goals.places))) if self._watch else None
+        for drone, what in leg_goals.give_way(hazards, preferred, self._ground, floor_plan):
             simulation.log_event(drone, what)
-        routes = self._routes(leg_goals, hazards, starts, delays)
+        routes = self._routes(leg_goals, hazards, starts, delays, floor_plan)
         check_length(len(self.names), simulation.now_s + routes.duration_s)
         trajectory = Trajectory(routes, leg_goals.who, simulation.setpoints)
         unknown = {int(number): self._obstacles[number] for number in np.flatnonzero(~known)}
@@ -248,12 +259,16 @@ class Flight:
         radii = np.concatenate((np.full(len(fallen), self._distance), np.full(kept, keep)))
         return Hazards(points, radii)
 
-    def _routes(self, leg_goals: LegGoals, hazards: Hazards, starts: Array, delays: Array) -> RoutePlan:
+    def _routes(
+        self, leg_goals: LegGoals, hazards: Hazards, starts: Array, delays: Array, floor_plan: FloorPlan | None
+    ) -> RoutePlan:
         """Plan the routes of a leg, from `starts` (N, 3)."""
         planned = leg_goals.planned(starts, hazards)
         self._simulation.set_spare_distance(planned - self._distance)
         who = leg_goals.who
         self._progress(f"planning routes of {len(who)} drones")
+        if self._watch and floor_plan:
+            floor_plan = self._watch.with_ways(floor_plan, who, starts, leg_goals.places)
         try:
             return plan_routes(
                 starts[who],
@@ -261,10 +276,11 @@ class Flight:
                 distance=planned,
                 standing=leg_goals.standing(hazards, starts, planned),
                 delays=delays[who],
-                limits=LIMITS,
+                limits=self._limits,
                 ground=self._ground,
                 rises=self._rises,
                 downwash=self._downwash,
+                floor_plan=floor_plan,
             )
         except (TooCloseError, NoRouteError) as refused:
             raise ValueError(self._refusal(refused, who)) from refused
@@ -353,7 +369,7 @@ def fly(
             check_near([names[number] for number in leg.goals], places)
         conditions = replace(conditions, distance=_distance([homes, *goals], conditions.downwash))
     ground = mission.ground if mission.has_volume else None
-    flight = Flight(names, homes, conditions, progress, rises=mission.rises, ground=ground)
+    flight = Flight(names, homes, conditions, progress, rises=mission.rises, ground=ground, walls=mission.walls)
     blocks = [block for block in mission.blocks if not block.is_cube]
     for number, leg in enumerate(mission.legs):
         flight.fly(leg.opened_by, leg.goals, blocks=[block.at for block in blocks if block.leg <= number])

@@ -147,11 +147,14 @@ def layout_of(crafts: Sequence[Craft], others: Iterable[Craft] = (), ground: Gro
     beside = _lines(rows.low, rows.cells, columns.high + _GAP, 1)
     homes: list[Point] = []
     taken = _Taken()
-    for craft, (x, y) in zip(crafts, cells, strict=True):
+    exact = _exact_places(crafts, ground) if ground else {}
+    for number, (craft, cell) in enumerate(zip(crafts, cells, strict=True)):
+        x, y = exact.get(number, cell)
         level = volume.starts.get(craft.robot) if volume else None
         z = levels.ground if volume is None or level is None else levels.at(volume.z(level))
         home = (rows.at(x), columns.at(y), z)
-        homes.append((*next(beside), levels.ground) if taken.is_near(home) else home)
+        beside_others = taken.is_near(home) and number not in exact
+        homes.append((*next(beside), levels.ground) if beside_others else home)
         taken.add(homes[-1])
     return Layout(axes, tuple(homes))
 
@@ -175,6 +178,17 @@ def _standing(crafts: Sequence[Craft], cells: Sequence[Cell], ground: GroundMap)
         else cell
         for craft, cell in zip(crafts, cells, strict=True)
     ]
+
+
+def _exact_places(crafts: Sequence[Craft], ground: GroundMap) -> dict[int, tuple[float, float]]:
+    """Return where crafts stand exactly, in units of topics, by their numbers."""
+    count = Counter(craft.robot for craft in crafts)
+    found = {}
+    for number, craft in enumerate(crafts):
+        place = ground.places.get(craft.robot)
+        if place and ground.scale and count[craft.robot] == 1:
+            found[number] = (place[0] / ground.scale, place[1] / ground.scale)
+    return found
 
 
 def _axes(

@@ -25,6 +25,16 @@ class ClosestApproach:
 
 
 @dataclass(frozen=True)
+class NearestWall:
+    """The smallest distance of a drone, by its number, from a wall, when it had it, and the distance to be kept."""
+
+    distance_m: float
+    drone: int
+    at_s: float
+    set_m: float
+
+
+@dataclass(frozen=True)
 class LegTimes:
     """A leg of the flight: its title, and its times in seconds from the beginning."""
 
@@ -61,6 +71,8 @@ class FlightLog:
         wall_s: How long simulation and planning took.
         seen_s: When each obstacle was seen first; 0 for one that the planner knew.
         downwash: The number by which heights are divided in `nearest` and `distance`.
+        nearest_wall: The closest approach to a wall, of all samples of drones that have not fallen; None: there are no
+            walls, or none came near.
     """
 
     names: tuple[str, ...]
@@ -77,6 +89,7 @@ class FlightLog:
     wall_s: float
     seen_s: tuple[float, ...] = ()
     downwash: float = 1.0
+    nearest_wall: NearestWall | None = None
 
     @property
     def simulated_s(self) -> float:

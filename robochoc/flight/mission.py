@@ -12,6 +12,7 @@ from dataclasses import dataclass, field, replace
 
 from robochoc.flight.crafts import Craft, craft_of_variable, crafts_of, possible_crafts, row_and_column
 from robochoc.flight.layout import Axis, Layout, Point, layout_of
+from robochoc.flight.walls import Walls, walls_of
 from robochoc.formats.ground_map import ALL_SIDES, GroundMap
 from robochoc.model.cost_units import Cost
 from robochoc.model.outcome import EpochOutcome, Outcome, Verdict
@@ -80,7 +81,8 @@ class Mission:
     """All legs of a run, and the drones that fly them. `axes` are the sides of the box around all places.
 
     With a map of the ground, drones rise from where they stand before they fly elsewhere (`rises`), and there are
-    `blocks` to be avoided. With a three-dimensional one (`has_volume`), they are in the air in the beginning.
+    `blocks` to be avoided, or `walls`. With a three-dimensional one (`has_volume`), they are in the air in the
+    beginning.
     """
 
     team: str
@@ -91,6 +93,7 @@ class Mission:
     rises: bool = False
     blocks: tuple[Block, ...] = ()
     has_volume: bool = False
+    walls: Walls | None = None
 
     @property
     def ground(self) -> float:
@@ -108,7 +111,11 @@ class MissionBuilder:
         others: Crafts at other times; the box holds them, too.
         leaving: How many drones will leave; None: any may.
         scale: Metres a unit; by default the map's, or else `UNIT_M`, or less where the box would be vast.
-        ground: A map of the ground. Robots whose files name no waypoint then stay where they stand.
+        ground: A map of the ground. Robots whose files name no waypoint then stay where they stand. Where it has walls,
+            drones that withdraw land where they have stood.
+
+    Raises:
+        ValueError: The map has walls, and another `scale` is asked for.
     """
 
     def __init__(
@@ -123,6 +130,8 @@ class MissionBuilder:
         ground: GroundMap | None = None,
     ) -> None:
         self._ground = ground
+        self.walls = walls_of(ground)
+        check_scale(scale, ground)
         self._robots = {robot.name: robot for robot in robots}
         self._names = [*names]
         crafts = sorted(self._crafts(first), key=lambda craft: (natural_key(craft.name), craft.name))
@@ -166,10 +175,23 @@ class MissionBuilder:
             tuple(legs),
             self.layout.axes,
             self.scale,
-            rises=ground is not None,
+            rises=self.rises,
             blocks=blocks,
             has_volume=ground is not None and ground.volume is not None,
+            walls=self.walls,
         )
+
+    @property
+    def ground(self) -> float | None:
+        """The height of the ground on a three-dimensional map, where drones are in the air in the beginning."""
+        levels = self.layout.axes[2]
+        has_volume = self._ground is not None and self._ground.volume is not None
+        return levels.value(levels.ground) * self.scale if has_volume else None
+
+    @property
+    def rises(self) -> bool:
+        """Return whether drones leave the ground straight up: where they stand is known from a map."""
+        return self._ground is not None
 
     def _blocks(self) -> Iterator[Block]:
         if self._ground is None:
@@ -205,12 +227,18 @@ class MissionBuilder:
 
     def _spot(self, number: int) -> Point:
         if number not in self._aside:
-            self._aside[number] = next(self._edge)
+            self._aside[number] = self.layout.homes[number] if self.walls else next(self._edge)
         return self._aside[number]
 
     def _metres(self, point: Point) -> Point:
         x, y, z = (axis.value(cell) * self.scale for axis, cell in zip(self.layout.axes, point, strict=True))
         return x, y, z
+
+
+def check_scale(scale: float | None, ground: GroundMap | None) -> None:
+    """Raise `ValueError` where a map has walls, and its scale is not the one that is asked for."""
+    if ground and ground.walls and scale not in {None, ground.scale}:
+        raise ValueError(f"the map has walls, and a unit is {ground.scale:g} m on it, not {scale:g} m")
 
 
 def mission_of(
@@ -223,6 +251,9 @@ def mission_of(
         team: The team as its files have it, before its scenario. Without it, only names are known.
         scale: Metres a unit; by default the map's, or else `UNIT_M`, or less where the box would be vast.
         ground: A map of the ground, if there is one.
+
+    Raises:
+        ValueError: See `MissionBuilder`.
     """
     epochs = outcome.epochs or (
         EpochOutcome(outcome.verdict, team.order if team else (), assignment=outcome.assignment),

@@ -89,6 +89,7 @@ def _with_flyable_cells(mission: Mission) -> Mission:
         axes=(rows, columns, levels),
         scale=1.0,
         blocks=tuple(replace(block, at=moved(block.at)) for block in mission.blocks),
+        walls=mission.walls and mission.walls.moved(moved((0.0, 0.0, 0.0)), 1 / mission.scale),
     )
 
 

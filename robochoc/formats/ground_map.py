@@ -1,7 +1,7 @@
-"""The ground below a mission, as a map: where robots stand in the beginning, and which cells are blocked.
+"""The ground below a mission, as a map: where robots stand, which cells are blocked, and where walls are.
 
-Files of teams do not have it: whoever draws a map, or makes a team on one, hands it over beside the result (`robochoc
-fly --map`).
+Robots' files do not have it. It is a file beside them, `map.json` in the team's folder, or handed over (`robochoc fly
+--map`).
 """
 
 from __future__ import annotations
@@ -15,9 +15,12 @@ MAX_BLOCKED = 10_000
 """Blocked cells of a map: each is a block to draw, and a point that routes avoid."""
 ALL_SIDES = 0b111111
 """The sides of a cube, from which it is seen."""
+MAX_PIXELS = 4_000_000
+"""As many as an image of a map may have (`occupancy/pgm.py`)."""
 _SIDE_MAX = 1_000
 _FAR = 1_000_000
 
+_Metres = Annotated[float, msgspec.Meta(ge=-_FAR, le=_FAR)]
 _Coordinate = Annotated[int, msgspec.Meta(ge=1, le=_SIDE_MAX)]
 _First = Annotated[int, msgspec.Meta(ge=-_FAR, le=_FAR)]
 
@@ -57,7 +60,35 @@ class Volume(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
         return self.first + level - 1
 
 
-class GroundMap(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+class WallPixels(msgspec.Struct, frozen=True, forbid_unknown_fields=True, omit_defaults=True):
+    """The pixels of a map of a building, and the robots for which ways around its walls were found.
+
+    Pixels are flags in bytes (`occupancy/packed.py`): rows from the lowest y on. Lengths are in metres.
+
+    Attributes:
+        columns: The number of pixels in a row.
+        rows: The number of rows.
+        resolution: The side of a pixel.
+        corner: The x and the y of the lower left corner of the lower left pixel.
+        radius: The robots' radius: their centres are no nearer to pixels that are not free, nor to the outside.
+        speed: The speed, in m/s, of which travel times were told.
+        free: Which pixels are free.
+        occupied: Which are occupied. A pixel that is neither is not known.
+        yaw: The counterclockwise angle, in radians, by which the pixels are turned around `corner`.
+    """
+
+    columns: Annotated[int, msgspec.Meta(ge=1, le=MAX_PIXELS)]
+    rows: Annotated[int, msgspec.Meta(ge=1, le=MAX_PIXELS)]
+    resolution: Annotated[float, msgspec.Meta(gt=0, le=100)]
+    corner: tuple[_Metres, _Metres]
+    radius: Annotated[float, msgspec.Meta(ge=0, le=1_000)]
+    speed: Annotated[float, msgspec.Meta(gt=0, le=1_000)]
+    free: bytes
+    occupied: bytes
+    yaw: Annotated[float, msgspec.Meta(ge=-7, le=7)] = 0.0
+
+
+class GroundMap(msgspec.Struct, frozen=True, forbid_unknown_fields=True, omit_defaults=True):
     """A map. Columns and rows are numbered from 1; unless `first` says otherwise, they are the x and y of topics.
 
     Attributes:
@@ -68,6 +99,8 @@ class GroundMap(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
         first: The x and y of topics in the first column and row.
         scale: Metres a unit of topics; None: the map does not say.
         volume: The third dimension, if the map has one.
+        walls: Walls that drones fly around; None: there are none. A map with walls has a scale.
+        places: Where robots stand exactly, in metres, by their names.
     """
 
     columns: _Coordinate
@@ -77,6 +110,8 @@ class GroundMap(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     first: tuple[_First, _First] = (1, 1)
     scale: Annotated[float, msgspec.Meta(gt=0, le=_SIDE_MAX)] | None = None
     volume: Volume | None = None
+    walls: WallPixels | None = None
+    places: dict[str, tuple[_Metres, _Metres]] = {}
 
     def x_and_y(self, column: int, row: int) -> tuple[int, int]:
         """Return the x and y of topics in a column and a row."""
@@ -105,6 +140,7 @@ def read_ground_map(content: bytes) -> GroundMap:
             raise ValueError(f"{what} is at ({x}, {y}), beside the map of {found.columns} x {found.rows} cells")
     if found.volume:
         _check_volume(found, found.volume)
+    _check_walls(found)
     return found
 
 
@@ -118,3 +154,17 @@ def _check_volume(ground: GroundMap, volume: Volume) -> None:
     for name, level in volume.starts.items():
         if level > volume.levels:
             raise ValueError(f"{name} is at level {level}, above the map's {volume.levels}")
+
+
+def _check_walls(ground: GroundMap) -> None:
+    walls = ground.walls
+    if (walls or ground.places) and ground.scale is None:
+        raise ValueError("it has walls or places, which are in metres, and no scale")
+    if walls is None:
+        return
+    count = walls.columns * walls.rows
+    if count > MAX_PIXELS:
+        raise ValueError(f"its walls have {count:,} pixels, more than {MAX_PIXELS:,}")
+    for name, content in (("free", walls.free), ("occupied", walls.occupied)):
+        if len(content) != -(-count // 8):
+            raise ValueError(f"its walls have {count:,} pixels, and {name} has flags for {8 * len(content):,}")

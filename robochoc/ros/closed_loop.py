@@ -13,8 +13,19 @@ from dataclasses import replace
 from typing import NamedTuple
 
 from robochoc.flight.crafts import crafts_of
-from robochoc.flight.mission import VAST_M, Drone, Goal, Leg, Mission, MissionBuilder, all_robots, mission_of
+from robochoc.flight.mission import (
+    VAST_M,
+    Drone,
+    Goal,
+    Leg,
+    Mission,
+    MissionBuilder,
+    all_robots,
+    check_scale,
+    mission_of,
+)
 from robochoc.flight.reports import Report
+from robochoc.formats.ground_map import GroundMap
 from robochoc.model.change import apply_possible_changes
 from robochoc.model.outcome import EpochOutcome, Outcome, Verdict
 from robochoc.model.problem import Assignment, Change, Robot, ScenarioEvent, Team
@@ -82,8 +93,10 @@ class ClosedLoop:
         scale: Metres a unit of the problem; None: as `mission.py` chooses.
         battery: A drone with less charge is out of order.
         publish: What else is published, and as what type.
+        ground: A map of the ground, if there is one.
 
     Raises:
+        ValueError: The map has walls, and another `scale` is asked for.
         NameClashError: Two topics would have the same name in ROS.
         NoMappingError: A topic has a type that no waypoint can become.
         NothingToPublishError: No drone has a topic.
@@ -106,8 +119,11 @@ class ClosedLoop:
         scale: float | None = None,
         battery: float = BATTERY,
         publish: PublishOptions = WAYPOINTS_ALONE,
+        ground: GroundMap | None = None,
     ) -> None:
+        check_scale(scale, ground)
         self._team = team
+        self._ground = ground
         self._robots = all_robots(team)
         self.feedback = feedback
         self._scale = scale
@@ -152,7 +168,7 @@ class ClosedLoop:
 
     def publish(self, outcome: Outcome) -> None:
         """Publish the decisions of a run that was not connected to this loop."""
-        mission = mission_of(outcome, self._team, self._scale)
+        mission = mission_of(outcome, self._team, self._scale, self._ground)
         self._legs = [*mission.legs]
         for leg in mission.legs:
             self._decide(leg)
@@ -206,7 +222,7 @@ class ClosedLoop:
         near = {**_values(self._robots, 0, VAST_M), **assignment}
         far = {**near, **_values(self._robots, -1, VAST_M)}
         others = [craft for values in (near, far) for robot in self._robots for craft in crafts_of(robot, values)]
-        return MissionBuilder(self._robots, first, others=others, scale=self._scale)
+        return MissionBuilder(self._robots, first, others=others, scale=self._scale, ground=self._ground)
 
     def _decide(self, leg: Leg) -> None:
         at_ns = self.feedback.now_ns() if self.feedback else time.time_ns()

@@ -110,7 +110,15 @@ class SimulatedFeedback(Feedback):
             try:
                 conditions = self.settings.conditions(builder.drones, builder.scale)
                 names = [drone.name for drone in builder.drones]
-                self._flight = Flight(names, homes, conditions, lambda _: self.idle())
+                self._flight = Flight(
+                    names,
+                    homes,
+                    conditions,
+                    lambda _: self.idle(),
+                    rises=builder.rises,
+                    ground=builder.ground,
+                    walls=builder.walls,
+                )
             except ValueError as refused:
                 raise CannotFlyError(on_one_line(str(refused))) from refused
         elif not self._calls[-1] and self._leg is not None:

@@ -15,9 +15,9 @@ from robochoc.flight.layout import Axis, Point
 from robochoc.view.keyframes import Keys, Samples, angle, attitude_keys, position_keys
 from robochoc.view.label import label
 from robochoc.view.meshcat_commands import MeshcatCommands, Track
-from robochoc.view.palette import GREY, RED, STONE, Colour, colours
+from robochoc.view.palette import GREY, RED, STONE, UNKNOWN, Colour, colours
 from robochoc.view.playback import DroneState, Playback
-from robochoc.view.quadrotor import HUB, Shape, box, disc, joined_shapes, quadrotor
+from robochoc.view.quadrotor import HUB, Shape, box, disc, joined_shapes, prisms, quadrotor
 from robochoc.view.scene import DrawnDrone, Scene
 from robochoc.view.walls import walls_of
 
@@ -57,6 +57,9 @@ _OPACITIES = {"body": 0.35, "edges": 0.9}
 _BLOCK = 0.94
 """The width of a blocked cell's block, in cells: one is told from the next."""
 _BLOCK_OPACITY = 0.85
+_WALL_OPACITY = 0.6
+_FLAT = 0.02
+"""The height, in cells, of what lies flat on the ground."""
 
 
 def commands(scene: Scene) -> list[bytes]:
@@ -107,6 +110,7 @@ def _drawn(scene: Scene, points: Sequence[Point]) -> MeshcatCommands:
     walls = _walls(scene)
     if walls:
         meshcat.mesh("walls", walls, STONE, one_sided=True)
+    _draw_walls(meshcat, scene)
     _label_axes(meshcat, scene.axes, _TEXT * radius)
     _draw_drones(meshcat, scene.drones, points, radius)
     return meshcat
@@ -255,6 +259,18 @@ def _walls(scene: Scene) -> Shape | None:
     sides = np.array([cube.sides for cube in cubes], dtype=np.int64)
     low, high = np.array([axis.low for axis in scene.axes]), np.array([axis.high for axis in scene.axes])
     return walls_of(places, sides, low, high, _BLOCK)
+
+
+def _draw_walls(meshcat: MeshcatCommands, scene: Scene) -> None:
+    """Draw walls as high as the box, and what nobody knows flat on the ground."""
+    if scene.walls is None:
+        return
+    top = scene.axes[2].high + 0.5
+    if len(scene.walls.occupied):
+        meshcat.mesh("walls/occupied", prisms(scene.walls.occupied, scene.ground, top), STONE, _WALL_OPACITY)
+    if len(scene.walls.unknown):
+        flat = prisms(scene.walls.unknown, scene.ground, scene.ground + _FLAT)
+        meshcat.mesh("walls/unknown", flat, UNKNOWN, _WALL_OPACITY)
 
 
 def _animate(meshcat: MeshcatCommands, scene: Scene, playback: Playback) -> None:

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from html import escape
 
 from robochoc.system.plain_text import printable
-from robochoc.view.palette import GREY, RED, STONE, Colour, colours, web
+from robochoc.view.palette import GREY, RED, STONE, UNKNOWN, Colour, colours, web
 from robochoc.view.playback import DroneState
 from robochoc.view.scene import Scene
 
@@ -49,6 +49,10 @@ def _states(scene: Scene) -> Iterator[str]:
         yield _entry(f"{web(RED)}59", "obstacle", "edged")
     if scene.blocks:
         yield _named(STONE, "blocked cell")
+    if scene.walls and len(scene.walls.occupied):
+        yield _named(STONE, "wall")
+    if scene.walls and len(scene.walls.unknown):
+        yield _named(UNKNOWN, "not known")
 
 
 def _named(colour: Colour, text: str) -> str:

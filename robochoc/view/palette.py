@@ -12,7 +12,9 @@ GREY: Colour = (0.62, 0.64, 0.67)
 RED: Colour = (0.86, 0.16, 0.18)
 """Of obstacles, and of fallen drones."""
 STONE: Colour = (0.40, 0.44, 0.50)
-"""Of blocked cells."""
+"""Of blocked cells, and of walls."""
+UNKNOWN: Colour = (0.73, 0.70, 0.62)
+"""Of the part of a map that nobody knows."""
 
 _RAMP = np.array(
     [

@@ -58,6 +58,19 @@ def box(centre: tuple[float, float, float], size: float | tuple[float, float, fl
     return _painted(corners, faces, 1)
 
 
+def prisms(footprints: _Vertices, low: float, high: float) -> Shape:
+    """Return upright blocks on footprints (K, 4, 2), whose corners are given counterclockwise."""
+    count = len(footprints)
+    heights = np.repeat([low, high], 4)
+    vertices = np.empty((count, 8, 3))
+    vertices[:, :, :2] = np.tile(footprints, (1, 2, 1))
+    vertices[:, :, 2] = heights
+    sides = [(a, b, b + 4, a + 4) for a, b in ((0, 1), (1, 2), (2, 3), (3, 0))]
+    faces = np.array([face for a, b, c, d in (*sides, (4, 5, 6, 7)) for face in ((a, b, c), (a, c, d))])
+    every = (faces[None] + 8 * np.arange(count)[:, None, None]).reshape(-1, 3)
+    return _painted(vertices.reshape(-1, 3), every, 1)
+
+
 def joined_shapes(parts: list[Shape]) -> Shape:
     """Return several shapes as one."""
     before = np.cumsum([0, *(len(part.vertices) for part in parts)])

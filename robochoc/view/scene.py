@@ -18,6 +18,7 @@ from robochoc.formats.ground_map import ALL_SIDES
 from robochoc.model.cost_units import cost_shown
 from robochoc.model.headline import describe_outcome
 from robochoc.model.outcome import Outcome
+from robochoc.view.footprints import DrawnWalls, walls_drawn
 from robochoc.view.playback import Playback, fell, playback_of
 
 
@@ -67,6 +68,7 @@ class Scene:
     axes: tuple[Axis, Axis, Axis]
     playback: Playback | None = None
     blocks: tuple[DrawnBlock, ...] = ()
+    walls: DrawnWalls | None = None
 
     @property
     def ground(self) -> float:
@@ -100,7 +102,8 @@ def scene_of(
     flight = _flight_facts(flown, why_not, is_to_scale=flown_mission is mission)
     playback = playback_of(flown_mission, flown) if flown else None
     blocks = tuple(_blocks(flown_mission, flown))
-    return Scene(title, (*_facts(outcome, mission), *flight), drones, mission.axes, playback, blocks)
+    walls = walls_drawn(flown_mission)
+    return Scene(title, (*_facts(outcome, mission), *flight), drones, mission.axes, playback, blocks, walls)
 
 
 def _headline(outcome: Outcome, mission: Mission, drones: Sequence[DrawnDrone], *, weighted: bool | None) -> str:
@@ -148,6 +151,8 @@ def _flight_facts(flown: FlightLog | None, why_not: str, *, is_to_scale: bool) -
             yield "flight", f"none: {why_not}"
         return
     yield "flown", f"{flown.times[-1]:.1f} s{'' if is_to_scale else ', not to scale'}"
+    if flown.nearest_wall and is_to_scale:
+        yield "from walls", f"{flown.nearest_wall.distance_m:.2f} m (required: {flown.nearest_wall.set_m:.2g} m)"
     if flown.nearest and is_to_scale:
         yield "separation", f"{flown.nearest.distance_m:.2f} m (required: {flown.distance:.2g} m)"
     for number, event in fell(flown).items():

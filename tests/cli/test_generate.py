@@ -130,15 +130,15 @@ def test_what_does_not_fit_is_wrong_usage(words: str, said: str, tmp_path: Path)
 
 
 @pytest.mark.usefixtures("in_a_folder")
-def test_a_map_is_written_beside_the_team_and_flown_over(tmp_path: Path) -> None:
+def test_a_map_is_written_beside_the_team_and_flown_on(tmp_path: Path) -> None:
     words = ["generate", "formation", "--map", BUILDING, "--agents", "3", "--anchor", "7,2", "-o", "team"]
     done = robochoc_within(*words)
-    assert done.stdout.endswith("team/map.json: cells of 0.75 m; fly and animate take it with --map\n")
+    assert done.stdout.endswith("team/map.json: cells of 0.75 m, and walls that drones fly around\n")
     assert robochoc_within(*words).returncode == INVALID
     assert robochoc_within(*words, "--force").returncode == 0
     solved = robochoc_within("solve", "team", "--runtime", "simulator", "--json")
     (tmp_path / "result.json").write_text(solved.stdout)
-    flown = robochoc_within("fly", "result.json", "--team", "team", "--map", "team/map.json", "--json")
+    flown = robochoc_within("fly", "result.json", "--team", "team", "--json")
     assert flown.returncode == 0, flown.stderr
     found = json.loads(flown.stdout)
     assert found["scale"] == 0.75
@@ -154,10 +154,10 @@ def test_a_map_is_written_beside_the_team_and_flown_over(tmp_path: Path) -> None
 def test_a_house_is_flown_in(tmp_path: Path) -> None:
     words = ("--map", HOUSE, "--at", "2,2,1 6,4,3.5", "--anchor", "2,4.5,3.5", "-o", "team")
     done = robochoc_within("generate", "formation", *words)
-    assert done.stdout.endswith("team/map.json: cells of 1 m; fly and animate take it with --map\n")
+    assert done.stdout.endswith("team/map.json: cells of 1 m, and walls\n")
     solved = robochoc_within("solve", "team", "--runtime", "simulator", "--json")
     (tmp_path / "result.json").write_text(solved.stdout)
-    flown = robochoc_within("fly", "result.json", "--team", "team", "--map", "team/map.json", "--json")
+    flown = robochoc_within("fly", "result.json", "--team", "team", "--json")
     assert flown.returncode == 0, flown.stderr
     ends = {drone["name"]: drone["at"] for drone in json.loads(flown.stdout)["drones"]}
     values = json.loads(solved.stdout)["assignment"]

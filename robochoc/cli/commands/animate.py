@@ -40,8 +40,8 @@ def animate(
         raise click.UsageError("--port is for --serve")
     refuse_same_places({"--html": html}, {"the result": saved, "--map": ground}, teams=[folder] if folder else [])
     outcome = saved_outcome(saved)
-    team = saved_team(outcome, saved, folder)
+    team, folder = saved_team(outcome, saved, folder)
     from robochoc.flight.mission import mission_of
 
-    mission = mission_of(outcome, team, ground=ground_map(ground))
+    mission = mission_of(outcome, team, ground=ground_map(ground, folder))
     show_scene(scene_for(outcome, team, mission=mission), html, serve=serve, port=port)

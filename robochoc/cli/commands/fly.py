@@ -12,7 +12,14 @@ from robochoc.cli.options.ground import ground_map, map_option
 from robochoc.cli.options.pages import html_option, serve_option
 from robochoc.cli.options.paths import InputPath, refuse_same_places
 from robochoc.cli.options.ros import FRAME, flight_options, ros_options
-from robochoc.cli.options.ros_setup import conditions_of, open_sinks, publish_options, ros_errors_fail, sink_places
+from robochoc.cli.options.ros_setup import (
+    conditions_of,
+    open_sinks,
+    publish_options,
+    ros_errors_fail,
+    scale_usage,
+    sink_places,
+)
 from robochoc.cli.options.saved import saved_outcome, saved_team, team_option
 from robochoc.cli.options.sections import COMMON, SectionedCommand, Sections
 from robochoc.cli.reports.failures import INVALID, LOST, Failure, invalid_input_fails
@@ -44,7 +51,8 @@ def fly(saved: Path, folder: Path | None, html: Path | None, *, serve: bool, as_
     """Simulate the flight of a saved result: what 'robochoc solve' wrote with --json or --journal.
 
     In each epoch the drones fly to their positions and keep their distance; drones of withdrawn robots land at the
-    edge. --ros publishes the waypoints of each epoch, and all poses 20 times a second of simulated time. The exit
+    edge. Of a team that 'generate formation', 'coverage' or 'patrol' made on a map, they fly around its walls. --ros
+    publishes the waypoints of each epoch, and all poses 20 times a second of simulated time. The exit
     status is 4 if a drone did not arrive, fell, or came too close to another.
 
     \b
@@ -60,12 +68,14 @@ def fly(saved: Path, folder: Path | None, html: Path | None, *, serve: bool, as_
         more_outputs=sink_places(given["sinks"]),
     )
     outcome = saved_outcome(saved)
-    team = saved_team(outcome, saved, folder)
+    team, folder = saved_team(outcome, saved, folder)
     if given["sinks"] and team is None:
         raise click.UsageError("--ros publishes on the topics that robots' files name: give their folder with --team")
     from robochoc.flight.mission import mission_of
 
-    mission = mission_of(outcome, team, given["scale"], ground_map(given["ground"]))
+    ground = ground_map(given["ground"], folder)
+    with scale_usage():
+        mission = mission_of(outcome, team, given["scale"], ground)
     flown, published = _flown(saved, mission, given)
     click.echo(flight_json(mission, flown) if as_json else flight_report(mission, flown))
     if not as_json:

@@ -12,6 +12,7 @@ import click
 
 from robochoc.cli.options.channel import CHANNEL_NAME
 from robochoc.cli.options.channel import NAMES as CHANNELS
+from robochoc.cli.options.ground import ground_map
 from robochoc.cli.options.local_problems import local_options
 from robochoc.cli.options.order import NAMES as ORDERS
 from robochoc.cli.options.order import ORDER_NAME, order_for
@@ -275,7 +276,8 @@ def _solved(folder: Path, options: Options, products: Products, wanted: Wanted, 
     if products.html or products.serve:
         from robochoc.cli.reports.scene import scene_for, show_scene
 
-        scene = scene_for(outcome, team, mission=flight.mission, flown=flight.flown)
+        ground = ground_map(None, folder)
+        scene = scene_for(outcome, team, mission=flight.mission, flown=flight.flown, ground=ground)
         show_scene(scene, products.html, serve=products.serve, quiet=wanted.as_json)
     if outcome.verdict != "unknown":
         return flight.status
@@ -323,7 +325,7 @@ def _recorded(folder: Path, options: Options, products: Products, wanted: Wanted
 
     objective = None if wanted.ros.situation else objective_to_record(team, options)
     with (
-        closed_loop(wanted.ros, team, options.seed) as loop,
+        closed_loop(wanted.ros, team, options.seed, folder) as loop,
         recording(products.journal, header, objective, watch.begun()) as recorder,
     ):
         audience = ImprovementsTold(team, loop, quiet=wanted.as_json) if options.improve else None

@@ -99,7 +99,8 @@ def write(make: Callable[[], Team | TeamOnMap], output: Path | None, *, replace:
     count = len(team.robots)
     click.echo(f"{folder}: {count} robots, {constraints} constraints; {next_step(folder, count)}")
     if ground:
-        click.echo(f"{folder / GROUND_FILE}: cells of {ground.scale:g} m; fly and animate take it with --map")
+        around = " that drones fly around" * (ground.walls is not None)
+        click.echo(f"{folder / GROUND_FILE}: cells of {ground.scale:g} m, and walls{around}")
 
 
 def next_step(folder: Path | str, robots: int) -> str:

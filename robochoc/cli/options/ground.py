@@ -1,4 +1,4 @@
-"""`--map`: the ground below a flight, as the application draws it."""
+"""`--map`: the ground below a flight, as the application draws it, or as it lies in the team's folder."""
 
 from __future__ import annotations
 
@@ -18,15 +18,18 @@ map_option = click.option(
     "ground",
     type=InputPath(),
     metavar="FILE",
-    help="Where robots stand in the beginning, and which cells are blocked: JSON.",
+    help="Where robots stand, walls and blocked cells: JSON.  [default: the team's map.json]",
 )
 
 
-def ground_map(file: Path | None) -> GroundMap | None:
-    """Return the map in `file`, if there is one. Raises `Failure`."""
+def ground_map(file: Path | None, folder: Path | None) -> GroundMap | None:
+    """Return the map in `file`, or else in the `folder` of the team; None if there is none. Raises `Failure`."""
     from robochoc.formats import on_one_line
+    from robochoc.formats.folder import GROUND_FILE
     from robochoc.formats.ground_map import MAX_BYTES, read_ground_map
 
+    if file is None and folder and (folder / GROUND_FILE).is_file():
+        file = folder / GROUND_FILE
     if file is None:
         return None
     try:

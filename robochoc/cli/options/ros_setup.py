@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from robochoc.cli.options.ground import ground_map
 from robochoc.cli.options.paths import Place, refuse_same_places
 from robochoc.cli.options.ros import (
     CONDITIONS,
@@ -113,8 +114,19 @@ def conditions_of(given: Mapping[str, Any], mission: Mission) -> FlightCondition
 
 
 @contextmanager
-def closed_loop(ros: RosOptions, team: Team, seed: int) -> Iterator[ClosedLoop | None]:
+def scale_usage() -> Iterator[None]:
+    """Turn a scale that is not that of the map into `click.UsageError`."""
+    try:
+        yield
+    except ValueError as wrong:
+        raise click.UsageError(f"--scale: {wrong}") from wrong
+
+
+@contextmanager
+def closed_loop(ros: RosOptions, team: Team, seed: int, folder: Path | None = None) -> Iterator[ClosedLoop | None]:
     """Give the closed loop of `team`, or None if no option asks for one. At the end, what was published is complete.
+
+    A map in the `folder` of the team says where robots stand, how long a unit is, and what is in the way.
 
     Raises:
         Failure: A sink or a source fails, or a decision cannot be flown.
@@ -132,15 +144,18 @@ def closed_loop(ros: RosOptions, team: Team, seed: int) -> Iterator[ClosedLoop |
         sinks = open_sinks(ros.sinks, stack)
         if ros.arm:
             _allow_arming(ros.sinks, sinks)
-        yield ClosedLoop(
-            team,
-            sinks,
-            feedback,
-            frame=ros.frame,
-            scale=ros.scale,
-            battery=battery,
-            publish=publish_options(ros.published),
-        )
+        with scale_usage():
+            loop = ClosedLoop(
+                team,
+                sinks,
+                feedback,
+                frame=ros.frame,
+                scale=ros.scale,
+                battery=battery,
+                publish=publish_options(ros.published),
+                ground=ground_map(None, folder),
+            )
+        yield loop
 
 
 def _feedback(ros: RosOptions, drones: Sequence[Drone], seed: int, stack: ExitStack) -> Feedback:

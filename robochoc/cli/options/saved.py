@@ -70,8 +70,8 @@ def saved_outcome(saved: Path) -> Outcome:
     return journal.outcome
 
 
-def saved_team(outcome: Outcome, saved: Path, folder: Path | None) -> Team | None:
-    """Return the team in `folder`, or in the default folder of its name. None if it does not exist.
+def saved_team(outcome: Outcome, saved: Path, folder: Path | None) -> tuple[Team | None, Path | None]:
+    """Return the team in `folder`, or in the default folder of its name, and that folder. None if it does not exist.
 
     Raises `InvalidInputError`, and `Failure` for another team than that of `outcome`, which is from the file `saved`.
     """
@@ -82,7 +82,7 @@ def saved_team(outcome: Outcome, saved: Path, folder: Path | None) -> Team | Non
     if team and not _is_team_of(outcome, team):
         why = f"this is not the team of {saved}, {outcome.team} (give its folder with --team)"
         raise Failure(INVALID, f"{folder}: {why}")
-    return team
+    return team, folder
 
 
 def _is_team_of(outcome: Outcome, team: Team) -> bool:

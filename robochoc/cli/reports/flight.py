@@ -21,6 +21,8 @@ _NAMES = 6
 def as_planned(flown: FlightLog, *, may_fall: bool = False) -> bool:
     """Return whether all drones have arrived, kept the set distance, and none has fallen (unless `may_fall`)."""
     apart = flown.nearest is None or flown.nearest.distance_m >= flown.distance
+    walls = flown.nearest_wall
+    apart = apart and (walls is None or walls.distance_m >= walls.set_m)
     return apart and all(error <= ARRIVED_M or (may_fall and isnan(error)) for error in flown.errors_m)
 
 
@@ -34,7 +36,8 @@ def flight_report(mission: Mission, flown: FlightLog) -> str:
 def how_it_went(flown: FlightLog) -> str:
     """Return a text on the flight: events, arrivals, the smallest distance, and the speed of the simulation."""
     lines = [f"{one.at_s:6.1f} s  {_name(flown, one.drone)}: {one.what}" for one in flown.events]
-    return "\n".join(f"  {line}" for line in (*lines, _arrival(flown), _apart(flown), _speed(flown)))
+    told = [*lines, _arrival(flown), _apart(flown), *_from_walls(flown), _speed(flown)]
+    return "\n".join(f"  {line}" for line in told)
 
 
 def too_late(failures: Iterable[tuple[str, float]], flown: FlightLog) -> list[str]:
@@ -104,6 +107,14 @@ def _apart(flown: FlightLog) -> str:
     return "; ".join(told)
 
 
+def _from_walls(flown: FlightLog) -> Iterator[str]:
+    wall = flown.nearest_wall
+    if wall:
+        word = "nearer to a wall than set" if wall.distance_m < wall.set_m else "nearest to a wall"
+        told = f"{_length(wall.distance_m)} ({_name(flown, wall.drone)}, at {wall.at_s:.1f} s)"
+        yield f"{word}: {told}; set: {_length(wall.set_m)}"
+
+
 def _speed(flown: FlightLog) -> str:
     seconds = float(flown.times[-1]) if len(flown.times) else 0.0
     return f"{seconds:.1f} s of flight simulated in {flown.wall_s:.2f} s{_rate(seconds, flown.wall_s)}"
@@ -150,6 +161,7 @@ def flight_json(mission: Mission, flown: FlightLog) -> bytes:
         "downwash": flown.downwash,
         "nearest": _approach(flown, flown.nearest),
         "nearest_fallen": _approach(flown, flown.nearest_fallen),
+        "nearest_wall": _from_wall(flown),
         "drones": [
             {"name": name, "at": [float(part) for part in end], "error_m": float(error) if isfinite(error) else None}
             for name, end, error in zip(flown.names, ends, flown.errors_m, strict=True)
@@ -170,3 +182,15 @@ def _approach(flown: FlightLog, nearest: ClosestApproach | None) -> dict[str, ob
         return None
     drones = [flown.names[nearest.first], flown.names[nearest.second]]
     return {"distance_m": nearest.distance_m, "drones": drones, "at_s": nearest.at_s}
+
+
+def _from_wall(flown: FlightLog) -> dict[str, object] | None:
+    wall = flown.nearest_wall
+    if wall is None:
+        return None
+    return {
+        "distance_m": wall.distance_m,
+        "drone": flown.names[wall.drone],
+        "at_s": wall.at_s,
+        "set_m": wall.set_m,
+    }

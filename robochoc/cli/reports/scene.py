@@ -12,13 +12,19 @@ from robochoc.formats import write_atomically
 if TYPE_CHECKING:
     from robochoc.flight.log import FlightLog
     from robochoc.flight.mission import Mission
+    from robochoc.formats.ground_map import GroundMap
     from robochoc.model.outcome import Outcome
     from robochoc.model.problem import Team
     from robochoc.view.scene import Scene
 
 
 def scene_for(
-    outcome: Outcome, team: Team | None, *, mission: Mission | None = None, flown: FlightLog | None = None
+    outcome: Outcome,
+    team: Team | None,
+    *,
+    mission: Mission | None = None,
+    flown: FlightLog | None = None,
+    ground: GroundMap | None = None,
 ) -> Scene:
     """Return the scene of `outcome`. If it was not flown yet, it is flown here, in calm air.
 
@@ -27,13 +33,14 @@ def scene_for(
         team: The team as its files have it, before its scenario. Without it, all that is known are names.
         mission: What `outcome` asks of the drones, if that is known already.
         flown: How they flew `mission`.
+        ground: A map of the ground, for a mission that is not known yet.
     """
     from robochoc.cli.reports.progress import stages
     from robochoc.flight.mission import mission_of
     from robochoc.flight.preview import preview_of
     from robochoc.view.scene import scene_of
 
-    mission = mission or mission_of(outcome, team)
+    mission = mission or mission_of(outcome, team, ground=ground)
     weighted = None if team is None else any(robot.weight != 1 for robot in team.robots)
     if flown is not None:
         return scene_of(outcome, mission, flown, weighted=weighted)

@@ -5,6 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from robochoc.flight.quadrotor.airframe import Array
+from robochoc.flight.quadrotor.rigid_bodies import Mask
+from robochoc.flight.routes.floor_plan import FloorPlan
 
 _STEPS = 8
 """The number of steps, of half a distance each, in which free points are searched for in each direction."""
@@ -24,10 +26,15 @@ def nearest_distances(points: Array, others: Array) -> Array:
     return np.asarray(_distances(points, others).min(axis=1, initial=np.inf))
 
 
-def free_point(wish: Array, taken: Array, radii: Array, ground: float, *, low: bool) -> Array:
+def free_point(
+    wish: Array, taken: Array, radii: Array, ground: float, *, low: bool, floor_plan: FloorPlan | None = None
+) -> Array:
     """Return `wish`, or the nearest point to it on a grid, that is `radii` (M,) away from `taken` (M, 3).
 
-    It is on the ground if `low`, else not much lower than `wish`.
+    It is on the ground if `low`, else not much lower than `wish`. No wall of the `floor_plan` is between the two.
+
+    Raises:
+        ValueError: Walls leave no such point.
     """
     step = float(radii.max(initial=0.5)) / 2
     steps = np.arange(-_STEPS, _STEPS + 1) * step
@@ -39,9 +46,13 @@ def free_point(wish: Array, taken: Array, radii: Array, ground: float, *, low: b
         spots[:, 2] = ground
     else:
         spots = spots[spots[:, 2] >= min(ground + 2 * step, wish[2])]
-    free = (_distances(spots, taken) >= radii).all(1)
+    free: Mask = np.asarray((_distances(spots, taken) >= radii).all(1))
+    if floor_plan is not None:
+        free[free] = floor_plan.open(np.broadcast_to(wish, spots[free].shape), spots[free])
     if free.any():
         return np.asarray(spots[free.argmax()])
+    if floor_plan is not None:
+        raise ValueError(f"there is no free place around ({wish[0]:.2f}, {wish[1]:.2f}), between the walls")
     # No free point around: take one beyond all others, beside or above.
     beyond = np.array([wish[0], wish[1], ground if low else wish[2]])
     side = 0 if low else 2

@@ -15,6 +15,7 @@ from robochoc.flight.quadrotor.airframe import Array
 from robochoc.flight.quadrotor.conditions import DISTANCE_MIN_M
 from robochoc.flight.quadrotor.free_points import free_point, nearest_distances, nearest_two
 from robochoc.flight.quadrotor.rigid_bodies import Mask
+from robochoc.flight.routes.floor_plan import FloorPlan
 from robochoc.flight.routes.spacing import SLACK_M, squashed
 
 MARGIN_M = 0.1
@@ -76,11 +77,16 @@ class LegGoals:
             leave = min(leave, float(apart[apart >= self._distance].min(initial=np.inf)))
         return max(self._distance, min(self._distance + MARGIN_M, _ALL_BUT * leave))
 
-    def give_way(self, hazards: Hazards, preferred: Array, ground: float) -> list[tuple[int, str]]:
+    def give_way(
+        self, hazards: Hazards, preferred: Array, ground: float, floor_plan: FloorPlan | None = None
+    ) -> list[tuple[int, str]]:
         """Replace places that are not free; return which drones are moved, and what each does instead, in words.
 
         Goals give way to hazards. Drones that only stay where they are give way to others' goals. Each gets the free
-        point that is nearest to its `preferred` one (N, 3).
+        point that is nearest to its `preferred` one (N, 3), with no wall of the `floor_plan` in between.
+
+        Raises:
+            ValueError: Walls leave no free point.
         """
         moved = []
         going = np.array([number for number in self.who.tolist() if number in self.goals], dtype=np.intp)
@@ -100,7 +106,8 @@ class LegGoals:
             low = goal.lands if goal is not None else place[2] <= ground + _LOW_M
             radii = np.full(len(others), self._distance + MARGIN_M)
             taken, radii = self._flat(np.vstack((others, hazards.points))), np.concatenate((radii, hazards.radii))
-            spot = free_point(self._flat(preferred[number]), taken, radii, ground / self._downwash, low=bool(low))
+            wish = self._flat(preferred[number])
+            spot = free_point(wish, taken, radii, ground / self._downwash, low=bool(low), floor_plan=floor_plan)
             self.places[number] = squashed(spot, 1 / self._downwash)
             off = float(np.sqrt(np.square(self.places[number] - place).sum()))
             moved.append((number, f"{'lands' if low else 'hovers'} {off:.2f} m beside its place: {why}"))

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from robochoc.flight.routes.spacing import Array, norms, squashed
 
-_TOP_SPEED = 15 / 8
+PEAK = 15 / 8
 """The greatest speed of minimum-jerk motion over a unit of length in a unit of time; half way."""
 _TOP_ACCELERATION = 10 / math.sqrt(3)
 """The greatest acceleration of the same."""
@@ -36,9 +36,7 @@ class MotionLimits:
 
     def durations(self, lengths: Array) -> Array:
         """Return the shortest times (K,), in seconds, of motion over `lengths` (K,), from rest to rest."""
-        least: Array = np.maximum(
-            _TOP_SPEED * lengths / self.speed, np.sqrt(_TOP_ACCELERATION * lengths / self.acceleration)
-        )
+        least: Array = np.maximum(PEAK * lengths / self.speed, np.sqrt(_TOP_ACCELERATION * lengths / self.acceleration))
         return least
 
 

@@ -20,13 +20,15 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
-from itertools import count, product
+from itertools import count, product, takewhile
 
 import numpy as np
 
 from robochoc.flight.routes.paths import Space
-from robochoc.flight.routes.spacing import Array, norms
+from robochoc.flight.routes.spacing import Array, Flags, norms
 
+_RINGS = 20
+"""Where there are walls, a drone waits in the sky no more rings of a distance away."""
 _Way = Callable[[Array, Array, Array], Array | None]
 
 
@@ -104,7 +106,9 @@ class _Sequence:
         up = self.space.up(self.rests[drone], others)
         if up is None:
             return False
-        spot = self._spot(self.rests[drone])
+        spot = self._spot(self.rests[drone], up[-1])
+        if spot is None:
+            return False
         if (up[-1, :2] == spot[:2]).all():
             path = np.vstack((up[:-1], spot))
         else:
@@ -115,12 +119,17 @@ class _Sequence:
         self.waiting.add(drone)
         return True
 
-    def _spot(self, start: Array) -> Array:
-        """Return the nearest point in the sky whose column is apart from those of all drones that wait there."""
+    def _spot(self, start: Array, up: Array) -> Array | None:
+        """Return the nearest point in the sky whose column is apart from those of all drones that wait there.
+
+        It can be reached from `up`. Walls may leave none.
+        """
         taken = self.rests[[*self.waiting], :2]
-        spots = (start[:2] + offset for offset in _spiral(self.space.distance))
-        free = (spot for spot in spots if (norms(taken - spot) >= self.space.distance).all())
-        return np.array([*next(free), self.space.sky + self.space.distance])
+        offsets = _spiral(self.space.distance, math.inf if self.space.floor_plan is None else _RINGS)
+        spots = (start[:2] + offset for offset in offsets)
+        apart = (spot for spot in spots if (norms(taken - spot) >= self.space.distance).all())
+        free = next((spot for spot in apart if not self.space.is_walled(up[None], spot[None])[0]), None)
+        return None if free is None else np.array([*free, self.space.sky + self.space.distance])
 
 
 class _Direct(_Sequence):
@@ -141,7 +150,7 @@ class _Direct(_Sequence):
         self._blocked[active] = space.near(starts[active], goals[active], self.points)
         self._would[active] = space.near(starts[active], goals[active], goals)
         self._blocked[active, active] = self._would[active, active] = False
-        self._blocked[space.slides(starts, goals), :] = True
+        self._blocked[self._barred(starts, goals), :] = True
 
     def is_done(self) -> bool:
         """Move all drones to their goals; return whether that was possible."""
@@ -165,16 +174,22 @@ class _Direct(_Sequence):
         self._blocked[:, drone] = False
         others = [other for other in self.away if other != drone]
         if others:
-            slides = self.space.slides(self.rests[others], self.goals[others])
+            barred = self._barred(self.rests[others], self.goals[others])
             near = self.space.near(self.rests[others], self.goals[others], here[None])[:, 0]
-            self._blocked[others, drone] = near | slides
+            self._blocked[others, drone] = near | barred
         if (here == goal).all():
             self.away.discard(drone)
         else:
             for matrix, points in ((self._blocked, self.points), (self._would, self.goals)):
                 matrix[drone] = self.space.near(here[None], goal[None], points)[0]
                 matrix[drone, drone] = False
+            if self._barred(here[None], goal[None])[0]:
+                self._blocked[drone] = True
             self._lengths[drone] = norms(goal - here)
+
+    def _barred(self, starts: Array, goals: Array) -> Flags:
+        """Return which straight ways (K,) are none: they lead along the ground, or through walls."""
+        return self.space.slides(starts, goals) | self.space.is_walled(starts, goals)
 
     def _ranks(self) -> list[int]:
         """Return the drones not at their goals, in the order of delay, of drones that they would block, of distance."""
@@ -228,7 +243,7 @@ class _Direct(_Sequence):
         spots = here + _AROUND * self.space.distance
         low = min(self.space.ground + self.space.distance, float(here[2]))
         spots = spots[(spots[:, 2] >= low) & (spots[:, 2] <= self._top)]
-        spots = spots[~self.space.slides(np.broadcast_to(here, spots.shape), spots)]
+        spots = spots[~self._barred(np.broadcast_to(here, spots.shape), spots)]
         rest = [other for other in self.away if other != drone]
         taken = np.vstack((others, self.goals[rest]))
         # A thousandth farther than needed: on the line between two places, say, rounding must not decide.
@@ -272,10 +287,10 @@ class _Emptied(_Sequence):
                 raise NoRouteError(sorted(drones))
 
 
-def _spiral(distance: float) -> Iterator[Array]:
+def _spiral(distance: float, rings: float) -> Iterator[Array]:
     """Yield offsets in the plane, ring by ring, further and further out."""
     yield np.zeros(2)
-    for ring in count(1):
+    for ring in takewhile(lambda ring: ring <= rings, count(1)):
         for step in range(6 * ring):
             angle = math.pi * step / (3 * ring)
             yield np.array([math.cos(angle), math.sin(angle)]) * (ring * distance)

@@ -12,6 +12,8 @@ Candidates, in order of preference:
 What a point blocks is computed, not searched for. Of a vertical line, or of all horizontal lines between two columns,
 it blocks an interval of heights. Half of the interval is sqrt(distance^2 - r^2), where r is the distance of the point
 in the plane. So `by_lane` finds a lane whenever there is one.
+
+With a floor plan (`floor_plan.py`), "across" is not straight, but by a way around the walls, all at one height.
 """
 
 from __future__ import annotations
@@ -23,6 +25,7 @@ from itertools import product
 
 import numpy as np
 
+from robochoc.flight.routes.floor_plan import FloorPlan
 from robochoc.flight.routes.spacing import SLACK_M, Array, Flags, norms, segment_distances
 
 Column = Array
@@ -38,13 +41,15 @@ _RADII = (1.0, math.sqrt(2), 2.0, 3.0)
 class Space:
     """The space for paths: at least `distance` from points at rest, not below `ground`. `sky` is above all points.
 
-    With `rises`, drones leave the ground, and land, straight up and down where they can.
+    With `rises`, drones leave the ground, and land, straight up and down where they can. No path leads through walls of
+    the `floor_plan`, however high it is.
     """
 
     distance: float
     ground: float
     sky: float
     rises: bool = False
+    floor_plan: FloorPlan | None = None
 
     @property
     def least(self) -> float:
@@ -70,24 +75,57 @@ class Space:
         flags: Flags = low & (starts[:, :2] != goals[:, :2]).any(axis=1)
         return flags
 
+    def is_walled(self, starts: Array, goals: Array) -> Flags:
+        """Return which straight lines (K,) lead through walls."""
+        if self.floor_plan is None:
+            return np.zeros(len(starts), dtype=bool)
+        return ~self.floor_plan.open(starts, goals)
+
+    def across(
+        self, start: Array, goal: Array, first: Column | None = None, last: Column | None = None
+    ) -> Array | None:
+        """Return the columns (K + 1, 2) by which a drone gets from `start` to `goal` in the plane; None if it cannot.
+
+        It begins in the column `first`, and ends in `last`, where these are not the columns of `start` and `goal`.
+        """
+        first, last = start[:2] if first is None else first, goal[:2] if last is None else last
+        if self.floor_plan is None:
+            return np.array([first, last])
+        way = self.floor_plan.way(start, goal)
+        if way is None:
+            return None
+        ends = ([first] if (first != way[0]).any() else [], [last] if (last != way[-1]).any() else [])
+        columns = [*ends[0], *way, *ends[1]]
+        # From a column beside the start, or to one beside the goal, a corner may be left out.
+        for at, beside in ((1, ends[0]), (len(columns) - 2, ends[1])):
+            if beside and 0 < at < len(columns) - 1 and self._is_open(columns[at - 1], columns[at + 1]):
+                del columns[at]
+        return np.array(columns)
+
+    def _is_open(self, first: Column, second: Column) -> bool:
+        return self.floor_plan is None or bool(self.floor_plan.open(first[None], second[None])[0])
+
     def by_lane(self, start: Array, goal: Array, points: Array) -> Array | None:
         """Return the path up or down to the best lane, across, and up or down; None if no lane is clear of `points`."""
         return next(self.lanes(start, goal, points), None)
 
     def lanes(self, start: Array, goal: Array, points: Array) -> Iterator[Array]:
         """Yield the paths by several lanes, a distance or more from each other, the best first."""
+        columns = self.across(start, goal)
+        if columns is None:
+            return
         least, most = self._reach(start, points)
         lowest, highest = self._reach(goal, points)
         floor = min(self.ground + self.distance, max(start[2], goal[2]))
         if self.slides(start[None], goal[None])[0]:
             floor = max([self.ground + self.distance, *((start[2], goal[2]) if self.rises else ())])
         low, high = max(least, lowest, floor), min(most, highest, self.sky)
-        heights = _outside(self._walls(start[:2], goal[:2], points), low, high, (start[2], goal[2]))
+        heights = _outside(self._spans(columns, points), low, high, (start[2], goal[2]))
         lower, upper = sorted((float(start[2]), float(goal[2])))
         taken: list[float] = []
         for height in sorted(heights, key=lambda h: (round(max(lower - h, h - upper, 0.0), 9), h)):
             if all(abs(height - other) >= self.least for other in taken):
-                path = _path(start, (start[:2], height), (goal[:2], height), goal)
+                path = _path(start, *((column, height) for column in columns), goal)
                 if self.is_clear(path, points):
                     taken.append(height)
                     yield path
@@ -96,16 +134,16 @@ class Space:
         """Return the path by way of the best column beside the start or the goal; None if there is none."""
         best, path = math.inf, None
         reach, limits = self._reach(start, points), self._reach(goal, points)
-        for column in (*self._beside(start), *self._beside(goal)):
-            outs = self._exits(start, column, points, reach)
-            backs = self._exits(goal, column, points, limits) if outs else []
-            walls = self._walls(column, column, points)
+        for column, there, here in self._ways_round(start, goal):
+            outs = self._exits(start, there, points, reach)
+            backs = self._exits(goal, here[::-1], points, limits) if outs else []
+            spans = self._spans(column[None], points)
             for out, back in product(outs, backs):
                 length = abs(out - start[2]) + abs(out - back) + abs(back - goal[2])
-                length += float(norms(column - start[:2]) + norms(column - goal[:2]))
-                if length < best and not _is_walled(walls, out, back):
-                    there, here = (start[:2], out), (goal[:2], back)
-                    tried = _path(start, there, (column, out), (column, back), here, goal)
+                length += float(norms(np.diff(there, axis=0)).sum() + norms(np.diff(here, axis=0)).sum())
+                if length < best and not _is_spanned(spans, out, back):
+                    bends = (*((one, out) for one in there), *((one, back) for one in here))
+                    tried = _path(start, *bends, goal)
                     if self.is_clear(tried, points):
                         best, path = length, tried
         return path
@@ -115,7 +153,11 @@ class Space:
         up, down = self.up(start, points), self.up(goal, points)
         if up is None or down is None:
             return None
-        path = _joined(np.vstack((up, down[::-1])))
+        columns = self.across(start, goal, up[-1, :2], down[-1, :2])
+        if columns is None:
+            return None
+        between = np.column_stack((columns[1:-1], np.full(len(columns) - 2, self.sky)))
+        path = _joined(np.vstack((up, between, down[::-1])))
         return path if self.is_clear(path, points) else None
 
     def up(self, start: Array, points: Array) -> Array | None:
@@ -126,40 +168,57 @@ class Space:
         best, found = math.inf, None
         reach = self._reach(start, points)
         for column in self._beside(start):
-            walls = self._walls(column, column, points)
-            for out in self._exits(start, column, points, reach):
+            spans = self._spans(column[None], points)
+            for out in self._exits(start, np.array([start[:2], column]), points, reach):
                 length = abs(out - start[2]) + float(norms(column - start[:2]))
-                if length < best and not _is_walled(walls, out, self.sky):
+                if length < best and not _is_spanned(spans, out, self.sky):
                     tried = _path(start, (start[:2], out), (column, out), (column, self.sky))
                     if self.is_clear(tried, points):
                         best, found = length, tried
         return found
 
+    def _ways_round(self, start: Array, goal: Array) -> Iterator[tuple[Column, Array, Array]]:
+        """Yield each column beside the start or the goal, with the columns on the way to it, and from it on."""
+        for column in self._beside(start):
+            here = self.across(start, goal, first=column)
+            if here is not None:
+                yield column, np.array([start[:2], column]), here
+        for column in self._beside(goal):
+            there = self.across(start, goal, last=column)
+            if there is not None:
+                yield column, there, np.array([column, goal[:2]])
+
     def _beside(self, point: Array) -> Iterator[Column]:
         for radius, step in product(_RADII, range(_DIRECTIONS)):
             angle = 2 * math.pi * step / _DIRECTIONS
-            yield point[:2] + (self.distance * radius) * np.array([math.cos(angle), math.sin(angle)])
+            column = point[:2] + (self.distance * radius) * np.array([math.cos(angle), math.sin(angle)])
+            if self._is_open(point[:2], column):
+                yield column
 
-    def _exits(self, start: Array, column: Column, points: Array, reach: tuple[float, float]) -> list[float]:
-        """Return the heights at which a drone can leave for a column: those where clear intervals begin and end.
+    def _exits(self, start: Array, columns: Array, points: Array, reach: tuple[float, float]) -> list[float]:
+        """Return the heights at which a drone can leave by `columns`: those where clear intervals begin and end.
 
         Heights along the ground count only if there are no others.
         """
         low, high = max(reach[0], min(self.ground, float(start[2]))), min(reach[1], self.sky)
-        found = _outside(self._walls(start[:2], column, points), low, high, (start[2], self.off))
+        found = _outside(self._spans(columns, points), low, high, (start[2], self.off))
         return [height for height in found if height >= self.off] or found
 
     def _reach(self, start: Array, points: Array) -> tuple[float, float]:
         """Return the lowest and the highest height that can be reached straight from `start`."""
-        walls = self._walls(start[:2], start[:2], points)
-        above = walls.mean(axis=1) > start[2]
-        low = walls[~above, 1].max(initial=-math.inf)
-        high = walls[above, 0].min(initial=math.inf)
+        spans = self._spans(start[None, :2], points)
+        above = spans.mean(axis=1) > start[2]
+        low = spans[~above, 1].max(initial=-math.inf)
+        high = spans[above, 0].min(initial=math.inf)
         return min(float(low), float(start[2])), max(float(high), float(start[2]))
 
-    def _walls(self, first: Column, second: Column, points: Array) -> Array:
-        """Return the intervals of heights (W, 2) in which points block the way across between two columns."""
-        radius = segment_distances(first[None], second[None], points[:, :2])[0]
+    def _spans(self, columns: Array, points: Array) -> Array:
+        """Return the intervals of heights (W, 2) in which points block the way across by `columns`, or in one of them.
+
+        With several pieces there is one interval for each point: that of the piece which it is nearest to.
+        """
+        first, second = (columns[:-1], columns[1:]) if len(columns) > 1 else (columns, columns)
+        radius = segment_distances(first, second, points[:, :2]).min(axis=0)
         # A little less strict than `is_clear` is, which has the last word: rounding must not make them disagree.
         least = self.distance - SLACK_M / 2
         close = radius < least
@@ -168,18 +227,18 @@ class Space:
         return np.column_stack((heights - half, heights + half))
 
 
-def _outside(walls: Array, low: float, high: float, wished: tuple[float, ...]) -> list[float]:
-    """Return the ends of what is left of `low` to `high` without `walls`, and those of `wished` that are left."""
-    heights = np.concatenate((walls.ravel(), [low, high], wished))
+def _outside(spans: Array, low: float, high: float, wished: tuple[float, ...]) -> list[float]:
+    """Return the ends of what is left of `low` to `high` without `spans`, and those of `wished` that are left."""
+    heights = np.concatenate((spans.ravel(), [low, high], wished))
     heights = np.unique(heights[(low <= heights) & (heights <= high)])
-    free = ~((walls[None, :, 0] < heights[:, None]) & (heights[:, None] < walls[None, :, 1])).any(axis=1)
+    free = ~((spans[None, :, 0] < heights[:, None]) & (heights[:, None] < spans[None, :, 1])).any(axis=1)
     found: list[float] = heights[free].tolist()
     return found
 
 
-def _is_walled(walls: Array, first: float, second: float) -> bool:
+def _is_spanned(spans: Array, first: float, second: float) -> bool:
     low, high = min(first, second), max(first, second)
-    return bool(((walls[:, 0] < high) & (low < walls[:, 1])).any())
+    return bool(((spans[:, 0] < high) & (low < spans[:, 1])).any())
 
 
 def _path(start: Array, *bends: tuple[Column, float] | Array) -> Array:

@@ -23,6 +23,7 @@ from itertools import islice
 import numpy as np
 from numpy.typing import NDArray
 
+from robochoc.flight.routes.floor_plan import FloorPlan
 from robochoc.flight.routes.motion import MotionLimits, Route, RoutePlan
 from robochoc.flight.routes.moves import Move, moves_between
 from robochoc.flight.routes.paths import Space
@@ -54,6 +55,7 @@ def plan_routes(  # noqa: PLR0913 - a problem of planning, in its own words
     ground: float = 0.0,
     rises: bool = False,
     downwash: float = 1.0,
+    floor_plan: FloorPlan | None = None,
 ) -> RoutePlan:
     """Return how N drones fly from `starts` to `goals`, never nearer to each other than `distance`.
 
@@ -72,6 +74,7 @@ def plan_routes(  # noqa: PLR0913 - a problem of planning, in its own words
         ground: No drone flies lower, except for starts and goals.
         rises: Drones leave the ground, and land, straight up and down where they can.
         downwash: The distance needed right above each other, in distances; 1 at least.
+        floor_plan: Walls that no drone goes over.
 
     Raises:
         TooCloseError: Two starts, or two goals, or one of them and a standing point, are nearer than `distance`.
@@ -91,7 +94,7 @@ def plan_routes(  # noqa: PLR0913 - a problem of planning, in its own words
     check_spacing(starts, standing, distance, "start")
     check_spacing(goals, standing, distance, "goal")
     heights = np.concatenate((starts[:, 2], goals[:, 2], standing[:, 2], [ground]))
-    space = Space(distance, ground, float(heights.max()) + 2 * distance, rises)
+    space = Space(distance, ground, float(heights.max()) + 2 * distance, rises, floor_plan)
     table = _Timetable(starts, space, limits or MotionLimits(), delays, downwash)
     for move in moves_between(starts, goals, standing, space, delays):
         table.add(move)

@@ -7,16 +7,18 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from itertools import combinations
-from math import floor
+from math import atan2, floor
 from pathlib import Path
 from random import Random
 
 import msgspec
 
 from robochoc.formats import PREDEFINED
-from robochoc.formats.ground_map import MAX_BLOCKED, BlockedCell, GroundMap, Volume
+from robochoc.formats.ground_map import MAX_BLOCKED, GroundMap, Volume, WallPixels
 from robochoc.formats.maps import read_map
+from robochoc.formats.occupancy.packed import packed
 from robochoc.generators.draws import check_bounds, some
+from robochoc.generators.maps.cells import Cells
 from robochoc.generators.maps.cubes import Cubes
 from robochoc.generators.maps.sizes import AnyCells, Place, cells_of
 from robochoc.generators.maps.travel import STRAIGHT, UNREACHED, lengths_from
@@ -70,6 +72,8 @@ class Reach:
         cells: The cells of the map.
         starts: Where each robot is.
         unit: The time of a length of 1 on the pixels, in seconds.
+        radius: The radius of a robot.
+        speed: Metres a second.
         longest: The longest way of a robot, as a length on the pixels. None: any.
         seconds: For each robot the time to each cell that it can get to, in units of 10**-`PLACES` seconds.
     """
@@ -77,6 +81,8 @@ class Reach:
     cells: AnyCells
     starts: tuple[Place, ...]
     unit: Fraction
+    radius: Fraction
+    speed: Fraction
     longest: int | None
     seconds: tuple[Mapping[int, int], ...] = ()
 
@@ -129,13 +135,10 @@ class Reach:
         """Return the map as the flight reads it.
 
         Raises:
-            ValueError: Too many cells are blocked.
+            ValueError: Too many cells of a three-dimensional map are blocked.
         """
         cells = self.cells
-        if len(cells.blocked) > MAX_BLOCKED:
-            raise ValueError(f"{len(cells.blocked):,} cells are blocked, more than {MAX_BLOCKED:,}; take larger cells")
         # From 1 on along each axis, as maps of the ground have it.
-        blocked = [self._places_from_1(cells.coordinates(cell)) for cell in cells.blocked]
         standing = {
             name: self._places_from_1(cells.containing(start))
             for name, start in zip(self.names, self.starts, strict=True)
@@ -150,10 +153,31 @@ class Reach:
         )
         if isinstance(cells, Cubes):
             heights = {name: at[2] for name, at in standing.items()}
-            cubes = tuple((at[0], at[1], at[2]) for at in blocked)
-            volume = Volume(cells.counts[2], cells.first[2], heights, cubes, cells.sides)
-            return msgspec.structs.replace(ground, volume=volume)
-        return msgspec.structs.replace(ground, blocked=tuple(BlockedCell(at[0], at[1]) for at in blocked))
+            return msgspec.structs.replace(ground, volume=self._volume(cells, heights))
+        places = {name: (float(start[0]), float(start[1])) for name, start in zip(self.names, self.starts, strict=True)}
+        return msgspec.structs.replace(ground, walls=self._walls(cells), places=places)
+
+    def _volume(self, cells: Cubes, heights: dict[str, int]) -> Volume:
+        if len(cells.blocked) > MAX_BLOCKED:
+            raise ValueError(f"{len(cells.blocked):,} cells are blocked, more than {MAX_BLOCKED:,}; take larger cells")
+        blocked = (self._places_from_1(cells.coordinates(cell)) for cell in cells.blocked)
+        cubes = tuple((at[0], at[1], at[2]) for at in blocked)
+        return Volume(cells.counts[2], cells.first[2], heights, cubes, cells.sides)
+
+    def _walls(self, cells: Cells) -> WallPixels:
+        grid = cells.grid
+        rows, columns = grid.free.shape
+        return WallPixels(
+            columns,
+            rows,
+            float(grid.resolution),
+            (float(grid.origin[0]), float(grid.origin[1])),
+            float(self.radius),
+            float(self.speed),
+            packed(grid.free),
+            packed(grid.occupied),
+            atan2(grid.turn.sine, grid.turn.cosine),
+        )
 
     def _places_from_1(self, coordinates: tuple[int, ...]) -> tuple[int, ...]:
         return tuple(one - first + 1 for one, first in zip(coordinates, self.cells.first, strict=True))
@@ -203,7 +227,7 @@ def reach_of(choice: MapChoice, chance: Random) -> Reach:
     unit = cells.grid.resolution / (STRAIGHT * speed)
     longest = None if within is None else floor(within / unit)
     pixels = [_standing(cells, number, place) for number, place in enumerate(places, 1)]
-    reach = Reach(cells, tuple(places), unit, longest)
+    reach = Reach(cells, tuple(places), unit, radius, speed, longest)
     return replace(reach, seconds=tuple(map(reach.seconds_from, pixels)))
 
 

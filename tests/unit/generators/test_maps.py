@@ -16,7 +16,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from robochoc.formats import InvalidInputError, check_team, read_team, write_team
+from robochoc.formats.ground_map import ground_map_json, read_ground_map
 from robochoc.formats.occupancy.grid import OccupancyGrid, before, read_occupancy_grid
+from robochoc.formats.occupancy.packed import unpacked
 from robochoc.generators.maps.cells import Cells
 from robochoc.generators.maps.clearance import passable
 from robochoc.generators.maps.formation import formation
@@ -271,7 +273,17 @@ def test_the_flight_reads_the_same_map(rooms: str) -> None:
     _, ground = formation(MapChoice(map=rooms, at="1,1 3,2.9", cell=0.5, radius=0), anchor="1,2")
     assert ground.first == (0, 0)
     assert {name: ground.x_and_y(*cell) for name, cell in ground.starts.items()} == {"Robot1": (2, 2), "Robot2": (6, 6)}
-    assert {ground.x_and_y(cell.x, cell.y) for cell in ground.blocked} >= {(4, 1), (5, 1), (0, 0), (9, 7)}
+    assert ground.places == {"Robot1": (1.0, 1.0), "Robot2": (3.0, 2.9)}
+    assert not ground.blocked
+    assert read_ground_map(ground_map_json(ground)) == ground
+    walls = ground.walls
+    assert walls is not None
+    grid = read_occupancy_grid(Path(rooms))
+    assert (walls.rows, walls.columns) == grid.free.shape
+    assert (walls.resolution, walls.corner) == (float(grid.resolution), tuple(map(float, grid.origin)))
+    assert (walls.radius, walls.speed) == (0, 0.5)
+    assert (unpacked(walls.free, walls.rows, walls.columns) == grid.free).all()
+    assert (unpacked(walls.occupied, walls.rows, walls.columns) == grid.occupied).all()
 
 
 @pytest.mark.parametrize(

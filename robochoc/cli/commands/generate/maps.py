@@ -116,7 +116,7 @@ def formation(**problem: Any) -> TeamOnMap:  # noqa: ANN401 - `formation`'s own
     """Formations on a map: each robot takes a slot, and the sum of their travel times is minimised.
 
     A robot's values are the slots that it can get to, around walls and inflated obstacles. No two take the same. Slots
-    in walls move to the nearest free cell. Waypoints are in cells; map.json beside the robots is for fly --map. On an
+    in walls move to the nearest free cell. Waypoints are in cells; map.json beside the robots has the walls. On an
     OctoMap all places have a Z: cells are cubes, and drones fly through free ones.
 
     \b

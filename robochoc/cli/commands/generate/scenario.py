@@ -63,6 +63,7 @@ def scenario(
     robochoc generate scenario out/random --events 10 --rate 0.05 --kinds add-constraint --kinds remove-constraint
     """  # noqa: D301 - \\b is how click is told to leave the lines as they are
     from robochoc.formats import read_team, write_team
+    from robochoc.formats.folder import GROUND_FILE
     from robochoc.generators.scenario import random_scenario
 
     try:
@@ -74,6 +75,8 @@ def scenario(
             raise
         raise click.UsageError(str(error)) from None
     folder = output or Path("instances") / changing.name
-    write_team(changing, folder, replace=force)
+    ground = team / GROUND_FILE
+    beside = {GROUND_FILE: ground.read_bytes()} if ground.is_file() else {}
+    write_team(changing, folder, replace=force, beside=beside)
     changes = sum(len(event.changes) for event in changing.scenario)
     click.echo(f"{folder}: {events} events, {changes} changes; next: robochoc solve {folder}")

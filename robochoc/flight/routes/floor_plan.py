@@ -1,0 +1,243 @@
+"""The floor plan of a building: walls that no drone can go over, and ways around them in the plane.
+
+Walls are the pixels of a map that are not free, and all that lies beside the map. A drone keeps `keep` metres between
+its centre and the nearest border of such a pixel, measured exactly: not between centres of pixels.
+
+A way is found on a lattice (`lattice.py`), and then pulled taut: of its points those are kept that make the shortest
+way of few straight pieces, each of which is clear of all walls. A corner counts as `_CORNER_M` metres, since drones
+come to rest there.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from itertools import pairwise
+
+import numpy as np
+import numpy.typing as npt
+
+from robochoc.flight.pixel_frame import PixelFrame
+from robochoc.flight.routes.lattice import Lattice
+from robochoc.flight.routes.spacing import Array, Flags, norms
+
+_Sees = Callable[[int, int], bool]
+
+SPARE_M = 0.1
+"""Ways keep so much more than they have to, if that is no detour of more than a quarter."""
+_CORNER_M = 0.25
+_ROUNDING = 1e-9
+"""In pixels. A wall that is nearer than it may be by no more than that is not too near."""
+_AROUND = (-16, -8, -4, -2, -1, 0, 1, 2, 4, 8, 16)
+"""Points of a way beside each of its corners that may become a corner."""
+_LOOK_BACK = 60
+_ROUNDS = 2
+_HALVINGS = 6
+_PORTION = 2_000_000
+
+
+@dataclass(frozen=True, eq=False)
+class FloorPlan:
+    """Walls, and how far from them drones keep. Lengths are in metres.
+
+    Attributes:
+        solid: The pixels that are not free: rows from the lowest y on, in each the lowest x first.
+        frame: Where the pixels lie.
+        keep: The distance of a drone's centre from walls.
+    """
+
+    solid: Flags
+    frame: PixelFrame
+    keep: float
+    _ways: dict[bytes, Array | None] = field(default_factory=dict)
+
+    def keeping(self, keep: float) -> FloorPlan:
+        """Return the same walls, with another distance."""
+        return self if keep == self.keep else replace(self, keep=keep, _ways={})
+
+    def clearances(self, points: Array, most: float) -> Array:
+        """Return the distance (K,) of each of `points` (K, 2) from the nearest wall; `most` where it is further."""
+        places = self.frame.in_pixels(points)
+        found = np.full(len(places), most)
+        reach = math.ceil(most / self.frame.size) + 1
+        padded, counts = self._padded(reach)
+        pixels = np.floor(places).astype(np.int64)
+        rows, columns = self.solid.shape
+        inside = ((pixels >= 0) & (pixels < (columns, rows))).all(axis=1)
+        found[~inside] = 0.0
+        x, y = pixels[:, 0].clip(0, columns - 1), pixels[:, 1].clip(0, rows - 1)
+        side = 2 * reach + 1
+        near = counts[y + side, x + side] - counts[y, x + side] - counts[y + side, x] + counts[y, x]
+        asked = np.flatnonzero(inside & (near > 0))
+        steps = np.arange(side)
+        for some in np.array_split(asked, max(1, len(asked) * side * side // _PORTION)):
+            window = padded[(y[some, None] + steps)[:, :, None], (x[some, None] + steps)[:, None, :]]
+            gaps = [
+                np.maximum(np.maximum(low - at[:, None], at[:, None] - low - 1), 0)
+                for at, low in (
+                    (places[some, 0], x[some, None] + steps - reach),
+                    (places[some, 1], y[some, None] + steps - reach),
+                )
+            ]
+            apart = np.where(window, np.hypot(gaps[1][:, :, None], gaps[0][:, None, :]), np.inf)
+            found[some] = np.minimum(self.frame.size * apart.min(axis=(1, 2)), most)
+        return found
+
+    def open(self, origins: Array, ends: Array) -> Flags:
+        """Return which straight lines (K,), seen from above, are clear of walls."""
+        first, last = self.frame.in_pixels(origins), self.frame.in_pixels(ends)
+        return np.array([self._sees(*pair, self.keep) for pair in zip(first, last, strict=True)], dtype=bool)
+
+    def way(self, first: Array, second: Array) -> Array | None:
+        """Return a short way (K + 1, 2) between two points of the plane; None if there is none."""
+        key = np.concatenate((first[:2], second[:2])).tobytes()
+        if key not in self._ways:
+            self._ways[key] = self._way(first[:2], second[:2])
+        return self._ways[key]
+
+    def _way(self, first: Array, second: Array) -> Array | None:
+        ends = self.frame.in_pixels(np.array([first, second]))
+        wish = self.keep + SPARE_M
+        if (first == second).all() or self._sees(ends[0], ends[1], wish):
+            return np.array([first, second])
+        found = self._lattice.path(ends[0], ends[1], lambda a, b: self._sees(a, b, self.keep))
+        if found is None:
+            return None
+        points, wide = found
+        roomy = [[self._sees(end, end, wish)] for end in ends]
+        bends = self._taut(np.vstack((ends[:1], points, ends[1:])), np.concatenate((roomy[0], wide, roomy[1])))
+        return np.vstack((first, self.frame.in_metres(bends[1:-1]), second))
+
+    @cached_property
+    def _lattice(self) -> Lattice:
+        return Lattice(self.solid, self.keep / self.frame.size, SPARE_M / self.frame.size, self.frame.size)
+
+    @cached_property
+    def _before(self) -> npt.NDArray[np.int32]:
+        """How many solid pixels of a row are before each column."""
+        return np.cumsum(np.pad(self.solid, ((0, 0), (1, 0))), axis=1, dtype=np.int32)
+
+    def _padded(self, reach: int) -> tuple[Flags, npt.NDArray[np.int64]]:
+        padded = np.pad(self.solid, reach, constant_values=True)
+        return padded, np.cumsum(np.cumsum(np.pad(padded, ((1, 0), (1, 0))), axis=0, dtype=np.int64), axis=1)
+
+    def _sees(self, first: Array, second: Array, keep: float) -> bool:
+        """Return whether no wall is nearer than `keep`, in metres, to a straight line, whose ends are in pixels.
+
+        Of each row of pixels the line, made as thick as that, covers an interval: no pixel there is solid.
+        """
+        radius = keep / self.frame.size
+        (x, y), (to_x, to_y) = (first, second) if first[1] <= second[1] else (second, first)
+        low, high = math.floor(y - radius + _ROUNDING), math.ceil(to_y + radius - _ROUNDING)
+        left, right = min(x, to_x) - radius, max(x, to_x) + radius
+        rows, columns = self.solid.shape
+        if low < 0 or high > rows or left < -_ROUNDING or right > columns + _ROUNDING:
+            return False
+        row = np.arange(low, high)
+        begins, ends = _covered(row, (x, y), (to_x - x, to_y - y), radius)
+        begin = np.floor(begins + _ROUNDING).astype(np.int64).clip(0, columns)
+        end = np.ceil(ends - _ROUNDING).astype(np.int64).clip(0, columns)
+        return not bool((self._before[row, end] > self._before[row, begin]).any())
+
+    def _taut(self, points: Array, wide: Flags) -> Array:
+        """Return the corners of a way along `points` (K, 2), which keeps more where all of its points are `wide`."""
+        keeps = np.where(wide, self.keep + SPARE_M, self.keep)
+
+        def sees(i: int, j: int) -> bool:
+            # From one point of the lattice to the next nothing can be nearer than `keep`.
+            keep = float(keeps[i : j + 1].min()) if j > i + 1 else self.keep
+            return self._sees(points[i], points[j], keep)
+
+        chain = _far_sighted(len(points) - 1, sees)
+        chosen = _shortest(points, chain, sees, _CORNER_M / self.frame.size)
+        bends = [points[number] for number in chosen]
+        kept = [float(keeps[i : j + 1].min()) for i, j in pairwise(chosen)]
+        for _ in range(_ROUNDS):
+            for at in range(1, len(bends) - 1):
+                bends[at] = self._nearer(bends[at - 1], bends[at], bends[at + 1], min(kept[at - 1], kept[at]))
+        return np.array(bends)
+
+    def _nearer(self, before: Array, bend: Array, after: Array, keep: float) -> Array:
+        """Return `bend`, moved as near to the straight line between its neighbours as walls allow."""
+        along = after - before
+        squared = float(along @ along)
+        share = min(max(float((bend - before) @ along) / squared, 0.0), 1.0) if squared else 0.0
+        target = before + share * along
+        low, high = 0.0, 1.0
+        for _ in range(_HALVINGS):
+            middle = (low + high) / 2
+            tried = bend + middle * (target - bend)
+            clear = self._sees(before, tried, keep) and self._sees(tried, after, keep)
+            low, high = (middle, high) if clear else (low, middle)
+        return np.asarray(bend + low * (target - bend))
+
+
+def _covered(
+    row: npt.NDArray[np.int64], origin: tuple[float, float], along: tuple[float, float], radius: float
+) -> tuple[Array, Array]:
+    """Return which x a line of this radius covers in each of the rows that it touches, from where to where.
+
+    That is the least and the greatest x of all discs around its points, cut to the row. Along the line x is a concave
+    function (the least one: convex), so it is greatest at an end, where the line enters or leaves the row, or where the
+    slope of the disc's border at the row's edge is that of the line.
+    """
+    (x, y), (right, up) = origin, along
+    shares: list[Array] = [np.zeros(len(row)), np.ones(len(row))]
+    if up > _ROUNDING:
+        lean = radius * abs(right) / math.hypot(right, up)
+        shares += [np.asarray((row + at - y) / up) for at in (0.0, 1.0, -lean, 1 + lean)]
+    share = np.clip(np.array(shares), 0, 1)
+    level = y + up * share
+    off = np.maximum(np.maximum(row - level, level - row - 1), 0)
+    half = np.sqrt(np.maximum(radius * radius - off * off, 0))
+    reached = off <= radius + _ROUNDING
+    middle = x + right * share
+    least: Array = np.where(reached, middle - half, np.inf).min(axis=0)
+    most: Array = np.where(reached, middle + half, -np.inf).max(axis=0)
+    return least, most
+
+
+def _far_sighted(last: int, sees: _Sees) -> list[int]:
+    """Return points from 0 to `last` that see each other one after the other, each about as far away as it can be."""
+    chain = [0]
+    while (here := chain[-1]) < last:
+        good, bad = here + 1, last + 1
+        step = 2
+        while here + step <= last and sees(here, here + step):
+            good = here + step
+            step *= 2
+        bad = min(bad, here + step)
+        while bad - good > 1:
+            middle = (good + bad) // 2
+            good, bad = (middle, bad) if sees(here, middle) else (good, middle)
+        chain.append(good)
+    return chain
+
+
+def _shortest(points: Array, chain: Sequence[int], sees: _Sees, corner: float) -> list[int]:
+    """Return the corners of the shortest way over points of `chain`, and around them; a corner counts as a length."""
+    last = chain[-1]
+    links = set(pairwise(chain))
+    numbers = sorted({*chain, *(at + by for at in chain[1:-1] for by in _AROUND if 0 < at + by < last)})
+    costs = {0: 0.0}
+    origin: dict[int, int] = {}
+    for place, number in enumerate(numbers[1:], 1):
+        before = [one for one in _earlier(numbers, place, chain) if one in costs]
+        lengths = norms(points[before] - points[number]) + np.array([costs[one] for one in before]) + corner
+        for at in np.argsort(lengths, kind="stable").tolist():
+            if (before[at], number) in links or sees(before[at], number):
+                costs[number], origin[number] = float(lengths[at]), before[at]
+                break
+    found = [last]
+    while found[-1]:
+        found.append(origin[found[-1]])
+    return found[::-1]
+
+
+def _earlier(numbers: Sequence[int], place: int, chain: Sequence[int]) -> Iterator[int]:
+    """Yield the points before a place that are looked at: the last ones, and those of the chain."""
+    first = max(0, place - _LOOK_BACK)
+    yield from numbers[first:place]
+    yield from (one for one in chain if one < numbers[first])

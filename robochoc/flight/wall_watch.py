@@ -1,0 +1,114 @@
+"""What a flight keeps of walls: the floor plan for each leg, and how near drones have come.
+
+Drones keep the radius for which the team was made between their centres and all pixels that are not free. Travel times
+of generated teams are measured between centres of pixels, so places may be a little nearer to a wall: then drones keep
+what their places leave.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from robochoc.flight.log import SAMPLE_RATE_HZ, NearestWall
+from robochoc.flight.routes.floor_plan import FloorPlan
+from robochoc.flight.routes.motion import PEAK, MotionLimits
+from robochoc.flight.routes.spacing import Array
+from robochoc.flight.walls import Walls
+
+_SPARES_M = (0.06, 0.04, 0.02, 0.0)
+"""Routes keep so much more than the radius, the most that leaves a way for all."""
+_ERROR_M = 0.04
+"""In sharp turns, in calm air, tracking errors take 3 cm of what routes keep."""
+_SHARE = 0.999
+"""Of what a place leaves: rounding must not make a route impossible."""
+_CLOSE_M = 1e-6
+_LEAST_M = 0.03
+"""Places that are nearer to a wall are refused."""
+_NEAR_M = 0.3
+"""Drones that are further from walls than their radius and this are not told of."""
+
+
+class WallWatch:
+    """Watches the distance of drones, called `names`, from walls. Samples that were looked at once are not again."""
+
+    def __init__(self, walls: Walls, names: Sequence[str]) -> None:
+        self._names = names
+        self._radius = walls.radius
+        self._speed = walls.speed
+        self._plan = FloorPlan(walls.solid, walls.frame, walls.radius)
+        self._plans: dict[float, FloorPlan] = {}
+        self._kept = walls.radius
+        self._looked = 0
+        self._nearest: tuple[float, int, int] | None = None
+
+    def limits(self, usual: MotionLimits) -> MotionLimits:
+        """Return the limits of a motion whose mean speed is that of the walls' robots, or the `usual` ones if less."""
+        return replace(usual, speed=min(usual.speed, PEAK * self._speed))
+
+    def floor_plan(self, places: Array) -> FloorPlan:
+        """Return the plan for routes between `places` (K, 3), those of all drones once, or several times.
+
+        Raises:
+            ValueError: A place is in a wall, or too near to one.
+        """
+        wish = self._radius + _SPARES_M[0]
+        apart = self._plan.clearances(places, wish)
+        worst = int(apart.argmin())
+        leave = float(apart[worst])
+        if leave < min(_LEAST_M, self._radius):
+            x, y = places[worst, :2]
+            where = "in a wall" if not leave else f"{leave:.2g} m from a wall"
+            name = self._names[worst % len(self._names)]
+            raise ValueError(f"{name} is to be at ({x:.2f}, {y:.2f}), {where} or what nobody knows")
+        return self._keeping(wish) if leave >= wish else self._leaving(leave)
+
+    def with_ways(self, plan: FloorPlan, who: NDArray[np.intp], starts: Array, goals: Array) -> FloorPlan:
+        """Return `plan`, or one of less distance from walls if only that has ways for the drones `who`.
+
+        Raises:
+            ValueError: Walls do not let one of them through from its start to its goal; all have some (N, 3).
+        """
+        without = [number for number in who.tolist() if plan.way(starts[number], goals[number]) is None]
+        if not without:
+            return plan
+        less = [self._radius + spare for spare in _SPARES_M if self._radius + spare < plan.keep - _CLOSE_M]
+        if less:  # a door may leave the radius, and nothing else
+            return self.with_ways(self._leaving(less[0]), who, starts, goals)
+        (x, y), (to_x, to_y) = starts[without[0], :2], goals[without[0], :2]
+        raise ValueError(
+            f"{self._names[without[0]]} has no way around the walls from ({x:.2f}, {y:.2f}) to ({to_x:.2f}, {to_y:.2f})"
+            f" that keeps its radius of {self._radius:g} m: a team that is made with a larger radius is told of no such"
+            " way"
+        )
+
+    def nearest(self, positions: Array, failures: Sequence[tuple[int, str, float]]) -> NearestWall | None:
+        """Return the closest approach in all `positions` (T, N, 3) so far, but for those of drones that have failed."""
+        new = positions[self._looked :]
+        if len(new):
+            counts = np.ones(new.shape[:2], dtype=np.bool_)
+            for drone, _, at_s in failures:
+                counts[max(round(at_s * SAMPLE_RATE_HZ) - self._looked, 0) :, drone] = False
+            apart = self._plan.clearances(new[counts], self._radius + _NEAR_M)
+            if len(apart) and apart.min() < min(self._radius + _NEAR_M, self._nearest[0] if self._nearest else np.inf):
+                worst = int(apart.argmin())
+                sample, drone = np.argwhere(counts)[worst].tolist()
+                self._nearest = (float(apart[worst]), sample + self._looked, drone)
+            self._looked = len(positions)
+        if self._nearest is None:
+            return None
+        distance, sample, drone = self._nearest
+        return NearestWall(distance, drone, sample / SAMPLE_RATE_HZ, self._kept)
+
+    def _leaving(self, leave: float) -> FloorPlan:
+        """Return the plan for places, or doors, that leave only so much."""
+        self._kept = min(self._kept, max(leave - _ERROR_M, leave / 2))
+        return self._keeping(_SHARE * leave)
+
+    def _keeping(self, keep: float) -> FloorPlan:
+        if keep not in self._plans:
+            self._plans[keep] = self._plan.keeping(keep)
+        return self._plans[keep]

@@ -1,0 +1,130 @@
+"""Teams on maps on the command line: their folder says where walls are, and how long a unit is."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import pytest
+from click.testing import CliRunner, Result
+from mcap.reader import make_reader
+from mcap_ros2.decoder import DecoderFactory
+
+from robochoc.cli.group import cli
+from tests.support.maps import write_map
+
+HALL = ["#########", "#...#...#", "#...#...#", "#.......#", "#...#...#", "#...#...#", "#########"]
+"""Two rooms with a door, 0.5 m a pixel."""
+
+
+def ran(*words: object) -> Result:
+    done = CliRunner().invoke(cli, [*map(str, words)], catch_exceptions=False)
+    assert "Traceback" not in done.output
+    return done
+
+
+@pytest.fixture
+def team(tmp_path: Path) -> Path:
+    folder = tmp_path / "team"
+    at = ("--at", "1,1 1,2.5", "--anchor", "3.5,1.75", "--shape", "line", "--cell", "0.5", "--spacing", "1.5")
+    made = ran("generate", "formation", "--map", write_map(tmp_path, HALL), *at, "-o", folder)
+    assert made.exit_code == 0, made.output
+    assert "cells of 0.5 m, and walls that drones fly around" in made.output
+    return folder
+
+
+@pytest.fixture
+def result(team: Path, tmp_path: Path) -> Path:
+    path = tmp_path / "result.json"
+    path.write_text(ran("solve", team, "--runtime", "simulator", "--protocol", "dpop", "--json").output)
+    return path
+
+
+def told(done: Result) -> dict[str, Any]:
+    assert done.exit_code == 0, done.output
+    found: dict[str, Any] = json.loads(done.stdout)
+    return found
+
+
+def test_fly_and_animate_find_the_walls_beside_the_robots(team: Path, result: Path, tmp_path: Path) -> None:
+    page = tmp_path / "page.html"
+    flown = told(ran("fly", result, "--team", team, "--html", page, "--json"))
+    assert flown["scale"] == 0.5
+    assert flown["as_planned"]
+    assert flown["nearest_wall"]["set_m"] == 0.2
+    assert 0.2 <= flown["nearest_wall"]["distance_m"] < 0.5
+    assert "</i>wall</li>" in page.read_text()
+    report = ran("fly", result, "--team", team).output
+    assert "nearest to a wall: 0.2" in report
+    assert "; set: 0.20 m" in report
+    assert ran("animate", result, "--team", team, "--html", page).exit_code == 0
+    assert "0.2 m)" in page.read_text()
+    # A map that is handed over counts in its place.
+    bare = tmp_path / "bare.json"
+    whole = json.loads((team / "map.json").read_text())
+    bare.write_text(json.dumps({key: part for key, part in whole.items() if key != "walls"}))
+    assert told(ran("fly", result, "--team", team, "--map", bare, "--json"))["nearest_wall"] is None
+
+
+def test_a_drone_that_is_blown_against_a_wall_is_told(team: Path, result: Path) -> None:
+    blown = ran("fly", result, "--team", team, "--wind", "12", "--gusts", "4")
+    assert blown.exit_code == 4
+    assert "nearer to a wall than set: " in blown.output
+
+
+def test_solve_flies_and_publishes_in_the_scale_of_the_map(team: Path, tmp_path: Path) -> None:
+    page, bag = tmp_path / "page.html", tmp_path / "bag.mcap"
+    simulator = ("--runtime", "simulator")
+    done = ran("solve", team, *simulator, "--situation", "flight", "--ros", f"mcap:{bag}", "--html", page)
+    assert done.exit_code == 0, done.output
+    assert "nearest to a wall: " in done.output
+    assert "</i>wall</li>" in page.read_text()
+    with bag.open("rb") as stream:
+        places = [
+            (message.pose.position.x, message.pose.position.y, message.pose.position.z)
+            for _, channel, _, message in make_reader(
+                stream, decoder_factories=[DecoderFactory()]
+            ).iter_decoded_messages()
+            if channel.topic.endswith("/waypoint")
+        ]
+    assert sorted(places) == [(3.5, 1.0, 0.5), (3.5, 2.5, 0.5)]
+    plain = ran("solve", team, *simulator, "--html", page)
+    assert plain.exit_code == 0
+    assert "</i>wall</li>" in page.read_text()
+    for more in (("--situation", "flight"), ("--ros", f"mcap:{bag}")):
+        refused = ran("solve", team, *simulator, *more, "--scale", "2")
+        assert refused.exit_code == 2
+        assert "--scale: the map has walls, and a unit is 0.5 m on it, not 2 m" in refused.stderr
+
+
+def test_a_scenario_of_a_team_keeps_its_map(team: Path, tmp_path: Path) -> None:
+    changing = tmp_path / "changing"
+    made = ran("generate", "scenario", team, "--events", "1", "--kinds", "remove-constraint", "-o", changing)
+    assert made.exit_code == 0, made.output
+    assert (changing / "map.json").read_bytes() == (team / "map.json").read_bytes()
+    path = tmp_path / "changes.json"
+    path.write_text(ran("solve", changing, "--runtime", "simulator", "--json").output)
+    assert told(ran("fly", path, "--team", changing, "--json"))["nearest_wall"]
+
+
+def test_what_is_wrong_with_a_map_is_said_with_its_file(team: Path, result: Path) -> None:
+    ground = team / "map.json"
+    whole = json.loads(ground.read_text())
+    for walls, why in (
+        ({**whole["walls"], "free": "AAAA"}, "its walls have 63 pixels, and free has flags for 24"),
+        ({**whole["walls"], "resolution": "x"}, "Expected `float`"),
+    ):
+        ground.write_text(json.dumps({**whole, "walls": walls}))
+        for words in (
+            ("fly", result, "--team", team),
+            ("solve", team, "--runtime", "simulator", "--situation", "flight"),
+        ):
+            refused = ran(*words)
+            assert refused.exit_code == 1
+            assert f"{ground}: " in refused.stderr
+            assert why in refused.stderr
+    ground.write_text(json.dumps({**whole, "walls": {**whole["walls"], "radius": 0.3}}))
+    refused = ran("fly", result, "--team", team)
+    assert refused.exit_code == 1
+    assert "has no way around the walls from (1.00, " in refused.stderr
