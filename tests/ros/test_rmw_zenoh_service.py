@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 import json
+import signal
 import subprocess
 from collections.abc import Iterator
 from contextlib import ExitStack
+from pathlib import Path
 
 import pytest
 import zenoh
 from click.testing import CliRunner
 
+from robochoc.app.sketch.building import model_of
 from robochoc.cli.group import cli
 from robochoc.communication.network.zenoh_config import config
 from robochoc.ros.decide_service import DECIDE, TRIGGER, refusal
@@ -22,8 +25,10 @@ from robochoc.ros.live.service_hashes import service_hash
 from robochoc.ros.live.services import WAITING_MAX
 from robochoc.ros.recordings.types import UnknownTypeError, types_of
 from robochoc.ros.sink import SinkError
+from tests.support.faults import running
 from tests.support.limits import HANG_S, wait_until
 from tests.support.program import PROGRAM, ROOT
+from tests.support.slot_sketches import slots
 from tests.support.zenoh_ros2 import FarEnd, Router
 
 HANGAR = str(ROOT / "docs" / "examples" / "hangar")
@@ -278,3 +283,36 @@ def test_a_router_that_goes_away_ends_it(monkeypatch: pytest.MonkeyPatch) -> Non
 
         wait_until(is_told, "nobody says that the router is gone")
         assert "is gone" in told[0]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("how", [signal.SIGKILL, signal.SIGTERM])
+def test_nothing_is_left_of_a_server_that_is_killed(
+    tmp_path: Path, session: zenoh.Session, router: Router, how: signal.Signals
+) -> None:
+    """It is killed while robots search, each in a process of its own; the client learns that no answer comes."""
+    model_of(slots(14, 14)).save(tmp_path / "slots")
+    place = f"rmw_zenoh://{router.place}"
+    words = [
+        PROGRAM,
+        "serve",
+        str(tmp_path / "slots"),
+        "--protocol",
+        "syncbb",
+        "--runtime",
+        "processes",
+        "--ros",
+        place,
+    ]
+    heard: list[str] = []
+    key = f"0/robochoc/feedback/std_msgs::msg::dds_::String_/{types_of(2).type_hash('std_msgs/String')}"
+    subscriber = session.declare_subscriber(key, lambda sample: heard.append(str(sample.key_expr)))
+    with running([*words, "--feedback"], tmp_path) as run:
+        wait_until(lambda: "/robochoc/cancel" in run.errors(), "it does not serve")
+        asked = Asked(session, request(""), attachment(1, 5, GID))
+        wait_until(lambda: bool(heard), "nobody decides")
+        run.strike(how)
+        run.end()
+        assert run.left_behind() == []
+        wait_until(lambda: asked.is_over, "the client still waits")
+    subscriber.undeclare()  # type: ignore[no-untyped-call]  # zenoh's stubs

@@ -24,7 +24,15 @@ import pytest
 from robochoc.ros.recordings.types import FieldType, types_of
 from tests.support.limits import HANG_S
 
-PACKAGES = ("builtin_interfaces", "geometry_msgs", "sensor_msgs", "std_msgs")
+PACKAGES = (
+    "builtin_interfaces",
+    "diagnostic_msgs",
+    "geometry_msgs",
+    "nav_msgs",
+    "sensor_msgs",
+    "std_msgs",
+    "tf2_msgs",
+)
 _SPELLING = {"float64": "double", "float32": "float", "bool": "boolean", "byte": "octet", "char": "uint8"}
 _CHECKS: dict[str, type] = {"double": float, "float": float, "boolean": bool, "octet": bytes, "string": str}
 

@@ -9,7 +9,9 @@ def generate_launch_description() -> LaunchDescription:
     """Return what is started, and the arguments that it takes."""
     arguments = [
         DeclareLaunchArgument("team", description="The folder with the robots' files, or a folder of teams."),
-        DeclareLaunchArgument("ros", default_value="dds", description="Where requests come from."),
+        DeclareLaunchArgument(
+            "ros", default_value="dds", description="Where requests come from: dds, rclpy, rmw_zenoh."
+        ),
         DeclareLaunchArgument("timeout", default_value="60", description="Seconds for one request, at most."),
     ]
     command = [
