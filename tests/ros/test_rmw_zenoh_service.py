@@ -37,6 +37,7 @@ SERVICES = {SERVICE: DECIDE, "/robochoc/hangar/decide": TRIGGER}
 TRIGGER_HASH = "RIHS01_eeff2cd6fa5ad9d27cdf4dec64818317839b62f212a91e6b5304b634b2062c5f"
 DECIDE_HASH = "RIHS01_5ed2d7a6bc492a40099e97f702a96a64693731dc44e8dc29ecd1fd53a3b2c74b"
 DECIDE_KEY = f"0/robochoc/decide/robochoc_msgs::srv::dds_::Decide_/{DECIDE_HASH}"
+DECIDE_SEEN = "@ros2_lv/0/*/*/*/SS/*/*/*/%robochoc%decide/**"
 NOTHING = {"structure_needs_at_least_one_member": 0}
 GID = bytes(range(16))
 
@@ -78,6 +79,7 @@ class Asked:
     def __init__(self, session: zenoh.Session, content: bytes | None, attached: bytes | None = None) -> None:
         self.answers: list[zenoh.Reply] = []
         self.is_over = False
+        wait_until(lambda: bool([*session.liveliness().get(DECIDE_SEEN)]), "the router does not know the service")
         handler = zenoh.handlers.Callback(self.answers.append, drop=self._end, indirect=False)
         session.get(
             DECIDE_KEY,
