@@ -37,6 +37,10 @@ _CHANGE_S, _STALL_S = 0.5, 1.0
 TICK_S = 0.02
 _HEARTBEAT_S, _TELEMETRY_S = 0.2, 0.05
 _NEAR_M = 0.05
+SETTLE_S = 0.5
+"""So long after arming ArduCopter refuses to take off."""
+_COPTER = {"hold": 17, "offboard": 4, "takeoff": 4, "land": 9, "stabilize": 0, "posctl": 16, "rtl": 6}
+"""ArduCopter's modes: BRAKE, GUIDED, GUIDED, LAND, STABILIZE, POSHOLD, RTL."""
 _AUTO = {"takeoff": 2, "hold": 3, "land": 6}
 _MAIN_AUTO, _MAIN_OFFBOARD = 4, 6
 _MODES = {(_MAIN_AUTO, sub): name for name, sub in _AUTO.items()} | {(_MAIN_OFFBOARD, 0): "offboard"}
@@ -63,6 +67,8 @@ class Vehicle:
     silent_from: str = ""
     """The mode from whose beginning on it is silent."""
     healthy: bool = True
+    is_ardupilot: bool = False
+    """True: it speaks as ArduCopter does. It keeps on flying to the last set point when no others come."""
     stalls: bool = False
     """True: it stays where it is, whatever it is told."""
     chance: Random | None = None
@@ -134,7 +140,7 @@ class _Played:
         self._move(vehicle, passed)
         if vehicle.flies:
             vehicle.battery = max(0.0, vehicle.battery - vehicle.drain * passed)
-        if vehicle.mode == "offboard" and now - self._setpoint_at > OFFBOARD_LOSS_S:
+        if vehicle.mode == "offboard" and not vehicle.is_ardupilot and now - self._setpoint_at > OFFBOARD_LOSS_S:
             self._enter("land", "offboard lost")
         if vehicle.armed and not vehicle.flies:
             if vehicle.mode == "land":
@@ -147,9 +153,10 @@ class _Played:
                 common.MAV_MODE_FLAG_SAFETY_ARMED if vehicle.armed else 0
             )
             state = common.MAV_STATE_ACTIVE if vehicle.armed else common.MAV_STATE_STANDBY
-            self._mav.heartbeat_send(
-                common.MAV_TYPE_QUADROTOR, common.MAV_AUTOPILOT_PX4, base, _CUSTOM[vehicle.mode], state
-            )
+            kind, mode = common.MAV_AUTOPILOT_PX4, _CUSTOM.get(vehicle.mode, 0)
+            if vehicle.is_ardupilot:
+                kind, mode = common.MAV_AUTOPILOT_ARDUPILOTMEGA, _COPTER[vehicle.mode]
+            self._mav.heartbeat_send(common.MAV_TYPE_QUADROTOR, kind, base, mode, state)
         if now - self._telemetry_at > _TELEMETRY_S:
             self._telemetry_at = now
             self._tell(round((now - self._begun) * 1000))
@@ -172,7 +179,8 @@ class _Played:
                 vehicle.log.append("reached " + ",".join(f"{one:g}" for one in vehicle.target))
             vehicle.at = vehicle.target
             if vehicle.mode == "takeoff":
-                self._enter("hold", "took off")
+                self._wanted = vehicle.at
+                self._enter("offboard" if vehicle.is_ardupilot else "hold", "took off")
             return
         e, n, u = (here + (there - here) * step / left for here, there in zip(vehicle.at, vehicle.target, strict=True))
         vehicle.at = (e, n, u)
@@ -232,6 +240,10 @@ class _Played:
         match message.get_type():
             case "COMMAND_LONG":
                 self._mav.command_ack_send(message.command, self._obey(message))
+            case "SET_POSITION_TARGET_LOCAL_NED" | "SET_POSITION_TARGET_GLOBAL_INT" if (
+                self.vehicle.is_ardupilot and math.isnan(message.yaw)
+            ):
+                self.vehicle.log.append("no heading")
             case "SET_POSITION_TARGET_LOCAL_NED":
                 self._set((message.y, message.x, -message.z))
             case "SET_POSITION_TARGET_GLOBAL_INT":
@@ -260,11 +272,14 @@ class _Played:
             case common.MAV_CMD_COMPONENT_ARM_DISARM:
                 result = self._armed(on=message.param1 > 0)
             case common.MAV_CMD_NAV_TAKEOFF:
-                result = self._mode("takeoff")
+                result = self._mode("takeoff") if not self.vehicle.is_ardupilot else self._rise(message.param7)
             case common.MAV_CMD_NAV_LAND:
                 result = self._mode("land")
             case common.MAV_CMD_DO_SET_MODE:
                 main, sub = round(message.param2), round(message.param3)
+                if self.vehicle.is_ardupilot:
+                    modes = {number: mode for mode, number in _COPTER.items() if mode != "takeoff"}
+                    return self._mode(modes.get(main, ""))
                 result = self._mode(_MODES.get((main, 0 if main == _MAIN_OFFBOARD else sub), ""))
             case common.MAV_CMD_REQUEST_MESSAGE:
                 result = self._answer(round(message.param1))
@@ -283,7 +298,8 @@ class _Played:
 
     def _armed(self, *, on: bool) -> int:
         vehicle = self.vehicle
-        if "arm" in vehicle.refuses or (not on and vehicle.flies):
+        unarmable = vehicle.is_ardupilot and on and vehicle.mode != "offboard"
+        if unarmable or "arm" in vehicle.refuses or (not on and vehicle.flies):
             vehicle.log.append("refused to arm")
             return int(common.MAV_RESULT_DENIED)
         if on and not vehicle.armed:
@@ -293,9 +309,20 @@ class _Played:
             self._disarm("disarmed")
         return int(common.MAV_RESULT_ACCEPTED)
 
+    def _rise(self, height_m: float) -> int:
+        """Take off as ArduCopter does: in GUIDED, and some time after arming."""
+        vehicle = self.vehicle
+        if vehicle.mode != "offboard" or not vehicle.armed or time.monotonic() - self._armed_at < SETTLE_S:
+            vehicle.log.append("refused takeoff")
+            return int(common.MAV_RESULT_FAILED)
+        vehicle.takeoff_m = height_m
+        return self._mode("takeoff")
+
     def _mode(self, mode: str) -> int:
         vehicle = self.vehicle
-        stale = mode == "offboard" and time.monotonic() - self._setpoint_at > OFFBOARD_LOSS_S
+        stale = (
+            mode == "offboard" and not vehicle.is_ardupilot and time.monotonic() - self._setpoint_at > OFFBOARD_LOSS_S
+        )
         if not mode or mode in vehicle.refuses or stale or (mode == "takeoff" and not vehicle.armed):
             vehicle.log.append(f"refused {mode}")
             return int(common.MAV_RESULT_DENIED)

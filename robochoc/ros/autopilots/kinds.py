@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import re
 from dataclasses import dataclass
 from enum import StrEnum
@@ -57,7 +56,7 @@ _RULES = {
         least_takeoff_m=0.5,
         near_m=0.5,
         distance_m=1.0,
-        renews_m=math.inf,
+        renews_m=2.0,  # ArduCopter brakes for each new one
         connect_s=0.0,
         alone="vehicles do what their own failsafe says",
     ),

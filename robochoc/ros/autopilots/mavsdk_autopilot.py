@@ -2,10 +2,15 @@
 
 Each vehicle has an instance of MAVSDK, so that two of them may have the same MAVLink system number. MAVSDK repeats
 set points 20 times a second; PX4 wants 2 at least.
+
+ArduCopter differs: its GUIDED mode is PX4's offboard mode (MAVSDK calls it that), it arms in few modes only, so it is
+brought to GUIDED before, and rises some time after that. It has no mode of its own for a take-off. A set point without
+a heading, which PX4 takes for "as it is", has to have one there: the heading that the vehicle had at the first one.
 """
 
 from __future__ import annotations
 
+import json
 import math
 import time
 from collections.abc import Callable
@@ -14,6 +19,7 @@ from typing import Any
 import mavsdk
 from mavsdk.plugins.action import Action
 from mavsdk.plugins.mavlink_direct import MavlinkDirect
+from mavsdk.plugins.mavlink_direct.mavlink_direct import MavlinkMessage
 from mavsdk.plugins.offboard import Offboard
 from mavsdk.plugins.offboard.offboard import PositionGlobalYaw, PositionNedYaw
 from mavsdk.plugins.telemetry import Telemetry as TelemetryPlugin
@@ -27,6 +33,8 @@ from robochoc.ros.autopilots.frames import GpsPlace, enu_from_gps, enu_of, gps_o
 _IN_AIR = {LandedState.IN_AIR, LandedState.TAKING_OFF, LandedState.LANDING}
 _ANY_YAW = math.nan
 """PX4 keeps its heading where a set point has none."""
+_DO_SET_MODE, _CUSTOM_MODE, _GUIDED = 176, 1, 4
+_ANSWER_S, _LOOK_S, _RISE_S = 5.0, 0.1, 0.5
 
 
 class MavsdkAutopilot(Autopilot):
@@ -37,12 +45,14 @@ class MavsdkAutopilot(Autopilot):
         self._link = link
         self._origin = origin
         self._sdk: Any = None
+        self._system_number = 0
         self._heard_at = -math.inf
         self._telemetry: Any = None
         self._action: Any = None
         self._offboard: Any = None
         self._direct: Any = None
-        self._follows = False
+        self._follows = self._is_ardupilot = False
+        self._yaw_deg = _ANY_YAW
 
     def connect(self) -> bool:
         """Return whether the vehicle has been heard; see `Autopilot`."""
@@ -56,6 +66,8 @@ class MavsdkAutopilot(Autopilot):
             system = self._sdk.first_autopilot(0)
             if system is None:
                 return False
+            self._is_ardupilot = system.autopilot_type() is mavsdk.Autopilot.ARDUPILOT
+            self._system_number = system.get_system_id()
             self._direct = MavlinkDirect(system)
             self._direct.subscribe_message("HEARTBEAT", self._heard)
             self._action, self._offboard = Action(system), Offboard(system)
@@ -79,27 +91,43 @@ class MavsdkAutopilot(Autopilot):
         )
 
     def arm(self) -> None:
-        """Arm the motors."""
+        """Arm the motors. ArduCopter arms in its GUIDED mode."""
+        if self._is_ardupilot:
+            self._ask("enter its mode GUIDED", self._guide)
         self._ask("arm", self._action.arm)
+        if self._is_ardupilot:
+            self._await("arm", lambda: bool(self._telemetry.armed()))
 
     def disarm(self) -> None:
         """Disarm the motors."""
         self._ask("disarm", self._action.disarm)
 
     def take_off(self, height_m: float) -> None:
-        """Rise, and hold there. The height is a parameter of the vehicle (PX4's MIS_TAKEOFF_ALT)."""
+        """Rise, and hold there. The height is a parameter of the vehicle (PX4's MIS_TAKEOFF_ALT), or of the command.
+
+        ArduCopter refuses that for some time after it was armed, so it is asked again.
+        """
         self._ask("set the height of its take-off", lambda: self._action.set_takeoff_altitude(height_m))
-        self._ask("take off", self._action.takeoff)
+        until = time.monotonic() + (_ANSWER_S if self._is_ardupilot else 0.0)
+        while True:
+            try:
+                return self._ask("take off", self._action.takeoff)
+            except RefusedError:
+                if time.monotonic() > until:
+                    raise
+                time.sleep(_RISE_S)
 
     def go_to(self, place: Point) -> None:
         """Fly straight to `place`."""
+        if self._is_ardupilot and not self._follows and self._telemetry is not None:
+            self._yaw_deg = float(self._telemetry.heading().heading_deg)
         if self._origin:
             gps = gps_of(place, self._origin)
             above_sea = PositionGlobalYaw.AltitudeType.AMSL
             self._ask(
                 "take a set point",
                 lambda: self._offboard.set_position_global(
-                    PositionGlobalYaw(gps.latitude, gps.longitude, gps.altitude_m, _ANY_YAW, above_sea)
+                    PositionGlobalYaw(gps.latitude, gps.longitude, gps.altitude_m, self._yaw_deg, above_sea)
                 ),
             )
         else:
@@ -108,7 +136,7 @@ class MavsdkAutopilot(Autopilot):
             north, east, down = ned_of((x - own_x, y - own_y, z - own_z))
             self._ask(
                 "take a set point",
-                lambda: self._offboard.set_position_ned(PositionNedYaw(north, east, down, _ANY_YAW)),
+                lambda: self._offboard.set_position_ned(PositionNedYaw(north, east, down, self._yaw_deg)),
             )
         if not self._follows:
             self._ask("follow set points", self._offboard.start)
@@ -146,6 +174,22 @@ class MavsdkAutopilot(Autopilot):
         x, y, z = enu_of((local.north_m, local.east_m, local.down_m))
         own_x, own_y, own_z = self._link.at
         return x + own_x, y + own_y, z + own_z
+
+    def _guide(self) -> None:
+        """Ask ArduCopter for its mode GUIDED, and wait for that. MAVSDK itself does so with a set point only."""
+        fields: dict[str, float] = {f"param{number}": 0.0 for number in range(1, 8)}
+        fields |= {"param1": _CUSTOM_MODE, "param2": _GUIDED, "command": _DO_SET_MODE, "confirmation": 0}
+        fields |= {"target_system": self._system_number, "target_component": 1}
+        self._direct.send_message(MavlinkMessage("COMMAND_LONG", 0, 0, self._system_number, 1, json.dumps(fields)))
+        self._await("enter its mode GUIDED", lambda: self._telemetry.flight_mode() == FlightMode.OFFBOARD)
+
+    @staticmethod
+    def _await(what: str, is_so: Callable[[], bool]) -> None:
+        until = time.monotonic() + _ANSWER_S
+        while not is_so():
+            if time.monotonic() > until:
+                raise RefusedError(f"it did not {what} (timeout)")
+            time.sleep(_LOOK_S)
 
     def _ask(self, what: str, command: Callable[[], object]) -> None:
         if self._telemetry is None:

@@ -30,7 +30,7 @@ from robochoc.ros.autopilots.ways import Leg, NoWayError, Ways, spacing
 
 STILL_S = 3.0
 """Where vehicles block each other for so long, ways are planned anew."""
-_AHEAD_M = 2.0
+_AHEAD_M = 4.0
 """A set point is so far ahead, or twice the distance, if that is more."""
 _NEARER_M = 0.02
 """A way leads nearer to another vehicle if it does by more than this."""
