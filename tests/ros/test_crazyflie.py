@@ -16,10 +16,15 @@ from robochoc.ros.autopilots.messages import Phase, Target
 from tests.support.crazyflie_teams import crazyflie_field, solve
 from tests.support.crazyflies import Crazyfly
 from tests.support.limits import HANG_S, wait_until
+from tests.support.mavlink_teams import NAMES
 
 
 def reached(vehicle: Crazyfly) -> list[str]:
     return [line.removeprefix("goto ") for line in vehicle.log if line.startswith("goto")]
+
+
+def all_ready(guard: GuardProcess) -> bool:
+    return [state.phase for state in guard.states.values()] == [Phase.READY] * len(NAMES)
 
 
 def test_without_permission_crazyflies_are_seen_and_none_is_commanded(tmp_path: Path) -> None:
@@ -156,6 +161,7 @@ def test_a_port_at_which_nobody_is(tmp_path: Path) -> None:
         pytest.param({"refuses": {"takeoff"}}, "it did not take off (command denied)", marks=pytest.mark.slow),
         pytest.param({"tumbled": True}, "it does not stand upright", marks=pytest.mark.slow),
         pytest.param({"locked": True}, "it is locked: restart it", marks=pytest.mark.slow),
+        pytest.param({"low_power": True}, "its battery is low", marks=pytest.mark.slow),
     ],
 )
 def test_who_cannot_fly_ends_the_flight_of_all(tmp_path: Path, trouble: dict[str, object], why: str) -> None:
@@ -190,12 +196,29 @@ def test_who_loses_its_link_hovers_and_the_others_land(tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
+def test_whose_battery_is_low_on_the_way_lands(tmp_path: Path) -> None:
+    with crazyflie_field(tmp_path) as (vehicles, fleet):
+        guard = GuardProcess(read_fleet(fleet, Kind.CRAZYFLIE))
+        try:
+            guard.permit()
+            assert guard.wait_for(lambda: all_ready(guard), HANG_S)
+            guard.fly({"RB": Target((2, 0, 2))})
+            wait_until(lambda: vehicles[1].at[2] > 1.9, vehicles.state)
+            vehicles[1].low_power = True
+            vehicles.wait_until_landed()
+            assert guard.states["RB"].why == "its battery is low"
+        finally:
+            guard.close()
+
+
+@pytest.mark.slow
 @pytest.mark.parametrize("lost", ["silent", "gone"])
 def test_who_is_heard_again_lands(tmp_path: Path, lost: str) -> None:
     with crazyflie_field(tmp_path, patience=1) as (vehicles, fleet):
         guard = GuardProcess(read_fleet(fleet, Kind.CRAZYFLIE))
         try:
             guard.permit()
+            assert guard.wait_for(lambda: all_ready(guard), HANG_S)
             guard.fly({"RB": Target((2, 0, 2))})
             wait_until(lambda: vehicles[1].flies, vehicles.state)
             setattr(vehicles[1], lost, True)

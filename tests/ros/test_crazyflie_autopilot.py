@@ -131,6 +131,19 @@ def test_an_error_of_the_link_that_passes_is_none_of_ours() -> None:
         assert vehicle.log[-1] == "hold"
 
 
+def test_packets_that_are_cut_off_are_none() -> None:
+    with linked() as (vehicle, autopilot):
+        telling = {(13, 1), (15, 1)}  # by these it would be another Crazyflie, of another version
+        places = [(port, channel) for port in range(16) for channel in range(4) if (port, channel) not in telling]
+        vehicle.noise = [
+            bytes([port << 4 | 3 << 2 | channel, *range(length)]) for port, channel in places for length in range(5)
+        ]
+        wait_until(lambda: not vehicle.noise, "it is quiet")
+        fly(vehicle, autopilot)
+        autopilot.hold()
+        assert vehicle.log[-1] == "hold"
+
+
 def test_on_the_ground_it_is_disarmed_and_does_not_land() -> None:
     with linked() as (vehicle, autopilot):
         autopilot.arm()

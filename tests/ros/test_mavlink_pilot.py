@@ -244,6 +244,7 @@ def test_a_take_off_that_never_ends(pilot: Pilot, played: Played) -> None:
             {"mode": "HOLD", "silent_s": SILENCE_S + 1},
             "it no longer follows set points: its mode is hold",
         ),
+        ({"alarm": "its battery is low"}, "its battery is low"),
     ],
 )
 def test_who_does_not_fly_as_told_is_out_and_lands(

@@ -36,10 +36,10 @@ _PARAM, _SETPOINT, _MEMORY, _LOG, _GENERIC_SETPOINT, _HIGH_LEVEL, _SUPERVISOR, _
     *(2, 3, 4, 5, 7, 8, 9, 13, 15),
 )
 _RESET, _CREATE, _START = 5, 6, 3
-_FORMATS = {1: "B", 2: "H", 7: "f"}
+_FORMATS = {1: "B", 2: "H", 4: "b", 7: "f"}
 _VARIABLES = (
     *(("stateEstimate.x", 7), ("stateEstimate.y", 7), ("stateEstimate.z", 7), ("stateEstimate.yaw", 7)),
-    *(("pm.vbat", 7), ("pm.batteryLevel", 1), ("supervisor.info", 2), ("radio.rssi", 1)),
+    *(("pm.vbat", 7), ("pm.batteryLevel", 1), ("supervisor.info", 2), ("radio.rssi", 1), ("pm.state", 4)),
 )
 BUSY = 16
 _REFUSED = 1
@@ -69,6 +69,10 @@ class Crazyfly:
     """The height from which on it is silent, in metres."""
     gone: bool = False
     """True: nobody is at its port, as when a simulator has ended."""
+    low_power: bool = False
+    """Whether its power management tells a low voltage."""
+    noise: list[bytes] = field(default_factory=list)
+    """What it sends besides, once."""
     tumbled: bool = False
     flown_by_hand: bool = False
     """Somebody else sends it set points."""
@@ -177,6 +181,8 @@ class _Played:
         if vehicle.flies:
             vehicle.battery = max(0.0, vehicle.battery - vehicle.drain * passed)
         self._supervise(now)
+        while vehicle.noise and self._peer is not None:
+            self.socket.sendto(vehicle.noise.pop(), self._peer)
         for block, (period, told) in [*self._running.items()]:
             if now - told >= period:
                 self._running[block] = (period, now)
@@ -244,6 +250,7 @@ class _Played:
             **dict(zip(("stateEstimate.x", "stateEstimate.y", "stateEstimate.z"), self.vehicle.at, strict=True)),
             "pm.batteryLevel": round(self.vehicle.battery * 100),
             "supervisor.info": self._bits(),
+            "pm.state": 3 if self.vehicle.low_power else 0,
             "stateEstimate.yaw": 90.0,
         }
         return struct.pack("<" + _FORMATS[kind], values.get(name, 0))

@@ -31,6 +31,8 @@ class Telemetry:
     healthy: bool = False
     problem: str = ""
     """Why the autopilot is not healthy, if it tells that."""
+    alarm: str = ""
+    """Why it has to land at once, where its autopilot does not do that by itself."""
     connecting: bool = False
     """Whether it is heard, and has not told all yet that it has to tell before it can fly."""
     silent_s: float = 0.0

@@ -53,9 +53,11 @@ _NO_DRIVER = "Couldn't load link driver:"
 _TAKE_OFF, _LAND, _GO_TO = 7, 8, 12
 _ARMED = 0x81
 _BUSY = 16
+_LOW_POWER = 3
+"""From this state of the power management on (its pm.h), the battery has had a low voltage for some seconds."""
 _VARIABLES = (
     *("stateEstimate.x", "stateEstimate.y", "stateEstimate.z", "stateEstimate.yaw"),
-    *("supervisor.info", "pm.batteryLevel"),
+    *("supervisor.info", "pm.batteryLevel", "pm.state"),
 )
 
 cflib.crtp.init_drivers()
@@ -105,14 +107,16 @@ class CflibAutopilot(Autopilot):
         if not values:
             return Telemetry(connecting=now - self._heard_at < _ATTEMPT_S)
         told = Supervisor(int(values["supervisor.info"]))
+        alarm = "its battery is low" if values["pm.state"] >= _LOW_POWER else ""
         return Telemetry(
             place=self._place(values),
             battery=min(max(values["pm.batteryLevel"] / 100, 0.0), 1.0),
             mode=told.mode,
             armed=told.armed,
             in_air=told.flies,
-            healthy=not told.problem,
-            problem=told.problem,
+            healthy=not (told.problem or alarm),
+            problem=told.problem or alarm,
+            alarm=alarm,
             silent_s=silent_s,
         )
 

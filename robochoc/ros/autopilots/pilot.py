@@ -246,8 +246,8 @@ class Pilot:
         lands = self._phase is Phase.LANDING
         if (not lands or self._clock() - self._foreign_s > MODE_S) and self._is_taken_over(seen):
             return f"{_NOT_OURS} {seen.mode_and_who}"
-        if lands:
-            return ""
+        if lands or seen.alarm:
+            return "" if lands else seen.alarm
         if seen.place and seen.in_air and not self._fleet.fence.holds_above(seen.place, OUTSIDE_M):
             return f"it has left the fence, at {point_text(seen.place)}"
         return self._mode_trouble(seen) if self._clock() - self._since_s > MODE_S else ""
