@@ -206,11 +206,21 @@ def test_in_processes_no_verdict_is_wrong_where_a_tenth_is_lost(runs: int) -> No
             assert outcome.cost >= least_cost(team)
 
 
-def test_who_comes_back_is_caught_up_with_although_messages_are_lost(tmp_path: Path) -> None:
+@pytest.mark.parametrize(
+    "protocol",
+    [
+        "dsa",
+        *(
+            pytest.param(name, marks=pytest.mark.slow)
+            for name in ("mgm", "mgm2", "gdba", "maxsum", "regret-matching", "lamdls", "dsa-sdp", "mixed-dsa")
+        ),
+    ],
+)
+def test_who_comes_back_is_caught_up_with_although_messages_are_lost(tmp_path: Path, protocol: str) -> None:
     """A robot's process is killed at once, and starts again, while a fifth of all messages is lost."""
     write_team(random_csp(4, 3, 0.7, 0, 4, max_cost=9), tmp_path / "team")
     team = read_team(tmp_path / "team")
-    options = replace(lossy("dsa", Runtime.PROCESSES, cycles="6"), spares=1, kill=(Kill(team.order[0], 0.0),))
+    options = replace(lossy(protocol, Runtime.PROCESSES, cycles="6"), spares=1, kill=(Kill(team.order[0], 0.0),))
     outcome = solve(team, options)
     assert [epoch.opened_by for epoch in outcome.epochs[1:]] == [f"{team.order[0]} was lost, and came back"]
     assert outcome.metrics.lost_messages > 0
