@@ -290,8 +290,8 @@ def test_every_runtime_publishes_while_it_searches(runtime: Runtime, protocol: s
     if runtime is Runtime.ARRAYS and not local:
         return
     team = random_csp(8, 4, 0.6, 0.0, seed=3, max_cost=50)
-    told = Told()
-    options = Options(protocol=protocol, runtime=runtime, deadline=0.3, improve=1.2, settings=LONG if local else {})
+    told = Told(news_at=1)
+    options = Options(protocol=protocol, runtime=runtime, deadline=0.3, improve=600, settings=LONG if local else {})
     outcome = solve(team, options, audience=told)
     agreed(team, outcome, told)
     assert outcome.verdict in FOUND
