@@ -20,6 +20,7 @@ from collections import defaultdict
 from collections.abc import Iterable, Mapping
 from typing import NamedTuple
 
+from robochoc.model.constraint import Definition
 from robochoc.model.problem import INFINITE, Constraint, ConstraintModel, Domain, Team
 from robochoc.solver.agent_problem import AgentProblem
 from robochoc.solver.encoding import MAX_TUPLES, Cost, UnsupportedError, cost_function
@@ -151,6 +152,8 @@ class _Exclusions:
         self._congestion = congestion
         self._owners = owners
         self._domains = domains
+        self._definitions: dict[int, int] = {}
+        self._same_definition: dict[Definition, Definition] = {}
         self._columns: dict[str, Column] = {}
         self._same: dict[Column, Column] = {}
         self._found: dict[tuple[object, ...], tuple[tuple[Pair, Cost], ...]] = {}
@@ -176,12 +179,21 @@ class _Exclusions:
             raise UnsupportedError(f"{constraint.name!r} has {size:,} pairs of values, more than {MAX_TUPLES:,}")
         place = {one: 0, other: 1}
         terms = tuple([place[term] if isinstance(term, str) else (term,) for term in constraint.parameters])
-        key = id(constraint.definition), constraint.cost, terms, id(columns[0]), id(columns[1])
+        key = self._definition(constraint), constraint.cost, terms, id(columns[0]), id(columns[1])
         if key not in self._found:
             costs = _EVALUATIONS.costs(constraint, (one, other), terms, columns)
             self._refuse_costs(constraint, (one, other), costs)
             self._found[key] = costs
         return self._found[key]
+
+    def _definition(self, constraint: Constraint) -> int:
+        """Return what stands for the definition of `constraint`: the same for all that say the same."""
+        known = id(constraint.definition)
+        if known not in self._definitions:
+            self._definitions[known] = id(
+                self._same_definition.setdefault(constraint.definition, constraint.definition)
+            )
+        return self._definitions[known]
 
     def _column(self, name: str) -> Column:
         """Return the values of a variable: the same object for variables of the same values."""

@@ -136,6 +136,8 @@ class SSI(Auction):
     def _tell(self, bought: list[int]) -> None:
         """Tell those who can do them which tasks are bought, and all rivals the own bid if it is another."""
         amount = self.offer.amount if self.offer else 0
+        if not bought and amount == self._told:
+            return
         for rival, shared in self.market.shared.items():
             lots = [self.market.lot(task) for task in bought if task in shared]
             if lots:
