@@ -26,6 +26,8 @@ _ERROR_M = 0.04
 _SHARE = 0.999
 """Of what a place leaves: rounding must not make a route impossible."""
 _CLOSE_M = 1e-6
+_LEAST_S = 1.0
+"""From one corner to the next."""
 _LEAST_M = 0.03
 """Places that are nearer to a wall are refused."""
 _NEAR_M = 0.3
@@ -47,7 +49,7 @@ class WallWatch:
 
     def limits(self, usual: MotionLimits) -> MotionLimits:
         """Return the limits of a motion whose mean speed is that of the walls' robots, or the `usual` ones if less."""
-        return replace(usual, speed=min(usual.speed, PEAK * self._speed))
+        return replace(usual, speed=min(usual.speed, PEAK * self._speed), least_s=_LEAST_S)
 
     def floor_plan(self, places: Array) -> FloorPlan:
         """Return the plan for routes between `places` (K, 3), those of all drones once, or several times.

@@ -25,10 +25,15 @@ _TOP_ACCELERATION = 10 / math.sqrt(3)
 
 @dataclass(frozen=True)
 class MotionLimits:
-    """The limits of a drone's motion: `speed` in m/s, `acceleration` in m/s^2."""
+    """The limits of a drone's motion: `speed` in m/s, `acceleration` in m/s^2, and the least seconds from rest to rest.
+
+    In much less than a second a drone cannot lean to one side and to the other: it overshoots where one short piece
+    follows upon another.
+    """
 
     speed: float = 2.0
     acceleration: float = 2.0
+    least_s: float = 0.0
 
     def __post_init__(self) -> None:
         if not (0 < self.speed < math.inf and 0 < self.acceleration < math.inf):
@@ -37,7 +42,7 @@ class MotionLimits:
     def durations(self, lengths: Array) -> Array:
         """Return the shortest times (K,), in seconds, of motion over `lengths` (K,), from rest to rest."""
         least: Array = np.maximum(PEAK * lengths / self.speed, np.sqrt(_TOP_ACCELERATION * lengths / self.acceleration))
-        return least
+        return np.maximum(least, self.least_s)
 
 
 @dataclass(frozen=True)
