@@ -167,7 +167,7 @@ def _differences(one: Setup, others: Sequence[Setup]) -> list[str]:
     """Return the words that say in what a setup differs from others."""
     settings = sorted({name for other in others for name in other.settings})
     differing = [name for name in settings if len({other.settings.get(name) for other in others}) > 1]
-    names = [name for name in _TOLD if len({getattr(other, name) for other in others}) > 1]
+    names = [name for name in _TOLD if any(getattr(other, name) != getattr(one, name) for other in others)]
     words = [f"{name}={one.settings[name]}" for name in differing if name in one.settings]
     return [word for word in [*words, *(_told(name, getattr(one, name)) for name in names)] if word]
 
