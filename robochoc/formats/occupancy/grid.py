@@ -20,8 +20,8 @@ import numpy.typing as npt
 
 from robochoc.formats.diagnostics import InvalidInputError, MistakeError, shortened
 from robochoc.formats.dialects.yaml_tree import Node, Scalar, read_yaml
-from robochoc.formats.occupancy.content import content_of, told
-from robochoc.formats.occupancy.images import Image, read_image
+from robochoc.formats.occupancy.content import beginning_of, content_of, told
+from robochoc.formats.occupancy.images import Image, is_image, read_image
 from robochoc.formats.occupancy.pgm import MAX_BYTES
 from robochoc.formats.occupancy.turn import UNTURNED, Place, Turn, turn_of
 
@@ -33,6 +33,7 @@ _FAR_M = Fraction(1_000_000)
 _YAW = Fraction(1000)
 _MODES = ("trinary", "scale", "raw")
 _KEYS = ("image", "resolution", "origin", "negate", "occupied_thresh", "free_thresh")
+_MAGIC_BYTES = 8
 _PERCENT = 100
 _RAW = 255
 """White in the mode `raw`, whatever it is in the image."""
@@ -95,13 +96,15 @@ def read_occupancy_grid(path: Path) -> OccupancyGrid:
         InvalidInputError: One of the files cannot be read, is no such file, or is too large.
     """
     with told(path):
+        if is_image(beginning_of(path, _MAGIC_BYTES)):
+            raise MistakeError("is an image", "name the YAML file of the map, which names its image")
         content = content_of(path, MAX_YAML)
         try:
             text = content.decode()
         except UnicodeDecodeError:
             raise MistakeError("is not text in UTF-8", "name the YAML file of the map, not its image") from None
         described = _Description(text)
-    image = path.parent / described.image
+        image = described.image_beside(path)
     with told(image):
         shades = read_image(content_of(image, MAX_BYTES), adds_alpha=described.mode == "trinary")
     free, occupied = described.classified(shades)
@@ -168,6 +171,14 @@ class _Description:
         if not isinstance(node.scalar, str) or not node.scalar or "\0" in node.scalar:
             raise MistakeError("has an image that is no path", "name the image beside the YAML file", node.line)
         return node.scalar
+
+    def image_beside(self, path: Path) -> Path:
+        """Return where the image is that the file at `path` names."""
+        image = path.parent / self.image
+        if not image.exists():
+            why = f"names the image {shortened(self.image)}, which does not exist"
+            raise MistakeError(why, "its path counts from the folder of this file", self._entries["image"].line)
+        return image
 
     def _number(self, key: str, least: Fraction, most: Fraction) -> Fraction:
         return _number(self._entries[key], key, least, most)

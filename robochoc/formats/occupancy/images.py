@@ -42,6 +42,11 @@ class Image:
     opaque: npt.NDArray[np.bool_] | None = None
 
 
+def is_image(content: bytes) -> bool:
+    """Return whether a file begins as an image does that is read."""
+    return content.startswith((*_PGM, *_OTHERS))
+
+
 def read_image(content: bytes, *, adds_alpha: bool) -> Image:
     """Return the image that a file has.
 

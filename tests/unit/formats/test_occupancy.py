@@ -121,7 +121,8 @@ def test_modes_in_which_free_means_free_are_read(tmp_path: Path, mode: str) -> N
     [
         ("image: plan.pgm\n", "", "plan.yaml: has no image"),
         ("plan.pgm", "[plan]", "plan.yaml:1: has an image that is no path"),
-        ("plan.pgm", "other.pgm", "other.pgm: No such file"),
+        ("plan.pgm", "other.pgm", "plan.yaml:1: names the image other.pgm, which does not exist .*folder of this file"),
+        (YAML, f"P2 1 1 255 1{' ' * MAX_YAML}", "plan.yaml: is an image .*name the YAML file"),
         ("0.5", "0", "plan.yaml:2: has a wrong resolution .*from 0.001 to 100"),
         ("0.5", "much", "plan.yaml:2: has a wrong resolution"),
         ("0.5", "true", "plan.yaml:2: has a wrong resolution"),
