@@ -140,11 +140,14 @@ class FleetSink(Sink):
 
         with _reported():
             guard.wait_for(lambda: all(map(is_known, names)), self._fleet.connect_s + _SPARE_S)
-        for name in names:
-            state = guard.states.get(name)
+        missing = [name for name in names if not is_known(name) or guard.states[name].phase is Phase.OUT]
+        if missing:
+            state = guard.states.get(missing[0])
             why = state.why if state and state.why else "nothing is known of it"
-            if state is None or state.phase in {Phase.OUT, Phase.CONNECTING}:
-                raise self._wrong(f"{name} cannot be flown: {why}", "nothing was armed")
+            others = f"; nor can {', '.join(missing[1:])}" if missing[1:] else ""
+            raise self._wrong(f"{missing[0]} cannot be flown: {why}{others}", "nothing was armed")
+        for name in names:
+            state = guard.states[name]
             if self._may_arm and state.place and not state.in_air and not self._fleet.fence.holds_above(state.place):
                 where = f"{name} stands at {point_text(state.place)}, outside of the fence"
                 raise self._wrong(where, f"the fence is from {self._fleet.fence}; nothing was armed")
