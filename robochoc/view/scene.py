@@ -152,9 +152,9 @@ def _flight_facts(flown: FlightLog | None, why_not: str, *, is_to_scale: bool) -
         return
     yield "flown", f"{flown.times[-1]:.1f} s{'' if is_to_scale else ', not to scale'}"
     if flown.nearest_wall and is_to_scale:
-        yield "from walls", f"{flown.nearest_wall.distance_m:.2f} m (required: {flown.nearest_wall.set_m:.2g} m)"
+        yield "from walls", f"{flown.nearest_wall.distance_m:.2f} m (set: {flown.nearest_wall.set_m:.2g} m)"
     if flown.nearest and is_to_scale:
-        yield "separation", f"{flown.nearest.distance_m:.2f} m (required: {flown.distance:.2g} m)"
+        yield "separation", f"{flown.nearest.distance_m:.2f} m (set: {flown.distance:.2g} m)"
     for number, event in fell(flown).items():
         yield "fallen", f"{flown.names[number]} ({event.what})"
     if flown.nearest_fallen and is_to_scale:

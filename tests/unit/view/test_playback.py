@@ -283,7 +283,7 @@ def test_what_happened_is_told_in_its_order() -> None:
 def test_the_caption_tells_of_the_flight() -> None:
     facts = dict(shown().facts)
     assert facts["flown"] == "6.0 s"
-    assert facts["separation"] == "0.98 m (required: 0.5 m)"
+    assert facts["separation"] == "0.98 m (set: 0.5 m)"
     assert "fallen" not in facts
 
 
