@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import threading
 
-from robochoc.communication.control import Conclusion, Counters, Ready
+from robochoc.communication.control import Conclusion, Counters, Ready, WentOn
 from robochoc.communication.network.audited_state import AuditedSearchState
 from robochoc.communication.network.refusals import KINDS, LONGEST, WHO, Refusals
 from robochoc.communication.network.router import Log, Refusal
@@ -50,6 +50,26 @@ def test_messages_that_are_missing_are_told_only_when_nothing_moves_any_more() -
     assert state.missing(14, 10) == 1
     state.handle("B", Counters(1, 0, 0, 3))
     assert state.missing(15, 10) == 0
+
+
+def test_no_message_is_missing_while_a_robot_has_not_said_whether_it_goes_on() -> None:
+    """A busy machine may give it no turn for long, and no wave asks the others before."""
+    state = AuditedSearchState(1, ["A", "B"])
+    state.lossy = True
+    for name in ("A", "B"):
+        state.handle(name, Counters(1, 0, 1, 1))
+    wave = state.counters.begin_wave()
+    for name in ("A", "B"):
+        state.handle(name, Counters(1, wave, 1, 1))
+    assert state.begin_going_on()
+    state.handle("A", WentOn(1, went=True))
+    state.handle("A", Counters(1, 0, 2, 1))
+    for now in (0, 11, 12, 13, 14):
+        assert state.missing(now, 10) == 0
+        assert state.next_wave() is None
+    state.handle("B", WentOn(1, went=False))
+    assert [state.missing(now, 10) for now in (15, 24, 26)] == [0, 0, 0]
+    assert state.next_wave() is not None, "now all are asked"
 
 
 # What is refused is counted

@@ -142,14 +142,15 @@ class AuditedSearchState(SearchState):
         """Return how many messages were sent and are lost for good; 0 as long as that is not certain.
 
         It is certain when nothing has been sent or received for `patience_s` seconds, and all robots, asked twice after
-        that, say the same again: then nothing is under way either.
+        that, say the same again: then nothing is under way either. While a robot has not said whether it goes on, no
+        wave asks them.
 
         Args:
             now: The time on the monotonic clock.
             patience_s: How long a message may be under way.
         """
         total = self.counters.total
-        if total is None or total != self._still or total.sent == total.received:
+        if total is None or total != self._still or total.sent == total.received or self._undecided:
             self._still, self._still_since, self._asked = total, now, 0
         elif now - self._still_since > patience_s and not self.counters.waving:
             if self._asked == _ASKED_ENOUGH:

@@ -27,6 +27,9 @@ BUILDING = str(ROOT / "docs/examples/building/building.yaml")
 HALL = ["#########", "#...#...#", "#...#...#", "#.......#", "#...#...#", "#...#...#", "#########"]
 """Two rooms with a door, 0.5 m a pixel."""
 
+NO_ROOM = ("that keeps its radius of", "are to be kept")
+"""Words of the two refusals of a flight: a way is too narrow, or places are too near each other."""
+
 
 def hall(folder: Path, **how: object) -> tuple[Team, GroundMap]:
     path = write_map(folder, HALL)
@@ -61,7 +64,7 @@ def test_drones_fly_around_walls_on_hundreds_of_maps(block: int, tmp_path: Path)
     flown = {seed: one for seed, one in made.items() if isinstance(one, FlownTeam)}
     assert {seed: one.faults() for seed, one in flown.items() if one.faults()} == {}
     refused = [one for one in made.values() if isinstance(one, str) and not one.startswith("no team")]
-    assert all("that keeps its radius of" in one for one in refused)
+    assert [one for one in refused if not any(words in one for words in NO_ROOM)] == []
     assert len(flown) >= 10
 
 
