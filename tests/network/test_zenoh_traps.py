@@ -9,8 +9,10 @@ import sys
 from collections.abc import Iterator
 from functools import partial
 from pathlib import Path
+from typing import NamedTuple
 
 import pytest
+import zenoh
 
 from robochoc.authority.admission import InMemoryAuthority
 from robochoc.communication.control import Failed
@@ -54,6 +56,25 @@ def posts(household: InMemoryAuthority, router: Router) -> Iterator[tuple[Transp
     join = partial(Transport, router.endpoint, watch=(), patience_s=HANG_S)
     with join(household.identity("A")) as a, join(household.identity("B")) as b:
         yield a, b
+
+
+class DeadSession(NamedTuple):
+    """A session with a dead link: its end is not confirmed, and zenoh says so after a while."""
+
+    session: zenoh.Session
+
+    def close(self) -> None:
+        self.session.close()  # type: ignore[no-untyped-call]  # zenoh's stubs
+        raise zenoh.ZError("close operation timed out!")
+
+
+def test_a_dead_link_makes_no_end_of_a_session_fail(
+    household: InMemoryAuthority, router: Router, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    with Transport(router.endpoint, household.identity("A"), watch=(), patience_s=HANG_S) as transport:
+        session = transport._session  # noqa: SLF001 - no link is dead at a time that a test could choose
+        monkeypatch.setattr(transport, "_session", DeadSession(session))
+    assert session.is_closed()
 
 
 def frame(of: Transport) -> Item:

@@ -152,8 +152,9 @@ class Transport:
         self.inbox.put(WakeUp())
 
     def close(self) -> None:
-        """End the connection. What zenoh has taken over is sent before."""
-        self._session.close()  # type: ignore[no-untyped-call]  # zenoh's stubs
+        """End the connection. What zenoh has taken over is sent before, unless the link is dead."""
+        with suppress(zenoh.ZError):  # it has taken leave in vain: there is nobody at the other end of a dead link
+            self._session.close()  # type: ignore[no-untyped-call]  # zenoh's stubs
 
     def __enter__(self) -> Self:
         return self
