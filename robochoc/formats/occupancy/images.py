@@ -89,6 +89,8 @@ def _summed(opened: Pillow.Image, *, adds_alpha: bool) -> Image:
     """Return the sums of channels."""
     if opened.mode.startswith("I"):
         return _wide(opened)
+    if opened.mode == "P" and opened.palette is None:
+        raise ValueError("its palette is missing")
     if not opened.has_transparency_data:
         grey = opened.mode in {"1", "L"}
         channels = np.asarray(opened.convert("L" if grey else "RGB"))

@@ -23,6 +23,8 @@ from robochoc.formats.occupancy.pgm import MAX_PIXELS
 from tests.support.examples import examples
 from tests.support.maps import write_map
 
+_PALETTE = 3
+"""PNG's type of colour where pixels are places in a palette."""
 SHADES = np.arange(256, dtype=np.uint8).reshape(16, 16)
 
 
@@ -95,8 +97,8 @@ def chunk(name: bytes, content: bytes) -> bytes:
     return struct.pack(">I", len(content)) + name + content + struct.pack(">I", zlib.crc32(name + content))
 
 
-def png(width: int, height: int, content: bytes) -> bytes:
-    head = struct.pack(">IIBBBBB", width, height, 8, 0, 0, 0, 0)
+def png(width: int, height: int, content: bytes, colour: int = 0) -> bytes:
+    head = struct.pack(">IIBBBBB", width, height, 8, colour, 0, 0, 0)
     return b"\x89PNG\r\n\x1a\n" + chunk(b"IHDR", head) + chunk(b"IDAT", content) + chunk(b"IEND", b"")
 
 
@@ -111,6 +113,7 @@ def png(width: int, height: int, content: bytes) -> bytes:
         (png(0, 2, b""), "is a broken PNG|has 0 x 2 pixels"),
         (png(2, 2, b"nonsense"), "is a broken PNG"),
         (png(2, 2, zlib.compress(bytes(6)))[:-30], "is a broken PNG"),
+        (png(1, 1, zlib.compress(bytes(2)), _PALETTE), "is a broken PNG image: its palette is missing"),
         (b"\x89PNG\r\n\x1a\n", "is a broken PNG"),
         (b"BM" + bytes(100), "is a broken BMP"),
     ],
