@@ -68,6 +68,8 @@ def _offered(group: str, kind: str, name: str, base: type, wrong: type[Exception
     namesakes = entry_points_named(group, name)
     if not namesakes:
         hint = "" if name else f"; a {kind} is written NAME:PLACE, such as mcap:run.mcap"
+        if "?" in name:
+            hint = f"; options follow a colon: {name.replace('?', ':?', 1)}"
         raise wrong(on_one_line(not_installed_message(group, kind, name) + hint))
     entry = namesakes[0]
     lacking = _lacking(entry) if len(namesakes) == 1 else ""

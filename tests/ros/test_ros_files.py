@@ -277,6 +277,7 @@ def test_what_cannot_be_published_is_told_with_its_topic(text: str) -> None:
         ("run.txt", "no sink 'run.txt'"),
         ("", "a sink is written NAME:PLACE"),
         (":run.mcap", "no sink ''"),
+        ("dds?wait=3", r"no sink 'dds\?wait=3' .*; options follow a colon: dds:\?wait=3"),
     ],
 )
 def test_sinks_that_there_are_not(text: str, told: str) -> None:
