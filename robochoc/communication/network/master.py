@@ -60,6 +60,9 @@ from robochoc.system.plain_text import LONGEST_REASON, on_one_line
 REGISTRY_S = 0.5
 """The interval at which the Authority's registry is read for new enrolments and revocations, in seconds."""
 REPORTS_S, FAREWELL_S, AGAIN_S = 10.0, 5.0, 0.5
+HELD_S = 15.0
+"""How much longer reports are waited for where there is a verdict. zenoh holds frames back while it asks for earlier
+ones, for 10 seconds where a busy machine does not answer."""
 
 
 class Master(MasterLoop):
@@ -182,7 +185,8 @@ class Master(MasterLoop):
         """End the search, and collect all reports. Raises `RobotsLostError` when it was stuck."""
         state = self.state
         self._send_all(Pause())
-        self._serve_until(lambda: not state.pending_reports, time.monotonic() + REPORTS_S)
+        patience_s = REPORTS_S if state.verdict is None else REPORTS_S + HELD_S
+        self._serve_until(lambda: not state.pending_reports, time.monotonic() + patience_s)
         for name in state.pending_reports if state.verdict is not None else ():
             self._lose(name, "it did not report at the end")
         doubts = self.events.doubted(state.doubts_about_counts)
