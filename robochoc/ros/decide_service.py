@@ -14,7 +14,7 @@ from typing import Any
 
 import msgspec
 
-from robochoc.formats.diagnostics import on_one_line, shortened
+from robochoc.formats.diagnostics import InvalidInputError, on_one_line, shortened
 from robochoc.formats.result import result_json
 from robochoc.model.change import apply_changes
 from robochoc.model.outcome import Outcome, Verdict
@@ -76,7 +76,7 @@ class DecideService:
             options = replace(self._options, timeout=self._timeout_s(fields.get("timeout", 0.0)))
             changed = apply_changes(team, _changes(_text(fields, "changes")))
             return _answer(self._solve(changed, options))
-        except (RequestError, ChangeError) as wrong:
+        except (RequestError, ChangeError, InvalidInputError) as wrong:  # the last: a change leaves no team
             return refusal(str(wrong))
         except Exception as error:  # noqa: BLE001 - each request is answered
             return refusal(f"{type(error).__name__}: {error}")

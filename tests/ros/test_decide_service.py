@@ -45,6 +45,11 @@ def service(*teams: Team, options: Options = SIMULATED) -> DecideService:
     return DecideService(teams, solve, options)
 
 
+def removals(kind: str, *removed: object) -> str:
+    """Changes of one kind, as JSON."""
+    return json.dumps([{kind: one} for one in removed])
+
+
 # What is asked, and what is answered
 
 
@@ -109,6 +114,11 @@ def test_a_trigger_tells_the_assignment() -> None:
         ({"changes": '[{"remove_agent": {"name": "a"}, "add_value": {"variable": "b", "value": 1}}]'}, "change 1 must"),
         ({"changes": '[{"remove_agent": {"name": "Stern"}}]'}, "Stern"),
         ({"changes": '[{"add_value": {"variable": "port", "value": 3}}]'}, "port"),
+        ({"changes": removals("remove_agent", *({"name": robot.name} for robot in HANGAR.robots))}, "^team hangar: "),
+        (
+            {"changes": removals("remove_value", *({"variable": "port", "value": value} for value in range(1, 5)))},
+            "^robot Port, domain levels: .* has no value",
+        ),
         (
             {"changes": " " * CHANGES_CHARACTERS_MAX + "[]"},
             "changes have 65,538 characters, and at most 65,536 are read",
