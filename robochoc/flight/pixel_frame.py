@@ -1,4 +1,4 @@
-"""Where the pixels of a map lie: from metres to pixels, and back."""
+"""The place of a map's pixels in its frame: from metres to pixels, and back."""
 
 from __future__ import annotations
 

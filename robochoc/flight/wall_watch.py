@@ -1,4 +1,4 @@
-"""What a flight keeps of walls: the floor plan for each leg, and how near drones have come.
+"""Walls during a flight: the floor plan for each leg, and how near drones have come to it.
 
 Drones keep the radius for which the team was made between their centres and all pixels that are not free. Travel times
 of generated teams are measured between centres of pixels, so places may be a little nearer to a wall: then drones keep

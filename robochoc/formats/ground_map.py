@@ -34,7 +34,7 @@ class BlockedCell(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class Volume(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """What a three-dimensional map has besides. Levels are numbered from 1, the lowest first.
+    """The third dimension of a map. Levels are numbered from 1, the lowest first.
 
     Attributes:
         levels: The number of levels.

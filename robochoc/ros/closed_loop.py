@@ -133,7 +133,7 @@ class ClosedLoop:
         self._legs: list[Leg] = []
         self._goals: dict[int, Goal] = {}
         self._improved: Leg | None = None
-        """What was published last of the epoch that goes on."""
+        """The answer that was published last of the epoch that goes on."""
         self._news: News | None = None
         self._happened = 0
         self._lost = True

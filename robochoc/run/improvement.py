@@ -27,7 +27,7 @@ _FOUND = frozenset({Verdict.SOLUTION, Verdict.OPTIMAL})
 
 
 class Audience(Protocol):
-    """Those who are told of each answer while a search goes on."""
+    """Observers that are told of each answer while a search goes on."""
 
     def improve(self, team: Team, /, epoch: EpochOutcome, withdrawn: Sequence[str]) -> None:
         """Take in an answer that is better than all before in its epoch. The robots `withdrawn` do not fly.

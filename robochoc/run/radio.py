@@ -1,4 +1,4 @@
-"""What a channel model says of robots by name or by place, held against the team."""
+"""Checks a channel model, which names robots and places, against the team."""
 
 from __future__ import annotations
 

@@ -213,7 +213,7 @@ class _Exclusions:
 
 
 class _Row(NamedTuple):
-    """What one value of a variable costs with values of another one, as far as that was evaluated.
+    """The costs of one value of a variable with values of another one, as far as they were evaluated.
 
     Attributes:
         columns: The numbers of the columns whose values were all evaluated.
@@ -227,7 +227,7 @@ class _Row(NamedTuple):
 
 
 class Evaluations:
-    """What definitions cost, kept for the robots of a process: the same constraint stands in many files.
+    """The costs of definitions, kept for the robots of a process: the same constraint stands in many files.
 
     Args:
         most: Of more pairs of values nothing is kept.

@@ -1,4 +1,4 @@
-"""How a radio loses messages by link: by the distance of two robots, in bursts, and on links that are named.
+"""Losses of messages by link: by the distance of two robots, in bursts, and on links that are named.
 
 All of it is what a channel model's file says (docs/guides/channels.md); `losses.py` draws by it.
 """

@@ -116,7 +116,7 @@ class FloorPlan:
 
     @cached_property
     def _before(self) -> npt.NDArray[np.int32]:
-        """How many solid pixels of a row are before each column."""
+        """The number of solid pixels of a row before each column."""
         return np.cumsum(np.pad(self.solid, ((0, 0), (1, 0))), axis=1, dtype=np.int32)
 
     def _padded(self, reach: int) -> tuple[Flags, npt.NDArray[np.int64]]:

@@ -28,7 +28,7 @@ from robochoc.flight.routes.paths import Space
 from robochoc.flight.routes.spacing import Array, Flags, norms
 
 _RINGS = 20
-"""Where there are walls, a drone waits in the sky no more rings of a distance away."""
+"""The most rings of a distance away at which a drone waits in the sky where there are walls."""
 _Way = Callable[[Array, Array, Array], Array | None]
 
 

@@ -1,4 +1,4 @@
-"""What files of maps hold: bounded, and told with the file's name where it cannot be read."""
+"""Reads the content of map files: bounded, and told with the file's name where it cannot be read."""
 
 from __future__ import annotations
 

@@ -131,7 +131,7 @@ def _states(leaves: Sequence[Leaves], exponent: int, low: Integers, high: Intege
 def _join(leaves: Sequence[Leaves], exponent: int, states: States, low: Integers, high: Integers) -> None:
     """Write into the states what leaves that are smaller than a voxel make of it."""
     free = np.zeros(states.size, dtype=np.int64)
-    """How much of each voxel is free."""
+    """The free part of each voxel."""
     for some in leaves:
         corners: Corners = some.corners >> np.uint16(exponent - some.exponent)
         inside = ((corners >= low) & (corners < high)).all(axis=1)

@@ -1,4 +1,4 @@
-"""Where a robot fits on a map: obstacles are inflated by its radius."""
+"""The pixels of a map on which a robot fits: obstacles are inflated by its radius."""
 
 from __future__ import annotations
 

@@ -117,7 +117,7 @@ class _SightInSpace(Sight):
         (x, y, z), (right, back, top) = sorted((self._points[one], self._points[other]))
         across, along, up = right - x, back - y, top - z
         whole = (across or 1) * (abs(along) or 1)
-        """How far it is from end to end: a number that the borders of all layers and rows divide into integers."""
+        """The length from end to end: a number that the borders of all layers and rows divide into integers."""
         size, solid = self._unit * whole, self._solid
         for column, begin, end in _crossed(x, across, (0, whole), whole, self._unit):
             for row, first, last in _crossed(y, along, (begin, end), whole, self._unit):

@@ -41,7 +41,7 @@ _JOIN_S = 3.0
 SPIN_UP_S = 4.0
 """Motors that have to be armed may take so long to spin up, in seconds; the firmware gives them 2."""
 SETTLED_S = 0.3
-"""What a command has brought about is told after so long at the latest, in seconds."""
+"""The longest time after which it is told what a command has brought about, in seconds."""
 STALE_S = 1.0
 """No command is given by telemetry that is older, in seconds."""
 _ATTEMPT_S = 2.0

@@ -12,7 +12,7 @@ from robochoc.ros.autopilots.steps import Step
 
 @dataclass(frozen=True)
 class Clearance:
-    """What a vehicle may do now."""
+    """The permission of a vehicle for its next step."""
 
     to: Point | None = None
     """Its set point; None before it has one."""

@@ -11,11 +11,11 @@ _HOST = r"(?:[A-Za-z0-9._-]{1,253}|\[[0-9A-Fa-f:.]{2,45}\]):(?P<port>\d{1,5})"
 
 @dataclass(frozen=True)
 class _Rules:
-    """What a fleet file of one kind may say, and what is taken where it says nothing."""
+    """The fields of a fleet file of one kind, and their values where it says nothing."""
 
     link: re.Pattern[str]
     links: str
-    """What is expected in the place of a link that is none."""
+    """The form of a link, told where a text is none."""
     example: str
     entries: tuple[str, ...]
     """Names of entries that other kinds do not have."""

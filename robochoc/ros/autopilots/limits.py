@@ -1,4 +1,4 @@
-"""How long a pilot waits for what, and how far a vehicle may stray: the same for all vehicles."""
+"""The times that a pilot waits, and the distances that a vehicle may stray: the same for all vehicles."""
 
 from __future__ import annotations
 

@@ -25,7 +25,7 @@ _PARTS = 32
 
 
 class Does(Enum):
-    """What a vehicle does in a step: the first and the last are done by its autopilot alone."""
+    """The kind of a step: the first and the last are done by the vehicle's autopilot alone."""
 
     CLIMB = auto()
     FLY = auto()

@@ -1,4 +1,4 @@
-"""What the supervisor of a Crazyflie's firmware tells: the bits of its log variable `supervisor.info`.
+"""The state that the supervisor of a Crazyflie's firmware tells: the bits of its log variable `supervisor.info`.
 
 Source: the firmware's supervisor.c.
 """

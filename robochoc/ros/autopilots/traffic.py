@@ -29,7 +29,7 @@ from robochoc.ros.autopilots.steps import Does, Step, length_along, on_line, ste
 from robochoc.ros.autopilots.ways import Leg, NoWayError, Ways, spacing
 
 STILL_S = 3.0
-"""Where vehicles block each other for so long, ways are planned anew."""
+"""The time for which vehicles may block each other before ways are planned anew, in seconds."""
 _AHEAD_M = 4.0
 """A set point is so far ahead, or twice the distance, if that is more."""
 _NEARER_M = 0.02

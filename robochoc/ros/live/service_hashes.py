@@ -38,7 +38,7 @@ _NUMBERS: Mapping[str, int] = MappingProxyType(
 """The numbers of types in `type_description_interfaces/msg/FieldType`."""
 _NESTED, _BOUNDED_STRING = 1, 21
 _ARRAY, _BOUNDED, _UNBOUNDED = 48, 96, 144
-"""What is added to the number of a type for an array, and for a sequence with and without a limit."""
+"""Numbers added to that of a type for an array, and for a sequence with and without a limit."""
 _TIME, _INFO = "builtin_interfaces/msg/Time", "service_msgs/msg/ServiceEventInfo"
 _INFO_FIELDS = (
     ("event_type", FieldType("uint8")),

@@ -1,4 +1,4 @@
-"""What services of ROS have in common, whatever carries them: requests wait for their turn, or are answered at once.
+"""Services of ROS, whatever carries them: requests wait for their turn, or are answered at once.
 
 Requests come from outside: each that can be told from others is answered, also one that cannot be read.
 """
@@ -41,7 +41,7 @@ class Services(ABC):
     """
 
     where: str = ""
-    """Where they are offered, in words."""
+    """The place where they are offered, in words."""
     lacking: Collection[str] = ()
     """The names of services that are not offered, as their types are not known here."""
 

@@ -21,7 +21,7 @@ Tasks = tuple[int, ...]
 
 @dataclass(frozen=True)
 class Trip:
-    """What the tours of one robot depend on.
+    """The facts on which the tours of one robot depend.
 
     Attributes:
         name: The robot's name.
