@@ -111,7 +111,10 @@ def allocation_fault(team: Team, *, congestion: bool = False) -> str:
         return str(fault)
     for name in sorted({name for name, _ in excluded}):
         if all((name, value) in excluded for value in variables[name]):
-            return f"{team.owner[name]} cannot leave all tasks to others: each value of {name} excludes another robot's"
+            return (
+                f"{team.owner[name]} cannot leave all tasks to others: each value of {name} excludes another robot's,"
+                " as where a task asks for several robots"
+            )
     return _scattered(excluded, team.owner)
 
 

@@ -114,6 +114,8 @@ def serve(
             is_here = name not in offered.lacking
             told = SERVICES[what] if is_here else f"not offered: {SERVICES[what]} is not built here"
             click.echo(f"{offered.where}: {name} ({told})", err=True)
+        if feedback:
+            click.echo(f"{offered.where}: {_FEEDBACK} (a topic, {_TEXT})", err=True)
         for request in _requests(offered, requests):
             named = triggers.get(request.name)
             answer = decider.decide(request.fields) if named is None else decider.trigger(named)

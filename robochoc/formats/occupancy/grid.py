@@ -209,7 +209,8 @@ class _Description:
         for mode in _MODES:
             if node.scalar == mode:
                 return mode
-        raise MistakeError(f"has the mode {shortened(str(node.scalar))}", f"{', '.join(_MODES)} are read", node.line)
+        told = "a list or mapping as its mode" if node.scalar is None else f"the mode {shortened(str(node.scalar))}"
+        raise MistakeError(f"has {told}", f"{', '.join(_MODES)} are read", node.line)
 
 
 def _number(node: Node, key: str, least: Fraction, most: Fraction) -> Fraction:

@@ -94,6 +94,8 @@ def formation(
         raise ValueError("anchor is one place")
     reach = reach_of(choice, seeded(seed))
     check_dimensions(middle, reach.cells, "anchor")
+    if middle and reach.cells.pixel(middle[0]) is None:
+        raise ValueError(f"the anchor {anchor} is not on the map")
     agents = len(reach.starts)
     offsets = _offsets(shape, agents, spacing)
     slots = slots_of(reach, offsets, middle[0] if middle else _mean(reach.starts), heading)

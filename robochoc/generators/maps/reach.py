@@ -287,7 +287,7 @@ def label_of(path: str) -> str:
 
 def _agents(agents: int | None, places: Sequence[Place]) -> int:
     if agents is None and not places:
-        raise ValueError("agents is missing (without at)")
+        raise ValueError("agents is missing, as at names no places")
     if places and agents not in {None, len(places)}:
         raise ValueError(f"agents is {agents}, and at has {len(places)} places")
     found = agents or len(places)

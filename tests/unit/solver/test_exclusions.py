@@ -94,7 +94,10 @@ def test_a_team_that_shares_exclusions_alone_has_no_fault() -> None:
         (
             {"A": (1, 2), "B": (0, 1, 2)},
             [not_the_same("A", "B")],
-            "RA cannot leave all tasks to others: each value of A excludes another robot's",
+            (
+                "RA cannot leave all tasks to others: each value of A excludes another robot's, as where a task asks"
+                " for several robots"
+            ),
         ),
         (
             {"A": (0, 1), "B": (0, 1), "C": (0, 1)},
