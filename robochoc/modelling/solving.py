@@ -47,6 +47,7 @@ class Solvable(ABC):
         seed: int = 0,
         timeout: float | None = None,
         deadline: float | None = None,
+        improve: float | None = None,
         messages: int | None = None,
         ncccs: int | None = None,
         cycles: int | None = None,
@@ -86,6 +87,7 @@ class Solvable(ABC):
             seed: The seed of the simulator, of the order `random`, and of protocols that draw lots.
             timeout: A limit on wall-clock time, in seconds. None: no limit.
             deadline: The same, when the best assignment that is known counts as an answer.
+            improve: For how many seconds after the deadline robots search on for what is better. None: not at all.
             messages: A limit on the number of messages. None: no limit.
             ncccs: A limit on non-concurrent constraint checks, in the simulator. None: no limit.
             cycles: A limit on cycles, with the schedule `cycles`. None: no limit.
@@ -126,8 +128,8 @@ class Solvable(ABC):
             10
         """
         _refuse(unknown)
-        _check_numbers(seed=seed, timeout=timeout, deadline=deadline, delay=delay, spares=spares, patience=patience)
-        _check_numbers(messages=messages, ncccs=ncccs, cycles=cycles)
+        _check_numbers(seed=seed, timeout=timeout, deadline=deadline, improve=improve, patience=patience)
+        _check_numbers(delay=delay, spares=spares, messages=messages, ncccs=ncccs, cycles=cycles)
         team = self._team_to_solve()
         called = self._robots_called(team)
         options = Options(
@@ -136,6 +138,7 @@ class Solvable(ABC):
             seed=seed,
             timeout=timeout,
             deadline=deadline,
+            improve=improve,
             withdraw=None if withdraw is None else _choice("withdraw", Withdrawal, withdraw),
             schedule=_choice("schedule", ScheduleName, schedule),
             delay=delay,
@@ -196,7 +199,7 @@ def _refuse(unknown: Iterable[str]) -> None:
 def _check_numbers(**given: float | None) -> None:
     """Raise `TypeError` for options that are no numbers, or integers, and `ValueError` for those that are negative."""
     for name, value in given.items():
-        whole = name not in {"timeout", "deadline", "patience"}
+        whole = name not in {"timeout", "deadline", "improve", "patience"}
         if value is None:
             continue
         if not isinstance(value, int if whole else (int, float)):

@@ -16,7 +16,7 @@ class SettingsError(ValueError):
 
 
 MOST = 10**12
-"""No number of a setting is higher."""
+"""No number of a setting is higher, but for `inf` where the protocol takes it (`Settings.may_be_infinite`)."""
 
 
 def equip(protocol: Protocol, given: Mapping[str, str]) -> None:
@@ -40,6 +40,7 @@ def settings_of(protocol: type[Protocol], given: Mapping[str, str]) -> Settings:
         raise SettingsError(describe_decode_error(error, known)) from None
     for name in given:
         value = getattr(settings, name)
-        if isinstance(value, int | float) and not -MOST <= value <= MOST:
+        infinite = given[name] == "inf" and name in known.may_be_infinite
+        if isinstance(value, int | float) and not (-MOST <= value <= MOST or infinite):
             raise SettingsError(f"{name} is a number up to {MOST:,}, not {given[name][:40]}")
     return settings

@@ -139,10 +139,12 @@ def open_simulator(request: SessionRequest) -> Session:
 
 def _losses_of(options: Options) -> Losses | None:
     """Return what decides which messages are lost: by the option, or else by the channel model. None: none is."""
-    from robochoc.communication.simulator.losses import LinkLosses, Losses  # noqa: PLC0415 - one runtime is enough
+    from robochoc.communication.simulator.losses import Losses  # noqa: PLC0415 - one runtime is enough
 
     if options.message_loss or not options.loss or options.channel is None:
         return Losses(options.loss, options.seed) if options.loss else None
+    from robochoc.communication.simulator.link_losses import LinkLosses  # noqa: PLC0415 - start-up: seldom asked for
+
     return LinkLosses(options.channel, options.seed)
 
 

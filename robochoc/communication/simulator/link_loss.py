@@ -1,6 +1,6 @@
 """Losses of messages by link: by the distance of two robots, in bursts, and on links that are named.
 
-All of it is what a channel model's file says (docs/guides/channels.md); `losses.py` draws by it.
+All of it is what a channel model's file says (docs/guides/channels.md); `link_losses.py` draws by it.
 """
 
 from __future__ import annotations

@@ -20,7 +20,7 @@ from robochoc.communication.simulator.link_loss import (
     loss_by_table,
     place_of,
 )
-from robochoc.communication.simulator.losses import LinkLosses
+from robochoc.communication.simulator.link_losses import LinkLosses
 from robochoc.communication.simulator.simulator import Simulation
 from robochoc.communication.simulator.timed import Timed
 from robochoc.generators.queens3d import queens3d

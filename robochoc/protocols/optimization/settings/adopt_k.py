@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import ClassVar
+
 from robochoc.model.problem import INFINITE
 from robochoc.protocols.optimization.settings.bnb_adopt import BnBADOPTSettings
 
@@ -11,6 +13,8 @@ class ADOPTkSettings(BnBADOPTSettings, frozen=True):
 
     `heuristic`: where lower bounds begin: at 0 (`none`), or at what children say before the search (`dp`).
     """
+
+    may_be_infinite: ClassVar[frozenset[str]] = frozenset({"k"})
 
     k: int | float = 1000
 

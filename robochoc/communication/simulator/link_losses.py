@@ -1,0 +1,77 @@
+"""Messages that a channel model loses for good by link: by distance, in bursts, and on named links."""
+
+from __future__ import annotations
+
+import random
+from collections.abc import Callable, Mapping
+
+from robochoc.communication.simulator.channel import ChannelModel
+from robochoc.communication.simulator.link_loss import Point, distance, either, place_of
+from robochoc.communication.simulator.losses import Link, Losses
+from robochoc.model.problem import Team
+
+
+class LinkLosses(Losses):
+    """Draws which messages are lost by what `channel` says of each link."""
+
+    def __init__(self, channel: ChannelModel, seed: int) -> None:
+        super().__init__(channel.message_loss, seed)
+        self._channel = channel
+        self._seed = seed
+        self._named = {link: named.loss for named in channel.links for link in named.directions}
+        self._bursts: dict[Link, _Burst] = {}
+        self._team: Team | None = None
+        self._values_of: Callable[[str], Mapping[str, int]] = lambda _: {}
+        self._places: dict[tuple[object, ...], Point | None] = {}
+
+    def follow(self, team: Team, values_of: Callable[[str], Mapping[str, int]]) -> None:
+        """See `Losses.follow`."""
+        self._team, self._values_of = team, values_of
+        self._places.clear()
+
+    def _loss_of(self, link: Link) -> float:
+        """Return what `Losses._loss_of` returns: all causes of a loss are independent of each other."""
+        if link in self._named:
+            return self._named[link]
+        usual = either(self._probability, self._loss_by_distance(link))
+        return usual if self._channel.bursts is None else either(usual, self._burst_of(link).next())
+
+    def _loss_by_distance(self, link: Link) -> float:
+        """Return what is lost by distance. If a robot is nowhere, as its values lead to no place, that is nothing."""
+        if not self._channel.by_distance:
+            return 0.0
+        sender, receiver = map(self._place_of, link)
+        return 0.0 if sender is None or receiver is None else self._channel.loss_at(distance(sender, receiver))
+
+    def _place_of(self, name: str) -> Point | None:
+        """Return where a robot is: where it stands, or where the values that it has now lead to."""
+        place = self._channel.positions.get(name)
+        if place is not None or self._team is None or name not in self._team:
+            return place
+        values = self._values_of(name)
+        key = (name, *values.values())
+        if key not in self._places:
+            self._places[key] = place_of(self._team[name], values)
+        return self._places[key]
+
+    def _burst_of(self, link: Link) -> _Burst:
+        if link not in self._bursts:
+            self._bursts[link] = _Burst(self._channel, f"bursts {self._seed} {link[0]} {link[1]}")
+        return self._bursts[link]
+
+
+class _Burst:
+    """The state of one link: in a burst, or not."""
+
+    def __init__(self, channel: ChannelModel, seed: str) -> None:
+        self._bursts = channel.bursts
+        self._chance = random.Random(seed)  # noqa: S311 - a radio is no secret
+        self._is_on = False
+
+    def next(self) -> float:
+        """Go on to the next message; return with which probability a burst takes it."""
+        if self._bursts is None:
+            return 0.0
+        drawn = self._chance.random()
+        self._is_on = drawn >= self._bursts.end if self._is_on else drawn < self._bursts.begin
+        return self._bursts.loss if self._is_on else 0.0
