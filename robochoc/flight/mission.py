@@ -71,7 +71,7 @@ class Block:
     at: Point
     leg: int = 0
     is_cube: bool = False
-    """Whether it is a cell of a three-dimensional map, whose middle is `at`. No route keeps away from it."""
+    """True for a cell of a three-dimensional map, with its middle at `at`. No route keeps away from it."""
     sides: int = ALL_SIDES
     """From which sides a cube is seen, as `Volume.sides` has them."""
 

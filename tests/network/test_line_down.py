@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import itertools
 import subprocess
 from collections.abc import Iterator
 from pathlib import Path
@@ -13,11 +12,10 @@ import pytest
 from robochoc.formats import write_team
 from robochoc.journal.events import Decided, Event, Sent
 from robochoc.journal.journal import read_journal
-from robochoc.model.problem import Constraint, Team
-from tests.support.deployments import PAIR, Deployment, Program, ended
+from robochoc.model.problem import Team
+from tests.support.deployments import CROWD, PAIR, Deployment, Program, ended
 from tests.support.limits import wait_until
 from tests.support.namespaces import TUN, Link, bad_line, namespaces, why_not
-from tests.support.problems import PREDICATES, team_of
 from tests.support.warm_programs import WarmPrograms
 
 WHY_NOT = why_not()
@@ -30,11 +28,6 @@ pytestmark = [
 PORT = 7447
 HILL, FIELD = "10.78.1.1", "10.78.1.2"
 PATIENCE_S = 3
-CROWD = team_of(
-    dict.fromkeys("ABCDE", range(1, 5)),
-    [Constraint("C", PREDICATES[0], pair, pair) for pair in itertools.combinations("ABCDE", 2)],
-)
-"""One robot too many: on a line that delays, its search takes seconds."""
 
 
 class Apart(NamedTuple):

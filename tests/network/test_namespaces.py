@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import itertools
 import time
 from collections.abc import Iterator
 from pathlib import Path
@@ -13,7 +12,7 @@ import pytest
 from robochoc.formats import write_team
 from robochoc.model.problem import Constraint
 from robochoc.run import Options, Runtime, solve
-from tests.support.deployments import TRIANGLE, Deployment, Program, ended, written
+from tests.support.deployments import CROWD, TRIANGLE, Deployment, Program, ended, written
 from tests.support.journal_entries import entries_of
 from tests.support.namespaces import DELAY_S, LOSS, TUN, Link, bad_line, namespaces, route, veth, why_not
 from tests.support.problems import PREDICATES, team_of
@@ -28,11 +27,6 @@ FOUR = ROOT / "instances" / "queens3d-4"
 PORT = 7447
 HILL, FIELD = "10.77.1.1", "10.77.1.2"
 OUTAGE_S = 5.0
-CROWD = team_of(
-    dict.fromkeys("ABCDE", range(1, 5)),
-    [Constraint("C", PREDICATES[0], pair, pair) for pair in itertools.combinations("ABCDE", 2)],
-)
-"""One robot too many; told one after the other (`sbt`), which takes the same messages whatever the link does."""
 
 
 class Apart(NamedTuple):

@@ -35,29 +35,12 @@ POSE_KEY = f"geometry_msgs::msg::dds_::PoseStamped_/{POSE_HASH}"
 TEXT_HASH = types_of(2).type_hash(TEXT)
 TEXT_KEY = f"std_msgs::msg::dds_::String_/{TEXT_HASH}"
 
+pytestmark = pytest.mark.usefixtures("no_ros_here")
+
 
 def pose(number: int) -> dict[str, object]:
     place = {"position": {"x": float(number), "y": 0.0, "z": 1.5}, "orientation": {"w": 1.0}}
     return {"header": {"stamp": STAMP, "frame_id": "map"}, "pose": place}
-
-
-@pytest.fixture(autouse=True)
-def _no_ros_here(monkeypatch: pytest.MonkeyPatch) -> None:
-    for name in ("ROS_DOMAIN_ID", "ROS_DISTRO", rmw_zenoh_session.CONFIG_FILE):
-        monkeypatch.delenv(name, raising=False)
-
-
-@pytest.fixture(scope="module")
-def router() -> Iterator[Router]:
-    with Router() as router:
-        yield router
-
-
-@pytest.fixture(scope="module")
-def end(router: Router) -> Iterator[FarEnd]:
-    pytest.importorskip("zenoh_ros2_sdk")
-    with FarEnd(router) as end:
-        yield end
 
 
 @pytest.fixture

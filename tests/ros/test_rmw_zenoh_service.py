@@ -41,24 +41,7 @@ DECIDE_SEEN = "@ros2_lv/0/*/*/*/SS/*/*/*/%robochoc%decide/**"
 NOTHING = {"structure_needs_at_least_one_member": 0}
 GID = bytes(range(16))
 
-
-@pytest.fixture(autouse=True)
-def _no_ros_here(monkeypatch: pytest.MonkeyPatch) -> None:
-    for name in ("ROS_DOMAIN_ID", "ROS_DISTRO", rmw_zenoh_session.CONFIG_FILE):
-        monkeypatch.delenv(name, raising=False)
-
-
-@pytest.fixture(scope="module")
-def router() -> Iterator[Router]:
-    with Router() as router:
-        yield router
-
-
-@pytest.fixture(scope="module")
-def end(router: Router) -> Iterator[FarEnd]:
-    pytest.importorskip("zenoh_ros2_sdk")
-    with FarEnd(router) as end:
-        yield end
+pytestmark = pytest.mark.usefixtures("no_ros_here")
 
 
 @pytest.fixture

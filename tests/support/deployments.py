@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import json
 import os
 import signal
@@ -28,6 +29,11 @@ LONG_S = HANG_S
 _DIFFERENT = [Constraint("C", PREDICATES[0], pair, pair) for pair in (("A", "B"), ("B", "C"), ("A", "C"))]
 PAIR = team_of(dict.fromkeys("AB", range(1, 3)), _DIFFERENT[:1])
 TRIANGLE = team_of(dict.fromkeys("ABC", range(1, 3)), _DIFFERENT)
+CROWD = team_of(
+    dict.fromkeys("ABCDE", range(1, 5)),
+    [Constraint("C", PREDICATES[0], pair, pair) for pair in itertools.combinations("ABCDE", 2)],
+)
+"""One robot more than there are values: told to be so (`sbt`) after many messages."""
 
 
 class Program:

@@ -61,8 +61,10 @@ REGISTRY_S = 0.5
 """The interval at which the Authority's registry is read for new enrolments and revocations, in seconds."""
 REPORTS_S, FAREWELL_S, AGAIN_S = 10.0, 5.0, 0.5
 HELD_S = 15.0
-"""How much longer reports are waited for where there is a verdict. zenoh holds frames back while it asks for earlier
-ones, for 10 seconds where a busy machine does not answer."""
+"""The time, beyond `REPORTS_S`, that the master waits for reports where there is a verdict, in seconds.
+
+zenoh holds frames back while it asks for earlier ones: for 10 seconds where a busy machine does not answer.
+"""
 
 
 class Master(MasterLoop):

@@ -34,7 +34,7 @@ class Telemetry:
     alarm: str = ""
     """Why it has to land at once, where its autopilot does not do that by itself."""
     connecting: bool = False
-    """Whether it is heard, and has not told all yet that it has to tell before it can fly."""
+    """True from its first message until it has told everything that is needed before it can fly."""
     silent_s: float = 0.0
     """The time since the last heartbeat, in seconds."""
 

@@ -19,7 +19,7 @@ class Clearance:
     climbs: bool = False
     lands: bool = False
     rests: bool = False
-    """Whether it is where it was sent, as far as there is a way."""
+    """True once the vehicle has arrived at its target, or as near to it as there is a way."""
     waits_for: str = ""
     """The name of another vehicle; empty if it need not wait."""
 
@@ -35,9 +35,9 @@ class Craft:
     ground_m: float = 0.0
     """The height at which it was last on the ground."""
     flies: bool = False
-    """Whether it is in the air by our command."""
+    """True while the vehicle is in the air by our command."""
     lands: bool = False
-    """Whether its autopilot lands it."""
+    """True while the vehicle's autopilot lands it."""
     gone: bool = False
     target: Target | None = None
     setpoint: Point | None = None

@@ -1,4 +1,4 @@
-"""Whether a library is there: the guard's process imports it, not the one that starts the guard."""
+"""Looks for a library without importing it: only the guard's process imports it, not the one that starts the guard."""
 
 from __future__ import annotations
 

@@ -28,7 +28,7 @@ class _Rules:
     connect_s: float
     """A vehicle that is heard may take so long until it has told all; 0: not longer than a silent one."""
     alone: str
-    """What vehicles do that nobody talks to."""
+    """A sentence that says how vehicles behave when the guard is gone, for error messages."""
 
 
 class Kind(StrEnum):
