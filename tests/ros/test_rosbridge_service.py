@@ -157,7 +157,11 @@ def test_a_client_that_is_gone_does_no_harm(server: Server, offered: RosbridgeSe
         request = offered.next(HANG_S)
         client.connection.abort()
     assert request is not None
+    assert server.wait_for(lambda: "closed" in server.log), "the bridge has not seen that the client is gone"
     offered.reply(request, {"success": True, "message": "nobody hears it"})
+    with Client(server) as another:
+        another.ask(CANCEL)
+        assert another.wait_for(1) == [{"success": False, "message": "nothing"}]
     offered.check()
 
 

@@ -8,12 +8,13 @@ import json
 import socket
 import threading
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import dataclass, field
 from typing import Any, Self
 
 from tornado.httpserver import HTTPServer
 from tornado.web import Application
-from tornado.websocket import WebSocketHandler
+from tornado.websocket import WebSocketClosedError, WebSocketHandler
 
 from tests.support.leftovers import shared_by_tests
 from tests.support.limits import HANG_S
@@ -198,7 +199,9 @@ class Handler(WebSocketHandler):
                 server.wrong.append(f"unknown operation {operation}")
 
     def send(self, content: str | bytes) -> None:
-        self.write_message(content, binary=isinstance(content, bytes))
+        """Send this, unless the client is gone: a rosbridge drops what it can no longer deliver."""
+        with suppress(WebSocketClosedError):
+            self.write_message(content, binary=isinstance(content, bytes))
 
     def break_off(self) -> None:
         if self.ws_connection is not None and self.ws_connection.stream is not None:
