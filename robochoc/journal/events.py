@@ -65,6 +65,13 @@ class Registered(Event, frozen=True):
     robot: str
 
 
+class DroppedOut(Event, frozen=True):
+    """A registered robot is gone, because of `why`, before the team was complete: the master waits for it again."""
+
+    robot: str
+    why: str
+
+
 class Sent(Event, frozen=True):
     """`sender` has sent a message; `clock` is its NCCC clock, `content` the message's fields."""
 
@@ -178,6 +185,7 @@ AnyEvent = (
     Began
     | Given
     | Registered
+    | DroppedOut
     | Sent
     | Received
     | Decided
@@ -202,7 +210,7 @@ def actor(event: AnyEvent) -> str | None:
             return event.receiver
         case Heard() | Decided() | Concluded() | Settled():
             return event.robot
-        case Began() | Given() | Registered() | Bounded() | Improved() | Lost() | Granted() | Refused():
+        case Began() | Given() | Registered() | DroppedOut() | Bounded() | Improved() | Lost() | Granted() | Refused():
             return None
         case never:
             assert_never(never)

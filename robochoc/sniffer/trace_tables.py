@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 
 import msgspec
 
-from robochoc.journal.events import AnyEvent, Given, Granted, Improved, Lost, Refused
+from robochoc.journal.events import AnyEvent, DroppedOut, Given, Granted, Improved, Lost, Refused
 from robochoc.model.cost_units import cost_shown
 
 
@@ -76,6 +76,8 @@ def note_of(event: AnyEvent, step: int) -> Note | None:
     match event:
         case Improved():
             return Note(event.t, step, "improved", "", f"the cheapest so far costs {cost_shown(event.cost)}")
+        case DroppedOut():
+            return Note(event.t, step, "lost", event.robot, f"{event.robot} has dropped out: {event.why}")
         case Lost():
             return Note(event.t, step, "lost", event.robot, f"{event.robot} was lost: {event.why}")
         case Refused():

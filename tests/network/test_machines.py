@@ -106,6 +106,35 @@ def test_a_robot_comes_back_while_others_are_awaited(site: Deployment) -> None:
     ended(robots)
 
 
+def test_a_robot_that_drops_out_is_told_and_waited_for_again(site: Deployment) -> None:
+    files = written(PAIR, site)
+    tokens = site.enrol("--team", files)
+    journal = site.folder / "run.jsonl"
+    master = site.master("--team", files, "--journal", journal)
+    first = site.robot(files / "RA.xml", "--token", tokens["RA"])
+    master.wait_to_say("RA is there")
+    first.kill()
+    dropped = "RA has dropped out: it has not been there for 10 s; waiting for it again\n"
+    master.hurry_until(lambda: dropped in master.errors)
+    robots = {"RA": site.robot(files / "RA.xml"), **site.robots(files, {"RB": tokens["RB"]})}
+    assert master.status() == 0, master.errors
+    ended(robots)
+    assert (master.errors.count(dropped), master.errors.count("RA is there")) == (1, 2)
+    found = [(entry["event"], entry["robot"]) for entry in entries_of(journal) if entry["event"] == "DroppedOut"]
+    assert found == [("DroppedOut", "RA")]
+
+
+def test_who_has_dropped_out_is_named_when_the_time_is_over(site: Deployment) -> None:
+    files = written(PAIR, site)
+    robot = site.robot(files / "RA.xml", "--token", site.enrol("RA")["RA"])
+    master = site.master("--gather", 3600, "--patience", 1, "--team", files)
+    master.wait_to_say("RA is there")
+    robot.kill()
+    master.wait_to_say("RA has dropped out: it has not been there for 1 s; waiting for it again")
+    assert master.hurried_status() == 3
+    assert "awaited: RA (it was there, and has dropped out), RB" in master.errors
+
+
 def test_robots_that_are_there_before_their_master(site: Deployment) -> None:
     files = written(PAIR, site)
     robots = site.robots(files, site.enrol("--team", files))

@@ -155,6 +155,17 @@ def test_an_open_team_misses_who_is_given_up() -> None:
     assert not members.complete
 
 
+def test_a_robot_that_has_dropped_out_is_waited_for_by_name_until_it_is_back() -> None:
+    members = Members(number=4)
+    join(members, RA, RB)
+    members.drop_out(RB)
+    assert members.waited_for == [f"{RB} (it was there, and has dropped out)", RC, "1 more robot"]
+    members.register(RB, PROFILES[RB], "second")
+    assert members.waited_for == [RC, f"{RB} (it has registered, and does not answer)", "1 more robot"]
+    join(members, RB, RC, incarnation="second")
+    assert members.waited_for == ["1 more robot"]
+
+
 # What others want to see
 
 

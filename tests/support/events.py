@@ -46,6 +46,7 @@ any_event: st.SearchStrategy[AnyEvent] = st.one_of(
         why=names,
     ),
     _of(events.Registered, robot=names),
+    _of(events.DroppedOut, robot=names, why=names),
     _of(events.Sent, sender=names, receiver=names, type=names, content=contents, bytes=counts, clock=counts),
     _of(events.Received, sender=names, receiver=names, type=names, clock=counts),
     _of(events.Decided, robot=names, assignment=assignments, clock=counts),

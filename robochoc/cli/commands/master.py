@@ -275,11 +275,13 @@ class _Teller:
 def _tell_event(event: AnyEvent) -> None:
     """Print one line for each event that the master's operator needs at once."""
     from robochoc.formats import on_one_line
-    from robochoc.journal.events import Granted, Lost, Refused, Registered
+    from robochoc.journal.events import DroppedOut, Granted, Lost, Refused, Registered
 
     match event:
         case Registered(robot=name):
             line = f"{name} is there"
+        case DroppedOut(robot=name, why=why):
+            line = f"{name} has dropped out: {why}; waiting for it again"
         case Lost(robot=name, why=why):
             line = f"{name} is lost: {why}"
         case Granted(who=who, what=what):

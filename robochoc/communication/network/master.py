@@ -354,7 +354,8 @@ class Master(MasterLoop):
             return
         self._facilitator.leave(name)
         if not self.members.closed and not for_good:
-            self.members.remove([name])
+            self.members.drop_out(name)
+            self.events.dropped_out(name, why)
             return
         self.events.lost(name, why)
         self.state.lose(name, why)

@@ -10,7 +10,7 @@ import msgspec
 from robochoc.communication.network.plausibility import Doubt
 from robochoc.communication.network.quotas import EVENTS_A_SECOND, Allowance
 from robochoc.communication.network.refusals import Refusals
-from robochoc.journal.events import AnyEvent, Granted, Lost, Observer, Refused, Registered, actor
+from robochoc.journal.events import AnyEvent, DroppedOut, Granted, Lost, Observer, Refused, Registered, actor
 
 
 class MasterEvents:
@@ -35,6 +35,10 @@ class MasterEvents:
     def registered(self, robot: str) -> None:
         """Report that `robot` has registered."""
         self._tell(Registered(t=self._now, robot=robot))
+
+    def dropped_out(self, robot: str, why: str) -> None:
+        """Report that a registered `robot` is gone, and waited for again."""
+        self._tell(DroppedOut(t=self._now, robot=robot, why=why))
 
     def lost(self, robot: str, why: str) -> None:
         """Report that `robot` is lost."""

@@ -111,6 +111,8 @@ class Members:
         self.closed = False
         self._known: frozenset[tuple[str, str]] = frozenset()
         self._acquainted: dict[str, tuple[str, ...]] = {}
+        self._dropped: set[str] = set()
+        """Robots that were registered, are gone, and have not come back."""
         self._over: set[str] = set()
         """Incarnations that have ended. If one goes on after all, its frames have unexpected numbers."""
 
@@ -137,6 +139,7 @@ class Members:
             raise RegistrationRefusedError(fault)
         if known:
             self._over.add(known.incarnation)
+        self._dropped.discard(sender)
         self.robots[sender] = Member(profile, incarnation)
         return self.robots[sender]
 
@@ -166,6 +169,18 @@ class Members:
     def awaited(self) -> set[str]:
         """The robots that have to register yet, as far as they are known by name."""
         return (set(self.expected or ()) | missing(self.profiles)) - self.robots.keys()
+
+    @property
+    def waited_for(self) -> list[str]:
+        """The robots without which the team is not complete, in words: those that are not there, or not for certain."""
+        absent = sorted((self.awaited | self._dropped) - self.robots.keys())
+        unsure = sorted(name for name, m in self.robots.items() if not m.joined or m.unconfirmed)
+        more = 0 if self.number is None else self.number - len(self.robots) - len(absent)
+        return [
+            *(f"{name} (it was there, and has dropped out)" if name in self._dropped else name for name in absent),
+            *(f"{name} (it has registered, and does not answer)" for name in unsure),
+            *[f"{more} more robot{'s' * (more > 1)}"] * (more > 0),
+        ]
 
     @property
     def complete(self) -> bool:
@@ -242,6 +257,11 @@ class Members:
             member = self.robots.pop(name, None)
             if member:
                 self._over.add(member.incarnation)
+
+    def drop_out(self, name: str) -> None:
+        """Remove a robot while the team is open; it may register again."""
+        self.remove([name])
+        self._dropped.add(name)
 
     def to_welcome(self) -> dict[str, str]:
         """Return the incarnations of robots that are there and have not answered a welcome, while the team is open.

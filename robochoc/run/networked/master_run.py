@@ -195,7 +195,7 @@ def _run(
 def _solve(plan: MasterPlan, master: Master, observer: Observer | None) -> MasterResult:
     """Wait for the team, and let it solve its problem."""
     if not master.gather(None if plan.gather_s is None else time.monotonic() + plan.gather_s):
-        names = first_names(sorted(master.members.awaited)) or "more robots"
+        names = first_names(master.members.waited_for) or "more robots"
         raise TeamIncompleteError(f"the team is not complete after {plan.gather_s:g} s; awaited: {names}")
     team = registered_team(master, plan.name)
     options = decided_unseen(team, plan.options(plan.protocol or AUTO)).options
