@@ -123,6 +123,24 @@ def test_closing_the_link_in_the_air_lets_it_hover() -> None:
         assert "low-level set point" not in vehicle.log
 
 
+def test_closing_the_link_ends_a_thread_that_was_woken_too_early() -> None:
+    with linked() as (_, autopilot):
+        requests = autopilot._crazyflie.param.param_updater.request_queue  # noqa: SLF001 - cflib's
+        put, get, begun = requests.put, requests.get, []
+
+        def counted(*how: object, **more: object) -> object:
+            begun.append(how)
+            return get(*how, **more)
+
+        def woken(request: object) -> None:
+            before = len(begun)
+            requests.put = put
+            put(request)
+            wait_until(lambda: len(begun) > before, "the thread does not wait for more")
+
+        requests.get, requests.put = counted, woken
+
+
 def test_an_error_of_the_link_that_passes_is_none_of_ours() -> None:
     with linked() as (vehicle, autopilot):
         fly(vehicle, autopilot)

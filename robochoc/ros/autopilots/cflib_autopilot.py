@@ -210,7 +210,11 @@ class CflibAutopilot(Autopilot):
         driver, crazyflie.link = crazyflie.link, None
         if driver is not None:
             driver.close()
+        updater = crazyflie.param.param_updater
         crazyflie.close_link()
+        if updater is not None:
+            # Cflib wakes this thread before it says that all is over, so it may have gone back to wait.
+            updater.request_queue.put(None)
 
     # The link
 
