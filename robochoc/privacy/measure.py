@@ -51,8 +51,8 @@ def privacy_of(journal: Journal, options: ReplayOptions | None = None, number: i
     number = len(runs) if number is None else number
     if not 1 <= number <= len(runs):
         raise PrivacyError(f"there is no run {number}: the journal holds {len(runs)}")
-    rebuilder = Rebuilder(journal.header, options or ReplayOptions())
     try:
+        rebuilder = Rebuilder(journal.header, options or ReplayOptions())
         robots = [rebuilder.robots_of(run) for run in runs[:number]][-1]
         return _Measured(journal, runs, number, robots).report()
     except CannotReplayError as why:

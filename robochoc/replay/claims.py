@@ -1,7 +1,8 @@
 """Claims of a journal besides its steps (header and outcome), compared with the results of the steps.
 
 All steps may be the same while the header, or the outcome, is another run's. Metrics are counted anew from the steps
-that were played. Verdict and values are those that the protocol objects have in the end.
+that were played. Verdict and values are those that the protocol objects have in the end. An answer that was published
+while the search went on (`--improve`) may be older than these: it is checked with the constraints, and must be as good.
 """
 
 from __future__ import annotations
@@ -19,20 +20,24 @@ from robochoc.journal.events import AnyEvent, Lost, Received, Sent
 from robochoc.journal.journal import Header, Journal, metrics_of
 from robochoc.model.costs import told_cost
 from robochoc.model.outcome import EpochOutcome, Metrics, Outcome, Verdict
+from robochoc.model.problem import Team
 from robochoc.protocols.satisfaction.disac import DisAC
 from robochoc.replay.rebuild import RebuiltRobots
 from robochoc.replay.steps import RecordedRun
 from robochoc.run.evaluation import Search, check_with_files, evaluate_search
+from robochoc.run.improvement import Rank
 from robochoc.run.options import CENTRAL
 from robochoc.run.registry import protocol_by_class
 from robochoc.run.withdrawal import Phase
 from robochoc.solver.agent_problem import RunParameters
 from robochoc.solver.domain import TooManySolutionsError
-from robochoc.verification.checker import RefutedError
+from robochoc.verification.checker import RefutedError, assignment_cost, violations
 
 _COUNTED = ("messages", "bytes", "ncccs", "checks", "largest")
 _COUNTED_BEFORE = _COUNTED[:-1]
 """In the first version of journals."""
+ANY_DEADLINE = 0.0
+"""Limits are not in a journal: what robots had when the journal ends may be an answer, by a deadline."""
 
 
 class Contradiction(msgspec.Struct, frozen=True, kw_only=True):
@@ -45,15 +50,16 @@ class Contradiction(msgspec.Struct, frozen=True, kw_only=True):
 
 @dataclass(frozen=True)
 class ReplayedRun:
-    """A replayed run with its answer; None: the journal does not hold enough for one."""
+    """A replayed run of `team` with its answer; None: the journal does not hold enough for one."""
 
     run: RecordedRun
+    team: Team
     answer: EpochOutcome | Outcome | None
 
 
 def with_answer(run: RecordedRun, robots: RebuiltRobots, outcome: Outcome | None) -> ReplayedRun:
     """Return a run that its robots have just replayed, with its answer."""
-    return ReplayedRun(run, _answer(run, robots, outcome) if outcome else None)
+    return ReplayedRun(run, robots.compiled.team, _answer(run, robots, outcome) if outcome else None)
 
 
 def contradicted_claims(journal: Journal, runs: Sequence[ReplayedRun], *, whole: bool) -> Iterator[Contradiction]:
@@ -83,8 +89,8 @@ def contradicted_claims(journal: Journal, runs: Sequence[ReplayedRun], *, whole:
     last = _last_runs(runs)
     for number, epoch in enumerate(outcome.epochs):
         if number in last:
-            yield from _answers(f"epoch {number}'s ", epoch, last[number].answer)
-    yield from _answers("the outcome's ", outcome, runs[-1].answer)
+            yield from _answers(f"epoch {number}'s ", epoch, last[number])
+    yield from _answers("the outcome's ", outcome, runs[-1])
 
 
 def _last_runs(runs: Sequence[ReplayedRun]) -> dict[int, ReplayedRun]:
@@ -122,16 +128,41 @@ def _beginning(header: Header, runs: Sequence[RecordedRun], placed_by: str | Non
         yield Contradiction(what="the header's order", recorded=header.order, replayed=order)
 
 
-def _answers(
-    whose: str, recorded: EpochOutcome | Outcome, replayed: EpochOutcome | Outcome | None
-) -> Iterator[Contradiction]:
+def _answers(whose: str, recorded: EpochOutcome | Outcome, last: ReplayedRun) -> Iterator[Contradiction]:
+    replayed = last.answer
     if replayed is None or recorded.verdict is Verdict.UNKNOWN:  # limits are not in a journal
+        return
+    if recorded.improvements:
+        yield from _published(whose, recorded, replayed, last.team)
         return
     yield from _differing(whose, recorded, replayed, ("verdict", "assignment", "cost"))
     if isinstance(recorded, Outcome) and isinstance(replayed, Outcome):
         left, right = sorted(recorded.withdrawn), sorted(replayed.withdrawn)
         if left != right:
             yield Contradiction(what=whose + "withdrawn", recorded=left, replayed=right)
+
+
+def _published(
+    whose: str, recorded: EpochOutcome | Outcome, replayed: EpochOutcome | Outcome, team: Team
+) -> Iterator[Contradiction]:
+    """Yield what is wrong with an answer that was published while the search went on, or was better than its end."""
+    withdrawn = recorded.withdrawn if isinstance(recorded, Outcome) else ()
+    faults = [*violations(team, recorded.assignment, withdrawn)]
+    if faults:
+        yield Contradiction(what=whose + "assignment", recorded=recorded.assignment, replayed=faults[0])
+        return
+    cost = told_cost(team, assignment_cost(team, recorded.assignment), without=withdrawn)
+    if recorded.cost != cost:
+        yield Contradiction(what=whose + "cost", recorded=recorded.cost, replayed=cost)
+    rank = Rank(team, partial(told_cost, team))
+    of_recorded = rank.of(cost, withdrawn)
+    found = replayed.verdict in {Verdict.SOLUTION, Verdict.OPTIMAL}
+    of_replayed = rank.of(replayed.cost or 0, replayed.withdrawn if isinstance(replayed, Outcome) else ())
+    if found and of_replayed < of_recorded:
+        yield Contradiction(what=whose + "cost", recorded=recorded.cost, replayed=replayed.cost)
+    proven = replayed.verdict is Verdict.OPTIMAL and of_replayed == of_recorded
+    if recorded.verdict is Verdict.OPTIMAL and not (proven or (replayed.bound == cost and not withdrawn)):
+        yield Contradiction(what=whose + "verdict", recorded=recorded.verdict, replayed=replayed.verdict)
 
 
 def _differing(whose: str, recorded: object, replayed: object, names: Sequence[str]) -> Iterator[Contradiction]:
@@ -160,7 +191,7 @@ def _answer(run: RecordedRun, robots: RebuiltRobots, outcome: Outcome) -> EpochO
     phase = Phase("", robots.protocol, RunParameters(withdrawal_cost=given.aside), withdrawal)
     check = partial(check_with_files, phase, result, team, robots.compiled)
     try:
-        answer = evaluate_search(phase, Search(result, check), team.kind, partial(told_cost, team))
+        answer = evaluate_search(phase, Search(result, check), team.kind, partial(told_cost, team), ANY_DEADLINE)
     except (RefutedError, TooManySolutionsError):
         return EpochOutcome(Verdict.UNKNOWN, team.order)
     if not withdrawal:

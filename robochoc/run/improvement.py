@@ -46,9 +46,13 @@ class Rank:
         self._weights = {robot.name: robot.weight for robot in team.robots}
         self._sign = -1 if told(1) < told(0) else 1
 
-    def of(self, answer: Answer) -> tuple[int, Cost]:
-        """Return the rank of `answer`, which has an assignment: the lower, the better."""
-        return sum(self._weights[name] for name in answer.withdrawn), self._signed(answer.cost or 0)
+    def of(self, cost: Cost, withdrawn: Sequence[str]) -> tuple[int, Cost]:
+        """Return the rank of an answer of this `cost` without the robots `withdrawn`: the lower, the better."""
+        return sum(self._weights[name] for name in withdrawn), self._signed(cost)
+
+    def of_answer(self, answer: Answer) -> tuple[int, Cost]:
+        """Return the rank of `answer`, which has an assignment."""
+        return self.of(answer.cost or 0, answer.withdrawn)
 
     def tightest(self, bounds: Sequence[Cost | None]) -> Cost | None:
         """Return the bound that says the most; None if there is none."""
@@ -144,7 +148,9 @@ class Improvements(SearchWatch):
         """Keep `answer` if it is the best so far, and what is proven of the costs of all."""
         if self._bounded:
             self._bound = self._rank.tightest([self._bound, answer.bound])
-        if _is_found(answer) and (self._best is None or self._rank.of(answer) < self._rank.of(self._best)):
+        if _is_found(answer) and (
+            self._best is None or self._rank.of_answer(answer) < self._rank.of_answer(self._best)
+        ):
             self._best = answer
         best = self._best
         if best is not None and (self._has_costs or best.withdrawn) and self._is_proven(best, answer):
@@ -152,7 +158,7 @@ class Improvements(SearchWatch):
 
     def _is_proven(self, best: Answer, answer: Answer) -> bool:
         """Return whether nothing is better than the `best`, as `answer` says, or the bound."""
-        optimal = answer.verdict is Verdict.OPTIMAL and self._rank.of(answer) == self._rank.of(best)
+        optimal = answer.verdict is Verdict.OPTIMAL and self._rank.of_answer(answer) == self._rank.of_answer(best)
         return optimal or self._rank.meets(best, self._bound)
 
     def _publish_if_due(self, now: float) -> None:
@@ -164,7 +170,7 @@ class Improvements(SearchWatch):
     def _tell(self, best: Answer, now: float) -> None:
         """Publish the `best`, if that is a gain: robots under way are not sent elsewhere for nothing."""
         before = self._published
-        if self._outdated or (before is not None and not self._rank.of(best) < self._rank.of(before)):
+        if self._outdated or (before is not None and not self._rank.of_answer(best) < self._rank.of_answer(before)):
             return
         self._published = best
         if now >= self._deadline:
@@ -210,7 +216,7 @@ class Improvements(SearchWatch):
             return
         if final.verdict is Verdict.NO_SOLUTION:
             raise RefutedError(f"the protocol says that there is no solution, and one ({best.cost}) was found")
-        if final.verdict is Verdict.OPTIMAL and self._rank.of(best) < self._rank.of(final):
+        if final.verdict is Verdict.OPTIMAL and self._rank.of_answer(best) < self._rank.of_answer(final):
             raise RefutedError(f"the protocol says that {final.cost} is optimal, and {best.cost} was found before")
 
 

@@ -133,7 +133,8 @@ class ThisMachine(Deployment):
     def limit_reached(self, why: str) -> Answer:
         """Return the answer of a run that a limit has ended before the robots could search."""
         reason = "; ".join([why, *self._scenario.failed_returns])
-        return self._with_epochs(Answer(Verdict.UNKNOWN, reason=reason))
+        before = total_preprocessing(self._done)
+        return self._with_epochs(Answer(Verdict.UNKNOWN, reason=reason, preprocessing=before))
 
     # Epochs
 

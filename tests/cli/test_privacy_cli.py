@@ -76,3 +76,12 @@ def test_a_journal_that_ends_before_a_run_begins_is_not_measured(saved: Path, tm
 def test_what_is_no_journal_is_invalid(tmp_path: Path) -> None:
     (tmp_path / "file").write_text("hello")
     assert run("privacy", tmp_path / "file").exit_code == INVALID
+
+
+def test_a_run_that_has_lost_messages_is_refused_in_one_line(saved: Path, tmp_path: Path) -> None:
+    journal = tmp_path / "lossy.journal"
+    lossy = ["--protocol", "dba", "--runtime", "simulator", "--message-loss", "0.2", "--messages", "50"]
+    run("solve", saved.parent / "team", *lossy, "--journal", journal, "--no-cache")
+    refused = run("privacy", journal, "--no-cache")
+    assert (refused.exit_code, refused.stdout) == (USAGE, "")
+    assert refused.stderr == f"{journal}: messages were lost in it (--message-loss), and no journal says which\n"

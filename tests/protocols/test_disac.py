@@ -23,6 +23,7 @@ from robochoc.run.registry import protocol_named, protocol_names
 from robochoc.solver.agent_problem import agent_problems
 from robochoc.solver.compiled import LocalProblem
 from robochoc.solver.encoding import UnsupportedError
+from robochoc.solver.team_compiler import OutOfTimeError
 from tests.support.agents import replies
 from tests.support.examples import count
 from tests.support.limits import HANG_S
@@ -212,6 +213,20 @@ def test_a_limit_may_end_it() -> None:
     outcome = solve(random_csp(12, 4, 0.5, 0.4), replace(AC, protocol="abt", messages=3))
     assert outcome.verdict is Verdict.UNKNOWN
     assert outcome.reason == "so many messages have been sent (--messages 3)"
+
+
+def test_what_it_took_is_told_where_the_time_is_over_after_it(monkeypatch: pytest.MonkeyPatch) -> None:
+    def too_late(*_: object) -> Team:
+        raise OutOfTimeError("the time was over while RA was compiled")
+
+    monkeypatch.setattr("robochoc.run.this_machine.restricted", too_late)
+    journal = record(chain(1, 2, 3, 4), replace(AC, protocol="abt"))
+    outcome = journal.outcome
+    assert outcome is not None
+    assert (outcome.verdict, outcome.reason) == (Verdict.UNKNOWN, "the time was over while RA was compiled")
+    assert outcome.preprocessing is not None
+    assert outcome.preprocessing.removed == 6
+    assert not replay(journal).contradictions
 
 
 @pytest.mark.parametrize("protocol", ["abt", "sfb"])

@@ -10,10 +10,12 @@ import pytest
 
 from robochoc.formats import read_team
 from robochoc.generators.queens3d import queens3d
+from robochoc.generators.random_csp import random_csp
 from robochoc.journal.journal import Journal
 from robochoc.model.outcome import Verdict
 from robochoc.replay import replay
 from robochoc.run.options import Options, Runtime, Withdrawal
+from tests.support.counted_clock import time_passes_at_each_look
 from tests.support.program import ROOT
 from tests.support.replays import recorded
 
@@ -78,3 +80,47 @@ def test_a_solution_is_not_a_proof_that_there_is_none() -> None:
         "the outcome's assignment",
         "the outcome's cost",
     }
+
+
+BY_A_DEADLINE = Options(
+    protocol="dsa", runtime=Runtime.SIMULATOR, settings={"cycles": "100000"}, seed=1, deadline=40, improve=400
+)
+
+
+def ended_by_the_time(options: Options) -> Journal:
+    """Return the journal of a search for the least cost that the time has ended."""
+    with time_passes_at_each_look():
+        journal = recorded(random_csp(6, 4, 0.8, 0, 1, max_cost=50), options)
+    assert journal.outcome is not None
+    assert (journal.outcome.verdict, journal.outcome.deadline) == ("solution", 40)
+    return journal
+
+
+def test_an_answer_by_a_deadline_is_what_the_robots_had_then() -> None:
+    journal = ended_by_the_time(replace(BY_A_DEADLINE, improve=None))
+    assert journal.outcome is not None
+    assert replay(journal).identical
+    for field, claimed in (
+        ("verdict", replace(journal.outcome, verdict=Verdict.OPTIMAL)),
+        ("cost", replace(journal.outcome, cost=1)),
+    ):
+        found = replay(replace(journal, outcome=claimed))
+        assert [one.what for one in found.contradictions] == [f"the outcome's {field}"]
+
+
+def test_an_answer_that_was_improved_is_as_good_as_what_the_robots_end_with() -> None:
+    journal = ended_by_the_time(BY_A_DEADLINE)
+    outcome = journal.outcome
+    assert outcome is not None
+    assert len(outcome.improvements) > 1
+    assert replay(journal).identical
+    worse = {name: value % 4 + 1 for name, value in outcome.assignment.items()}
+    beyond = dict.fromkeys(outcome.assignment, 17)
+    for field, claimed in (
+        ("assignment", replace(outcome, assignment=beyond)),
+        ("cost", replace(outcome, assignment=worse)),
+        ("cost", replace(outcome, cost=1)),
+        ("verdict", replace(outcome, verdict=Verdict.OPTIMAL)),
+    ):
+        found = replay(replace(journal, outcome=claimed))
+        assert {one.what for one in found.contradictions} == {f"the outcome's {field}"}

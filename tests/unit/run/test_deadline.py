@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-import itertools
-import time
+from collections.abc import Iterator
 from dataclasses import replace
 from functools import partial
 from random import Random
-from types import SimpleNamespace
 
 import pytest
 
@@ -28,6 +26,7 @@ from robochoc.solver.encoding import UnsupportedError
 from robochoc.verification.checker import assignment_cost, violations
 from tests.support.brute_force import least_cost, priced_solutions
 from tests.support.cost_problems import random_cost_team
+from tests.support.counted_clock import time_passes_at_each_look
 from tests.support.examples import count
 from tests.support.problems import random_team
 
@@ -40,11 +39,10 @@ def hard_to_prove() -> Team:
 
 
 @pytest.fixture
-def a_second_a_look(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Let a second pass whenever the simulator, or the run, looks at the clock: so no machine is too slow."""
-    clock = itertools.count(time.monotonic())
-    for module in ("communication.simulator.simulator", "run.context"):
-        monkeypatch.setattr(f"robochoc.{module}.time", SimpleNamespace(monotonic=lambda: next(clock)))
+def a_second_a_look() -> Iterator[None]:
+    """Let a second pass whenever somebody looks at the clock: so as much is done on every machine."""
+    with time_passes_at_each_look():
+        yield
 
 
 @pytest.mark.usefixtures("a_second_a_look")

@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-import itertools
 import os
 import signal
 import sys
-import time
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
 from random import Random
@@ -33,6 +31,7 @@ from robochoc.solver.encoding import UnsupportedError
 from robochoc.verification.checker import RefutedError, assignment_cost, violations
 from tests.support.brute_force import least_cost
 from tests.support.cost_problems import random_cost_team
+from tests.support.counted_clock import time_passes_at_each_look
 from tests.support.examples import count
 from tests.support.faults import own_children
 from tests.support.problems import random_team
@@ -63,11 +62,10 @@ class Told:
 
 
 @pytest.fixture
-def a_second_a_look(monkeypatch: pytest.MonkeyPatch) -> None:
+def a_second_a_look() -> Iterator[None]:
     """Let a second pass whenever somebody looks at the clock: so as much is done on every machine."""
-    clock = itertools.count(time.monotonic())
-    for module in ("communication.simulator.simulator", "run.context", "run.improvement"):
-        monkeypatch.setattr(f"robochoc.{module}.time", SimpleNamespace(monotonic=lambda: next(clock)))
+    with time_passes_at_each_look():
+        yield
 
 
 def costly(size: int = 8, **more: object) -> Team:
