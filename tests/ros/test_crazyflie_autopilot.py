@@ -10,6 +10,7 @@ import pytest
 
 pytest.importorskip("cflib")
 
+from robochoc.ros.autopilots import cflib_autopilot
 from robochoc.ros.autopilots.autopilot import OFFBOARD, RefusedError, Telemetry
 from robochoc.ros.autopilots.cflib_autopilot import PEAK, CflibAutopilot
 from robochoc.ros.autopilots.fleet import Link
@@ -27,10 +28,18 @@ from robochoc.ros.autopilots.supervisor import (
     Supervisor,
 )
 from tests.support.crazyflies import Crazyflies, Crazyfly, Place
-from tests.support.limits import wait_until
+from tests.support.limits import HANG_S, wait_until
 from tests.support.mavlink_teams import udp_ports
 
 SPEED_MS = 2.0
+
+
+@pytest.fixture(autouse=True)
+def patient(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Commands are given again, and telemetry counts as fresh, for as long as a busy machine may take."""
+    monkeypatch.setattr(cflib_autopilot, "_TRIES", round(HANG_S / cflib_autopilot._ANSWER_S))  # noqa: SLF001
+    monkeypatch.setattr(cflib_autopilot, "SPIN_UP_S", HANG_S)
+    monkeypatch.setattr(cflib_autopilot, "STALE_S", HANG_S)
 
 
 @contextmanager
@@ -86,13 +95,14 @@ def test_what_is_told_is_in_the_frame_of_the_team() -> None:
 
 
 def test_on_its_way_it_is_sent_elsewhere_in_a_straight_line() -> None:
-    with linked(haste=4.0) as (vehicle, autopilot):
+    with linked() as (vehicle, autopilot):
         fly(vehicle, autopilot)
+        vehicle.haste = 1.0  # it is on its way for some seconds
         wait_until(going(autopilot, (4, 0, 1)), vehicle.log.__str__)
         _, lasts, straight = vehicle.paths[-1]
         assert lasts == pytest.approx(PEAK * 4 / SPEED_MS, rel=0.01)
         assert not straight
-        seen(autopilot, lambda told: told.place is not None and told.place[0] > 0.5)
+        seen(autopilot, lambda told: told.place is not None and told.place[0] > 0.01)
         autopilot.go_to((0, 0, 1))
         to, lasts, straight = vehicle.paths[-1]
         assert (to, straight) == ((0, 0, 1), True)
@@ -179,11 +189,12 @@ def test_a_take_off_whose_answer_is_lost_is_none_that_was_refused() -> None:
         autopilot.arm()
         autopilot.take_off(1)
         autopilot.land()
-        assert vehicle.log[-1] == "land"
+        assert "land" in vehicle.log
 
 
 @pytest.mark.slow
-def test_who_is_not_heard_gets_no_command() -> None:
+def test_who_is_not_heard_gets_no_command(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(cflib_autopilot, "STALE_S", 1.0)
     with linked() as (vehicle, autopilot):
         vehicle.silent = True
         seen(autopilot, lambda told: told.silent_s > 1)
@@ -192,8 +203,9 @@ def test_who_is_not_heard_gets_no_command() -> None:
 
 
 def test_a_landing_that_is_under_way_is_no_refusal() -> None:
-    with linked(haste=4.0) as (vehicle, autopilot):
+    with linked() as (vehicle, autopilot):
         fly(vehicle, autopilot)
+        vehicle.haste = 0.1  # it does not get there
         autopilot.land()
         autopilot.land()
         assert vehicle.log.count("land") == 1

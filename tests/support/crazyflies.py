@@ -3,8 +3,9 @@
 They know what cflib and robochoc rely on: the echo and the source of the link, the version of the protocol, the tables
 of log variables and parameters, blocks of the log, memories, the supervisor with its arming, and the high-level
 commander. A set point of low level takes over from that commander, and one without thrust lets a Crazyflie fall, as it
-does in the firmware. All times of the firmware are divided by `haste`. Places are in metres, from where each was
-switched on.
+does in the firmware. All times of the firmware are divided by `haste`, but for the one that it gives to whoever is
+armed and does not take off: that is for people, and a busy machine needs some of it. A path that is asked for again, as
+the answer came late, is one path. Places are in metres, from where each was switched on.
 
 Source: the firmware's documentation of CRTP, and its supervisor.c, planner.c and crtp_commander_high_level.c, protocol
 version 12.
@@ -127,6 +128,7 @@ class _Played:
         self._begun = self._armed_at = self._down_at = 0.0
         self._lasts = 0.001
         self._straight = False
+        self._asked = b""
         self._thrust_at = -math.inf
         self._begun_at = time.monotonic()
 
@@ -208,7 +210,7 @@ class _Played:
             self._down_at = now
             return
         flew = math.isfinite(self._thrust_at) and self._thrust_at > self._armed_at
-        if now - self._down_at > (LANDED_S if flew else PREFLIGHT_S) / vehicle.haste:
+        if now - self._down_at > (LANDED_S / vehicle.haste if flew else PREFLIGHT_S):
             vehicle.armed = False
             self._say("disarmed by itself")
 
@@ -356,8 +358,11 @@ class _Played:
             result = _REFUSED
         elif what != "stop" and not self._can_fly():
             result = BUSY
+        elif what == "goto" and content == self._asked and self.vehicle.planner == "flying":
+            result = 0
         else:
             result = obey(content[2:])
+            self._asked = content
         self._answer(what, _HIGH_LEVEL, 0, content[:3] + bytes([result]))
 
     def _stop(self, _content: bytes) -> int:
