@@ -196,10 +196,13 @@ def test_who_comes_late_receives_the_last(domain: int, depth: int, numbers: list
 
 
 def test_a_subscriber_that_asks_for_less_receives_too(domain: int) -> None:
+    """It is sent nothing again: what is published before it has found the publisher is lost to it."""
     with (
-        subscriber(domain, {"/a/waypoint": "PoseStamped"}, reliable=False) as peer,
+        subscriber(domain, {"/a/waypoint": "PoseStamped"}, reliable=False, tells_matched=True) as peer,
         DdsSink(f"{domain}?{WAITS}") as sink,
     ):
+        sink.advertise({"/a/waypoint": POSE})
+        assert peer.heard() == "matched"
         sink.publish("/a/waypoint", POSE, pose(1), STAMP)
         topic, message = peer.heard()
     assert topic == "/a/waypoint"

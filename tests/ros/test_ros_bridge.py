@@ -75,7 +75,7 @@ def loop() -> None:
 @pytest.fixture(autouse=True)
 def impatient(monkeypatch: pytest.MonkeyPatch) -> Callable[..., None]:
     """What makes sinks and sources wait so long, as long as a test says, for what never comes. The rest has time."""
-    for name in ("CONNECT_S", "DRAIN_S", "CONFIRM_S", "CLOSE_S"):
+    for name in ("CONNECT_S", "DRAIN_S", "LOOP_S", "CONFIRM_S", "CLOSE_S"):
         monkeypatch.setattr(rosbridge_connection, name, HANG_S)
 
     def waits(*names: str) -> None:

@@ -14,6 +14,7 @@ from click.testing import CliRunner
 from robochoc.cli.group import cli
 from robochoc.ros.decide_service import DECIDE, TRIGGER, DecideService, refusal
 from robochoc.ros.decision import FollowedDecision
+from robochoc.ros.live import rosbridge_connection
 from robochoc.ros.live.rosbridge_connection import Connection
 from robochoc.ros.live.rosbridge_service import RosbridgeServices
 from robochoc.ros.live.services import WAITING_MAX
@@ -30,8 +31,10 @@ SERVICES = {SERVICE: DECIDE, CANCEL: TRIGGER}
 
 
 @pytest.fixture(autouse=True)
-def _loop() -> None:
+def _loop(monkeypatch: pytest.MonkeyPatch) -> None:
     begin_the_loop_of_roslibpy()
+    for name in ("CONNECT_S", "DRAIN_S", "LOOP_S", "CONFIRM_S", "CLOSE_S"):
+        monkeypatch.setattr(rosbridge_connection, name, HANG_S)
 
 
 @pytest.fixture

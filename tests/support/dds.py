@@ -14,6 +14,7 @@ from types import TracebackType
 from typing import Any, Self
 
 from tests.support.limits import HANG_S
+from tests.support.ports import share_of_this_worker
 
 LOOPBACK_ALONE = (
     "<CycloneDDS><Domain><General><Interfaces><NetworkInterface name='lo'/></Interfaces>"
@@ -31,9 +32,12 @@ _given: set[int] = set()
 
 
 def free_domain() -> int:
-    """A domain that nobody is in, and that no test of this process was given before."""
+    """A domain that nobody is in, and that no test of this process was given lately."""
+    ours = share_of_this_worker(range(_FIRST, _LAST + 1))
     while True:
-        domain = _chance.randint(_FIRST, _LAST)
+        if _given.issuperset(ours):
+            _given.clear()
+        domain = _chance.choice(ours)
         if domain not in _given and all(_is_free(7410 + 250 * domain + 2 * index) for index in range(4)):
             _given.add(domain)
             return domain

@@ -1,8 +1,9 @@
 """The other end of DDS: a program of cyclonedds alone, with types written by hand, that shares no code with ours.
 
 Run as `dds_peer.py subscribe DOMAIN SETTINGS` or `dds_peer.py report DOMAIN SETTINGS`; the settings are JSON. It says
-"ready" when its topics exist. A subscriber says a line of JSON for each message until its input ends; a reporter
-publishes one message for each line of its input, once somebody has subscribed.
+"ready" when its topics exist. A subscriber says a line of JSON for each message until its input ends; with
+`tells_matched` it says "matched" when it has found a publisher of each topic. A reporter publishes one message for each
+line of its input, once somebody has subscribed.
 """
 
 import json
@@ -121,9 +122,12 @@ def subscribe(participant: DomainParticipant, settings: dict[str, Any]) -> None:
         for topic, kind in settings["topics"].items()
     }
     say("ready")
-    over = False
+    over, is_told = False, not settings.get("tells_matched")
     while not over:
         over = ended(0.02)
+        if not is_told and all(reader.get_subscription_matched_status().current_count for reader in readers.values()):
+            is_told = True
+            say("matched")
         for topic, reader in readers.items():
             for message in reader.take(100):
                 if message.sample_info.valid_data:

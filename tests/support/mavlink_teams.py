@@ -12,7 +12,7 @@ from random import Random
 from robochoc.formats import write_team
 from robochoc.model.expression import Constant, Name
 from robochoc.model.problem import Team, Topic
-from tests.support.ports import LOOPBACK
+from tests.support.ports import LOOPBACK, share_of_this_worker
 from tests.support.small_teams import graph_team
 
 NAMES = ("RA", "RB", "RC", "RD")
@@ -45,7 +45,7 @@ def team_folder(folder: Path) -> Path:
 def udp_ports(count: int) -> list[int]:
     """Return ports of this machine that nobody receives at."""
     while True:
-        ports = _CHANCE.sample(range(_FIRST, _LAST), count)
+        ports = _CHANCE.sample(share_of_this_worker(range(_FIRST, _LAST)), count)
         with ExitStack() as stack:
             try:
                 for port in ports:

@@ -84,8 +84,15 @@ class FarEnd(_Program):
         """The messages that it has received: topics and fields."""
         self._came = threading.Condition()
         self._answers: Queue[Any] = Queue()
-        threading.Thread(target=self._read, daemon=True).start()
+        self._reader = threading.Thread(target=self._read, daemon=True)
+        self._reader.start()
         assert self._answers.get(timeout=HANG_S) == "ready"
+
+    def kill(self) -> None:
+        """Kill it; the reader has read to the end before its stream is closed."""
+        self.process.kill()
+        self._reader.join(HANG_S)
+        super().kill()
 
     def ask(self, name: str, **given: object) -> Any:  # noqa: ANN401 - JSON
         """Give a command; return the answer."""
@@ -111,6 +118,8 @@ class FarEnd(_Program):
     def _read(self) -> None:
         assert self.process.stdout is not None
         for line in self.process.stdout:
+            if not line.endswith("\n"):
+                return  # it was killed while it wrote
             topic, what = json.loads(line)
             if not topic:
                 self._answers.put(what)

@@ -24,6 +24,8 @@ CONNECT_S = 5.0
 """The longest wait for a server's answer, in seconds."""
 DRAIN_S = 10.0
 """The longest time for which the server may leave pending messages unread, in seconds."""
+LOOP_S = 10.0
+"""The longest wait for the connection's own thread, in seconds."""
 CONFIRM_S = 3.0
 """The longest wait for the confirmation that all was read, in seconds. A server that forbids services sends none."""
 CLOSE_S = 4.0
@@ -161,7 +163,7 @@ class Connection:
 
         self.ros.factory.manager.loop.call_soon_threadsafe(look)
         try:
-            return size.result(DRAIN_S)
+            return size.result(LOOP_S)
         except TimeoutError:
             raise self._failed(f"the connection to the rosbridge at {self.url} is stuck; start again") from None
 
