@@ -187,6 +187,10 @@ def test_links_to_crazyflies(tmp_path: Path, uri: str) -> None:
             )
         ),
         (f"vehicles: {{A: {{at: [0, 0, 0]}}}}\n{FENCE}", "vehicle A has no 'link'; as in link: radio://0/80"),
+        *(
+            (f"vehicles:\n  A: {URI}\n  B: {other}\n{FENCE}", "fleet.yaml:3: B and A have the same link")
+            for other in (URI, URI.replace("//0", "//1"), URI.replace("E7", "e7"))
+        ),
         (
             f"vehicles: {{A: {URI}}}\n{FENCE}\norigin: [1, 2, 3]",
             "'origin' does not belong in a fleet file of crazyflie",

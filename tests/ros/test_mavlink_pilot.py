@@ -6,64 +6,21 @@ from dataclasses import replace
 
 import pytest
 
-from robochoc.flight.layout import Point
-from robochoc.ros.autopilots.autopilot import OFFBOARD, Autopilot, RefusedError, Telemetry
-from robochoc.ros.autopilots.fleet import AtEnd, Fence, Fleet, Link, point_text
+from robochoc.ros.autopilots.autopilot import OFFBOARD, Telemetry
+from robochoc.ros.autopilots.fleet import AtEnd, Fence, Fleet, Link
 from robochoc.ros.autopilots.limits import CLIMB_S, END_S, LANDING_S, MODE_S, SILENCE_S
 from robochoc.ros.autopilots.messages import Phase, State, Target
 from robochoc.ros.autopilots.pilot import Pilot
 from robochoc.ros.autopilots.traffic import Traffic
+from tests.support.played_autopilot import GROUND, Played
 
 FLEET = Fleet({"A": Link("udpin://0.0.0.0:1")}, Fence((-1, -1, 0), (9, 9, 9)), distance_m=2)
 """With such a distance set points are far ahead: at the places themselves."""
-GROUND = Telemetry((0, 0, 0), 1.0, "HOLD", healthy=True)
 THERE = Target((3, 1, 2))
 
 
-class Played(Autopilot):
-    """Does what it is told, at once, and keeps what that was."""
-
-    url = "udpin://0.0.0.0:1"
-
-    def __init__(self) -> None:
-        self.now = 0.0
-        self.seen = GROUND
-        self.done: list[str] = []
-        self.refuses: set[str] = set()
-        self.connects = True
-
-    def take(self, what: str, **after: object) -> None:
-        self.done.append(what)
-        if what.split(maxsplit=1)[0] in self.refuses:
-            raise RefusedError(f"it did not {what}")
-        self.seen = replace(self.seen, **after)  # type: ignore[arg-type]
-
-    def connect(self) -> bool:
-        return self.connects
-
-    def look(self) -> Telemetry:
-        return self.seen
-
-    def arm(self) -> None:
-        self.take("arm", armed=True)
-
-    def disarm(self) -> None:
-        self.take("disarm", armed=False)
-
-    def take_off(self, height_m: float) -> None:
-        self.take(f"rise {height_m:g}", in_air=True, mode="TAKEOFF", place=(0.0, 0.0, height_m))
-
-    def go_to(self, place: Point) -> None:
-        self.take(f"go ({point_text(place)})", mode=OFFBOARD, place=place)
-
-    def hold(self) -> None:
-        self.take("hold", mode="HOLD")
-
-    def land(self) -> None:
-        self.take("land", mode="LAND")
-
-    def close(self) -> None:
-        pass
+def broken(*_: object, **__: object) -> None:
+    raise ValueError("nobody foresaw it")
 
 
 @pytest.fixture
@@ -188,6 +145,20 @@ def test_who_has_landed_takes_off_again(pilot: Pilot, played: Played) -> None:
     assert steps(pilot, played, 3).phase is Phase.ARRIVED
 
 
+def test_who_is_sent_elsewhere_while_it_lands_takes_off_again(pilot: Pilot, played: Played) -> None:
+    flying(pilot)
+    steps(pilot, played, 3)
+    pilot.fly(2, Target((6, 0, 0), lands=True))
+    assert steps(pilot, played, 2).phase is Phase.LANDING
+    pilot.fly(3, THERE)
+    steps(pilot, played)
+    played.seen = replace(played.seen, armed=False, in_air=False, place=(6, 0, 0))
+    assert steps(pilot, played, 5) == State(
+        "A", Phase.ARRIVED, 3, (3, 1, 2), 1.0, healthy=True, in_air=True, commanded=True
+    )
+    assert played.done[-5:] == ["land", "arm", "rise 2.5", "go (6, 0, 2.5)", "go (3, 1, 2)"]
+
+
 @pytest.mark.parametrize(
     ("seen", "why"),
     [
@@ -237,6 +208,7 @@ def test_a_take_off_that_never_ends(pilot: Pilot, played: Played) -> None:
     ("seen", "why"),
     [
         ({"silent_s": 11.0}, "its link has been silent for 10 s"),
+        ({"place_age_s": 11.0}, "it has not told its place for 10 s"),
         ({"place": (3.0, 11.0, 2.0)}, "it has left the fence, at 3, 11, 2"),
         ({"place": (3.0, 1.0, 10.5)}, "it has left the fence, at 3, 1, 10.5"),
         ({"armed": False}, "its motors have stopped"),
@@ -419,3 +391,72 @@ def test_who_is_not_heard_is_not_waited_for_for_ever(pilot: Pilot, played: Playe
     pilot.recover(AtEnd.LAND)
     steps(pilot, played, 12, 1.0)
     assert is_over(pilot)
+
+
+# What nobody foresaw
+
+
+FAILED = "its pilot failed: ValueError: nobody foresaw it"
+
+
+@pytest.mark.parametrize("what", ["look", "go_to"])
+def test_who_has_a_pilot_that_fails_is_out_and_lands(
+    pilot: Pilot, played: Played, monkeypatch: pytest.MonkeyPatch, what: str
+) -> None:
+    flying(pilot)
+    steps(pilot, played, 3)
+    pilot.fly(2, Target((4, 2, 4)))
+    monkeypatch.setattr(played, what, broken)
+    assert steps(pilot, played).why == FAILED
+    assert steps(pilot, played, 3).phase is Phase.OUT
+    assert played.done.count("land") == 1
+    pilot.end(AtEnd.LAND, waits=False)
+    steps(pilot, played)
+    assert is_over(pilot)
+
+
+def test_who_cannot_be_planned_for_lands_all_the_same(
+    pilot: Ordered, played: Played, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    flying(pilot)
+    steps(pilot, played, 3)
+    for method in ("see", "lose", "clearance", "is_clear_below"):
+        monkeypatch.setattr(pilot.traffic, method, broken)
+    assert steps(pilot, played).why == FAILED
+    assert played.done[-1] == "land"
+
+
+def test_a_landing_that_fails_is_tried_again_and_given_up_at_last(
+    pilot: Pilot, played: Played, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    flying(pilot)
+    steps(pilot, played, 3)
+    for method in ("look", "land"):
+        monkeypatch.setattr(played, method, broken)
+    pilot.end(AtEnd.LAND, waits=True)
+    steps(pilot, played, 3, 1.0)
+    assert not is_over(pilot)
+    steps(pilot, played, 1, 2 * END_S)
+    assert is_over(pilot)
+
+
+def test_whom_a_person_flies_is_left_alone_by_a_pilot_that_fails(
+    pilot: Pilot, played: Played, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    flying(pilot)
+    steps(pilot, played, 3)
+    played.seen = replace(played.seen, mode="POSCTL")
+    monkeypatch.setattr(pilot, "_trouble", broken)
+    steps(pilot, played, 3)
+    assert "land" not in played.done
+
+
+def test_who_was_never_commanded_is_not_commanded_by_a_pilot_that_fails(
+    pilot: Pilot, played: Played, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    steps(pilot, played, 2)
+    monkeypatch.setattr(played, "look", broken)
+    pilot.end(AtEnd.LAND, waits=True)
+    steps(pilot, played)
+    assert is_over(pilot)
+    assert played.done == []

@@ -66,6 +66,11 @@ class Vehicle:
     """True: neither sends nor hears, as without radio."""
     silent_from: str = ""
     """The mode from whose beginning on it is silent."""
+    has_camera: bool = False
+    """True: a camera on board sends heartbeats of its own, also while the autopilot is silent."""
+    lost_from: str = ""
+    """The mode from whose beginning on it tells no place any more, as without GPS."""
+    is_lost: bool = False
     healthy: bool = True
     is_ardupilot: bool = False
     """True: it speaks as ArduCopter does. It keeps on flying to the last set point when no others come."""
@@ -107,6 +112,7 @@ class _Played:
         self.socket.setblocking(False)
         self._mav: Any = common.MAVLink(self, srcSystem=system, srcComponent=1)
         self._mav.robust_parsing = True
+        self._camera: Any = common.MAVLink(None, srcSystem=system, srcComponent=common.MAV_COMP_ID_CAMERA)
         self._begun = time.monotonic()
         self._heartbeat_at = self._telemetry_at = self._armed_at = 0.0
         self._setpoint_at = -math.inf
@@ -117,8 +123,11 @@ class _Played:
     def write(self, content: bytes) -> None:
         """Send, as the library's file."""
         if not self.vehicle.silent:
-            with suppress(OSError):
-                self.socket.sendto(content, (LOOPBACK, self.vehicle.port))
+            self._send(content)
+
+    def _send(self, content: bytes) -> None:
+        with suppress(OSError):
+            self.socket.sendto(content, (LOOPBACK, self.vehicle.port))
 
     def hear(self) -> None:
         while True:
@@ -157,6 +166,9 @@ class _Played:
             if vehicle.is_ardupilot:
                 kind, mode = common.MAV_AUTOPILOT_ARDUPILOTMEGA, _COPTER[vehicle.mode]
             self._mav.heartbeat_send(common.MAV_TYPE_QUADROTOR, kind, base, mode, state)
+            if vehicle.has_camera:
+                beat = self._camera.heartbeat_encode(common.MAV_TYPE_CAMERA, common.MAV_AUTOPILOT_INVALID, 0, 0, state)
+                self._send(beat.pack(self._camera))
         if now - self._telemetry_at > _TELEMETRY_S:
             self._telemetry_at = now
             self._tell(round((now - self._begun) * 1000))
@@ -206,6 +218,7 @@ class _Played:
         if mode != self.vehicle.mode:
             self.vehicle.mode = mode
             self.vehicle.silent = self.vehicle.silent or mode == self.vehicle.silent_from
+            self.vehicle.is_lost = self.vehicle.is_lost or mode == self.vehicle.lost_from
             self.vehicle.log.append(mode)
         if mode == "hold":
             self.vehicle.target = self.vehicle.at if self.vehicle.flies else None
@@ -220,8 +233,9 @@ class _Played:
         east, north, up = vehicle.at
         place = geodetic_of((east, north, up), vehicle.home)
         lat, lon = round(place.lat * 1e7), round(place.lon * 1e7)
-        mav.local_position_ned_send(boot_ms, north, east, -up, 0, 0, 0)
-        mav.global_position_int_send(boot_ms, lat, lon, round(place.alt * 1000), round(up * 1000), 0, 0, 0, 0)
+        if not vehicle.is_lost:
+            mav.local_position_ned_send(boot_ms, north, east, -up, 0, 0, 0)
+            mav.global_position_int_send(boot_ms, lat, lon, round(place.alt * 1000), round(up * 1000), 0, 0, 0, 0)
         mav.gps_raw_int_send(boot_ms * 1000, 3, lat, lon, round(place.alt * 1000), 100, 100, 0, 0, 10)
         home = vehicle.home
         mav.home_position_send(

@@ -37,6 +37,8 @@ class Telemetry:
     """True from its first message until it has told everything that is needed before it can fly."""
     silent_s: float = 0.0
     """The time since the last heartbeat, in seconds."""
+    place_age_s: float = 0.0
+    """The time since it last told its place, in seconds: a vehicle that is heard may no longer know where it is."""
 
     @property
     def is_flown_by_others(self) -> bool:

@@ -17,7 +17,7 @@ from robochoc.flight.layout import Point
 from robochoc.formats.diagnostics import MistakeError, on_one_line, shortened, suggestion
 from robochoc.formats.dialects.yaml_tree import Node, read_yaml, shown
 from robochoc.ros.autopilots.frames import FAR_M, LATITUDE_MAX, GpsPlace
-from robochoc.ros.autopilots.kinds import Kind, shared_port
+from robochoc.ros.autopilots.kinds import Kind, address_of, shared_port
 
 BYTES_MAX = 64 * 1024
 VEHICLES_MAX = 64
@@ -167,17 +167,18 @@ def _fleet(root: Node, kind: Kind) -> Fleet:
 
 def _vehicles(node: Node, kind: Kind, origin: GpsPlace | None) -> dict[str, Link]:
     found: dict[str, Link] = {}
-    urls: dict[str, str] = {}
+    names: dict[str, str] = {}
     for name, entry in _mapping(node, "'vehicles'").items():
         link = _link(entry, name, kind, origin)
-        if link.url in urls:
-            problem = f"{shortened(name)} and {shortened(urls[link.url])} have the same link"
+        address = address_of(link.url)
+        if address in names:
+            problem = f"{shortened(name)} and {shortened(names[address])} have the same link"
             raise MistakeError(problem, "a vehicle has a link of its own", entry.line)
-        for url, other in urls.items():
-            if port := shared_port(link.url, url):
+        for other, its in found.items():
+            if port := shared_port(link.url, its.url):
                 problem = f"{shortened(name)} and {shortened(other)} both receive at port {port} of this machine"
                 raise MistakeError(problem, "only one of them would be heard: give each a port of its own", entry.line)
-        urls[link.url] = name
+        names[address] = name
         found[name] = link
     if not 0 < len(found) <= VEHICLES_MAX:
         raise MistakeError(f"{len(found)} vehicles", f"a fleet has 1 to {VEHICLES_MAX}", node.line)

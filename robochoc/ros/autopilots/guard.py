@@ -9,6 +9,7 @@ ends. Ctrl-C is left to the parent.
 
 from __future__ import annotations
 
+import math
 import os
 import select
 import signal
@@ -17,12 +18,15 @@ import threading
 import time
 from collections import deque
 from collections.abc import Callable
+from contextlib import suppress
 
 import msgspec
 
+from robochoc.formats.diagnostics import on_one_line, shortened
 from robochoc.ros.autopilots.autopilot import Autopilot
 from robochoc.ros.autopilots.fleet import AtEnd, Fleet
 from robochoc.ros.autopilots.kinds import Kind
+from robochoc.ros.autopilots.limits import END_S, TURN_S
 from robochoc.ros.autopilots.messages import (
     LINE_MAX,
     End,
@@ -47,6 +51,8 @@ STEP_S = 0.1
 TOLD_S = 0.25
 """The time between two states of a vehicle that does nothing new, in seconds."""
 _ORDERS_MAX = 1 << 20
+_SPARE_S = 20.0
+"""Commands of the end may wait some seconds for their answers."""
 Tell = Callable[[FromGuard], None]
 
 
@@ -68,10 +74,9 @@ class _Flight(threading.Thread):
                 now = time.monotonic()
                 if self._news(state) != told or now - told_s >= TOLD_S or self.pilot.ended:
                     told, told_s = self._news(state), now
-                    self._tell(state)
+                    with suppress(Exception):  # what cannot be told is no reason to fly no longer
+                        self._tell(state)
                 time.sleep(STEP_S)
-        except Exception as error:  # noqa: BLE001 - said to the parent; the others fly on
-            self._tell(Failed(f"the pilot of {self.pilot.name} failed: {type(error).__name__}: {error}"))
         finally:
             self._autopilot.close()
 
@@ -85,6 +90,8 @@ class Guard:
 
     def __init__(self, fleet: Fleet, open_autopilot: Callable[[str], Autopilot], tell: Tell) -> None:
         self.at_end = fleet.end
+        self.end_s = fleet.connect_s + TURN_S + END_S + _SPARE_S
+        """No vehicle takes longer to be brought to an end, unless its pilot hangs."""
         self._tell = tell
         self._permitted = False
         self._traffic = Traffic(fleet)
@@ -95,7 +102,18 @@ class Guard:
             flight.start()
 
     def take(self, order: ToGuard) -> None:
-        """Obey an order."""
+        """Obey an order. If that fails, all vehicles are brought to an end."""
+        try:
+            self._take(order)
+        except Exception as error:  # noqa: BLE001 - the parent says it; nobody may be left in the air
+            self.fail(error)
+
+    def fail(self, error: Exception) -> None:
+        """Say what has failed, and bring all vehicles to an end."""
+        self._tell(Failed(f"{type(error).__name__}: {shortened(on_one_line(str(error)))}"))
+        self.end(self.at_end, waits=False)
+
+    def _take(self, order: ToGuard) -> None:
         match order:
             case Permit():
                 self._permitted = True
@@ -123,17 +141,23 @@ class Guard:
     def end(self, how: AtEnd, *, waits: bool) -> None:
         """Bring all vehicles to an end."""
         if how is AtEnd.LAND:
-            self._traffic.bring_down()
+            with suppress(Exception):  # without a plan each lands where it is, after a while
+                self._traffic.bring_down()
         for flight in self._flights.values():
             flight.pilot.end(how, waits=waits)
 
     @property
     def ended(self) -> bool:
         """Return whether all vehicles have been brought to an end."""
-        return not any(flight.is_alive() for flight in self._flights.values())
+        return not self.hanging
+
+    @property
+    def hanging(self) -> list[str]:
+        """Return the names of vehicles that have not been brought to an end yet."""
+        return [name for name, flight in self._flights.items() if flight.is_alive()]
 
 
-class _Orders:
+class Orders:
     """Orders from standard input. `over` is True when it has ended, or the parent has died."""
 
     def __init__(self) -> None:
@@ -148,7 +172,7 @@ class _Orders:
         return self._is_closed or os.getppid() != self._parent
 
     def next(self, wait_s: float) -> ToGuard | None:
-        """Return the next order; None if none comes within `wait_s`."""
+        """Return the next order; None if none comes within `wait_s`. Raises `msgspec.DecodeError`."""
         if not self._lines and self._is_closed:
             time.sleep(wait_s)
         elif not self._lines and select.select([0], [], [], wait_s)[0]:
@@ -189,17 +213,17 @@ def main() -> None:
     for ignored in (signal.SIGINT, signal.SIGHUP, signal.SIGPIPE):
         signal.signal(ignored, signal.SIG_IGN)
     signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGINT, signal.SIGTERM})
-    outlet, orders = _Outlet(), _Orders()
+    outlet, orders = _Outlet(), Orders()
     try:
         guard = _begun(orders, outlet.tell)
         if guard:
-            _watch(guard, orders, told_to_end)
+            watch(guard, orders, told_to_end)
             outlet.tell(Ended())
     except Exception as error:  # noqa: BLE001 - the parent says it
         outlet.tell(Failed(f"{type(error).__name__}: {error}"))
 
 
-def _begun(orders: _Orders, tell: Tell) -> Guard | None:
+def _begun(orders: Orders, tell: Tell) -> Guard | None:
     """Return the guard of the fleet that is named first; None if the parent is gone before."""
     while not orders.over:
         order = orders.next(STEP_S)
@@ -221,19 +245,25 @@ def _guard_of(fleet: Fleet, tell: Tell) -> Guard:
             return Guard(fleet, lambda name: CflibAutopilot(fleet.vehicles[name], fleet.speed_ms), tell)
 
 
-def _watch(guard: Guard, orders: _Orders, told_to_end: threading.Event) -> None:
-    """Obey orders until all is over; then bring all vehicles to an end.
+def watch(guard: Guard, orders: Orders, told_to_end: threading.Event) -> None:
+    """Obey orders until all is over; then bring all vehicles to an end. Raises `TimeoutError` if a pilot hangs.
 
-    `Ended` follows when each of them has been. If the parent dies meanwhile, it is not waited for landings.
+    If the parent dies meanwhile, it is not waited for landings.
     """
-    left = False
+    until = math.inf
     while not guard.ended:
-        order = orders.next(STEP_S)
+        try:
+            order = orders.next(STEP_S)
+        except msgspec.DecodeError as error:
+            guard.fail(error)
+            continue
         if order is not None:
             guard.take(order)
-        if not left and (orders.over or told_to_end.is_set()):
-            left = True
+        if until == math.inf and (orders.over or told_to_end.is_set()):
+            until = time.monotonic() + guard.end_s
             guard.end(guard.at_end, waits=False)
+        if time.monotonic() > until:
+            raise TimeoutError(f"{', '.join(guard.hanging)}: not brought to an end within {guard.end_s:g} s")
 
 
 if __name__ == "__main__":

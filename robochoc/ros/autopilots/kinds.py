@@ -99,3 +99,16 @@ def shared_port(url: str, other: str) -> str:
         return ""
     hosts = {first["host"].lower(), second["host"].lower()}
     return first["port"] if len(hosts) == 1 or hosts & _ALL_HOSTS or hosts <= _OWN_HOSTS else ""
+
+
+def address_of(url: str) -> str:
+    """Return what a link says of the vehicle alone: a Crazyflie is the same one by every dongle.
+
+    >>> address_of("radio://1/80/2M/e7e7e7e701")
+    'radio 80 2M E7E7E7E701'
+    """
+    scheme, _, rest = url.partition("://")
+    if scheme != "radio":
+        return url
+    _, channel, rate, address = rest.split("/")
+    return f"radio {int(channel)} {rate} {address.upper()}"

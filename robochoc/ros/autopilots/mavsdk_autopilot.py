@@ -34,6 +34,8 @@ _IN_AIR = {LandedState.IN_AIR, LandedState.TAKING_OFF, LandedState.LANDING}
 _ANY_YAW = math.nan
 """PX4 keeps its heading where a set point has none."""
 _DO_SET_MODE, _CUSTOM_MODE, _GUIDED = 176, 1, 4
+_AUTOPILOT = 1
+"""The component number of an autopilot (MAV_COMP_ID_AUTOPILOT1)."""
 _ANSWER_S, _LOOK_S, _RISE_S = 5.0, 0.1, 0.5
 
 
@@ -46,7 +48,7 @@ class MavsdkAutopilot(Autopilot):
         self._origin = origin
         self._sdk: Any = None
         self._system_number = 0
-        self._heard_at = -math.inf
+        self._heard_at = self._placed_at = -math.inf
         self._telemetry: Any = None
         self._action: Any = None
         self._offboard: Any = None
@@ -70,16 +72,18 @@ class MavsdkAutopilot(Autopilot):
             self._system_number = system.get_system_id()
             self._direct = MavlinkDirect(system)
             self._direct.subscribe_message("HEARTBEAT", self._heard)
+            place = "GLOBAL_POSITION_INT" if self._origin else "LOCAL_POSITION_NED"
+            self._direct.subscribe_message(place, self._placed)
             self._action, self._offboard = Action(system), Offboard(system)
             self._telemetry = TelemetryPlugin(system)
-            self._heard_at = time.monotonic()
+            self._heard_at = self._placed_at = time.monotonic()
         return True
 
     def look(self) -> Telemetry:
         """Return the newest telemetry; see `Autopilot`."""
         if self._telemetry is None:
             return Telemetry()
-        percent = self._telemetry.battery().remaining_percent
+        percent, now = self._telemetry.battery().remaining_percent, time.monotonic()
         return Telemetry(
             place=self._place(),
             battery=percent / 100 if math.isfinite(percent) else None,
@@ -87,7 +91,8 @@ class MavsdkAutopilot(Autopilot):
             armed=bool(self._telemetry.armed()),
             in_air=self._telemetry.landed_state() in _IN_AIR,
             healthy=bool(self._telemetry.health().is_armable),
-            silent_s=time.monotonic() - self._heard_at,
+            silent_s=now - self._heard_at,
+            place_age_s=now - self._placed_at,
         )
 
     def arm(self) -> None:
@@ -159,8 +164,17 @@ class MavsdkAutopilot(Autopilot):
             self._sdk = self._telemetry = None
 
     def _heard(self, message: Any, _data: object) -> None:  # noqa: ANN401 - MAVSDK's, in its own thread
-        del message
-        self._heard_at = time.monotonic()
+        if self._is_its_own(message):
+            self._heard_at = time.monotonic()
+
+    def _placed(self, message: Any, _data: object) -> None:  # noqa: ANN401 - MAVSDK's, in its own thread
+        """Take note that a place was told: MAVSDK itself keeps the last one, however old it is."""
+        if self._is_its_own(message):
+            self._placed_at = time.monotonic()
+
+    def _is_its_own(self, message: Any) -> bool:  # noqa: ANN401 - MAVSDK's
+        """Return whether a message is the autopilot's: cameras and computers on board send heartbeats, too."""
+        return bool(message.system_id == self._system_number and message.component_id == _AUTOPILOT)
 
     def _place(self) -> Point | None:
         if self._origin:
@@ -179,8 +193,10 @@ class MavsdkAutopilot(Autopilot):
         """Ask ArduCopter for its mode GUIDED, and wait for that. MAVSDK itself does so with a set point only."""
         fields: dict[str, float] = {f"param{number}": 0.0 for number in range(1, 8)}
         fields |= {"param1": _CUSTOM_MODE, "param2": _GUIDED, "command": _DO_SET_MODE, "confirmation": 0}
-        fields |= {"target_system": self._system_number, "target_component": 1}
-        self._direct.send_message(MavlinkMessage("COMMAND_LONG", 0, 0, self._system_number, 1, json.dumps(fields)))
+        fields |= {"target_system": self._system_number, "target_component": _AUTOPILOT}
+        self._direct.send_message(
+            MavlinkMessage("COMMAND_LONG", 0, 0, self._system_number, _AUTOPILOT, json.dumps(fields))
+        )
         self._await("enter its mode GUIDED", lambda: self._telemetry.flight_mode() == FlightMode.OFFBOARD)
 
     @staticmethod

@@ -11,7 +11,9 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Callable
+from contextlib import suppress
 
+from robochoc.formats.diagnostics import on_one_line, shortened
 from robochoc.ros.autopilots.autopilot import OFFBOARD, Autopilot, RefusedError, Telemetry
 from robochoc.ros.autopilots.craft import Clearance
 from robochoc.ros.autopilots.fleet import AtEnd, Fleet, point_text
@@ -24,10 +26,10 @@ from robochoc.ros.autopilots.limits import (
     MODE_S,
     OUTSIDE_M,
     RETRY_S,
-    SILENCE_S,
     TURN_S,
 )
 from robochoc.ros.autopilots.messages import Phase, State, Target
+from robochoc.ros.autopilots.takeover import Takeover
 from robochoc.ros.autopilots.traffic import Traffic
 
 _NOT_OURS = "it no longer follows set points: its mode is"
@@ -62,13 +64,12 @@ class Pilot:
         self._order = 0
         self._target: Target | None = None
         self._climb_to = -math.inf
-        self._commanded = self._hands_off = False
+        self._commanded = False
+        self._takeover = Takeover(clock)
         self._ending: tuple[AtEnd, bool] | None = None
         self._end_begun_s = self._turn_s = self._retry_s = -math.inf
-        self._obeyed = self._was_armed = self._recovers = False
-        self._is_due = self._was_ours = False
-        self._commanded_s = self._foreign_s = math.inf
-        self._silence_s = 0.0
+        self._obeyed = self._was_armed = self._recovers = self._is_due = False
+        self._seen = Telemetry()
         self._clearance = Clearance()
         self._sent: Clearance | None = None
 
@@ -87,8 +88,23 @@ class Pilot:
 
     def step(self) -> State:
         """Do what is next, and return the state of the vehicle."""
-        seen = self._autopilot.look()
-        self._note(seen)
+        try:
+            self._seen = self._autopilot.look()
+            self._do(self._seen)
+        except Exception as error:  # noqa: BLE001 - whatever it was, no vehicle may be left in the air
+            self._fail(f"its pilot failed: {type(error).__name__}: {shortened(on_one_line(str(error)))}")
+        if self._commanded:
+            self._takeover.command()
+        seen = self._seen
+        told = seen.place, seen.battery, seen.healthy, seen.in_air
+        return State(self.name, self._phase, self._order, *told, self._commanded, self._why, self._clearance.waits_for)
+
+    def _do(self, seen: Telemetry) -> None:
+        """Take note of what the vehicle tells, and do what is next."""
+        self._was_armed = self._was_armed or (self._commanded and seen.armed)
+        if self._commanded:
+            self._takeover.note(seen)
+        self._traffic.see(self.name, seen.place, in_air=seen.in_air)
         try:
             if self._recovers:
                 self._recover(seen)
@@ -102,19 +118,6 @@ class Pilot:
                 self._go_on(seen)
         except RefusedError as refused:
             self._out(str(refused))
-        if self._commanded:
-            self._commanded_s = min(self._commanded_s, self._clock())
-        told = seen.place, seen.battery, seen.healthy, seen.in_air
-        return State(self.name, self._phase, self._order, *told, self._commanded, self._why, self._clearance.waits_for)
-
-    def _note(self, seen: Telemetry) -> None:
-        """Take note of what a vehicle tells."""
-        self._was_armed = self._was_armed or (self._commanded and seen.armed)
-        if self._commanded:
-            self._was_ours = self._was_ours or (seen.armed and not seen.is_flown_by_others)
-            self._foreign_s = min(self._foreign_s, self._clock()) if seen.is_flown_by_others else math.inf
-            self._silence_s = max(self._silence_s, seen.silent_s)
-        self._traffic.see(self.name, seen.place, in_air=seen.in_air)
 
     # On the way
 
@@ -238,13 +241,13 @@ class Pilot:
 
     def _trouble(self, seen: Telemetry) -> str:
         """Return what speaks against going on; empty if nothing does."""
-        if seen.silent_s > self._fleet.patience_s:
-            return f"its link has been silent for {self._fleet.patience_s:g} s"
+        ages = (seen.silent_s, "its link has been silent"), (seen.place_age_s, "it has not told its place")
+        if problems := [problem for age_s, problem in ages if age_s > self._fleet.patience_s]:
+            return f"{problems[0]} for {self._fleet.patience_s:g} s"
         if self._phase in {Phase.READY, Phase.LANDED}:
             return ""
-        # Some tell another mode for a moment after they have landed.
         lands = self._phase is Phase.LANDING
-        if (not lands or self._clock() - self._foreign_s > MODE_S) and self._is_taken_over(seen):
+        if (not lands or self._takeover.lasts) and self._takeover.has_come(seen):
             return f"{_NOT_OURS} {seen.mode_and_who}"
         if lands or seen.alarm:
             return "" if lands else seen.alarm
@@ -253,28 +256,12 @@ class Pilot:
         return self._mode_trouble(seen) if self._clock() - self._since_s > MODE_S else ""
 
     def _mode_trouble(self, seen: Telemetry) -> str:
-        """Return what a vehicle does that should be in the air and follow us; empty if it does.
-
-        Who leaves our mode while its link is good was told to by a person, or by its own failsafe: neither is fought.
-        """
+        """Return what a vehicle does that should be in the air and follow us; empty if it does."""
         if not seen.armed:
             return "its motors have stopped"
         if self._phase is Phase.CLIMBING or seen.mode == OFFBOARD:
             return ""
-        if self._silence_s <= SILENCE_S:
-            self._hands_off = True
-            return f"{_NOT_OURS} {seen.mode_and_who}"
-        return f"{_NOT_OURS} {seen.mode_in_words}"
-
-    def _is_taken_over(self, seen: Telemetry) -> bool:
-        """Return whether a person flies the vehicle, or its autopilot on its own. For good: it gets no command again.
-
-        Before it has obeyed once its mode may be that of before.
-        """
-        told = self._was_ours or self._clock() - self._commanded_s > MODE_S
-        if self._commanded and told and seen.is_flown_by_others:
-            self._hands_off = True
-        return self._hands_off
+        return f"{_NOT_OURS} {seen.mode_and_who if self._takeover.has_left_us() else seen.mode_in_words}"
 
     def _has_landed(self, seen: Telemetry) -> bool:
         """Return whether the vehicle lies on the ground. One that was armed a moment ago may not have told it yet."""
@@ -291,6 +278,19 @@ class Pilot:
         self._clearance = Clearance()
         self._enter(Phase.OUT)
         self._traffic.lose(self.name)
+
+    def _fail(self, why: str) -> None:
+        """Make a vehicle land whose step has failed. What it told last counts; traffic may be what has failed."""
+        with suppress(Exception):
+            if self._phase is not Phase.OUT:
+                self._out(why)
+        with suppress(Exception):
+            if self._commanded and not self._obeyed:
+                self._obeyed = self._is_brought_down(self._seen, AtEnd.LAND)
+        if self._ending:
+            self._end_begun_s = max(self._end_begun_s, self._since_s)
+            is_due = self._commanded or self._recovers
+            self.ended = self._obeyed or not is_due or self._clock() - self._end_begun_s > END_S
 
     # The end
 
@@ -324,9 +324,9 @@ class Pilot:
         if not math.isfinite(self._end_begun_s):
             self._end_begun_s = self._turn_s = now
         lies = self._phase is Phase.LANDED and not seen.in_air
-        if self._obeyed and not self._hands_off:
+        if self._obeyed and not self._takeover.is_known:
             self._await_landing(seen, now, waits=waits and how is AtEnd.LAND)
-        elif not self._commanded or self._is_taken_over(seen) or lies:
+        elif not self._commanded or self._takeover.has_come(seen) or lies:
             self.ended = True
         elif how is AtEnd.LAND and not self._is_my_turn(seen):
             self._end_begun_s = now
@@ -373,7 +373,7 @@ class Pilot:
     def _is_brought_down(self, seen: Telemetry, how: AtEnd) -> bool:
         """Return whether the vehicle has obeyed: it lands, holds, or is disarmed. A refused command is repeated."""
         now = self._clock()
-        if self._is_taken_over(seen):
+        if self._takeover.has_come(seen):
             return True
         if now - self._retry_s < RETRY_S:
             return False

@@ -106,8 +106,11 @@ class Traffic:
         with self._lock:
             craft = self._crafts[name]
             craft.flies = craft.lands = False
-            craft.setpoint, craft.target = craft.place, None
-            craft.done = len(craft.steps)
+            craft.setpoint, craft.done = craft.place, len(craft.steps)
+            if craft.target and not craft.target.lands and not self._ends:
+                self._replan()  # it was sent elsewhere while it landed
+            else:
+                craft.target = None
 
     def lose(self, name: str) -> None:
         """Take note that a vehicle no longer follows us: the others keep clear of it, and of what is below it."""
