@@ -12,7 +12,7 @@ from robochoc.experiments.table import MAX_INTEGER, Place
 from robochoc.experiments.task import GIVEN, Limits, Setup, options_of
 from robochoc.formats.diagnostics import shortened, suggestion
 from robochoc.model.orders import Order
-from robochoc.run.compatibility import refuse_options
+from robochoc.run.compatibility.option_rules import refuse_options
 from robochoc.run.defaults import AUTO
 from robochoc.run.options import CENTRAL, Preprocess, Runtime, ScheduleName, Withdrawal
 from robochoc.run.protocol_settings import refuse_settings

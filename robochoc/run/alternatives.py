@@ -9,7 +9,8 @@ from robochoc.model.costs import UnboundedCostError, normalized
 from robochoc.model.problem import Team
 from robochoc.protocols.traits import Traits
 from robochoc.run.choice_rules import RULES
-from robochoc.run.compatibility import CENTRAL_TRAITS, max_total, refuse_options, refuse_unfit
+from robochoc.run.compatibility.option_rules import refuse_options
+from robochoc.run.compatibility.team_rules import CENTRAL_TRAITS, max_total, refuse_unfit
 from robochoc.run.facts import Facts
 from robochoc.run.options import CENTRAL, Options, Runtime
 from robochoc.run.registry import InstalledProtocol, installed_protocols

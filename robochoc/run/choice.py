@@ -1,7 +1,7 @@
 """The choice of protocol and order for a team, where none was asked for (`--protocol auto`). No other module chooses.
 
 `RULES` (`run/choice_rules.py`) are asked from the first to the last. The first one that holds, and whose protocol
-accepts the team and the options (`run/compatibility.py`), decides. Where none does, any installed protocol that accepts
+accepts the team and the options (`run/compatibility`), decides. Where none does, any installed protocol that accepts
 them is taken, complete ones first.
 """
 

@@ -78,7 +78,7 @@ class CentralSolverName(StrEnum):
 
 @dataclass(frozen=True)
 class Options:
-    """The options of a run. `run/compatibility.py` decides which of them can be combined.
+    """The options of a run. `run/compatibility` decides which of them can be combined.
 
     Attributes:
         protocol: The name of the protocol by which the robots solve the problem, or `CENTRAL`; or `AUTO`, for one that

@@ -15,12 +15,8 @@ from robochoc.model.outcome import Outcome, Verdict
 from robochoc.model.problem import Team
 from robochoc.model.symbols import symbol_table, symbolic_variables
 from robochoc.run.choice import decided
-from robochoc.run.compatibility import (
-    CENTRAL_TRAITS,
-    UnfitProtocolError,
-    refuse_options,
-    refuse_unfit,
-)
+from robochoc.run.compatibility.option_rules import refuse_options
+from robochoc.run.compatibility.team_rules import CENTRAL_TRAITS, UnfitProtocolError, refuse_unfit
 from robochoc.run.context import RunContext
 from robochoc.run.distributed import solve_distributed
 from robochoc.run.improvement import Audience

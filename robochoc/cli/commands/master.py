@@ -130,7 +130,7 @@ def master(
     if given["number"] and team:
         raise click.UsageError("--robots and --team both define the team; drop one")
     if team and (team / "scenario.xml").exists():
-        from robochoc.run.compatibility import scenario_refusal
+        from robochoc.run.compatibility.team_rules import scenario_refusal
 
         raise click.UsageError(scenario_refusal(team, "robochoc master"))
     for option in ("gather_s", "timeout"):

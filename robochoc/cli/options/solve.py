@@ -206,10 +206,10 @@ def options_of(arguments: dict[str, Any], *, environment: bool) -> Options:
         environment: whether the robots' situation changes the problem.
 
     Raises:
-        click.UsageError: for options that do not go together (`robochoc.run.compatibility`).
+        click.UsageError: for options that do not go together (`robochoc.run.compatibility.option_rules`).
         Failure: for a channel that cannot be read.
     """
-    from robochoc.run.compatibility import refuse_options
+    from robochoc.run.compatibility.option_rules import refuse_options
     from robochoc.solver.encoding import UnsupportedError
 
     for name in ("timeout", "deadline"):

@@ -26,7 +26,8 @@ from robochoc.model.outcome import Outcome, Verdict
 from robochoc.model.problem import Team
 from robochoc.model.symbols import symbol_table, symbolic_variables
 from robochoc.run.choice import decided_unseen
-from robochoc.run.compatibility import refuse_options, refuse_unfit
+from robochoc.run.compatibility.option_rules import refuse_options
+from robochoc.run.compatibility.team_rules import refuse_unfit
 from robochoc.run.defaults import AUTO, DEFAULT_COST_PROTOCOL, DEFAULT_PROTOCOL
 from robochoc.run.distributed import solve_distributed
 from robochoc.run.networked.address import LOOPBACK, Address
