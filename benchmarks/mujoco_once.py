@@ -6,6 +6,7 @@ actuators at the ends of its arms, filtered with the rotors' time constant; drag
 
 from __future__ import annotations
 
+import argparse
 import json
 import sys
 import time
@@ -23,6 +24,7 @@ Array = npt.NDArray[np.float64]
 
 def main() -> None:
     """Answer all lines."""
+    argparse.ArgumentParser(description=__doc__).parse_args()
     asked = json.loads(sys.stdin.readline())
     frame, places, speed = asked["frame"], asked["places"], "speed" in asked
     steps = 1 if speed else FINE_STEPS

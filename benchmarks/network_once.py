@@ -5,6 +5,7 @@ A process that is forked while zenoh is open hangs, so those that play by zenoh 
 
 from __future__ import annotations
 
+import argparse
 import json
 import multiprocessing
 import os
@@ -153,8 +154,11 @@ ROBOTS: Mapping[str, Robots] = {
 
 def main() -> None:
     """Time what is asked for."""
-    what, how = sys.argv[1:]
-    print(json.dumps(_team(int(how)) if what == "team" else _timed(what, how)))
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("what", choices=["team", *ROBOTS, *JOINED], help="who plays; team: how a team begins and ends")
+    parser.add_argument("how", metavar="GAME|N", help="the game; team: the number of robots")
+    asked = parser.parse_args()
+    print(json.dumps(_team(int(asked.how)) if asked.what == "team" else _timed(asked.what, asked.how)))
 
 
 def _timed(what: str, game: str) -> dict[str, float]:

@@ -10,7 +10,7 @@ for hours. The last table is of auctions, on tasks, one for each robot.
 
 from __future__ import annotations
 
-import sys
+import argparse
 from collections.abc import Callable
 from statistics import mean
 
@@ -81,7 +81,9 @@ def row(protocol: str, problems: int, problem: Callable[[int], Team]) -> str:
 
 def main() -> None:
     """Print the tables."""
-    problems = int(sys.argv[1]) if sys.argv[1:] else PROBLEMS
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("problems", nargs="?", type=int, default=PROBLEMS, metavar="PROBLEMS", help="how many")
+    problems = parser.parse_args().problems
     for protocols, problem in TABLES:
         print(f"| protocol | {' | '.join(Kind)} |")
         print(f"| --- |{' --- |' * len(Kind)}")

@@ -5,8 +5,8 @@ Runs in the peer's own Python, which has raven-csp and sympy installed, and no r
 
 from __future__ import annotations
 
+import argparse
 import json
-import sys
 from pathlib import Path
 
 from csp.core import CSP  # type: ignore[import-not-found]
@@ -15,13 +15,18 @@ from dcsp.api import run_distributed_search  # type: ignore[import-not-found]
 
 def main() -> None:
     """Build the problem, search, and print the answer and the count of messages as JSON."""
-    told = json.loads(Path(sys.argv[3]).read_text())
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("algorithm", metavar="ALGORITHM")
+    parser.add_argument("runtime", choices=["sim", "mp"])
+    parser.add_argument("file", type=Path, metavar="FILE")
+    asked = parser.parse_args()
+    told = json.loads(asked.file.read_text())
     problem = CSP()
     for name, values in told["domains"].items():
         problem.add_variable(name, set(values))
     for number, (scope, forbidden) in enumerate(told["constraints"]):
         problem.add_constraint_explicit(f"c{number}", _expression(scope, forbidden), scope)
-    result = run_distributed_search(sys.argv[1], problem, runtime=sys.argv[2])
+    result = run_distributed_search(asked.algorithm, problem, runtime=asked.runtime)
     print(json.dumps({"solved": result.satisfiable, "messages": result.metrics.get("messages_sent")}))
 
 

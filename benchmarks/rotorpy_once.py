@@ -7,6 +7,7 @@ that so many steps of drones that hover take, in RotorPy's own settings.
 
 from __future__ import annotations
 
+import argparse
 import json
 import sys
 import time
@@ -21,6 +22,7 @@ FINE = {"method": "RK45", "rtol": 1e-6, "atol": 1e-9}
 
 def main() -> None:
     """Answer all lines."""
+    argparse.ArgumentParser(description=__doc__).parse_args()
     asked = json.loads(sys.stdin.readline())
     parameters = {key: np.array(value) if isinstance(value, list) else value for key, value in asked["frame"].items()}
     parameters["rotor_pos"] = {f"r{number}": np.array(at) for number, at in enumerate(asked["frame"]["rotor_pos"])}

@@ -6,10 +6,10 @@ many seconds there is what; write: make a journal of N messages.
 
 from __future__ import annotations
 
+import argparse
 import asyncio
 import os
 import signal
-import sys
 import time
 from itertools import count
 from pathlib import Path
@@ -29,13 +29,13 @@ _ROBOTS = 49
 _FANOUT = 4
 
 
-async def follow(url: str, *, until_over: bool = False) -> None:
-    """Ask for whatever is new."""
+async def follow(url: str, *, until_over: bool = False, stops: bool = False) -> None:
+    """Ask for whatever is new. With `stops`, this process is stopped once it is connected."""
     client = AsyncHTTPClient()
     began = time.perf_counter()
     about: dict[str, Any] = msgspec.json.decode((await client.fetch(f"{url}about")).body)
     socket = await websocket_connect(f"{url.replace('http', 'ws', 1)}news")
-    if "stop" in sys.argv:
+    if stops:
         _stop()
     had = {"columns": 0, "steps": 0}
     first = True
@@ -95,8 +95,18 @@ def write(path: Path, messages: int) -> None:
     file.close()
 
 
-if __name__ == "__main__":
-    if sys.argv[2] == "write":
-        write(Path(sys.argv[1]), int(sys.argv[3]))
+def main() -> None:
+    """Do what is asked for."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("place", metavar="URL|FILE")
+    parser.add_argument("what", choices=["follow", "stop", "time", "write"])
+    parser.add_argument("messages", nargs="?", type=int, default=0, metavar="N", help="with write")
+    asked = parser.parse_args()
+    if asked.what == "write":
+        write(Path(asked.place), asked.messages)
     else:
-        asyncio.run(follow(sys.argv[1], until_over=sys.argv[2] == "time"))
+        asyncio.run(follow(asked.place, until_over=asked.what == "time", stops=asked.what == "stop"))
+
+
+if __name__ == "__main__":
+    main()

@@ -5,6 +5,7 @@
 
 from __future__ import annotations
 
+import argparse
 import re
 from importlib.resources import files
 from pathlib import Path
@@ -51,6 +52,7 @@ def test_all_lessons_are_in_the_navigation_in_their_order() -> None:
 
 
 if __name__ == "__main__":
+    argparse.ArgumentParser(description="Write the lessons and their recorded runs anew.").parse_args()
     PAGES.mkdir(exist_ok=True)
     for number in NUMBERS:
         runs = msgspec.json.encode(recorded(lesson(number)))

@@ -5,6 +5,7 @@
 
 from __future__ import annotations
 
+import argparse
 import re
 from collections.abc import Iterator
 from pathlib import Path
@@ -70,4 +71,5 @@ def rewrite() -> None:
 
 
 if __name__ == "__main__":
+    argparse.ArgumentParser(description="Write the numbers of lines anew.").parse_args()
     rewrite()

@@ -5,6 +5,7 @@
 
 from __future__ import annotations
 
+import argparse
 import re
 from collections.abc import Iterator
 
@@ -69,4 +70,5 @@ def test_the_page_has_every_rule_and_the_bounds_as_they_are() -> None:
 
 
 if __name__ == "__main__":
+    argparse.ArgumentParser(description="Write the tables of the page on sketches anew.").parse_args()
     PAGE.write_text(written(PAGE.read_text(encoding="utf-8")), encoding="utf-8")

@@ -7,6 +7,7 @@ about as one to skip.
 
 from __future__ import annotations
 
+import argparse
 import json
 import subprocess
 import sys
@@ -34,11 +35,14 @@ def verdict(packages: list[dict[str, Any]]) -> tuple[int, list[str]]:
 
 def main() -> int:
     """Ask about each lock, and print the outcome."""
-    program, *locks = sys.argv[1:]
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("program", metavar="PIP_AUDIT", help="the program pip-audit")
+    parser.add_argument("locks", nargs="*", metavar="LOCK", help="a file of requirements with hashes")
+    asked = parser.parse_args()
     packages = []
-    for lock in locks:
-        command = [program, "--disable-pip", "--require-hashes", "--progress-spinner=off", "--format=json", "-r", lock]
-        done = subprocess.run(command, capture_output=True, text=True, check=False)
+    for lock in asked.locks:
+        command = [asked.program, "--disable-pip", "--require-hashes", "--progress-spinner=off", "--format=json"]
+        done = subprocess.run([*command, "-r", lock], capture_output=True, text=True, check=False)
         try:
             packages += json.loads(done.stdout)["dependencies"]
         except ValueError:

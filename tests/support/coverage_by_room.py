@@ -6,6 +6,7 @@ fewer of its branches than `FLOORS` asks for.
 
 from __future__ import annotations
 
+import argparse
 import json
 import sys
 from collections import Counter
@@ -75,7 +76,9 @@ def below_the_floor(found: dict[str, Counter[str]], floors: dict[str, float]) ->
 
 def main() -> int:
     """Print the table, and what is below its floor."""
-    found = rooms(Path(sys.argv[1]).read_text(encoding="utf-8"))
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("report", type=Path, metavar="REPORT", help="the JSON report of coverage.py")
+    found = rooms(parser.parse_args().report.read_text(encoding="utf-8"))
     print(table(found))  # noqa: T201 - for make
     failed = below_the_floor(found, FLOORS)
     print(*failed, sep="\n", end="\n" if failed else "", file=sys.stderr)  # noqa: T201 - the same

@@ -5,6 +5,7 @@ there. For each line of its input, the name and the fields of a request, it says
 goes out as it is, with the header before it. A line `["", N]` has it ask the first service N times before it listens.
 """
 
+import argparse
 import json
 import struct
 import sys
@@ -130,4 +131,8 @@ def run(domain: int, services: dict[str, str]) -> None:
 
 
 if __name__ == "__main__":
-    run(int(sys.argv[1]), json.loads(sys.argv[2]))
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("domain", type=int, metavar="DOMAIN")
+    parser.add_argument("services", type=json.loads, metavar="SERVICES", help="a JSON object")
+    asked = parser.parse_args()
+    run(asked.domain, asked.services)

@@ -6,6 +6,7 @@ Run as `dds_peer.py subscribe DOMAIN SETTINGS` or `dds_peer.py report DOMAIN SET
 line of its input, once somebody has subscribed.
 """
 
+import argparse
 import json
 import select
 import sys
@@ -158,5 +159,10 @@ def report(participant: DomainParticipant, settings: dict[str, Any]) -> None:
 
 
 if __name__ == "__main__":
-    what, domain, settings = sys.argv[1:]
-    {"subscribe": subscribe, "report": report}[what](DomainParticipant(int(domain)), json.loads(settings))
+    roles = {"subscribe": subscribe, "report": report}
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("role", choices=roles)
+    parser.add_argument("domain", type=int, metavar="DOMAIN")
+    parser.add_argument("settings", type=json.loads, metavar="SETTINGS", help="a JSON object")
+    asked = parser.parse_args()
+    roles[asked.role](DomainParticipant(asked.domain), asked.settings)

@@ -1,7 +1,12 @@
-"""The golden journals: fixed runs, kept in git. `make journals` rewrites them; a changed one is a changed protocol."""
+"""The golden journals: fixed runs, kept in git. `make journals` rewrites them; a changed one is a changed protocol.
+
+`python -m tests.support.golden PROTOCOL...` rewrites those of the named protocols.
+"""
 
 from __future__ import annotations
 
+import argparse
+from collections.abc import Collection
 from dataclasses import replace
 from functools import cache
 
@@ -97,8 +102,25 @@ def content(file: str) -> bytes:
     return journal(fixed_teams(protocol)[team], protocol, schedule)
 
 
+def rewrite(protocols: Collection[str]) -> None:
+    """Rewrite the golden journals of `protocols`, or all if there are none."""
+    for file, (protocol, _, _) in files().items():
+        if not protocols or protocol in protocols:
+            (FOLDER / file).parent.mkdir(parents=True, exist_ok=True)
+            (FOLDER / file).write_bytes(content(file))
+            print(FOLDER / file)  # noqa: T201 - a script's output
+
+
+def main() -> None:
+    """Rewrite what is asked for."""
+    parser = argparse.ArgumentParser(description="Rewrite the golden journals in tests/golden.")
+    parser.add_argument("protocols", nargs="*", metavar="PROTOCOL", help="only those of this protocol; all without one")
+    protocols = parser.parse_args().protocols
+    known = {protocol for protocol, _, _ in files().values()}
+    if unknown := sorted({*protocols} - known):
+        parser.error(f"no protocol of robochoc: {', '.join(unknown)}")
+    rewrite(protocols)
+
+
 if __name__ == "__main__":
-    for file in files():
-        (FOLDER / file).parent.mkdir(parents=True, exist_ok=True)
-        (FOLDER / file).write_bytes(content(file))
-        print(FOLDER / file)  # noqa: T201 - a script's output
+    main()

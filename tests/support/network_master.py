@@ -5,6 +5,7 @@ It tells of the verdict, or of what went wrong, on standard output; `searching` 
 
 from __future__ import annotations
 
+import argparse
 import sys
 
 from robochoc.authority.authority import Authority
@@ -32,4 +33,8 @@ def main(folder: str, endpoint: str, file: str) -> None:
 
 
 if __name__ == "__main__":
-    main(*sys.argv[1:])
+    parser = argparse.ArgumentParser(description=__doc__)
+    for word in ("authority", "endpoint", "file"):
+        parser.add_argument(word, metavar=word.upper())
+    asked = parser.parse_args()
+    main(asked.authority, asked.endpoint, asked.file)

@@ -8,6 +8,7 @@ that are moved to other namespaces stay connected with whoever has made them.
 
 from __future__ import annotations
 
+import argparse
 import fcntl
 import heapq
 import os
@@ -55,11 +56,15 @@ def carry(ends: tuple[int, int], delay_s: float, loss: float, chance: random.Ran
 
 def main() -> None:
     """The program."""
-    delay_s, loss, seed = sys.argv[1:]
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("delay_s", type=float, metavar="DELAY_S")
+    parser.add_argument("loss", type=float, metavar="LOSS", help="probability that a packet is dropped")
+    parser.add_argument("seed", type=int, metavar="SEED")
+    asked = parser.parse_args()
     ends = tun(f"t{os.getpid()}a"), tun(f"t{os.getpid()}b")
     sys.stdout.write("ready\n")
     sys.stdout.flush()
-    carry(ends, float(delay_s), float(loss), random.Random(int(seed)))
+    carry(ends, asked.delay_s, asked.loss, random.Random(asked.seed))
 
 
 if __name__ == "__main__":

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import argparse
 import ctypes
 import gc
 import importlib
@@ -118,8 +119,11 @@ def _import_all() -> None:
 
 
 if __name__ == "__main__":
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("socket", type=int, metavar="SOCKET", help="descriptor of a socket that is inherited")
+    listener = parser.parse_args().socket
     _import_all()
     gc.freeze()
     use_large_pages()
-    main(socket.socket(fileno=int(sys.argv[1])))
+    main(socket.socket(fileno=listener))
     runpy.run_module("robochoc", run_name="__main__", alter_sys=True)

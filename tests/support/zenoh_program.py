@@ -6,6 +6,7 @@ as the robots' fork server imports the program that it belongs to.
 
 from __future__ import annotations
 
+import argparse
 import sys
 
 from robochoc.communication.network.local import LocalNetwork
@@ -30,4 +31,5 @@ def main() -> None:
 
 
 if __name__ == "__main__":
+    argparse.ArgumentParser(description=__doc__).parse_args()
     main()

@@ -7,6 +7,7 @@ Definitions are written here as ROS 2 has them, and hashes are computed by the S
 
 from __future__ import annotations
 
+import argparse
 import json
 import os
 import sys
@@ -167,7 +168,9 @@ def plain(message: Any) -> Any:  # noqa: ANN401 - the SDK's messages
 
 
 def main() -> None:
-    end = End(int(sys.argv[1]))
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("port", type=int, metavar="PORT", help="port of the zenoh router")
+    end = End(parser.parse_args().port)
     end.say(["", "ready"])
     for line in sys.stdin:
         name, given = json.loads(line)
