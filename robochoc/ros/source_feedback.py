@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 import time
-from collections import deque
 from dataclasses import replace
 from itertools import starmap
 
@@ -12,6 +11,7 @@ from robochoc.flight.mission import Leg, MissionBuilder
 from robochoc.flight.reports import Report
 from robochoc.formats.diagnostics import on_one_line
 from robochoc.ros.closed_loop import TOGETHER_S, Feedback
+from robochoc.ros.live.inbox import RosInbox, weight_of
 from robochoc.ros.mappings import short_kind
 from robochoc.ros.names import REPORTS
 from robochoc.ros.report_decoder import ReportDecoder
@@ -22,7 +22,7 @@ PATIENCE_S = 10.0
 """The default time to wait for reports of a live source after a decision, in seconds."""
 _NOTES_MAX = 12
 _SLICE_S = 0.2
-"""The interval between calls of `idle`, in seconds."""
+"""The interval between calls of `idle`, and the longest time that a look at what has come may take, in seconds."""
 
 
 class SourceFeedback(Feedback):
@@ -45,7 +45,7 @@ class SourceFeedback(Feedback):
         self._kept: Report | None = None
         self._now_ns: int | None = None
         self._sim = SimClock() if sim_time else None
-        self._early: deque[ReceivedMessage] = deque()
+        self._early = RosInbox()
         self._last = math.inf
         self._idle_s = time.monotonic()
         source.assign(decoder.namespaces)
@@ -80,16 +80,19 @@ class SourceFeedback(Feedback):
         return time.time_ns() if self._source.live or self._now_ns is None else self._now_ns
 
     def _sim_ns(self, clock: SimClock) -> int:
-        """Return the time of a simulation: the newest that has come. Waits for the first. Raises `SourceError`."""
+        """Return the time of a simulation: the newest that has come. Waits for the first. Raises `SourceError`.
+
+        Other messages may come all the time meanwhile. They are kept, as an inbox does.
+        """
         deadline = time.monotonic() + self._patience_s
-        while self._source.live:
+        while self._source.live and time.monotonic() < deadline:
             received = self._source.next(0 if clock.now_ns is not None else _SLICE_S)
-            if received is None:
-                if clock.now_ns is not None or time.monotonic() >= deadline:
-                    break
-                self.idle()
-            elif not clock.takes(received):
-                self._early.append(received)
+            if received is not None and not clock.takes(received):
+                self._early.put(received, weight_of(received.fields))
+            if clock.now_ns is None:
+                self._idle_now_and_then(received)
+            elif received is None:
+                break
         if clock.now_ns is None:
             when = f"within {self._patience_s:g} s" if self._source.live else "before its first report"
             problem = f"no time came on {CLOCK} of {self._source.place or 'the source'} {when}"
@@ -119,7 +122,7 @@ class SourceFeedback(Feedback):
     def poll(self) -> Report | None:
         """Return a report of a live source that has come; see `Feedback.poll`."""
         if self._kept is None and self._source.live:
-            self._kept = self._pull(None, wait=False)
+            self._kept = self._pull(time.monotonic() + _SLICE_S, wait=False)
         report, self._kept = (self._kept, None) if self._source.live else (None, self._kept)
         self._published(report)
         return report
@@ -151,14 +154,14 @@ class SourceFeedback(Feedback):
     def _pull(self, soon: float | None, *, wait: bool = True) -> Report | None:
         """Return the next report of the source before `soon`, and before the wait is over; None if there is none.
 
-        Without `wait`, return None as soon as nothing has come.
+        Without `wait`, return None as soon as nothing has come, and `soon` at the latest.
         """
         while True:
-            deadline = self._ends(soon) if wait else None
+            deadline = self._ends(soon) if wait else soon
             left_s = _SLICE_S if deadline is None else min(_SLICE_S, deadline - time.monotonic())
             if left_s <= 0:
                 return None
-            received = self._early.popleft() if self._early else self._source.next(left_s if wait else 0)
+            received = self._early.get(0) or self._source.next(left_s if wait else 0)
             if received is None and not wait:
                 return None
             if self._source.live and wait:

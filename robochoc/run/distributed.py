@@ -97,9 +97,7 @@ class Deployment(ABC):
         """Return the answer of `search`, confirmed by the central solver if that is asked for."""
         deadline = self.options.deadline if self.left_s() == 0 else None
         answer = self.concluded(phase, search, evaluate_search(phase, search, self.kind, self.told, deadline))
-        if answer.verdict is Verdict.NO_SOLUTION:
-            return answer.confirmed_as(self.confirm(phase, answer))
-        if answer.verdict is Verdict.OPTIMAL:
+        if answer.verdict in {Verdict.NO_SOLUTION, Verdict.OPTIMAL}:
             return answer.confirmed_as(self.confirm(phase, answer))
         return answer
 

@@ -67,6 +67,15 @@ class Live(Source):
         """Nothing to leave."""
 
 
+class Endless(Live):
+    """A live source on which one robot reports its place all the time, after what it was given."""
+
+    def next(self, wait_s: float) -> ReceivedMessage | None:
+        self.clock.waited_s += min(wait_s, 0.1) or 0.01
+        assert self.clock.waited_s < 1_000, "somebody waits for ever"
+        return super().next(0) if self.messages else pose()
+
+
 class Kept(Sink):
     """A recording that keeps what is published."""
 
@@ -86,6 +95,10 @@ class Kept(Sink):
 
 def tick(seconds: float) -> ReceivedMessage:
     return ReceivedMessage(CLOCK, CLOCK_KIND, {"clock": round(seconds * SECOND)}, 77)
+
+
+def pose() -> ReceivedMessage:
+    return ReceivedMessage("/port/pose", "geometry_msgs/PoseStamped", {"pose": {"position": {"z": 9.0}}}, 0)
 
 
 def blocked() -> ReceivedMessage:
@@ -121,6 +134,19 @@ def test_a_report_that_came_before_the_first_decision_counts(waited: Waited) -> 
     """It waits while the clock is read."""
     published = run(Live(waited, blocked(), tick(5))).messages
     assert len([topic for topic, _, _ in published if topic == "/port/waypoint"]) == 2
+
+
+def test_without_a_clock_the_run_ends_also_where_robots_report_all_the_time(waited: Waited) -> None:
+    with pytest.raises(SourceError, match="no time came on /clock of live within 3 s"):
+        run(Endless(waited), 3.0)
+
+
+def test_reports_that_come_faster_than_they_are_read_keep_no_decision_from_its_time(waited: Waited) -> None:
+    feedback = SourceFeedback(Endless(waited, tick(5)), ReportDecoder(drones_of(HANGAR), "map"), 3.0, sim_time=True)
+    assert feedback.now_ns() == 5 * SECOND
+    assert waited.waited_s <= 3.1
+    assert feedback.poll() is None  # none of them says where it is
+    assert waited.waited_s <= 3.4
 
 
 def test_without_a_clock_the_run_ends(waited: Waited) -> None:

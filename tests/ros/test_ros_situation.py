@@ -248,6 +248,7 @@ def test_what_is_near_is_found_as_if_all_were_looked_at(
             assert places.remove_near(there, 0.5) == bool(near)
             kept = [place for place in kept if place not in near]
         assert len(places) == len(kept)
+        assert places.cubes == len({tuple(map(math.floor, place)) for place in kept})
 
 
 coordinates = st.floats(-1, 6) | st.sampled_from([1.0, 2.0, 1.5, 2.5])
