@@ -35,11 +35,11 @@ from robochoc.flight.quadrotor.rigid_bodies import Mask
 from robochoc.flight.quadrotor.simulation import DT, QuadrotorSimulation
 from robochoc.flight.quadrotor.trajectory import STOP_S, Trajectory
 from robochoc.flight.reports import Blocked, OutOfOrder, Report
-from robochoc.flight.routes.floor_plan import FloorPlan
 from robochoc.flight.routes.motion import MotionLimits, RoutePlan
-from robochoc.flight.routes.moves import NoRouteError
+from robochoc.flight.routes.move_order import NoRouteError
 from robochoc.flight.routes.spacing import TooCloseError, squashed
 from robochoc.flight.routes.timetable import plan_routes
+from robochoc.flight.routes.wall_plan import WallPlan
 from robochoc.flight.wall_watch import WallWatch
 from robochoc.flight.walls import Walls
 
@@ -260,7 +260,7 @@ class Flight:
         return Hazards(points, radii)
 
     def _routes(
-        self, leg_goals: LegGoals, hazards: Hazards, starts: Array, delays: Array, floor_plan: FloorPlan | None
+        self, leg_goals: LegGoals, hazards: Hazards, starts: Array, delays: Array, floor_plan: WallPlan | None
     ) -> RoutePlan:
         """Plan the routes of a leg, from `starts` (N, 3)."""
         planned = leg_goals.planned(starts, hazards)
@@ -289,6 +289,9 @@ class Flight:
         """Return `refused` in words, with the drones' names. The planner knows only their places in `who`."""
         numbers = refused.drones if isinstance(refused, NoRouteError) else (refused.first, refused.second)
         named = [self.names[who[number]] if number < len(who) else "something that is in the way" for number in numbers]
+        if isinstance(refused, NoRouteError) and refused.indoors:
+            told = f"no order of flying was found in which {', '.join(named)} get past each other between the walls"
+            return f"{told}: ask for a smaller distance, or send them elsewhere"
         if isinstance(refused, NoRouteError):
             return f"there is no way for {', '.join(named)}: what is in the way encloses where they start or end"
         ends = "start" if refused.where == "start" else "are to end"

@@ -150,8 +150,7 @@ def layout_of(crafts: Sequence[Craft], others: Iterable[Craft] = (), ground: Gro
     exact = _exact_places(crafts, ground) if ground else {}
     for number, (craft, cell) in enumerate(zip(crafts, cells, strict=True)):
         x, y = exact.get(number, cell)
-        level = volume.starts.get(craft.robot) if volume else None
-        z = levels.ground if volume is None or level is None else levels.at(volume.z(level))
+        z = _height(craft, ground, levels, is_exact=number in exact)
         home = (rows.at(x), columns.at(y), z)
         beside_others = taken.is_near(home) and number not in exact
         homes.append((*next(beside), levels.ground) if beside_others else home)
@@ -189,6 +188,16 @@ def _exact_places(crafts: Sequence[Craft], ground: GroundMap) -> dict[int, tuple
         if place and ground.scale and count[craft.robot] == 1:
             found[number] = (place[0] / ground.scale, place[1] / ground.scale)
     return found
+
+
+def _height(craft: Craft, ground: GroundMap | None, levels: Axis, *, is_exact: bool) -> float:
+    """Return the height at which a craft is, in cells: on the ground, or where a three-dimensional map says."""
+    volume = ground.volume if ground else None
+    level = volume.starts.get(craft.robot) if volume else None
+    if ground is None or volume is None or level is None:
+        return levels.ground
+    exact = volume.heights.get(craft.robot)
+    return levels.at(exact / ground.scale if exact is not None and ground.scale and is_exact else volume.z(level))
 
 
 def _axes(

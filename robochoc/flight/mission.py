@@ -71,7 +71,7 @@ class Block:
     at: Point
     leg: int = 0
     is_cube: bool = False
-    """True for a cell of a three-dimensional map, with its middle at `at`. No route keeps away from it."""
+    """True for a cell of a three-dimensional map, with its middle at `at`. Routes keep from its voxels (`walls`)."""
     sides: int = ALL_SIDES
     """From which sides a cube is seen, as `Volume.sides` has them."""
 
@@ -112,7 +112,7 @@ class MissionBuilder:
         leaving: How many drones will leave; None: any may.
         scale: Metres a unit; by default the map's, or else `UNIT_M`, or less where the box would be vast.
         ground: A map of the ground. Robots whose files name no waypoint then stay where they stand. Where it has walls,
-            drones that withdraw land where they have stood.
+            drones that withdraw go back to where they have been.
 
     Raises:
         ValueError: The map has walls, and another `scale` is asked for.
@@ -237,7 +237,8 @@ class MissionBuilder:
 
 def check_scale(scale: float | None, ground: GroundMap | None) -> None:
     """Raise `ValueError` where a map has walls, and its scale is not the one that is asked for."""
-    if ground and ground.walls and scale not in {None, ground.scale}:
+    walled = ground and (ground.walls or (ground.volume and ground.volume.walls))
+    if ground and walled and scale not in {None, ground.scale}:
         raise ValueError(f"the map has walls, and a unit is {ground.scale:g} m on it, not {scale:g} m")
 
 

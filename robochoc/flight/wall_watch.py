@@ -17,6 +17,9 @@ from robochoc.flight.log import SAMPLE_RATE_HZ, NearestWall
 from robochoc.flight.routes.floor_plan import FloorPlan
 from robochoc.flight.routes.motion import PEAK, MotionLimits
 from robochoc.flight.routes.spacing import Array
+from robochoc.flight.routes.voxel_plan import VoxelPlan
+from robochoc.flight.routes.wall_plan import WallPlan
+from robochoc.flight.voxel_frame import VoxelFrame
 from robochoc.flight.walls import Walls
 
 _SPARES_M = (0.06, 0.04, 0.02, 0.0)
@@ -41,8 +44,8 @@ class WallWatch:
         self._names = names
         self._radius = walls.radius
         self._speed = walls.speed
-        self._plan = FloorPlan(walls.solid, walls.frame, walls.radius)
-        self._plans: dict[float, FloorPlan] = {}
+        self._plan = _plan_of(walls)
+        self._plans: dict[float, WallPlan] = {}
         self._kept = walls.radius
         self._looked = 0
         self._nearest: tuple[float, int, int] | None = None
@@ -51,7 +54,7 @@ class WallWatch:
         """Return the limits of a motion whose mean speed is that of the walls' robots, or the `usual` ones if less."""
         return replace(usual, speed=min(usual.speed, PEAK * self._speed), least_s=_LEAST_S)
 
-    def floor_plan(self, places: Array) -> FloorPlan:
+    def floor_plan(self, places: Array) -> WallPlan:
         """Return the plan for routes between `places` (K, 3), those of all drones once, or several times.
 
         Raises:
@@ -62,13 +65,12 @@ class WallWatch:
         worst = int(apart.argmin())
         leave = float(apart[worst])
         if leave < min(_LEAST_M, self._radius):
-            x, y = places[worst, :2]
             where = "in a wall" if not leave else f"{leave:.2g} m from a wall"
             name = self._names[worst % len(self._names)]
-            raise ValueError(f"{name} is to be at ({x:.2f}, {y:.2f}), {where} or what nobody knows")
+            raise ValueError(f"{name} is to be at {self._told(places[worst])}, {where} or what nobody knows")
         return self._keeping(wish) if leave >= wish else self._leaving(leave)
 
-    def with_ways(self, plan: FloorPlan, who: NDArray[np.intp], starts: Array, goals: Array) -> FloorPlan:
+    def with_ways(self, plan: WallPlan, who: NDArray[np.intp], starts: Array, goals: Array) -> WallPlan:
         """Return `plan`, or one of less distance from walls if only that has ways for the drones `who`.
 
         Raises:
@@ -80,11 +82,10 @@ class WallWatch:
         less = [self._radius + spare for spare in _SPARES_M if self._radius + spare < plan.keep - _CLOSE_M]
         if less:  # a door may leave the radius, and nothing else
             return self.with_ways(self._leaving(less[0]), who, starts, goals)
-        (x, y), (to_x, to_y) = starts[without[0], :2], goals[without[0], :2]
+        ends = f"from {self._told(starts[without[0]])} to {self._told(goals[without[0]])}"
         raise ValueError(
-            f"{self._names[without[0]]} has no way around the walls from ({x:.2f}, {y:.2f}) to ({to_x:.2f}, {to_y:.2f})"
-            f" that keeps its radius of {self._radius:g} m: a team that is made with a larger radius is told of no such"
-            " way"
+            f"{self._names[without[0]]} has no way around the walls {ends} that keeps its radius of {self._radius:g} m:"
+            " a team that is made with a larger radius is told of no such way"
         )
 
     def nearest(self, positions: Array, failures: Sequence[tuple[int, str, float]]) -> NearestWall | None:
@@ -105,12 +106,24 @@ class WallWatch:
         distance, sample, drone = self._nearest
         return NearestWall(distance, drone, sample / SAMPLE_RATE_HZ, self._kept)
 
-    def _leaving(self, leave: float) -> FloorPlan:
+    def _told(self, place: Array) -> str:
+        """Return a place in words: its height counts only on a map that has heights."""
+        parts = place if isinstance(self._plan, VoxelPlan) else place[:2]
+        return f"({', '.join(f'{part:.2f}' for part in parts)})"
+
+    def _leaving(self, leave: float) -> WallPlan:
         """Return the plan for places, or doors, that leave only so much."""
         self._kept = min(self._kept, max(leave - _ERROR_M, leave / 2))
         return self._keeping(_SHARE * leave)
 
-    def _keeping(self, keep: float) -> FloorPlan:
+    def _keeping(self, keep: float) -> WallPlan:
         if keep not in self._plans:
             self._plans[keep] = self._plan.keeping(keep)
         return self._plans[keep]
+
+
+def _plan_of(walls: Walls) -> WallPlan:
+    frame = walls.frame
+    if isinstance(frame, VoxelFrame):
+        return VoxelPlan(walls.solid, frame, walls.radius)
+    return FloorPlan(walls.solid, frame, walls.radius)

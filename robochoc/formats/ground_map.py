@@ -10,13 +10,15 @@ from typing import Annotated
 
 import msgspec
 
-MAX_BYTES = 4 << 20
+MAX_BYTES = 8 << 20
 MAX_BLOCKED = 10_000
 """Blocked cells of a map: each is a block to draw, and a point that routes avoid."""
 ALL_SIDES = 0b111111
 """The sides of a cube, from which it is seen."""
 MAX_PIXELS = 4_000_000
 """As many as an image of a map may have (`occupancy/pgm.py`)."""
+MAX_VOXELS = 16_000_000
+"""As many as a three-dimensional map may have (`octomap/voxels.py`)."""
 _SIDE_MAX = 1_000
 _FAR = 1_000_000
 
@@ -33,7 +35,36 @@ class BlockedCell(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     epoch: Annotated[int, msgspec.Meta(ge=0)] = 0
 
 
-class Volume(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+class WallVoxels(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """The voxels of a three-dimensional map, and the robots for which ways between them were found.
+
+    Voxels are flags in bytes (`occupancy/packed.py`): by z, then y, then x, each from the lowest on. Lengths are in
+    metres.
+
+    Attributes:
+        columns: The number of voxels along x.
+        rows: The same along y.
+        levels: The same along z.
+        resolution: The side of a voxel.
+        corner: The x, y and z of the lowest corner of the first voxel.
+        radius: The robots' radius: their centres are no nearer to voxels that are not free, nor to the outside.
+        speed: The speed, in m/s, of which travel times were told.
+        free: Which voxels are free.
+        occupied: Which are occupied. A voxel that is neither is not known.
+    """
+
+    columns: Annotated[int, msgspec.Meta(ge=1, le=MAX_VOXELS)]
+    rows: Annotated[int, msgspec.Meta(ge=1, le=MAX_VOXELS)]
+    levels: Annotated[int, msgspec.Meta(ge=1, le=MAX_VOXELS)]
+    resolution: Annotated[float, msgspec.Meta(gt=0, le=1_000)]
+    corner: tuple[_Metres, _Metres, _Metres]
+    radius: Annotated[float, msgspec.Meta(ge=0, le=1_000)]
+    speed: Annotated[float, msgspec.Meta(gt=0, le=1_000)]
+    free: bytes
+    occupied: bytes
+
+
+class Volume(msgspec.Struct, frozen=True, forbid_unknown_fields=True, omit_defaults=True):
     """The third dimension of a map. Levels are numbered from 1, the lowest first.
 
     Attributes:
@@ -43,6 +74,8 @@ class Volume(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
         blocked: The cells that are blocked: column, row and level.
         sides: From which sides each blocked cell is seen: 1 from a lower x, 2 from a higher one, 4 and 8 for y, 16 and
             32 for z, added up. Empty: from all.
+        walls: Walls that drones fly around; None: they fly straight. A map with walls has a scale.
+        heights: The z at which robots are exactly, in metres, by their names.
     """
 
     levels: _Coordinate
@@ -54,6 +87,8 @@ class Volume(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     sides: Annotated[
         tuple[Annotated[int, msgspec.Meta(ge=0, le=ALL_SIDES)], ...], msgspec.Meta(max_length=MAX_BLOCKED)
     ] = ()
+    walls: WallVoxels | None = None
+    heights: dict[str, _Metres] = {}
 
     def z(self, level: int) -> int:
         """Return the z of topics at a level."""
@@ -157,14 +192,21 @@ def _check_volume(ground: GroundMap, volume: Volume) -> None:
 
 
 def _check_walls(ground: GroundMap) -> None:
-    walls = ground.walls
-    if (walls or ground.places) and ground.scale is None:
+    volume = ground.volume
+    walls, voxels = ground.walls, volume.walls if volume else None
+    if (walls or voxels or ground.places or (volume and volume.heights)) and ground.scale is None:
         raise ValueError("it has walls or places, which are in metres, and no scale")
-    if walls is None:
-        return
-    count = walls.columns * walls.rows
-    if count > MAX_PIXELS:
-        raise ValueError(f"its walls have {count:,} pixels, more than {MAX_PIXELS:,}")
+    if walls and volume:
+        raise ValueError("it has walls in the plane, and a volume")
+    if walls:
+        _check_flags(walls, walls.columns * walls.rows, MAX_PIXELS, "pixels")
+    if voxels:
+        _check_flags(voxels, voxels.columns * voxels.rows * voxels.levels, MAX_VOXELS, "voxels")
+
+
+def _check_flags(walls: WallPixels | WallVoxels, count: int, most: int, what: str) -> None:
+    if count > most:
+        raise ValueError(f"its walls have {count:,} {what}, more than {most:,}")
     for name, content in (("free", walls.free), ("occupied", walls.occupied)):
         if len(content) != -(-count // 8):
-            raise ValueError(f"its walls have {count:,} pixels, and {name} has flags for {8 * len(content):,}")
+            raise ValueError(f"its walls have {count:,} {what}, and {name} has flags for {8 * len(content):,}")

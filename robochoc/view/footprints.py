@@ -9,6 +9,7 @@ import numpy.typing as npt
 
 from robochoc.flight.cells import in_cells
 from robochoc.flight.mission import Mission
+from robochoc.flight.pixel_frame import PixelFrame
 
 _MOST = 4_000
 """Rectangles of a map. Where there would be more, pixels are drawn twice as large, and again."""
@@ -27,9 +28,10 @@ class DrawnWalls:
 
 
 def walls_drawn(mission: Mission) -> DrawnWalls | None:
-    """Return the walls of a mission in the cells of its box; None if it has none."""
+    """Return the walls of a mission in the cells of its box; None if it has none in the plane."""
     walls = mission.walls
-    if walls is None:
+    frame = walls.frame if walls else None
+    if walls is None or not isinstance(frame, PixelFrame):
         return None
 
     def footprints(flags: Flags) -> Corners:
@@ -37,7 +39,7 @@ def walls_drawn(mission: Mission) -> DrawnWalls | None:
         left, low, right, high = factor * sides.T
         corners = np.stack([left, low, right, low, right, high, left, high], axis=1).reshape(-1, 2)
         rows, columns = flags.shape
-        places = walls.frame.in_metres(np.minimum(corners, (columns, rows)).astype(np.float64))
+        places = frame.in_metres(np.minimum(corners, (columns, rows)).astype(np.float64))
         flat = np.column_stack((places, np.zeros(len(places))))
         return in_cells(mission, flat)[:, :2].reshape(-1, 4, 2)
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from itertools import product
 from pathlib import Path
 from typing import Any
 
@@ -13,6 +14,7 @@ from mcap_ros2.decoder import DecoderFactory
 
 from robochoc.cli.group import cli
 from tests.support.maps import write_map
+from tests.support.octomaps import FREE, write_octomap
 
 HALL = ["#########", "#...#...#", "#...#...#", "#.......#", "#...#...#", "#...#...#", "#########"]
 """Two rooms with a door, 0.5 m a pixel."""
@@ -65,6 +67,26 @@ def test_fly_and_animate_find_the_walls_beside_the_robots(team: Path, result: Pa
     whole = json.loads((team / "map.json").read_text())
     bare.write_text(json.dumps({key: part for key, part in whole.items() if key != "walls"}))
     assert told(ran("fly", result, "--team", team, "--map", bare, "--json"))["nearest_wall"] is None
+
+
+def test_on_an_octomap_they_fly_around_its_voxels(tmp_path: Path) -> None:
+    rooms = {(x, y, z): FREE for x, y, z in product(range(5), range(3), range(3)) if x != 2 or (y, z) == (1, 1)}
+    folder, path = tmp_path / "team", tmp_path / "result.json"
+    house = write_octomap(tmp_path / "rooms.bt", rooms)
+    at = ("--at", "0.5,0.5,0.5", "--anchor", "2,0.5,1", "--cell", "0.5", "--cells", "200")
+    made = ran("generate", "formation", "--map", house, *at, "-o", folder)
+    assert "cells of 0.5 m, and walls that drones fly around" in made.output
+    path.write_text(ran("solve", folder, "--runtime", "simulator", "--protocol", "dpop", "--json").output)
+    flown = told(ran("fly", path, "--team", folder, "--json"))
+    assert flown["as_planned"]
+    assert flown["nearest_wall"]["set_m"] == 0.2
+    assert flown["drones"][0]["at"] == pytest.approx([2, 0.5, 1], abs=0.02)
+    done = ran("solve", folder, "--runtime", "simulator", "--situation", "flight")
+    assert "nearest to a wall: " in done.output
+    whole = json.loads((folder / "map.json").read_text())
+    whole["volume"]["walls"]["free"] = "AAAA"
+    (folder / "map.json").write_text(json.dumps(whole))
+    assert "voxels, and free has flags for 24" in ran("fly", path, "--team", folder).stderr
 
 
 def test_a_drone_that_is_blown_against_a_wall_is_told(team: Path, result: Path) -> None:

@@ -155,7 +155,7 @@ def test_a_map_is_written_beside_the_team_and_flown_on(tmp_path: Path) -> None:
 def test_a_house_is_flown_in(tmp_path: Path) -> None:
     words = ("--map", HOUSE, "--at", "2,2,1 6,4,3.5", "--anchor", "2,4.5,3.5", "-o", "team")
     done = robochoc_within("generate", "formation", *words)
-    assert done.stdout.endswith("team/map.json: cells of 1 m, and walls\n")
+    assert done.stdout.endswith("team/map.json: cells of 1 m, and walls that drones fly around\n")
     solved = robochoc_within("solve", "team", "--runtime", "simulator", "--json")
     (tmp_path / "result.json").write_text(solved.stdout)
     flown = robochoc_within("fly", "result.json", "--team", "team", "--json")

@@ -99,8 +99,7 @@ def write(make: Callable[[], Team | TeamOnMap], output: Path | None, *, replace:
     count = len(team.robots)
     click.echo(f"{folder}: {count} robots, {constraints} constraints; {next_step(folder, count)}")
     if ground:
-        around = " that drones fly around" * (ground.walls is not None)
-        click.echo(f"{folder / GROUND_FILE}: cells of {ground.scale:g} m, and walls{around}")
+        click.echo(f"{folder / GROUND_FILE}: cells of {ground.scale:g} m, and walls that drones fly around")
 
 
 def next_step(folder: Path | str, robots: int) -> str:

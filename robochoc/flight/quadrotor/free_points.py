@@ -6,7 +6,7 @@ import numpy as np
 
 from robochoc.flight.quadrotor.airframe import Array
 from robochoc.flight.quadrotor.rigid_bodies import Mask
-from robochoc.flight.routes.floor_plan import FloorPlan
+from robochoc.flight.routes.wall_plan import WallPlan
 
 _STEPS = 8
 """The number of steps, of half a distance each, in which free points are searched for in each direction."""
@@ -27,7 +27,7 @@ def nearest_distances(points: Array, others: Array) -> Array:
 
 
 def free_point(
-    wish: Array, taken: Array, radii: Array, ground: float, *, low: bool, floor_plan: FloorPlan | None = None
+    wish: Array, taken: Array, radii: Array, ground: float, *, low: bool, floor_plan: WallPlan | None = None
 ) -> Array:
     """Return `wish`, or the nearest point to it on a grid, that is `radii` (M,) away from `taken` (M, 3).
 

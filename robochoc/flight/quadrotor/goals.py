@@ -15,8 +15,8 @@ from robochoc.flight.quadrotor.airframe import Array
 from robochoc.flight.quadrotor.conditions import DISTANCE_MIN_M
 from robochoc.flight.quadrotor.free_points import free_point, nearest_distances, nearest_two
 from robochoc.flight.quadrotor.rigid_bodies import Mask
-from robochoc.flight.routes.floor_plan import FloorPlan
 from robochoc.flight.routes.spacing import SLACK_M, squashed
+from robochoc.flight.routes.wall_plan import WallPlan
 
 MARGIN_M = 0.1
 """The margin that routes keep beyond the distance. Tracking errors take 1 cm of it in calm air, and 6 cm where a drone
@@ -78,7 +78,7 @@ class LegGoals:
         return max(self._distance, min(self._distance + MARGIN_M, _ALL_BUT * leave))
 
     def give_way(
-        self, hazards: Hazards, preferred: Array, ground: float, floor_plan: FloorPlan | None = None
+        self, hazards: Hazards, preferred: Array, ground: float, floor_plan: WallPlan | None = None
     ) -> list[tuple[int, str]]:
         """Replace places that are not free; return which drones are moved, and what each does instead, in words.
 
@@ -103,7 +103,7 @@ class LegGoals:
                 why = "another one flies to where it is"
             else:
                 continue
-            low = goal.lands if goal is not None else place[2] <= ground + _LOW_M
+            low = place[2] <= ground + _LOW_M
             radii = np.full(len(others), self._distance + MARGIN_M)
             taken, radii = self._flat(np.vstack((others, hazards.points))), np.concatenate((radii, hazards.radii))
             wish = self._flat(preferred[number])

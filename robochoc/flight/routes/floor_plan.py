@@ -3,38 +3,34 @@
 Walls are the pixels of a map that are not free, and all that lies beside the map. A drone keeps `keep` metres between
 its centre and the nearest border of such a pixel, measured exactly: not between centres of pixels.
 
-A way is found on a lattice (`lattice.py`), and then pulled taut: of its points those are kept that make the shortest
-way of few straight pieces, each of which is clear of all walls. A corner counts as `_CORNER_M` metres, since drones
-come to rest there.
+A way is found on a lattice (`lattice.py`), and then pulled taut (`taut.py`).
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from itertools import pairwise
 
 import numpy as np
 import numpy.typing as npt
 
 from robochoc.flight.pixel_frame import PixelFrame
 from robochoc.flight.routes.lattice import Lattice
-from robochoc.flight.routes.spacing import Array, Flags, norms
-
-_Sees = Callable[[int, int], bool]
+from robochoc.flight.routes.spacing import Array, Flags
+from robochoc.flight.routes.taut import taut
 
 SPARE_M = 0.1
 """Ways keep so much more than they have to, if that is no detour of more than a quarter."""
-_CORNER_M = 0.25
+CORNER_M = 0.25
+"""The length for which a corner counts: drones come to rest there."""
+_FINE = 4
+"""Points of the lattice in the distance that drones keep from walls, at least."""
+_FINE_M = 0.02
+"""Points are never closer to each other, whatever drones keep."""
+_POINTS_MAX = 4_000_000
 _ROUNDING = 1e-9
 """In pixels. A wall that is nearer than it may be by no more than that is not too near."""
-_AROUND = (-16, -8, -4, -2, -1, 0, 1, 2, 4, 8, 16)
-"""Points of a way beside each of its corners that may become a corner."""
-_LOOK_BACK = 60
-_ROUNDS = 2
-_HALVINGS = 6
 _PORTION = 2_000_000
 
 
@@ -107,12 +103,18 @@ class FloorPlan:
             return None
         points, wide = found
         roomy = [[self._sees(end, end, wish)] for end in ends]
-        bends = self._taut(np.vstack((ends[:1], points, ends[1:])), np.concatenate((roomy[0], wide, roomy[1])))
+        wide = np.concatenate((roomy[0], wide, roomy[1]))
+        keeps = np.where(wide, wish, self.keep)
+        bends = taut(np.vstack((ends[:1], points, ends[1:])), keeps, self._sees, CORNER_M / self.frame.size)
         return np.vstack((first, self.frame.in_metres(bends[1:-1]), second))
 
     @cached_property
     def _lattice(self) -> Lattice:
-        return Lattice(self.solid, self.keep / self.frame.size, SPARE_M / self.frame.size, self.frame.size)
+        keep, size = self.keep / self.frame.size, self.frame.size
+        parts = min(max(1, math.ceil(_FINE / keep)) if keep > 0 else 1, max(1, int(size / _FINE_M)))
+        while parts > 1 and self.solid.size * parts * parts > _POINTS_MAX:
+            parts -= 1
+        return Lattice(self.solid, keep, SPARE_M / size, parts)
 
     @cached_property
     def _before(self) -> npt.NDArray[np.int32]:
@@ -141,38 +143,6 @@ class FloorPlan:
         end = np.ceil(ends - _ROUNDING).astype(np.int64).clip(0, columns)
         return not bool((self._before[row, end] > self._before[row, begin]).any())
 
-    def _taut(self, points: Array, wide: Flags) -> Array:
-        """Return the corners of a way along `points` (K, 2), which keeps more where all of its points are `wide`."""
-        keeps = np.where(wide, self.keep + SPARE_M, self.keep)
-
-        def sees(i: int, j: int) -> bool:
-            # From one point of the lattice to the next nothing can be nearer than `keep`.
-            keep = float(keeps[i : j + 1].min()) if j > i + 1 else self.keep
-            return self._sees(points[i], points[j], keep)
-
-        chain = _far_sighted(len(points) - 1, sees)
-        chosen = _shortest(points, chain, sees, _CORNER_M / self.frame.size)
-        bends = [points[number] for number in chosen]
-        kept = [float(keeps[i : j + 1].min()) for i, j in pairwise(chosen)]
-        for _ in range(_ROUNDS):
-            for at in range(1, len(bends) - 1):
-                bends[at] = self._nearer(bends[at - 1], bends[at], bends[at + 1], min(kept[at - 1], kept[at]))
-        return np.array(bends)
-
-    def _nearer(self, before: Array, bend: Array, after: Array, keep: float) -> Array:
-        """Return `bend`, moved as near to the straight line between its neighbours as walls allow."""
-        along = after - before
-        squared = float(along @ along)
-        share = min(max(float((bend - before) @ along) / squared, 0.0), 1.0) if squared else 0.0
-        target = before + share * along
-        low, high = 0.0, 1.0
-        for _ in range(_HALVINGS):
-            middle = (low + high) / 2
-            tried = bend + middle * (target - bend)
-            clear = self._sees(before, tried, keep) and self._sees(tried, after, keep)
-            low, high = (middle, high) if clear else (low, middle)
-        return np.asarray(bend + low * (target - bend))
-
 
 def _covered(
     row: npt.NDArray[np.int64], origin: tuple[float, float], along: tuple[float, float], radius: float
@@ -197,47 +167,3 @@ def _covered(
     least: Array = np.where(reached, middle - half, np.inf).min(axis=0)
     most: Array = np.where(reached, middle + half, -np.inf).max(axis=0)
     return least, most
-
-
-def _far_sighted(last: int, sees: _Sees) -> list[int]:
-    """Return points from 0 to `last` that see each other one after the other, each about as far away as it can be."""
-    chain = [0]
-    while (here := chain[-1]) < last:
-        good, bad = here + 1, last + 1
-        step = 2
-        while here + step <= last and sees(here, here + step):
-            good = here + step
-            step *= 2
-        bad = min(bad, here + step)
-        while bad - good > 1:
-            middle = (good + bad) // 2
-            good, bad = (middle, bad) if sees(here, middle) else (good, middle)
-        chain.append(good)
-    return chain
-
-
-def _shortest(points: Array, chain: Sequence[int], sees: _Sees, corner: float) -> list[int]:
-    """Return the corners of the shortest way over points of `chain`, and around them; a corner counts as a length."""
-    last = chain[-1]
-    links = set(pairwise(chain))
-    numbers = sorted({*chain, *(at + by for at in chain[1:-1] for by in _AROUND if 0 < at + by < last)})
-    costs = {0: 0.0}
-    origin: dict[int, int] = {}
-    for place, number in enumerate(numbers[1:], 1):
-        before = [one for one in _earlier(numbers, place, chain) if one in costs]
-        lengths = norms(points[before] - points[number]) + np.array([costs[one] for one in before]) + corner
-        for at in np.argsort(lengths, kind="stable").tolist():
-            if (before[at], number) in links or sees(before[at], number):
-                costs[number], origin[number] = float(lengths[at]), before[at]
-                break
-    found = [last]
-    while found[-1]:
-        found.append(origin[found[-1]])
-    return found[::-1]
-
-
-def _earlier(numbers: Sequence[int], place: int, chain: Sequence[int]) -> Iterator[int]:
-    """Yield the points before a place that are looked at: the last ones, and those of the chain."""
-    first = max(0, place - _LOOK_BACK)
-    yield from numbers[first:place]
-    yield from (one for one in chain if one < numbers[first])

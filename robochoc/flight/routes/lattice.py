@@ -1,10 +1,12 @@
-"""Shortest ways on a lattice of points that are far enough from all walls.
+"""Shortest ways on a lattice of points that are far enough from all walls, in the plane or in space.
 
-A* (Hart, Nilsson, Raphael 1968) on the points with eight neighbours, in integers: steps of 5 and 7 as in the travel
-times of generated teams (`generators/maps/travel.py`), four times as long where walls are far, five times where they
-are near. All points of one estimate are looked at together.
+A* (Hart, Nilsson, Raphael 1968) on the points with eight neighbours, or 26, in integers: steps of 15, 21 and 26 as in
+the travel times of generated teams (`generators/maps/travel.py`), four times as long where walls are far, five times
+where they are near. Points whose estimates differ by less than a step are looked at together, and again if a shorter
+way to them is found.
 
-Points are the centres of pixels; where pixels are large for a drone, those of parts of pixels.
+Points are the centres of pixels, or of voxels; where these are large for a drone, those of their parts, and where they
+are small, those of every second one, say.
 """
 
 from __future__ import annotations
@@ -12,142 +14,182 @@ from __future__ import annotations
 import heapq
 import math
 from collections.abc import Callable, Iterator
+from functools import cached_property
+from itertools import product
 
 import numpy as np
 import numpy.typing as npt
 
 from robochoc.flight.routes.spacing import Array, Flags, norms
 
-_STRAIGHT, _DIAGONAL = 5, 7
+_LENGTHS = (15, 21, 26)
+"""The lengths of steps along one axis, two and three."""
 _WIDE, _NARROW = 4, 5
 """By what steps are multiplied to a point where walls are far, and where they are near."""
-_FINE = 4
-"""Points of the lattice in the distance that drones keep from walls, at least."""
-_FINE_M = 0.02
-"""Points are never closer to each other, whatever drones keep."""
-_POINTS_MAX = 4_000_000
+_TOGETHER = _WIDE * _LENGTHS[0]
+_LIMIT = 2**30
+"""The length of a way that there is not."""
 _GATES = 4
 """Points of the lattice that are tried as the first, or the last, of a way."""
 
 Numbers = npt.NDArray[np.int64]
+Lengths = npt.NDArray[np.int32]
 
 
 class Lattice:
-    """A lattice over pixels. Lengths are in sides of a pixel, of which one is `size_m` metres.
+    """A lattice over pixels or voxels. Lengths are in their sides; places have the x first, arrays have it last.
 
     Args:
-        solid: The pixels that are not free.
-        keep: The distance from solid pixels, and from the outside, that all lines between neighbours keep.
+        solid: The pixels or voxels that are not free.
+        keep: The distance from these, and from the outside, that all lines between neighbours keep.
         spare: Where walls are further away than that, too, they are far.
-        size_m: The side of a pixel in metres.
+        parts: The number of points along the side of one.
+        every: Only each so-many-th of these is a point.
     """
 
-    def __init__(self, solid: Flags, keep: float, spare: float, size_m: float) -> None:
-        finest = max(1, int(size_m / _FINE_M), 1)
-        parts = min(max(1, math.ceil(_FINE / keep)) if keep > 0 else 1, finest)
-        while parts > 1 and solid.size * parts * parts > _POINTS_MAX:
-            parts -= 1
-        self._parts = parts
+    def __init__(self, solid: Flags, keep: float, spare: float, parts: int, every: int = 1) -> None:
         self._keep = keep
-        fine = np.repeat(np.repeat(solid, parts, axis=0), parts, axis=1)
+        self._begin = min(every // 2, min(solid.shape) * parts - 1)
+        self._side = every / parts
+        self._offset = (self._begin + 0.5) / parts
         # Half way between two neighbours walls may be nearer than at both: by no more than that of a single corner.
-        self._free = np.pad(_away(fine, math.sqrt((keep * parts) ** 2 + 0.5)), 1)
-        wide = np.pad(_away(fine, math.sqrt(((keep + spare) * parts) ** 2 + 0.5)), 1)
-        self._weights = np.where(wide, _WIDE, _NARROW).astype(np.int64).ravel()
-        self._width = self._free.shape[1]
+        bulge = solid.ndim * every * every / 4
+        squares = [((keep + more) * parts) ** 2 + bulge for more in (0.0, spare)]
+        apart = _quarters(solid, parts, math.ceil(math.sqrt(squares[1])) + 1)
+        apart = apart[(slice(self._begin, None, every),) * solid.ndim]
+        self._free = np.pad(apart >= 4 * squares[0], 1)
+        wide = np.pad(apart >= 4 * squares[1], 1)
+        self._weights = np.where(wide, _WIDE, _NARROW).astype(np.int8).ravel()
 
-    def path(self, start: Array, goal: Array, sees: Callable[[Array, Array], bool]) -> tuple[Array, Flags] | None:
+    def path(
+        self, start: Array, goal: Array, sees: Callable[[Array, Array], bool], without: Numbers | None = None
+    ) -> tuple[Array, Flags] | None:
         """Return the points of a shortest way from near `start` to near `goal`, and at which of them walls are far.
 
-        The first point and `start` see each other, as do the last and `goal`. None: there is no way.
+        The first point and `start` see each other, as do the last and `goal`. None: there is no way. The points
+        `without` are left out.
         """
-        firsts, lasts = [*self._gates(start, sees)], [*self._gates(goal, sees)]
+        free = self._without(without)
+        firsts, lasts = [*self._gates(start, sees, free)], [*self._gates(goal, sees, free)]
         if not (firsts and lasts):
             return None
-        lengths, done = self._search(firsts, lasts[0])
-        reached = [last for last in lasts if done[last]]  # all to which there is a way, where it is not the first one
+        lengths = self._search(free, firsts, lasts[0])
+        reached = [last for last in lasts if lengths[last] < _LIMIT]  # there may be no way to the first one
         if not reached:
             return None
-        numbers = self._traced(lengths, done, reached[0])
+        numbers = self._traced(lengths, free, reached[0])
         return self._places(numbers), self._weights[numbers] == _WIDE
 
-    def _places(self, numbers: Numbers) -> Array:
-        rows, columns = np.divmod(numbers, self._width)
-        return (np.column_stack((columns, rows)) - 0.5) / self._parts
+    def reached(self, start: Array, sees: Callable[[Array, Array], bool], without: Numbers, most: float) -> Array:
+        """Return the points (K, D) to which a way of no more than `most` leads, the nearest first."""
+        free = self._without(without)
+        firsts = [*self._gates(start, sees, free)]
+        if not firsts:
+            return np.empty((0, self._free.ndim))
+        longest = min(most / self._side * _WIDE * _LENGTHS[0], _LIMIT)
+        lengths = self._search(free, firsts, None, math.ceil(longest))
+        found = np.flatnonzero(lengths < _LIMIT)
+        return self._places(found[np.argsort(lengths[found], kind="stable")])
 
-    def _gates(self, place: Array, sees: Callable[[Array, Array], bool]) -> Iterator[int]:
+    def around(self, place: Array, radii: Array) -> Numbers:
+        """Return the points in the ellipsoid around a place that has these radii along the axes, and a little more.
+
+        A line between neighbours that are not among them does not lead through the ellipsoid.
+        """
+        least = float(radii.min())
+        radii = radii * math.sqrt(1 + self._free.ndim * self._side**2 / (4 * least * least))
+        low, high = (np.floor((place + side * radii - self._offset) / self._side).astype(int) + 1 for side in (-1, 1))
+        axes = [
+            np.arange(max(first, 1), min(last + 2, size - 1))
+            for first, last, size in zip(low, high, reversed(self._free.shape), strict=True)
+        ]
+        if not all(map(len, axes)):
+            return np.empty(0, dtype=np.int64)
+        numbers: Numbers = np.ravel_multi_index(np.ix_(*reversed(axes)), self._free.shape).ravel()
+        found: Numbers = numbers[np.square((self._places(numbers) - place) / radii).sum(axis=1) < 1]
+        return found
+
+    def _without(self, numbers: Numbers | None) -> Flags:
+        free = self._free.ravel()
+        if numbers is not None:
+            free = free.copy()
+            free[numbers] = False
+        return free
+
+    def _places(self, numbers: Numbers) -> Array:
+        at = np.column_stack(np.unravel_index(numbers, self._free.shape)[::-1])
+        return np.asarray((at - 1) * self._side + self._offset)
+
+    def _gates(self, place: Array, sees: Callable[[Array, Array], bool], free: Flags) -> Iterator[int]:
         """Yield the nearest points of the lattice that see a place."""
-        rows, columns = self._free.shape
-        reach = math.ceil(self._keep * self._parts) + 3
-        column, row = (math.floor(part * self._parts) + 1 for part in place)
-        low, left = max(row - reach, 0), max(column - reach, 0)
-        near = self._free[low : min(row + reach + 1, rows), left : min(column + reach + 1, columns)]
-        found = np.argwhere(near)
-        numbers = (found[:, 0] + low) * self._width + found[:, 1] + left
+        reach = math.ceil(self._keep / self._side) + 3
+        at = np.floor((place[::-1] - self._offset) / self._side + 0.5).astype(int) + 1
+        low = np.maximum(at - reach, 0)
+        window = tuple(slice(first, last) for first, last in zip(low, np.maximum(at + reach + 1, 0), strict=True))
+        found = np.argwhere(free.reshape(self._free.shape)[window]) + low
+        numbers = np.ravel_multi_index(tuple(found.T), self._free.shape)
         places = self._places(numbers)
         count = 0
-        for at in np.argsort(norms(places - place), kind="stable").tolist():
-            if sees(place, places[at]):
-                yield int(numbers[at])
+        for number in np.argsort(norms(places - place), kind="stable").tolist():
+            if sees(place, places[number]):
+                yield int(numbers[number])
                 count += 1
                 if count == _GATES:
                     return
 
-    def _search(self, firsts: list[int], last: int) -> tuple[Numbers, Flags]:
-        """Return the lengths of shortest ways from one of `firsts`, and the points for which they are known.
+    def _search(self, free: Flags, firsts: list[int], last: int | None, most: int = _LIMIT) -> Lengths:
+        """Return the lengths of shortest ways from one of `firsts`; `_LIMIT` where none is known.
 
-        `last` is one of these; if no way leads there, they are all points to which one leads.
+        The search ends when the way to `last` is known. If no way leads there, or it is None, all points have been
+        looked at to which one leads that is no longer than `most`.
         """
-        free = self._free.ravel()
-        steps = _steps(self._width)
-        limit = np.iinfo(np.int64).max // 2
-        lengths = np.full(free.size, limit, dtype=np.int64)
-        done = np.zeros(free.size, dtype=bool)
-        begins = np.array(firsts)
-        lengths[begins] = 0
+        lengths = np.full(free.size, _LIMIT, dtype=np.int32)
         waiting: dict[int, list[Numbers]] = {}
         heap: list[int] = []
 
         def wait(points: Numbers) -> None:
-            estimates = lengths[points] + self._least(points, last)
-            for estimate in np.unique(estimates).tolist():
-                if estimate not in waiting:
-                    waiting[estimate] = []
-                    heapq.heappush(heap, estimate)
-                waiting[estimate].append(points[estimates == estimate])
+            rounds = (lengths[points] + self._least(points, last)) // _TOGETHER
+            for later in np.unique(rounds).tolist():
+                if later not in waiting:
+                    waiting[later] = []
+                    heapq.heappush(heap, later)
+                waiting[later].append(points[rounds == later])
 
+        begins = np.array(firsts)
+        lengths[begins] = 0
         wait(begins)
-        while heap and not done[last]:
-            estimate = heapq.heappop(heap)
-            points = np.unique(np.concatenate(waiting.pop(estimate)))
-            points = points[~done[points]]
-            done[points] = True
+        while heap:
+            this = heapq.heappop(heap)
+            if last is not None and lengths[last] <= this * _TOGETHER:
+                break
+            points = np.unique(np.concatenate(waiting.pop(this)))
+            points = points[(lengths[points] + self._least(points, last)) // _TOGETHER == this]
             fresh = []
-            for step, beside, length in steps:
+            for step, beside, length in self._steps:
                 ends = points + step
-                new = free[ends] & ~done[ends]
+                further = lengths[points] + length * self._weights[ends].astype(np.int32)
+                new = free[ends] & (further < lengths[ends]) & (further <= most)
                 for side in beside:
                     new &= free[points + side]
-                ends, further = ends[new], lengths[points[new]] + length * self._weights[ends[new]]
-                shorter = further < lengths[ends]
-                ends = ends[shorter]
-                lengths[ends] = further[shorter]
+                ends = ends[new]
+                lengths[ends] = further[new]
                 fresh.append(ends)
             if (new_points := np.unique(np.concatenate(fresh))).size:
                 wait(new_points)
-        return lengths, done
+        return lengths
 
-    def _least(self, points: Numbers, last: int) -> Numbers:
+    def _least(self, points: Numbers, last: int | None) -> Lengths:
         """Return the length of the way to `last` that there would be without walls."""
-        rows, columns = np.divmod(points, self._width)
-        row, column = divmod(last, self._width)
-        up, right = np.abs(rows - row), np.abs(columns - column)
-        across = np.minimum(up, right)
-        found: Numbers = _WIDE * (_STRAIGHT * (np.maximum(up, right) - across) + _DIAGONAL * across)
+        if last is None:
+            return np.zeros(len(points), dtype=np.int32)
+        ends = np.unravel_index(last, self._free.shape)
+        ways = zip(np.unravel_index(points, self._free.shape), ends, strict=True)
+        apart = np.sort([np.abs(at - end) for at, end in ways], axis=0)[::-1]  # the longest axis first
+        steps = apart - np.concatenate((apart[1:], np.zeros_like(apart[:1])))
+        found: Lengths = (_WIDE * np.array(_LENGTHS[: len(steps)]) @ steps).astype(np.int32)
         return found
 
-    def _traced(self, lengths: Numbers, done: Flags, last: int) -> Numbers:
-        free, steps = self._free.ravel(), _steps(self._width)
+    def _traced(self, lengths: Lengths, free: Flags, last: int) -> Numbers:
         found = [last]
         while lengths[found[-1]]:
             here = found[-1]
@@ -155,37 +197,43 @@ class Lattice:
             # A step is the same both ways: it cuts no corner.
             before = next(
                 here + step
-                for step, beside, length in steps
-                if done[here + step]
-                and lengths[here + step] + length * weight == lengths[here]
+                for step, beside, length in self._steps
+                if lengths[here + step] + length * weight <= lengths[here]
+                and free[here + step]
                 and all(free[here + side] for side in beside)
             )
             found.append(before)
         return np.array(found[::-1])
 
+    @cached_property
+    def _steps(self) -> list[tuple[int, tuple[int, ...], int]]:
+        """All steps in the flat array, each with the steps to what is beside it, and its length; the shortest first."""
+        shape = self._free.shape
+        strides = [int(np.prod(shape[axis + 1 :])) for axis in range(len(shape))]
+        found = []
+        for moves in product((0, 1, -1), repeat=len(shape)):
+            parts = [move * stride for move, stride in zip(moves, strides, strict=True) if move]
+            if parts:
+                some = [sum(chosen) for chosen in product(*((0, part) for part in parts))]
+                found.append((some[-1], tuple(some[1:-1]), _LENGTHS[len(parts) - 1]))
+        return sorted(found, key=lambda step: step[2])
 
-def _steps(width: int) -> list[tuple[int, tuple[int, ...], int]]:
-    """Return the eight steps in a flat array of rows so wide, with the points beside a diagonal, and the length."""
-    straight = [(step, (), _STRAIGHT) for step in (1, -1, width, -width)]
-    return [*straight, *((up + side, (up, side), _DIAGONAL) for up in (width, -width) for side in (1, -1))]
 
+def _quarters(solid: Flags, parts: int, reach: int) -> Lengths:
+    """Return four times the squares of the distances of points from the borders of all that is solid, or outside.
 
-def _away(solid: Flags, distance: float) -> Flags:
-    """Return the pixels whose centres are at least `distance`, in pixels, from all solid ones and from the outside.
-
-    Distances are to the borders of solid pixels.
+    Each side is cut into `parts`, whose centres are the points; lengths are in parts. Of what is further than `reach`
+    only that is known. Squares are added up axis by axis.
     """
-    rows, columns = solid.shape
-    reach = math.ceil(distance + 0.5)
-    padded = np.pad(solid, reach, constant_values=True)
-    near = np.zeros_like(solid)
-    for step in range(-reach, reach + 1):
-        left = distance * distance - max(abs(step) - 0.5, 0) ** 2
-        if left <= 0:
-            continue
-        half = math.ceil(math.sqrt(left) + 0.5) - 1
-        line = padded[reach + step : reach + step + rows]
-        sums = np.cumsum(np.pad(line, ((0, 0), (1, 0))), axis=1, dtype=np.int32)
-        first = reach - half
-        near |= sums[:, first + 2 * half + 1 : first + 2 * half + 1 + columns] > sums[:, first : first + columns]
-    return ~near
+    fine = np.pad(solid, 1, constant_values=True)
+    for axis in range(solid.ndim):
+        fine = np.repeat(fine, parts, axis=axis)
+    squares = np.where(fine, 0, (2 * reach + 1) ** 2).astype(np.int32)
+    for axis in range(solid.ndim):
+        lines = np.moveaxis(squares, axis, 0)
+        before = lines.copy()
+        for step in range(1, min(reach, len(lines) - 1) + 1):
+            off = (2 * step - 1) ** 2
+            np.minimum(lines[step:], before[:-step] + off, out=lines[step:])
+            np.minimum(lines[:-step], before[step:] + off, out=lines[:-step])
+    return squares[(slice(parts, -parts),) * solid.ndim]

@@ -18,37 +18,18 @@ or drones between which none fits, enclose a drone: that is `NoRouteError`.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Iterator, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable, Iterator
 from itertools import count, product, takewhile
 
 import numpy as np
 
+from robochoc.flight.routes.move_order import Move, MoveOrder, NoRouteError
 from robochoc.flight.routes.paths import Space
 from robochoc.flight.routes.spacing import Array, Flags, norms
 
 _RINGS = 20
 """The most rings of a distance away at which a drone waits in the sky where there are walls."""
 _Way = Callable[[Array, Array, Array], Array | None]
-
-
-class NoRouteError(ValueError):
-    """No order of moves was found in which `drones` reach their goals: standing points enclose them."""
-
-    def __init__(self, drones: Sequence[int]) -> None:
-        self.drones = tuple(drones)
-        names = ", ".join(map(str, self.drones))
-        super().__init__(f"no way was found for drones {names} (standing points enclose where they start or end)")
-
-
-@dataclass(frozen=True)
-class Move:
-    """A drone's move along a path (K + 1, 3), from rest to rest."""
-
-    drone: int
-    path: Array
-    points: Array
-    """The places of all drones that rest meanwhile. Any other path that is clear of them is as good."""
 
 
 def moves_between(starts: Array, goals: Array, standing: Array, space: Space, delays: Array) -> list[Move]:
@@ -62,31 +43,18 @@ def moves_between(starts: Array, goals: Array, standing: Array, space: Space, de
     return found.moves
 
 
-class _Sequence:
-    """The moves so far, and where all drones rest after them."""
+class _UnderTheSky(MoveOrder[Space]):
+    """Moves where nothing is above all drones, so that they can wait there."""
 
     def __init__(self, starts: Array, goals: Array, standing: Array, space: Space, delays: Array) -> None:
-        self.goals = goals
-        self.delays = delays
-        self.space = space
-        self.count = len(starts)
-        self.points = np.vstack((starts, standing))
-        """Positions of drones, and standing points after them."""
-        self.rests = self.points[: self.count]
-        self.moves: list[Move] = []
+        super().__init__(starts, goals, standing, space, delays)
         self.waiting: set[int] = set()
         """The drones in the sky."""
 
-    def others(self, drone: int) -> Array:
-        return np.delete(self.points, drone, axis=0)
-
     def go(self, drone: int, path: Array) -> None:
-        self.moves.append(Move(drone, path, self.others(drone)))
-        self.points[drone] = path[-1]
+        """Move a drone, which then does not wait in the sky."""
+        super().go(drone, path)
         self.waiting.discard(drone)
-
-    def goal_is_free(self, drone: int) -> bool:
-        return bool((norms(self.others(drone) - self.goals[drone]) >= self.space.least).all())
 
     def to_goal(self, drone: int, ways: Iterable[_Way], *, low: bool = True) -> bool:
         """Move to the goal if one of `ways` leads there; along the ground only if `low`. Return whether it moved."""
@@ -132,7 +100,7 @@ class _Sequence:
         return None if free is None else np.array([*free, self.space.sky + self.space.distance])
 
 
-class _Direct(_Sequence):
+class _Direct(_UnderTheSky):
     """Drones go to their goals as soon as they can; drones that block others make room."""
 
     def __init__(self, starts: Array, goals: Array, standing: Array, space: Space, delays: Array) -> None:
@@ -261,7 +229,7 @@ class _Direct(_Sequence):
         return any(self.to_sky(drone) for drone in ranks if drone not in been)
 
 
-class _Emptied(_Sequence):
+class _Emptied(_UnderTheSky):
     """All drones go up, and down to their goals in the reverse of an order in which they could leave the goals."""
 
     def all_moves(self) -> list[Move]:

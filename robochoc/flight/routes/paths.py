@@ -26,7 +26,7 @@ from itertools import product
 import numpy as np
 
 from robochoc.flight.routes.floor_plan import FloorPlan
-from robochoc.flight.routes.spacing import SLACK_M, Array, Flags, norms, segment_distances
+from robochoc.flight.routes.spacing import SLACK_M, Array, Flags, Spacing, norms, segment_distances
 
 Column = Array
 """The x and the y of a vertical line."""
@@ -38,36 +38,22 @@ _RADII = (1.0, math.sqrt(2), 2.0, 3.0)
 
 
 @dataclass(frozen=True)
-class Space:
+class Space(Spacing):
     """The space for paths: at least `distance` from points at rest, not below `ground`. `sky` is above all points.
 
     With `rises`, drones leave the ground, and land, straight up and down where they can. No path leads through walls of
     the `floor_plan`, however high it is.
     """
 
-    distance: float
     ground: float
     sky: float
     rises: bool = False
     floor_plan: FloorPlan | None = None
 
     @property
-    def least(self) -> float:
-        """The distance, less rounding."""
-        return self.distance - SLACK_M
-
-    @property
     def off(self) -> float:
         """The height from which on a drone is off the ground."""
         return self.ground + self.distance / 4
-
-    def near(self, origins: Array, ends: Array, points: Array) -> Flags:
-        """Return whether (K, P) straight lines come too near to `points` (P, 3)."""
-        return segment_distances(origins, ends, points) < self.least
-
-    def is_clear(self, path: Array, points: Array) -> bool:
-        """Return whether a path keeps the distance from `points`."""
-        return not self.near(path[:-1], path[1:], points).any()
 
     def slides(self, starts: Array, goals: Array) -> Flags:
         """Return which straight lines (K,) lead along the ground; or, with `rises`, aslant from it or to it."""

@@ -5,6 +5,7 @@ Lengths are in metres, arrays are of float64, a point is a row of three.
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
@@ -103,3 +104,23 @@ def check_spacing(points: Array, standing: Array, distance: float, where: Litera
     first, second = divmod(int(apart.argmin()), len(everything))
     if apart[first, second] < distance - SLACK_M:
         raise TooCloseError(first, second, float(apart[first, second]), where)
+
+
+@dataclass(frozen=True)
+class Spacing:
+    """The `distance` that drones keep from points at rest."""
+
+    distance: float
+
+    @property
+    def least(self) -> float:
+        """The distance, less rounding."""
+        return self.distance - SLACK_M
+
+    def near(self, origins: Array, ends: Array, points: Array) -> Flags:
+        """Return whether (K, P) straight lines come too near to `points` (P, 3)."""
+        return segment_distances(origins, ends, points) < self.least
+
+    def is_clear(self, path: Array, points: Array) -> bool:
+        """Return whether a path keeps the distance from `points`."""
+        return not self.near(path[:-1], path[1:], points).any()

@@ -23,11 +23,14 @@ from itertools import islice
 import numpy as np
 from numpy.typing import NDArray
 
-from robochoc.flight.routes.floor_plan import FloorPlan
+from robochoc.flight.routes.indoors import Indoors, moves_indoors
 from robochoc.flight.routes.motion import MotionLimits, Route, RoutePlan
-from robochoc.flight.routes.moves import Move, moves_between
+from robochoc.flight.routes.move_order import Move
+from robochoc.flight.routes.moves import moves_between
 from robochoc.flight.routes.paths import Space
 from robochoc.flight.routes.spacing import Array, Flags, check_spacing, closest_approach, norms, squashed
+from robochoc.flight.routes.voxel_plan import VoxelPlan
+from robochoc.flight.routes.wall_plan import WallPlan
 
 Steps = NDArray[np.int64]
 
@@ -55,7 +58,7 @@ def plan_routes(  # noqa: PLR0913 - a problem of planning, in its own words
     ground: float = 0.0,
     rises: bool = False,
     downwash: float = 1.0,
-    floor_plan: FloorPlan | None = None,
+    floor_plan: WallPlan | None = None,
 ) -> RoutePlan:
     """Return how N drones fly from `starts` to `goals`, never nearer to each other than `distance`.
 
@@ -74,11 +77,11 @@ def plan_routes(  # noqa: PLR0913 - a problem of planning, in its own words
         ground: No drone flies lower, except for starts and goals.
         rises: Drones leave the ground, and land, straight up and down where they can.
         downwash: The distance needed right above each other, in distances; 1 at least.
-        floor_plan: Walls that no drone goes over.
+        floor_plan: Walls that no drone goes over; or walls in space, with floors and ceilings.
 
     Raises:
         TooCloseError: Two starts, or two goals, or one of them and a standing point, are nearer than `distance`.
-        NoRouteError: Standing points enclose a start or a goal.
+        NoRouteError: Standing points enclose a start or a goal; or drones do not get past each other between walls.
         ValueError: An argument makes no sense.
     """
     starts, goals = _points(starts, "starts"), _points(goals, "goals")
@@ -93,10 +96,16 @@ def plan_routes(  # noqa: PLR0913 - a problem of planning, in its own words
     _check_counts(starts, goals, delays)
     check_spacing(starts, standing, distance, "start")
     check_spacing(goals, standing, distance, "goal")
-    heights = np.concatenate((starts[:, 2], goals[:, 2], standing[:, 2], [ground]))
-    space = Space(distance, ground, float(heights.max()) + 2 * distance, rises, floor_plan)
+    space: Indoors | Space
+    if isinstance(floor_plan, VoxelPlan):
+        space = Indoors(distance, floor_plan, downwash)
+        moves = moves_indoors(starts, goals, standing, space, delays)
+    else:
+        heights = np.concatenate((starts[:, 2], goals[:, 2], standing[:, 2], [ground]))
+        space = Space(distance, ground, float(heights.max()) + 2 * distance, rises, floor_plan)
+        moves = moves_between(starts, goals, standing, space, delays)
     table = _Timetable(starts, space, limits or MotionLimits(), delays, downwash)
-    for move in moves_between(starts, goals, standing, space, delays):
+    for move in moves:
         table.add(move)
     return table.plan()
 
@@ -147,7 +156,9 @@ class _Entry:
 class _Timetable:
     """The scheduled moves, and where all drones rest in between."""
 
-    def __init__(self, starts: Array, space: Space, limits: MotionLimits, delays: Array, downwash: float) -> None:
+    def __init__(
+        self, starts: Array, space: Space | Indoors, limits: MotionLimits, delays: Array, downwash: float
+    ) -> None:
         self._starts = starts
         self._downwash = downwash
         self._space = space

@@ -1,6 +1,8 @@
-"""Flags of pixels as bytes: eight pixels a byte, the first one highest, row by row without gaps."""
+"""Flags of pixels, or voxels, as bytes: eight a byte, the first one highest, row by row without gaps."""
 
 from __future__ import annotations
+
+import math
 
 import numpy as np
 
@@ -12,7 +14,7 @@ def packed(flags: Flags) -> bytes:
     return np.packbits(flags).tobytes()
 
 
-def unpacked(content: bytes, rows: int, columns: int) -> Flags:
-    """Return the flags in bytes, of which there are enough."""
-    bits = np.unpackbits(np.frombuffer(content, dtype=np.uint8), count=rows * columns)
-    return bits.reshape(rows, columns).astype(bool)
+def unpacked(content: bytes, *shape: int) -> Flags:
+    """Return the flags in bytes, of which there are enough, as an array of a shape."""
+    bits = np.unpackbits(np.frombuffer(content, dtype=np.uint8), count=math.prod(shape))
+    return bits.reshape(shape).astype(bool)

@@ -14,7 +14,7 @@ from random import Random
 import msgspec
 
 from robochoc.formats import PREDEFINED
-from robochoc.formats.ground_map import MAX_BLOCKED, GroundMap, Volume, WallPixels
+from robochoc.formats.ground_map import MAX_BLOCKED, GroundMap, Volume, WallPixels, WallVoxels
 from robochoc.formats.maps import read_map
 from robochoc.formats.occupancy.packed import packed
 from robochoc.generators.draws import check_bounds, some
@@ -151,18 +151,21 @@ class Reach:
             first=(first[0], first[1]),
             scale=float(cells.side),
         )
-        if isinstance(cells, Cubes):
-            heights = {name: at[2] for name, at in standing.items()}
-            return msgspec.structs.replace(ground, volume=self._volume(cells, heights))
         places = {name: (float(start[0]), float(start[1])) for name, start in zip(self.names, self.starts, strict=True)}
-        return msgspec.structs.replace(ground, walls=self._walls(cells), places=places)
+        ground = msgspec.structs.replace(ground, places=places)
+        if isinstance(cells, Cubes):
+            levels = {name: at[2] for name, at in standing.items()}
+            return msgspec.structs.replace(ground, volume=self._volume(cells, levels))
+        return msgspec.structs.replace(ground, walls=self._walls(cells))
 
-    def _volume(self, cells: Cubes, heights: dict[str, int]) -> Volume:
+    def _volume(self, cells: Cubes, starts: dict[str, int]) -> Volume:
         if len(cells.blocked) > MAX_BLOCKED:
             raise ValueError(f"{len(cells.blocked):,} cells are blocked, more than {MAX_BLOCKED:,}; take larger cells")
         blocked = (self._places_from_1(cells.coordinates(cell)) for cell in cells.blocked)
         cubes = tuple((at[0], at[1], at[2]) for at in blocked)
-        return Volume(cells.counts[2], cells.first[2], heights, cubes, cells.sides)
+        heights = {name: float(start[2]) for name, start in zip(self.names, self.starts, strict=True)}
+        walls = self._walls_in_space(cells)
+        return Volume(cells.counts[2], cells.first[2], starts, cubes, cells.sides, walls, heights)
 
     def _walls(self, cells: Cells) -> WallPixels:
         grid = cells.grid
@@ -178,6 +181,14 @@ class Reach:
             packed(grid.occupied),
             atan2(grid.turn.sine, grid.turn.cosine),
         )
+
+    def _walls_in_space(self, cells: Cubes) -> WallVoxels:
+        grid = cells.grid
+        levels, rows, columns = grid.free.shape
+        x, y, z = map(float, grid.origin)
+        free, occupied = packed(grid.free), packed(grid.occupied)
+        sizes = (columns, rows, levels, float(grid.resolution))
+        return WallVoxels(*sizes, (x, y, z), float(self.radius), float(self.speed), free, occupied)
 
     def _places_from_1(self, coordinates: tuple[int, ...]) -> tuple[int, ...]:
         return tuple(one - first + 1 for one, first in zip(coordinates, self.cells.first, strict=True))

@@ -17,7 +17,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from robochoc.flight.layout import Point
-from robochoc.flight.routes.moves import NoRouteError, moves_between
+from robochoc.flight.routes.move_order import NoRouteError
+from robochoc.flight.routes.moves import moves_between
 from robochoc.flight.routes.paths import Space
 from robochoc.flight.routes.spacing import SLACK_M, Array, TooCloseError, check_spacing, norms, squashed
 from robochoc.ros.autopilots.fleet import Fleet, point_text

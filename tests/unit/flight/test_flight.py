@@ -18,7 +18,7 @@ from robochoc.flight.quadrotor.bounds import check_length
 from robochoc.flight.quadrotor.conditions import FlightConditions, MotorFailure
 from robochoc.flight.quadrotor.simulation import DT, QuadrotorSimulation
 from robochoc.flight.reports import Blocked, OutOfOrder
-from robochoc.flight.routes.moves import NoRouteError
+from robochoc.flight.routes.move_order import NoRouteError
 from robochoc.flight.routes.spacing import TooCloseError
 from tests.support.flights import planar
 

@@ -11,6 +11,7 @@ import pytest
 
 from robochoc.flight.flight import fly
 from robochoc.flight.mission import Mission, mission_of
+from robochoc.flight.pixel_frame import PixelFrame
 from robochoc.flight.preview import preview_of
 from robochoc.flight.quadrotor.conditions import FlightConditions, MotorFailure
 from robochoc.flight.routes.floor_plan import FloorPlan
@@ -141,6 +142,7 @@ def test_a_map_with_tiny_cells_is_flown_in_a_picture_with_its_walls(tmp_path: Pa
     assert preview.mission.scale == 1
     walls = preview.mission.walls
     assert walls is not None
+    assert isinstance(walls.frame, PixelFrame)
     assert walls.frame.size == pytest.approx(1)
     plan = FloorPlan(walls.solid, walls.frame, walls.radius)
     assert plan.clearances(preview.flown.positions.reshape(-1, 3), 1.0).min() >= 0.17

@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from robochoc.flight.routes.motion import Motion, MotionLimits, RoutePlan
-from robochoc.flight.routes.moves import NoRouteError
+from robochoc.flight.routes.move_order import NoRouteError
 from robochoc.flight.routes.paths import Space
 from robochoc.flight.routes.spacing import Array, TooCloseError, norms, segment_distances
 from robochoc.flight.routes.timetable import plan_routes

@@ -1,0 +1,185 @@
+"""Moves between walls, floors and ceilings: paths in space, and an order in which drones get past each other.
+
+No sky is above all drones here. A drone goes to its goal when that is free and a way leads there, clear of all that
+rest meanwhile; those whose goals are in fewer others' ways go first. Where none can go, one is let through: all drones
+on its way go to points beside it, which are in nobody else's way if there are such, and later on to their goals. What
+is done for a drone that does not get through after all is undone.
+
+That is not complete: a corridor may hold drones in an order in which they cannot leave it. Other orders of precedence
+are tried then, and at last it is `NoRouteError`.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from robochoc.flight.routes.move_order import Move, MoveOrder, NoRouteError
+from robochoc.flight.routes.spacing import Array, Flags, Spacing, norms, squashed
+from robochoc.flight.routes.voxel_plan import Resting, VoxelPlan
+
+_ORDERS = 6
+"""The number of orders of precedence that are tried."""
+_AWAY_M = (3.0, 12.0, math.inf)
+"""How far away a drone looks for a point where it is in nobody's way, one after the other."""
+_SPOTS = 2_000
+"""The number of such points of which the best is taken."""
+
+
+@dataclass(frozen=True)
+class Indoors(Spacing):
+    """The space between the walls of a `plan`. Heights of all points are divided by `downwash`, those of it are not."""
+
+    plan: VoxelPlan
+    downwash: float = 1.0
+
+    def way(self, start: Array, goal: Array, points: Array) -> Array | None:
+        """Return a short path that keeps from walls and from `points`; None if none is found."""
+        found = self.plan.way_among(self._tall(start), self._tall(goal), self._resting(points))
+        if found is None:
+            return None
+        path = np.vstack((start, squashed(found[1:-1], self.downwash), goal))
+        return path if self.is_clear(path, points) else None
+
+    def lanes(self, start: Array, goal: Array, points: Array) -> Iterator[Array]:
+        """Yield other paths that are about as good: none are looked for."""
+        del start, goal, points
+        yield from ()
+
+    def spots(self, start: Array, points: Array, most: float) -> Array:
+        """Return points (K, 3) to which paths lead from `start`, clear of others, the nearest first."""
+        found = self.plan.reached(self._tall(start), self._resting(points), most)
+        return squashed(found, self.downwash)
+
+    def _resting(self, points: Array) -> Resting:
+        return Resting(self._tall(points), self.distance, self.downwash)
+
+    def _tall(self, points: Array) -> Array:
+        return squashed(points, 1 / self.downwash)
+
+
+def moves_indoors(starts: Array, goals: Array, standing: Array, space: Indoors, delays: Array) -> list[Move]:
+    """Return moves, one after the other, that bring all drones from `starts` to `goals`. Raises `NoRouteError`."""
+    refused: NoRouteError | None = None
+    for number in range(_ORDERS):
+        turns = np.random.default_rng(number).permutation(len(starts)) if number else np.arange(len(starts))
+        try:
+            return _Order(starts, goals, standing, space, delays, turns).all_moves()
+        except NoRouteError as error:
+            refused = refused or error
+    raise refused or NoRouteError([])
+
+
+class _Order(MoveOrder[Indoors]):
+    """Moves in one order of precedence: of drones that are alike else, the one with the least of `turns` goes first."""
+
+    def __init__(
+        self, starts: Array, goals: Array, standing: Array, space: Indoors, delays: Array, turns: npt.NDArray[np.int64]
+    ) -> None:
+        super().__init__(starts, goals, standing, space, delays)
+        self._turns = turns
+        self._standing = self.points[self.count :]
+        self._ways: dict[tuple[int, bytes], Array] = {}
+        self._let_through = 2 * self.count + 2
+        self.away = {int(drone) for drone in np.flatnonzero((starts != goals).any(axis=1))}
+
+    def all_moves(self) -> list[Move]:
+        """Return the moves. Raises `NoRouteError`."""
+        while self.away:
+            if not (self._goes() or self._lets_through()):
+                raise NoRouteError(sorted(self.away), indoors=True)
+        return self.moves
+
+    def go(self, drone: int, path: Array) -> None:
+        """Move a drone, and note whether it is at its goal."""
+        super().go(drone, path)
+        if (self.rests[drone] == self.goals[drone]).all():
+            self.away.discard(drone)
+        else:
+            self.away.add(drone)
+
+    def _way(self, drone: int) -> Array:
+        """Return the path of a drone to its goal, whatever other drones are on it."""
+        key = drone, self.rests[drone].tobytes()
+        if key not in self._ways:
+            found = self.space.way(self.rests[drone], self.goals[drone], self._standing)
+            if found is None:
+                raise NoRouteError([drone], indoors=not len(self._standing))
+            self._ways[key] = found
+        return self._ways[key]
+
+    def _on(self, drone: int, points: Array) -> Flags:
+        """Return which of `points` (P, 3) are on the way of a drone."""
+        way = self._way(drone)
+        return np.asarray(self.space.near(way[:-1], way[1:], points).any(axis=0))
+
+    def _ranks(self) -> list[int]:
+        """Return the drones not at their goals, in the order of delay, and of others in whose way their goals are."""
+        away = sorted(self.away)
+        hinders = np.zeros(self.count)
+        for drone in away:
+            hinders += self._on(drone, self.goals)
+        return sorted(away, key=lambda drone: (self.delays[drone], hinders[drone], self._turns[drone]))
+
+    def _goes(self) -> bool:
+        """Move a drone to its goal; return whether one moved."""
+        ranks = [drone for drone in self._ranks() if self.goal_is_free(drone)]
+        for drone in ranks:
+            if self.space.is_clear(self._way(drone), self.others(drone)):
+                self.go(drone, self._way(drone))
+                return True
+        return any(self._goes_round(drone) for drone in ranks)
+
+    def _goes_round(self, drone: int) -> bool:
+        path = self.space.way(self.rests[drone], self.goals[drone], self.others(drone))
+        if path is not None:
+            self.go(drone, path)
+        return path is not None
+
+    def _lets_through(self) -> bool:
+        """Move all drones that are on the way of one out of it, and then that one; return whether that was possible."""
+        self._let_through -= 1
+        if self._let_through < 0:
+            return False
+        for drone in self._ranks():
+            count, points, away = len(self.moves), self.points.copy(), set(self.away)
+            way = self._way(drone)
+            others = [other for other in np.flatnonzero(self._on(drone, self.rests)).tolist() if other != drone]
+            nearest = sorted(others, key=lambda other: (norms(way - self.rests[other]).argmin(), other))
+            if (
+                all(self._makes_room(other, drone) for other in nearest)
+                and self.goal_is_free(drone)
+                and self._goes_round(drone)
+            ):
+                return True
+            del self.moves[count:]
+            self.points[:] = points
+            self.away = away
+        return False
+
+    def _makes_room(self, other: int, drone: int) -> bool:
+        """Move `other` off the way of a drone, if it is still on it; return whether it is."""
+        if not self._on(drone, self.rests[other][None])[0]:
+            return True
+        others = self.others(other)
+        for most in _AWAY_M:
+            spots = self.space.spots(self.rests[other], others, most)
+            spots = spots[~self._on(drone, spots)][:_SPOTS]
+            if len(spots):
+                path = self.space.way(self.rests[other], self._best(spots, {other, drone}), others)
+                if path is not None:
+                    self.go(other, path)
+                    return True
+        return False
+
+    def _best(self, spots: Array, without: set[int]) -> Array:
+        """Return the first of those of `spots` that are on fewest ways, and near to fewest goals, of other drones."""
+        rest = [drone for drone in range(self.count) if drone not in without]
+        hindered = (norms(spots[:, None] - self.goals[rest][None]) < self.space.distance).sum(axis=1)
+        for drone in self.away - without:
+            hindered = hindered + self._on(drone, spots)
+        return np.asarray(spots[hindered.argmin()])

@@ -1,0 +1,64 @@
+"""Moves of drones one after the other, whatever the space is in which they fly."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Generic, TypeVar
+
+import numpy as np
+
+from robochoc.flight.routes.spacing import Array, Spacing, norms
+
+_Space = TypeVar("_Space", bound=Spacing)
+
+
+class NoRouteError(ValueError):
+    """No order of moves was found in which `drones` reach their goals.
+
+    Standing points enclose them; or drones are in each other's way between walls, if these are `indoors`.
+    """
+
+    def __init__(self, drones: Sequence[int], *, indoors: bool = False) -> None:
+        self.drones = tuple(drones)
+        self.indoors = indoors
+        names = ", ".join(map(str, self.drones))
+        why = "they do not get past each other" if indoors else "standing points enclose where they start or end"
+        super().__init__(f"no way was found for drones {names} ({why})")
+
+
+@dataclass(frozen=True)
+class Move:
+    """A drone's move along a path (K + 1, 3), from rest to rest."""
+
+    drone: int
+    path: Array
+    points: Array
+    """The places of all drones that rest meanwhile. Any other path that is clear of them is as good."""
+
+
+class MoveOrder(Generic[_Space]):
+    """The moves so far, and where all drones rest after them."""
+
+    def __init__(self, starts: Array, goals: Array, standing: Array, space: _Space, delays: Array) -> None:
+        self.goals = goals
+        self.delays = delays
+        self.space = space
+        self.count = len(starts)
+        self.points = np.vstack((starts, standing))
+        """Positions of drones, and standing points after them."""
+        self.rests = self.points[: self.count]
+        self.moves: list[Move] = []
+
+    def others(self, drone: int) -> Array:
+        """Return where all others rest, and all standing points."""
+        return np.delete(self.points, drone, axis=0)
+
+    def go(self, drone: int, path: Array) -> None:
+        """Move a drone."""
+        self.moves.append(Move(drone, path, self.others(drone)))
+        self.points[drone] = path[-1]
+
+    def goal_is_free(self, drone: int) -> bool:
+        """Return whether nothing rests too near to a drone's goal."""
+        return bool((norms(self.others(drone) - self.goals[drone]) >= self.space.least).all())

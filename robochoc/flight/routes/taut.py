@@ -1,0 +1,107 @@
+"""Ways pulled taut: few straight pieces, each of which is clear of walls, in the place of many points.
+
+A corner counts as a length, since drones come to rest there.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from itertools import pairwise
+
+import numpy as np
+
+from robochoc.flight.routes.spacing import Array, norms
+
+Sees = Callable[[Array, Array, float], bool]
+"""Whether a straight line between two points keeps a distance from all walls."""
+_Numbered = Callable[[int, int], bool]
+
+_AROUND = (-16, -8, -4, -2, -1, 0, 1, 2, 4, 8, 16)
+"""Points of a way beside each of its corners that may become a corner."""
+_LOOK_BACK = 60
+_ROUNDS = 2
+_HALVINGS = 6
+
+
+def taut(points: Array, keeps: Array, sees: Sees, corner: float) -> Array:
+    """Return the corners of a short way along `points` (K, D), from the first to the last one.
+
+    Args:
+        points: From each to the next a line keeps the least of `keeps`.
+        keeps: The distance from walls (K,) that is to be kept at each point. A piece keeps the least one on its way.
+        sees: Whether a line keeps a distance.
+        corner: The length for which a corner counts.
+    """
+    least = float(keeps.min())
+
+    def seen(i: int, j: int) -> bool:
+        return sees(points[i], points[j], float(keeps[i : j + 1].min()) if j > i + 1 else least)
+
+    chain = _far_sighted(len(points) - 1, seen)
+    chosen = _shortest(points, chain, seen, corner)
+    bends = [points[number] for number in chosen]
+    kept = [float(keeps[i : j + 1].min()) for i, j in pairwise(chosen)]
+    for _ in range(_ROUNDS):
+        for at in range(1, len(bends) - 1):
+            keep = min(kept[at - 1], kept[at])
+            bends[at] = _nearer(bends[at - 1], bends[at], bends[at + 1], keep, sees)
+    return np.array(bends)
+
+
+def _nearer(before: Array, bend: Array, after: Array, keep: float, sees: Sees) -> Array:
+    """Return `bend`, moved as near to the straight line between its neighbours as walls allow."""
+    along = after - before
+    squared = float(along @ along)
+    share = min(max(float((bend - before) @ along) / squared, 0.0), 1.0) if squared else 0.0
+    target = before + share * along
+    low, high = 0.0, 1.0
+    for _ in range(_HALVINGS):
+        middle = (low + high) / 2
+        tried = bend + middle * (target - bend)
+        clear = sees(before, tried, keep) and sees(tried, after, keep)
+        low, high = (middle, high) if clear else (low, middle)
+    return np.asarray(bend + low * (target - bend))
+
+
+def _far_sighted(last: int, sees: _Numbered) -> list[int]:
+    """Return points from 0 to `last` that see each other one after the other, each about as far away as it can be."""
+    chain = [0]
+    while (here := chain[-1]) < last:
+        good, bad = here + 1, last + 1
+        step = 2
+        while here + step <= last and sees(here, here + step):
+            good = here + step
+            step *= 2
+        bad = min(bad, here + step)
+        while bad - good > 1:
+            middle = (good + bad) // 2
+            good, bad = (middle, bad) if sees(here, middle) else (good, middle)
+        chain.append(good)
+    return chain
+
+
+def _shortest(points: Array, chain: Sequence[int], sees: _Numbered, corner: float) -> list[int]:
+    """Return the corners of the shortest way over points of `chain`, and around them; a corner counts as a length."""
+    last = chain[-1]
+    links = set(pairwise(chain))
+    numbers = sorted({*chain, *(at + by for at in chain[1:-1] for by in _AROUND if 0 < at + by < last)})
+    costs = {0: 0.0}
+    origin: dict[int, int] = {}
+    for place, number in enumerate(numbers[1:], 1):
+        before = [one for one in _earlier(numbers, place, chain) if one in costs]
+        lengths = norms(points[before] - points[number]) + np.array([costs[one] for one in before]) + corner
+        for at in np.argsort(lengths, kind="stable").tolist():
+            if (before[at], number) in links or sees(before[at], number):
+                costs[number], origin[number] = float(lengths[at]), before[at]
+                break
+    found = [last]
+    while found[-1]:
+        found.append(origin[found[-1]])
+    return found[::-1]
+
+
+def _earlier(numbers: Sequence[int], place: int, chain: Sequence[int]) -> Iterator[int]:
+    """Yield the points before a place that are looked at: the last ones, and those of the chain."""
+    first = max(0, place - _LOOK_BACK)
+    yield from numbers[first:place]
+    yield from (one for one in chain if one < numbers[first])
