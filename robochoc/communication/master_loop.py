@@ -12,7 +12,7 @@ from collections.abc import Callable
 
 from robochoc.communication.control import GoOn, TakeSnapshot, Wave
 from robochoc.communication.kill_schedule import KillSchedule
-from robochoc.communication.run_result import Progress
+from robochoc.communication.run_result import Progress, RunResult
 from robochoc.communication.search_state import SearchState
 from robochoc.communication.search_watch import SearchWatch
 from robochoc.communication.session import over
@@ -108,13 +108,21 @@ class MasterLoop(ABC):
 
     def _take_snapshots(self, watch: SearchWatch) -> None:
         """Give `watch` the snapshot that all robots have answered, and ask for the next one when it is wanted."""
-        snapshot = self.state.end_snapshot()
+        snapshot = self._snapshot()
         if snapshot is not None:
             watch.take(snapshot)
         if watch.wants_snapshot(time.monotonic()):
             number = self.state.begin_snapshot()
             if number is not None:
-                self._send_all(TakeSnapshot(number))
+                self._ask_for_snapshot(number)
+
+    def _ask_for_snapshot(self, number: int) -> None:
+        """Ask all robots for the snapshot `number`."""
+        self._send_all(TakeSnapshot(number))
+
+    def _snapshot(self) -> RunResult | None:
+        """Return the snapshot that was asked for, once it is complete; None before, and afterwards."""
+        return self.state.end_snapshot()
 
     def _kill_due(self) -> None:
         if self._kill is not None:

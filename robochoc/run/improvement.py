@@ -17,6 +17,8 @@ from robochoc.model.cost_units import Cost
 from robochoc.model.outcome import EpochOutcome, Improvement, Verdict
 from robochoc.model.problem import Team
 from robochoc.run.evaluation import Answer
+from robochoc.run.options import Options
+from robochoc.run.withdrawal import Phase
 from robochoc.verification.checker import RefutedError
 
 PERIOD_S = 0.1
@@ -79,6 +81,7 @@ class Improvements(SearchWatch):
         publish: Publishes an answer.
         has_news: Returns whether the problem has changed.
         earlier: What was published before, where this is not the first search of an epoch.
+        keep: Is called with each answer that is the best so far, published or not (None: nobody needs to know).
     """
 
     def __init__(  # noqa: PLR0913 - what differs between runs, by names
@@ -93,6 +96,7 @@ class Improvements(SearchWatch):
         publish: Callable[[Answer, tuple[Improvement, ...]], None],
         has_news: Callable[[], bool],
         earlier: Sequence[Improvement] = (),
+        keep: Callable[[Answer], None] | None = None,
     ) -> None:
         self._began = began
         self._deadline = deadline
@@ -102,6 +106,7 @@ class Improvements(SearchWatch):
         self._bounded = bounded
         self._publish = publish
         self._has_news = has_news
+        self._keep = keep
         self._published: Answer | None = None
         self._best: Answer | None = None
         self._bound: Cost | None = None
@@ -152,6 +157,8 @@ class Improvements(SearchWatch):
             self._best is None or self._rank.of_answer(answer) < self._rank.of_answer(self._best)
         ):
             self._best = answer
+            if self._keep is not None:
+                self._keep(answer)
         best = self._best
         if best is not None and (self._has_costs or best.withdrawn) and self._is_proven(best, answer):
             self._best = replace(best, verdict=Verdict.OPTIMAL, bound=None, deadline=None)
@@ -203,6 +210,7 @@ class Improvements(SearchWatch):
             cost=best.cost,
             withdrawn=best.withdrawn,
             verified=best.verified,
+            checked=best.checked,
             bound=None if proven else self._bound if self._bounded and not _is_found(final) else final.bound,
             deadline=None if proven or final.ended else best.deadline,
             reason=final.reason if _is_found(final) else best.reason,
@@ -218,6 +226,17 @@ class Improvements(SearchWatch):
             raise RefutedError(f"the protocol says that there is no solution, and one ({best.cost}) was found")
         if final.verdict is Verdict.OPTIMAL and self._rank.of_answer(best) < self._rank.of_answer(final):
             raise RefutedError(f"the protocol says that {final.cost} is optimal, and {best.cost} was found before")
+
+
+def as_told_one_after_the_other(snapshot: RunResult, phase: Phase, options: Options) -> RunResult:
+    """Return `snapshot`, of which nothing is known but what can be checked where messages get lost.
+
+    Robots tell one after the other, so a message may be lost that none has missed yet.
+    """
+    if not options.loss or phase.traits.bears_loss:
+        return snapshot
+    lost = max(1, snapshot.metrics.lost_messages)
+    return replace(snapshot, metrics=replace(snapshot.metrics, lost_messages=lost))
 
 
 def _is_found(answer: Answer) -> bool:

@@ -16,7 +16,7 @@ from robochoc.model.problem import INFINITE, ProblemKind, Team
 from robochoc.run.context import RunContext
 from robochoc.run.distributed import Deployment
 from robochoc.run.evaluation import Answer, Search, check_with_files, evaluate_search
-from robochoc.run.improvement import Audience, Improvements, Rank
+from robochoc.run.improvement import Audience, Improvements, Rank, as_told_one_after_the_other
 from robochoc.run.preprocessing import preprocessing_phase, removed_values, restricted, total_preprocessing
 from robochoc.run.runtimes import SessionRequest, open_session
 from robochoc.run.scenario import Environment, EpochStart, FinishedEpoch, ScenarioRun
@@ -197,9 +197,7 @@ class ThisMachine(Deployment):
         team, compiled, began = self._scenario.team, start.epoch.compiled, self._context.began
 
         def evaluate(snapshot: RunResult) -> Answer:
-            if options.loss and not phase.traits.bears_loss:  # as robots tell one after the other
-                lost = max(1, snapshot.metrics.lost_messages)
-                snapshot = replace(snapshot, metrics=replace(snapshot.metrics, lost_messages=lost))
+            snapshot = as_told_one_after_the_other(snapshot, phase, options)
             search = Search(snapshot, partial(check_with_files, phase, snapshot, team, compiled))
             return evaluate_search(phase, search, team.kind, self.told, options.deadline)
 

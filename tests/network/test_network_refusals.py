@@ -3,11 +3,19 @@
 from __future__ import annotations
 
 import threading
+from typing import cast
 
+from robochoc.authority.admission import InMemoryAuthority
 from robochoc.communication.control import Conclusion, Counters, Ready, WentOn
 from robochoc.communication.network.audited_state import AuditedSearchState
+from robochoc.communication.network.control_messages import LostFrames
+from robochoc.communication.network.master import HELD_S, Master
+from robochoc.communication.network.members import Member, Members
+from robochoc.communication.network.profile import Profile
 from robochoc.communication.network.refusals import KINDS, LONGEST, WHO, Refusals
 from robochoc.communication.network.router import Log, Refusal
+from robochoc.communication.network.settings import PATIENCE_S
+from robochoc.communication.network.transport import HEARTBEAT_S
 from robochoc.journal.events import Decided, Received, Refused, actor
 from robochoc.model.outcome import Verdict
 
@@ -140,3 +148,23 @@ def test_a_large_log_is_read() -> None:
     log = Log({"RX3"})
     block = (LINE % b"authorized") * 40_000 + (LINE % b"unauthorized" + INTERCEPTED) * 20_000
     assert sum(1 for _ in log.refusals(block)) == 20_000
+
+
+def test_messages_that_zenoh_may_hold_back_are_not_missing_yet() -> None:
+    """It holds them for as long as it asks for an earlier one; the loss of that one a robot reports."""
+    asked: list[float] = []
+
+    class Recorded(AuditedSearchState):
+        def missing(self, now: float, patience_s: float) -> int:
+            asked.append(patience_s)
+            return super().missing(now, patience_s)
+
+    authority = InMemoryAuthority(("A", "B"))
+    master = Master(authority, authority.master_identity(("127.0.0.1",)), "127.0.0.1:7447", Members())
+    master.state = Recorded(1, ["A", "B"])
+    master._detect_end(0)  # noqa: SLF001 - a step of its loop
+    master.members.robots["A"] = Member(cast("Profile", None), "incarnation")
+    master._frame_loss.note_between("B", LostFrames("A", 3))  # noqa: SLF001 - as B says it
+    master._detect_end(0)  # noqa: SLF001
+    assert asked == [PATIENCE_S + HELD_S, PATIENCE_S]
+    assert HELD_S >= HEARTBEAT_S + 10

@@ -10,6 +10,7 @@ import pytest
 
 from robochoc.communication.control import Counters, Failed, Pause, Ready, Wave
 from robochoc.communication.network.control_messages import (
+    Adopt,
     Bye,
     Charge,
     CheckRequest,
@@ -24,6 +25,7 @@ from robochoc.communication.network.control_messages import (
     Leave,
     Objection,
     ProtocolMessage,
+    Recall,
     Register,
     RegistrationDenied,
     StartSearch,
@@ -141,7 +143,7 @@ def test_what_comes_with_the_end_of_a_search_changes_nothing_any_more() -> None:
 
 @pytest.mark.parametrize(
     "word",
-    [StartSearch(1), Wave(1), Pause(), CheckRequest(1, {})],
+    [StartSearch(1), Wave(1), Pause(), CheckRequest(1, {}), Recall(1, 1), Adopt(1, 1)],
     ids=lambda word: type(word).__name__,
 )
 def test_orders_out_of_place_are_objected_to(word: ControlMessage) -> None:
@@ -161,7 +163,11 @@ def test_orders_out_of_place_are_objected_to(word: ControlMessage) -> None:
     ]
 
 
-@pytest.mark.parametrize("word", [StartSearch(2), CheckRequest(2, {})], ids=lambda word: type(word).__name__)
+@pytest.mark.parametrize(
+    "word",
+    [StartSearch(2), CheckRequest(2, {}), CheckRequest(1, {}, 7), Recall(2, 1), Adopt(2, 0), Adopt(1, 7, "solution")],
+    ids=repr,
+)
 def test_orders_of_another_search_are_objected_to(word: ControlMessage) -> None:
     def script(_post: ScriptedTransport, heard: ControlMessage) -> Iterator[ControlMessage | Item]:
         match heard:

@@ -165,8 +165,9 @@ def install(lie: Lie, name: str, patch: Callable[[type, str, object], None] = se
 
     judge = Searcher.check_constraints
 
-    def judge_lying(me: Searcher, told: Mapping[str, int]) -> CheckResult:
-        (found,) = lie(me, judge(me, told)) if me.name == name else (judge(me, told),)
+    def judge_lying(me: Searcher, told: Mapping[str, int], snapshot: int = 0) -> CheckResult:
+        true = judge(me, told, snapshot)
+        (found,) = lie(me, true) if me.name == name else (true,)
         assert isinstance(found, CheckResult)
         return found
 

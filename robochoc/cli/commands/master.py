@@ -14,9 +14,11 @@ import click
 from robochoc.cli.options.network import PlaceType, authority_option, network_failures_told, patience_option
 from robochoc.cli.options.paths import TeamFolder
 from robochoc.cli.options.recording import journal_option, recording, shown_and_flushed
+from robochoc.cli.options.ros import improve_option
 from robochoc.cli.options.sections import COMMON, Sections
 from robochoc.cli.options.solve import (
     SolveCommand,
+    deadline_option,
     filter_option,
     messages_option,
     protocol_option,
@@ -25,20 +27,23 @@ from robochoc.cli.options.solve import (
     withdraw_option,
 )
 from robochoc.cli.reports.failures import LIMIT
+from robochoc.cli.reports.improvements import ImprovementsTold
 from robochoc.cli.reports.progress import print_above, progress_line
+from robochoc.system.stopping import stop_heard
 
 if TYPE_CHECKING:
     from robochoc.communication.network.journal_server import Publication
     from robochoc.journal.events import AnyEvent
     from robochoc.journal.journal import Header, JournalRecorder
     from robochoc.model.outcome import Outcome
+    from robochoc.run.improvement import Audience
     from robochoc.run.networked.address import Address
     from robochoc.run.networked.master_run import MasterPlan, MasterResult
 
 
 _SECTIONS: Sections = {
     COMMON: (
-        "--listen", "--robots", "--team", "--protocol", "--withdraw", "--timeout",
+        "--listen", "--robots", "--team", "--protocol", "--withdraw", "--timeout", "--deadline", "--improve",
         "--json", "--journal", "--sniffable", "--help",
     ),
     "Search": ("--set", "--seed", "--messages", "--message-loss"),
@@ -81,6 +86,8 @@ _SECTIONS: Sections = {
 @filter_option
 @click.option("--gather", "gather_s", type=float, metavar="SECONDS", help="Stop if the team is not complete by then.")
 @click.option("--timeout", type=float, metavar="SECONDS", help="Stop this long after the team is complete (status 3).")
+@deadline_option
+@improve_option
 @messages_option
 @click.option(
     "--message-loss",
@@ -133,16 +140,17 @@ def master(
         from robochoc.run.compatibility.team_rules import scenario_refusal
 
         raise click.UsageError(scenario_refusal(team, "robochoc master"))
-    for option in ("gather_s", "timeout"):
+    for option in ("gather_s", "timeout", "deadline"):
         if given[option] is not None and not given[option] > 0:
             raise click.UsageError(f"--{option.removesuffix('_s')} takes a number of seconds, more than 0")
-    with network_failures_told("master"):
+    with network_failures_told("master"), stop_heard():
         plan = _plan(folder, team, given)
         with (
             _publication(sniffable=sniffable) as publication,
             recording(journal, lambda: _header(plan), None, [publication.write] if publication else []) as recorder,
         ):
-            led = _led(plan, recorder, publication)
+            audience = ImprovementsTold(None, quiet=as_json)
+            led = _led(plan, recorder, publication, audience)
             _tell(led, as_json=as_json)
     context.exit(LIMIT if led.outcome.verdict == "unknown" else 0)
 
@@ -191,7 +199,9 @@ def _publication(*, sniffable: bool) -> Iterator[Publication | None]:
         yield publication
 
 
-def _led(plan: MasterPlan, recorder: JournalRecorder | None, publication: Publication | None) -> MasterResult:
+def _led(
+    plan: MasterPlan, recorder: JournalRecorder | None, publication: Publication | None, audience: Audience
+) -> MasterResult:
     """Open the run with its observers."""
     from robochoc.run.networked.master_run import run_master
 
@@ -210,6 +220,7 @@ def _led(plan: MasterPlan, recorder: JournalRecorder | None, publication: Public
         return run_master(
             plan,
             observer=observe,
+            audience=audience,
             watched=recorder is not None,
             progress=progress,
             listening=teller.listening,

@@ -13,14 +13,15 @@ from robochoc.cli.options.local_problems import limits, local_options
 from robochoc.cli.options.network import identity_option, master_option, network_failures_told, patience_option
 from robochoc.cli.options.paths import InputPath
 from robochoc.cli.options.ros import ros_options
-from robochoc.cli.options.ros_setup import robot_publisher
+from robochoc.cli.options.ros_setup import robot_publisher, ros_errors_fail
 from robochoc.cli.options.sections import COMMON, SectionedCommand, Sections
 from robochoc.cli.options.tokens import token_options
 from robochoc.cli.reports.failures import LIMIT, LOST, Failure
-from robochoc.cli.reports.progress import progress_line
+from robochoc.cli.reports.progress import print_above, progress_line
 
 if TYPE_CHECKING:
     from robochoc.communication.network.robot import Ending
+    from robochoc.model.problem import Assignment, Robot
     from robochoc.run.networked.address import Address
 
 
@@ -118,30 +119,61 @@ def _run(
     with robot_publisher(itself, given) as publish:
         show_stage(f"looking for the master at {place}")
         identity = identity_of(file.stem, place, *credentials, given["patience"])
-        settings = RobotSettings(given["patience"], sniffed=given["sniff"], stage=show_stage)
+        settings = RobotSettings(
+            given["patience"], sniffed=given["sniff"], stage=show_stage, decided=_Decisions(itself, publish).tell
+        )
         cache = None if given["no_cache"] else SolutionCache()
         bounds = limits(given["local_solutions"], given["local_timeout"], always_ace=given["always_ace"])
         with Compiler(bounds, cache) as compiler:
             ending = join(itself, place, identity, settings, compiler)
         if ending.failed:
             raise Failure(LOST, f"{file.stem}: {ending.why}")
-        domains = {variable.name: variable.domain for variable in itself.variables}
-        values = {name: domains[name].label(value) for name, value in ending.assignment.items()}
-        return ending, values, publish(ending.why, ending.assignment)
+        return ending, _labelled(itself, ending.assignment), publish(ending.why, ending.assignment)
+
+
+def _labelled(itself: Robot, assignment: Assignment) -> dict[str, int | str]:
+    """Return the robot's values, with symbols by their names."""
+    domains = {variable.name: variable.domain for variable in itself.variables}
+    return {name: domains[name].label(value) for name, value in assignment.items()}
+
+
+class _Decisions:
+    """Tells, and publishes, what the robot has decided on while its team searches on; the same only once."""
+
+    def __init__(self, itself: Robot, publish: Callable[[str, Assignment], list[str]]) -> None:
+        self._robot = itself
+        self._publish = publish
+        self._last: Assignment | None = None
+
+    def tell(self, why: str, assignment: Assignment) -> None:
+        """Print a decision on standard error, and publish it. That it cannot be published ends no search."""
+        if assignment == self._last:
+            return
+        self._last = dict(assignment)
+        print_above(_in_words(self._robot.name, f"{why} so far", _labelled(self._robot, assignment)))
+        try:
+            with ros_errors_fail():
+                self._publish(why, assignment)
+        except Failure as failure:
+            failure.show()
+
+
+def _in_words(name: str, why: str, values: Mapping[str, int | str]) -> str:
+    from robochoc.system.plain_text import on_one_line
+
+    decision = ", ".join(f"{variable} = {value}" for variable, value in values.items())
+    return on_one_line(f"{name}: {why}; {decision or 'no value'}")
 
 
 def _print_ending(
     name: str, ending: Ending, values: Mapping[str, int | str], published: Sequence[str], *, as_json: bool
 ) -> None:
-    from robochoc.system.plain_text import on_one_line
-
     if as_json:
         import msgspec
 
         result = {"robot": name, "outcome": ending.why, "assignment": values}
         click.echo(msgspec.json.encode(result).decode())
         return
-    decision = ", ".join(f"{variable} = {value}" for variable, value in values.items())
-    click.echo(on_one_line(f"{name}: {ending.why}; {decision or 'no value'}"))
+    click.echo(_in_words(name, ending.why, values))
     for line in published:
         click.echo(line, err=True)

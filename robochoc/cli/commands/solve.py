@@ -31,6 +31,7 @@ from robochoc.cli.options.solve import (
     SolveCommand,
     Wanted,
     check_products,
+    deadline_option,
     filter_option,
     kill_option,
     messages_option,
@@ -128,12 +129,7 @@ _SECTIONS: Sections = {
     metavar="SECONDS",
     help="Stop after this time: verdict unknown, exit status 3.",
 )
-@click.option(
-    "--deadline",
-    type=click.FloatRange(0, min_open=True),
-    metavar="SECONDS",
-    help="Stop by then with the best solution so far.",
-)
+@deadline_option
 @withdraw_option
 @preprocess_option
 @messages_option

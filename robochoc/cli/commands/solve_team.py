@@ -108,7 +108,7 @@ def _recorded(folder: Path, options: Options, products: Products, wanted: Wanted
         closed_loop(wanted.ros, team, options.seed, folder) as loop,
         recording(products.journal, header, objective, watch.begun()) as recorder,
     ):
-        audience = ImprovementsTold(team, loop, quiet=wanted.as_json) if options.improve else None
+        audience = ImprovementsTold(loop, quiet=wanted.as_json) if options.improve else None
         outcome = _run(team, options, recorder, loop, audience)
         team = loop.team if loop else team
         _tell(problem._replace(team=team), outcome, wanted, choice)

@@ -82,6 +82,12 @@ arm_option = click.option(
     help="Let vehicles of mavlink: and crazyflie: fly.",
 )
 
+improve_option = click.option(
+    "--improve",
+    type=Finite(0, min_open=True),
+    metavar="SECONDS",
+    help="After --deadline: search on, publish better.",
+)
 situation_options = _optional(
     click.option(
         "--situation",
@@ -106,12 +112,7 @@ situation_options = _optional(
         metavar="LEVEL",
         help="A robot leaves below this charge.  [default: 0.2]",
     ),
-    click.option(
-        "--improve",
-        type=Finite(0, min_open=True),
-        metavar="SECONDS",
-        help="After --deadline: search on, publish better.",
-    ),
+    improve_option,
     click.option("--use-sim-time", is_flag=True, help="Stamps are the time on /clock of --situation."),
     click.option(
         "--obstacle",

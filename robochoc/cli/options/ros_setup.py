@@ -25,7 +25,7 @@ from robochoc.cli.options.ros import (
 from robochoc.cli.reports.failures import INVALID, USAGE, Failure
 
 if TYPE_CHECKING:
-    from robochoc.flight.mission import Drone, Mission
+    from robochoc.flight.mission import Drone, Leg, Mission
     from robochoc.flight.quadrotor.conditions import FlightConditions
     from robochoc.model.problem import Assignment, Robot, Team
     from robochoc.ros.closed_loop import ClosedLoop, Feedback
@@ -183,8 +183,9 @@ def _feedback(ros: RosOptions, drones: Sequence[Drone], seed: int, stack: ExitSt
 def robot_publisher(robot: Robot, given: dict[str, Any]) -> Iterator[Callable[[str, Assignment], list[str]]]:
     """Give a function that publishes the decision of `robot` alone, and returns what was published where.
 
-    The function takes the master's word for how the run ended, and the robot's own decision. All options of
-    `ros_options` are taken out of `given`. Raises `Failure`.
+    The function takes the master's word for how the run ended, or for what it has come to, and the robot's own
+    decision. What was published last is not published again. All options of `ros_options` are taken out of `given`.
+    Raises `Failure`.
     """
     texts = given.pop("sinks")
     asked = {name: given.pop(name) for name in (*IN_FRAME, *PUBLISHED)}
@@ -202,11 +203,14 @@ def robot_publisher(robot: Robot, given: dict[str, Any]) -> Iterator[Callable[[s
     with ros_errors_fail(), ExitStack() as stack:
         opened = open_sinks(texts, stack)
         found = [SinkPublisher(robot.name, drones_of_robot(robot), sink, frame, options) for sink in opened]
+        last: Leg | None = None
 
         def publish(why: str, assignment: Assignment) -> list[str]:
+            nonlocal last
             leg = leg_of_robot(robot, why, assignment, scale)
-            for publisher in found:
+            for publisher in found if leg != last else ():
                 publisher.decide(leg, time.time_ns())
+            last = leg
             return [f"{publisher.place}: {publisher.summary}" for publisher in found]
 
         yield publish

@@ -66,6 +66,12 @@ withdraw_option = click.option(
         " maximal: nobody can be added, found fast."
     ),
 )
+deadline_option = click.option(
+    "--deadline",
+    type=click.FloatRange(0, min_open=True),
+    metavar="SECONDS",
+    help="Stop by then with the best solution so far.",
+)
 preprocess_option = click.option(
     "--preprocess",
     type=click.Choice(["ac"]),

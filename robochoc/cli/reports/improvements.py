@@ -16,13 +16,12 @@ if TYPE_CHECKING:
 
 
 class ImprovementsTold:
-    """The audience of a run of `team` (`robochoc.run.improvement.Audience`): prints a line unless `quiet`.
+    """The audience of a run (`robochoc.run.improvement.Audience`): prints a line for each answer unless `quiet`.
 
     What is better is published by the closed `loop`, if there is one.
     """
 
-    def __init__(self, team: Team, loop: ClosedLoop | None, *, quiet: bool) -> None:
-        self._name = team.name
+    def __init__(self, loop: ClosedLoop | None, *, quiet: bool) -> None:
         self._loop = loop
         self._quiet = quiet
         self._epochs: list[EpochOutcome] = []
@@ -60,4 +59,4 @@ class ImprovementsTold:
         maximised = any(robot.costs.maximize or robot.told_in.maximize for robot in team.robots)
         cost = shown and f" {'worth' if maximised else 'of cost'} {shown}"
         without = f", {len(last.withdrawn)} of {len(team.robots)} withdrawn" if last.withdrawn else ""
-        return on_one_line(f"{self._name}: {what}{cost}{without} after {last.at_s:.1f} s")
+        return on_one_line(f"{team.name}: {what}{cost}{without} after {last.at_s:.1f} s")

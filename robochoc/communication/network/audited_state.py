@@ -58,6 +58,8 @@ class AuditedSearchState(SearchState):
         self._received_before: int | None = None
         self._accounts: dict[str, DetailedReport] = {}
         self._checks: dict[str, CheckResult] = {}
+        self._snapshot_checks: dict[str, CheckResult] = {}
+        self._snapshot_checked = 0
         self._contradictions: list[Doubt] = []
         self._still: Counts | None = None
         self._still_since = 0.0
@@ -112,15 +114,28 @@ class AuditedSearchState(SearchState):
 
     def _take_check(self, name: str, check: CheckResult) -> str:
         fault = fault_of_check(name, check, self._declared, self.order)
+        checks = self._snapshot_checks if check.snapshot else self._checks
+        if check.snapshot and (check.snapshot != self._snapshot_checked or name in checks):
+            fault = fault or "it was not asked to check that"
         if not fault:
-            self._checks[name] = check
+            checks[name] = check
         return fault
+
+    def begin_check(self, number: int) -> None:
+        """Expect that robots check the snapshot `number`."""
+        self._snapshot_checked, self._snapshot_checks = number, {}
+
+    @property
+    def snapshot_checks(self) -> Mapping[str, CheckResult] | None:
+        """What all robots have found of the snapshot that they were to check; None while some have not answered."""
+        return None if self._present - self._snapshot_checks.keys() else self._snapshot_checks
 
     def lose(self, name: str, why: str) -> None:
         """See `SearchState.lose`."""
         super().lose(name, why)
         self._accounts.pop(name, None)
         self._checks.pop(name, None)
+        self._snapshot_checks.pop(name, None)
 
     def note_end(self, duration_s: float, *, in_time: bool) -> None:
         """Note that the search is over after `duration_s` seconds: `in_time`, or because the time was over."""
@@ -199,8 +214,9 @@ class AuditedSearchState(SearchState):
         After quiescence the verdict is that of the counters; only the proof that a cost is optimal rests on it.
         """
         proven = self._declared.traits.costs and self.by_quiescence
+        values = {name: account.assignment for name, account in self._accounts.items()}
         found = [*self._contradictions, *(self.doubts_about_counts if proven else ())]
-        found += [*doubts_about_values(self._accounts), *doubts_about_checks(self._checks)]
+        found += [*doubts_about_values(values), *doubts_about_checks(self._checks)]
         return tuple(found[:_MOST_NAMED])
 
     @property

@@ -29,6 +29,7 @@ from robochoc.communication.control import (
     WentOn,
 )
 from robochoc.communication.network.profile import Profile, Ranges
+from robochoc.model.message import Value
 from robochoc.solver.encoding import Cost
 
 LATEST = 2**53
@@ -100,7 +101,7 @@ class CheckResult(OfEpoch, frozen=True):
     """The cost of the robot's constraints for the decided values. `allowed`: none is violated.
 
     `held` is their number. Of these, `shared` are those that others may know too; `copies` are constraints of others
-    that the robot knows.
+    that the robot knows. `snapshot` is the number of the snapshot that was checked; 0: what was reported at the end.
     """
 
     allowed: bool
@@ -108,6 +109,7 @@ class CheckResult(OfEpoch, frozen=True):
     held: int = 0
     shared: tuple[Charge, ...] = ()
     copies: tuple[Charge, ...] = ()
+    snapshot: int = 0
 
 
 class Objection(_Message, frozen=True):
@@ -192,10 +194,36 @@ class StartSearch(OfEpoch, frozen=True):
     """The order to begin, as all robots are ready."""
 
 
+class Recall(OfEpoch, frozen=True):
+    """Asks for a `Snapshot` of this `number`: what the robot has now.
+
+    With a `cycle`: what it had in that cycle of its protocol. With a `value`: what is behind that value, as others see
+    it.
+    """
+
+    number: int
+    cycle: int | None = None
+    value: Value | None = None
+
+
 class CheckRequest(OfEpoch, frozen=True):
-    """The decided values of the robot and of those that share constraints with it: the robot checks them."""
+    """The decided values of those that share constraints with the robot: it checks them, with its own.
+
+    `snapshot`: they are those of that snapshot (0: those that were reported at the end).
+    """
 
     values: Mapping[str, int]
+    snapshot: int = 0
+
+
+class Adopt(OfEpoch, frozen=True):
+    """The order to keep what the robot had at the snapshot `number`, the best so far (0: what it reported at the end).
+
+    With a `why`, it is the robot's decision until it hears otherwise: the verdict, in a few words.
+    """
+
+    number: int
+    why: str = ""
 
 
 class Revoked(_Message, frozen=True):
@@ -275,7 +303,9 @@ ToRobot = (
     | TakeSnapshot
     | GoOn
     | Pause
+    | Recall
     | CheckRequest
+    | Adopt
     | Revoked
     | DirectoryAnswer
     | JournalAnswer

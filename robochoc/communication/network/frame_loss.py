@@ -35,6 +35,11 @@ class LossTracker:
         """Begin a search: what robots reported in another one no longer counts."""
         self._said.clear()
 
+    @property
+    def is_reported(self) -> bool:
+        """Return whether a robot has reported in this search that frames of another one are lost."""
+        return bool(self._said)
+
     def note_at_master(self, missed: FramesLost) -> None:
         """Note that frames to the master are lost, and with them their sender, if it takes part.
 

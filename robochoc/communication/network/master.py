@@ -21,7 +21,9 @@ from robochoc.authority.identity import Identity
 from robochoc.communication.control import Events, Failed, OfEpoch, Pause
 from robochoc.communication.master_loop import TICK_S, MasterLoop
 from robochoc.communication.network.audited_state import AuditedSearchState
+from robochoc.communication.network.checked_snapshots import CheckedSnapshots
 from robochoc.communication.network.control_messages import (
+    Adopt,
     Bye,
     CheckRequest,
     ControlMessage,
@@ -61,9 +63,11 @@ REGISTRY_S = 0.5
 """The interval at which the Authority's registry is read for new enrolments and revocations, in seconds."""
 REPORTS_S, FAREWELL_S, AGAIN_S = 10.0, 5.0, 0.5
 HELD_S = 15.0
-"""The time, beyond `REPORTS_S`, that the master waits for reports where there is a verdict, in seconds.
+"""The longest time that a frame is held back where no link is down, in seconds.
 
-zenoh holds frames back while it asks for earlier ones: for 10 seconds where a busy machine does not answer.
+zenoh finds out that the last frame of a sender is missing after `transport.HEARTBEAT_S` (5 s), asks for it, and waits
+10 s for a busy machine that does not answer. So the master waits longer for reports where there is a verdict, and
+before it believes that messages are lost.
 """
 
 
@@ -110,6 +114,8 @@ class Master(MasterLoop):
         self._requests = Requests(self._journal_server, self._facilitator, self._send, self.events.refuse)
         self._registrar = Registrar(members, connection, self._facilitator, self.events, settings, watched)
         self._dead: dict[str, str] = {}
+        self.snapshots: CheckedSnapshots | None = None
+        """The snapshots of the search that goes on, if robots are to check them."""
         self._frame_loss = LossTracker(members, self.events.refuse, self._lose)
 
     def __enter__(self) -> Self:
@@ -156,8 +162,13 @@ class Master(MasterLoop):
         parameters: RunParameters,
         timeout: float | None = None,
         messages: int | None = None,
+        *,
+        checked: bool = False,
     ) -> RunResult:
         """Have all registered robots search by `protocol`, from the beginning, for at most `timeout` seconds.
+
+        If there is a `watch`, it gets snapshots. If they are to be `checked`, these are the ones that all robots have
+        checked (`snapshots`).
 
         Raises:
             RobotsLostError: when robots are lost and the run does not survive that, or messages are lost for good.
@@ -172,12 +183,28 @@ class Master(MasterLoop):
         state = self.state = AuditedSearchState(epoch, self.members.order, messages, declared)
         state.drops = parameters.message_loss > 0
         state.lossy = state.drops and traits.bears_loss
+        self.snapshots = CheckedSnapshots(state, self.members, self._send) if checked else None
         for name, task in self.members.tasks(epoch, protocol, traits, parameters).items():
             self._send(name, task)
         self._search_until(deadline)
+        if self.snapshots and self.watch and not state.lost:
+            self.watch.wants_snapshot(time.monotonic())  # what is due now does not wait for the reports
         state.note_end(time.monotonic() - began, in_time=not (over(deadline) or self.is_to_stop))
         self._collect()
         return state.result(state.duration_s)
+
+    def _ask_for_snapshot(self, number: int) -> None:
+        if self.snapshots:
+            self.snapshots.ask(number)
+        else:
+            super()._ask_for_snapshot(number)
+
+    def _snapshot(self) -> RunResult | None:
+        return self.snapshots.advance() if self.snapshots else super()._snapshot()
+
+    def adopt(self, number: int, why: str = "") -> None:
+        """Tell all robots to keep what they had at a snapshot, or (with a `why`) to decide on it. See `Adopt`."""
+        self._send_all(Adopt(self.state.epoch, number, why))
 
     def _order_start(self) -> None:
         self._send_all(StartSearch(self.state.epoch))
@@ -284,8 +311,12 @@ class Master(MasterLoop):
         self._connection.follow_registry()
 
     def _detect_end(self, now: float) -> None:
-        """See `MasterLoop._detect_end`. The search also ends when messages are missing without a reported loss."""
-        missing = self.state.missing(now, self._settings.patience_s)
+        """See `MasterLoop._detect_end`. The search also ends when messages are missing without a reported loss.
+
+        Such messages may still be on their way, held back by zenoh: they get more time.
+        """
+        held_s = 0 if self._frame_loss.is_reported else HELD_S
+        missing = self.state.missing(now, self._settings.patience_s + held_s)
         if missing and not self._frame_loss.explain_missing():
             self.state.stuck = f"{missing:,} messages between robots were lost for good"
         else:

@@ -264,11 +264,11 @@ def _gap(name: str, sent: int, other: str, had: int) -> str:
     return f"{name} says that it has sent {other} {sent:,} messages, and {other} that it has had {had:,} of it"
 
 
-def doubts_about_values(accounts: Mapping[str, DetailedReport]) -> Iterator[Doubt]:
+def doubts_about_values(assignments: Mapping[str, Mapping[str, int]]) -> Iterator[Doubt]:
     """Yield which variables two robots call their own."""
     owners: dict[str, str] = {}
-    for name, account in accounts.items():
-        for variable in account.assignment:
+    for name, assignment in assignments.items():
+        for variable in assignment:
             other = owners.setdefault(variable, name)
             if other != name:
                 yield Doubt((other, name), f"the variable {variable} is {other}'s, and {name}'s too")

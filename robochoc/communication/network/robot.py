@@ -20,6 +20,7 @@ from robochoc.communication.control import Failed, GoOn, Pause, TakeSnapshot, Wa
 from robochoc.communication.filters import NotGenuineError
 from robochoc.communication.host import BadMessageError
 from robochoc.communication.network.control_messages import (
+    Adopt,
     Bye,
     CheckRequest,
     ControlMessage,
@@ -33,6 +34,7 @@ from robochoc.communication.network.control_messages import (
     LostFrames,
     Objection,
     ProtocolMessage,
+    Recall,
     Register,
     RegistrationDenied,
     Revoked,
@@ -270,16 +272,33 @@ class NetworkRobot:
                 searcher.begin(time.monotonic())
             case Wave(number) if searcher:
                 searcher.report_counters(number)
-            case TakeSnapshot(number) if searcher:
-                searcher.report_snapshot(number)
             case GoOn() if searcher:
                 searcher.go_on()
             case Pause() if searcher:
                 searcher.pause()
-            case CheckRequest(epoch, values) if searcher and epoch == searcher.epoch:
-                self._say(searcher.check_constraints(values))
+            case _ if searcher:
+                self._obey_about_answers(order, searcher)
             case _:
-                self._object(MASTER, f"{type(order).__name__} is nothing to be told now")
+                self._refuse_order(order)
+
+    def _obey_about_answers(self, order: ControlMessage, searcher: Searcher) -> None:
+        """Obey an order that is about what the robots have: at a moment of the search, or at its end."""
+        match order:
+            case TakeSnapshot(number):
+                searcher.report_snapshot(number)
+            case Recall(epoch) if epoch == searcher.epoch:
+                searcher.recall(order)
+            case CheckRequest(epoch, values, snapshot) if epoch == searcher.epoch:
+                self._say(searcher.check_constraints(values, snapshot))
+            case Adopt(epoch, number, why) if epoch == searcher.epoch:
+                searcher.adopt(number, published=bool(why))
+                if why:
+                    self._settings.decided(on_one_line(why, LONGEST_REASON), searcher.assignment)
+            case _:
+                self._refuse_order(order)
+
+    def _refuse_order(self, order: ControlMessage) -> None:
+        self._object(MASTER, f"{type(order).__name__} is nothing to be told now")
 
     def _register(self, incarnation: str) -> None:
         self._say(Register(profile_of(self._robot), incarnation))

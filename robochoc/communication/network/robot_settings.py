@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 from robochoc.solver.compiled_team import CompileRobot
@@ -22,6 +22,7 @@ class RobotSettings:
         sniffed: The master's observers receive all events of the robot, even if they do not ask for them.
         set_rank: Called before each search with the robot's place in the priority order, and the number of robots.
         stage: Called with a short text on how far the robot is.
+        decided: Called with the verdict in words, and the robot's values, when the team has a decision and searches on.
         compiled: Compiles the robot's domain again, should others have to see more of its variables than it knew.
     """
 
@@ -29,6 +30,7 @@ class RobotSettings:
     sniffed: bool = False
     set_rank: Callable[[int, int], None] = _ignore
     stage: Callable[[str], None] = _ignore
+    decided: Callable[[str, Mapping[str, int]], None] = _ignore
     compiled: CompileRobot = compile_domain
 
 

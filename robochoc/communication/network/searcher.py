@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 
 import msgspec
 
-from robochoc.communication.control import RobotMessage
+from robochoc.communication.control import RobotMessage, Snapshot
 from robochoc.communication.host import BadMessageError, Host
 from robochoc.communication.network.constraint_check import check_constraints
 from robochoc.communication.network.control_messages import (
@@ -22,6 +22,7 @@ from robochoc.communication.network.control_messages import (
     DetailedReport,
     Exchanged,
     ProtocolMessage,
+    Recall,
     Task,
     ToMaster,
     ToPeer,
@@ -30,13 +31,14 @@ from robochoc.communication.network.framing import LARGEST_FRAME
 from robochoc.communication.network.plausibility import fault_of_findings
 from robochoc.communication.network.profile import ProfileError, domain_of
 from robochoc.communication.network.quotas import Backlog
+from robochoc.communication.network.recalled import Recalled, values_asked_for
 from robochoc.communication.network.shared import SharedConstraintError, SharedRecord, known_of, record_of
 from robochoc.communication.resources import own_memory
 from robochoc.communication.robot_loop import RobotLoop
 from robochoc.model.message import Envelope
 from robochoc.model.outcome import Metrics
 from robochoc.model.problem import Constraint, ConstraintModel, ProblemKind
-from robochoc.protocols.findings import NOTHING, Findings
+from robochoc.protocols.findings import NOTHING, Findings, Trail
 from robochoc.protocols.protocol import Protocol
 from robochoc.protocols.requirements import unmet_requirement
 from robochoc.solver.agent_problem import AgentProblem, RunParameters, TeamKnowledge
@@ -93,6 +95,7 @@ class Searcher(RobotLoop):
         self._sent_to: Counter[str] = Counter()
         self._received_from: Counter[str] = Counter()
         self._clocks: dict[str, int] = {}
+        self._recalled = Recalled()
         if task.interfaces.get(self._robot.name) != self._robot.interface:  # others would misread its values
             raise UnsupportedError(
                 f"{self._robot.name} received invalid data: other interface variables than in its file"
@@ -105,7 +108,15 @@ class Searcher(RobotLoop):
 
     @property
     def assignment(self) -> dict[str, int]:
-        """The values that the robot has decided on for its variables; empty while there are none."""
+        """The values that the robot has decided on for its variables; empty while there are none.
+
+        The master may have told the robot to stay with what it had at a snapshot.
+        """
+        adopted = self._recalled.adopted
+        return self._present if adopted is None else adopted
+
+    @property
+    def _present(self) -> dict[str, int]:
         return self._host.protocol.assignment if self._host else {}
 
     # Getting ready
@@ -226,7 +237,7 @@ class Searcher(RobotLoop):
             return
         metrics = self._host.metrics()
         metrics = replace(metrics, ncccs=min(metrics.ncccs, LATEST), memory=own_memory())
-        assigned = bool(self.assignment)  # a withdrawn robot has a value, and none of its variables has
+        assigned = bool(self._present)  # a withdrawn robot has a value, and none of its variables has
         values, findings = self._known_to_master(self._host)
         self._context.say(DetailedReport(self.epoch, values, metrics, findings, assigned, self._exchanged()))
 
@@ -246,9 +257,32 @@ class Searcher(RobotLoop):
             for other in others
         }
 
-    def check_constraints(self, values: Mapping[str, int]) -> CheckResult:
-        """Check the robot's constraints against what all have decided. See `check_constraints`."""
-        return check_constraints(self.epoch, self._robot, {**values, **self.assignment}, self.assignment, self._learnt)
+    def recall(self, order: Recall) -> None:
+        """Tell the master what it asks for, and keep that until it has been checked. The search goes on."""
+        host = self._host
+        if host is None:
+            return
+        private = self._context.private
+        values = {} if private else values_asked_for(order, host.protocol, self._own.domain)
+        self._recalled.note(order.number, values)
+        findings = NOTHING if private else self._findings(host.protocol)
+        if findings.trail is not None:  # the master asks for one cycle, and may not have all
+            findings = msgspec.structs.replace(findings, trail=Trail([], findings.trail.cycle))
+        lost = 0 if host.dropped is None else host.dropped.many
+        self._say(Snapshot(self.epoch, order.number, values, lost, findings))
+
+    def adopt(self, number: int, *, published: bool) -> None:
+        """Keep what the robot had at a snapshot; see `Recalled.adopt`. Raises `FrameRefusedError`."""
+        self._recalled.adopt(number, published=published)
+
+    def check_constraints(self, values: Mapping[str, int], snapshot: int = 0) -> CheckResult:
+        """Check the robot's constraints against what all have decided, or had at a `snapshot`. See `check_constraints`.
+
+        Raises `FrameRefusedError` if the robot was not asked what it had then.
+        """
+        own = self._recalled.at(snapshot) if snapshot else self._present
+        found = check_constraints(self.epoch, self._robot, {**values, **own}, own, self._learnt)
+        return msgspec.structs.replace(found, snapshot=snapshot)
 
 
 def _sorted(copies: Sequence[KeyedConstraint], order: Sequence[str]) -> tuple[KeyedConstraint, ...]:

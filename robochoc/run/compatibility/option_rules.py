@@ -170,9 +170,21 @@ ENVIRONMENT_RULES = (
 )
 """Further combinations that are refused if an environment changes the problem."""
 
+PRIVATE_RULES = (
+    OptionRule(
+        lambda o: o.deadline,
+        "--deadline counts what was checked by then, and --private hides the values that would be checked",
+        "--timeout",
+    ),
+)
+"""Further combinations that are refused if robots keep their values to themselves."""
 
-def refuse_options(options: Options, *, environment: bool = False) -> None:
-    """Raise `UnsupportedError` for options that do not go together; `environment`: one changes the problem."""
-    for rule in (*ENVIRONMENT_RULES * environment, *OPTION_RULES):
+
+def refuse_options(options: Options, *, environment: bool = False, private: bool = False) -> None:
+    """Raise `UnsupportedError` for options that do not go together.
+
+    `environment`: one changes the problem. `private`: robots keep their values to themselves.
+    """
+    for rule in (*ENVIRONMENT_RULES * environment, *PRIVATE_RULES * private, *OPTION_RULES):
         if rule.refuses(options):
             raise UnsupportedError("; ".join(filter(None, [rule.why, rule.instead])))

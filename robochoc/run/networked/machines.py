@@ -7,26 +7,38 @@ word (`claimed`).
 from __future__ import annotations
 
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
-from typing import assert_never
+from typing import NamedTuple, assert_never
 
 from msgspec import UNSET
 
 from robochoc.communication.network.master import Master
+from robochoc.communication.network.plausibility import doubts_about_checks, doubts_about_values, thoroughness
 from robochoc.communication.run_result import RobotsLostError, RunResult
 from robochoc.journal.events import Began, Observer
 from robochoc.model.cost_units import Cost, common_units
-from robochoc.model.outcome import ALL_ROBOTS, Outcome, Verdict
-from robochoc.model.problem import Domain, ProblemKind, Team, Variable
+from robochoc.model.outcome import ALL_ROBOTS, Improvement, Outcome, Verdict
+from robochoc.model.problem import Domain, ProblemKind, Robot, Team, Variable
 from robochoc.run.distributed import Deployment
-from robochoc.run.evaluation import CheckedAssignment, Search, is_proven
+from robochoc.run.evaluation import Answer, CheckedAssignment, Search, evaluate_search, is_proven
+from robochoc.run.improvement import Audience, Improvements, Rank, as_told_one_after_the_other
 from robochoc.run.incumbent import merged_values
 from robochoc.run.options import Options
 from robochoc.run.withdrawal import Phase
 from robochoc.verification.checker import RefutedError
 
+
+class Snapshot(NamedTuple):
+    """What all robots had at the snapshot `number`: the `values` of all variables, and by the robots' names."""
+
+    number: int
+    values: Mapping[str, int]
+    assignments: Mapping[str, dict[str, int]]
+
+
+NO_SNAPSHOT = Snapshot(0, {}, {})
 _NAMED = 5
 """No more robots than these are named in a message."""
 
@@ -39,16 +51,27 @@ class Machines(Deployment):
         options: how to run.
         name: the team's name.
         observer: gets the events of the run.
+        audience: gets each answer that is published while the robots search.
     """
 
-    def __init__(self, master: Master, options: Options, name: str, observer: Observer | None) -> None:
+    def __init__(
+        self, master: Master, options: Options, name: str, observer: Observer | None, audience: Audience | None = None
+    ) -> None:
         self.options = options
         self._master = master
         self._name = name
         self._observer = observer
-        self._deadline = None if options.limit_s is None else time.monotonic() + options.limit_s
+        self._audience = audience
+        self._begin_time()
         self._lost: dict[str, str] = {}
-        self._values: dict[str, dict[str, int]] = {}
+        self._gone: list[Robot] = []
+        self._values: Mapping[str, dict[str, int]] = {}
+        self._improvements: Improvements | None = None
+        self._snapshot = self._kept = NO_SNAPSHOT
+
+    def _begin_time(self) -> None:
+        self._began = time.monotonic()
+        self._deadline = None if self.options.limit_s is None else self._began + self.options.limit_s
 
     @property
     def kind(self) -> ProblemKind:
@@ -86,26 +109,111 @@ class Machines(Deployment):
     def remove(self, lost: Mapping[str, str]) -> None:
         """See `Deployment.remove`."""
         self._lost |= lost
-        self._master.members.remove(lost)
+        members = self._master.members
+        self._gone += [members.robots[name].robot for name in lost if name in members.robots]
+        members.remove(lost)
+        if self.options.deadline is not None:  # those who are left have a deadline of their own
+            self._begin_time()
+            self._improvements = None
 
     def search(self, phase: Phase) -> Search:
         """See `Deployment.search`. Raises `RefutedError` when robots contradict each other."""
         if self._observer:
             self._observer(Began(t=0, protocol=phase.name, minimises=True if phase.traits.costs else UNSET))
-        result = self._master.search(phase.name, phase.traits, phase.parameters, self.left_s(), self.options.messages)
+        left_s, checked = self.left_s(), self.options.deadline is not None
+        self._master.watch = self._improvements = self._watch(phase) if checked else None
+        result = self._master.search(
+            phase.name, phase.traits, phase.parameters, left_s, self.options.messages, checked=checked
+        )
         if not result.lost:
             self._refuse_contradictions()
         return Search(result, partial(self._check, phase, result))
 
+    # Answers while the robots search
+
+    def _watch(self, phase: Phase) -> Improvements:
+        """Return what keeps the best answer of a search, and publishes it from the deadline on."""
+        team = registered_team(self._master, self._name)
+        before = self._improvements
+        options, audience = self.options, self._audience
+        deadline = options.deadline or 0.0
+        self._snapshot = self._kept = NO_SNAPSHOT
+
+        def evaluate(snapshot: RunResult) -> Answer:
+            snapshot = as_told_one_after_the_other(snapshot, phase, options)
+            search = Search(snapshot, partial(self._check_snapshot, phase, snapshot))
+            return evaluate_search(phase, search, team.kind, self.told, options.deadline)
+
+        def publish(answer: Answer, improvements: tuple[Improvement, ...]) -> None:
+            self._adopt(answer)
+            if audience is not None and options.improve is not None:
+                now = replace(answer, improvements=improvements)
+                audience.improve(team, now.as_epoch(team.order), answer.withdrawn)
+
+        def keep(answer: Answer) -> None:
+            if answer.assignment is self._snapshot.values:
+                self._kept = self._snapshot
+                self._master.adopt(self._kept.number)
+
+        return Improvements(
+            began=self._began,
+            deadline=self._began + deadline,
+            evaluate=evaluate,
+            rank=Rank(team, self.told),
+            has_costs=team.kind is ProblemKind.DISWCSP,
+            bounded=phase.parameters.withdrawal_cost is None,
+            publish=publish,
+            has_news=lambda: audience is not None and audience.has_news(team),
+            earlier=before.improvements if before else (),
+            keep=keep,
+        )
+
+    def _check_snapshot(self, phase: Phase, snapshot: RunResult) -> CheckedAssignment | None:
+        """Return what the robots had at a snapshot, which all of them have checked; None if something is against it.
+
+        Raises:
+            RefutedError: when robots contradict each other.
+        """
+        found = self._master.snapshots
+        if found is None:
+            return None
+        doubts = [*doubts_about_values(snapshot.assignments), *doubts_about_checks(found.checks)]
+        self._refuse(doubt.why for doubt in doubts)
+        without = tuple(name for name in self._master.members.order if not snapshot.assignments.get(name))
+        if (without and not phase.withdrawal) or not all(check.allowed for check in found.checks.values()):
+            return None
+        values = merged_values(snapshot.assignments)
+        self._snapshot = Snapshot(found.number, values, snapshot.assignments)
+        cost = sum(check.cost for check in found.checks.values())
+        return CheckedAssignment(values, self.told(cost), without, check_counts=thoroughness(found.checks))
+
+    def _adopt(self, answer: Answer) -> None:
+        """Tell the robots that `answer` is their decision until they hear otherwise."""
+        withdrawn = f", {len(answer.withdrawn)} withdraw" if answer.withdrawn else ""
+        number = self._kept.number if answer.assignment is self._kept.values else 0
+        self._master.adopt(number, f"{answer.verdict}{withdrawn}")
+
+    def concluded(self, phase: Phase, search: Search, answer: Answer) -> Answer:  # noqa: ARG002 - see `Deployment`
+        """See `Deployment.concluded`. The best that robots have checked may be what they had at a snapshot."""
+        improvements = self._improvements
+        if improvements is None:
+            return answer
+        best = improvements.concluded(answer, lost=bool(search.result.lost))
+        if best.assignment is self._kept.values:
+            self._values = self._kept.assignments
+        return best if self.options.improve is not None else replace(best, improvements=())
+
+    # The end
+
     def team_seen(self) -> Team:
-        """Return the team as the outcome shows it: with variables that only their robots knew before."""
+        """Return the team as the outcome shows it: with lost robots, and variables that only the robots knew before."""
         robots = []
         for robot in registered_team(self._master, self._name).robots:
             known = {variable.name for variable in robot.variables}
             others = [(name, value) for name, value in self._values.get(robot.name, {}).items() if name not in known]
             shown = tuple(Variable(name, Domain(name, (range(value, value + 1),))) for name, value in others)
             robots.append(replace(robot, variables=(*robot.variables, *shown)))
-        return Team(self._name, tuple(robots))
+        return Team(self._name, (*robots, *self._gone))
 
     def _check(self, phase: Phase, result: RunResult) -> CheckedAssignment | None:
         """Return the values that robots have reported, once every robot has checked its own constraints.
@@ -115,6 +223,8 @@ class Machines(Deployment):
             RobotsLostError: when a robot has values and does not report them.
         """
         state, members = self._master.state, self._master.members
+        if self.options.deadline is not None and not state.assigned.keys() >= set(members.order):
+            return None  # one has not said in time what it has: neither that it flies, nor that it withdraws
         without = tuple(name for name in members.order if not state.assigned.get(name))
         if self._master.is_private:
             withdrawn = without if phase.withdrawal and result.verdict is Verdict.SOLUTION else ()
@@ -141,9 +251,12 @@ class Machines(Deployment):
 
     def _refuse_contradictions(self) -> None:
         """Raise `RefutedError` if robots contradict each other. It is unknown which of them lies."""
-        doubts = "; ".join(doubt.why for doubt in self._master.state.doubts_about_verdict)
-        if doubts:
-            raise RefutedError(f"{self._name} has no answer that can be believed: {doubts}")
+        self._refuse(doubt.why for doubt in self._master.state.doubts_about_verdict)
+
+    def _refuse(self, doubts: Iterable[str]) -> None:
+        """Raise `RefutedError` if there are `doubts`."""
+        if why := "; ".join(doubts):
+            raise RefutedError(f"{self._name} has no answer that can be believed: {why}")
 
 
 def registered_team(master: Master, name: str) -> Team:

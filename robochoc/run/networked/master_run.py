@@ -30,6 +30,7 @@ from robochoc.run.compatibility.option_rules import refuse_options
 from robochoc.run.compatibility.team_rules import refuse_unfit
 from robochoc.run.defaults import AUTO, DEFAULT_COST_PROTOCOL, DEFAULT_PROTOCOL
 from robochoc.run.distributed import solve_distributed
+from robochoc.run.improvement import Audience
 from robochoc.run.networked.address import LOOPBACK, Address
 from robochoc.run.networked.machines import Machines, claimed, first_names, registered_team
 from robochoc.run.options import OnLoss, Options, Runtime, Withdrawal
@@ -60,6 +61,8 @@ class MasterPlan:
         withdraw: Which robots withdraw when the team has no solution (None: none).
         gather_s: How many seconds to wait for the team (None: no limit).
         timeout: A limit in seconds, from when the team is complete (None: no limit).
+        deadline: The same, when the best assignment that is known counts as an answer (None: there is none).
+        improve: For how many seconds after the deadline the robots search on for what is better (None: not at all).
         messages: A limit on the number of messages (None: no limit).
         message_loss: The probability with which robots drop what they receive.
         conditions: The settings of the network.
@@ -77,6 +80,8 @@ class MasterPlan:
     withdraw: Withdrawal | None = None
     gather_s: float | None = None
     timeout: float | None = None
+    deadline: float | None = None
+    improve: float | None = None
     messages: int | None = None
     message_loss: float = 0.0
     conditions: NetworkSettings = NetworkSettings()
@@ -88,6 +93,8 @@ class MasterPlan:
             runtime=Runtime.NETWORK,
             seed=self.seed,
             timeout=self.timeout,
+            deadline=self.deadline,
+            improve=self.improve,
             withdraw=self.withdraw,
             messages=self.messages,
             message_loss=self.message_loss,
@@ -113,6 +120,7 @@ def run_master(
     plan: MasterPlan,
     *,
     observer: Observer | None = None,
+    audience: Audience | None = None,
     watched: bool = False,
     progress: Callable[[Progress], None] | None = None,
     listening: Callable[[], None] = lambda: None,
@@ -124,6 +132,7 @@ def run_master(
     Args:
         plan: What to do.
         observer: Gets all events of the master.
+        audience: Gets each answer that is published while the robots search (`plan.improve`).
         watched: Whether the observer gets the robots' events too.
         progress: Gets the number of messages so far, now and then.
         listening: Is called once robots can come.
@@ -161,7 +170,7 @@ def run_master(
         master.publish(publication)
     with _enrolling(authority, identity, plan.place), master:
         listening()
-        return _run(plan, master, observer, concluded)
+        return _run(plan, master, (observer, audience), concluded)
 
 
 @contextmanager
@@ -178,11 +187,14 @@ def _enrolling(authority: Authority, identity: Identity, place: Address) -> Iter
 
 
 def _run(
-    plan: MasterPlan, master: Master, observer: Observer | None, concluded: Callable[[Outcome | None], None]
+    plan: MasterPlan,
+    master: Master,
+    observers: tuple[Observer | None, Audience | None],
+    concluded: Callable[[Outcome | None], None],
 ) -> MasterResult:
     """Let the robots solve their problem, once the master listens, and tell them the outcome."""
     try:
-        led = _solve(plan, master, observer)
+        led = _solve(plan, master, *observers)
     except BaseException as error:
         failure = isinstance(error, RobotsLostError | UnsupportedError | RefutedError | TeamIncompleteError)
         concluded(None)
@@ -193,7 +205,7 @@ def _run(
     return led
 
 
-def _solve(plan: MasterPlan, master: Master, observer: Observer | None) -> MasterResult:
+def _solve(plan: MasterPlan, master: Master, observer: Observer | None, audience: Audience | None) -> MasterResult:
     """Wait for the team, and let it solve its problem."""
     if not master.gather(None if plan.gather_s is None else time.monotonic() + plan.gather_s):
         names = first_names(master.members.waited_for) or "more robots"
@@ -203,7 +215,7 @@ def _solve(plan: MasterPlan, master: Master, observer: Observer | None) -> Maste
     name, protocol = options.protocol, protocol_or_stage(options.protocol)
     refuse_settings(name, protocol, options.settings)
     refuse_unfit(team, options, protocol.traits)
-    machines = Machines(master, options, plan.name, observer)
+    machines = Machines(master, options, plan.name, observer, audience)
     header = Outcome(
         plan.name,
         name,
@@ -221,7 +233,7 @@ def _solve(plan: MasterPlan, master: Master, observer: Observer | None) -> Maste
 def _refuse_early(plan: MasterPlan) -> None:
     """Refuse what can be refused before any robot has come. Raises `UnsupportedError`."""
     asked = plan.protocol or AUTO
-    refuse_options(plan.options(asked))
+    refuse_options(plan.options(asked), private=plan.conditions.private)
     try:
         name = DEFAULT_PROTOCOL if asked == AUTO else asked
         refuse_settings(name, protocol_or_stage(name), plan.settings)
