@@ -100,10 +100,10 @@ def test_a_place_outside_of_the_fence_is_refused_before_anything_is_armed(tmp_pa
 
 
 def test_a_crazyflie_that_is_not_there_ends_with_one_message(tmp_path: Path) -> None:
-    with crazyflie_field(tmp_path, patience=1) as (vehicles, fleet):
+    with crazyflie_field(tmp_path) as (vehicles, fleet):
         vehicles[2].silent = True
         done = solve(tmp_path, fleet, "--arm")
-        assert f"RC cannot be flown: it is not heard on udp://127.0.0.1:{vehicles[2].port} within 1 s" in done.stderr
+        assert f"RC cannot be flown: it is not heard on udp://127.0.0.1:{vehicles[2].port} within 5 s" in done.stderr
         assert done.stderr.count("\n") == 1
         assert done.returncode == 1
         assert [vehicle.log for vehicle in vehicles] == [[]] * 4
@@ -145,10 +145,10 @@ def test_a_link_that_cannot_be_opened(tmp_path: Path, link: str, why: str) -> No
 
 @pytest.mark.slow
 def test_a_port_at_which_nobody_is(tmp_path: Path) -> None:
-    with crazyflie_field(tmp_path, patience=1) as (vehicles, fleet):
+    with crazyflie_field(tmp_path) as (vehicles, fleet):
         fleet.write_text(fleet.read_text().replace(str(vehicles[0].port), "9"))
         done = solve(tmp_path, fleet)
-        assert "RA cannot be flown: it is not heard on udp://127.0.0.1:9 within 1 s" in done.stderr
+        assert "RA cannot be flown: it is not heard on udp://127.0.0.1:9 within 5 s" in done.stderr
 
 
 # What goes wrong on the way
@@ -186,10 +186,10 @@ def test_answers_that_are_lost_are_asked_for_again(tmp_path: Path) -> None:
 
 @pytest.mark.slow
 def test_who_loses_its_link_hovers_and_the_others_land(tmp_path: Path) -> None:
-    with crazyflie_field(tmp_path, patience=1) as (vehicles, fleet):
+    with crazyflie_field(tmp_path) as (vehicles, fleet):
         vehicles[1].silent_above = 0.5
         done = solve(tmp_path, fleet, "--arm")
-        assert "RB is out of order: its link has been silent for 1 s; the others are brought down" in done.stderr
+        assert "RB is out of order: its link has been silent for 5 s; the others are brought down" in done.stderr
         vehicles.wait_until_safe()
         assert vehicles[1].flies
         assert vehicles[0].is_down
@@ -214,7 +214,7 @@ def test_whose_battery_is_low_on_the_way_lands(tmp_path: Path) -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize("lost", ["silent", "gone"])
 def test_who_is_heard_again_lands(tmp_path: Path, lost: str) -> None:
-    with crazyflie_field(tmp_path, patience=1) as (vehicles, fleet):
+    with crazyflie_field(tmp_path) as (vehicles, fleet):
         guard = GuardProcess(read_fleet(fleet, Kind.CRAZYFLIE))
         try:
             guard.permit()

@@ -111,23 +111,24 @@ def test_a_vehicle_that_stands_outside_of_the_fence_is_refused(tmp_path: Path) -
 
 
 def test_a_link_that_is_silent_ends_with_one_message(tmp_path: Path) -> None:
-    with field(tmp_path, patience=1) as (vehicles, fleet):
+    with field(tmp_path) as (vehicles, fleet):
         vehicles[2].silent = True
         done = solve(tmp_path, fleet, "--arm")
         assert "RC cannot be flown: it is not heard on udpin://127.0.0.1:" in done.stderr
-        assert "within 1 s; nothing was armed" in done.stderr
+        assert "within 5 s; nothing was armed" in done.stderr
         assert done.stderr.count("\n") == 1
         assert done.returncode == 1
         assert [vehicle.log for vehicle in vehicles] == [[]] * 4
 
 
+@pytest.mark.slow
 def test_all_vehicles_that_are_not_heard_are_told_at_once(tmp_path: Path) -> None:
-    with field(tmp_path, patience=1) as (vehicles, fleet):
+    with field(tmp_path) as (vehicles, fleet):
         for number in (1, 2, 3):
             vehicles[number].silent = True
         done = solve(tmp_path, fleet, "--arm")
         assert "RB cannot be flown: it is not heard on udpin://127.0.0.1:" in done.stderr
-        assert "within 1 s; nor can RC, RD; nothing was armed" in done.stderr
+        assert "within 5 s; nor can RC, RD; nothing was armed" in done.stderr
 
 
 def test_a_link_that_cannot_be_opened(tmp_path: Path) -> None:
@@ -189,10 +190,10 @@ def test_who_refuses_ends_the_flight_of_all(tmp_path: Path, refused: str, why: s
 @pytest.mark.slow
 @pytest.mark.parametrize("has_camera", [False, True])
 def test_who_loses_its_link_ends_the_flight_and_lands_by_itself(tmp_path: Path, *, has_camera: bool) -> None:
-    with field(tmp_path, patience=1) as (vehicles, fleet):
+    with field(tmp_path) as (vehicles, fleet):
         vehicles[1].silent_from, vehicles[1].has_camera = "offboard", has_camera
         done = solve(tmp_path, fleet, "--arm")
-        assert "RB is out of order: its link has been silent for 1 s; the others are brought down" in done.stderr
+        assert "RB is out of order: its link has been silent for 5 s; the others are brought down" in done.stderr
         vehicles.wait_until_landed()
         assert "offboard lost" in vehicles[1].log
 

@@ -362,6 +362,12 @@ def test_who_is_not_heard_in_time_is_out(pilot: Pilot, played: Played) -> None:
     assert steps(pilot, played, 3, 1.0).why == "it is not heard on udpin://0.0.0.0:1 within 10 s"
 
 
+def test_the_time_that_it_takes_to_open_a_link_is_no_silence(pilot: Pilot, played: Played) -> None:
+    played.connects, played.seen, played.opens_s = False, Telemetry(), 20.0
+    assert steps(pilot, played, 9, 1.0).phase is Phase.CONNECTING
+    assert steps(pilot, played, 3, 1.0).phase is Phase.OUT
+
+
 def test_who_tells_no_place_is_out(pilot: Pilot, played: Played) -> None:
     played.seen = replace(GROUND, place=None)
     assert steps(pilot, played, 12, 1.0).why == "it has told no place on udpin://0.0.0.0:1 within 10 s"

@@ -22,6 +22,8 @@ class Played(Autopilot):
         self.done: list[str] = []
         self.refuses: set[str] = set()
         self.connects = True
+        self.opens_s = 0.0
+        """The time that it takes to open the link."""
 
     def take(self, what: str, **after: object) -> None:
         self.done.append(what)
@@ -30,6 +32,7 @@ class Played(Autopilot):
         self.seen = replace(self.seen, **after)  # type: ignore[arg-type]
 
     def connect(self) -> bool:
+        self.now, self.opens_s = self.now + self.opens_s, 0.0
         return self.connects
 
     def look(self) -> Telemetry:

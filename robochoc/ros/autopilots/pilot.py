@@ -57,7 +57,7 @@ class Pilot:
         self._fleet = fleet
         self._traffic = traffic
         self._clock = clock
-        self._begun_s = self._since_s = clock()
+        self._begun_s, self._since_s = math.inf, clock()
         self._phase = Phase.CONNECTING
         self._why = ""
         self._wanted: tuple[int, Target] | None = None
@@ -122,8 +122,10 @@ class Pilot:
     # On the way
 
     def _connect(self, seen: Telemetry) -> None:
+        is_there = self._autopilot.connect() and seen.place is not None
+        self._begun_s = min(self._begun_s, self._clock())  # opening the link takes time, too
         waited_s = self._clock() - self._begun_s
-        if self._autopilot.connect() and seen.place is not None:
+        if is_there:
             self._enter(Phase.READY)
             return
         limit_s = self._fleet.connect_s if seen.connecting else self._fleet.patience_s
