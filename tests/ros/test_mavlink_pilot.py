@@ -368,6 +368,15 @@ def test_the_time_that_it_takes_to_open_a_link_is_no_silence(pilot: Pilot, playe
     assert steps(pilot, played, 3, 1.0).phase is Phase.OUT
 
 
+def test_motors_of_a_vehicle_that_is_not_heard_are_not_said_to_have_stopped(pilot: Pilot, played: Played) -> None:
+    flying(pilot)
+    steps(pilot, played, 3)
+    played.seen = replace(played.seen, armed=False, silent_s=SILENCE_S + 1)
+    assert steps(pilot, played, 2, MODE_S).phase in {Phase.FLYING, Phase.ARRIVED}
+    played.seen = replace(played.seen, silent_s=FLEET.patience_s + 1)
+    assert steps(pilot, played).why == "its link has been silent for 10 s"
+
+
 def test_who_tells_no_place_is_out(pilot: Pilot, played: Played) -> None:
     played.seen = replace(GROUND, place=None)
     assert steps(pilot, played, 12, 1.0).why == "it has told no place on udpin://0.0.0.0:1 within 10 s"

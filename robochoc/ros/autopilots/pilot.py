@@ -26,6 +26,7 @@ from robochoc.ros.autopilots.limits import (
     MODE_S,
     OUTSIDE_M,
     RETRY_S,
+    SILENCE_S,
     TURN_S,
 )
 from robochoc.ros.autopilots.messages import Phase, State, Target
@@ -122,12 +123,11 @@ class Pilot:
     # On the way
 
     def _connect(self, seen: Telemetry) -> None:
-        is_there = self._autopilot.connect() and seen.place is not None
-        self._begun_s = min(self._begun_s, self._clock())  # opening the link takes time, too
-        waited_s = self._clock() - self._begun_s
-        if is_there:
+        if self._autopilot.connect() and seen.place is not None:
             self._enter(Phase.READY)
             return
+        self._begun_s = min(self._begun_s, self._clock())  # opening the link takes time, too
+        waited_s = self._clock() - self._begun_s
         limit_s = self._fleet.connect_s if seen.connecting else self._fleet.patience_s
         if waited_s > limit_s:
             missing = "has told no place" if seen.mode or seen.connecting else "is not heard"
@@ -259,8 +259,8 @@ class Pilot:
 
     def _mode_trouble(self, seen: Telemetry) -> str:
         """Return what a vehicle does that should be in the air and follow us; empty if it does."""
-        if not seen.armed:
-            return "its motors have stopped"
+        if not seen.armed:  # MAVSDK says so of whom it no longer hears, too
+            return "its motors have stopped" if seen.silent_s <= SILENCE_S else ""
         if self._phase is Phase.CLIMBING or seen.mode == OFFBOARD:
             return ""
         return f"{_NOT_OURS} {seen.mode_and_who if self._takeover.has_left_us() else seen.mode_in_words}"
