@@ -8,6 +8,7 @@ import subprocess
 import sys
 import tempfile
 import threading
+import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from random import Random
@@ -16,6 +17,7 @@ from typing import Any
 import pytest
 import zenoh
 
+from robochoc.communication.network import journal_server
 from robochoc.communication.network.access import ALL, journal_key
 from robochoc.communication.network.control_messages import JournalAnswer, JournalRequest
 from robochoc.communication.network.framing import MASTER, Framing
@@ -58,6 +60,7 @@ for _ in range(1000):
 os.kill(os.getpid(), signal.SIGSTOP)
 """
 PATIENCE_S = 2.0
+"""How long an answer is waited for that does not come, or is asked for again."""
 
 
 def blocks(count: int) -> list[bytes]:
@@ -75,6 +78,18 @@ BLOCKS = blocks(101)
 def state_of(process: int) -> str:
     """The state of a process, as proc(5) has it."""
     return Path(f"/proc/{process}/stat").read_text().rpartition(")")[2].split()[0]
+
+
+class Ahead:
+    """The time, which a test moves on."""
+
+    sleep = staticmethod(time.sleep)
+
+    def __init__(self) -> None:
+        self.by_s = 0.0
+
+    def monotonic(self) -> float:
+        return time.monotonic() + self.by_s
 
 
 class Sniffing:
@@ -98,7 +113,7 @@ class Sniffing:
                 Address(host, int(port)),
                 self._run.household.identity(self._name),
                 self.content.extend,
-                patience_s=PATIENCE_S,
+                patience_s=HANG_S,
                 stopped=self._stop.is_set,
                 granted=self.granted.set,
             )
@@ -207,7 +222,11 @@ def test_the_router_lets_nobody_ask_who_may_not_or_in_anothers_name(run: Network
     run.wait_for_progress()
 
 
-def test_revoked_in_mid_run(run: NetworkRun, publication: Publication, sniffing: Callable[[str], Sniffing]) -> None:
+def test_revoked_in_mid_run(
+    run: NetworkRun, publication: Publication, sniffing: Callable[[str], Sniffing], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    clock = Ahead()
+    monkeypatch.setattr("robochoc.sniffer.remote.time", clock)
     run.household.enrol("Eye", sniffs=True)
     run.household.enrol("Ear", sniffs=True)
     eye, ear = sniffing("Eye"), sniffing("Ear")
@@ -215,18 +234,22 @@ def test_revoked_in_mid_run(run: NetworkRun, publication: Publication, sniffing:
     run.wait_until(lambda: eye.content == ear.content == BLOCKS[0], "they do not follow")
     run.household.revoke("Eye")
     run.household.enrol("Ear")  # which keeps its certificate, and loses the right
+    for name in ("Eye", "Ear"):
+        run.wait_for_refusal(name, "sniff|query|connect", "no right|no rule|not registered")
+    clock.by_s = 2 * HANG_S
     for one in (eye, ear):
         ending = one.ended()
         assert isinstance(ending, Followed)
         assert (ending.over, "sniff no more" in ending.why) == (False, True), ending
         assert bytes(one.content) == BLOCKS[0]
-    for name in ("Eye", "Ear"):
-        run.wait_for_refusal(name, "sniff|query|connect", "no right|no rule|not registered")
     publication.write(BLOCKS[1])
     run.wait_for_progress()
 
 
-def test_who_asks_without_end_and_reads_nothing(run: NetworkRun, publication: Publication) -> None:
+def test_who_asks_without_end_and_reads_nothing(
+    run: NetworkRun, publication: Publication, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(journal_server, "ANSWERED_AT_MOST", ANSWERED_AT_MOST // 10)  # a busy master answers slowly
     for each in BLOCKS:
         publication.write(each)
     run.household.enrol("Eye", sniffs=True)
