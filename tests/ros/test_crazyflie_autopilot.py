@@ -202,6 +202,23 @@ def test_who_is_not_heard_gets_no_command(monkeypatch: pytest.MonkeyPatch) -> No
             autopilot.arm()
 
 
+def test_a_link_that_was_opened_in_vain_is_opened_anew(monkeypatch: pytest.MonkeyPatch) -> None:
+    """What it asks for is lost; and who is heard again goes on with its log, as if that were an answer."""
+    for name in ("_REOPEN_S", "_ATTEMPT_S"):
+        monkeypatch.setattr(cflib_autopilot, name, 0.5)
+    with linked() as (vehicle, autopilot):
+        first = autopilot._crazyflie  # noqa: SLF001 - the link
+        vehicle.silent = True
+        seen(autopilot, lambda _: autopilot._crazyflie not in {first, None})  # noqa: SLF001
+        missed = vehicle.missed
+        seen(autopilot, lambda _: vehicle.missed > missed)
+        silent_s = autopilot.look().silent_s
+        vehicle.silent = False
+        seen(autopilot, lambda told: told.silent_s < silent_s)
+        autopilot.arm()
+        assert vehicle.log == ["armed"]
+
+
 def test_a_landing_that_is_under_way_is_no_refusal() -> None:
     with linked() as (vehicle, autopilot):
         fly(vehicle, autopilot)

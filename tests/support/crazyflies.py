@@ -66,6 +66,8 @@ class Crazyfly:
     """Log variables that its firmware does not have."""
     silent: bool = False
     """True: neither sends nor hears, as without radio."""
+    missed: int = 0
+    """The packets that have come while it was silent."""
     silent_above: float = math.inf
     """The height from which on it is silent, in metres."""
     gone: bool = False
@@ -154,7 +156,9 @@ class _Played:
                 return
             except OSError:
                 continue  # what was sent before has reached nobody
-            if content and not self.vehicle.silent:
+            if self.vehicle.silent:
+                self.vehicle.missed += 1
+            elif content:
                 self._take(content[0] >> 4, content[0] & 3, content[1:])
 
     def _send(self, port: int, channel: int, content: bytes) -> None:

@@ -53,6 +53,8 @@ _NO_DRIVER = "Couldn't load link driver:"
 _TAKE_OFF, _LAND, _GO_TO = 7, 8, 12
 _ARMED = 0x81
 _BUSY = 16
+_LOG_DATA = 2
+"""The channel on which blocks of the log come."""
 _LOW_POWER = 3
 """From this state of the power management on (its pm.h), the battery has had a low voltage for some seconds."""
 _VARIABLES = (
@@ -260,8 +262,10 @@ class CflibAutopilot(Autopilot):
 
     # What comes, in cflib's threads
 
-    def _heard(self, _packet: object) -> None:
-        self._heard_at = time.monotonic()
+    def _heard(self, packet: Any) -> None:  # noqa: ANN401 - cflib's
+        # Blocks of the log go on from before a silence: they are no answer to what a new link has asked for in vain.
+        if (packet.port, packet.channel) != (CRTPPort.LOGGING, _LOG_DATA):
+            self._heard_at = time.monotonic()
 
     def _connected(self, _url: str) -> None:
         self._is_connected = True
