@@ -60,6 +60,8 @@ class ThisMachine(Deployment):
             parameters=RunParameters(options.seed, options.settings, message_loss=options.dropped),
             prepare=None if options.preprocess is None else self._preprocessed,
         )
+        self._searched = CompiledTeam(team, only=())
+        """The team of the last `search`; of none, before the first."""
         self._done: list[Preprocessing] = []
         self._cut_short = ""
         """Why the robots could not end the last preprocessing."""
@@ -111,7 +113,8 @@ class ThisMachine(Deployment):
         team = self._scenario.ordered_team()
         if phase.takes_over and phase.traits.costs and not self._order_requested:
             team = with_dom_deg_order(team)  # faster
-        epoch = Epoch(self._compiler.compile(team, every=True), parameters=phase.parameters)
+        self._searched = self._compiler.compile(team, every=True)
+        epoch = Epoch(self._searched, parameters=phase.parameters)
         self._start_events.report(phase.protocol, EpochStart(epoch))
         with self._session(phase, epoch.compiled) as session:
             self._watch(phase, EpochStart(epoch), session)
@@ -233,7 +236,7 @@ class ThisMachine(Deployment):
             return self._scenario.compiled(), None
         phase = preprocessing_phase(self.options)
         result = self._search_without_losses(phase).result
-        whole = self._scenario.compiled()
+        whole = self._searched
         values = sum(len(robot.domain.values) for robot in whole.robots.values())
         self._done.append(Preprocessing(phase.name, result.metrics, removed_values(whole, result.findings), values))
         if result.verdict is Verdict.SOLUTION:

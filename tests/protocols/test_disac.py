@@ -22,8 +22,9 @@ from robochoc.run.options import Preprocess
 from robochoc.run.registry import protocol_named, protocol_names
 from robochoc.solver.agent_problem import agent_problems
 from robochoc.solver.compiled import LocalProblem
+from robochoc.solver.compiled_team import CompiledTeam
 from robochoc.solver.encoding import UnsupportedError
-from robochoc.solver.team_compiler import OutOfTimeError
+from robochoc.solver.team_compiler import OutOfTimeError, TeamCompiler
 from tests.support.agents import replies
 from tests.support.examples import count
 from tests.support.limits import HANG_S
@@ -216,10 +217,16 @@ def test_a_limit_may_end_it() -> None:
 
 
 def test_what_it_took_is_told_where_the_time_is_over_after_it(monkeypatch: pytest.MonkeyPatch) -> None:
-    def too_late(*_: object) -> Team:
-        raise OutOfTimeError("the time was over while RA was compiled")
+    compiled = TeamCompiler.compile
 
-    monkeypatch.setattr("robochoc.run.this_machine.restricted", too_late)
+    def in_time(compiler: TeamCompiler, team: Team, *, every: bool = False) -> CompiledTeam:
+        if len(teams) == 2:  # for the run, and for the robots that make their domains consistent
+            raise OutOfTimeError("the time was over while RA was compiled")
+        teams.append(team)
+        return compiled(compiler, team, every=every)
+
+    teams: list[Team] = []
+    monkeypatch.setattr(TeamCompiler, "compile", in_time)
     journal = record(chain(1, 2, 3, 4), replace(AC, protocol="abt"))
     outcome = journal.outcome
     assert outcome is not None

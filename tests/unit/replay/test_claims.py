@@ -124,3 +124,16 @@ def test_an_answer_that_was_improved_is_as_good_as_what_the_robots_end_with() ->
     ):
         found = replay(replace(journal, outcome=claimed))
         assert {one.what for one in found.contradictions} == {f"the outcome's {field}"}
+
+
+def test_processes_that_a_deadline_ends_may_have_told_less_than_they_did_and_not_more() -> None:
+    journal = ended_by_the_time(replace(BY_A_DEADLINE, improve=None))
+    assert journal.outcome is not None
+    outcome = replace(journal.outcome, runtime="processes")
+    metrics = outcome.metrics
+    header = msgspec.structs.replace(journal.header, runtime="processes")
+    for messages, told in ((-1, []), (1, ["the outcome's messages"])):
+        more = {kind: number + messages for kind, number in metrics.messages.items()}
+        claimed = replace(outcome, metrics=replace(metrics, messages=more))
+        found = replay(replace(journal, header=header, outcome=claimed))
+        assert [one.what for one in found.contradictions] == told
