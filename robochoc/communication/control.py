@@ -38,8 +38,8 @@ class Ready(OfEpoch, frozen=True):
     """The robot is there, with its problem compiled."""
 
 
-class OpenQueues(_Control, frozen=True):
-    """The robot needs queues to `receivers`, at most `QUEUES_AT_ONCE` of them."""
+class OpenQueues(OfEpoch, frozen=True):
+    """The robot needs queues to `receivers`, at most `QUEUES_AT_ONCE` of them. Asked again in each epoch."""
 
     receivers: list[str]
 

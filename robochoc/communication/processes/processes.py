@@ -256,13 +256,14 @@ class ProcessesRun(Session, MasterLoop):
 
     def _handle(self, robot: RobotLink, message: FromRobot) -> None:
         match message:
+            case OpenQueues(epoch, receivers):
+                if epoch == self.state.epoch:  # else some of them may be gone
+                    self._open_queues(robot, receivers)
             case OfEpoch():
                 if fault := self.state.handle(robot.name, message):
                     raise RobotsLostError({robot.name: fault})
                 if isinstance(message, Ready) and message.epoch == self.state.epoch:
                     self._observe(Registered(t=self._now(), robot=robot.name))
-            case OpenQueues(receivers):
-                self._open_queues(robot, receivers)
             case Events(events):
                 for event in events:
                     self._observe(event)

@@ -104,7 +104,7 @@ class QueueRobot(RobotLoop):
             writer.put_stamped(self.epoch, envelope.clock, envelope.content)
             touched[envelope.receiver] = writer
         for start in range(0, len(unopened), QUEUES_AT_ONCE):
-            self._say(OpenQueues(unopened[start : start + QUEUES_AT_ONCE]))
+            self._say(OpenQueues(self.epoch, unopened[start : start + QUEUES_AT_ONCE]))
         for writer in touched.values():
             self._flush(writer)
 
@@ -187,6 +187,8 @@ class QueueRobot(RobotLoop):
                 self._close_reader(self._readers[name])
             if name in self._writers:
                 self._close_writer(self._writers.pop(name))
+        # What the parent had not opened before it gave this order, it does not open any more.
+        self._writers = {name: writer for name, writer in self._writers.items() if writer.fd is not None}
         self.epoch = order.epoch
         self._patience_s = IDLE_S
         self._reset()
