@@ -52,6 +52,8 @@ from robochoc.system.signals import signals_held
 from robochoc.system.temporary_files import PrivateFolder
 
 CHUNK = 1 << 20
+LONGEST_WAIT_S = 1e6
+"""`select` refuses to wait for 1e300 seconds at once, and users may."""
 LAST_WORDS_S = 1.0
 TASKS = 400
 """The number of tasks after which the process is replaced: ACE keeps parts of every problem in memory."""
@@ -296,8 +298,10 @@ class AceProcess:
             self._receive(deadline)
 
     def _receive(self, deadline: float | None) -> None:
-        left = None if deadline is None else max(0.0, deadline - time.monotonic())
+        left = None if deadline is None else min(max(0.0, deadline - time.monotonic()), LONGEST_WAIT_S)
         if not select.select([self.fileno()], [], [], left)[0]:
+            if left == LONGEST_WAIT_S:
+                return
             raise self.give_up()
         chunk = b""
         with suppress(OSError):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+import math
 import os
 import re
 import signal
@@ -190,6 +191,16 @@ def test_a_limit_ends_the_search(warm: AceProcess, strategy: Strategy) -> None:
     assert warm.solve(board, limit=len(every), strategy=strategy).found == len(every)
     answer = warm.solve(board, limit=len(every) + 1, strategy=strategy)
     assert (answer.found, answer.complete, sorted(answer.solutions)) == (len(every), True, every)
+
+
+@pytest.mark.parametrize("longest_s", [0.0, 1e6])
+def test_any_limit_of_time_can_be_waited_for(
+    warm: AceProcess, longest_s: float, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("robochoc.solver.ace.LONGEST_WAIT_S", longest_s)
+    for limit_s in (1e300, math.inf):
+        answer = warm.solve(queens_network(6), limit=1000, deadline=time.monotonic() + limit_s)
+        assert (answer.found, answer.complete) == (len(brute_force(queens_network(6))), True)
 
 
 def test_solutions_can_be_counted_only(warm: AceProcess) -> None:
