@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import signal
 import subprocess
 from collections.abc import Iterator
 from pathlib import Path
@@ -10,9 +11,11 @@ from typing import NamedTuple
 import pytest
 
 from robochoc.formats import write_team
+from robochoc.generators.random_csp import random_csp
 from robochoc.journal.events import Decided, Event, Sent
 from robochoc.journal.journal import read_journal
 from robochoc.model.problem import Team
+from robochoc.verification.checker import violations
 from tests.support.deployments import CROWD, PAIR, Deployment, Program, ended
 from tests.support.limits import wait_until
 from tests.support.namespaces import TUN, Link, bad_line, namespaces, why_not
@@ -28,6 +31,7 @@ pytestmark = [
 PORT = 7447
 HILL, FIELD = "10.78.1.1", "10.78.1.2"
 PATIENCE_S = 3
+COSTLY = random_csp(4, 4, 0.8, 0.0, seed=1, max_cost=50)
 
 
 class Apart(NamedTuple):
@@ -133,3 +137,42 @@ def test_a_line_that_goes_down_for_good_at_the_end(apart: Apart) -> None:
     apart.line.set("down")
     assert master.status() in {0, 4}, master.errors
     assert {robot.status() for robot in crew.values()} <= {0, 4}
+
+
+# By a deadline
+
+
+def improving(apart: Apart) -> tuple[Program, dict[str, Program]]:
+    """Robots with costs that have decided, and search on; the master is patient, they are not."""
+    files, tokens = apart.enrolled(COSTLY)
+    words = ("--protocol", "dsa", "--set", "cycles=1000000000", "--deadline", 0.1, "--improve", 3600, "--patience", 60)
+    master = apart.site.master("--team", files, "--json", *words, inside=apart.hill)
+    crew = apart.robots(files, tokens, 60)
+    for robot in crew.values():
+        robot.wait_to_say("solution so far; V")
+    return master, crew
+
+
+def test_a_line_that_goes_down_after_the_deadline_takes_no_answer_away(apart: Apart) -> None:
+    master, crew = improving(apart)
+    apart.line.set("down")
+    master.strike(signal.SIGUSR1)
+    assert master.status() == 0, master.errors
+    told = master.object
+    assert (told["verdict"], told["verified"], "lost" in told) == ("solution", True, False)
+    assert list(violations(COSTLY, told["assignment"])) == []
+    assert {robot.hurried_status() for robot in crew.values()} == {4}
+
+
+def test_a_search_goes_on_when_the_line_is_up_again(apart: Apart) -> None:
+    master, crew = improving(apart)
+    apart.line.set("down")
+    wait_until(lambda: not apart.linked(), "links to robots that are out of reach stay open")
+    apart.line.set("up")
+    wait_until(apart.linked, "no robot comes back")
+    master.strike(signal.SIGUSR1)
+    assert master.status() == 0, master.errors
+    ended(crew)
+    assert list(violations(COSTLY, master.object["assignment"])) == []
+    said = {robot.output.rpartition("; ")[2].strip() for robot in crew.values()}
+    assert said == {f"{name} = {value}" for name, value in master.object["assignment"].items()}

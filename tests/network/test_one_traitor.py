@@ -4,18 +4,20 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
-from typing import Any
+from types import SimpleNamespace
+from typing import Any, cast
 
 import msgspec
 import pytest
 
 from robochoc.cli.reports.outcome import outcome_report
 from robochoc.communication.control import Conclusion
-from robochoc.communication.network.control_messages import Charge
+from robochoc.communication.network.control_messages import Charge, CheckResult
+from robochoc.communication.network.master import Master
 from robochoc.communication.processes.processes import ProcessesRun
-from robochoc.communication.run_result import RobotsLostError
+from robochoc.communication.run_result import RobotsLostError, RunResult
 from robochoc.formats.result import read_result, result_json
-from robochoc.model.outcome import ALL_ROBOTS, CheckCounts, Outcome, Verdict
+from robochoc.model.outcome import ALL_ROBOTS, CheckCounts, Metrics, Outcome, Verdict
 from robochoc.protocols.optimization.sfb import SFB
 from robochoc.protocols.protocol import Protocol
 from robochoc.protocols.satisfaction.abt import ABT
@@ -23,8 +25,12 @@ from robochoc.protocols.satisfaction.afc import AFC
 from robochoc.protocols.satisfaction.awc import AWC
 from robochoc.protocols.satisfaction.first_fit import FirstFit
 from robochoc.protocols.traits import Traits
-from robochoc.run.networked.machines import claimed
+from robochoc.run.networked.machines import Machines, claimed
+from robochoc.run.options import Options
 from robochoc.run.registry import protocol_named, protocol_names
+from robochoc.run.withdrawal import Phase
+from robochoc.solver.agent_problem import RunParameters
+from robochoc.verification.checker import RefutedError
 from tests.support import traitors
 from tests.support.in_memory_network import InMemoryNetwork
 from tests.support.one_traitor import CHAIN, DIFFERENT, VALUES, begun
@@ -121,6 +127,50 @@ def test_a_verdict_after_all_were_quiet_blames_nobody_and_changes_nothing() -> N
     state.verdict = Verdict.SOLUTION
     assert not state.handle("RB", Conclusion(1, "no-solution"))
     assert (state.verdict, state.doubts_about_verdict) == (Verdict.SOLUTION, ())
+
+
+# While they search
+
+PHASE = Phase("abt", ABT, RunParameters())
+BROKEN, HELD = CheckResult(1, allowed=False, cost=0, held=1), CheckResult(1, allowed=True, cost=0, held=1)
+
+
+def machines(checks: dict[str, CheckResult]) -> Machines:
+    """The three robots, who have checked what they had."""
+    members = SimpleNamespace(order=("RA", "RB", "RC"), robots={})
+    snapshots = SimpleNamespace(number=1, checks=checks)
+    master = cast("Master", SimpleNamespace(members=members, snapshots=snapshots))
+    return Machines(master, Options(protocol="abt", deadline=1), "t", None)
+
+
+def had(**values: dict[str, int]) -> RunResult:
+    return RunResult(Verdict.UNKNOWN, None, values, Metrics())
+
+
+def test_what_one_robot_finds_broken_is_no_answer() -> None:
+    found = machines({"RA": HELD, "RB": BROKEN, "RC": HELD})
+    now = had(RA={"A": 1}, RB={"B": 1}, RC={"C": 1})
+    assert found._check_snapshot(PHASE, now) is None  # noqa: SLF001 - the robots' word for it
+
+
+def test_what_not_all_have_is_no_answer() -> None:
+    found = machines(dict.fromkeys(("RA", "RB", "RC"), HELD))
+    now = had(RA={"A": 1}, RB={}, RC={"C": 1})
+    assert found._check_snapshot(PHASE, now) is None  # noqa: SLF001
+
+
+@pytest.mark.parametrize(
+    ("liar", "why"),
+    [
+        ({"copies": (Charge("RA", ("A", "B"), 1, 5),)}, "RB says that the constraint over A B charges 5, and RA"),
+        ({}, "the variable A is RA's, and RB's too"),
+    ],
+)
+def test_who_contradicts_another_while_they_search_ends_the_run(liar: dict[str, Any], why: str) -> None:
+    found = machines({"RA": HELD, "RB": changed(HELD, **liar), "RC": HELD})
+    now = had(RA={"A": 1}, RB={"B": 1} if liar else {"A": 2}, RC={"C": 1})
+    with pytest.raises(RefutedError, match=why):
+        found._check_snapshot(PHASE, now)  # noqa: SLF001
 
 
 # What is said of that
