@@ -119,7 +119,8 @@ class Flight:
         self._limits = self._watch.limits(LIMITS) if self._watch else LIMITS
         if self._watch:
             self._watch.floor_plan(self._homes)
-        self._simulation = QuadrotorSimulation(self.names, self._homes, self._ground, conditions)
+        floor = self._watch.floor if self._watch else None
+        self._simulation = QuadrotorSimulation(self.names, self._homes, self._ground, conditions, floor)
         self._hovers = False
 
     def fly(

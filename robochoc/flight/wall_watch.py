@@ -70,6 +70,10 @@ class WallWatch:
             raise ValueError(f"{name} is to be at {self._told(places[worst])}, {where} or what nobody knows")
         return self._keeping(wish) if leave >= wish else self._leaving(leave)
 
+    def floor(self, place: Array) -> float | None:
+        """Return the height of the floor below a place; None where only the ground is known, or in a wall."""
+        return self._plan.floor(place) if isinstance(self._plan, VoxelPlan) else None
+
     def with_ways(self, plan: WallPlan, who: NDArray[np.intp], starts: Array, goals: Array) -> WallPlan:
         """Return `plan`, or one of less distance from walls if only that has ways for the drones `who`.
 

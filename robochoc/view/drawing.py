@@ -19,7 +19,7 @@ from robochoc.view.palette import GREY, RED, STONE, UNKNOWN, Colour, colours
 from robochoc.view.playback import DroneState, Playback
 from robochoc.view.quadrotor import HUB, Shape, box, disc, joined_shapes, prisms, quadrotor
 from robochoc.view.scene import DrawnDrone, Scene
-from robochoc.view.walls import walls_of
+from robochoc.view.walls import shape_of, walls_of
 
 _Corners = npt.NDArray[np.float64]
 """The lowest and the highest x, y and z, a row each."""
@@ -254,6 +254,8 @@ def _blocks(scene: Scene) -> dict[float, Shape]:
 
 def _walls(scene: Scene) -> Shape | None:
     """Return the walls of a three-dimensional map."""
+    if scene.faces is not None:
+        return shape_of(scene.faces.reshape(-1, 3))
     cubes = [block for block in scene.blocks if block.is_cube]
     places = np.rint(np.array([cube.top for cube in cubes]).reshape(-1, 3)).astype(np.int64)
     sides = np.array([cube.sides for cube in cubes], dtype=np.int64)

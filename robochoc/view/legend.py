@@ -49,7 +49,7 @@ def _states(scene: Scene) -> Iterator[str]:
         yield _entry(f"{web(RED)}59", "obstacle", "edged")
     if scene.blocks:
         yield _named(STONE, "blocked cell")
-    if scene.walls and len(scene.walls.occupied):
+    if (scene.walls and len(scene.walls.occupied)) or scene.faces is not None:
         yield _named(STONE, "wall")
     if scene.walls and len(scene.walls.unknown):
         yield _named(UNKNOWN, "not known")

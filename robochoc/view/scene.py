@@ -20,6 +20,7 @@ from robochoc.model.headline import describe_outcome
 from robochoc.model.outcome import Outcome
 from robochoc.view.footprints import DrawnWalls, walls_drawn
 from robochoc.view.playback import Playback, fell, playback_of
+from robochoc.view.voxel_faces import Faces, faces_drawn
 
 
 @dataclass(frozen=True)
@@ -69,6 +70,8 @@ class Scene:
     playback: Playback | None = None
     blocks: tuple[DrawnBlock, ...] = ()
     walls: DrawnWalls | None = None
+    faces: Faces | None = None
+    """The walls of a map in three dimensions; None: its blocked cells are drawn."""
 
     @property
     def ground(self) -> float:
@@ -102,8 +105,10 @@ def scene_of(
     flight = _flight_facts(flown, why_not, is_to_scale=flown_mission is mission)
     playback = playback_of(flown_mission, flown) if flown else None
     blocks = tuple(_blocks(flown_mission, flown))
-    walls = walls_drawn(flown_mission)
-    return Scene(title, (*_facts(outcome, mission), *flight), drones, mission.axes, playback, blocks, walls)
+    walls, faces = walls_drawn(flown_mission), faces_drawn(flown_mission)
+    if faces is not None:
+        blocks = tuple(block for block in blocks if not block.is_cube)
+    return Scene(title, (*_facts(outcome, mission), *flight), drones, mission.axes, playback, blocks, walls, faces)
 
 
 def _headline(outcome: Outcome, mission: Mission, drones: Sequence[DrawnDrone], *, weighted: bool | None) -> str:

@@ -1,4 +1,4 @@
-"""The walls of a three-dimensional map, as seen from within.
+"""The blocked cells of a three-dimensional map, as seen from within, where its voxels are not known.
 
 A blocked cell has a face towards each free cell of the map. Each is drawn from that side alone: whoever looks from
 outside sees through the nearer walls, and the ceiling, onto the further ones and the floor.
@@ -39,7 +39,11 @@ def walls_of(blocked: _Cells, sides: _Cells, low: _Cells, high: _Cells, width: f
             turn = [(-1, -1), (1, -1), (1, 1), (-1, 1)][::side]  # counterclockwise, seen from the other cell
             face[:, across] = np.array(turn) * width / 2
             corners.append((blocked[shown][:, None, :] + face).reshape(-1, 3))
-    vertices = np.concatenate(corners)
+    return shape_of(np.concatenate(corners))
+
+
+def shape_of(vertices: npt.NDArray[np.float64]) -> Shape | None:
+    """Return faces, of which each has four of the vertices (4 F, 3), as a shape; None: there are none."""
     if not vertices.size:
         return None
     first = np.arange(0, len(vertices), 4)

@@ -33,6 +33,7 @@ class RigidBodies:
         thrusts: (4, N), N, of the rotors.
         stands: (N,): held by the ground.
         fallen: (N,): crashed; these are held by the ground for good.
+        grounds: (N,): the height of the ground below each.
     """
 
     def __init__(self, homes: Array, ground: float, airframe: Airframe, dt: float) -> None:
@@ -49,7 +50,7 @@ class RigidBodies:
         self.fallen: Mask = np.zeros(number, dtype=np.bool_)
         self.motors_running = np.ones((4, number))
         """0 for a motor that has stopped, else 1."""
-        self._ground = ground
+        self.grounds = np.full(number, ground)
         self._airframe = airframe
         self._dt = dt
         self._mixing = airframe.mixing()
@@ -78,7 +79,7 @@ class RigidBodies:
         self._turn(wrench[1:])
         up += self._axes[2]
         self._move(wrench[0] * up, air)
-        low = self.state[2] <= self._ground
+        low = self.state[2] <= self.grounds
         if before is not None or low.any():
             self._touch(low, before, axes_before)
 
@@ -89,7 +90,7 @@ class RigidBodies:
 
     def lay(self, drone: int, place: Array) -> None:
         """Put `drone` on the ground below `place`, for good."""
-        self.state[:, drone] = [place[0], place[1], self._ground, 0, 0, 0]
+        self.state[:, drone] = [place[0], place[1], self.grounds[drone], 0, 0, 0]
         self._axes[:, :, drone] = np.eye(3)[[0, 1, 2, 0, 1]]
         self.rates[:, drone] = 0
         self.thrusts[:, drone] = 0
@@ -99,7 +100,7 @@ class RigidBodies:
         """Return the energy (N,) in J: kinetic, of translation and rotation, and potential above the ground."""
         mass, inertia = self._airframe.mass, np.array(self._airframe.inertia)[:, None]
         moving = mass / 2 * (self.state[3:] ** 2).sum(0) + (inertia / 2 * self.rates**2).sum(0)
-        return np.asarray(moving + mass * GRAVITY * (self.state[2] - self._ground))
+        return np.asarray(moving + mass * GRAVITY * (self.state[2] - self.grounds))
 
     def _spin(self, command: Array) -> Array:
         """Return the mean thrusts of the step, and advance the thrusts to its end."""
@@ -154,7 +155,7 @@ class RigidBodies:
         if before is not None and axes_before is not None:
             np.copyto(self.state[:2], before, where=held)
             np.copyto(self._axes, axes_before, where=held)
-        np.copyto(self.state[2], self._ground, where=low)
+        np.copyto(self.state[2], self.grounds, where=low)
         np.copyto(self.state[3:], 0.0, where=low)
         np.copyto(self.rates, 0.0, where=low)
         np.copyto(self.stands, low)

@@ -8,7 +8,7 @@ the energy of its spin to 3e-5 (`tests/unit/flight/test_rigid_bodies.py`). Half 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import numpy as np
 
@@ -39,9 +39,25 @@ _BOUNDS = 1e6
 
 
 class QuadrotorSimulation:
-    """Simulates N drones, step by step. `setpoints` (9, N) are their positions, velocities and accelerations."""
+    """Simulates N drones, step by step. `setpoints` (9, N) are their positions, velocities and accelerations.
 
-    def __init__(self, names: Sequence[str], homes: Array, ground: float, conditions: FlightConditions) -> None:
+    Args:
+        names: The drones' names.
+        homes: Where they are in the beginning.
+        ground: The height of the ground.
+        conditions: Wind and failures.
+        floor: The height of the floor below a place, on which drones fall that cannot fly any more. None: it is not
+            known there.
+    """
+
+    def __init__(
+        self,
+        names: Sequence[str],
+        homes: Array,
+        ground: float,
+        conditions: FlightConditions,
+        floor: Callable[[Array], float | None] | None = None,
+    ) -> None:
         number = len(names)
         self.setpoints = np.zeros((9, number))
         self.setpoints[:3] = homes.T
@@ -54,6 +70,7 @@ class QuadrotorSimulation:
         """(N,): the drones that fall or have fallen."""
         self._names = names
         self._ground = ground
+        self._floor = floor or (lambda _: None)
         self._bodies = RigidBodies(homes, ground, HUMMINGBIRD, DT)
         self._controller = Controller(number, HUMMINGBIRD, DT)
         self._wind = Wind(conditions.wind, conditions.gusts, conditions.seed, number, DT)
@@ -166,6 +183,9 @@ class QuadrotorSimulation:
     def _look_after_the_lost(self) -> None:
         bodies = self._bodies
         self._off |= self.failed & (bodies.axes[2, 2] < _CUT_OFF)
+        for drone in np.flatnonzero(self.failed & ~self._down).tolist():
+            floor = self._floor(bodies.state[:3, drone])
+            bodies.grounds[drone] = bodies.grounds[drone] if floor is None else floor
         for drone in np.flatnonzero(bodies.fallen & ~self._down).tolist():
             self._down[drone] = self._off[drone] = True
             if self.failed[drone]:

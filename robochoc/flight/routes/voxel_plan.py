@@ -85,6 +85,17 @@ class VoxelPlan:
         first, last = self.frame.in_voxels(origins), self.frame.in_voxels(ends)
         return np.array([self._sees(*pair, self.keep) for pair in zip(first, last, strict=True)], dtype=bool)
 
+    def floor(self, place: Array) -> float | None:
+        """Return the height of the floor below a place; None in a wall, or beside the map."""
+        voxel = np.floor(self.frame.in_voxels(place[None])[0]).astype(np.int64)
+        if (voxel < 0).any() or (voxel >= self.solid.shape[::-1]).any():
+            return None
+        x, y, z = voxel.tolist()
+        if self.solid[z, y, x]:
+            return None
+        below = np.flatnonzero(self.solid[:z, y, x])
+        return self.frame.corner[2] + self.frame.size * (int(below[-1]) + 1 if len(below) else 0)
+
     def way(self, first: Array, second: Array) -> Array | None:
         """Return a short way (K + 1, 3) between two points; None if there is none."""
         found = self._known(first, second)

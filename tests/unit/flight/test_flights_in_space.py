@@ -14,7 +14,7 @@ import pytest
 from robochoc.flight.flight import fly
 from robochoc.flight.mission import Mission, mission_of
 from robochoc.flight.preview import preview_of
-from robochoc.flight.quadrotor.conditions import FlightConditions
+from robochoc.flight.quadrotor.conditions import FlightConditions, MotorFailure
 from robochoc.formats.ground_map import GroundMap, ground_map_json, read_ground_map
 from robochoc.generators.maps.formation import formation
 from robochoc.generators.maps.reach import MapChoice
@@ -108,6 +108,18 @@ def test_an_obstacle_is_flown_around_between_the_walls(tmp_path: Path) -> None:
     assert np.linalg.norm(log.positions[:, 0] - (2.2, 0.4, 0.5), axis=1).min() > 0.4
     assert gaps_in_space(FLOORS, 0.5, log.positions.reshape(-1, 3)).min() >= 0.2
     assert log.errors_m.max() < 0.01
+
+
+def test_who_fails_falls_to_the_floor_below_and_is_flown_around(tmp_path: Path) -> None:
+    team, ground = floors(tmp_path, at="0.5,0.5,2 3.5,0.5,2")
+    mission = sent(team, ground, (2, 0.5, 2), (0.5, 1.5, 2))
+    log = fly(mission, FlightConditions(failures=(MotorFailure("Robot1", 1.6),)))
+    assert np.isnan(log.errors_m[0])
+    # The upper storey begins at 1.5 m; below it are a floor and another storey.
+    assert log.positions[-1, 0, 2] == pytest.approx(1.5, abs=0.01)
+    assert log.positions[:, 0, 2].min() > 1.45
+    assert log.errors_m[1] < 0.01
+    assert gaps_in_space(FLOORS, 0.5, log.positions[:, 1]).min() >= 0.2
 
 
 def test_what_cannot_be_flown_is_said_in_one_sentence(tmp_path: Path) -> None:
