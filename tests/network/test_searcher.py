@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 import msgspec
 import pytest
 
-from robochoc.communication.control import Conclusion, Counters, Events, Ready
+from robochoc.communication.control import Conclusion, Counters, Events, Ready, Snapshot
 from robochoc.communication.host import BadMessageError
 from robochoc.communication.network.audited_state import AuditedSearchState
 from robochoc.communication.network.control_messages import (
@@ -17,6 +17,7 @@ from robochoc.communication.network.control_messages import (
     Copies,
     DetailedReport,
     ProtocolMessage,
+    Recall,
     Task,
     ToMaster,
 )
@@ -29,7 +30,8 @@ from robochoc.formats import PREDEFINED
 from robochoc.journal.events import Received
 from robochoc.model.message import Envelope, encode
 from robochoc.model.problem import INFINITE, Constraint, Team
-from robochoc.protocols.findings import NOTHING
+from robochoc.protocols.findings import NOTHING, Trail
+from robochoc.protocols.local_search.dsa import DSA
 from robochoc.protocols.optimization.messages.syncbb import BestPath, Path
 from robochoc.protocols.optimization.syncbb import SyncBB
 from robochoc.protocols.protocol import Protocol
@@ -325,3 +327,20 @@ def test_of_copies_it_checks_no_more_than_can_be_told(monkeypatch: pytest.Monkey
     assert one.check_constraints({"A": 2, "C": 2}).copies == (copy,)
     monkeypatch.setattr("robochoc.communication.network.constraint_check.MOST_CHARGES", 1)
     assert one.check_constraints({"A": 2, "C": 2}).copies == ()
+
+
+def test_a_master_that_recalls_does_not_get_all_cycles() -> None:
+    """In a long search these would be more than a frame holds."""
+    around = Around()
+    team = chain(cost=1)
+    one = searcher(around.context(), DSA, team=team)
+    one.prepare()
+    one.learn("RC", msgspec.msgpack.encode(list(map(record_of, held_above(team["RC"])))))
+    one.begin(0)
+    one.report_snapshot(1)
+    one.recall(Recall(1, 2))
+    one.pause()
+    told, recalled, report = (word for word in around.said if isinstance(word, Snapshot | DetailedReport))
+    assert told.findings.trail is not None
+    assert told.findings.trail.entries
+    assert recalled.findings.trail == report.findings.trail == Trail([], told.findings.trail.cycle)

@@ -25,6 +25,11 @@ class Recalled:
         self._last: tuple[int, _Values] = (0, {})
         self._kept: tuple[int, _Values] = (0, {})
 
+    @property
+    def is_used(self) -> bool:
+        """Return whether the robot was ever asked for a snapshot."""
+        return self._last[0] > 0
+
     def note(self, number: int, values: _Values) -> None:
         """Keep `values` until the next snapshot."""
         self._last = (number, values)

@@ -246,8 +246,15 @@ class Searcher(RobotLoop):
         return ({}, NOTHING) if self._context.private else (host.protocol.assignment, self._findings(host.protocol))
 
     def _findings(self, protocol: Protocol) -> Findings:
-        """Return the findings, some of which come from others; nothing if one of those cannot be true."""
-        return NOTHING if fault_of_findings(protocol.findings, self._task.order) else protocol.findings
+        """Return the findings, some of which come from others; nothing if one of those cannot be true.
+
+        A master that recalls asks for the cycle that it wants. It does not need them all: in a long search they are
+        more than a frame holds.
+        """
+        findings = protocol.findings
+        if findings.trail is not None and self._recalled.is_used:
+            findings = msgspec.structs.replace(findings, trail=Trail([], findings.trail.cycle))
+        return NOTHING if fault_of_findings(findings, self._task.order) else findings
 
     def _exchanged(self) -> dict[str, Exchanged]:
         """Return the counts of messages with each other robot, by its name."""
@@ -266,8 +273,6 @@ class Searcher(RobotLoop):
         values = {} if private else values_asked_for(order, host.protocol, self._own.domain)
         self._recalled.note(order.number, values)
         findings = NOTHING if private else self._findings(host.protocol)
-        if findings.trail is not None:  # the master asks for one cycle, and may not have all
-            findings = msgspec.structs.replace(findings, trail=Trail([], findings.trail.cycle))
         lost = 0 if host.dropped is None else host.dropped.many
         self._say(Snapshot(self.epoch, order.number, values, lost, findings))
 
