@@ -8,7 +8,8 @@ from __future__ import annotations
 import math
 from collections import Counter
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from fractions import Fraction
 from itertools import count, product
 
 from robochoc.flight.crafts import Cell, Craft, row_and_column
@@ -24,8 +25,11 @@ _LEVELS = range(4, 13)
 """Minimum and maximum of levels in a box whose levels are scaled."""
 _TICKS = 15
 """Maximum of labels on an axis."""
+_LEAST_POWER = -3
+"""The exponent of ten of the smallest step between labels in metres."""
 _FAR = 1000
 """Axes that begin beyond it are moved to begin at 1: a browser draws in single precision."""
+_PLACE = ("x", "y", "z")
 _TOO_CLOSE = 0.5
 """Places nearer to each other count as the same place."""
 _GOLDEN_ANGLE = math.pi * (3 - math.sqrt(5))
@@ -33,13 +37,17 @@ _GOLDEN_ANGLE = math.pi * (3 - math.sqrt(5))
 
 @dataclass(frozen=True)
 class Axis:
-    """One side of the box: values `first` to `last` are spread evenly over cells `low` to `high`."""
+    """One side of the box: values `first` to `last` are spread evenly over cells `low` to `high`.
+
+    On a map that says how long a value is, `unit_m`, the axis is labelled in metres of the map's frame.
+    """
 
     name: str
     low: int
     high: int
     first: int
     last: int
+    unit_m: float | None = None
 
     @classmethod
     def over(cls, name: str, values: Iterable[int], *, most: int, scaled: int) -> Axis:
@@ -84,11 +92,26 @@ class Axis:
         return self.low - 1.0
 
     @property
+    def title(self) -> str:
+        """The name, and the unit of the labels where they have one."""
+        return self.name if self.unit_m is None else f"{self.name} (m)"
+
+    def text(self, value: Fraction | float) -> str:
+        """Return how a value is shown: in metres, to the millimetre, where it has a length."""
+        return str(value) if self.unit_m is None else f"{round(float(value) * self.unit_m, 3) + 0.0:.10g}"
+
+    @property
     def ticks(self) -> list[tuple[float, str]]:
-        """Positions and texts of the labels: round values, not too many."""
-        span = self.last - self.first
-        step = next(digit * 10**power for power in count() for digit in (1, 2, 5) if span < _TICKS * digit * 10**power)
-        return [(self.at(value), str(value)) for value in range(-(-self.first // step) * step, self.last + 1, step)]
+        """Positions and texts of the labels: round numbers, not too many."""
+        unit = Fraction(1) if self.unit_m is None else Fraction(str(self.unit_m))
+        span = (self.last - self.first) * unit
+        if unit != 1 and not span:  # a single level, say, may be at no round number
+            return [(self.at(self.first), self.text(self.first))]
+        tens = (Fraction(10) ** power for power in count(0 if self.unit_m is None else _LEAST_POWER))
+        step = next(digit * ten for ten in tens for digit in (1, 2, 5) if span < _TICKS * digit * ten)
+        steps = range(math.ceil(self.first * unit / step), math.floor(self.last * unit / step) + 1)
+        values = [number * step / unit for number in steps]
+        return [(self.at(float(value)), self.text(value)) for value in values]
 
 
 @dataclass(frozen=True)
@@ -102,6 +125,11 @@ class Layout:
     def ground(self) -> float:
         """The height of the ground: one cell below the lowest level."""
         return self.axes[2].ground
+
+    def in_metres(self, unit_m: float) -> Layout:
+        """Return the same layout, whose axes are labelled in metres: so many are one unit of `x`, `y` and `z`."""
+        rows, columns, levels = (replace(axis, unit_m=unit_m if axis.name in _PLACE else None) for axis in self.axes)
+        return replace(self, axes=(rows, columns, levels))
 
     def places(self, crafts: Sequence[Craft]) -> list[Point | None]:
         """Return where each of `crafts` flies to, in the order of `homes`; None without a level. No two meet."""

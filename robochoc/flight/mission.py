@@ -140,6 +140,8 @@ class MissionBuilder:
         self.layout: Layout = layout_of(crafts, others, ground)
         given = ground.scale if scale is None and ground else scale
         self.scale = _scale(self.layout.axes) if given is None else given
+        if ground and ground.scale is not None:
+            self.layout = self.layout.in_metres(self.scale)
         self._edge = self.layout.edge(len(crafts) if leaving is None else leaving)
         self._aside: dict[int, Point] = {}
         self._seen: set[str] = set()
@@ -222,7 +224,7 @@ class MissionBuilder:
                 yield craft_of_variable(name, values) if name in values else Craft(name, row_and_column(name))
 
     def _drone(self, craft: Craft, home: Point) -> Drone:
-        group = craft.cell[0] if craft.cell and not self._ground else round(home[0])
+        group = craft.cell[0] if craft.cell and not self._ground else round(self.layout.axes[0].value(home[0]))
         return Drone(craft.name, craft.robot, craft.topic, self._metres(home), group)
 
     def _spot(self, number: int) -> Point:

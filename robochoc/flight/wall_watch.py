@@ -1,8 +1,8 @@
 """Walls during a flight: the floor plan for each leg, and how near drones have come to it.
 
-Drones keep the radius for which the team was made between their centres and all pixels that are not free. Travel times
-of generated teams are measured between centres of pixels, so places may be a little nearer to a wall: then drones keep
-what their places leave.
+Drones keep the radius for which the team was made between their centres and all that is not free. Places of teams that
+were not generated, or by an earlier version, and places between voxels may be a little nearer to a wall: then drones
+keep what their places leave.
 """
 
 from __future__ import annotations
@@ -83,13 +83,16 @@ class WallWatch:
         without = [number for number in who.tolist() if plan.way(starts[number], goals[number]) is None]
         if not without:
             return plan
-        less = [self._radius + spare for spare in _SPARES_M if self._radius + spare < plan.keep - _CLOSE_M]
-        if less:  # a door may leave the radius, and nothing else
-            return self.with_ways(self._leaving(less[0]), who, starts, goals)
+        if plan.keep > _SHARE * self._radius:  # a door may leave the radius, and nothing else
+            wider = (self._radius + spare for spare in _SPARES_M)
+            less = next((keep for keep in wider if keep < plan.keep - _CLOSE_M), self._radius)
+            return self.with_ways(self._leaving(less), who, starts, goals)
         ends = f"from {self._told(starts[without[0]])} to {self._told(goals[without[0]])}"
+        has_heights = isinstance(self._plan, VoxelPlan)
+        made = "a team that is made with a larger radius" if has_heights else "a team that is generated anew"
         raise ValueError(
             f"{self._names[without[0]]} has no way around the walls {ends} that keeps its radius of {self._radius:g} m:"
-            " a team that is made with a larger radius is told of no such way"
+            f" {made} is told of no such way"
         )
 
     def nearest(self, positions: Array, failures: Sequence[tuple[int, str, float]]) -> NearestWall | None:

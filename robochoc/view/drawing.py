@@ -58,6 +58,8 @@ _BLOCK = 0.94
 """The width of a blocked cell's block, in cells: one is told from the next."""
 _BLOCK_OPACITY = 0.85
 _WALL_OPACITY = 0.6
+_BESIDE_UNIT = 3.4
+"""How far from its numbers, in their heights, the name of an axis with a unit is: it is wider than one without."""
 _FLAT = 0.02
 """The height, in cells, of what lies flat on the ground."""
 
@@ -192,7 +194,7 @@ def _label_axes(meshcat: MeshcatCommands, axes: Sequence[Axis], height: float) -
             spot = origin.copy()
             spot[number] = at
             _write(meshcat, f"axes/{axis.name} {text}", text, spot, height)
-        _write(meshcat, f"axes/{axis.name}", axis.name, name_at, 1.2 * height)
+        _write(meshcat, f"axes/{axis.name}", axis.title, name_at, 1.2 * height)
 
 
 def _beside(axes: Sequence[Axis], height: float) -> Iterator[tuple[int, Axis, _Corner, _Corner]]:
@@ -207,7 +209,8 @@ def _beside(axes: Sequence[Axis], height: float) -> Iterator[tuple[int, Axis, _C
     ]
     for number, (axis, origin) in enumerate(zip(axes, lines, strict=True)):
         if axis.name:
-            yield number, axis, origin, origin + np.sign(origin - middle) * [1, 1, 0] * 2.2 * height
+            away = (2.2 if axis.unit_m is None else _BESIDE_UNIT) * height
+            yield number, axis, origin, origin + np.sign(origin - middle) * [1, 1, 0] * away
 
 
 def _lattice(walls: Sequence[npt.NDArray[np.float64]]) -> npt.NDArray[np.float64]:

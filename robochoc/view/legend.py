@@ -23,18 +23,18 @@ def legend(scene: Scene) -> str:
 def _rows(scene: Scene) -> Iterator[str]:
     """Yield an entry for each row, by the first axis: drones of a row have the same colour."""
     rows = sorted({drone.group for drone in scene.drones})
-    axis = scene.axes[0].name or "row"
-    name = f"{axis} = " if axis == "x" else f"{axis} "
+    axis = scene.axes[0]
+    name = f"{axis.name} = " if axis.name == "x" else f"{axis.name or 'row'} "
+    unit = "" if axis.unit_m is None else " m"
     ramp = colours(len(rows))
     if len(rows) <= 1:
         return
     if len(rows) <= _SWATCHES_MAX:
         for row, colour in zip(rows, ramp, strict=True):
-            yield _entry(web(colour), f"{name}{row}")
+            yield _entry(web(colour), f"{name}{axis.text(row)}{unit}")
     else:
-        yield _entry(
-            f"linear-gradient(to right, {', '.join(map(web, ramp))})", f"{name}{rows[0]} to {rows[-1]}", "ramp"
-        )
+        ends = " to ".join(map(axis.text, (rows[0], rows[-1])))
+        yield _entry(f"linear-gradient(to right, {', '.join(map(web, ramp))})", f"{name}{ends}{unit}", "ramp")
 
 
 def _states(scene: Scene) -> Iterator[str]:

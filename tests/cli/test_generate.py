@@ -23,6 +23,7 @@ from robochoc.generators.maps.cubes import Cubes
 from robochoc.generators.maps.formation import formation
 from robochoc.generators.maps.patrol import patrol
 from robochoc.generators.maps.reach import MapChoice
+from robochoc.generators.maps.room import room_on
 from robochoc.generators.meetings import meetings
 from robochoc.generators.random_csp import random_on
 from robochoc.generators.sensors import Reach, grid_sensors, sensors
@@ -145,7 +146,7 @@ def test_a_map_is_written_beside_the_team_and_flown_on(tmp_path: Path) -> None:
     assert found["scale"] == 0.75
     values = json.loads(solved.stdout)["assignment"]
     grid = read_occupancy_grid(Path(BUILDING))
-    cells = Cells(grid, Fraction("0.75"), grid.free)
+    cells = Cells(grid, Fraction("0.75"), room_on(grid.free, Fraction(0)))
     for drone in found["drones"]:
         place = cells.centre(values[drone["name"].replace("Robot", "V")])
         assert drone["at"][:2] == pytest.approx([float(one) for one in place], abs=0.05)

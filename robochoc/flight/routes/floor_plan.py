@@ -19,19 +19,14 @@ from robochoc.flight.pixel_frame import PixelFrame
 from robochoc.flight.routes.lattice import Lattice
 from robochoc.flight.routes.spacing import Array, Flags
 from robochoc.flight.routes.taut import taut
+from robochoc.formats.occupancy.lattice import clearances, parts_of
 
 SPARE_M = 0.1
 """Ways keep so much more than they have to, if that is no detour of more than a quarter."""
 CORNER_M = 0.25
 """The length for which a corner counts: drones come to rest there."""
-_FINE = 4
-"""Points of the lattice in the distance that drones keep from walls, at least."""
-_FINE_M = 0.02
-"""Points are never closer to each other, whatever drones keep."""
-_POINTS_MAX = 4_000_000
 _ROUNDING = 1e-9
 """In pixels. A wall that is nearer than it may be by no more than that is not too near."""
-_PORTION = 2_000_000
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,44 +37,23 @@ class FloorPlan:
         solid: The pixels that are not free: rows from the lowest y on, in each the lowest x first.
         frame: Where the pixels lie.
         keep: The distance of a drone's centre from walls.
+        parts: Into how many parts a pixel's side is cut, for the lattice of ways. 0: as many as suit `keep`.
     """
 
     solid: Flags
     frame: PixelFrame
     keep: float
+    parts: int = 0
     _ways: dict[bytes, Array | None] = field(default_factory=dict)
 
     def keeping(self, keep: float) -> FloorPlan:
-        """Return the same walls, with another distance."""
-        return self if keep == self.keep else replace(self, keep=keep, _ways={})
+        """Return the same walls and the same lattice, with another distance."""
+        return self if keep == self.keep else replace(self, keep=keep, parts=self._parts, _ways={})
 
     def clearances(self, points: Array, most: float) -> Array:
         """Return the distance (K,) of each of `points` (K, 2) from the nearest wall; `most` where it is further."""
-        places = self.frame.in_pixels(points)
-        found = np.full(len(places), most)
-        reach = math.ceil(most / self.frame.size) + 1
-        padded, counts = self._padded(reach)
-        pixels = np.floor(places).astype(np.int64)
-        rows, columns = self.solid.shape
-        inside = ((pixels >= 0) & (pixels < (columns, rows))).all(axis=1)
-        found[~inside] = 0.0
-        x, y = pixels[:, 0].clip(0, columns - 1), pixels[:, 1].clip(0, rows - 1)
-        side = 2 * reach + 1
-        near = counts[y + side, x + side] - counts[y, x + side] - counts[y + side, x] + counts[y, x]
-        asked = np.flatnonzero(inside & (near > 0))
-        steps = np.arange(side)
-        for some in np.array_split(asked, max(1, len(asked) * side * side // _PORTION)):
-            window = padded[(y[some, None] + steps)[:, :, None], (x[some, None] + steps)[:, None, :]]
-            gaps = [
-                np.maximum(np.maximum(low - at[:, None], at[:, None] - low - 1), 0)
-                for at, low in (
-                    (places[some, 0], x[some, None] + steps - reach),
-                    (places[some, 1], y[some, None] + steps - reach),
-                )
-            ]
-            apart = np.where(window, np.hypot(gaps[1][:, :, None], gaps[0][:, None, :]), np.inf)
-            found[some] = np.minimum(self.frame.size * apart.min(axis=(1, 2)), most)
-        return found
+        size = self.frame.size
+        return size * clearances(self.solid, self.frame.in_pixels(points), most / size)
 
     def open(self, origins: Array, ends: Array) -> Flags:
         """Return which straight lines (K,), seen from above, are clear of walls."""
@@ -110,20 +84,16 @@ class FloorPlan:
 
     @cached_property
     def _lattice(self) -> Lattice:
-        keep, size = self.keep / self.frame.size, self.frame.size
-        parts = min(max(1, math.ceil(_FINE / keep)) if keep > 0 else 1, max(1, int(size / _FINE_M)))
-        while parts > 1 and self.solid.size * parts * parts > _POINTS_MAX:
-            parts -= 1
-        return Lattice(self.solid, keep, SPARE_M / size, parts)
+        return Lattice(self.solid, self.keep / self.frame.size, SPARE_M / self.frame.size, self._parts)
+
+    @property
+    def _parts(self) -> int:
+        return self.parts or parts_of(self.keep / self.frame.size, self.solid.size)
 
     @cached_property
     def _before(self) -> npt.NDArray[np.int32]:
         """The number of solid pixels of a row before each column."""
         return np.cumsum(np.pad(self.solid, ((0, 0), (1, 0))), axis=1, dtype=np.int32)
-
-    def _padded(self, reach: int) -> tuple[Flags, npt.NDArray[np.int64]]:
-        padded = np.pad(self.solid, reach, constant_values=True)
-        return padded, np.cumsum(np.cumsum(np.pad(padded, ((1, 0), (1, 0))), axis=0, dtype=np.int64), axis=1)
 
     def _sees(self, first: Array, second: Array, keep: float) -> bool:
         """Return whether no wall is nearer than `keep`, in metres, to a straight line, whose ends are in pixels.

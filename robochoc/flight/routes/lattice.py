@@ -21,6 +21,7 @@ import numpy as np
 import numpy.typing as npt
 
 from robochoc.flight.routes.spacing import Array, Flags, norms
+from robochoc.formats.occupancy.lattice import quarters
 
 _LENGTHS = (15, 21, 26)
 """The lengths of steps along one axis, two and three."""
@@ -55,7 +56,7 @@ class Lattice:
         # Half way between two neighbours walls may be nearer than at both: by no more than that of a single corner.
         bulge = solid.ndim * every * every / 4
         squares = [((keep + more) * parts) ** 2 + bulge for more in (0.0, spare)]
-        apart = _quarters(solid, parts, math.ceil(math.sqrt(squares[1])) + 1)
+        apart = quarters(solid, parts, math.ceil(math.sqrt(squares[1])) + 1)
         apart = apart[(slice(self._begin, None, every),) * solid.ndim]
         self._free = np.pad(apart >= 4 * squares[0], 1)
         wide = np.pad(apart >= 4 * squares[1], 1)
@@ -217,23 +218,3 @@ class Lattice:
                 some = [sum(chosen) for chosen in product(*((0, part) for part in parts))]
                 found.append((some[-1], tuple(some[1:-1]), _LENGTHS[len(parts) - 1]))
         return sorted(found, key=lambda step: step[2])
-
-
-def _quarters(solid: Flags, parts: int, reach: int) -> Lengths:
-    """Return four times the squares of the distances of points from the borders of all that is solid, or outside.
-
-    Each side is cut into `parts`, whose centres are the points; lengths are in parts. Of what is further than `reach`
-    only that is known. Squares are added up axis by axis.
-    """
-    fine = np.pad(solid, 1, constant_values=True)
-    for axis in range(solid.ndim):
-        fine = np.repeat(fine, parts, axis=axis)
-    squares = np.where(fine, 0, (2 * reach + 1) ** 2).astype(np.int32)
-    for axis in range(solid.ndim):
-        lines = np.moveaxis(squares, axis, 0)
-        before = lines.copy()
-        for step in range(1, min(reach, len(lines) - 1) + 1):
-            off = (2 * step - 1) ** 2
-            np.minimum(lines[step:], before[:-step] + off, out=lines[step:])
-            np.minimum(lines[:-step], before[step:] + off, out=lines[:-step])
-    return squares[(slice(parts, -parts),) * solid.ndim]

@@ -19,6 +19,7 @@ import numpy.typing as npt
 
 from robochoc.formats.occupancy.grid import Counts, Flags, OccupancyGrid, before
 from robochoc.formats.occupancy.turn import Place as Place  # noqa: PLC0414 - from here, too
+from robochoc.generators.maps.room import Room
 from robochoc.generators.maps.turned import TurnedSquares
 
 _HALF = Fraction(1, 2)
@@ -33,12 +34,17 @@ class Cells:
     Attributes:
         grid: The map.
         side: The side of a cell, in metres.
-        passable: The pixels where the centre of a robot can be.
+        room: Where a robot fits.
     """
 
     grid: OccupancyGrid
     side: Fraction
-    passable: Flags
+    room: Room
+
+    @property
+    def passable(self) -> Flags:
+        """The pixels where the centre of a robot can be."""
+        return self.room.passable
 
     @cached_property
     def first(self) -> tuple[int, int]:
@@ -61,7 +67,7 @@ class Cells:
         """The numbers of all free cells."""
         if not self.grid.turn.is_none:
             touched, flagged = self._turned.counts(self.grid.free)
-            return self._numbers(touched == flagged, self._turned.centres())
+            return self._numbers(touched == flagged, self._turned.centres(self.room.parts))
         low, high, middle = zip(self._pixels(1), self._pixels(0), strict=True)
         sizes = np.outer(high[0] - low[0], high[1] - low[1])  # pixels beside the map count, and are not free
         found = _sums(self.grid.free_before, low, high) == sizes
@@ -96,6 +102,10 @@ class Cells:
         rows, columns = self.grid.free.shape
         return (y, x) if 0 <= y < rows and 0 <= x < columns else None
 
+    def fits(self, place: tuple[Fraction, ...]) -> bool:
+        """Return whether a robot fits at a place on the map."""
+        return self.room.fits(self.grid.in_pixels((place[0], place[1])))
+
     def containing(self, place: tuple[Fraction, ...]) -> tuple[int, int]:
         """Return the x and the y, in sides of a cell, of the cell in which a place lies."""
         x, y = (floor(one / self.side + _HALF) for one in place)
@@ -110,19 +120,26 @@ class Cells:
         return TurnedSquares(self.grid, self.side, self.first, (self.rows, self.columns))
 
     def _numbers(self, found: Flags, centres: tuple[npt.NDArray[np.int64], ...]) -> tuple[int, ...]:
-        """Return the numbers of the cells that are found, where a robot fits on the pixel of the centre."""
-        height, width = self.passable.shape
-        fits = self.passable[centres[0].clip(0, height - 1), centres[1].clip(0, width - 1)]
-        return tuple(np.flatnonzero(found & fits).tolist())
+        """Return the numbers of the cells that are found, where a robot fits at the centre.
+
+        Centres are given by the points of the room's lattice at which they are.
+        """
+        height, width = self.room.points.shape
+        fits = self.room.points[centres[0].clip(0, height - 1), centres[1].clip(0, width - 1)]
+        cells: list[int] = np.flatnonzero(found & fits).tolist()
+        if cells and self.side < 2 * self.room.radius * self.grid.resolution:  # a robot is larger than a cell
+            clear = self.room.is_clear([self.grid.in_pixels(self.centre(cell)) for cell in cells])
+            cells = [cell for cell, is_clear in zip(cells, clear.tolist(), strict=True) if is_clear]
+        return tuple(cells)
 
     def _pixels(self, axis: int) -> tuple[npt.NDArray[np.int64], ...]:
-        """Return for each column (`axis` 0) or row its first pixel, the one behind its last, and that of its centre."""
+        """Return for each column (`axis` 0) or row its first pixel, the one behind its last, and its centre's point."""
         corner, size, first = self.grid.origin[axis], self.grid.resolution, self.first[axis]
         found = [
             (
                 floor(((number - _HALF) * self.side - corner) / size),
                 ceil(((number + _HALF) * self.side - corner) / size),
-                floor((number * self.side - corner) / size),
+                floor((number * self.side - corner) / size * self.room.parts),
             )
             for number in range(first, first + self._count(axis))
         ]

@@ -1,4 +1,4 @@
-"""The pixels of a map on which a robot fits: obstacles are inflated by its radius."""
+"""The voxels of a map in which a robot fits: obstacles are inflated by its radius. For pixels see `room.py`."""
 
 from __future__ import annotations
 
@@ -11,6 +11,13 @@ from robochoc.formats.occupancy.grid import Flags
 
 MAX_RADIUS = 100
 """The maximum radius of a robot, in pixels."""
+
+
+def in_pixels(radius: Fraction, resolution: Fraction) -> Fraction:
+    """Return a radius in sides of a pixel. Raises `ValueError` where it has more than `MAX_RADIUS`."""
+    if radius > MAX_RADIUS * resolution:
+        raise ValueError(f"radius is {float(radius):g} m, more than {MAX_RADIUS} pixels of this map")
+    return radius / resolution
 
 
 def passable(free: Flags, resolution: Fraction, radius: Fraction) -> Flags:
@@ -27,9 +34,7 @@ def passable(free: Flags, resolution: Fraction, radius: Fraction) -> Flags:
     Raises:
         ValueError: The radius has more than `MAX_RADIUS` pixels.
     """
-    limit = floor((radius / resolution) ** 2)
-    if limit > MAX_RADIUS**2:
-        raise ValueError(f"radius is {float(radius):g} m, more than {MAX_RADIUS} pixels of this map")
+    limit = floor(in_pixels(radius, resolution) ** 2)
     beyond = limit + 1
     squares = np.where(free, beyond, 0).astype(np.int32)
     for axis in range(free.ndim):

@@ -122,7 +122,9 @@ class Reach:
 
     def seconds_from(self, pixel: tuple[int, ...]) -> dict[int, int]:
         """Return the time from a passable pixel, or voxel, to each free cell to which a way leads."""
-        lengths = lengths_from(pixel, self.cells.passable, self.longest)
+        cells = self.cells
+        joined = cells.room.joined if isinstance(cells, Cells) else ()
+        lengths = lengths_from(pixel, cells.passable, self.longest, joined)
         found = {}
         for cell in self.cells.free:
             end = self.cells.pixel(self.cells.centre(cell))
@@ -312,6 +314,6 @@ def _standing(cells: AnyCells, number: int, place: Place) -> tuple[int, ...]:
     told = f"robot {number} at {','.join(f'{float(part):g}' for part in place)}"
     if pixel is None:
         raise ValueError(f"{told} is not on the map")
-    if not cells.passable[pixel]:
+    if not (cells.fits(place) if isinstance(cells, Cells) else cells.passable[pixel]):
         raise ValueError(f"{told} stands where it does not fit: its radius, or what is not free, is in the way")
     return pixel

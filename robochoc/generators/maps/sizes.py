@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from fractions import Fraction
 from typing import TypeAlias
 
 from robochoc.formats.maps import Map
 from robochoc.formats.occupancy.grid import OccupancyGrid
 from robochoc.generators.maps.cells import Cells
-from robochoc.generators.maps.clearance import passable
+from robochoc.generators.maps.clearance import in_pixels, passable
 from robochoc.generators.maps.cubes import Cubes
+from robochoc.generators.maps.room import room_on
 
 MAX_SIDE = 1000
 """The maximum number of columns, of rows, and of levels of cells."""
@@ -31,14 +33,7 @@ def cells_of(grid: Map, radius: Fraction, most: int, side: Fraction | None = Non
     Raises:
         ValueError: There is no free cell, or there are too many of them.
     """
-    fits = passable(grid.free, grid.resolution, radius)
-    if not fits.any():
-        what = "pixel" if isinstance(grid, OccupancyGrid) else "voxel"
-        raise ValueError(f"no {what} is free for a robot of the radius {float(radius):g} m; take a smaller radius")
-
-    def sized(side: Fraction) -> AnyCells:
-        return Cells(grid, side, fits) if isinstance(grid, OccupancyGrid) else Cubes(grid, side, fits)
-
+    sized = _sized(grid, radius)
     if side is not None:
         return _checked(sized(side), most)
     step, more = 1, 0
@@ -52,6 +47,20 @@ def cells_of(grid: Map, radius: Fraction, most: int, side: Fraction | None = Non
     if more and not cells.free:
         raise ValueError(f"no cell of {float(cells.side):g} m is free, and {more:,} smaller ones are; allow more cells")
     return _checked(cells, most)
+
+
+def _sized(grid: Map, radius: Fraction) -> Callable[[Fraction], AnyCells]:
+    """Return what makes the cells of a map, by their side. Raises `ValueError` where a robot fits nowhere."""
+    nowhere = f"is free for a robot of the radius {float(radius):g} m; take a smaller radius"
+    if isinstance(grid, OccupancyGrid):
+        room = room_on(grid.free, in_pixels(radius, grid.resolution))
+        if not room.points.any():
+            raise ValueError(f"no pixel {nowhere}")
+        return lambda side: Cells(grid, side, room)
+    fits = passable(grid.free, grid.resolution, radius)
+    if not fits.any():
+        raise ValueError(f"no voxel {nowhere}")
+    return lambda side: Cubes(grid, side, fits)
 
 
 def _checked(cells: AnyCells, most: int) -> AnyCells:

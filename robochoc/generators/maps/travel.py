@@ -3,7 +3,8 @@
 Dijkstra's algorithm (1959) on the pixels with eight neighbours, or on the voxels with 26, in integers: a step across a
 face counts 15, across an edge 21 and across a corner 26. In the plane these are the 5 and 7 of the chamfer distance in
 Borgefors, "Distance transformations in digital images", CVGIP 34 (1986), 1 % less than the root of 2; the third is less
-than 0.1 % more than the root of 3. A diagonal step cuts no corner: all beside it have to be passable.
+than 0.1 % more than the root of 3. A diagonal step cuts no corner: all beside it have to be passable. Where a robot
+does not fit through between two neighbours, no step leads from one to the other, nor does a diagonal one pass by.
 
 Lengths are integers, and no step is shorter than 15. So all pixels whose lengths differ by less are looked at together:
 none of them lies behind another one (Dial, CACM 12, 1969).
@@ -12,7 +13,9 @@ none of them lies behind another one (Dial, CACM 12, 1969).
 from __future__ import annotations
 
 import heapq
+from collections.abc import Sequence
 from itertools import product
+from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -27,13 +30,25 @@ Lengths = npt.NDArray[np.int32]
 _LONGEST = np.iinfo(np.int32).max - SPACE_DIAGONAL
 
 
-def lengths_from(start: tuple[int, ...], passable: Flags, longest: int | None = None) -> Lengths:
+class _Step(NamedTuple):
+    """A step in a flat array: where it leads, what is beside it, between which pixels it leads, and its length."""
+
+    to: int
+    beside: tuple[int, ...]
+    crossed: tuple[tuple[int, ...], ...]
+    length: int
+
+
+def lengths_from(
+    start: tuple[int, ...], passable: Flags, longest: int | None = None, joined: Sequence[Flags] = ()
+) -> Lengths:
     """Return the lengths of the shortest ways to all pixels: `STRAIGHT` a pixel, or `UNREACHED`.
 
     Args:
         start: The indices of the pixel where all ways begin. It is passable.
         passable: The pixels on which ways lead, in an array of two dimensions or three.
         longest: Longer ways are not looked for.
+        joined: For each axis, from which pixels a robot fits through to the next one. Empty: from all.
     """
     free = np.pad(passable, 1)
     flat = free.ravel()
@@ -44,17 +59,21 @@ def lengths_from(start: tuple[int, ...], passable: Flags, longest: int | None = 
     waiting = {0: [np.array([here])]}
     rounds = [0]
     steps = _steps(free.shape)
+    through = [np.pad(flags, 1).ravel() for flags in joined]
     while rounds:
         this = heapq.heappop(rounds)
         pixels = np.unique(np.concatenate(waiting.pop(this)))
         lengths = found[pixels]
         now = lengths // STRAIGHT == this
         pixels, lengths = pixels[now], lengths[now]
-        for step, beside, length in steps:
+        for step, beside, crossed, length in steps:
             ends, further = pixels + step, lengths + length
             better = flat[ends] & (found[ends] > further) & (further <= limit)
             for side in beside:
                 better &= flat[pixels + side]
+            for flags, some in zip(through, crossed, strict=False):
+                for side in some:
+                    better &= flags[pixels + side]
             new, further = ends[better], further[better]
             found[new] = further
             for later in np.unique(further // STRAIGHT).tolist():
@@ -66,13 +85,23 @@ def lengths_from(start: tuple[int, ...], passable: Flags, longest: int | None = 
     return found.reshape(free.shape)[(slice(1, -1),) * free.ndim]
 
 
-def _steps(shape: tuple[int, ...]) -> list[tuple[int, tuple[int, ...], int]]:
-    """Return all steps in a flat array of a shape, each with the steps to what is beside it, and its length."""
+def _steps(shape: tuple[int, ...]) -> list[_Step]:
+    """Return all steps in a flat array of a shape."""
     strides = [int(np.prod(shape[axis + 1 :])) for axis in range(len(shape))]
     found = []
     for moves in product((-1, 0, 1), repeat=len(shape)):
-        parts = [move * stride for move, stride in zip(moves, strides, strict=True) if move]
-        if parts:
-            some = [sum(chosen) for chosen in product(*((0, part) for part in parts))]
-            found.append((some[-1], tuple(some[1:-1]), (STRAIGHT, DIAGONAL, SPACE_DIAGONAL)[len(parts) - 1]))
+        parts = [move * stride for move, stride in zip(moves, strides, strict=True)]
+        if any(moves):
+            some = [sum(chosen) for chosen in product(*((0, part) for part in parts if part))]
+            length = (STRAIGHT, DIAGONAL, SPACE_DIAGONAL)[sum(map(abs, moves)) - 1]
+            found.append(_Step(some[-1], tuple(some[1:-1]), _crossed(parts), length))
     return found
+
+
+def _crossed(parts: Sequence[int]) -> tuple[tuple[int, ...], ...]:
+    """Return for each axis the pixels from which to the next one a step leads, or past which: all edges of its box."""
+    found = []
+    for axis, part in enumerate(parts):
+        others = product(*((0, other) for other in (*parts[:axis], *parts[axis + 1 :]) if other))
+        found.append(tuple(min(part, 0) + sum(chosen) for chosen in others) if part else ())
+    return tuple(found)

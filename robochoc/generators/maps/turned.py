@@ -42,13 +42,18 @@ class TurnedSquares:
         self._x: _Numbers = x + columns * along + rows * up
         self._y: _Numbers = y + rows * along - columns * up
 
-    def centres(self) -> tuple[Counts, Counts]:
-        """Return the row and the column of the pixel at each square's centre."""
-        x, y = np.floor(self._x).astype(np.int64), np.floor(self._y).astype(np.int64)
-        at_border = [np.abs(part - np.rint(part)) < _HAIR for part in (self._x, self._y)]
+    def centres(self, parts: int = 1) -> tuple[Counts, Counts]:
+        """Return the row and the column of the pixel at each square's centre, or of the part of a pixel there.
+
+        Args:
+            parts: Into how many parts a pixel's side is cut.
+        """
+        at_x, at_y = parts * self._x, parts * self._y
+        x, y = np.floor(at_x).astype(np.int64), np.floor(at_y).astype(np.int64)
+        at_border = [np.abs(part - np.rint(part)) < _HAIR for part in (at_x, at_y)]
         for row, column in np.argwhere(at_border[0] | at_border[1]).tolist():
             place = (self._first[0] + column) * self._side, (self._first[1] + row) * self._side
-            x[row, column], y[row, column] = (floor(part) for part in self._grid.in_pixels(place))
+            x[row, column], y[row, column] = (floor(parts * part) for part in self._grid.in_pixels(place))
         return y, x
 
     def counts(self, flags: Flags) -> tuple[Counts, Counts]:

@@ -5,9 +5,12 @@ from __future__ import annotations
 import json
 from dataclasses import replace
 from pathlib import Path
+from tempfile import TemporaryDirectory
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from robochoc.flight.flight import fly
 from robochoc.flight.mission import Mission, mission_of
@@ -20,16 +23,18 @@ from robochoc.generators.maps.formation import formation
 from robochoc.generators.maps.reach import MapChoice
 from robochoc.model.outcome import EpochOutcome, Outcome, Verdict
 from robochoc.model.problem import Team
+from tests.support.examples import examples
 from tests.support.flights_on_maps import FlownTeam, flown_team, gaps
 from tests.support.maps import write_map
 from tests.support.program import ROOT
+from tests.support.ways_on_maps import NO_TEAM, refused_way
 
 BUILDING = str(ROOT / "docs/examples/building/building.yaml")
 HALL = ["#########", "#...#...#", "#...#...#", "#.......#", "#...#...#", "#...#...#", "#########"]
 """Two rooms with a door, 0.5 m a pixel."""
 
-NO_ROOM = ("that keeps its radius of", "are to be kept")
-"""Words of the two refusals of a flight: a way is too narrow, or places are too near each other."""
+NO_ROOM = "are to be kept"
+"""Words of the refusal of a flight: places are too near each other."""
 
 
 def hall(folder: Path, **how: object) -> tuple[Team, GroundMap]:
@@ -65,8 +70,23 @@ def test_drones_fly_around_walls_on_hundreds_of_maps(block: int, tmp_path: Path)
     flown = {seed: one for seed, one in made.items() if isinstance(one, FlownTeam)}
     assert {seed: one.faults() for seed, one in flown.items() if one.faults()} == {}
     refused = [one for one in made.values() if isinstance(one, str) and not one.startswith("no team")]
-    assert [one for one in refused if not any(words in one for words in NO_ROOM)] == []
+    assert [one for one in refused if NO_ROOM not in one] == []
     assert len(flown) >= 5, "most teams that could be made fly"
+
+
+@given(st.integers(0, 2**32))
+@examples(12)
+def test_no_flight_of_a_generated_team_is_refused_for_a_narrow_way(seed: int) -> None:
+    with TemporaryDirectory() as folder:
+        assert refused_way(seed, Path(folder)) in {"", NO_TEAM}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("block", range(10))
+def test_no_flight_of_hundreds_of_teams_is_refused_for_a_narrow_way(block: int, tmp_path: Path) -> None:
+    said = {seed: refused_way(seed, tmp_path) for seed in range(40 * block, 40 * block + 40)}
+    assert {seed: why for seed, why in said.items() if why not in {"", NO_TEAM}} == {}
+    assert 4 * list(said.values()).count("") > len(said), "many teams can be made"
 
 
 def test_a_flight_takes_as_long_as_the_team_was_told(tmp_path: Path) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from itertools import combinations
 
 import pytest
@@ -136,6 +137,22 @@ def test_an_axis_goes_both_ways(values: list[int], most: int, scaled: int, cell:
     axis = Axis.over("x", values, most=most, scaled=scaled)
     assert axis.at(axis.value(cell)) == pytest.approx(cell)
     assert [axis.at(axis.first), axis.at(axis.last)] == [axis.low, axis.high]
+
+
+def test_an_axis_of_a_map_is_labelled_in_metres() -> None:
+    axis = replace(Axis.over("x", [-2, 18], most=40, scaled=40), unit_m=0.75)  # from -1.5 m to 13.5 m
+    assert axis.title == "x (m)"
+    assert [text for _, text in axis.ticks] == ["0", "2", "4", "6", "8", "10", "12"]
+    assert all(axis.value(at) * 0.75 == pytest.approx(float(text)) for at, text in axis.ticks)
+    small = replace(Axis.over("y", [0, 3], most=40, scaled=40), unit_m=0.05)
+    assert [text for _, text in small.ticks][:3] == ["0", "0.02", "0.04"]
+    assert small.ticks[-1] == (pytest.approx(2.8), "0.14")
+    assert replace(Axis.over("z", [1], most=6, scaled=6), unit_m=0.75).ticks == [(1, "0.75")]
+
+
+def test_axes_without_a_map_are_labelled_in_their_own_values() -> None:
+    assert Axis.over("x", [3, 5], most=40, scaled=40).ticks == [(3, "3"), (4, "4"), (5, "5")]
+    assert Axis.over("level", [0, 10**18], most=6, scaled=6).ticks[-1] == (6, str(10**18))
 
 
 @given(st.lists(st.tuples(st.integers(0, 3), st.integers(0, 3), st.integers(0, 2)), min_size=1, max_size=30))

@@ -18,6 +18,7 @@ from robochoc.formats.occupancy.grid import read_occupancy_grid
 from robochoc.generators.maps.cells import Cells
 from robochoc.generators.maps.coverage import coverage, worth_of_a_cell
 from robochoc.generators.maps.reach import MapChoice, reach_of
+from robochoc.generators.maps.room import room_on
 from robochoc.generators.maps.sight import sight_on
 from robochoc.run.options import Options, Runtime
 from robochoc.run.orchestrator import solve
@@ -63,7 +64,7 @@ def test_walls_are_in_the_way(columns: int, rows: int, seed: int, corner: str, s
     drawn = drawn_rows(Random(seed), columns, rows, 0.15)
     with TemporaryDirectory() as folder:
         grid = read_occupancy_grid(write_map(Path(folder), drawn, origin=f"[{corner}, -0.25, 0]"))
-    cells = Cells(grid, Fraction(side), grid.free)
+    cells = Cells(grid, Fraction(side), room_on(grid.free, Fraction(0)))
     assert sight_on(cells).seen(Fraction(sensing)) == seen_on(drawn, cells, Fraction(sensing))
 
 

@@ -23,6 +23,7 @@ from robochoc.generators.maps.cells import Cells
 from robochoc.generators.maps.clearance import passable
 from robochoc.generators.maps.formation import formation
 from robochoc.generators.maps.reach import MapChoice, Reach, reach_of
+from robochoc.generators.maps.room import room_on
 from robochoc.generators.maps.sizes import cells_of
 from robochoc.generators.maps.travel import UNREACHED, lengths_from
 from robochoc.model.expression import evaluate
@@ -31,6 +32,7 @@ from robochoc.run.options import Options, Runtime
 from robochoc.run.orchestrator import solve
 from tests.support.evaluation import best, digest
 from tests.support.examples import examples
+from tests.support.flights_on_maps import gaps
 from tests.support.maps import Pixel, drawn_rows, fitting, free_pixels, ways, write_map
 from tests.support.program import ROOT
 
@@ -103,7 +105,7 @@ def test_ways_are_the_shortest_and_cut_no_corner(columns: int, rows: int, seed: 
 def test_a_cell_is_free_where_all_its_pixels_are(columns: int, rows: int, seed: int, corner: str, side: str) -> None:
     drawn = drawn_rows(Random(seed), columns, rows, 0.1)
     grid = grid_of(drawn, resolution="0.5", origin=f"[{corner}, 0, 0]")
-    cells = Cells(grid, Fraction(side), grid.free)
+    cells = Cells(grid, Fraction(side), room_on(grid.free, Fraction(0)))
     free, known = free_pixels(drawn), set[tuple[int, int]]()
     for cell in range(cells.columns * cells.rows):
         x, y = cells.centre(cell)
@@ -183,6 +185,68 @@ def test_robots_reach_what_lies_in_no_other_room(columns: int, rows: int, seed: 
         assert {reach.cells.coordinates(cell): time for cell, time in seconds.items()} == wanted
 
 
+def disc_reaches(rows: list[str], start: tuple[float, float], radius: float) -> set[Pixel]:
+    """Return the pixels that a disc gets to from a place in pixels, moved by sixteenths of a pixel.
+
+    The disc is smaller by a sixteenth, as it may have to be moved beside its way.
+    """
+    steps = (np.arange(16 * len(rows[0])) + 0.5) / 16, (np.arange(16 * len(rows)) + 0.5) / 16
+    x, y = np.meshgrid(*steps)
+    apart = gaps(rows, 1, np.column_stack((x.ravel(), y.ravel()))).reshape(x.shape)
+    left = {(column, row) for row, column in np.argwhere(apart >= radius - 1 / 16).tolist()}
+    waiting, found = [(floor(16 * start[0]), floor(16 * start[1]))], set()
+    while waiting:
+        here = waiting.pop()
+        found.add(here)
+        beside = {(here[0] + right, here[1] + up) for right in (-1, 0, 1) for up in (-1, 0, 1)} & left
+        left -= beside
+        waiting += beside
+    return {(column // 16, row // 16) for column, row in found}
+
+
+@given(st.integers(3, 7), st.integers(3, 7), st.integers(0, 2**32), st.sampled_from(["0.2", "0.45", "0.7", "1.1"]))
+@examples(25)
+def test_ways_lead_where_a_disc_of_the_radius_gets(columns: int, rows: int, seed: int, radius: str) -> None:
+    drawn = drawn_rows(Random(seed), columns, rows, 0.2)
+    room = room_on(grid_of(drawn).free, Fraction(radius))
+    for row, column in np.argwhere(room.passable).tolist()[:2]:
+        found = pixels(lengths_from((row, column), room.passable, None, room.joined) != UNREACHED)
+        parts = room.parts
+        inside = room.points[row * parts : (row + 1) * parts, column * parts : (column + 1) * parts]
+        up, right = np.argwhere(inside)[0].tolist()
+        start = column + (right + 0.5) / parts, row + (up + 0.5) / parts
+        assert found <= disc_reaches(drawn, start, float(radius))
+
+
+@pytest.mark.parametrize(
+    ("side", "door", "radius", "rooms"),
+    [("0.25", 1, 0.2, 1), ("0.25", 2, 0.2, 2), ("0.25", 1, 0.12, 2), ("0.05", 8, 0.2, 1), ("0.05", 9, 0.2, 2),
+     ("0.5", 1, 0.24, 2), ("0.5", 1, 0.26, 1), ("0.1", 5, 0.2, 2), ("0.1", 4, 0.21, 1)],
+)  # fmt: skip
+def test_a_door_is_a_way_for_robots_that_fit_through(
+    tmp_path: Path, side: str, door: int, radius: float, rooms: int
+) -> None:
+    width, height = (int(size / Fraction(side)) for size in (4, 2))
+    solid = {(width // 2, y) for y in range(height) if not 1 <= y < 1 + door}
+    rows = ["".join("#" if (x, y) in solid else "." for x in range(width)) for y in range(height)]
+    assert len(reached_halves(tmp_path, rows, side, "1,1", radius)) == rooms
+
+
+def reached_halves(folder: Path, rows: list[str], side: str, at: str, radius: float) -> set[bool]:
+    """Return in which halves of a map, above its diagonal and below it, a robot gets to cells of half a metre."""
+    path = write_map(folder, rows, resolution=side)
+    reach = reach_of(MapChoice(map=str(path), at=at, radius=radius, cell=0.5), Random(0))
+    middle = Fraction(side) * (len(rows) + len(rows[0])) / 2
+    return {sum(reach.cells.centre(cell)) > middle for cell in reach.reached}
+
+
+def test_a_robot_fits_between_pillars_at_two_corners_of_a_pixel_or_not(tmp_path: Path) -> None:
+    """The pixel itself is free, and all around it are that hold no pillar."""
+    rows = ["#......", ".......", "..#....", ".......", "....#..", ".......", "......#"]
+    halves = [reached_halves(tmp_path, rows, "0.5", "0.75,0.75", radius) for radius in (0.3, 0.4)]
+    assert [len(found) for found in halves] == [2, 1]
+
+
 def test_who_has_little_time_gets_less_far(rooms: str) -> None:
     choice = MapChoice(map=rooms, at="1,1", cell=0.5, radius=0, speed=0.5)
     near, far = (reach_of(MapChoice(**{**vars(choice), "within": time}), Random(0)).seconds[0] for time in (2.0, None))
@@ -248,7 +312,9 @@ def test_slots_are_where_the_shape_is(tmp_path: Path) -> None:
 
     def slots(shape: str, heading: float = 0.0) -> list[tuple[float, float]]:
         team, _ = formation(choice, shape=shape, heading=heading, anchor="5,5", spacing=1)
-        cells = Cells(read_occupancy_grid(Path(path)), Fraction(1, 2), np.ones((20, 20), dtype=np.bool_))
+        cells = Cells(
+            read_occupancy_grid(Path(path)), Fraction(1, 2), room_on(np.ones((20, 20), dtype=np.bool_), Fraction(0))
+        )
         return sorted((float(x), float(y)) for x, y in map(cells.centre, team.variables["V1"].domain))
 
     assert slots("line") == [(5, 3.5), (5, 4.5), (5, 5.5), (5, 6.5)]
@@ -295,7 +361,7 @@ def test_the_flight_reads_the_same_map(rooms: str) -> None:
         (lambda choice: formation(choice(at="1;1")), "at has '1;1'; expected places in metres"),
         (lambda choice: formation(choice(at="9,9")), "robot 1 at 9,9 is not on the map"),
         (lambda choice: formation(choice(at="0.2,1")), "robot 1 at 0.2,1 stands where it does not fit"),
-        (lambda choice: formation(choice(at="0.7,1", radius=0.6)), "robot 1 at 0.7,1 stands where it does not fit"),
+        (lambda choice: formation(choice(at="0.7,1", radius=0.45)), "robot 1 at 0.7,1 stands where it does not fit"),
         (lambda choice: formation(choice(radius=3)), "no pixel is free for a robot of the radius 3 m"),
         (lambda choice: formation(choice(radius=51)), "radius is 51 m, more than 100 pixels"),
         (lambda choice: formation(choice(speed=0)), "speed is 0"),

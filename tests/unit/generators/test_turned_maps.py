@@ -20,6 +20,7 @@ from robochoc.generators.maps.coverage import coverage
 from robochoc.generators.maps.formation import formation
 from robochoc.generators.maps.patrol import patrol
 from robochoc.generators.maps.reach import MapChoice, reach_of
+from robochoc.generators.maps.room import room_on
 from robochoc.generators.maps.sight import sight_on
 from robochoc.model.expression import evaluate
 from robochoc.run.options import Options, Runtime
@@ -88,7 +89,7 @@ def test_cells_of_turned_maps_are_squares_of_the_frame(
 ) -> None:
     drawn = drawn_rows(Random(seed), columns, rows, 0.15)
     grid = grid_of(drawn, origin=f"[{corner[0]}, {corner[1]}, {yaw:.12f}]")
-    cells = Cells(grid, Fraction(side), np.ones_like(grid.free))
+    cells = Cells(grid, Fraction(side), room_on(np.ones_like(grid.free), Fraction(0)))
     free, blocked = wanted_cells(drawn, cells, (float(corner[0]), float(corner[1])), float(f"{yaw:.12f}"))
     assert {cell: cell in cells.free for cell in free} == free
     assert {cell: cell in cells.blocked for cell in blocked} == blocked
@@ -172,14 +173,18 @@ def test_ways_on_turned_maps_take_the_time_of_the_image(
         for cell in cells.free
         if (at := pixel(cells.centre(cell))) in times
     }
-    assert wanted == reach.seconds[0]
+    found = reach.seconds[0]
+    if radius:  # a robot may not fit through between two pixels, which makes ways longer
+        assert {cell for cell, time in found.items() if time < wanted[cell]} == set()
+    else:
+        assert found == wanted
 
 
 def test_lines_of_sight_on_a_turned_map_are_those_of_the_image() -> None:
     rows = ["....." + "#" + "....."] * 4 + ["." * 11] + ["....." + "#" + "....."] * 4
     yaw = 0.4
     grid = grid_of(rows, origin=f"[0, 0, {yaw}]")
-    cells = Cells(grid, Fraction(1, 2), grid.free)
+    cells = Cells(grid, Fraction(1, 2), room_on(grid.free, Fraction(0)))
     sight = sight_on(cells)
     found = sight.seen(Fraction(4))
     through = 0

@@ -58,7 +58,7 @@ def map_options(command: Command) -> Command:
             click.option(
                 "--at", default="", metavar="'X,Y X,Y'", help="Where robots are, in metres.  [default: in free cells]"
             ),
-            metres("--radius", "Radius of a robot: it keeps so far from all that is not free.", 0.2),
+            metres("--radius", "Radius of a robot: it fits through doors of twice that, and flights keep it.", 0.2),
             metres("--speed", "Metres a second.", 0.5, "M/S"),
             metres("--within", "Robots get as far as they come in so many seconds.", unit="SECONDS"),
             metres("--cell", "Side of a cell.  [default: as small as --cells allows]"),

@@ -1,0 +1,103 @@
+"""Room for robots on a map of the ground: where one of a radius fits, and from which pixel it gets to which.
+
+Distances are measured to the borders of pixels, so that no way leads through a door that is narrower than a robot. What
+fits is found on the lattice on which flights look for their ways (`formats/occupancy/lattice.py`): where two pixels are
+joined, a flight gets from one to the other.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from fractions import Fraction
+from functools import cached_property
+from math import floor
+
+import numpy as np
+
+from robochoc.formats.occupancy.grid import Counts, Flags
+from robochoc.formats.occupancy.lattice import clearances, open_points, parts_of
+
+_ROUNDING = 1e-9
+
+
+@dataclass(frozen=True, eq=False)
+class Room:
+    """Room for a robot. Lengths are in sides of a pixel.
+
+    Attributes:
+        solid: The pixels that are not free.
+        radius: The robot's radius.
+        parts: Into how many parts a pixel's side is cut, for the points of a lattice.
+        points: The points at which the robot can be, and that are joined within their pixel: where a pixel has several
+            groups of such points, these are the largest group.
+    """
+
+    solid: Flags
+    radius: float
+    parts: int
+    points: Flags
+
+    @cached_property
+    def passable(self) -> Flags:
+        """The pixels in which the robot can be."""
+        return np.asarray(self._by_pixel.any(axis=(1, 3)))
+
+    @cached_property
+    def joined(self) -> tuple[Flags, Flags]:
+        """From which pixel the robot gets straight to the next row, and from which to the next column."""
+        points, up, right = self._by_pixel, np.zeros_like(self.solid), np.zeros_like(self.solid)
+        up[:-1] = (points[:-1, -1] & points[1:, 0]).any(axis=2)
+        right[:, :-1] = (points[:, :, :-1, -1] & points[:, :, 1:, 0]).any(axis=1)
+        return up, right
+
+    def fits(self, place: tuple[Fraction, Fraction]) -> bool:
+        """Return whether the robot fits at a place on the map, an x and a y, and gets away from there."""
+        column, row = (floor(part * self.parts) for part in place)
+        return bool(self.points[row, column]) and bool(self.is_clear([place])[0])
+
+    def is_clear(self, places: list[tuple[Fraction, Fraction]]) -> Flags:
+        """Return at which places (K,) nothing is nearer than the radius."""
+        found = np.array(places, dtype=np.float64).reshape(-1, 2)
+        flags: Flags = clearances(self.solid, found, self.radius) >= self.radius - _ROUNDING
+        return flags
+
+    @cached_property
+    def _by_pixel(self) -> Flags:
+        """The points by row of pixels, row in the pixel, column of pixels and column in it."""
+        rows, columns = self.solid.shape
+        return self.points.reshape(rows, self.parts, columns, self.parts)
+
+
+def room_on(free: Flags, radius: Fraction) -> Room:
+    """Return the room for a robot of a radius in pixels on a map of which some pixels are `free`."""
+    solid, parts = ~free, parts_of(float(radius), free.size)
+    return Room(solid, float(radius), parts, _largest_groups(open_points(solid, float(radius), parts), parts))
+
+
+def _largest_groups(points: Flags, parts: int) -> Flags:
+    """Return of the points of each pixel the largest group that is joined within the pixel."""
+    rows, columns = (size // parts for size in points.shape)
+    blocks = points.reshape(rows, parts, columns, parts).transpose(0, 2, 1, 3)
+    counts = blocks.sum(axis=(2, 3))
+    some = (counts > 0) & (counts < parts * parts)
+    groups = _grouped(blocks[some])
+    most = parts * parts + 1
+    numbers = groups + most * np.arange(len(groups))[:, None, None]
+    sizes = np.bincount(numbers.ravel(), minlength=most * len(groups)).reshape(-1, most)
+    sizes[:, 0] = 0  # what is no point
+    kept = blocks.copy()
+    kept[some] = groups == sizes.argmax(axis=1)[:, None, None]
+    return kept.transpose(0, 2, 1, 3).reshape(points.shape)
+
+
+def _grouped(blocks: Flags) -> Counts:
+    """Return the number of the group in which each point of a block (K, N, N) is, from 1 on; 0 is no point."""
+    side = blocks.shape[1]
+    groups: Counts = np.where(blocks, np.arange(1, side * side + 1).reshape(side, side), 0)
+    while True:
+        around = np.pad(groups, ((0, 0), (1, 1), (1, 1)))
+        beside = (around[:, 1:-1, 1:-1], around[:, 2:, 1:-1], around[:, :-2, 1:-1], around[:, 1:-1, 2:])
+        further = np.where(blocks, np.maximum.reduce([*beside, around[:, 1:-1, :-2]]), 0)
+        if (further == groups).all():
+            return groups
+        groups = further
