@@ -116,6 +116,7 @@ class _Form(msgspec.Struct, omit_defaults=True):
     optima: _OptimaForm | None = None
     deadline: float | None = None
     improvements: list[_ImprovementForm] = []
+    places: dict[str, tuple[float, ...]] = {}
 
 
 _SAME = (
@@ -128,12 +129,17 @@ _SAME = (
 _ENCODER = msgspec.json.Encoder(decimal_format="number")
 
 
-def result_json(outcome: Outcome, names: Mapping[str, str] = MappingProxyType({})) -> bytes:
+def result_json(
+    outcome: Outcome,
+    names: Mapping[str, str] = MappingProxyType({}),
+    places: Mapping[str, tuple[float, ...]] = MappingProxyType({}),
+) -> bytes:
     """Return `outcome` as one line of JSON, without the line's end.
 
     Args:
         outcome: The outcome.
         names: What robots and variables are called elsewhere, by the names in `outcome`.
+        places: Where on a map the values of variables are, in metres.
     """
     same: dict[str, Any] = {name: getattr(outcome, name) for name in _SAME}
     form = _Form(
@@ -146,6 +152,7 @@ def result_json(outcome: Outcome, names: Mapping[str, str] = MappingProxyType({}
         metrics=_metrics(outcome.metrics),
         checked=_CheckedForm(*outcome.checked) if outcome.checked else None,
         names=dict(names),
+        places=dict(places),
         preprocessing=_preprocessing(outcome.preprocessing),
         optima=_optima(outcome),
         improvements=_improvements(outcome.improvements),

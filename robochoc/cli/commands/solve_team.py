@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import click
 
-from robochoc.cli.options.ground import ground_map
+from robochoc.cli.options.ground import ground_map, map_beside
 from robochoc.cli.options.order import order_for
 from robochoc.cli.options.recording import recording, shown_and_flushed
 from robochoc.cli.options.ros_setup import closed_loop
@@ -23,6 +23,7 @@ from robochoc.cli.reports.notes import bound_told, differences_told
 if TYPE_CHECKING:
     from robochoc.cli.reports.closed_loop import FlownMission
     from robochoc.communication.kill_schedule import Kill
+    from robochoc.formats.ground_map import GroundMap
     from robochoc.formats.problems import ReadProblem
     from robochoc.journal.journal import JournalRecorder
     from robochoc.model.outcome import Outcome
@@ -111,7 +112,7 @@ def _recorded(folder: Path, options: Options, products: Products, wanted: Wanted
         audience = ImprovementsTold(loop, quiet=wanted.as_json) if options.improve else None
         outcome = _run(team, options, recorder, loop, audience)
         team = loop.team if loop else team
-        _tell(problem._replace(team=team), outcome, wanted, choice)
+        _tell(problem._replace(team=team), outcome, wanted, choice, map_beside(folder))
         if loop and loop.mission is None:  # the run knew nothing of it
             loop.publish(outcome)
         flight = flight_told(loop, wanted.ros, quiet=wanted.as_json)
@@ -148,7 +149,7 @@ def _run(
     return outcome
 
 
-def _tell(problem: ReadProblem, outcome: Outcome, wanted: Wanted, choice: Choice) -> None:
+def _tell(problem: ReadProblem, outcome: Outcome, wanted: Wanted, choice: Choice, ground: GroundMap | None) -> None:
     """Print the outcome, in the original names if the problem was imported.
 
     In JSON a team's folder keeps its own names, with the others beside.
@@ -159,15 +160,18 @@ def _tell(problem: ReadProblem, outcome: Outcome, wanted: Wanted, choice: Choice
     if reached := bound_told(problem, outcome.cost):
         click.echo(f"{problem.team.name}: {reached}", err=True)
     if wanted.as_json:
+        from robochoc.formats.places import MapPlaces
         from robochoc.formats.result import result_json
+        from robochoc.model.change import team_after_events
 
-        shown = result_json(renamed_outcome(outcome, names)) if problem.foreign else result_json(outcome, names)
+        places = MapPlaces(team_after_events(problem.team, outcome.events), ground).of(outcome.assignment)
+        shown = result_json(renamed_outcome(outcome, names)) if problem.foreign else result_json(outcome, names, places)
         click.echo(shown)
     else:
         from robochoc.cli.reports.outcome import outcome_report
 
         outcome = renamed_outcome(outcome, names)
-        click.echo(outcome_report(renamed_team(problem.team, names, outcome.events), outcome))
+        click.echo(outcome_report(renamed_team(problem.team, names, outcome.events), outcome, ground))
         if wanted.explain:
             from robochoc.cli.reports.choice import choice_lines
             from robochoc.cli.reports.pseudo_tree import tree_text

@@ -40,3 +40,14 @@ def ground_map(file: Path | None, folder: Path | None) -> GroundMap | None:
         raise Failure(INVALID, on_one_line(f"{file}: {error.strerror or error}")) from error
     except ValueError as wrong:
         raise Failure(INVALID, on_one_line(f"{file}: {wrong}")) from wrong
+
+
+def map_beside(folder: Path) -> GroundMap | None:
+    """Return the map in the `folder` of a team; None if there is none that can be read.
+
+    It is for places that are told beside values: a run that needs no map does not fail for one.
+    """
+    try:
+        return ground_map(None, folder)
+    except Failure:
+        return None

@@ -10,6 +10,8 @@ from robochoc.cli.reports.table import table_lines
 from robochoc.cli.reports.tasks import task_table
 from robochoc.formats import on_one_line
 from robochoc.formats.diagnostics import shortened
+from robochoc.formats.ground_map import GroundMap
+from robochoc.formats.places import MapPlaces, Place
 from robochoc.model.change import team_after_events
 from robochoc.model.cost_units import Cost, cost_shown
 from robochoc.model.headline import describe_outcome
@@ -23,14 +25,17 @@ _LARGE = 1 << 16
 _CELL = re.compile(r"[A-Za-z_]+([0-9]+)[._]([0-9]+)")
 
 
-def outcome_report(team: Team, outcome: Outcome) -> str:
-    """Return a few lines: what happened and why, the values, the withdrawn and lost robots, and the metrics."""
+def outcome_report(team: Team, outcome: Outcome, ground: GroundMap | None = None) -> str:
+    """Return a few lines: what happened and why, the values, the withdrawn and lost robots, and the metrics.
+
+    Beside values that stand for places on the map `ground` of the team are their metres.
+    """
     lines = [f"{on_one_line(outcome.team)}: {_verdict(team, outcome)}", *_epochs(outcome)]
     team = team_after_events(team, outcome.events)
+    places = MapPlaces(team, ground)
     if outcome.assignment:
-        values = outcome.labelled(outcome.assignment)
-        lines += _values(team, values)
-    lines += _listed(team, outcome)
+        lines += _values(team, outcome.labelled(outcome.assignment), places.of(outcome.assignment))
+    lines += _listed(team, outcome, places)
     if outcome.withdrawn_alive:
         lines += [
             f"  {len(outcome.withdrawn_alive)} withdrawn{_weight(team, outcome)}:",
@@ -267,9 +272,16 @@ def _simulated(outcome: Outcome) -> str:
     return f"; {f'{seconds:,.2f} s' if seconds >= 1 else f'{seconds * 1000:,.2f} ms'} simulated ({outcome.channel})"
 
 
-def _values(team: Team, assignment: Mapping[str, int | str]) -> list[str]:
-    """Return who does which task, a board, or a list of the values."""
+def _values(team: Team, assignment: Mapping[str, int | str], places: Mapping[str, Place]) -> list[str]:
+    """Return who does which task, a board, or a list of the values, with their places where these are known."""
+    if places:
+        return _list(team, {name: f"{value}{_at(places.get(name))}" for name, value in assignment.items()})
     return task_table(team, assignment) or _board(team, assignment) or _list(team, assignment)
+
+
+def _at(place: Place | None) -> str:
+    """Return a place in metres, as the options of maps take it, after a value."""
+    return f" ({','.join(f'{part:.10g}' for part in place)} m)" if place else ""
 
 
 def _board(team: Team, assignment: Mapping[str, int | str]) -> list[str]:
@@ -296,7 +308,7 @@ def _list(team: Team, assignment: Mapping[str, int | str]) -> list[str]:
     return _wrapped([values[owner] if alike else f"{owner}: {values[owner]}" for owner in owners])
 
 
-def _listed(team: Team, outcome: Outcome) -> list[str]:
+def _listed(team: Team, outcome: Outcome, places: MapPlaces) -> list[str]:
     """Return the optima that were listed, but for the first, which is the assignment."""
     if outcome.optima is None:
         return []
@@ -309,8 +321,7 @@ def _listed(team: Team, outcome: Outcome) -> list[str]:
         f"  one of {number:,} {'solutions' if what == 'solution' else 'optima'}; {shown} are listed, the others are:"
     ]
     for place, one in enumerate(others, start=2):
-        values = outcome.labelled(one)
-        lines += [f"  {place:,}.", *_values(team, values)]
+        lines += [f"  {place:,}.", *_values(team, outcome.labelled(one), places.of(one))]
     return lines
 
 
