@@ -23,6 +23,8 @@ from robochoc.generators.maps.room import Room
 from robochoc.generators.maps.turned import TurnedSquares
 
 _HALF = Fraction(1, 2)
+_CHECKED_MAX = 10_000
+"""Where more cells are found, they are too many, however many of them are a little too near to a wall."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -127,7 +129,8 @@ class Cells:
         height, width = self.room.points.shape
         fits = self.room.points[centres[0].clip(0, height - 1), centres[1].clip(0, width - 1)]
         cells: list[int] = np.flatnonzero(found & fits).tolist()
-        if cells and self.side < 2 * self.room.radius * self.grid.resolution:  # a robot is larger than a cell
+        is_small = self.side < 2 * self.room.radius * self.grid.resolution  # a robot is larger than a cell
+        if is_small and 0 < len(cells) <= _CHECKED_MAX:
             clear = self.room.is_clear([self.grid.in_pixels(self.centre(cell)) for cell in cells])
             cells = [cell for cell, is_clear in zip(cells, clear.tolist(), strict=True) if is_clear]
         return tuple(cells)

@@ -9,7 +9,7 @@ from tempfile import TemporaryDirectory
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import example, given
 from hypothesis import strategies as st
 
 from robochoc.flight.flight import fly
@@ -74,6 +74,10 @@ def test_drones_fly_around_walls_on_hundreds_of_maps(block: int, tmp_path: Path)
     assert len(flown) >= 5, "most teams that could be made fly"
 
 
+# If ways kept 0.7 of the radius only, flights of these would be refused.
+@example(15)
+@example(24)
+@example(35)
 @given(st.integers(0, 2**32))
 @examples(12)
 def test_no_flight_of_a_generated_team_is_refused_for_a_narrow_way(seed: int) -> None:
