@@ -20,6 +20,7 @@ from tests.support import leftovers
 from tests.support.ace_stable import AceStable
 from tests.support.authorities import Clock, Seen
 from tests.support.authority_service import AuthorityService, open_files
+from tests.support.counted_clock import time_passes_at_each_look
 from tests.support.deployments import Deployment
 from tests.support.examples import register_profiles
 from tests.support.large_pages import use_large_pages
@@ -73,6 +74,13 @@ def quick_encryption(monkeypatch: pytest.MonkeyPatch) -> None:
     from tests.support.toy_group import ToyGroup  # noqa: PLC0415
 
     monkeypatch.setattr(P2DPOP, "group", ToyGroup)
+
+
+@pytest.fixture
+def a_second_a_look() -> Iterator[None]:
+    """Let a second pass whenever somebody looks at the clock: so as much is done on every machine."""
+    with time_passes_at_each_look():
+        yield
 
 
 @pytest.fixture

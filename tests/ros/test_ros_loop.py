@@ -1,183 +1,32 @@
-"""The closed loop: what robots report opens the next epoch, whoever they report to."""
+"""The closed loop: what robots report opens the next epoch, from a recording or a live source."""
 
 from __future__ import annotations
 
-import itertools
-import os
-import signal
-import sys
-import time
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from types import SimpleNamespace
 
 import pytest
 
-from robochoc.api import Problem
-from robochoc.communication.run_result import RobotsLostError
 from robochoc.formats import read_team
 from robochoc.model.outcome import EpochOutcome, Outcome, Verdict
-from robochoc.model.problem import AddAgent, RemoveAgent, RemoveValue, ScenarioEvent, Team
+from robochoc.model.problem import RemoveAgent, ScenarioEvent, Team
 from robochoc.ros.closed_loop import TOGETHER_S, ClosedLoop, drones_of
 from robochoc.ros.report_decoder import ReportDecoder
 from robochoc.ros.sink import Fields, Sink
-from robochoc.ros.source import ReceivedMessage, Source, SourceError
+from robochoc.ros.source import ReceivedMessage, Source
 from robochoc.ros.source_feedback import SourceFeedback
-from robochoc.run import OnLoss, Options, Runtime, Withdrawal, solve
-from robochoc.solver.encoding import UnsupportedError
-from tests.support.faults import own_children
+from robochoc.run import solve
+from tests.support.environments import SIMULATED, openings
 from tests.support.limits import HANG_S
-from tests.support.moved_clock import MovedClock
-from tests.support.problems import ON_ONE_MACHINE
 from tests.support.program import ROOT
-from tests.support.small_teams import pair
 
 HANGAR = read_team(ROOT / "docs" / "examples" / "hangar")
 PATROL = read_team(ROOT / "docs" / "examples" / "patrol")
-SIMULATED = Options(protocol="dynabt", runtime=Runtime.SIMULATOR)
 SECOND = 1_000_000_000
 SLICE_S = 1.0
 """How long the source is waited for at a time."""
 PORTS = {"point": {"x": 3.0, "y": 1.0, "z": 3.0}}
 """Where Port flies first."""
-
-# A field, whatever it is
-
-
-class Says:
-    """A field that says what it was told to say, and keeps what it is told."""
-
-    def __init__(self, *events: ScenarioEvent | None) -> None:
-        self.events = list(events)
-        self.summary: list[tuple[tuple[str, ...], EpochOutcome, float | None]] = []
-
-    def __call__(self, team: Team, epoch: EpochOutcome, left_s: float | None) -> ScenarioEvent | None:
-        self.summary.append((team.order, epoch, left_s))
-        return self.events.pop(0) if self.events else None
-
-
-def openings(outcome: Outcome) -> list[str]:
-    return [epoch.opened_by for epoch in outcome.epochs]
-
-
-@pytest.mark.parametrize("runtime", ON_ONE_MACHINE)
-def test_a_field_is_told_each_epoch_and_says_the_next(runtime: Runtime) -> None:
-    field = Says(ScenarioEvent((RemoveValue("A", 1),)), ScenarioEvent((RemoveAgent("RB"),)))
-    outcome = solve(pair(values=3), Options(protocol="dynabt", runtime=runtime), environment=field)
-    assert openings(outcome) == ["the start", "A without 1", "-RB"]
-    assert [(order, left_s) for order, _, left_s in field.summary] == [(("RA", "RB"), None)] * 2 + [(("RA",), None)]
-    assert [epoch for _, epoch, _ in field.summary] == [*outcome.epochs]
-    assert all(epoch.verified for epoch in outcome.epochs)
-    assert outcome.assignment == {"A": 2}
-
-
-def test_what_cannot_be_is_passed_over() -> None:
-    field = Says(
-        ScenarioEvent((RemoveAgent("RX"), RemoveValue("A", 9), RemoveValue("A", 1))),
-        ScenarioEvent((RemoveAgent("RX"),)),
-    )
-    outcome = solve(pair(values=3), SIMULATED, environment=field)
-    assert openings(outcome) == ["the start", "A without 1", "nothing"]
-    team = pair(values=3)
-    there = Says(ScenarioEvent((AddAgent(team["RB"]),)))
-    assert openings(solve(team, SIMULATED, environment=there)) == ["the start", "nothing"]
-
-
-def test_the_files_own_events_come_first() -> None:
-    team = pair(ScenarioEvent((RemoveValue("A", 1),)), values=3)
-    outcome = solve(team, SIMULATED, environment=Says(ScenarioEvent((RemoveValue("A", 2), RemoveValue("A", 1)))))
-    assert openings(outcome) == ["the start", "A without 1", "A without 2"]
-    assert outcome.events == 2
-
-
-def test_without_a_field_a_problem_that_does_not_change_has_no_epochs() -> None:
-    assert solve(pair(values=3), SIMULATED).epochs == ()
-    assert len(solve(pair(values=3), SIMULATED, environment=Says()).epochs) == 1
-
-
-def test_an_epoch_without_a_solution_may_be_followed_by_one_with() -> None:
-    values = tuple(RemoveValue("A", value) for value in (1, 2, 3))
-    outcome = solve(
-        pair(values=3), SIMULATED, environment=Says(ScenarioEvent(values), ScenarioEvent((RemoveAgent("RA"),)))
-    )
-    assert [epoch.verdict for epoch in outcome.epochs] == ["solution", "no-solution", "solution"]
-
-
-@pytest.mark.parametrize(
-    ("options", "named"),
-    [
-        (Options(protocol="dynabt", withdraw=Withdrawal.MINIMUM), "--withdraw"),
-        (Options(protocol="dynabt", runtime=Runtime.NETWORK), "--runtime network"),
-        (Options(protocol="central"), "--protocol central"),
-    ],
-)
-def test_what_a_changing_problem_cannot_have_is_refused(options: Options, named: str) -> None:
-    with pytest.raises(UnsupportedError, match=f"{named} is for problems that do not change"):
-        solve(pair(values=3), options, environment=Says())
-
-
-def test_when_the_time_is_over_nothing_that_comes_is_heeded(monkeypatch: pytest.MonkeyPatch) -> None:
-    clock = MovedClock()
-    for module in ("run.context", "solver.team_compiler", "communication.session"):
-        monkeypatch.setattr(f"robochoc.{module}.time", clock)
-
-    class Slow(Says):
-        def __call__(self, team: Team, epoch: EpochOutcome, left_s: float | None) -> ScenarioEvent | None:
-            assert left_s == (0 if self.summary else HANG_S)
-            clock.end()
-            return super().__call__(team, epoch, left_s)
-
-    field = Slow(ScenarioEvent((RemoveValue("A", 1),)))
-    outcome = solve(pair(values=3), replace(SIMULATED, timeout=HANG_S), environment=field)
-    assert (outcome.verdict, openings(outcome)) == (Verdict.UNKNOWN, ["the start", "A without 1"])
-    assert field.summary[-1][2] == 0
-    assert "--timeout" in (outcome.reason or "")
-
-
-def test_when_all_messages_are_sent_nothing_that_comes_is_heeded() -> None:
-    field = Says()
-    outcome = solve(HANGAR, replace(SIMULATED, messages=3), environment=field)
-    assert (outcome.verdict, field.summary[-1][2]) == (Verdict.UNKNOWN, 0)
-
-
-class Striking(Says):
-    """Kills a robot's process while the team waits."""
-
-    def __call__(self, team: Team, epoch: EpochOutcome, left_s: float | None) -> ScenarioEvent | None:
-        if not self.summary:
-            victim = next(pid for pid, name in own_children().items() if name == "RB")
-            os.kill(victim, signal.SIGKILL)
-            os.waitid(os.P_PID, victim, os.WEXITED | os.WNOWAIT)
-        return super().__call__(team, epoch, left_s)
-
-
-@pytest.mark.skipif(sys.platform != "linux", reason="as the runtime's other tests of faults")
-def test_a_robot_that_dies_while_the_team_waits_is_lost() -> None:
-    options = Options(protocol="dynabt")
-    event = ScenarioEvent((RemoveValue("A", 1),))
-    with pytest.raises(RobotsLostError) as lost:
-        solve(pair(values=3), options, environment=Striking(event))
-    assert "RB" in lost.value.robots
-    surviving = Options(protocol="dynabt", on_loss=OnLoss.WITHDRAW)
-    outcome = solve(pair(values=3), surviving, environment=Striking(event))
-    assert openings(outcome) == ["the start", "A without 1", "the loss of RB"]
-    assert (outcome.lost, outcome.assignment) == (("RB",), {"A": 2})
-
-
-@pytest.mark.parametrize("error", [KeyboardInterrupt, SourceError("the robots cannot be heard any more")])
-def test_no_process_outlives_a_field_that_fails(error: BaseException | type[BaseException]) -> None:
-    before = own_children()
-
-    def fails(_team: Team, _epoch: EpochOutcome, _left_s: float | None) -> ScenarioEvent | None:
-        assert len(own_children()) == len(before) + 2
-        raise error
-
-    with pytest.raises((KeyboardInterrupt, SourceError)):
-        solve(pair(values=3), Options(protocol="dynabt"), environment=fails)
-    assert own_children() == before
-
-
-# A loop with a source
 
 
 class WaitedClock:
@@ -355,13 +204,9 @@ class Audience:
         return self.loop.has_news(team)
 
 
-def test_a_report_while_the_team_searches_on_opens_the_next_epoch(
-    waited: WaitedClock, monkeypatch: pytest.MonkeyPatch
-) -> None:
+@pytest.mark.usefixtures("a_second_a_look")
+def test_a_report_while_the_team_searches_on_opens_the_next_epoch(waited: WaitedClock) -> None:
     """What would be better is of no use any more: the next epoch begins, and has a deadline of its own."""
-    clock = itertools.count(time.monotonic())
-    for module in ("communication.simulator.simulator", "run.context", "run.improvement"):
-        monkeypatch.setattr(f"robochoc.{module}.time", SimpleNamespace(monotonic=lambda: next(clock)))
     sink = Kept()
     kind = ReportDecoder(drones_of(PATROL), "map").topics["/west/out_of_order"]
 
@@ -410,9 +255,3 @@ def test_the_team_of_a_run_nobody_changed_is_as_its_files_have_it() -> None:
     loop.publish(solve(HANGAR, SIMULATED))
     assert (loop.team, loop.mission) == (HANGAR, None)
     assert loop.publishers[0].summary == "6 waypoints, 0 landings"
-
-
-def test_a_field_for_whoever_uses_the_library() -> None:
-    field = Says(ScenarioEvent((RemoveValue("port", 3),)))
-    outcome = Problem(HANGAR).solve("dynabt", "simulator", environment=field)
-    assert openings(outcome) == ["the start", "port without 3"]

@@ -1,4 +1,4 @@
-"""An autopilot that does what it is told, at once: no link, no library, no time."""
+"""An autopilot that does what it is told, at once, and the pilot that flies by it: no link, no library, no time."""
 
 from __future__ import annotations
 
@@ -6,7 +6,10 @@ from dataclasses import replace
 
 from robochoc.flight.layout import Point
 from robochoc.ros.autopilots.autopilot import OFFBOARD, Autopilot, RefusedError, Telemetry
-from robochoc.ros.autopilots.fleet import point_text
+from robochoc.ros.autopilots.fleet import AtEnd, Fence, Fleet, Link, point_text
+from robochoc.ros.autopilots.messages import State, Target
+from robochoc.ros.autopilots.pilot import Pilot
+from robochoc.ros.autopilots.traffic import Traffic
 
 GROUND = Telemetry((0, 0, 0), 1.0, "HOLD", healthy=True)
 
@@ -58,3 +61,45 @@ class Played(Autopilot):
 
     def close(self) -> None:
         pass
+
+
+FLEET = Fleet({"A": Link("udpin://0.0.0.0:1")}, Fence((-1, -1, 0), (9, 9, 9)), distance_m=2)
+"""With such a distance set points are far ahead: at the places themselves."""
+THERE = Target((3, 1, 2))
+
+
+class Ordered(Pilot):
+    """A pilot who gets orders as the guard gives them: ways are planned first."""
+
+    def __init__(self, played: Played) -> None:
+        self.traffic = Traffic(FLEET, lambda: played.now)
+        super().__init__("A", played, FLEET, self.traffic, lambda: played.now)
+
+    def fly(self, order: int, target: Target) -> None:
+        self.traffic.fly({"A": target})
+        super().fly(order, target)
+
+    def end(self, how: AtEnd, *, waits: bool) -> None:
+        if how is AtEnd.LAND:
+            self.traffic.bring_down()
+        super().end(how, waits=waits)
+
+
+def steps(pilot: Pilot, played: Played, count: int = 1, each_s: float = 0.1) -> State:
+    for _ in range(count):
+        played.now += each_s
+        state = pilot.step()
+    return state
+
+
+def flying(pilot: Pilot, target: Target = THERE) -> None:
+    pilot.step()
+    pilot.fly(1, target)
+
+
+def is_over(pilot: Pilot) -> bool:
+    return pilot.ended
+
+
+def landed(played: Played) -> None:
+    played.seen = replace(played.seen, armed=False, in_air=False)

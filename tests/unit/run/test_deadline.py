@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import replace
 from functools import partial
 from random import Random
@@ -26,7 +25,6 @@ from robochoc.solver.encoding import UnsupportedError
 from robochoc.verification.checker import assignment_cost, violations
 from tests.support.brute_force import least_cost, priced_solutions
 from tests.support.cost_problems import random_cost_team
-from tests.support.counted_clock import time_passes_at_each_look
 from tests.support.examples import count
 from tests.support.problems import random_team
 
@@ -36,13 +34,6 @@ BY_S = 0.4
 def hard_to_prove() -> Team:
     """A team whose least cost nobody proves in the time of a test."""
     return random_csp(24, 8, 0.6, 0.0, seed=1, max_cost=100)
-
-
-@pytest.fixture
-def a_second_a_look() -> Iterator[None]:
-    """Let a second pass whenever somebody looks at the clock: so as much is done on every machine."""
-    with time_passes_at_each_look():
-        yield
 
 
 @pytest.mark.usefixtures("a_second_a_look")

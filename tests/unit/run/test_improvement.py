@@ -1,102 +1,30 @@
-"""`--improve`: after the deadline the team searches on, and each answer that is better is published, checked."""
+"""`--improve` in the simulator: each answer after the deadline is better, published and checked."""
 
 from __future__ import annotations
 
-import os
-import signal
-import sys
-from collections.abc import Iterator, Sequence
 from dataclasses import replace
-from pathlib import Path
 from random import Random
-from types import SimpleNamespace
 
 import pytest
 
-from robochoc.communication.run_result import RobotsLostError
 from robochoc.formats.result import read_result, result_json
 from robochoc.generators.queens3d import queens3d
 from robochoc.generators.random_csp import random_csp
 from robochoc.generators.scenario import random_scenario
 from robochoc.model.change import team_after_events
 from robochoc.model.cost_units import CostUnits
-from robochoc.model.outcome import EpochOutcome, Improvement, Outcome, Verdict
-from robochoc.model.problem import INFINITE, ProblemKind, Team
+from robochoc.model.outcome import Verdict
+from robochoc.model.problem import ProblemKind
 from robochoc.run import CENTRAL, Options, Runtime, Withdrawal, solve
-from robochoc.run.evaluation import Answer
-from robochoc.run.improvement import Improvements, Rank
-from robochoc.run.options import OnLoss, Preprocess, ScheduleName
+from robochoc.run.options import Preprocess, ScheduleName
 from robochoc.run.registry import protocol_named, protocol_names
 from robochoc.solver.encoding import UnsupportedError
-from robochoc.verification.checker import RefutedError, assignment_cost, violations
+from robochoc.verification.checker import assignment_cost
 from tests.support.brute_force import least_cost
 from tests.support.cost_problems import random_cost_team
-from tests.support.counted_clock import time_passes_at_each_look
 from tests.support.examples import count
-from tests.support.faults import own_children
+from tests.support.improvements import LONG, Told, agreed, costly, simulated
 from tests.support.problems import random_team
-
-LONG = {"cycles": "100000"}
-FOUND = {Verdict.SOLUTION, Verdict.OPTIMAL}
-
-
-class Told:
-    """An audience that keeps all that it is told, and checks it by itself."""
-
-    def __init__(self, news_at: int | None = None) -> None:
-        self.heard: list[tuple[Team, EpochOutcome, tuple[str, ...]]] = []
-        self._news_at = news_at
-
-    def improve(self, team: Team, /, epoch: EpochOutcome, withdrawn: Sequence[str]) -> None:
-        assert list(violations(team, epoch.assignment, withdrawn)) == []
-        assert epoch.cost is not None
-        assert epoch.verified
-        self.heard.append((team, epoch, tuple(withdrawn)))
-
-    def has_news(self, _team: Team) -> bool:
-        return self._news_at is not None and len(self.heard) >= self._news_at
-
-    @property
-    def costs(self) -> list[float]:
-        return [float(epoch.cost or 0) for _, epoch, _ in self.heard]
-
-
-@pytest.fixture
-def a_second_a_look() -> Iterator[None]:
-    """Let a second pass whenever somebody looks at the clock: so as much is done on every machine."""
-    with time_passes_at_each_look():
-        yield
-
-
-def costly(size: int = 8, **more: object) -> Team:
-    return random_csp(size, 4, 0.6, 0, 1, max_cost=50, **more)  # type: ignore[arg-type]
-
-
-def simulated(protocol: str, deadline: float, improve: float, **more: object) -> Options:
-    options = Options(protocol=protocol, runtime=Runtime.SIMULATOR, deadline=deadline, improve=improve)
-    return replace(options, **more)  # type: ignore[arg-type]
-
-
-def agreed(team: Team, outcome: Outcome, told: Told) -> None:
-    """Check what was published against each other, against the outcome, and against brute force."""
-    assert told.costs == sorted(set(told.costs), reverse=True)
-    best = least_cost(team)
-    for _, epoch, withdrawn in told.heard:
-        assert epoch.cost == assignment_cost(team, epoch.assignment)
-        assert not withdrawn
-        assert epoch.cost >= best
-    if told.heard:
-        last = told.heard[-1][1]
-        assert (outcome.assignment, outcome.cost) == (last.assignment, last.cost)
-        assert outcome.verdict in FOUND
-    assert [one.cost for one in outcome.improvements] == told.costs[len(told.costs) - len(outcome.improvements) :]
-    if outcome.verdict is Verdict.OPTIMAL:
-        assert (outcome.cost, outcome.deadline, outcome.bound) == (best, None, None)
-    if outcome.verdict is Verdict.NO_SOLUTION:
-        assert best == INFINITE
-    if outcome.bound is not None and best < INFINITE:
-        assert outcome.bound <= best
-
 
 ANYTIME = [
     name
@@ -275,215 +203,3 @@ def test_with_withdrawal_fewer_and_fewer_withdraw(runs: int) -> None:
 def test_what_cannot_be_improved_is_refused(options: Options, why: str) -> None:
     with pytest.raises(UnsupportedError, match=why):
         solve(costly(), options)
-
-
-# In real time
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("runtime", [Runtime.PROCESSES, Runtime.SIMULATOR, Runtime.ARRAYS])
-@pytest.mark.parametrize("protocol", ["dsa", "mgm", "bnb-adopt", "afb", "sfb"])
-def test_every_runtime_publishes_while_it_searches(runtime: Runtime, protocol: str) -> None:
-    local = protocol in {"dsa", "mgm"}
-    if runtime is Runtime.ARRAYS and not local:
-        return
-    team = random_csp(8, 4, 0.6, 0.0, seed=3, max_cost=50)
-    told = Told(news_at=1)
-    options = Options(protocol=protocol, runtime=runtime, deadline=0.3, improve=600, settings=LONG if local else {})
-    outcome = solve(team, options, audience=told)
-    agreed(team, outcome, told)
-    assert outcome.verdict in FOUND
-    assert told.heard
-
-
-def test_processes_publish_while_they_search() -> None:
-    told = Told()
-    options = Options(protocol="dsa", runtime=Runtime.PROCESSES, deadline=0.3, improve=60, settings=LONG)
-    outcome = solve(costly(), options, audience=Watcher(told))
-    agreed(costly(), outcome, told)
-    assert outcome.improvements
-    assert outcome.deadline == 0.3
-
-
-class Watcher(Told):
-    """An audience for which the first answer is enough."""
-
-    def __init__(self, told: Told) -> None:
-        super().__init__(news_at=1)
-        self.heard = told.heard
-
-
-class Killer(Told):
-    """An audience that kills a robot's process once something is published, and is content with what the others find.
-
-    Processes are named by their robots.
-    """
-
-    def improve(self, team: Team, /, epoch: EpochOutcome, withdrawn: Sequence[str]) -> None:
-        super().improve(team, epoch, withdrawn)
-        if len(self.heard) == 1:
-            victim = next(
-                pid for pid in own_children() if Path(f"/proc/{pid}/comm").read_text().strip() == team.order[2]
-            )
-            os.kill(victim, signal.SIGKILL)
-
-    def has_news(self, team: Team) -> bool:
-        return self.heard[-1][0] is team and len(team.robots) < len(self.heard[0][0].robots)
-
-
-@pytest.mark.skipif(sys.platform != "linux", reason="looks into /proc")
-def test_a_robot_that_dies_meanwhile_ends_the_run_or_leaves() -> None:
-    """What was published stands; nothing is left (a fixture looks)."""
-    team = costly()
-    options = Options(protocol="dsa", runtime=Runtime.PROCESSES, deadline=0.3, improve=600, settings=LONG)
-    with pytest.raises(RobotsLostError, match=f"{team.order[2]} was lost"):
-        solve(team, options, audience=Killer())
-    told = Killer()
-    outcome = solve(team, replace(options, on_loss=OnLoss.WITHDRAW), audience=told)
-    assert outcome.lost == (team.order[2],)
-    assert team.order[2] not in told.heard[-1][0]
-    assert outcome.cost == told.heard[-1][1].cost == assignment_cost(told.heard[-1][0], outcome.assignment)
-    assert outcome.verdict is Verdict.SOLUTION
-    assert [epoch.verdict for epoch in outcome.epochs] == [Verdict.UNKNOWN, Verdict.SOLUTION]
-
-
-# The rules, one by one
-
-
-def answer(cost: int, verdict: Verdict = Verdict.SOLUTION, **more: object) -> Answer:
-    known = Answer(verdict, assignment={"X": cost}, cost=cost, verified=True)
-    return replace(known, **more)  # type: ignore[arg-type]
-
-
-class Bench:
-    """Improvements with a clock that is set, and snapshots that are given."""
-
-    def __init__(self, monkeypatch: pytest.MonkeyPatch, *, has_costs: bool = True) -> None:
-        self.now = 0.0
-        self.published: list[tuple[float, int]] = []
-        self.news = False
-        monkeypatch.setattr("robochoc.run.improvement.time", SimpleNamespace(monotonic=lambda: self.now))
-        self._given = Answer(Verdict.UNKNOWN)
-        self.made = Improvements(
-            began=0,
-            deadline=1,
-            evaluate=lambda _: self._given,
-            rank=Rank(costly(), float),  # type: ignore[arg-type]
-            has_costs=has_costs,
-            bounded=True,
-            publish=lambda one, _: self.published.append((self.now, int(one.cost or 0))),
-            has_news=lambda: self.news,
-        )
-
-    def tick(self, at_s: float, given: Answer | None = None) -> None:
-        self.now = at_s
-        if self.made.wants_snapshot(at_s) and given is not None:
-            self._given = given
-            self.made.take(None)  # type: ignore[arg-type]
-
-
-def test_nothing_before_the_deadline_and_the_best_then(monkeypatch: pytest.MonkeyPatch) -> None:
-    bench = Bench(monkeypatch)
-    for at_s, cost in ((0.2, 9), (0.5, 5), (0.8, 7)):
-        bench.tick(at_s, answer(cost))
-    assert bench.published == []
-    assert bench.made.wait_s(0.8) <= 0.2
-    bench.tick(1.0)
-    assert bench.published == [(1.0, 5)]
-
-
-def test_a_robot_that_computes_at_the_deadline_keeps_nobody_waiting(monkeypatch: pytest.MonkeyPatch) -> None:
-    bench = Bench(monkeypatch)
-    bench.tick(0.5, answer(5))
-    bench.tick(0.9)  # asked, and not answered
-    bench.tick(1.0)
-    assert bench.published == [(1.0, 5)]
-
-
-def test_what_is_as_good_is_not_published_again(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Robots are under way: they are not sent elsewhere for nothing."""
-    bench = Bench(monkeypatch)
-    for at_s, cost in ((1.0, 5), (1.2, 5), (1.4, 6), (1.6, 4)):
-        bench.tick(at_s, answer(cost))
-    assert bench.published == [(1.0, 5), (1.6, 4)]
-    final = bench.made.concluded(replace(answer(4, Verdict.OPTIMAL), assignment={"X": 0}), lost=False)
-    assert (final.verdict, final.assignment) == (Verdict.OPTIMAL, {"X": 4})
-    assert bench.published == [(1.0, 5), (1.6, 4)]
-    assert [(one.at_s, one.cost) for one in final.improvements] == bench.published
-
-
-def test_a_bound_proves_what_was_found_before(monkeypatch: pytest.MonkeyPatch) -> None:
-    bench = Bench(monkeypatch)
-    bench.tick(1.0, answer(5, bound=3, deadline=1.0))
-    bench.tick(1.2, answer(7, bound=5))
-    assert bench.made.satisfied
-    final = bench.made.concluded(Answer(Verdict.UNKNOWN, bound=4), lost=False)
-    assert (final.verdict, final.cost, final.bound, final.deadline) == (Verdict.OPTIMAL, 5, None, None)
-
-
-def test_a_limit_leaves_the_best_of_those_that_were_published(monkeypatch: pytest.MonkeyPatch) -> None:
-    bench = Bench(monkeypatch)
-    bench.tick(1.0, answer(5, deadline=1.0))
-    final = bench.made.concluded(Answer(Verdict.UNKNOWN, bound=4, reason="the time was over"), lost=False)
-    assert (final.verdict, final.cost, final.bound, final.deadline) == (Verdict.SOLUTION, 5, 4, 1.0)
-    assert final.reason is None
-
-
-def test_the_end_may_be_better_than_all_before(monkeypatch: pytest.MonkeyPatch) -> None:
-    bench = Bench(monkeypatch)
-    bench.tick(1.0, answer(5))
-    bench.now = 2.0
-    final = bench.made.concluded(answer(3, Verdict.OPTIMAL, ended=True), lost=False)
-    assert (final.verdict, final.cost) == (Verdict.OPTIMAL, 3)
-    assert bench.published == [(1.0, 5), (2.0, 3)]
-    assert final.improvements[-1] == Improvement(2.0, Verdict.OPTIMAL, 3)
-
-
-def test_who_ends_before_the_deadline_has_published_once_and_improved_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
-    bench = Bench(monkeypatch)
-    bench.tick(0.5, answer(5))
-    final = bench.made.concluded(answer(3, Verdict.OPTIMAL, ended=True), lost=False)
-    assert (final.verdict, final.cost, final.improvements) == (Verdict.OPTIMAL, 3, ())
-    assert bench.published == [(0.5, 3)]
-
-
-def test_a_limit_before_the_deadline_decides_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
-    bench = Bench(monkeypatch)
-    bench.tick(0.5, answer(5))
-    unknown = Answer(Verdict.UNKNOWN, reason="so many messages have been sent (--messages 3)")
-    assert bench.made.concluded(unknown, lost=False) == unknown
-    assert bench.published == []
-
-
-def test_after_a_loss_what_was_published_is_no_answer(monkeypatch: pytest.MonkeyPatch) -> None:
-    bench = Bench(monkeypatch)
-    bench.tick(1.0, answer(5))
-    final = bench.made.concluded(Answer(Verdict.UNKNOWN), lost=True)
-    assert (final.verdict, final.cost, len(final.improvements)) == (Verdict.UNKNOWN, None, 1)
-
-
-def test_a_protocol_that_an_answer_refutes_is_not_believed(monkeypatch: pytest.MonkeyPatch) -> None:
-    for claim in (Answer(Verdict.NO_SOLUTION), answer(6, Verdict.OPTIMAL)):
-        bench = Bench(monkeypatch)
-        bench.tick(1.0, answer(5))
-        with pytest.raises(RefutedError, match=r"5\)? was found"):
-            bench.made.concluded(claim, lost=False)
-
-
-def test_that_nobody_flies_is_an_answer_only_once_it_is_proven(monkeypatch: pytest.MonkeyPatch) -> None:
-    bench = Bench(monkeypatch)
-    nobody = answer(0, assignment={}, withdrawn=costly().order)
-    bench.tick(1.0, nobody)
-    assert bench.published == []
-    final = bench.made.concluded(replace(nobody, verdict=Verdict.OPTIMAL, ended=True), lost=False)
-    assert (final.verdict, final.withdrawn) == (Verdict.OPTIMAL, costly().order)
-
-
-def test_news_count_once_something_is_published(monkeypatch: pytest.MonkeyPatch) -> None:
-    bench = Bench(monkeypatch)
-    bench.news = True
-    bench.tick(0.5, answer(5))
-    assert not bench.made.satisfied
-    bench.tick(1.0)
-    bench.tick(1.2)
-    assert bench.made.satisfied

@@ -1,0 +1,46 @@
+"""Command lines of `robochoc solve --ros`, and what they have published."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+from click.testing import CliRunner, Result
+
+from robochoc.cli.group import cli
+from robochoc.ros.sinks import open_source
+from tests.support.program import ROOT
+
+HANGAR = ROOT / "docs" / "examples" / "hangar"
+PATROL = ROOT / "docs" / "examples" / "patrol"
+SCOUTS = ROOT / "docs" / "examples" / "scouts"
+MET = ("--situation", "flight", "--obstacle", "3,1,3", "--fail", "Fin@7")
+SIMULATED = ("--runtime", "simulator", "--protocol", "dynabt")
+OPENINGS = ["the start", "port without 3", "-Fin"]
+
+
+def ran(*words: object) -> Result:
+    done = CliRunner().invoke(cli, [*map(str, words)], catch_exceptions=False)
+    assert "Traceback" not in done.output
+    return done
+
+
+def solved(*words: object) -> Result:
+    return ran("solve", *words, *SIMULATED)
+
+
+def epochs(result: Result) -> list[tuple[str, str, dict[str, int]]]:
+    told = json.loads(result.stdout)["epochs"]
+    return [(epoch["opened_by"], epoch["verdict"], epoch["assignment"]) for epoch in told]
+
+
+def published(path: Path, topic: str, kind: str = "geometry_msgs/PoseStamped") -> list[tuple[float, tuple[float, ...]]]:
+    """When, and where to, in the recording at `path`."""
+    with open_source(f"mcap:{path}") as source:
+        source.listen({topic: kind})
+        found: list[tuple[float, tuple[float, ...]]] = []
+        while (heard := source.next(0)) is not None:
+            at = heard.fields["pose"]["position"]
+            assert heard.fields["header"]["stamp"] == heard.at_ns
+            found.append((heard.at_ns / 1e9, (at["x"], at["y"], at["z"])))
+    return found
