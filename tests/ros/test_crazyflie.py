@@ -13,8 +13,8 @@ from robochoc.ros.autopilots.fleet import read_fleet
 from robochoc.ros.autopilots.guard_process import GuardProcess
 from robochoc.ros.autopilots.kinds import Kind
 from robochoc.ros.autopilots.messages import Phase, Target
+from tests.support.crazyflie_firmware import Crazyfly
 from tests.support.crazyflie_teams import crazyflie_field, solve
-from tests.support.crazyflies import Crazyfly
 from tests.support.limits import HANG_S, wait_until
 from tests.support.mavlink_teams import NAMES
 

@@ -27,7 +27,8 @@ from robochoc.ros.autopilots.supervisor import (
     TUMBLED,
     Supervisor,
 )
-from tests.support.crazyflies import Crazyflies, Crazyfly, Place
+from tests.support.crazyflie_firmware import Crazyfly, Place
+from tests.support.crazyflies import Crazyflies
 from tests.support.limits import HANG_S, wait_until
 from tests.support.mavlink_teams import udp_ports
 

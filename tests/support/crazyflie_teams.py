@@ -7,7 +7,8 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-from tests.support.crazyflies import Crazyflies, Crazyfly
+from tests.support.crazyflie_firmware import Crazyfly
+from tests.support.crazyflies import Crazyflies
 from tests.support.mavlink_teams import NAMES, fleet_file, team_folder, udp_ports
 from tests.support.program import robochoc_within
 

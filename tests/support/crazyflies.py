@@ -1,14 +1,10 @@
 """Crazyflies, played in a thread of the test: they speak CRTP by UDP, one packet a datagram, as simulated ones do.
 
 They know what cflib and robochoc rely on: the echo and the source of the link, the version of the protocol, the tables
-of log variables and parameters, blocks of the log, memories, the supervisor with its arming, and the high-level
-commander. A set point of low level takes over from that commander, and one without thrust lets a Crazyflie fall, as it
-does in the firmware. All times of the firmware are divided by `haste`, but for the one that it gives to whoever is
-armed and does not take off: that is for people, and a busy machine needs some of it. A path that is asked for again, as
-the answer came late, is one path. Places are in metres, from where each was switched on.
+of log variables and parameters, blocks of the log, memories, and what `crazyflie_firmware.py` does when it is told. A
+path that is asked for again, as the answer came late, is one path.
 
-Source: the firmware's documentation of CRTP, and its supervisor.c, planner.c and crtp_commander_high_level.c, protocol
-version 12.
+Source: the firmware's documentation of CRTP, protocol version 12.
 """
 
 from __future__ import annotations
@@ -17,22 +13,14 @@ import math
 import selectors
 import socket
 import struct
-import threading
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from contextlib import suppress
-from dataclasses import dataclass, field
-from types import TracebackType
-from typing import Self
 
-from tests.support.limits import HANG_S, wait_until
+from tests.support.crazyflie_firmware import REFUSED, Crazyfly, Firmware
+from tests.support.played_fleet import PlayedFleet
 from tests.support.ports import LOOPBACK
 
-Place = tuple[float, float, float]
-TICK_S = 0.02
-PREFLIGHT_S, LANDED_S, THRUST_S = 30.0, 3.0, 2.0
-"""The firmware's: armed without a flight; landed and still armed; since the last thrust."""
-_NEAR_M = 0.02
 _PARAM, _SETPOINT, _MEMORY, _LOG, _GENERIC_SETPOINT, _HIGH_LEVEL, _SUPERVISOR, _PLATFORM, _LINK = (
     *(2, 3, 4, 5, 7, 8, 9, 13, 15),
 )
@@ -43,70 +31,6 @@ _VARIABLES = (
     *(("pm.vbat", 7), ("pm.batteryLevel", 1), ("supervisor.info", 2), ("radio.rssi", 1), ("pm.state", 4)),
 )
 BUSY = 16
-_REFUSED = 1
-
-
-@dataclass
-class Crazyfly:
-    """A Crazyflie: what it is told to be, and what has become of it. Tests read and set the fields while it lives."""
-
-    port: int
-    at: Place = (0.0, 0.0, 0.0)
-    haste: float = 20.0
-    battery: float = 1.0
-    drain: float = 0.0
-    """The charge that it uses in a second of flight."""
-    arms_itself: bool = False
-    version: int = 12
-    refuses: set[str] = field(default_factory=set)
-    """Of "arm", "takeoff", "goto", "land": commands that are denied."""
-    deaf: set[str] = field(default_factory=set)
-    """Of the same: commands that are obeyed, and whose first answer is lost."""
-    lacks: set[str] = field(default_factory=set)
-    """Log variables that its firmware does not have."""
-    silent: bool = False
-    """True: neither sends nor hears, as without radio."""
-    missed: int = 0
-    """The packets that have come while it was silent."""
-    silent_above: float = math.inf
-    """The height from which on it is silent, in metres."""
-    gone: bool = False
-    """True: nobody is at its port, as when a simulator has ended."""
-    low_power: bool = False
-    """Whether its power management tells a low voltage."""
-    noise: list[bytes] = field(default_factory=list)
-    """What it sends besides, once."""
-    tumbled: bool = False
-    flown_by_hand: bool = False
-    """Somebody else sends it set points."""
-    hand_after: str = ""
-    """The entry of the log from which on it is flown by hand."""
-    planner: str = "idle"
-    armed: bool = False
-    locked: bool = False
-    log: list[str] = field(default_factory=list)
-    """What has happened to it, in order."""
-    paths: list[tuple[Place, float, bool]] = field(default_factory=list)
-    """Where it was sent to, in how many seconds, and whether in a straight line."""
-
-    @property
-    def flies(self) -> bool:
-        return self.at[2] > _NEAR_M
-
-    @property
-    def is_down(self) -> bool:
-        """Return whether it has landed, as it should."""
-        return (
-            not self.flies
-            and self.planner == "idle"
-            and "fell" not in self.log
-            and (self.arms_itself or not self.armed)
-        )
-
-    @property
-    def is_safe(self) -> bool:
-        """Return whether it is on the ground, hovers by itself, or lands."""
-        return "fell" not in self.log and (self.is_down or (self.planner in {"flying", "landing"}))
 
 
 def _bound(port: int) -> socket.socket:
@@ -121,17 +45,13 @@ class _Played:
 
     def __init__(self, vehicle: Crazyfly) -> None:
         self.vehicle = vehicle
+        self._firmware = Firmware(vehicle)
         self.socket = _bound(vehicle.port)
         self._peer: tuple[str, int] | None = None
         self._parameters = [("hlCommander.vtoff", 6, struct.pack("<f", 0.5)), ("stabilizer.stop", 8, b"\0")]
         self._blocks: dict[int, list[int]] = {}
         self._running: dict[int, tuple[float, float]] = {}
-        self._from = self._to = vehicle.at
-        self._begun = self._armed_at = self._down_at = 0.0
-        self._lasts = 0.001
-        self._straight = False
         self._asked = b""
-        self._thrust_at = -math.inf
         self._begun_at = time.monotonic()
 
     def come_and_go(self, selector: selectors.BaseSelector) -> None:
@@ -166,27 +86,13 @@ class _Played:
             with suppress(OSError):
                 self.socket.sendto(bytes([port << 4 | 3 << 2 | channel]) + content[:30], self._peer)
 
-    def _say(self, what: str) -> None:
-        vehicle = self.vehicle
-        vehicle.log.append(what)
-        if what == vehicle.hand_after:
-            vehicle.flown_by_hand, vehicle.planner = True, "idle"
-
     # Time goes by
 
     def live(self, now: float, passed: float) -> None:
         vehicle = self.vehicle
-        if vehicle.planner in {"flying", "landing"}:
-            self._move(now)
-        if vehicle.flown_by_hand or (vehicle.planner != "idle" and (vehicle.flies or self._to[2] > _NEAR_M)):
-            self._thrust_at = now
-        elif vehicle.flies:
-            self._fall()
+        self._firmware.live(now, passed)
         if vehicle.at[2] > vehicle.silent_above:
             vehicle.silent, vehicle.silent_above = True, math.inf
-        if vehicle.flies:
-            vehicle.battery = max(0.0, vehicle.battery - vehicle.drain * passed)
-        self._supervise(now)
         while vehicle.noise and self._peer is not None:
             self.socket.sendto(vehicle.noise.pop(), self._peer)
         for block, (period, told) in [*self._running.items()]:
@@ -196,66 +102,12 @@ class _Played:
                 head = bytes([block]) + stamp.to_bytes(3, "little")
                 self._send(_LOG, 2, head + b"".join(map(self._value, self._blocks[block])))
 
-    def _move(self, now: float) -> None:
-        vehicle = self.vehicle
-        part = min((now - self._begun) / self._lasts, 1.0)
-        if not self._straight:
-            part = part**4 * (35 - 84 * part + 70 * part**2 - 20 * part**3)
-        x, y, z = (a + (b - a) * part for a, b in zip(self._from, self._to, strict=True))
-        vehicle.at = (x, y, z)
-        if self._is_finished(now) and vehicle.planner == "landing":
-            vehicle.planner = "idle"
-            self._say("landed")
-
-    def _supervise(self, now: float) -> None:
-        """Disarm as the firmware does: after a landing, and when nobody takes off."""
-        vehicle = self.vehicle
-        if self._is_flying(now) or not vehicle.armed or vehicle.arms_itself:
-            self._down_at = now
-            return
-        flew = math.isfinite(self._thrust_at) and self._thrust_at > self._armed_at
-        if now - self._down_at > (LANDED_S / vehicle.haste if flew else PREFLIGHT_S):
-            vehicle.armed = False
-            self._say("disarmed by itself")
-
-    def _fall(self) -> None:
-        vehicle = self.vehicle
-        vehicle.at, vehicle.locked, vehicle.armed, vehicle.planner = (*vehicle.at[:2], 0.0), True, False, "idle"
-        self._say("fell")
-
-    def _is_finished(self, now: float) -> bool:
-        return now - self._begun >= self._lasts
-
-    def _is_flying(self, now: float) -> bool:
-        return now - self._thrust_at < THRUST_S / self.vehicle.haste
-
-    def _is_armed(self) -> bool:
-        return self.vehicle.armed or self.vehicle.arms_itself
-
-    def _can_fly(self) -> bool:
-        return self._is_armed() and not self.vehicle.locked and not self.vehicle.tumbled
-
-    def _bits(self) -> int:
-        vehicle, now = self.vehicle, time.monotonic()
-        fit = not vehicle.locked and not vehicle.tumbled
-        return sum(
-            1 << bit
-            for bit, holds in enumerate(
-                (
-                    *(fit and not self._is_armed(), self._is_armed(), vehicle.arms_itself, self._can_fly()),
-                    *(self._is_flying(now), vehicle.tumbled, vehicle.locked, False),
-                    *(vehicle.planner != "idle", self._is_finished(now), False, False),
-                )
-            )
-            if holds
-        )
-
     def _value(self, number: int) -> bytes:
         name, kind = self._variables[number]
         values = {
             **dict(zip(("stateEstimate.x", "stateEstimate.y", "stateEstimate.z"), self.vehicle.at, strict=True)),
             "pm.batteryLevel": round(self.vehicle.battery * 100),
-            "supervisor.info": self._bits(),
+            "supervisor.info": self._firmware.bits(),
             "pm.state": 3 if self.vehicle.low_power else 0,
             "stateEstimate.yaw": 90.0,
         }
@@ -301,8 +153,7 @@ class _Played:
             self._send(_MEMORY, 0, b"\1\1" if content[0] == 1 else struct.pack("<BBBI8x", 2, 0, 0x12, 4096))
 
     def _low_level(self, _channel: int, _content: bytes) -> None:
-        self.vehicle.planner = "idle"
-        self._say("low-level set point")
+        self._firmware.stop_planner("low-level set point")
 
     def _table(self, port: int, content: bytes, entries: Sequence[tuple[str, int]]) -> None:
         if content[0] == 3:
@@ -330,18 +181,10 @@ class _Played:
 
     def _command(self, channel: int, content: bytes) -> None:
         """Arm, or disarm."""
-        vehicle = self.vehicle
         if channel != 1 or content[0] != 1:
             return
-        on = bool(content[1])
-        allowed = "arm" not in vehicle.refuses and (not on or not (vehicle.locked or vehicle.tumbled))
-        if not allowed:
-            self._say("refused arm")
-        elif on != vehicle.armed:
-            vehicle.armed = on
-            self._armed_at = self._down_at = time.monotonic()
-            self._say("armed" if on else "disarmed")
-        self._answer("arm", _SUPERVISOR, 1, bytes([0x81, allowed, self._is_armed()]))
+        allowed = self._firmware.arm(on=bool(content[1]))
+        self._answer("arm", _SUPERVISOR, 1, bytes([0x81, allowed, self._firmware.is_armed]))
 
     def _answer(self, what: str, port: int, channel: int, content: bytes) -> None:
         if what in self.vehicle.deaf:
@@ -351,16 +194,16 @@ class _Played:
 
     def _high_level(self, _channel: int, content: bytes) -> None:
         commands: dict[int, tuple[str, Callable[[bytes], int]]] = {
-            3: ("stop", self._stop),
-            7: ("takeoff", self._take_off),
-            8: ("land", self._land),
-            12: ("goto", self._go_to),
+            3: ("stop", self._firmware.stop),
+            7: ("takeoff", self._firmware.take_off),
+            8: ("land", self._firmware.land),
+            12: ("goto", self._firmware.go_to),
         }
         what, obey = commands[content[0]]
         if what in self.vehicle.refuses:
-            self._say(f"refused {what}")
-            result = _REFUSED
-        elif what != "stop" and not self._can_fly():
+            self._firmware.say(f"refused {what}")
+            result = REFUSED
+        elif what != "stop" and not self._firmware.can_fly:
             result = BUSY
         elif what == "goto" and content == self._asked and self.vehicle.planner == "flying":
             result = 0
@@ -369,95 +212,9 @@ class _Played:
             self._asked = content
         self._answer(what, _HIGH_LEVEL, 0, content[:3] + bytes([result]))
 
-    def _stop(self, _content: bytes) -> int:
-        self.vehicle.planner = "idle"
-        self._say("stop")
-        return 0
 
-    def _take_off(self, content: bytes) -> int:
-        if self.vehicle.planner != "idle":
-            return _REFUSED
-        height, _, own_yaw, lasts = struct.unpack("<ff?f", content)
-        assert own_yaw
-        self._path((*self.vehicle.at[:2], height), lasts, "flying", "takeoff", straight=False)
-        return 0
-
-    def _land(self, content: bytes) -> int:
-        if self.vehicle.planner == "landing":
-            return _REFUSED
-        height, _, own_yaw, lasts = struct.unpack("<ff?f", content)
-        assert own_yaw
-        self._path((*self.vehicle.at[:2], height), lasts, "landing", "land", straight=False)
-        return 0
-
-    def _go_to(self, content: bytes) -> int:
-        relative, straight, x, y, z, yaw, lasts = struct.unpack("<BBfffff", content)
-        if relative:
-            x, y, z = (a + b for a, b in zip(self.vehicle.at, (x, y, z), strict=True))
-        else:
-            assert math.isclose(yaw, math.pi / 2, rel_tol=1e-6)  # it keeps its heading
-        what = "hold" if relative else f"goto {x:g},{y:g},{z:g}"
-        self._path((x, y, z), lasts, "flying", what, straight=bool(straight))
-        return 0
-
-    def _path(self, to: Place, lasts: float, planner: str, what: str, *, straight: bool) -> None:
-        vehicle = self.vehicle
-        self._from, self._to, self._begun, self._straight = vehicle.at, to, time.monotonic(), straight
-        self._lasts = lasts / vehicle.haste
-        vehicle.planner = planner
-        vehicle.paths.append((to, lasts, straight))
-        self._say(what)
-
-
-class Crazyflies:
-    """Plays `vehicles` while it is a context."""
+class Crazyflies(PlayedFleet[Crazyfly]):
+    """Plays Crazyflies while it is a context."""
 
     def __init__(self, vehicles: Sequence[Crazyfly]) -> None:
-        self.vehicles = vehicles
-        self._over = threading.Event()
-        self._thread = threading.Thread(target=self._play, name="played Crazyflies")
-
-    def __enter__(self) -> Self:
-        self._played = [_Played(vehicle) for vehicle in self.vehicles]
-        self._thread.start()
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        self._over.set()
-        self._thread.join(HANG_S)
-        for played in self._played:
-            played.socket.close()
-
-    def __iter__(self) -> Iterator[Crazyfly]:
-        return iter(self.vehicles)
-
-    def __getitem__(self, number: int) -> Crazyfly:
-        return self.vehicles[number]
-
-    def wait_until_safe(self) -> None:
-        """Wait until each is on the ground, hovers by itself, or lands."""
-        wait_until(lambda: all(vehicle.is_safe for vehicle in self.vehicles), self.state)
-
-    def wait_until_landed(self) -> None:
-        wait_until(lambda: all(vehicle.is_down for vehicle in self.vehicles), self.state)
-
-    def state(self) -> str:
-        """Return in words where all are."""
-        return "; ".join(f"{one.planner} armed={one.armed} at {one.at}: {one.log}" for one in self.vehicles)
-
-    def _play(self) -> None:
-        with selectors.DefaultSelector() as selector:
-            for played in self._played:
-                selector.register(played.socket, selectors.EVENT_READ, played)
-            before = time.monotonic()
-            while not self._over.is_set():
-                for key, _ in selector.select(TICK_S):
-                    key.data.hear()
-                now = time.monotonic()
-                if now - before >= TICK_S:
-                    passed, before = now - before, now
-                    for played in self._played:
-                        played.live(now, passed)
-                        played.come_and_go(selector)
+        super().__init__(vehicles, lambda vehicle, _: _Played(vehicle))

@@ -11,19 +11,17 @@ from __future__ import annotations
 import math
 import selectors
 import socket
-import threading
 import time
 from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field
 from itertools import combinations
 from random import Random
-from types import TracebackType
-from typing import Any, Self
+from typing import Any
 
 from pymavlink.dialects.v20 import common
 
-from tests.support.limits import HANG_S, wait_until
+from tests.support.played_fleet import PlayedFleet
 from tests.support.ports import LOOPBACK
 from tests.support.wgs84 import Geodetic, enu_of, geodetic_of
 
@@ -34,7 +32,6 @@ DISARM_S = 3.0
 GUST_S = 0.5
 _SPEEDS_MS = 1.0, 8.0
 _CHANGE_S, _STALL_S = 0.5, 1.0
-TICK_S = 0.02
 _HEARTBEAT_S, _TELEMETRY_S = 0.2, 0.05
 _NEAR_M = 0.05
 SETTLE_S = 0.5
@@ -98,6 +95,15 @@ class Vehicle:
         """Return whether it is on the ground and disarmed, or keeps its place by itself, or lands."""
         return not self.armed or (self.flies and self.mode in {"hold", "land"})
 
+    @property
+    def is_down(self) -> bool:
+        return not self.armed and not self.flies
+
+    @property
+    def state(self) -> str:
+        """Return in words what it does and where it is."""
+        return f"{self.mode} armed={self.armed} at {self.at}: {self.log}"
+
     def is_near(self, at: tuple[float, float, float], within: float = 0.3) -> bool:
         return math.dist(self.at, at) < within
 
@@ -141,6 +147,9 @@ class _Played:
                 continue
             for message in self._mav.parse_buffer(content) or ():
                 self._take(message)
+
+    def come_and_go(self, selector: selectors.BaseSelector) -> None:
+        """Stay: tests of vehicles that are gone have silent ones."""
 
     # Time goes by
 
@@ -346,59 +355,15 @@ class _Played:
         return int(common.MAV_RESULT_ACCEPTED)
 
 
-class Vehicles:
+class Vehicles(PlayedFleet[Vehicle]):
     """Plays `vehicles` while it is a context, each with a MAVLink system of its own."""
 
     def __init__(self, vehicles: Sequence[Vehicle]) -> None:
-        self.vehicles = [*vehicles]
+        super().__init__(vehicles, lambda vehicle, number: _Played(vehicle, number + 1))
         self.nearest_m = math.inf
         """The smallest distance that two of them have had, if all share one frame."""
-        self._played: list[_Played] = []
-        self._over = threading.Event()
-        self._thread = threading.Thread(target=self._play, name="played vehicles")
 
-    def __enter__(self) -> Self:
-        self._played = [_Played(vehicle, number + 1) for number, vehicle in enumerate(self.vehicles)]
-        self._thread.start()
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        self._over.set()
-        self._thread.join(HANG_S)
-        for played in self._played:
-            played.socket.close()
-
-    def __iter__(self) -> Any:  # noqa: ANN401 - an iterator
-        return iter(self.vehicles)
-
-    def __getitem__(self, number: int) -> Vehicle:
-        return self.vehicles[number]
-
-    def wait_until_safe(self) -> None:
-        """Wait until each is on the ground, or holds or lands by itself."""
-        wait_until(lambda: all(vehicle.is_safe for vehicle in self.vehicles), self.state)
-
-    def wait_until_landed(self) -> None:
-        wait_until(lambda: not any(one.armed or one.flies for one in self.vehicles), self.state)
-
-    def state(self) -> str:
-        """Return in words where all are."""
-        return "; ".join(f"{one.mode} armed={one.armed} at {one.at}: {one.log}" for one in self.vehicles)
-
-    def _play(self) -> None:
-        with selectors.DefaultSelector() as selector:
-            for played in self._played:
-                selector.register(played.socket, selectors.EVENT_READ, played)
-            before = time.monotonic()
-            while not self._over.is_set():
-                for key, _ in selector.select(TICK_S):
-                    key.data.hear()
-                now = time.monotonic()
-                if now - before >= TICK_S:
-                    passed, before = now - before, now
-                    for played in self._played:
-                        played.live(now, passed)
-                    apart = (math.dist(one.at, other.at) for one, other in combinations(self.vehicles, 2))
-                    self.nearest_m = min(self.nearest_m, *apart, math.inf)
+    def watch(self) -> None:
+        """See how near two have come."""
+        apart = (math.dist(one.at, other.at) for one, other in combinations(self.vehicles, 2))
+        self.nearest_m = min(self.nearest_m, *apart, math.inf)
