@@ -17,7 +17,7 @@ import pytest
 from click.testing import CliRunner
 
 from robochoc.cli.group import cli
-from robochoc.ros.live import rclpy_node
+from robochoc.ros.live import rclpy_node, subscribers
 from robochoc.ros.live.rclpy_messages import fields_of, filled
 from robochoc.ros.live.rclpy_node import MESSAGE_BYTES_MAX, RclpyNode, RclpySink, RclpySource
 from robochoc.ros.sink import SinkError
@@ -45,7 +45,7 @@ def pose(number: int) -> dict[str, Any]:
 def _rclpy(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
     monkeypatch.delenv("ROS_DOMAIN_ID", raising=False)
     monkeypatch.setattr(rclpy_node, "LINGER_S", 0.0)
-    monkeypatch.setattr(rclpy_node, "SETTLE_S", 0.0)
+    monkeypatch.setattr(subscribers, "SETTLE_S", 0.0)
     monkeypatch.setattr(rclpy_node, "WAIT_S", HANG_S)
     rclpy_stand_in.install(monkeypatch)
     yield

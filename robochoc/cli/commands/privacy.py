@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from robochoc.cli.options.local_problems import limits, local_options
-from robochoc.cli.options.paths import InputPath, OutputFile, TeamFolder, refuse_same_places
-from robochoc.cli.options.saved import saved_journal
+from robochoc.cli.options.paths import InputPath, OutputFile, refuse_same_places
+from robochoc.cli.options.saved import journal_team_option, saved_journal
 from robochoc.cli.reports.failures import INVALID, USAGE, Failure, failures_told, invalid_input_fails
 
 if TYPE_CHECKING:
@@ -26,13 +26,7 @@ MEASURES = ("linear", "entropy", "known")
     "--measure", type=click.Choice(MEASURES), default="entropy", show_default=True, help="Measure of the table."
 )
 @click.option("--html", type=OutputFile(), metavar="FILE", help="Write a page: who has learnt how much of whom.")
-@click.option(
-    "--team",
-    "folder",
-    type=TeamFolder(),
-    metavar="DIR",
-    help="The team's folder, for a journal without the robots' problems (from several machines).",
-)
+@journal_team_option
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON object, with all measures of all pairs.")
 @local_options
 @invalid_input_fails

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING
 import click
 
 from robochoc.cli.options.local_problems import limits, local_options
-from robochoc.cli.options.paths import InputPath, TeamFolder
-from robochoc.cli.options.saved import saved_journal
+from robochoc.cli.options.paths import InputPath
+from robochoc.cli.options.saved import journal_team_option, saved_journal
 from robochoc.cli.options.solve import protocol_settings
 from robochoc.cli.reports.failures import INVALID, LOST, USAGE, Failure, failures_told, invalid_input_fails
 
@@ -20,13 +20,7 @@ if TYPE_CHECKING:
 
 @click.command()
 @click.argument("journal", type=InputPath(), metavar="JOURNAL")
-@click.option(
-    "--team",
-    "folder",
-    type=TeamFolder(),
-    metavar="DIR",
-    help="The team's folder, for a journal without the robots' problems (from several machines).",
-)
+@journal_team_option
 @click.option(
     "--set",
     "settings",

@@ -28,6 +28,14 @@ team_option = click.option(
     help="The team's folder, for names and topics.  [default: instances/TEAM]",
 )
 
+journal_team_option = click.option(
+    "--team",
+    "folder",
+    type=TeamFolder(),
+    metavar="DIR",
+    help="The team's folder, for a journal without the robots' problems (from several machines).",
+)
+
 
 def saved_content(file: Path, next_step: str) -> bytes:
     """Return the content of `file`. Raises `Failure`, whose message ends in `next_step`."""

@@ -12,6 +12,7 @@ from typing import NoReturn
 from robochoc.ros.live.dds_participant import MESSAGE_BYTES_MAX, Participant
 from robochoc.ros.live.dds_place import DdsPlace, Quality
 from robochoc.ros.live.inbox import PER_TOPIC_MAX, RosInbox, weight_of
+from robochoc.ros.live.subscribers import await_subscribers
 from robochoc.ros.names import is_for_waypoints
 from robochoc.ros.recordings.types import FieldsError, UnknownTypeError, types_of
 from robochoc.ros.sink import Fields, Sink, SinkError
@@ -19,8 +20,6 @@ from robochoc.ros.source import ReceivedMessage, Source, SourceError
 
 WAIT_S = 2.0
 """The default wait for subscribers, in seconds."""
-SETTLE_S = 0.3
-"""No new subscriber has come for so many seconds: then all are there."""
 STUCK_S = 10.0
 """The longest time for which a subscriber may leave messages unacknowledged, in seconds."""
 LINGER_S = 0.3
@@ -85,17 +84,8 @@ class DdsSink(Sink):
 
     def _gather(self, topics: Collection[str]) -> None:
         """Wait until each of `topics` has a subscriber and no more come; no longer than the place says."""
-        until = time.monotonic() + self._place.quality.wait_s
-        before, since, pause_s = 0, time.monotonic(), 0.01
-        while topics and time.monotonic() < until:
-            counts = self._participant.subscribers(topics)
-            now = time.monotonic()
-            if sum(counts) != before:
-                before, since = sum(counts), now
-            if all(counts) and now - since >= SETTLE_S:
-                return
-            time.sleep(pause_s)
-            pause_s = min(2 * pause_s, 0.1)
+        if topics:
+            await_subscribers(lambda: self._participant.subscribers(topics), self._place.quality.wait_s)
 
     def _stuck(self) -> NoReturn:
         raise SinkError(

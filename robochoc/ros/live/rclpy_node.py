@@ -25,14 +25,13 @@ from robochoc.ros.live.rclpy_messages import fields_of, filled
 from robochoc.ros.live.ros2_names import domain_id
 from robochoc.ros.live.ros_master import Failed
 from robochoc.ros.live.rospy_messages import message_class
+from robochoc.ros.live.subscribers import await_subscribers
 from robochoc.ros.names import is_for_waypoints
 from robochoc.ros.sink import Fields, Sink, SinkError
 from robochoc.ros.source import ReceivedMessage, Source, SourceError
 
 WAIT_S = 2.0
 """The longest wait for the first subscriber of each waypoint's topic, in seconds."""
-SETTLE_S = 0.3
-"""No new subscriber has come for so many seconds: then all are there."""
 STUCK_S = 10.0
 """The longest time for which a subscriber may leave a message unacknowledged, in seconds."""
 LINGER_S = 0.3
@@ -197,18 +196,13 @@ class RclpySink(Sink):
 
     def _gather(self, topics: Collection[str]) -> None:
         """Wait until each of `topics` has a subscriber and no more come; no longer than `WAIT_S`."""
-        until = time.monotonic() + WAIT_S
-        before, since, pause_s = 0, time.monotonic(), 0.01
-        while topics and time.monotonic() < until:
+
+        def counts() -> list[int]:
             self._ros.check()
-            counts = [self._publishers[topic].get_subscription_count() for topic in topics]
-            now = time.monotonic()
-            if sum(counts) != before:
-                before, since = sum(counts), now
-            if all(counts) and now - since >= SETTLE_S:
-                return
-            time.sleep(pause_s)
-            pause_s = min(2 * pause_s, 0.1)
+            return [self._publishers[topic].get_subscription_count() for topic in topics]
+
+        if topics:
+            await_subscribers(counts, WAIT_S)
 
     def _await_acknowledged(self, topic: str) -> None:
         """Wait until all subscribers of `topic` have its messages. Raises `SinkError` if one does not for `STUCK_S`."""
