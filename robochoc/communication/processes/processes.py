@@ -99,6 +99,8 @@ class ProcessesRun(Session, MasterLoop):
         self._deadline: float | None = None
         self._unstarted = Epoch(self.compiled, parameters=parameters).parts(protocol)
         self._drops = parameters.message_loss > 0
+        self._behind: set[str] = set()
+        """Robots that have not come to the present epoch: what they tell is of one that is over."""
         self.state = self._new_state(0, self.compiled.team.order)
 
     @property
@@ -137,6 +139,7 @@ class ProcessesRun(Session, MasterLoop):
         left = sorted({*gone, *epoch.restarted, *before.lost})
         for name in gone:
             self._pool.dismiss(name)
+        self._behind = {name for name in self._pool.robots if not before.has_reported(name)}
         self.state = self._new_state(before.epoch + 1, epoch.team.order)
         self._unstarted = {}
         for name, part in parts.items():
@@ -263,9 +266,10 @@ class ProcessesRun(Session, MasterLoop):
                 if fault := self.state.handle(robot.name, message):
                     raise RobotsLostError({robot.name: fault})
                 if isinstance(message, Ready) and message.epoch == self.state.epoch:
+                    self._behind.discard(robot.name)
                     self._observe(Registered(t=self._now(), robot=robot.name))
             case Events(events):
-                for event in events:
+                for event in events if robot.name not in self._behind else ():
                     self._observe(event)
             case Failed(why, unsupported, elsewhere):
                 refusal = TooLargeError if elsewhere else UnsupportedError

@@ -1,4 +1,7 @@
-"""A robot that computes when its epoch ends asks for queues late: to robots that are gone by then, or that are new."""
+"""A robot that computes when its epoch ends is late: what it asks for and tells is of an epoch that is over.
+
+It asks for queues to robots that are gone by then, or that are started again.
+"""
 
 from __future__ import annotations
 
@@ -10,6 +13,7 @@ from robochoc.communication.processes.processes import ProcessesRun
 from robochoc.communication.run_result import RunResult
 from robochoc.communication.search_watch import SearchWatch
 from robochoc.communication.session import Epoch
+from robochoc.journal.events import AnyEvent, Sent
 from robochoc.model.outcome import Verdict
 from robochoc.model.team_edits import without_robots
 from robochoc.protocols.satisfaction.abt import ABT
@@ -63,12 +67,15 @@ def test_what_a_robot_asks_for_late_is_of_an_epoch_that_is_over(*, restarted: bo
     team = CHAIN if restarted else without_robots(CHAIN, ["RX2"])
     third = frozenset({"RX2"} if restarted else set[str]())
     epoch = Epoch(ensure_compiled(team), restarted=third, parameters=parameters)
-    with ProcessesRun(CHAIN, LateABT, survive=True, parameters=parameters) as session:
+    told: list[AnyEvent] = []
+    with ProcessesRun(CHAIN, LateABT, survive=True, parameters=parameters, observer=told.append) as session:
         session.watch = EndsThen(Path(file + BEGUN))
         assert session.search(timeout=HANG_S).verdict is Verdict.UNKNOWN
         session.watch = None
         session.change(epoch)
+        told.clear()
         Path(file + GO_ON).touch()
         result = session.search(timeout=HANG_S)
     assert result.lost == {}
+    assert restarted or not [event for event in told if isinstance(event, Sent) and event.receiver == "RX2"]
     assert result.verdict is Verdict.SOLUTION
