@@ -2,16 +2,22 @@
 
 from __future__ import annotations
 
+import os
+import subprocess
 import threading
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
+from types import SimpleNamespace
+from typing import Any
 
 import msgspec
 import pytest
 
+from robochoc.ros.autopilots import guard_process
 from robochoc.ros.autopilots.autopilot import Telemetry
 from robochoc.ros.autopilots.fleet import Fence, Fleet, Link
 from robochoc.ros.autopilots.guard import Guard, Orders, watch
+from robochoc.ros.autopilots.guard_process import GuardError, GuardProcess
 from robochoc.ros.autopilots.messages import Failed, Fly, FromGuard, Permit, State, Target, ToGuard
 from tests.support.limits import HANG_S, wait_until
 from tests.support.played_autopilot import Played
@@ -29,6 +35,11 @@ class Hanging(Played):
         self.seen = Telemetry(place, 1.0, "HOLD", healthy=True)
         self.hangs = self.is_closed = False
         self.go = threading.Event()
+        self.when_armed: Callable[[], None] = lambda: None
+
+    def arm(self) -> None:
+        super().arm()
+        self.when_armed()
 
     def look(self) -> Telemetry:
         if self.hangs:
@@ -141,3 +152,31 @@ def test_what_cannot_be_told_keeps_nobody_in_the_air(stand: Stand) -> None:
     watch(stand.guard, Given([], over=True), threading.Event())
     assert stand.landed() == ["A", "B"]
     assert all(one.is_closed for one in stand.autopilots.values())
+
+
+def test_who_is_being_armed_when_the_end_comes_does_not_take_off(stand: Stand) -> None:
+    wait_until(lambda: stand.phases() == {"ready"}, lambda: str(stand.told))
+    stand.autopilots["A"].when_armed = lambda: stand.guard.end(FLEET.end, waits=False)
+    stand.guard.take(Permit())
+    stand.guard.take(THERE)
+    wait_until(lambda: stand.guard.ended, lambda: str(stand.told))
+    assert stand.autopilots["A"].done == ["arm", "land"]
+
+
+def test_a_guard_process_that_cannot_be_set_up_is_not_left_behind(monkeypatch: pytest.MonkeyPatch) -> None:
+    def gone(*_: object) -> None:
+        raise BrokenPipeError
+
+    started: list[subprocess.Popen[bytes]] = []
+
+    class Started(subprocess.Popen[bytes]):
+        def __init__(self, *words: Any, **settings: Any) -> None:  # noqa: ANN401 - whatever it takes
+            super().__init__(*words, **settings)
+            started.append(self)
+
+    monkeypatch.setattr(guard_process, "os", SimpleNamespace(write=gone, environ=os.environ))
+    monkeypatch.setattr(subprocess, "Popen", Started)
+    with pytest.raises(GuardError, match="the guard process has ended"):
+        GuardProcess(FLEET)
+    assert [one.returncode for one in started] == [0]
+    assert not any(thread.name == "hears the guard" for thread in threading.enumerate())

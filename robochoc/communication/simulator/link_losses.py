@@ -22,7 +22,8 @@ class LinkLosses(Losses):
         self._bursts: dict[Link, _Burst] = {}
         self._team: Team | None = None
         self._values_of: Callable[[str], Mapping[str, int]] = lambda _: {}
-        self._places: dict[tuple[object, ...], Point | None] = {}
+        self._places: dict[str, tuple[Mapping[str, int], Point | None]] = {}
+        """By robot the values that it had when it was last asked where it is, and the place to which they lead."""
 
     def follow(self, team: Team, values_of: Callable[[str], Mapping[str, int]]) -> None:
         """See `Losses.follow`."""
@@ -49,10 +50,10 @@ class LinkLosses(Losses):
         if place is not None or self._team is None or name not in self._team:
             return place
         values = self._values_of(name)
-        key = (name, *values.values())
-        if key not in self._places:
-            self._places[key] = place_of(self._team[name], values)
-        return self._places[key]
+        known = self._places.get(name)
+        if known is None or known[0] != values:
+            known = self._places[name] = {**values}, place_of(self._team[name], values)
+        return known[1]
 
     def _burst_of(self, link: Link) -> _Burst:
         if link not in self._bursts:

@@ -79,7 +79,11 @@ class GuardProcess:
             )
         self._reader = threading.Thread(target=self._read, daemon=True, name="hears the guard")
         self._reader.start()
-        self._say(Setup(fleet))
+        try:
+            self._say(Setup(fleet))
+        except GuardError:
+            self._shut()
+            raise
 
     def permit(self) -> None:
         """Let vehicles be armed."""

@@ -183,8 +183,9 @@ class Pilot:
             self._climb_to = seen.place[2] + CLIMBED * self._fleet.takeoff_m
             self._traffic.climbing(self.name)
             self._autopilot.arm()
-            self._autopilot.take_off(self._fleet.takeoff_m)
-            self._enter(Phase.CLIMBING)
+            if self._ending is None:  # the end may have come meanwhile
+                self._autopilot.take_off(self._fleet.takeoff_m)
+                self._enter(Phase.CLIMBING)
 
     def _not_ready(self, seen: Telemetry) -> str:
         """Return why the vehicle cannot take off; empty if it can."""

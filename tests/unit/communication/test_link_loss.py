@@ -116,16 +116,21 @@ def test_a_robot_is_where_its_first_topic_with_coordinates_says() -> None:
     assert place_of(robot_with(Topic("/goal", x=a)), {"A": 1}) is None
 
 
-def test_the_values_that_robots_have_now_decide_and_positions_come_before_them() -> None:
+def on_the_diagonal() -> Team:
+    """Two robots that stand where their values say, from (0, 0) to (99, 99)."""
     names = "AB"
     team = team_of(dict.fromkeys(names, range(100)), [])
-    team = replace(
+    return replace(
         team,
         robots=tuple(
             replace(robot, topics=(Topic("/goal", x=Name(name), y=Name(name)),))
             for robot, name in zip(team.robots, names, strict=True)
         ),
     )
+
+
+def test_the_values_that_robots_have_now_decide_and_positions_come_before_them() -> None:
+    team = on_the_diagonal()
     values: dict[str, Mapping[str, int]] = {"RA": {"A": 0}, "RB": {"B": 5}}
     one = Envelope("RA", "RB", b"", 0)
 
@@ -141,6 +146,16 @@ def test_the_values_that_robots_have_now_decide_and_positions_come_before_them()
     assert not takes(channel(distance_loss=STEP, positions={"RB": (0.0, 9.0)}))
     values["RB"] = {}  # as if it had its first value
     assert not takes(model)
+
+
+def test_a_robot_that_goes_elsewhere_again_and_again_takes_no_more_memory() -> None:
+    losses = LinkLosses(channel(distance_loss=STEP), 0)
+    values = {"RA": {"A": 0}, "RB": {"B": 0}}
+    losses.follow(on_the_diagonal(), values.__getitem__)
+    for place in (*range(8), *range(20, 100), *range(8)):
+        values["RB"]["B"] = place
+        assert losses.takes(Envelope("RA", "RB", b"", 0)) == (place >= 20)
+    assert len(losses._places) == 2  # noqa: SLF001 - what is kept
 
 
 def test_a_robot_whose_place_is_not_known_is_refused_and_so_is_a_name_that_is_none() -> None:
