@@ -41,6 +41,11 @@ class Telemetry:
     """The time since it last told its place, in seconds: a vehicle that is heard may no longer know where it is."""
 
     @property
+    def not_ready(self) -> str:
+        """Return why its autopilot would not arm; empty if it would."""
+        return "" if self.healthy else self.problem or "its autopilot is not ready to arm"
+
+    @property
     def is_flown_by_others(self) -> bool:
         """Return whether a person flies the vehicle, or its autopilot on its own."""
         return self.armed and self.mode in MANUAL | AWAY

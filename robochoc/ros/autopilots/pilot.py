@@ -168,7 +168,7 @@ class Pilot:
             self._head_for(order, target)
         elif target.lands:
             self._enter(Phase.LANDED)
-        elif problem := self._not_ready(seen):
+        elif problem := seen.not_ready or self._outside(seen):
             self._out(problem)
         else:
             self._is_due = True
@@ -187,14 +187,12 @@ class Pilot:
                 self._autopilot.take_off(self._fleet.takeoff_m)
                 self._enter(Phase.CLIMBING)
 
-    def _not_ready(self, seen: Telemetry) -> str:
-        """Return why the vehicle cannot take off; empty if it can."""
-        if not seen.healthy:
-            return seen.problem or "its autopilot is not ready to arm"
-        if seen.place is None or not self._fleet.fence.holds_above(seen.place):
-            where = point_text(seen.place) if seen.place else "nowhere"
-            return f"it stands at {where}, outside of the fence ({self._fleet.fence})"
-        return ""
+    def _outside(self, seen: Telemetry) -> str:
+        """Return where the vehicle stands if it cannot take off there; empty if it can."""
+        if seen.place is not None and self._fleet.fence.holds_above(seen.place):
+            return ""
+        where = point_text(seen.place) if seen.place else "nowhere"
+        return f"it stands at {where}, outside of the fence ({self._fleet.fence})"
 
     def _climbed(self, passed_s: float) -> None:
         """Go on from the take-off. Some autopilots refuse that at first."""
