@@ -291,7 +291,8 @@ class Flight:
         numbers = refused.drones if isinstance(refused, NoRouteError) else (refused.first, refused.second)
         named = [self.names[who[number]] if number < len(who) else "something that is in the way" for number in numbers]
         if isinstance(refused, NoRouteError) and refused.indoors:
-            told = f"no order of flying was found in which {', '.join(named)} get past each other between the walls"
+            past = f"{named[0]} gets past the others" if len(named) == 1 else f"{', '.join(named)} get past each other"
+            told = f"no order of flying was found in which {past} between the walls"
             return f"{told}: ask for a smaller distance, or send them elsewhere"
         if isinstance(refused, NoRouteError):
             return f"there is no way for {', '.join(named)}: what is in the way encloses where they start or end"

@@ -23,7 +23,7 @@ from robochoc.model.problem import Team
 from tests.support.flights_in_space import FlownInSpace, flown_in_space, gaps_in_space
 from tests.support.octomaps import FREE, Voxel, write_octomap
 
-NO_ROOM = ("that keeps its radius of", "are to be kept", "get past each other between the walls")
+NO_ROOM = ("that keeps its radius of", "are to be kept", "no order of flying was found")
 """Words of the refusals of a flight: a way is too narrow, places are too near, or drones block each other."""
 FLOORS = {
     (x, y, z): FREE for x, y, z in product(range(8), range(4), range(5)) if z != 2 or (x in {6, 7} and y in {2, 3})
