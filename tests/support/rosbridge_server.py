@@ -61,10 +61,9 @@ class Server:
     """The calls of these that are not answered yet: how the caller has numbered them, and who calls."""
 
     def __enter__(self) -> Self:
-        self._loop = asyncio.new_event_loop()
         self._ready, self._end = threading.Event(), asyncio.Event()
         self.changed = threading.Condition()
-        self._thread = threading.Thread(target=self._run)
+        self._thread = threading.Thread(target=lambda: asyncio.run(self._serve()))
         self._thread.start()
         assert self._ready.wait(HANG_S)
         return self
@@ -97,20 +96,19 @@ class Server:
         with self.changed:
             return bool(self.changed.wait_for(what, seconds))
 
+    async def over(self) -> None:
+        """Wait until the server ends."""
+        await self._end.wait()
+
     def _say(self, topic: str, message: object) -> None:
         for handler in self.handlers:
             if topic in handler.subscribed:
                 handler.send(json.dumps({"op": "publish", "topic": topic, "msg": message}))
 
-    def _run(self) -> None:
-        asyncio.set_event_loop(self._loop)
-        self._loop.run_until_complete(self._serve())
-        self._loop.close()
-
     async def _serve(self) -> None:
         listener = socket.create_server(("127.0.0.1", 0))
         listener.setblocking(False)
-        self.port = listener.getsockname()[1]
+        self.port, self._loop = listener.getsockname()[1], asyncio.get_running_loop()
         http = HTTPServer(Application([("/.*", Handler, {"server": self})]))
         http.add_socket(listener)
         self._ready.set()
@@ -149,7 +147,7 @@ class Handler(WebSocketHandler):
                 self.server.wrong.append(f"{error!r}: {message!r}")
             self.server.changed.notify_all()
         if self.server.manner.stalls:
-            await asyncio.sleep(3600)
+            await self.server.over()
 
     def _obey(self, message: Message) -> None:  # noqa: C901, PLR0912 - a protocol's words
         server, manner = self.server, self.server.manner
@@ -201,7 +199,8 @@ class Handler(WebSocketHandler):
     def send(self, content: str | bytes) -> None:
         """Send this, unless the client is gone: a rosbridge drops what it can no longer deliver."""
         with suppress(WebSocketClosedError):
-            self.write_message(content, binary=isinstance(content, bytes))
+            sent = self.write_message(content, binary=isinstance(content, bytes))
+            sent.add_done_callback(lambda done: done.cancelled() or done.exception())  # it is known, and not logged
 
     def break_off(self) -> None:
         if self.ws_connection is not None and self.ws_connection.stream is not None:

@@ -16,6 +16,7 @@ import sys
 import threading
 import time
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from pathlib import Path
 from types import TracebackType
 from typing import IO, Any, Self
@@ -122,7 +123,8 @@ class WarmProcess:
     def send_signal(self, signum: signal.Signals) -> None:
         """Send it a signal, if it has not ended."""
         if self.poll() is None:
-            os.kill(self.pid, signum)
+            with suppress(ProcessLookupError):  # its end is told a moment after it
+                os.kill(self.pid, signum)
 
     def kill(self) -> None:
         """End it at once."""
