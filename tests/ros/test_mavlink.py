@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import subprocess
+import sys
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
@@ -11,6 +12,7 @@ import pytest
 
 pytest.importorskip("mavsdk")
 
+from robochoc.ros.autopilots import guard_process
 from robochoc.ros.autopilots.fleet import read_fleet
 from robochoc.ros.autopilots.guard_process import GuardError, GuardProcess
 from robochoc.ros.autopilots.mavlink import MavlinkSink
@@ -237,6 +239,19 @@ def guarded(fleet: Path) -> Iterator[GuardProcess]:
 
 def all_in(guard: GuardProcess, phase: Phase) -> Callable[[], bool]:
     return lambda: [state.phase for state in guard.states.values()] == [phase] * len(NAMES)
+
+
+def test_a_guard_may_say_nothing_for_longer_at_first(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    mute = tmp_path / "python"
+    mute.write_text("#!/bin/sh\nexec cat >/dev/null\n", encoding="utf-8")
+    mute.chmod(0o755)
+    monkeypatch.setattr(sys, "executable", str(mute))
+    monkeypatch.setattr(guard_process, "SILENT_S", -1.0)
+    with guarded(fleet_file(tmp_path, {"RA": udp_ports(1)[0]})) as guard:
+        guard.check()
+        monkeypatch.setattr(guard_process, "START_S", -1.0)
+        with pytest.raises(GuardError, match="the guard process has said nothing for -1 s"):
+            guard.check()
 
 
 def test_the_guard_flies_nobody_without_a_permit(tmp_path: Path) -> None:

@@ -41,6 +41,8 @@ from robochoc.system.signals import signals_held
 
 SILENT_S = 20.0
 """A guard that says nothing for so long hangs: pilots may wait some seconds for an answer."""
+START_S = 60.0
+"""For so long it may say nothing at first: a busy machine takes its time to start it and its links."""
 _SPARE_S = 5.0
 _UNWRITABLE = "/proc"
 """A folder in which nobody makes files, not even root."""
@@ -134,8 +136,9 @@ class GuardProcess:
         problem = self._problem
         if not problem and self._is_over and not self._ends:
             problem = "the guard process has ended"
-        if not problem and time.monotonic() - self._heard_s > SILENT_S:
-            problem = f"the guard process has said nothing for {SILENT_S:g} s"
+        limit_s = SILENT_S if self.states else START_S
+        if not problem and time.monotonic() - self._heard_s > limit_s:
+            problem = f"the guard process has said nothing for {limit_s:g} s"
         if problem:
             raise GuardError(f"{problem}; {self.fleet.kind.rules.alone}, until another guard reaches them")
 

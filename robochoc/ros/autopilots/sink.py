@@ -16,17 +16,12 @@ from robochoc.flight.mission import Drone
 from robochoc.flight.routes.spacing import SLACK_M
 from robochoc.formats.diagnostics import on_one_line
 from robochoc.ros.autopilots.fleet import AtEnd, FleetError, point_text, read_fleet
-from robochoc.ros.autopilots.guard_process import GuardError, shared
+from robochoc.ros.autopilots.guard_process import START_S, GuardError, shared
 from robochoc.ros.autopilots.kinds import Kind
 from robochoc.ros.autopilots.messages import Phase, State, Target
 from robochoc.ros.autopilots.ways import spacing
 from robochoc.ros.sink import Fields, Sink, SinkError
 from robochoc.ros.waypoint import Waypoint
-
-_START_S = 30.0
-"""A vehicle that is not heard is told so by the guard, after the time that the fleet file gives it. A busy machine may
-take so long to start the guard and its links; a guard that hangs is noticed before.
-"""
 
 
 class FleetSink(Sink):
@@ -141,7 +136,7 @@ class FleetSink(Sink):
             return name in guard.states and guard.states[name].phase is not Phase.CONNECTING
 
         with _reported():
-            guard.wait_for(lambda: all(map(is_known, names)), self._fleet.connect_s + _START_S)
+            guard.wait_for(lambda: all(map(is_known, names)), self._fleet.connect_s + START_S)
         missing = [name for name in names if not is_known(name) or guard.states[name].phase is Phase.OUT]
         if missing:
             state = guard.states.get(missing[0])
