@@ -11,6 +11,7 @@ from typing import Any
 from robochoc.model.cost_units import common_units
 from robochoc.model.costs import normalized, told_cost
 from robochoc.model.problem import INFINITE, Function, ProblemKind, Team
+from robochoc.model.symbols import symbol_table
 from robochoc.model.team_edits import without_robots
 from tests.support.loose_problems import minimum_cost
 from tests.support.program import robochoc_within
@@ -47,6 +48,11 @@ class Truth:
         assert found is not None
         return found
 
+    def values(self, assignment: dict[str, int | str]) -> dict[str, int]:
+        """Return an assignment as the program counts: symbols by their places."""
+        symbols = symbol_table(self.team.robots)
+        return {name: symbols.index(one) if isinstance(one, str) else one for name, one in assignment.items()}
+
     def paid(self, assignment: dict[str, int], without: Collection[str] = ()) -> Fraction | None:
         """Return what an assignment costs, constraint by constraint; None: it breaks one."""
         units = common_units(robot.costs for robot in self.team.robots)
@@ -81,7 +87,7 @@ def check_answer(team: Team, found: dict[str, Any], words: Sequence[str], what: 
         assert verdict == "no-solution" or _cost(found) * truth.sign >= _least(truth, gone), what
         assert verdict != "optimal" or (_cost(found) == best and team.kind is ProblemKind.DISWCSP), what
     if found["assignment"] and verdict != "unknown":
-        assert truth.paid(found["assignment"], gone) == _cost(found), what
+        assert truth.paid(truth.values(found["assignment"]), gone) == _cost(found), what
     if found.get("bound") is not None and not any(word.startswith("--withdraw") for word in words):
         assert truth.best(lost) is None or Fraction(str(found["bound"])) * truth.sign <= _least(truth, lost), what
     if found["verdict"] in {"optimal", "no-solution"} and found.get("confirmed"):
@@ -106,7 +112,7 @@ def _check_withdrawal(
         for name in everybody - lost:
             rest = {variable.name: variable.domain for variable in truth.team[name].variables}
             for values in itertools.product(*rest.values()):
-                more = {**found["assignment"], **dict(zip(rest, values, strict=True))}
+                more = {**truth.values(found["assignment"]), **dict(zip(rest, values, strict=True))}
                 assert truth.paid(more, everybody - {name}) is None, what
 
 
