@@ -74,6 +74,12 @@ def on_page_markdown(markdown: str, *, page: Page, config: MkDocsConfig, files: 
     return with_links(markdown, f"docs/{page.file.src_uri}", page.file.src_uri)
 
 
+def on_page_content(html: str, *, page: Page, config: MkDocsConfig, files: Files) -> str:
+    """Return the page's HTML, in which no line breaks within an option."""
+    del page, config, files
+    return re.sub(r"<code>(--?[a-z][^<\n]{0,28})</code>", r'<code class="option">\1</code>', html)
+
+
 def with_links(text: str, path: str, name: str) -> str:
     """Return `text`, the file `path` of the repository, with links as they have to be on the page `name`."""
 

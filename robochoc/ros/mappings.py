@@ -88,9 +88,17 @@ def mapping_of(topic: str, robot: str, kind: str) -> WaypointMapping:
     if found is None:
         who = f"topic {topic!r} of {robot}" if robot else f"topic {topic!r}"
         problem = f"{who} has the type {kind!r}, and there is no mapping from waypoints to it"
-        known = f"known are {', '.join(kinds())}; a package may offer others ({GROUP})"
+        known = f"known are {', '.join(kinds())}; a package may offer others ({GROUP}){_meant(kind)}"
         raise NoMappingError(on_one_line(f"{problem}: {known}"))
     return found
+
+
+def _meant(kind: str) -> str:
+    """Return the type that may have been meant, as the end of a message; empty if none is like it."""
+    import difflib  # noqa: PLC0415 - start-up: only mistakes need it
+
+    near = difflib.get_close_matches(kind, kinds(), 1)
+    return f"; did you mean {near[0]!r}?" if near else ""
 
 
 def definition_of(kind: str) -> str:

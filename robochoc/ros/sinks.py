@@ -70,7 +70,8 @@ def _offered(group: str, kind: str, name: str, base: type, wrong: type[Exception
         hint = "" if name else f"; a {kind} is written NAME:PLACE, such as mcap:run.mcap"
         if "?" in name:
             hint = f"; options follow a colon: {name.replace('?', ':?', 1)}"
-        raise wrong(on_one_line(not_installed_message(group, kind, name) + hint))
+        also = ("flight",) if group == SOURCES else ()  # the simulated one
+        raise wrong(on_one_line(not_installed_message(group, kind, name, also=also) + hint))
     entry = namesakes[0]
     lacking = _lacking(entry) if len(namesakes) == 1 else ""
     if lacking:

@@ -75,11 +75,16 @@ def installed_protocols() -> tuple[InstalledProtocol, ...]:
     return tuple(_offer(entry, namesakes) for entry, namesakes in all_entry_points(GROUP))
 
 
+def unknown_protocol(name: str) -> str:
+    """Return that no protocol of that name is installed, and which may have been meant."""
+    return not_installed_message(GROUP, "protocol", name, listed_by="robochoc protocols")
+
+
 def installed_protocol(name: str) -> InstalledProtocol:
-    """Return the protocol that is offered as `name`. Raises `UnknownProtocolError`, which lists those there are."""
+    """Return the protocol that is offered as `name`. Raises `UnknownProtocolError`, which suggests others."""
     found = entry_points_named(GROUP, name)
     if not found:
-        raise UnknownProtocolError(not_installed_message(GROUP, "protocol", name))
+        raise UnknownProtocolError(unknown_protocol(name))
     return _offer(found[0], found)
 
 

@@ -59,13 +59,23 @@ def entry_points_named(group: str, name: str) -> list[EntryPoint]:
     return [entry for entry in installed_entry_points(group) if entry.name == name]
 
 
-def not_installed_message(group: str, kind: str, name: str) -> str:
-    """Return that nothing of that name is installed, what is, and what may have been meant."""
+def not_installed_message(group: str, kind: str, name: str, *, also: Sequence[str] = (), listed_by: str = "") -> str:
+    """Return that nothing of that name is installed, what is, and what may have been meant.
+
+    Args:
+        group: The group of entry points.
+        kind: What the names are, in a word.
+        name: The name that was given.
+        also: Names that are known without being installed.
+        listed_by: The command that lists the names, where they are too many for a message.
+    """
     import difflib  # noqa: PLC0415 - start-up: only mistakes need it
 
-    names = entry_point_names(group)
-    near = difflib.get_close_matches(name.lower(), names, 1)
-    hint = f"; did you mean {near[0]!r}?" if near else ""
+    names = sorted([*entry_point_names(group), *also])
+    near = difflib.get_close_matches(name.lower(), names, 3 if listed_by else 1)
+    hint = f"; did you mean {' or '.join(map(repr, near))}?" if near else ""
+    if listed_by:
+        return f"no {kind} {name!r} is installed{hint or ';'} {listed_by!r} lists all {len(names)}"
     return f"no {kind} {name!r} is installed, only: {', '.join(names) or 'none'}{hint}"
 
 

@@ -205,7 +205,8 @@ def test_a_limit_is_status_3(tmp_path: Path, runtime: str) -> None:
 @pytest.mark.parametrize(
     ("words", "said"),
     [
-        (["--protocol", "abtt"], "did you mean 'abt'"),
+        (["--protocol", "abtt"], "no protocol 'abtt' is installed; did you mean 'abt'"),
+        (["--protocol", "qqq"], "no protocol 'qqq' is installed; 'robochoc protocols' lists all "),
         (["--runtime", "threads"], "threads"),
         (["--seed", "-1"], "--seed"),
         (["--timeout", "0"], "--timeout"),

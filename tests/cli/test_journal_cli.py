@@ -275,7 +275,7 @@ def test_a_page_that_no_browser_could_open_is_refused(file: Path, monkeypatch: p
         (("--types", "Okay"), "no type of message is called 'Okay'; there are AddLink, Nogood, Ok"),
         (("--robots", "Robot1.1,X*"), "no robot is called 'X*'; there are Robot1.1, "),
         (("--conversation", "2"), "there is no conversation 2, only 1 to 1"),
-        (("--from", "-1"), "-1 is not in the range x>=0"),
+        (("--from", "-1"), "'-1' is no whole number of at least 0"),
         (("--from", "5", "--to", "3"), "there is no message from 5 to 3, only 0 to "),
         (("--from", "999999"), "there is no message from 999999 on, only 0 to "),
     ],

@@ -144,6 +144,7 @@ def test_a_link_that_cannot_be_opened(tmp_path: Path) -> None:
     ("names", "told"),
     [
         (["RA", "RB", "RC"], "there is no vehicle for RD; each drone with a topic needs one"),
+        (["RA", "RB", "RC", "RX"], "there is no vehicle for RD; no drone is called RX"),
         ([*NAMES, "RX"], "no drone is called RX; the team's drones are RA, RB, RC, RD"),
     ],
 )
@@ -160,6 +161,7 @@ def test_drones_and_vehicles_match(tmp_path: Path, names: list[str], told: str) 
             ["--arm", "--ros", "mcap:run.mcap"],
             "--arm is for --ros mavlink:FILE or crazyflie:FILE; mcap:run.mcap arms nothing",
         ),
+        (["--ros", "mavlink"], "mavlink: which vehicles is not said; name a fleet file, as in mavlink:fleet.yaml"),
         (["--ros", "mavlink:nowhere.yaml"], "nowhere.yaml: No such file or directory; name a fleet file"),
     ],
 )

@@ -223,6 +223,14 @@ def test_who_is_above_makes_room_for_one_that_rises() -> None:
     assert sky.nearest_m >= LEAST_M
 
 
+@pytest.mark.parametrize("above_m", [-0.1, 0.0, 0.1])
+def test_one_that_rises_past_its_place_goes_back_to_it(above_m: float) -> None:
+    sky = hovering((0, 0, TAKEOFF_M + above_m))
+    for _ in range(20):
+        sky.tick()
+    assert sky.flyers["v0"].at == pytest.approx((0, 0, TAKEOFF_M + above_m))
+
+
 # What is refused
 
 

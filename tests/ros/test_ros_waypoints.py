@@ -234,6 +234,8 @@ def test_one_type_for_all_waypoints() -> None:
     assert [kind for _, kind, _, _ in heap.said] == ["geometry_msgs/msg/Vector3"] * 2
     with pytest.raises(NoMappingError, match="'sensor_msgs/Image'"):
         Publisher("team", DRONES, [heap], options=PublishOptions(kind="sensor_msgs/Image"))
+    with pytest.raises(NoMappingError, match=r"; did you mean 'nav_msgs/Path'\?"):
+        Publisher("team", DRONES, [heap], options=PublishOptions(kind="nav_msgs/Pat"))
 
 
 def test_goals_and_drones_are_frames() -> None:

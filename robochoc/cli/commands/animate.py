@@ -7,6 +7,7 @@ from pathlib import Path
 import click
 
 from robochoc.cli.options.ground import ground_map, map_option
+from robochoc.cli.options.numbers import WholeNumber
 from robochoc.cli.options.pages import html_option, serve_option
 from robochoc.cli.options.paths import InputPath, refuse_same_places
 from robochoc.cli.options.saved import saved_outcome, saved_team, team_option
@@ -19,7 +20,7 @@ from robochoc.cli.reports.failures import invalid_input_fails
 @serve_option
 @team_option
 @map_option
-@click.option("--port", type=click.IntRange(0, 65535), default=0, metavar="N", help="Port of --serve; 0: any free one.")
+@click.option("--port", type=WholeNumber(0, 65535), default=0, metavar="N", help="Port of --serve; 0: any free one.")
 @invalid_input_fails
 def animate(
     saved: Path, html: Path | None, folder: Path | None, ground: Path | None, port: int, *, serve: bool

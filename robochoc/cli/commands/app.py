@@ -7,11 +7,12 @@ from pathlib import Path
 
 import click
 
+from robochoc.cli.options.numbers import WholeNumber
 from robochoc.cli.reports.failures import USAGE, Failure
 
 
 @click.command()
-@click.option("--port", type=click.IntRange(0, 65535), default=0, metavar="N", help="Port; 0: any free one.")
+@click.option("--port", type=WholeNumber(0, 65535), default=0, metavar="N", help="Port; 0: any free one.")
 @click.option("--no-open", is_flag=True, help="Print the address, and open no browser.")
 @click.option(
     "--folder",

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from robochoc.cli.options.numbers import Number, WholeNumber
 from robochoc.cli.options.paths import OutputFile
 from robochoc.cli.reports.failures import invalid_input_fails
 
@@ -26,13 +27,13 @@ DEFAULT_SEEDS = "1..10"
 @click.option("--runtime", default="simulator", show_default=True, metavar="NAME", help="simulator, arrays, processes.")
 @click.option("--channel", metavar="NAME", help="Channel model of the simulator: wlan, wpan, wman, wwan.")
 @click.option(
-    "--timeout", type=click.FloatRange(0, min_open=True), default=30, show_default=True, metavar="SECONDS",
+    "--timeout", type=Number(0, min_open=True), default=30, show_default=True, metavar="SECONDS",
     help="Limit of each run.",
 )  # fmt: skip
 @click.option("--over", metavar="PARAMETER", help="A row for each value of it.  [default: the first with several]")
 @click.option("--html", type=OutputFile(), metavar="FILE", help="Write a page with figures and tests.")
 @click.option("--save", type=OutputFile(), metavar="FILE", help="Keep the results: an SQLite file to go on with.")
-@click.option("--jobs", type=click.IntRange(1, 1024), metavar="N", help="Workers.  [default: one for each processor]")
+@click.option("--jobs", type=WholeNumber(1, 1024), metavar="N", help="Workers.  [default: one for each processor]")
 @invalid_input_fails
 def compare(
     problem: tuple[str, ...],

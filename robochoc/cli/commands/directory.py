@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from robochoc.cli.options.network import identity_option, master_option, network_failures_told, patience_option
+from robochoc.cli.options.numbers import WholeNumber
 from robochoc.cli.options.tokens import token_options
 
 if TYPE_CHECKING:
@@ -33,7 +34,7 @@ if TYPE_CHECKING:
     ),
 )
 @patience_option("Time without contact after which the master is given up.", 10.0)
-@click.option("--at-most", type=click.IntRange(1), metavar="N", help="At most N agents.")
+@click.option("--at-most", type=WholeNumber(1), metavar="N", help="At most N agents.")
 @click.option("--watch", "watching", is_flag=True, help="Print agents that register and leave, until Ctrl-C.")
 @click.option("--sl", is_flag=True, help="Print the answer in FIPA-SL0, as it is received.")
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON object per agent.")

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 
 import click
 
+from robochoc.cli.options.numbers import WholeNumber
 from robochoc.cli.options.paths import InputPath, OutputFile
 from robochoc.cli.reports.failures import INVALID, LOST, USAGE, Failure, invalid_input_fails
 
@@ -41,7 +42,7 @@ def experiment() -> None:
 @experiment.command(short_help="Carry out a study, or go on with it.")
 @click.argument("study", type=InputPath(), metavar="STUDY.toml")
 @click.option("-o", "--output", type=OutputFile(), metavar="FILE", help="File of the results.  [default: STUDY.sqlite]")
-@click.option("--jobs", type=click.IntRange(1, 1024), metavar="N", help="Workers.  [default: one for each processor]")
+@click.option("--jobs", type=WholeNumber(1, 1024), metavar="N", help="Workers.  [default: one for each processor]")
 @click.option("--again", type=click.Choice(AGAIN), multiple=True, help="Run again also what has ended so. Repeatable.")
 @click.option("--dry-run", is_flag=True, help="Show how many runs there are, and run none.")
 @click.option("--scheduler", metavar="ADDRESS", help="Run on the Dask cluster there, such as tcp://10.0.0.1:8786.")

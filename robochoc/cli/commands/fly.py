@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from robochoc.cli.options.ground import ground_map, map_option
+from robochoc.cli.options.numbers import WholeNumber
 from robochoc.cli.options.pages import html_option, serve_option
 from robochoc.cli.options.paths import InputPath, refuse_same_places
 from robochoc.cli.options.ros import FRAME, flight_options, ros_options
@@ -42,7 +43,7 @@ _SECTIONS: Sections = {
 @map_option
 @ros_options
 @flight_options
-@click.option("--seed", type=click.IntRange(0), default=0, show_default=True, metavar="N", help="Seed of --gusts.")
+@click.option("--seed", type=WholeNumber(0), default=0, show_default=True, metavar="N", help="Seed of --gusts.")
 @html_option()
 @serve_option
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")

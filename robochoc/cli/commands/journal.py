@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 
 import click
 
+from robochoc.cli.options.numbers import WholeNumber
 from robochoc.cli.options.paths import InputPath, OutputFile, refuse_same_places
 from robochoc.cli.options.saved import saved_journal
 from robochoc.cli.reports.failures import INVALID, USAGE, Failure
@@ -47,10 +48,10 @@ def show(file: Path) -> None:
 @click.option("--robots", default="", metavar="PATTERNS", help="Only messages between these robots: Robot3.1,Robot2.*")
 @click.option("--types", default="", metavar="PATTERNS", help="Only these types of messages: Ok,Nogood")
 @click.option(
-    "--from", "first", type=click.IntRange(0), default=0, metavar="N", help="First message; they are numbered from 0."
+    "--from", "first", type=WholeNumber(0), default=0, metavar="N", help="First message; they are numbered from 0."
 )
-@click.option("--to", "last", type=click.IntRange(0), metavar="N", help="Last message.")
-@click.option("--conversation", type=click.IntRange(1), metavar="N", help="Only run (or epoch) N, numbered from 1.")
+@click.option("--to", "last", type=WholeNumber(0), metavar="N", help="Last message.")
+@click.option("--conversation", type=WholeNumber(1), metavar="N", help="Only run (or epoch) N, numbered from 1.")
 def export(
     file: Path,
     form: str,

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from robochoc.cli.options.network import PlaceType, authority_option, network_failures_told, patience_option
+from robochoc.cli.options.numbers import Number, WholeNumber
 from robochoc.cli.options.paths import TeamFolder
 from robochoc.cli.options.recording import journal_option, recording, shown_and_flushed
 from robochoc.cli.options.ros import improve_option
@@ -69,7 +70,7 @@ _SECTIONS: Sections = {
     metavar="NAME",
     help="Another name or address of this machine; needed with --listen 0.0.0.0. Repeatable.",
 )
-@click.option("--robots", "number", type=click.IntRange(1), metavar="N", help="Start when N robots have registered.")
+@click.option("--robots", "number", type=WholeNumber(1), metavar="N", help="Start when N robots have registered.")
 @click.option(
     "--team",
     type=TeamFolder(),
@@ -79,7 +80,7 @@ _SECTIONS: Sections = {
 @protocol_option(central=False)
 @settings_option
 @click.option(
-    "--seed", type=click.IntRange(0), default=0, show_default=True, metavar="N", help="Seed of protocols that draw."
+    "--seed", type=WholeNumber(0), default=0, show_default=True, metavar="N", help="Seed of protocols that draw."
 )
 @withdraw_option
 @click.option("--private", is_flag=True, help="Robots do not report their values, only that they have one.")
@@ -91,7 +92,7 @@ _SECTIONS: Sections = {
 @messages_option
 @click.option(
     "--message-loss",
-    type=click.FloatRange(0, 0.9),
+    type=Number(0, 0.9),
     default=0.0,
     metavar="P",
     help="Robots drop what they receive with this probability.",

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from robochoc.cli.options.local_problems import limits, local_options
+from robochoc.cli.options.numbers import WholeNumber
 from robochoc.cli.options.paths import InputPath, OutputFile, refuse_same_places
 from robochoc.cli.options.saved import journal_team_option, saved_journal
 from robochoc.cli.reports.failures import INVALID, USAGE, Failure, failures_told, invalid_input_fails
@@ -21,7 +22,7 @@ MEASURES = ("linear", "entropy", "known")
 
 @click.command()
 @click.argument("journal", type=InputPath(), metavar="JOURNAL")
-@click.option("--run", "number", type=click.IntRange(1), metavar="N", help="Run or epoch N.  [default: the last]")
+@click.option("--run", "number", type=WholeNumber(1), metavar="N", help="Run or epoch N.  [default: the last]")
 @click.option(
     "--measure", type=click.Choice(MEASURES), default="entropy", show_default=True, help="Measure of the table."
 )

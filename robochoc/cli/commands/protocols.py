@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import difflib
-
 import click
 
 from robochoc.cli.options.names import ProtocolName
 from robochoc.cli.reports.failures import USAGE, Failure
 from robochoc.run.defaults import AUTO
+from robochoc.run.registry import unknown_protocol
 
 PURPOSES = ("satisfaction", "costs", "asymmetric")
 
@@ -51,10 +50,7 @@ def protocols(name: str | None, *, purpose: str | None, as_json: bool, long: boo
         return
     row: Row | None = next((row for row in found if row.name == name), None)
     if row is None:
-        known = [row.name for row in found]
-        near = difflib.get_close_matches(name.lower(), known, 1)
-        hint = f"; did you mean '{near[0]}'?" if near else ""
-        raise Failure(USAGE, on_one_line(f"no protocol '{name}' is installed, only: {', '.join(known)}{hint}"))
+        raise Failure(USAGE, on_one_line(unknown_protocol(name)))
     if as_json:
         click.echo(protocols_json([row], explain=True), nl=False)
     elif row.broken:

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from robochoc.cli.options.numbers import Number, WholeNumber
 from robochoc.cli.options.paths import InputPath, teams_at
 from robochoc.cli.options.ros_setup import ros_errors_fail
 from robochoc.cli.reports.failures import USAGE, Failure, failures_told, invalid_input_fails
@@ -54,15 +55,15 @@ _SLICE_S = 0.2
 )
 @click.option(
     "--timeout",
-    type=click.FloatRange(0, min_open=True),
+    type=Number(0, min_open=True),
     default=60.0,
     show_default=True,
     metavar="SECONDS",
     help="The longest time for one request; a request may ask for less.",
 )
-@click.option("--seed", type=click.IntRange(0), default=0, show_default=True, metavar="N", help="Seed of all chance.")
+@click.option("--seed", type=WholeNumber(0), default=0, show_default=True, metavar="N", help="Seed of all chance.")
 @click.option("--feedback", is_flag=True, help="While a team decides, tell on /robochoc/feedback how far it is.")
-@click.option("--requests", type=click.IntRange(1), metavar="N", help="End after N answers.  [default: at Ctrl-C]")
+@click.option("--requests", type=WholeNumber(1), metavar="N", help="End after N answers.  [default: at Ctrl-C]")
 @invalid_input_fails
 def serve(
     paths: tuple[Path, ...],

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from robochoc.cli.commands.sniff_master import Page, asks_master, master_options, sniff_master
+from robochoc.cli.options.numbers import WholeNumber
 from robochoc.cli.options.paths import InputPath
 from robochoc.cli.options.saved import JOURNAL_STEP
 from robochoc.cli.options.sections import COMMON, SectionedCommand, Sections
@@ -29,9 +30,7 @@ _SECTIONS: Sections = {
 @click.command(cls=SectionedCommand, sections=_SECTIONS)
 @click.argument("journal", type=InputPath(), metavar="[JOURNAL]", required=False)
 @master_options
-@click.option(
-    "--port", type=click.IntRange(0, 65535), default=0, metavar="N", help="Port of the page; 0: any free one."
-)
+@click.option("--port", type=WholeNumber(0, 65535), default=0, metavar="N", help="Port of the page; 0: any free one.")
 @click.option("--open", "open_browser", is_flag=True, help="Open the page in a browser.")
 @click.option(
     "--robots",

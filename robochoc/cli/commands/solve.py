@@ -11,6 +11,7 @@ from robochoc.cli.commands.solve_team import solve_team
 from robochoc.cli.options.channel import CHANNEL_NAME
 from robochoc.cli.options.channel import NAMES as CHANNELS
 from robochoc.cli.options.local_problems import local_options
+from robochoc.cli.options.numbers import Number, WholeNumber
 from robochoc.cli.options.order import NAMES as ORDERS
 from robochoc.cli.options.order import ORDER_NAME
 from robochoc.cli.options.pages import html_option, serve_option
@@ -89,7 +90,7 @@ _SECTIONS: Sections = {
 )
 @click.option(
     "--seed",
-    type=click.IntRange(0),
+    type=WholeNumber(0),
     default=0,
     show_default=True,
     metavar="N",
@@ -104,7 +105,7 @@ _SECTIONS: Sections = {
 )
 @click.option(
     "--delay",
-    type=click.IntRange(0),
+    type=WholeNumber(0),
     default=0,
     show_default=True,
     metavar="CHECKS",
@@ -118,14 +119,14 @@ _SECTIONS: Sections = {
 )
 @click.option(
     "--message-loss",
-    type=click.FloatRange(0, 0.9),
+    type=Number(0, 0.9),
     default=0.0,
     metavar="P",
     help="Lose each message with this probability, for good.",
 )
 @click.option(
     "--timeout",
-    type=click.FloatRange(0, min_open=True),
+    type=Number(0, min_open=True),
     metavar="SECONDS",
     help="Stop after this time: verdict unknown, exit status 3.",
 )
@@ -135,13 +136,13 @@ _SECTIONS: Sections = {
 @messages_option
 @click.option(
     "--ncccs",
-    type=click.IntRange(1),
+    type=WholeNumber(1),
     metavar="N",
     help="Simulator: stop after N non-concurrent constraint checks.",
 )
 @click.option(
     "--cycles",
-    type=click.IntRange(1),
+    type=WholeNumber(1),
     metavar="N",
     help="Stop after N cycles of --schedule cycles.",
 )
@@ -154,7 +155,7 @@ _SECTIONS: Sections = {
 @click.option(
     "--spare",
     "spares",
-    type=click.IntRange(0),
+    type=WholeNumber(0),
     default=0,
     metavar="[=N]",
     help="Restart up to N lost robots (1 without a number). Implies --on-loss withdraw.",

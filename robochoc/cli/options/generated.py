@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any, TypeAlias
 
 import click
 
+from robochoc.cli.options.numbers import Number, WholeNumber
 from robochoc.cli.options.paths import InputPath
 from robochoc.cli.reports.failures import invalid_input_fails
 
@@ -34,7 +35,7 @@ def number(name: str, text: str, *, least: int = 1, most: int = MAX, default: in
         required=default is None,
         default=default,
         show_default=default is not None,
-        type=click.IntRange(least, most),
+        type=WholeNumber(least, most),
         metavar="N",
         help=text,
     )
@@ -43,12 +44,12 @@ def number(name: str, text: str, *, least: int = 1, most: int = MAX, default: in
 def share(name: str, text: str, default: float) -> Callable[..., Any]:
     """Return an option that takes a share or a probability."""
     return click.option(
-        name, default=default, show_default=True, type=click.FloatRange(0, 1), metavar="P", help=f"{text}, 0 to 1."
+        name, default=default, show_default=True, type=Number(0, 1), metavar="P", help=f"{text}, 0 to 1."
     )
 
 
 seed_option = click.option(
-    "--seed", type=click.IntRange(0), default=0, show_default=True, metavar="N", help="Random seed."
+    "--seed", type=WholeNumber(0), default=0, show_default=True, metavar="N", help="Random seed."
 )
 
 
@@ -123,7 +124,7 @@ def graph_options(command: Command) -> Command:
     """Add the options of constraint graphs, which `graph_of` takes out again."""
     for option in reversed(
         (
-            click.option("--agents", type=click.IntRange(1, MAX_NODES), metavar="N", help="Number of robots."),
+            click.option("--agents", type=WholeNumber(1, MAX_NODES), metavar="N", help="Number of robots."),
             click.option(
                 "--graph",
                 default="random",
@@ -134,16 +135,16 @@ def graph_options(command: Command) -> Command:
             ),
             click.option("--connected", is_flag=True, help="random, small-world: draw graphs until one is connected."),
             click.option(
-                "--links", type=click.IntRange(1), metavar="N", help="scale-free: links of a new node.  [default: 2]"
+                "--links", type=WholeNumber(1), metavar="N", help="scale-free: links of a new node.  [default: 2]"
             ),
             click.option(
-                "--neighbours", type=click.IntRange(2), metavar="N", help="small-world: nearest nodes.  [default: 4]"
+                "--neighbours", type=WholeNumber(2), metavar="N", help="small-world: nearest nodes.  [default: 4]"
             ),
             click.option(
                 "--rewiring", type=float, metavar="P", help="small-world: share of edges moved.  [default: 0.1]"
             ),
             click.option(
-                "--rows", type=click.IntRange(1), metavar="N", help="grid: rows.  [default: nearest to a square]"
+                "--rows", type=WholeNumber(1), metavar="N", help="grid: rows.  [default: nearest to a square]"
             ),
             click.option("--torus", is_flag=True, help="grid: the borders meet."),
         )

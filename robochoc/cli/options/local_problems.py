@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING, TypeVar
 
 import click
 
+from robochoc.cli.options.numbers import Number, WholeNumber
+
 if TYPE_CHECKING:
     from robochoc.solver.compile import Limits
 
@@ -15,7 +17,7 @@ Command = TypeVar("Command", bound=Callable[..., object])
 _LOCAL_OPTIONS = (
     click.option(
         "--local-solutions",
-        type=click.IntRange(1),
+        type=WholeNumber(1),
         default=100_000,
         show_default=True,
         metavar="N",
@@ -23,7 +25,7 @@ _LOCAL_OPTIONS = (
     ),
     click.option(
         "--local-timeout",
-        type=click.FloatRange(0, min_open=True),
+        type=Number(0, min_open=True),
         default=60.0,
         show_default=True,
         metavar="SECONDS",

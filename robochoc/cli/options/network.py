@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, TypeVar
 
 import click
 
+from robochoc.cli.options.numbers import Number
 from robochoc.cli.options.paths import InputPath
 from robochoc.cli.reports.failures import INVALID, LIMIT, LOST, USAGE, Failure, failures_told
 
@@ -58,7 +59,7 @@ def patience_option(text: str, default_s: float, name: str = "patience_s") -> Ca
     return click.option(
         "--patience",
         name,
-        type=click.FloatRange(0, min_open=True),
+        type=Number(0, min_open=True),
         default=default_s,
         show_default=True,
         metavar="SECONDS",

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, TypeVar
 
 import click
 
+from robochoc.cli.options.numbers import WholeNumber
 from robochoc.cli.options.paths import TeamFolder
 
 if TYPE_CHECKING:
@@ -55,6 +56,6 @@ def reading_options(command: _Command) -> _Command:
         help="One robot for variables with the same match (or first group).",
     )
     infinity = click.option(
-        "--infinity", type=click.IntRange(1), metavar="N", help="Costs of N or more forbid (maximising: of -N or less)."
+        "--infinity", type=WholeNumber(1), metavar="N", help="Costs of N or more forbid (maximising: of -N or less)."
     )
     return infinity(owner(command))

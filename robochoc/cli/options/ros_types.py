@@ -7,6 +7,8 @@ from typing import Any
 
 import click
 
+from robochoc.cli.options.numbers import Number
+
 AXES = 3
 
 
@@ -47,8 +49,12 @@ class WindType(PointType):
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> tuple[float, ...]:  # noqa: ANN401 - click's signature
         """Return the numbers of `1,2,0.5`, and for `3` those of `3,0,0`."""
-        alone = isinstance(value, str) and "," not in value
-        return super().convert(f"{value},0,0" if alone else value, param, ctx)
+        if not isinstance(value, str) or "," in value:
+            return super().convert(value, param, ctx)
+        try:
+            return super().convert(f"{value},0,0", param, ctx)
+        except click.BadParameter:
+            self.fail(f"{value!r} is no speed such as 3, nor three numbers such as 1,2,3", param, ctx)
 
 
 class FailureType(click.ParamType["tuple[str, float]"]):
@@ -74,7 +80,7 @@ class FailureType(click.ParamType["tuple[str, float]"]):
         return name, at_s
 
 
-class Finite(click.FloatRange):
+class Finite(Number):
     """A finite number in a range."""
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:  # noqa: ANN401 - click's signature

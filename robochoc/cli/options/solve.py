@@ -15,6 +15,7 @@ import click
 from robochoc.cli.options.channel import channel_for
 from robochoc.cli.options.local_problems import limits
 from robochoc.cli.options.names import ProtocolName
+from robochoc.cli.options.numbers import Number, WholeNumber
 from robochoc.cli.options.order import GIVEN
 from robochoc.cli.options.ros import RosOptions
 from robochoc.cli.options.sections import SectionedCommand
@@ -68,7 +69,7 @@ withdraw_option = click.option(
 )
 deadline_option = click.option(
     "--deadline",
-    type=click.FloatRange(0, min_open=True),
+    type=Number(0, min_open=True),
     metavar="SECONDS",
     help="Stop by then with the best solution so far.",
 )
@@ -80,7 +81,7 @@ preprocess_option = click.option(
 )
 messages_option = click.option(
     "--messages",
-    type=click.IntRange(1),
+    type=WholeNumber(1),
     metavar="N",
     help="Stop after about N messages (unknown, status 3).",
 )

@@ -105,6 +105,8 @@ class Fleet(msgspec.Struct, frozen=True):
 def read_fleet(path: Path, kind: Kind = Kind.MAVLINK) -> Fleet:
     """Return the fleet in the file at `path`. Raises `FleetError`."""
     hint = f"name a fleet file, as in {kind}:fleet.yaml"
+    if path == Path():  # --ros mavlink, without a place
+        raise FleetError(f"{kind}: which vehicles is not said; {hint}")
     try:
         if path.is_fifo():  # to open it would be to wait for a writer
             content = None

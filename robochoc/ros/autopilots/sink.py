@@ -58,7 +58,8 @@ class FleetSink(Sink):
         if doubled:
             raise self._wrong(f"two drones are called {doubled[0]}", "a vehicle flies for one")
         if missing:
-            raise self._wrong(f"there is no vehicle for {missing[0]}", "each drone with a topic needs one")
+            nobodys = f"no drone is called {strange[0]}" if strange else "each drone with a topic needs one"
+            raise self._wrong(f"there is no vehicle for {missing[0]}", nobodys)
         if strange:
             known = ", ".join(self._names.values())
             raise self._wrong(f"no drone is called {strange[0]}", f"the team's drones are {known}")

@@ -172,6 +172,8 @@ class Traffic:
             if craft.place is None or not self._is_through(step, craft.place):
                 break
             craft.done += 1
+            if craft.done == len(craft.steps):  # near may be where it stops for another reason, as above its take-off
+                craft.setpoint = step.end
         following = craft.steps[craft.done : craft.released]
         is_corner = bool(following) and following[-1].is_corner
         while craft.released < len(craft.steps) and not is_corner:

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from robochoc.cli.options.generated import GRAPH, OUTPUT, graph_of, graph_options, number, seed_option, team_written
+from robochoc.cli.options.numbers import Number, WholeNumber
 from robochoc.cli.options.sections import COMMON, SectionedCommand
 
 if TYPE_CHECKING:
@@ -38,7 +39,7 @@ places_option = number("--places", "Decimal places of costs.", least=0, most=9, 
 )
 @click.option(
     "--max-cost",
-    type=click.IntRange(0, MAX_COST),
+    type=WholeNumber(0, MAX_COST),
     metavar="COST",
     help="Make a DisWCSP: each allowed pair of values has a cost, uniform from 0 to COST.",
 )
@@ -123,7 +124,7 @@ def coloring(**problem: Any) -> Team:  # noqa: ANN401 - `coloring`'s own
     "--coupling",
     default=1.6,
     show_default=True,
-    type=click.FloatRange(0, MAX_COST),
+    type=Number(0, MAX_COST),
     metavar="B",
     help="Couplings are uniform from -B to B.",
 )
@@ -131,7 +132,7 @@ def coloring(**problem: Any) -> Team:  # noqa: ANN401 - `coloring`'s own
     "--field",
     default=0.05,
     show_default=True,
-    type=click.FloatRange(0, MAX_COST),
+    type=Number(0, MAX_COST),
     metavar="R",
     help="Fields are uniform from -R to R.",
 )

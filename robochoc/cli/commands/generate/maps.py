@@ -17,6 +17,7 @@ from robochoc.cli.options.generated import (
     seed_option,
     team_written,
 )
+from robochoc.cli.options.numbers import Number, WholeNumber
 from robochoc.cli.options.paths import InputPath
 from robochoc.cli.options.sections import COMMON, SectionedCommand
 
@@ -33,7 +34,7 @@ _OWN = ("map", "agents", "at", "radius", "speed", "within", "cell", "cells")
 def metres(name: str, text: str, default: float | None = None, unit: str = "M") -> Callable[..., Any]:
     """Return an option that takes a length, or another measure that is not negative."""
     return click.option(
-        name, default=default, show_default=default is not None, type=click.FloatRange(0), metavar=unit, help=text
+        name, default=default, show_default=default is not None, type=Number(0), metavar=unit, help=text
     )
 
 
@@ -51,7 +52,7 @@ def map_options(command: Command) -> Command:
             ),
             click.option(
                 "--agents",
-                type=click.IntRange(1, MAX_ROBOTS),
+                type=WholeNumber(1, MAX_ROBOTS),
                 metavar="N",
                 help="Number of robots.  [default: as many as --at has]",
             ),
@@ -64,7 +65,7 @@ def map_options(command: Command) -> Command:
             metres("--cell", "Side of a cell.  [default: as small as --cells allows]"),
             click.option(
                 "--cells",
-                type=click.IntRange(1, MAX_CELLS),
+                type=WholeNumber(1, MAX_CELLS),
                 metavar="N",
                 help="Maximum number of free cells, which are values.  [default: 100; with --cell: 1000]",
             ),
@@ -105,7 +106,7 @@ def choice_of(options: Options) -> MapChoice:
     "--heading",
     default=0.0,
     show_default=True,
-    type=click.FloatRange(-360, 360),
+    type=Number(-360, 360),
     metavar="DEGREES",
     help="Where the formation looks: counterclockwise from x.",
 )

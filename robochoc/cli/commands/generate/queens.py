@@ -7,13 +7,14 @@ from pathlib import Path
 import click
 
 from robochoc.cli.options.generated import next_step
+from robochoc.cli.options.numbers import WholeNumber
 from robochoc.cli.options.paths import InputPath
 from robochoc.cli.reports.failures import invalid_input_fails
 
 
 @click.command(short_help="3D N^2 queens: one robot per cell or row of the board.")
 @click.option(
-    "--n", required=True, type=click.IntRange(1, 64), metavar="N", help="Side of the cube: N x N drones, N levels."
+    "--n", required=True, type=WholeNumber(1, 64), metavar="N", help="Side of the cube: N x N drones, N levels."
 )
 @click.option(
     "--model",

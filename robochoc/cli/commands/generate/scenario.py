@@ -7,6 +7,7 @@ from pathlib import Path
 import click
 
 from robochoc.cli.options.generated import seed_option
+from robochoc.cli.options.numbers import Number, WholeNumber
 from robochoc.cli.options.paths import InputPath, TeamFolder
 from robochoc.cli.reports.failures import invalid_input_fails
 
@@ -15,12 +16,12 @@ KINDS = ("remove-value", "add-value", "remove-constraint", "add-constraint", "re
 
 @click.command(short_help="A random scenario for a team: what changes over time.")
 @click.argument("team", type=TeamFolder())
-@click.option("--events", required=True, type=click.IntRange(1, 1000), metavar="N", help="Number of events.")
+@click.option("--events", required=True, type=WholeNumber(1, 1000), metavar="N", help="Number of events.")
 @click.option(
     "--rate",
     default=0.1,
     show_default=True,
-    type=click.FloatRange(0, 1),
+    type=Number(0, 1),
     metavar="R",
     help="Changes in an event, as a share of the team's shared constraints; at least one.",
 )
@@ -29,7 +30,7 @@ KINDS = ("remove-value", "add-value", "remove-constraint", "add-constraint", "re
 )
 @click.option(
     "--after",
-    type=click.IntRange(1, 1_000_000),
+    type=WholeNumber(1, 1_000_000),
     metavar="N",
     help="Events happen after N messages.  [default: when the problem before is solved]",
 )
