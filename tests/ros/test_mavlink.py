@@ -245,7 +245,7 @@ def all_in(guard: GuardProcess, phase: Phase) -> Callable[[], bool]:
 
 def test_a_guard_may_say_nothing_for_longer_at_first(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     mute = tmp_path / "python"
-    mute.write_text("#!/bin/sh\nexec cat >/dev/null\n", encoding="utf-8")
+    mute.write_text("#!/bin/sh\ncat >/dev/null\nexit 0\n", encoding="utf-8")
     mute.chmod(0o755)
     monkeypatch.setattr(sys, "executable", str(mute))
     monkeypatch.setattr(guard_process, "SILENT_S", -1.0)
