@@ -1,8 +1,5 @@
 """The cells of a map: squares of many pixels, which are values of variables.
 
-The centre of a cell lies at whole multiples of its side in the map's frame. So the waypoint of a cell is a pair of
-integers, and the side is the scale: integers x scale are metres in the map's frame, exactly.
-
 A cell is free if all pixels that it touches are free, and a robot fits at its centre. Cells are where robots go; how
 they get there is found on the pixels (`travel.py`), so that a door narrower than a cell is still a way.
 """
@@ -12,23 +9,23 @@ from __future__ import annotations
 from dataclasses import dataclass
 from fractions import Fraction
 from functools import cached_property
-from math import ceil, floor
+from math import floor
 
 import numpy as np
 import numpy.typing as npt
 
-from robochoc.formats.occupancy.grid import Counts, Flags, OccupancyGrid, before
+from robochoc.formats.occupancy.grid import Flags, OccupancyGrid, before
 from robochoc.formats.occupancy.turn import Place as Place  # noqa: PLC0414 - from here, too
+from robochoc.generators.maps.cell_grid import CellGrid, sums
 from robochoc.generators.maps.room import Room
 from robochoc.generators.maps.turned import TurnedSquares
 
-_HALF = Fraction(1, 2)
 _CHECKED_MAX = 10_000
 """Where more cells are found, they are too many, however many of them are a little too near to a wall."""
 
 
 @dataclass(frozen=True, eq=False)
-class Cells:
+class Cells(CellGrid):
     """The cells of a map.
 
     Cells are numbered row by row from 0, the row of the lowest y first.
@@ -48,21 +45,10 @@ class Cells:
         """The pixels where the centre of a robot can be."""
         return self.room.passable
 
-    @cached_property
-    def first(self) -> tuple[int, int]:
-        """The x and the y of cell 0, in sides of a cell."""
-        x, y = (floor(min(ends) / self.side + _HALF) for ends in zip(*self.grid.corners, strict=True))
-        return x, y
-
-    @cached_property
-    def columns(self) -> int:
-        """The number of columns."""
-        return self._count(0)
-
-    @cached_property
-    def rows(self) -> int:
-        """The number of rows."""
-        return self._count(1)
+    @property
+    def ends(self) -> list[tuple[Fraction, Fraction]]:
+        """For each axis the lowest and the highest coordinate of the map, in metres."""
+        return [(min(ends), max(ends)) for ends in zip(*self.grid.corners, strict=True)]
 
     @cached_property
     def free(self) -> tuple[int, ...]:
@@ -72,7 +58,7 @@ class Cells:
             return self._numbers(touched == flagged, self._turned.centres(self.room.parts))
         low, high, middle = zip(self._pixels(1), self._pixels(0), strict=True)
         sizes = np.outer(high[0] - low[0], high[1] - low[1])  # pixels beside the map count, and are not free
-        found = _sums(self.grid.free_before, low, high) == sizes
+        found = sums(self.grid.free_before, low, high) == sizes
         return self._numbers(found, np.ix_(*middle))
 
     @cached_property
@@ -81,22 +67,12 @@ class Cells:
         if not self.grid.turn.is_none:
             return tuple(np.flatnonzero(self._turned.counts(self.grid.occupied)[1]).tolist())
         low, high, _ = zip(self._pixels(1), self._pixels(0), strict=True)
-        return tuple(np.flatnonzero(_sums(before(self.grid.occupied), low, high)).tolist())
-
-    @property
-    def counts(self) -> tuple[int, int]:
-        """The number of columns and of rows."""
-        return self.columns, self.rows
-
-    def coordinates(self, cell: int) -> tuple[int, int]:
-        """Return the x and the y of a cell's centre, in sides of a cell."""
-        row, column = divmod(cell, self.columns)
-        return self.first[0] + column, self.first[1] + row
+        return tuple(np.flatnonzero(sums(before(self.grid.occupied), low, high)).tolist())
 
     def centre(self, cell: int) -> Place:
         """Return the place of a cell's centre."""
-        x, y = self.coordinates(cell)
-        return x * self.side, y * self.side
+        x, y = super().centre(cell)
+        return x, y
 
     def pixel(self, place: tuple[Fraction, ...]) -> tuple[int, int] | None:
         """Return the row and the column of the pixel of a place; None: it is not on the map."""
@@ -108,18 +84,9 @@ class Cells:
         """Return whether a robot fits at a place on the map."""
         return self.room.fits(self.grid.in_pixels((place[0], place[1])))
 
-    def containing(self, place: tuple[Fraction, ...]) -> tuple[int, int]:
-        """Return the x and the y, in sides of a cell, of the cell in which a place lies."""
-        x, y = (floor(one / self.side + _HALF) for one in place)
-        return x, y
-
-    def _count(self, axis: int) -> int:
-        behind: int = ceil(max(corner[axis] for corner in self.grid.corners) / self.side + _HALF)
-        return behind - self.first[axis]
-
     @cached_property
     def _turned(self) -> TurnedSquares:
-        return TurnedSquares(self.grid, self.side, self.first, (self.rows, self.columns))
+        return TurnedSquares(self.grid, self.side, (self.first[0], self.first[1]), (self.rows, self.columns))
 
     def _numbers(self, found: Flags, centres: tuple[npt.NDArray[np.int64], ...]) -> tuple[int, ...]:
         """Return the numbers of the cells that are found, where a robot fits at the centre.
@@ -137,30 +104,4 @@ class Cells:
 
     def _pixels(self, axis: int) -> tuple[npt.NDArray[np.int64], ...]:
         """Return for each column (`axis` 0) or row its first pixel, the one behind its last, and its centre's point."""
-        corner, size, first = self.grid.origin[axis], self.grid.resolution, self.first[axis]
-        found = [
-            (
-                floor(((number - _HALF) * self.side - corner) / size),
-                ceil(((number + _HALF) * self.side - corner) / size),
-                floor((number * self.side - corner) / size * self.room.parts),
-            )
-            for number in range(first, first + self._count(axis))
-        ]
-        return tuple(np.array(found, dtype=np.int64).T)
-
-
-def _sums(table: Counts, low: tuple[npt.NDArray[np.int64], ...], high: tuple[npt.NDArray[np.int64], ...]) -> Counts:
-    """Return how many flags are set in each rectangle of rows `low[0]` to `high[0]` and columns likewise.
-
-    `table` is what `before` returns for the flags.
-    """
-    height, width = table.shape
-    bottom, top = (ends[0].clip(0, height - 1) for ends in (low, high))
-    left, right = (ends[1].clip(0, width - 1) for ends in (low, high))
-    found: Counts = (
-        table[np.ix_(top, right)]
-        - table[np.ix_(bottom, right)]
-        - table[np.ix_(top, left)]
-        + table[np.ix_(bottom, left)]
-    )
-    return found
+        return self.spans(axis, self.grid.origin[axis], self.grid.resolution, self.room.parts)
