@@ -42,7 +42,7 @@ class Walls:
 
     @property
     def unknown(self) -> Flags:
-        """What is neither free nor occupied."""
+        """The pixels, or voxels, that are neither free nor occupied."""
         return self.solid & ~self.occupied
 
 

@@ -59,7 +59,7 @@ _BLOCK = 0.94
 _BLOCK_OPACITY = 0.85
 _WALL_OPACITY = 0.6
 _BESIDE_UNIT = 3.4
-"""How far from its numbers, in their heights, the name of an axis with a unit is: it is wider than one without."""
+"""The distance of the name of an axis with a unit from its numbers, in their heights: it is wider than one without."""
 _FLAT = 0.02
 """The height, in cells, of what lies flat on the ground."""
 

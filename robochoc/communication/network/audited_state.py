@@ -127,7 +127,7 @@ class AuditedSearchState(SearchState):
 
     @property
     def snapshot_checks(self) -> Mapping[str, CheckResult] | None:
-        """What all robots have found of the snapshot that they were to check; None while some have not answered."""
+        """The findings of all robots on the snapshot that they were to check; None while some have not answered."""
         return None if self._present - self._snapshot_checks.keys() else self._snapshot_checks
 
     def lose(self, name: str, why: str) -> None:

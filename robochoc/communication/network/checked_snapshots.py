@@ -20,7 +20,7 @@ from robochoc.protocols.findings import Incumbent
 
 
 class _Part(NamedTuple):
-    """What a robot is asked for: what it has now, had in a `cycle`, or would have with a `value`."""
+    """The values that a robot is asked for: those of now, of a `cycle`, or those with a `value`."""
 
     cycle: int | None = None
     value: Value | None = None
@@ -42,7 +42,7 @@ class CheckedSnapshots:
         self._send = send
         self._asked = 0
         self._first: RunResult | None = None
-        """What the robots have told, while they are asked for something better."""
+        """The values that robots have told, while they are asked for better ones."""
         self._unchecked: RunResult | None = None
         self._checked: RunResult | None = None
         self._tried: set[tuple[float, frozenset[tuple[str, Value]]]] = set()

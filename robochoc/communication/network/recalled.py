@@ -1,4 +1,4 @@
-"""What a robot has told of its values in the middle of a search: the master may say that it counts."""
+"""The values that a robot has told in the middle of a search: the master may say that they count."""
 
 from __future__ import annotations
 

@@ -25,7 +25,7 @@ from robochoc.flight.routes.voxel_plan import Resting, VoxelPlan
 _ORDERS = 6
 """The number of orders of precedence that are tried."""
 _AWAY_M = (3.0, 12.0, math.inf)
-"""How far away a drone looks for a point where it is in nobody's way, one after the other."""
+"""The distances within which a drone looks for a point where it is in nobody's way, one after the other."""
 _SPOTS = 2_000
 """The number of such points of which the best is taken."""
 

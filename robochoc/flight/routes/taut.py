@@ -13,7 +13,7 @@ import numpy as np
 from robochoc.flight.routes.spacing import Array, norms
 
 Sees = Callable[[Array, Array, float], bool]
-"""Whether a straight line between two points keeps a distance from all walls."""
+"""Returns whether a straight line between two points keeps a distance from all walls."""
 _Numbered = Callable[[int, int], bool]
 
 _AROUND = (-16, -8, -4, -2, -1, 0, 1, 2, 4, 8, 16)

@@ -21,7 +21,7 @@ from robochoc.generators.maps.room import Room
 from robochoc.generators.maps.turned import TurnedSquares
 
 _CHECKED_MAX = 10_000
-"""Where more cells are found, they are too many, however many of them are a little too near to a wall."""
+"""The largest number of cells that are looked at one by one. If more are found, they are too many anyway."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -31,7 +31,7 @@ from robochoc.verification.checker import RefutedError
 
 
 class Snapshot(NamedTuple):
-    """What all robots had at the snapshot `number`: the `values` of all variables, and by the robots' names."""
+    """A snapshot by its `number`: the `values` of all variables, and those by the robots' names."""
 
     number: int
     values: Mapping[str, int]
