@@ -131,6 +131,19 @@ def test_motors_of_a_vehicle_that_is_not_heard_are_not_said_to_have_stopped(pilo
     assert steps(pilot, played).why == "its link has been silent for 10 s"
 
 
+def test_motors_of_a_vehicle_that_is_not_heard_do_not_say_that_it_has_landed(pilot: Pilot, played: Played) -> None:
+    flying(pilot)
+    steps(pilot, played, 3)
+    pilot.end(AtEnd.LAND, waits=True)
+    assert steps(pilot, played).phase is Phase.LANDING
+    played.seen = replace(played.seen, armed=False, in_air=False, silent_s=SILENCE_S + 1)
+    assert steps(pilot, played, 2, MODE_S).phase is Phase.LANDING
+    assert not is_over(pilot)
+    played.seen = replace(played.seen, silent_s=0.5)
+    assert steps(pilot, played).phase is Phase.LANDED
+    assert is_over(pilot)
+
+
 def test_who_tells_no_place_is_out(pilot: Pilot, played: Played) -> None:
     played.seen = replace(GROUND, place=None)
     assert steps(pilot, played, 12, 1.0).why == "it has told no place on udpin://0.0.0.0:1 within 10 s"

@@ -6,6 +6,7 @@ from abc import ABC, abstractmethod
 from dataclasses import dataclass
 
 from robochoc.flight.layout import Point
+from robochoc.ros.autopilots.limits import SILENCE_S
 
 OFFBOARD = "OFFBOARD"
 """The mode in which an autopilot follows our set points."""
@@ -39,6 +40,11 @@ class Telemetry:
     """The time since the last heartbeat, in seconds."""
     place_age_s: float = 0.0
     """The time since it last told its place, in seconds: a vehicle that is heard may no longer know where it is."""
+
+    @property
+    def is_heard(self) -> bool:
+        """Return whether the vehicle is heard. MAVSDK says of one that is not that its motors have stopped."""
+        return self.silent_s <= SILENCE_S
 
     @property
     def not_ready(self) -> str:

@@ -26,7 +26,6 @@ from robochoc.ros.autopilots.limits import (
     MODE_S,
     OUTSIDE_M,
     RETRY_S,
-    SILENCE_S,
     TURN_S,
 )
 from robochoc.ros.autopilots.messages import Phase, State, Target
@@ -258,8 +257,8 @@ class Pilot:
 
     def _mode_trouble(self, seen: Telemetry) -> str:
         """Return what a vehicle does that should be in the air and follow us; empty if it does."""
-        if not seen.armed:  # MAVSDK says so of whom it no longer hears, too
-            return "its motors have stopped" if seen.silent_s <= SILENCE_S else ""
+        if not seen.armed:
+            return "its motors have stopped" if seen.is_heard else ""
         if self._phase is Phase.CLIMBING or seen.mode == OFFBOARD:
             return ""
         return f"{_NOT_OURS} {seen.mode_and_who if self._takeover.has_left_us() else seen.mode_in_words}"
@@ -267,7 +266,7 @@ class Pilot:
     def _has_landed(self, seen: Telemetry) -> bool:
         """Return whether the vehicle lies on the ground. One that was armed a moment ago may not have told it yet."""
         told = self._was_armed or self._clock() - self._since_s > MODE_S
-        return told and not seen.armed and not seen.in_air
+        return told and seen.is_heard and not seen.armed and not seen.in_air
 
     def _enter(self, phase: Phase) -> None:
         self._phase, self._since_s = phase, self._clock()
