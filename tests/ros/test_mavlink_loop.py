@@ -46,9 +46,10 @@ def solve(folder: Path, fleet: Path, *more: str) -> subprocess.CompletedProcess[
     return robochoc_within(*words(folder, fleet, "--runtime", "simulator", *more))
 
 
-def openings(output: str) -> list[str]:
+def openings(done: subprocess.CompletedProcess[str]) -> list[str]:
     """What opened the epochs, in the table of a report."""
-    lines = output.splitlines()
+    assert "opened by" in done.stdout, done.stderr
+    lines = done.stdout.splitlines()
     table = lines[next(n for n, line in enumerate(lines) if "opened by" in line) + 1 :]
     return [" ".join(line.split()[1:-4]) for line in table if line.split()[0].isdigit()]
 
@@ -57,7 +58,7 @@ def test_whose_battery_empties_lands_and_the_others_decide_anew(tmp_path: Path) 
     with field(tmp_path) as (vehicles, fleet):
         vehicles[1].drain = 3.0
         done = solve(tmp_path, fleet)
-        assert openings(done.stdout) == WITHOUT_RB
+        assert openings(done) == WITHOUT_RB
         assert f"{fleet}: 7 waypoints, 1 landing; 4 flown, 4 landed" in done.stderr
         assert done.returncode == 0
         assert not any(vehicle.armed for vehicle in vehicles)
@@ -79,7 +80,7 @@ def test_who_falls_out_leaves_and_the_others_decide_anew(tmp_path: Path, trouble
         for name, value in trouble.items():
             setattr(vehicles[1], name, value)
         done = solve(tmp_path, fleet)
-        assert openings(done.stdout) == WITHOUT_RB
+        assert openings(done) == WITHOUT_RB
         assert f"4 flown, 3 landed, RB is out of order: {why}" in done.stderr
         vehicles.wait_until_landed()
 
@@ -89,7 +90,7 @@ def test_a_slow_flight_is_waited_for(tmp_path: Path) -> None:
     with field(tmp_path, speed=0.7) as (vehicles, fleet):
         vehicles[1].drain = 0.3
         done = solve(tmp_path, fleet)
-        assert openings(done.stdout) == WITHOUT_RB
+        assert openings(done) == WITHOUT_RB
         assert "4 flown, 4 landed" in done.stderr
 
 

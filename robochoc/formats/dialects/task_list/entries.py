@@ -153,8 +153,8 @@ class Entry:
         return Fraction(scalar)
 
     def _mistake(self, key: str, node: Node, hint: str) -> MistakeError:
-        said = f" '{shortened(shown(node.scalar))}'" if node.is_scalar else ""
-        return MistakeError(f"{self._what} has the {key}{said}, which it cannot have", hint, node.line)
+        value = f"'{shortened(shown(node.scalar))}'" if node.is_scalar else "this value"
+        return MistakeError(f"{self._what} cannot have {value} as '{key}'", hint, node.line)
 
 
 def word_of(node: Node) -> str:

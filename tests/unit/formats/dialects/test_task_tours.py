@@ -73,7 +73,7 @@ def test_too_many_sets_of_tasks_are_refused_at_once(tmp_path: Path) -> None:
 
 
 def test_tours_are_yes_or_no(tmp_path: Path) -> None:
-    assert "the tours 'often', which it cannot have (write tours: yes, or tours: no)" in mistakes(
+    assert "cannot have 'often' as 'tours' (write tours: yes, or tours: no)" in mistakes(
         TOURS.replace("tours: yes", "tours: often"), tmp_path
     )
     assert cost_of(TOURS.replace("tours: yes", "tours: no"), tmp_path) == 2
