@@ -118,7 +118,10 @@ def test_a_family_is_written_under_its_name(words: str, tmp_path: Path) -> None:
         ("sensors --sensors 3 --targets 2 --visibility 0", "no sensor sees target 1"),
         ("tasks --agents 3 --tasks 2 --skilled 2", "skilled is 2"),
         (f"formation --map {BUILDING}", "agents is missing, as at names no places"),
-        (f"formation --map {BUILDING} --agents 2 --anchor 80,2.5", "the anchor 80,2.5 is not on the map"),
+        (
+            f"formation --map {BUILDING} --agents 2 --anchor 80,2.5",
+            "the anchor 80,2.5 is not on the map, which lies between -0.25,-0.25 and 10.25,6.25",
+        ),
         (f"formation --map {HOUSE} --at 4.8,1", "at has '4.8,1'; expected X,Y,Z on a three-dimensional map"),
         (f"formation --map {BUILDING} --at 4.8,1", "robot 1 at 4.8,1 stands where it does not fit"),
     ],

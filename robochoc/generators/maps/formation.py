@@ -31,6 +31,7 @@ from robochoc.generators.maps.reach import (
     charged,
     check_dimensions,
     label_of,
+    off_map,
     places_in,
     reach_of,
 )
@@ -95,7 +96,7 @@ def formation(
     reach = reach_of(choice, seeded(seed))
     check_dimensions(middle, reach.cells, "anchor")
     if middle and reach.cells.pixel(middle[0]) is None:
-        raise ValueError(f"the anchor {anchor} is not on the map")
+        raise ValueError(off_map(f"the anchor {anchor}", reach.cells))
     agents = len(reach.starts)
     offsets = _offsets(shape, agents, spacing)
     slots = slots_of(reach, offsets, middle[0] if middle else _mean(reach.starts), heading)

@@ -298,6 +298,16 @@ def label_of(path: str) -> str:
     return re.sub(r"[^A-Za-z0-9_]+", "-", Path(path).stem)[:50].strip("-") or "map"
 
 
+def off_map(what: str, cells: AnyCells) -> str:
+    """Return the words that `what` is not on the map, and where the map is."""
+    low, high = zip(*cells.ends, strict=True)
+    return f"{what} is not on the map, which lies between {_point(low)} and {_point(high)}, in metres"
+
+
+def _point(place: Sequence[Fraction]) -> str:
+    return ",".join(f"{float(part):g}" for part in place)
+
+
 def _agents(agents: int | None, places: Sequence[Place]) -> int:
     if agents is None and not places:
         raise ValueError("agents is missing, as at names no places")
@@ -311,9 +321,9 @@ def _agents(agents: int | None, places: Sequence[Place]) -> int:
 def _standing(cells: AnyCells, number: int, place: Place) -> tuple[int, ...]:
     """Return the pixel on which a robot stands, or the voxel in which it is."""
     pixel = cells.pixel(place)
-    told = f"robot {number} at {','.join(f'{float(part):g}' for part in place)}"
+    told = f"robot {number} at {_point(place)}"
     if pixel is None:
-        raise ValueError(f"{told} is not on the map")
+        raise ValueError(off_map(told, cells))
     if not (cells.fits(place) if isinstance(cells, Cells) else cells.passable[pixel]):
         raise ValueError(f"{told} stands where it does not fit: its radius, or what is not free, is in the way")
     return pixel
