@@ -77,7 +77,7 @@ def installed_protocols() -> tuple[InstalledProtocol, ...]:
 
 def unknown_protocol(name: str) -> str:
     """Return that no protocol of that name is installed, and which may have been meant."""
-    return not_installed_message(GROUP, "protocol", name, listed_by="robochoc protocols")
+    return not_installed_message(GROUP, "protocol", name, also=(CENTRAL, AUTO), listed_by="robochoc protocols")
 
 
 def installed_protocol(name: str) -> InstalledProtocol:

@@ -75,7 +75,7 @@ def not_installed_message(group: str, kind: str, name: str, *, also: Sequence[st
     near = difflib.get_close_matches(name.lower(), names, 3 if listed_by else 1)
     hint = f"; did you mean {' or '.join(map(repr, near))}?" if near else ""
     if listed_by:
-        return f"no {kind} {name!r} is installed{hint or ';'} {listed_by!r} lists all {len(names)}"
+        return f"no {kind} {name!r} is installed{hint or ';'} {listed_by!r} lists them"
     return f"no {kind} {name!r} is installed, only: {', '.join(names) or 'none'}{hint}"
 
 

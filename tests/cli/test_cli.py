@@ -206,7 +206,7 @@ def test_a_limit_is_status_3(tmp_path: Path, runtime: str) -> None:
     ("words", "said"),
     [
         (["--protocol", "abtt"], "no protocol 'abtt' is installed; did you mean 'abt'"),
-        (["--protocol", "qqq"], "no protocol 'qqq' is installed; 'robochoc protocols' lists all "),
+        (["--protocol", "qqq"], "no protocol 'qqq' is installed; 'robochoc protocols' lists them"),
         (["--runtime", "threads"], "threads"),
         (["--seed", "-1"], "--seed"),
         (["--timeout", "0"], "--timeout"),

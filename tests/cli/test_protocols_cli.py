@@ -240,7 +240,7 @@ def test_an_unknown_protocol_is_wrong_usage(name: str, near: str | None) -> None
     assert done.stdout == ""
     assert len(done.stderr.splitlines()) == 1
     if near:
-        assert f"did you mean '{near}'?" in done.stderr
+        assert f"; did you mean '{near}'" in done.stderr
 
 
 def test_solve_points_to_the_list() -> None:

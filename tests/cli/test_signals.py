@@ -290,8 +290,10 @@ def statuses(strike: Strike, last: signal.Signals, *, fatal: bool, struck: bool)
         return {own, 0} if last is INT or strike.moment != "staying" else {own}
     if strike.given_up:
         return {0, 3} if strike.target == "solver" else {0, 4}
-    lasting = strike.signum in {KILL, TERM}
-    return {0, 4} if lasting and strike.target != "viewer" else {0}
+    if strike.signum not in {KILL, TERM}:
+        return {0}
+    # Without its page a run ends by itself: Ctrl-C, which is for the page, may come in the middle of that.
+    return {0, 128 + INT} if strike.target == "viewer" else {0, 4}
 
 
 def told(strike: Strike, errors: str) -> bool:

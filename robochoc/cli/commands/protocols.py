@@ -7,7 +7,6 @@ import click
 from robochoc.cli.options.names import ProtocolName
 from robochoc.cli.reports.failures import USAGE, Failure
 from robochoc.run.defaults import AUTO
-from robochoc.run.registry import unknown_protocol
 
 PURPOSES = ("satisfaction", "costs", "asymmetric")
 
@@ -36,6 +35,7 @@ def protocols(name: str | None, *, purpose: str | None, as_json: bool, long: boo
     """  # noqa: D301 - \\b is how click is told to leave the lines as they are
     from robochoc.cli.reports.protocols import Row, print_protocols, protocol_text, protocols_json, rows
     from robochoc.formats import on_one_line
+    from robochoc.run.registry import unknown_protocol
 
     if name is not None and purpose is not None:
         raise Failure(USAGE, "--for is for the list, and not for one protocol: leave out one of the two")
