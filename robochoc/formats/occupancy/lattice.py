@@ -67,11 +67,11 @@ def quarters(solid: Flags, parts: int, reach: int) -> _Lengths:
     squares = np.where(fine, 0, (2 * reach + 1) ** 2).astype(np.int32)
     for axis in range(solid.ndim):
         lines = np.moveaxis(squares, axis, 0)
-        before = lines.copy()
+        former = lines.copy()
         for step in range(1, min(reach, len(lines) - 1) + 1):
             off = (2 * step - 1) ** 2
-            np.minimum(lines[step:], before[:-step] + off, out=lines[step:])
-            np.minimum(lines[:-step], before[step:] + off, out=lines[:-step])
+            np.minimum(lines[step:], former[:-step] + off, out=lines[step:])
+            np.minimum(lines[:-step], former[step:] + off, out=lines[:-step])
     return squares[(slice(parts, -parts),) * solid.ndim]
 
 

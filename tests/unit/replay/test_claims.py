@@ -15,6 +15,7 @@ from robochoc.journal.journal import Journal
 from robochoc.model.outcome import Verdict
 from robochoc.replay import replay
 from robochoc.run.options import Options, Runtime, Withdrawal
+from tests.support.compiled import plain_python_only
 from tests.support.counted_clock import time_passes_at_each_look
 from tests.support.program import ROOT
 from tests.support.replays import recorded
@@ -96,6 +97,7 @@ def ended_by_the_time(options: Options) -> Journal:
     return journal
 
 
+@plain_python_only
 def test_an_answer_by_a_deadline_is_what_the_robots_had_then() -> None:
     journal = ended_by_the_time(replace(BY_A_DEADLINE, improve=None))
     assert journal.outcome is not None
@@ -108,6 +110,7 @@ def test_an_answer_by_a_deadline_is_what_the_robots_had_then() -> None:
         assert [one.what for one in found.contradictions] == [f"the outcome's {field}"]
 
 
+@plain_python_only
 def test_an_answer_that_was_improved_is_as_good_as_what_the_robots_end_with() -> None:
     journal = ended_by_the_time(BY_A_DEADLINE)
     outcome = journal.outcome
@@ -126,6 +129,7 @@ def test_an_answer_that_was_improved_is_as_good_as_what_the_robots_end_with() ->
         assert {one.what for one in found.contradictions} == {f"the outcome's {field}"}
 
 
+@plain_python_only
 def test_processes_that_a_deadline_ends_may_have_told_less_than_they_did_and_not_more() -> None:
     journal = ended_by_the_time(replace(BY_A_DEADLINE, improve=None))
     assert journal.outcome is not None
