@@ -9,14 +9,15 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from functools import partial
 from typing import Protocol
 
 from robochoc.communication.run_result import RunResult
 from robochoc.communication.search_watch import SearchWatch
 from robochoc.model.cost_units import Cost
 from robochoc.model.outcome import EpochOutcome, Improvement, Verdict
-from robochoc.model.problem import Team
-from robochoc.run.evaluation import Answer
+from robochoc.model.problem import ProblemKind, Team
+from robochoc.run.evaluation import Answer, CheckedAssignment, Search, evaluate_search
 from robochoc.run.options import Options
 from robochoc.run.withdrawal import Phase
 from robochoc.verification.checker import RefutedError
@@ -228,7 +229,53 @@ class Improvements(SearchWatch):
             raise RefutedError(f"the protocol says that {final.cost} is optimal, and {best.cost} was found before")
 
 
-def as_told_one_after_the_other(snapshot: RunResult, phase: Phase, options: Options) -> RunResult:
+def improvements_of(  # noqa: PLR0913 - what differs between deployments, by names
+    phase: Phase,
+    team: Team,
+    options: Options,
+    *,
+    began: float,
+    told: Callable[[float], Cost],
+    check: Callable[[RunResult], CheckedAssignment | None],
+    publish: Callable[[Answer, tuple[Improvement, ...]], None],
+    audience: Audience | None,
+    before: Improvements | None,
+    keep: Callable[[Answer], None] | None = None,
+) -> Improvements:
+    """Return the best answers of the search of `phase`, of a run with a deadline.
+
+    Args:
+        phase: The phase.
+        team: The team as its files have it.
+        options: The options of the run.
+        began: When the time of the run began, on the monotonic clock, in seconds.
+        told: Turns a cost into the user's numbers.
+        check: Checks what robots had at a snapshot. It may raise `RefutedError`.
+        publish: Publishes an answer, with all improvements so far.
+        audience: Tells whether the problem has changed.
+        before: Those of the search before this one, if there was one.
+        keep: Gets each best answer when it is found.
+    """
+
+    def evaluate(snapshot: RunResult) -> Answer:
+        snapshot = _as_told_one_after_the_other(snapshot, phase, options)
+        return evaluate_search(phase, Search(snapshot, partial(check, snapshot)), team.kind, told, options.deadline)
+
+    return Improvements(
+        began=began,
+        deadline=began + (options.deadline or 0.0),
+        evaluate=evaluate,
+        rank=Rank(team, told),
+        has_costs=team.kind is ProblemKind.DISWCSP,
+        bounded=phase.parameters.withdrawal_cost is None,
+        publish=publish,
+        has_news=lambda: audience is not None and audience.has_news(team),
+        earlier=before.improvements if before else (),
+        keep=keep,
+    )
+
+
+def _as_told_one_after_the_other(snapshot: RunResult, phase: Phase, options: Options) -> RunResult:
     """Return `snapshot`, of which nothing is known but what can be checked where messages get lost.
 
     Robots tell one after the other, so a message may be lost that none has missed yet.

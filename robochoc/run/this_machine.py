@@ -15,8 +15,8 @@ from robochoc.model.outcome import EpochOutcome, Improvement, Metrics, Preproces
 from robochoc.model.problem import INFINITE, ProblemKind, Team
 from robochoc.run.context import RunContext
 from robochoc.run.distributed import Deployment
-from robochoc.run.evaluation import Answer, Search, check_with_files, evaluate_search
-from robochoc.run.improvement import Audience, Improvements, Rank, as_told_one_after_the_other
+from robochoc.run.evaluation import Answer, Search, check_with_files
+from robochoc.run.improvement import Audience, Improvements, improvements_of
 from robochoc.run.preprocessing import preprocessing_phase, removed_values, restricted, total_preprocessing
 from robochoc.run.runtimes import SessionRequest, open_session
 from robochoc.run.scenario import Environment, EpochStart, FinishedEpoch, ScenarioRun
@@ -197,28 +197,23 @@ class ThisMachine(Deployment):
         options, audience = self.options, self._audience
         if options.deadline is None or options.improve is None:
             return
-        team, compiled, began = self._scenario.team, start.epoch.compiled, self._context.began
-
-        def evaluate(snapshot: RunResult) -> Answer:
-            snapshot = as_told_one_after_the_other(snapshot, phase, options)
-            search = Search(snapshot, partial(check_with_files, phase, snapshot, team, compiled))
-            return evaluate_search(phase, search, team.kind, self.told, options.deadline)
+        team, compiled = self._scenario.team, start.epoch.compiled
 
         def publish(answer: Answer, improvements: tuple[Improvement, ...]) -> None:
             if audience is not None:
                 now = replace(answer, improvements=improvements)
                 audience.improve(team, now.as_epoch(team.order, start.opened_by or "the start"), answer.withdrawn)
 
-        session.watch = self._improvements = Improvements(
-            began=began,
-            deadline=began + options.deadline,
-            evaluate=evaluate,
-            rank=Rank(team, self.told),
-            has_costs=team.kind is ProblemKind.DISWCSP,
-            bounded=phase.parameters.withdrawal_cost is None,
+        session.watch = self._improvements = improvements_of(
+            phase,
+            team,
+            options,
+            began=self._context.began,
+            told=self.told,
+            check=lambda snapshot: check_with_files(phase, snapshot, team, compiled),
             publish=publish,
-            has_news=lambda: audience is not None and audience.has_news(team),
-            earlier=before.improvements if before else (),
+            audience=audience,
+            before=before,
         )
 
     def concluded(self, phase: Phase, search: Search, answer: Answer) -> Answer:  # noqa: ARG002 - see `Deployment`

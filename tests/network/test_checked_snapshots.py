@@ -44,7 +44,7 @@ class Round:
         self.snapshots.ask(number)
 
     def taken(self) -> list[ToRobot]:
-        """What was sent since this was asked last, to RB."""
+        """Return the messages that RB was sent since the last call."""
         sent, self.sent = [word for name, word in self.sent if name == "RB"], []
         return sent
 

@@ -30,7 +30,7 @@ def started(team: Team, site: Deployment, *words: object) -> tuple[Program, dict
 
 
 def ended_well(team: Team, master: Program, robots: dict[str, Program]) -> dict[str, Any]:
-    """What the master says once all have ended: it is checked, and each robot has decided the same."""
+    """Return the master's answer once all have ended. It is checked, and each robot has decided the same."""
     assert master.status() == 0, master.errors
     ended(robots)
     told = master.object
@@ -130,7 +130,7 @@ def test_robots_whose_master_dies_have_told_what_they_had_decided(site: Deployme
 
 @pytest.mark.slow
 def test_a_robot_that_is_stopped_keeps_no_answer_from_the_others(site: Deployment) -> None:
-    """What all had checked before stands; the stopped one hears of it when it goes on."""
+    """The answer that all had checked before stands. The stopped robot hears of it when it goes on."""
     words = (*ENDLESS, "--deadline", 0.5, "--improve", 3600, "--patience", 1e9, "--json")
     master, robots = started(COSTLY, site, *words)
     for robot in robots.values():

@@ -60,7 +60,7 @@ for _ in range(1000):
 os.kill(os.getpid(), signal.SIGSTOP)
 """
 PATIENCE_S = 2.0
-"""How long an answer is waited for that does not come, or is asked for again."""
+"""The time in seconds after which an answer that does not come is asked for again, or given up."""
 
 
 def blocks(count: int) -> list[bytes]:

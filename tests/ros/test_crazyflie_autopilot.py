@@ -204,7 +204,7 @@ def test_who_is_not_heard_gets_no_command(monkeypatch: pytest.MonkeyPatch) -> No
 
 
 def test_a_link_that_was_opened_in_vain_is_opened_anew(monkeypatch: pytest.MonkeyPatch) -> None:
-    """What it asks for is lost; and who is heard again goes on with its log, as if that were an answer."""
+    """Its questions are lost. Once it is heard again it goes on with its log, as if that were an answer."""
     for name in ("_REOPEN_S", "_ATTEMPT_S"):
         monkeypatch.setattr(cflib_autopilot, name, 0.5)
     with linked() as (vehicle, autopilot):

@@ -22,9 +22,9 @@ class AutopilotKind(ABC):
     library: str
     """The Python package that the sink needs."""
     phases: Mapping[str, Callable[[Any], bool]]
-    """What a vehicle does before it takes off, while it climbs, flies and lands."""
+    """By the name of each phase of a flight: returns whether a vehicle has come to it."""
     without_a_guard: str
-    """What the program says when its guard has ended."""
+    """The program's message when its guard has ended."""
     quick: Mapping[str, object] = {}
     """Settings of the fleet with which a flight is short."""
 

@@ -1,4 +1,4 @@
-"""What a command line has answered, held against brute force: the verdict, costs in the user's numbers, all claims."""
+"""Answers of command lines, held against brute force: the verdict, costs in the user's numbers, all claims."""
 
 from __future__ import annotations
 

@@ -22,8 +22,8 @@ from robochoc.model.cost_units import Cost, common_units
 from robochoc.model.outcome import ALL_ROBOTS, Improvement, Outcome, Verdict
 from robochoc.model.problem import Domain, ProblemKind, Robot, Team, Variable
 from robochoc.run.distributed import Deployment
-from robochoc.run.evaluation import Answer, CheckedAssignment, Search, evaluate_search, is_proven
-from robochoc.run.improvement import Audience, Improvements, Rank, as_told_one_after_the_other
+from robochoc.run.evaluation import Answer, CheckedAssignment, Search, is_proven
+from robochoc.run.improvement import Audience, Improvements, improvements_of
 from robochoc.run.incumbent import merged_values
 from robochoc.run.options import Options
 from robochoc.run.withdrawal import Phase
@@ -134,15 +134,8 @@ class Machines(Deployment):
     def _watch(self, phase: Phase) -> Improvements:
         """Return what keeps the best answer of a search, and publishes it from the deadline on."""
         team = registered_team(self._master, self._name)
-        before = self._improvements
         options, audience = self.options, self._audience
-        deadline = options.deadline or 0.0
         self._snapshot = self._kept = NO_SNAPSHOT
-
-        def evaluate(snapshot: RunResult) -> Answer:
-            snapshot = as_told_one_after_the_other(snapshot, phase, options)
-            search = Search(snapshot, partial(self._check_snapshot, phase, snapshot))
-            return evaluate_search(phase, search, team.kind, self.told, options.deadline)
 
         def publish(answer: Answer, improvements: tuple[Improvement, ...]) -> None:
             self._adopt(answer)
@@ -155,16 +148,16 @@ class Machines(Deployment):
                 self._kept = self._snapshot
                 self._master.adopt(self._kept.number)
 
-        return Improvements(
+        return improvements_of(
+            phase,
+            team,
+            options,
             began=self._began,
-            deadline=self._began + deadline,
-            evaluate=evaluate,
-            rank=Rank(team, self.told),
-            has_costs=team.kind is ProblemKind.DISWCSP,
-            bounded=phase.parameters.withdrawal_cost is None,
+            told=self.told,
+            check=partial(self._check_snapshot, phase),
             publish=publish,
-            has_news=lambda: audience is not None and audience.has_news(team),
-            earlier=before.improvements if before else (),
+            audience=audience,
+            before=self._improvements,
             keep=keep,
         )
 
