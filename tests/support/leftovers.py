@@ -40,6 +40,8 @@ _shared_processes: set[int] = set()
 _shared_descriptors: set[str] = set()
 _shared_files: set[str] = set()
 _shared_programs: set[int] = set()
+_socket_names: dict[str, str] = {}
+"""The names of the sockets seen so far. Listing TCP links takes the kernel 7 ms: it is done for new sockets only."""
 
 
 class Belongings(NamedTuple):
@@ -151,15 +153,19 @@ def _is_of_a_shared_program(pid: int) -> bool:
 
 
 def _descriptors(pid: str | int = "self") -> Iterator[str]:
-    """Yield the names of what is open: those of TCP links say whither, and how many of them there are."""
+    """Yield the names of the open descriptors: those of TCP links name the other end, and are numbered."""
+    so_far = Counter[str]()
     targets = list(_targets(pid))
-    links, so_far = _links(), Counter[str]()
+    sockets = {target for target in targets if target.startswith("socket:")}
+    if not _socket_names.keys() >= sockets:
+        links = _links()
+        _socket_names.update({target: links.get(target, target) for target in sockets - _socket_names.keys()})
     for target in targets:
-        if target in links:
-            so_far[links[target]] += 1
-            yield f"{links[target]}, number {so_far[links[target]]}"
-        else:
-            yield target
+        name = _socket_names.get(target, target)
+        if name != target:
+            so_far[name] += 1
+            name = f"{name}, number {so_far[name]}"
+        yield name
 
 
 def _targets(pid: str | int) -> Iterator[str]:
