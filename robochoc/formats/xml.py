@@ -21,7 +21,8 @@ MAX_BYTES = 16 * 1024 * 1024
 _SMALL = 64 * 1024
 _CHUNK = 1024
 
-_BLANKS = " \t\r\n"
+BLANKS = " \t\r\n"
+"""The characters that XML counts as blanks."""
 _DOCTYPE = re.compile(rb"(?>\xef\xbb\xbf)?(?>[ \t\r\n]|<\?.*?\?>|<!--.*?-->)*+<!DOCTYPE", re.DOTALL)
 _HINTS = {
     etree.ErrorTypes.ERR_ATTRIBUTE_NOT_STARTED: 'write name="value"',
@@ -55,13 +56,16 @@ def read_xml(path: Path, root: str) -> etree._Element:
     return parsed_xml(content, path, root)
 
 
-def read_tree(path: Path, most: int) -> etree._Element:
-    """Return the root element of any XML file of at most `most` bytes. Raises `InvalidInputError`, as `read_xml`."""
+def read_tree(path: Path, most: int, *, long_texts: bool = False) -> etree._Element:
+    """Return the root element of any XML file of at most `most` bytes. Raises `InvalidInputError`, as `read_xml`.
+
+    With `long_texts`, a text may have more than libxml2's usual limit of 10 million characters.
+    """
     try:
         content = _bytes(path, most)
     except OSError as error:
         raise _unreadable(path, error) from None
-    return parsed_tree(content, path, most)
+    return parsed_tree(content, path, most, long_texts=long_texts)
 
 
 def parsed_xml(content: bytes, path: Path, root: str) -> etree._Element:
@@ -79,7 +83,7 @@ def parsed_xml(content: bytes, path: Path, root: str) -> etree._Element:
     return tree
 
 
-def parsed_tree(content: bytes, path: Path, most: int) -> etree._Element:
+def parsed_tree(content: bytes, path: Path, most: int, *, long_texts: bool = False) -> etree._Element:
     """Return the root element of `content`, which is not trusted: no entities, no DTD, at most `most` bytes.
 
     Raises:
@@ -89,7 +93,7 @@ def parsed_tree(content: bytes, path: Path, most: int) -> etree._Element:
     doctype = _DOCTYPE.match(content)
     if doctype:
         raise _invalid(path, doctype[0].count(b"\n") + 1, "a DOCTYPE is not accepted", "delete it, and every entity")
-    parser = _parser()
+    parser = _parser(long_texts=long_texts)
     try:
         return etree.fromstring(content, parser)
     except etree.XMLSyntaxError as error:
@@ -98,7 +102,7 @@ def parsed_tree(content: bytes, path: Path, most: int) -> etree._Element:
 
 def attribute(element: etree._Element, name: str) -> str:
     """Return an attribute's text without blanks around it; empty where it is left out."""
-    return (element.get(name) or "").strip(_BLANKS)
+    return (element.get(name) or "").strip(BLANKS)
 
 
 def line(element: etree._Element) -> int:
@@ -106,14 +110,16 @@ def line(element: etree._Element) -> int:
     return cast("int | None", element.sourceline) or 0
 
 
-def _parser(schema: etree.XMLSchema | None = None, *, recover: bool = False) -> etree.XMLParser:
+def _parser(
+    schema: etree.XMLSchema | None = None, *, recover: bool = False, long_texts: bool = False
+) -> etree.XMLParser:
     """Return a parser that ignores comments and processing instructions, and reads UTF-8 whatever the file declares."""
     return etree.XMLParser(
         encoding="utf-8",
         resolve_entities=False,
         load_dtd=False,
         no_network=True,
-        huge_tree=False,
+        huge_tree=long_texts,
         remove_comments=True,
         remove_pis=True,
         recover=recover,

@@ -1,0 +1,241 @@
+"""XML elements that record which of their parts were read: a part that no reader has read is an error.
+
+`open_xml` is the only way to a view. When its block ends, the whole tree is checked: each element, attribute and text
+that was not read becomes a diagnostic with its line. So a reader cannot forget to refuse a part that it does not know.
+"""
+
+# ruff: noqa: SLF001 - a view and the views of its children share one record
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+
+from lxml import etree
+
+from robochoc.formats.diagnostics import DiagnosticCollector, MistakeError, encodable, shortened
+from robochoc.formats.diagnostics import suggestion as suggested_name
+from robochoc.formats.xml import BLANKS, line, read_tree
+
+MAX_DEPTH = 40
+"""The maximum depth of elements: readers that recurse through views cannot exceed Python's stack."""
+
+_ABOUT_THE_DOCUMENT = ("{http://www.w3.org/2001/XMLSchema-instance}", "{http://www.w3.org/XML/1998/namespace}")
+"""Namespaces of attributes that describe the XML document instead of its contents: `xsi:schemaLocation`, `xml:id`."""
+
+
+@contextmanager
+def open_xml(path: Path, most: int, *, long_texts: bool = False) -> Iterator[ElementView]:
+    """Provide the root element of the XML file `path`, of at most `most` bytes, as a view.
+
+    Args:
+        path: The file. Its contents are not trusted.
+        most: The maximum size of the file, in bytes.
+        long_texts: Whether a text may have more than 10 million characters.
+
+    Raises:
+        InvalidInputError: if the file is not valid XML; when the block ends, with every mistake that was noted in it,
+            or with every part that was not read in it.
+    """
+    report = DiagnosticCollector(encodable(str(path)))
+    with viewing(read_tree(path, most, long_texts=long_texts), report) as root:
+        yield root
+
+
+@contextmanager
+def viewing(element: etree._Element, report: DiagnosticCollector) -> Iterator[ElementView]:
+    """Provide a view of `element`, the root of a tree that is in memory. See `open_xml`."""
+    root = ElementView(element, report)
+    with root.guard():
+        yield root
+    root._report_unread()
+    report.finish()
+
+
+class ElementView:
+    """One element of an XML document, whose parts count as read once they were asked for.
+
+    Attributes:
+        tag: The name of the element.
+        line: The line where it starts.
+        report: The mistakes of the document.
+    """
+
+    __slots__ = ("_asked", "_asked_attributes", "_children", "_depth", "_element", "_is_read", "_is_text_read",
+                 "_is_unchecked", "line", "report", "tag")  # fmt: skip
+
+    def __init__(self, element: etree._Element, report: DiagnosticCollector, depth: int = 1) -> None:
+        self._element = element
+        self._depth = depth
+        self._children: list[ElementView] | None = None
+        self._is_read = depth == 1
+        self._is_text_read = False
+        self._is_unchecked = False
+        self._asked: set[str] = set()
+        self._asked_attributes: set[str] = set()
+        self.tag: str = element.tag
+        self.line = line(element)
+        self.report = report
+
+    # Attributes
+
+    def attribute(self, name: str) -> str:
+        """Return the text of an attribute without blanks around it; empty where it is left out."""
+        self._asked_attributes.add(name)
+        return (self._element.get(name) or "").strip(BLANKS)
+
+    def required_attribute(self, name: str) -> str:
+        """Return the text of an attribute. Raises `MistakeError` where it is missing or empty."""
+        text = self.attribute(name)
+        if not text:
+            unread = [other for other in self._attributes() if other not in self._asked_attributes]
+            raise self.mistake(f"<{self.tag}> lacks its attribute '{name}'", _hint_on_missing(name, unread))
+        return text
+
+    def has_attribute(self, name: str) -> bool:
+        """Return whether there is an attribute of this name. It does not count as read."""
+        return name in self._element.attrib
+
+    def ignore_attributes(self, *names: str) -> None:
+        """Count attributes as read that have no meaning here."""
+        self._asked_attributes.update(names)
+
+    # Text
+
+    def text(self) -> str:
+        """Return the text of an element without child elements. Raises `MistakeError` where there are some."""
+        for child in self._element:
+            raise MistakeError(f"<{child.tag}> inside <{self.tag}>", "only text is expected there", line(child))
+        self._is_text_read = True
+        return (self._element.text or "").strip(BLANKS)
+
+    def mixed(self) -> Iterator[str | ElementView]:
+        """Yield texts and child elements in their order, for an element that has both. All of them count as read."""
+        self._is_text_read = True
+        yield self._element.text or ""
+        for child in self._views():
+            child._is_read = True
+            yield child
+            yield child._element.tail or ""
+
+    def all_text(self) -> str:
+        """Return the text of the element and of everything in it. It does not count as read."""
+        return "".join(str(part) for part in self._element.itertext())
+
+    # Child elements
+
+    @property
+    def has_children(self) -> bool:
+        """Whether there are child elements."""
+        return len(self._element) > 0
+
+    def has(self, name: str) -> bool:
+        """Return whether there is a child element of this name. It does not count as read."""
+        self._asked.add(name)
+        return self._element.find(name) is not None
+
+    def child(self, name: str) -> ElementView | None:
+        """Return the child element of this name; None where it is missing. Raises `MistakeError` for a second one."""
+        found = self.children(name)
+        if len(found) > 1:
+            raise found[1].mistake(f"a second <{name}> in <{self.tag}>", "write one of them")
+        return found[0] if found else None
+
+    def required(self, name: str) -> ElementView:
+        """Return the child element of this name. Raises `MistakeError` where it is missing, or for a second one."""
+        found = self.child(name)
+        if found is None:
+            unread = [child.tag for child in self._views() if not child._is_read and child.tag not in self._asked]
+            raise self.mistake(f"<{self.tag}> without <{name}>", _hint_on_missing(name, unread))
+        return found
+
+    def children(self, *names: str) -> list[ElementView]:
+        """Return the child elements of these names, in the order of the document."""
+        self._asked.update(names)
+        found = [child for child in self._views() if child.tag in names]
+        for child in found:
+            child._is_read = True
+        return found
+
+    def ignore(self, *names: str) -> None:
+        """Count child elements of these names as read, with everything in them."""
+        for child in self.children(*names):
+            child._is_unchecked = True
+
+    # Mistakes
+
+    def mistake(self, message: str, hint: str) -> MistakeError:
+        """Return an error in this element."""
+        return MistakeError(message, hint, self.line)
+
+    @contextmanager
+    def guard(self) -> Iterator[None]:
+        """Note a `MistakeError` raised inside and continue behind the block.
+
+        Parts of this element that were not read because of the mistake are not reported.
+        """
+        try:
+            yield
+        except MistakeError as mistake:
+            self._is_unchecked = True
+            self.report.add(mistake.line or self.line, mistake.message, mistake.hint)
+
+    # Private
+
+    def _views(self) -> list[ElementView]:
+        """Return views of all child elements. Raises `MistakeError` where elements are nested too deeply."""
+        if self._children is None:
+            if self._depth == MAX_DEPTH and len(self._element):
+                raise self.mistake(f"elements nested deeper than {MAX_DEPTH} levels", "write fewer levels")
+            self._children = [ElementView(child, self.report, self._depth + 1) for child in self._element]
+        return self._children
+
+    def _attributes(self) -> list[str]:
+        """Return the names of the attributes that are about the contents of the document."""
+        return [str(name) for name in self._element.attrib if not str(name).startswith(_ABOUT_THE_DOCUMENT)]
+
+    def _report_unread(self) -> None:
+        """Add a diagnostic for each part of the tree that was not read."""
+        waiting = [self]
+        while waiting:
+            view = waiting.pop()
+            if view._is_unchecked:
+                continue
+            with view.guard():
+                children = view._views()
+                for child in children:
+                    if child._is_read:
+                        waiting.append(child)
+                    else:
+                        self._report_unread_part("element", f"<{child.tag}>", child.tag, view, child.line)
+            for name in view._attributes():
+                if name not in view._asked_attributes:
+                    self._report_unread_part("attribute", f"'{shortened(name)}'", name, view, view.line)
+            if not view._is_text_read:
+                view._report_text()
+
+    def _report_unread_part(self, what: str, shown: str, name: str, parent: ElementView, number: int) -> None:
+        asked = parent._asked if what == "element" else parent._asked_attributes
+        if name in asked:
+            hint = f"it is not supported together with the other parts of this <{parent.tag}>"
+        else:
+            hint = suggested_name(name, sorted(asked), f"{what}s of <{parent.tag}>") if asked else "delete it"
+        place = "" if what == "element" else f"the {what} "
+        self.report.add(number, f"{place}{shortened(shown)} is not supported in <{parent.tag}>", hint)
+
+    def _report_text(self) -> None:
+        for number, text in [
+            (self.line, self._element.text),
+            *((line(child), child.tail) for child in self._element),
+        ]:
+            if text and text.strip(BLANKS):
+                shown = shortened(" ".join(text.split()))
+                self.report.add(number, f"text inside <{self.tag}>: '{shown}'", "no text is expected there: delete it")
+
+
+def _hint_on_missing(name: str, unread: Sequence[str]) -> str:
+    hint = suggested_name(name, unread, "parts") if unread else ""
+    if hint.startswith("did you mean"):
+        similar = hint.removeprefix("did you mean '").removesuffix("'?")
+        return f"write '{name}' instead of '{shortened(similar)}'"
+    return "add it"
