@@ -52,6 +52,7 @@ JVM_OPTIONS = (
     "-Xmx2g",
     "-Xss16m",
     "-Xrs",  # signals are this process's, not the JVM's
+    "-XX:+DisableAttachMechanism",  # with -Xrs its socket is made at the start, and stays in the temporary folder
     "-XX:-UsePerfData",  # no file of statistics in the temporary folder
     "-XX:ErrorFile=/dev/null",
     "-XX:-CreateCoredumpOnCrash",

@@ -277,6 +277,7 @@ def test_processes_go_and_the_next_task_has_another(temporary: Path, monkeypatch
         os.kill(pid, signal.SIGKILL)
         with pytest.raises(SolverLostError, match="SIGKILL"):
             solver.answer()
+        assert not Path(f"/tmp/.java_pid{pid}").exists(), "the JVM has opened a socket for tools"  # noqa: S108 - its own
         assert solver.pid is None
         with pytest.raises(ProcessLookupError):
             os.kill(pid, 0)
