@@ -4,6 +4,7 @@ FOLDER/ID/history.json    the sketch, and what can be undone
 FOLDER/ID/team/           the files of a team that was not drawn here; foreign.json: what is known of it
 FOLDER/ID/runs/           what was decided and flown
 FOLDER/.removed-...       a team that is being removed
+FOLDER/.new-...           a team that is being written
 FOLDER/.lock              held by the one application that has the folder open
 """
 
@@ -34,6 +35,7 @@ FILES = "team"
 _FACTS = "foreign.json"
 _LOCK = ".lock"
 _REMOVED = ".removed-"
+_NEW = ".new-"
 _ID_BYTES = 6
 MAX_BYTES = 64 << 20
 """A larger file is none of ours. What would be larger is kept with fewer steps that can be undone."""
@@ -75,6 +77,7 @@ class Store:
             except BlockingIOError:
                 why = "use its page, or end it, or say another folder with --folder"
                 raise InUseError(f"{self.folder} is open in another 'robochoc app': {why}") from None
+            self._sweep(_NEW)
             yield
         finally:
             os.close(lock)
@@ -90,18 +93,24 @@ class Store:
 
     def add(self, sketch: Sketch) -> str:
         """Keep a sketch as a new team; return its id."""
-        while True:
+        with self._new_team() as (name, folder):
+            _write(folder / _HISTORY, History(sketch))
+        return name
+
+    @contextmanager
+    def _new_team(self) -> Iterator[tuple[str, Path]]:
+        """Yield the id of a new team and a folder for its files. The team exists once they are complete."""
+        name = secrets.token_hex(_ID_BYTES)
+        while (self.folder / name).exists():
             name = secrets.token_hex(_ID_BYTES)
-            try:
-                (self.folder / name).mkdir(mode=0o700)
-            except FileExistsError:
-                continue
-            try:
-                self.save(name, History(sketch))
-            except BaseException:
-                self.remove(name)
-                raise
-            return name
+        folder = self.folder / f"{_NEW}{name}"
+        folder.mkdir(mode=0o700)
+        try:
+            yield name, folder
+            folder.rename(self.folder / name)
+        except BaseException:
+            shutil.rmtree(folder, ignore_errors=True)
+            raise
 
     def foreign(self, name: str) -> Path | None:
         """Return the files of a team that was not drawn here; None: it was. Raises `KeyError` for what is no id."""
@@ -110,14 +119,11 @@ class Store:
 
     def add_foreign(self, team: ForeignTeam) -> str:
         """Keep a team that was not drawn here; return its id."""
-        name = self.add(drawn(team))
         facts = facts_of(team.team, files=team.changed, notes=team.notes, origin=team.path.name)
-        try:
-            team.save(self.path(name) / FILES)
-            (self.path(name) / _FACTS).write_bytes(msgspec.json.encode(facts))
-        except BaseException:
-            self.remove(name)
-            raise
+        with self._new_team() as (name, folder):
+            _write(folder / _HISTORY, History(drawn(team)))
+            team.save(folder / FILES)
+            (folder / _FACTS).write_bytes(msgspec.json.encode(facts))
         return name
 
     def facts(self, name: str) -> Facts:
@@ -173,18 +179,7 @@ class Store:
 
     def save(self, name: str, history: History) -> None:
         """Keep a team as it stands now."""
-        file = self.path(name) / _HISTORY
-        fresh = file.with_suffix(f".{os.getpid()}.new")
-        try:
-            with fresh.open("wb") as out:
-                out.write(_within_bounds(history))
-                out.flush()
-                os.fsync(out.fileno())
-            fresh.replace(file)
-        except BaseException:
-            with suppress(OSError):
-                fresh.unlink(missing_ok=True)
-            raise
+        _write(self.path(name) / _HISTORY, history)
 
     def remove(self, name: str) -> None:
         """Remove a team, and all that was decided by it. Raises `KeyError` for what is no id."""
@@ -203,7 +198,10 @@ class Store:
 
     def sweep(self) -> None:
         """Remove what is left of teams that were removed. What cannot be removed is left for the next time."""
-        for left in self.folder.glob(f"{_REMOVED}*"):
+        self._sweep(_REMOVED)
+
+    def _sweep(self, prefix: str) -> None:
+        for left in self.folder.glob(f"{prefix}*"):
             shutil.rmtree(left, ignore_errors=True)
 
     def path(self, name: str) -> Path:
@@ -211,6 +209,20 @@ class Store:
         if not (name.isascii() and name.isalnum() and len(name) == 2 * _ID_BYTES):
             raise KeyError(name)
         return self.folder / name
+
+
+def _write(file: Path, history: History) -> None:
+    fresh = file.with_suffix(f".{os.getpid()}.new")
+    try:
+        with fresh.open("wb") as out:
+            out.write(_within_bounds(history))
+            out.flush()
+            os.fsync(out.fileno())
+        fresh.replace(file)
+    except BaseException:
+        with suppress(OSError):
+            fresh.unlink(missing_ok=True)
+        raise
 
 
 def _within_bounds(history: History) -> bytes:

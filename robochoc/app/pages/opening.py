@@ -1,23 +1,22 @@
-"""Opening a file: the browser sends it, it is read in a thread, and what is wrong with it is told."""
+"""Opening a file: the browser sends it, a process of its own reads it, and its mistakes are shown."""
 
 from __future__ import annotations
 
+import asyncio
 from collections.abc import Callable
-from contextlib import suppress
 from pathlib import Path
 
 from fastapi import HTTPException, Request
-from nicegui import app, run, ui
+from nicegui import app, ui
 from nicegui.events import UploadEventArguments
 from starlette.datastructures import UploadFile
 from starlette.routing import Route
 
-from robochoc.app.flights.state import unpack_run
+from robochoc.app.jobs.job import EndedError
+from robochoc.app.opening import opening_of
 from robochoc.app.projects import Projects
-from robochoc.app.sketch.opening import MAX_BYTES, opened
-from robochoc.app.sketch.sketch import Sketch
+from robochoc.app.sketch.opening import MAX_BYTES
 from robochoc.app.texts import say
-from robochoc.formats import InvalidInputError
 from robochoc.system.plain_text import on_one_line
 from robochoc.system.temporary_files import PrivateFolder
 
@@ -44,22 +43,13 @@ def build_opening(projects: Projects, show: Callable[[str], None]) -> None:
             file = Path(folder) / (Path(event.file.name or "").name[-_LONGEST_NAME:] or "team")
             await event.file.save(file)
             try:
-                found = await run.io_bound(opened, file)
-            except (InvalidInputError, OSError) as error:
-                wrong.set_text(_told(str(error).replace(f"{folder}/", "")))
+                found = await asyncio.wrap_future(opening_of(file, projects.store).future)
+            except EndedError:  # the server ends
                 return
-            if isinstance(found, Sketch):
-                project = projects.add(found)
-                with suppress(OSError):  # what a state has beside its team
-                    await run.io_bound(unpack_run, file, project.folder)
-                show(project.id)
-            elif found is not None:  # the server is not about to end
-                made = await run.io_bound(projects.store.add_foreign, found)
-                if made is None:
-                    return
-                with suppress(OSError):
-                    await run.io_bound(unpack_run, file, projects.store.path(made))
-                show(made)
+            if found.mistakes:
+                wrong.set_text(_told(found.mistakes.replace(f"{folder}/", "")))
+            else:
+                show(found.team)
 
     with item:
         upload = ui.upload(

@@ -1,0 +1,65 @@
+"""Open a file as a new team, in a process of its own: a file of somebody else can take any time and memory to read.
+
+python -m robochoc.app.opening STORE FILE
+"""
+
+from __future__ import annotations
+
+import sys
+from contextlib import suppress
+from pathlib import Path
+
+import msgspec
+
+from robochoc.app.flights.state import unpack_run
+from robochoc.app.jobs.job import Job, LateError
+from robochoc.app.jobs.process import Command
+from robochoc.app.sketch.opening import opened
+from robochoc.app.sketch.sketch import Sketch
+from robochoc.app.store import Store
+from robochoc.app.texts import say
+from robochoc.formats import InvalidInputError
+
+PATIENCE_S = 60.0
+"""The time in which a file must have been opened."""
+
+
+class Opening(msgspec.Struct, frozen=True):
+    """The id of the new team, or the mistakes of the file, one a line."""
+
+    team: str = ""
+    mistakes: str = ""
+
+
+def opening_of(file: Path, store: Store, *, within_s: float = PATIENCE_S) -> Job[Opening]:
+    """Begin to open `file` as a new team in `store`; return the job."""
+
+    def work(job: Job[Opening]) -> Opening:
+        try:
+            finished = job.run(Command((str(store.folder.absolute()), str(file)), module=__name__), within_s=within_s)
+        except LateError:
+            return Opening(mistakes=say("gallery.too-slow", name=file.name, seconds=f"{within_s:g}"))
+        if finished.status or not finished.out:
+            return Opening(mistakes=say("gallery.broken", name=file.name, why=finished.why.splitlines()[-1]))
+        return msgspec.json.decode(finished.out, type=Opening)
+
+    return Job(f"opening of {file.name}", work).start()
+
+
+def main() -> None:
+    """Open the file."""
+    store, file = Store(Path(sys.argv[1])), Path(sys.argv[2])
+    try:
+        found = opened(file)
+        team = store.add(found) if isinstance(found, Sketch) else store.add_foreign(found)
+        with suppress(OSError):  # the run that a state has beside its team
+            unpack_run(file, store.path(team))
+    except (InvalidInputError, OSError) as error:
+        answer = Opening(mistakes=str(error))
+    else:
+        answer = Opening(team)
+    sys.stdout.buffer.write(msgspec.json.encode(answer))
+
+
+if __name__ == "__main__":
+    main()
