@@ -16,8 +16,11 @@ from robochoc.formats.dialects.pydcop.python_values import (
     ARITHMETIC,
     COMPARISONS,
     FUNCTIONS,
+    MAX_ITEMS,
     OF_MEMBERS,
     SIGNS,
+    Entries,
+    Items,
     NoValueError,
     Value,
     bounded,
@@ -25,6 +28,7 @@ from robochoc.formats.dialects.pydcop.python_values import (
     items,
     literal,
     number,
+    size_of,
 )
 
 MAX_LENGTH = 1_000_000
@@ -34,7 +38,12 @@ MAX_NODES = 50_000
 MAX_DEPTH = 300
 """The maximum depth of its nesting."""
 MAX_STEPS = 5_000_000
-"""The maximum number of steps of all loops of a function, for all arguments together."""
+"""The maximum number of steps of a function, for all arguments together.
+
+Passes of loops count, longer bodies more, and so do the members of all lists and texts that an operation looks at.
+"""
+_NODES_A_STEP = 10
+"""The number of operators and terms of a loop's body that are done in one step."""
 
 Outside = Callable[..., Value]
 """A function that is called by its name."""
@@ -85,6 +94,8 @@ class PythonFunction:
         compiler = _Compiler(
             {*variables, *stored}, {name: fixed[name] for name in fixed if name not in stored}, outside
         )
+        self._compiler = compiler
+        self._steps = _steps_of(self.body) // _NODES_A_STEP
         self._run: _Statement = (
             compiler.expression(self.body[0].value)
             if len(self.body) == 1 and isinstance(self.body[0], ast.Expr)
@@ -98,6 +109,7 @@ class PythonFunction:
             MistakeError: if it gives nothing, as for a division by zero.
         """
         try:
+            self._compiler.step(self._steps)
             result = self._run(dict(arguments))
         except NoValueError as error:
             self._refuse(str(error), arguments)
@@ -192,15 +204,17 @@ class _Compiler:
                 changed = ast.BinOp(ast.Name(name, ast.Load()), op, value)
                 return _assignment(name, self.expression(ast.copy_location(changed, node)))
             case ast.For(target=ast.Name(id=name), iter=over, body=body, orelse=[]):
-                return self._loop(name, self.expression(over), self.block(body))
+                return self._loop(name, self.expression(over), body)
             case _:
                 pass
         return _refuse(node)
 
-    def _loop(self, name: str, over: _Closure, body: _Statement) -> _Statement:
+    def _loop(self, name: str, over: _Closure, statements: Sequence[ast.stmt]) -> _Statement:
+        body, steps = self.block(statements), _steps_of(statements)
+
         def run(names: _Names) -> Value | _Nothing:
-            for one in items(over(names)):
-                self._step()
+            for one in self._items(over(names)):
+                self.step(steps)
                 names[name] = one
                 result = body(names)
                 if result is not _GOES_ON:
@@ -239,15 +253,12 @@ class _Compiler:
                 return self._call(name, self._outside, arguments)
             case ast.Tuple(elts=parts) | ast.List(elts=parts):
                 made = [self.expression(one) for one in parts]
-                return lambda names: tuple([one(names) for one in made])
+                return lambda names: Items([one(names) for one in made])
             case ast.Dict(keys=keys, values=values) if None not in keys:
-                pairs = [
-                    (self.expression(key), self.expression(one)) for key, one in zip(keys, values, strict=True) if key
-                ]
-                return lambda names: {key(names): one(names) for key, one in pairs}
+                return _entries([self.expression(key) for key in keys if key], [*map(self.expression, values)])
             case ast.Subscript(value=value, slice=index) if not isinstance(index, ast.Slice):
                 holder, place = self.expression(value), self.expression(index)
-                return lambda names: _item(holder(names), place(names))
+                return lambda names: self._item(holder(names), place(names))
             case ast.GeneratorExp(elt=part, generators=[loop]) | ast.ListComp(elt=part, generators=[loop]):
                 return self._comprehension(part, loop)
             case _:
@@ -283,8 +294,10 @@ class _Compiler:
         made = [read(one) for one in arguments]
 
         def call(names: _Names) -> Value:
-            result = bounded(called(*[one(names) for one in made]))
-            self._step(len(result) if isinstance(result, tuple) else 0)
+            values = [one(names) for one in made]
+            self.step(sum(map(size_of, values)))
+            result = bounded(called(*values))
+            self.step(size_of(result))
             return result
 
         return call
@@ -311,6 +324,7 @@ class _Compiler:
             before = first(names)
             for says, other in rest:
                 after = other(names)
+                self.step(size_of(before) + size_of(after))
                 if not says(before, after):
                     return False
                 before = after
@@ -323,23 +337,56 @@ class _Compiler:
             _refuse(loop.target)
         name, over, made = loop.target.id, self.expression(loop.iter), self.expression(part)
         conditions = [self.expression(one) for one in loop.ifs]
+        steps = _steps_of([part, *loop.ifs])
 
         def collect(names: _Names) -> Value:
+            self.step(len(names) // _NODES_A_STEP)
             inner = dict(names)
-            found = []
-            for one in items(over(names)):
-                self._step()
+            found: list[Value] = []
+            size = 0
+            for one in self._items(over(names)):
+                self.step(steps)
                 inner[name] = one
                 if all(condition(inner) for condition in conditions):
                     found.append(made(inner))
-            return tuple(found)
+                    size += max(1, size_of(found[-1]))
+                    if size > MAX_ITEMS:
+                        break
+            return Items(found)
 
         return collect
 
-    def _step(self, number: int = 1) -> None:
+    def _items(self, value: Value) -> tuple[Value, ...]:
+        self.step(0 if isinstance(value, tuple) else size_of(value))
+        return items(value)
+
+    def _item(self, holder: Value, place: Value) -> Value:
+        if isinstance(holder, dict):
+            self.step(size_of(place))
+            return holder[place]
+        if isinstance(holder, (tuple, str)) and isinstance(place, int):
+            return holder[place]
+        raise NoValueError("only lists, texts and dictionaries have items")
+
+    def step(self, number: int) -> None:
+        """Count steps. Raises `NoValueError` when there are too many."""
         self._steps -= number
         if self._steps < 0:
-            raise NoValueError("its loops take too many steps")
+            raise NoValueError("it takes too many steps")
+
+
+def _steps_of(body: Sequence[ast.AST]) -> int:
+    """Return the number of steps that a loop's body takes, what loops within it take apart."""
+    return 1 + sum(isinstance(node, ast.expr | ast.stmt) for node in _nodes(body)) // _NODES_A_STEP
+
+
+def _entries(keys: Sequence[_Closure], values: Sequence[_Closure]) -> _Closure:
+    def entries(names: _Names) -> Value:
+        found = [key(names) for key in keys]
+        distinct(found)
+        return Entries(dict(zip(found, [one(names) for one in values], strict=True)))
+
+    return entries
 
 
 def _assignment(name: str, value: _Closure) -> _Statement:
@@ -366,14 +413,6 @@ def _of_truth(parts: Sequence[_Closure], *, is_and: bool) -> _Closure:
         return value
 
     return decide
-
-
-def _item(holder: Value, place: Value) -> Value:
-    if isinstance(holder, dict):
-        return holder[place]
-    if isinstance(holder, (tuple, str)) and isinstance(place, int):
-        return holder[place]
-    raise NoValueError("only lists, texts and dictionaries have items")
 
 
 def _refuse(node: ast.AST) -> NoReturn:

@@ -1,6 +1,10 @@
-"""What Python's operators and a few of its functions do with the values of pyDCOP's functions: exactly, and bounded.
+"""Python's operators and a few of its functions on the values of pyDCOP's functions: exact, and bounded.
 
 Numbers are integers and fractions: `0.1 + 0.2` is 0.3 here. Only infinities are floats.
+
+Each operation is one call of C code, which nothing can interrupt. Its cost is therefore bounded by the size of its
+operands: numbers have at most `MAX_BITS` bits, and lists and dictionaries are `Items` and `Entries`, whose size
+counts nested members as often as they can be reached.
 """
 
 from __future__ import annotations
@@ -9,16 +13,20 @@ import ast
 import math
 import operator
 import re
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
 from fractions import Fraction
 
 Value = None | bool | int | Fraction | float | str | tuple["Value", ...] | dict["Value", "Value"]
-"""What an expression is worth."""
+"""The value of an expression. Lists and dictionaries are always `Items` and `Entries`."""
 
 MAX_BITS = 1024
 """The maximum size of a number, and of its denominator."""
 MAX_ITEMS = 100_000
-"""The maximum length of a range."""
+"""The maximum size of a value: the number of its members, those of its members included."""
+MAX_NESTING = 50
+"""The maximum depth of lists in lists."""
+_MAX_COLLISIONS = 16
+"""The maximum number of different keys with one hash: with more of them, a look-up is a search."""
 
 _DECIMAL = re.compile(r"\s*[+-]?[0-9]{1,18}(\.[0-9]{1,18})?\s*")
 _PLACES = 18
@@ -26,6 +34,48 @@ _PLACES = 18
 
 class NoValueError(Exception):
     """The function has no value for these arguments; says why."""
+
+
+class _Sized:
+    """The size of a list or dictionary: `size` members on all its levels, `nesting` levels."""
+
+    size: int
+    nesting: int
+
+    def _measure(self, members: Iterable[Value]) -> None:
+        """Raises `NoValueError` if it is too large."""
+        size = nesting = 0
+        for member in members:
+            size += max(1, size_of(member))
+            if isinstance(member, (Items, Entries)):
+                nesting = max(nesting, member.nesting)
+            if size > MAX_ITEMS:
+                raise NoValueError(f"a list has more than {MAX_ITEMS} members, those of its members included")
+        if nesting >= MAX_NESTING:
+            raise NoValueError(f"lists are nested more than {MAX_NESTING} levels deep")
+        self.size, self.nesting = size, nesting + 1
+
+
+class Items(tuple["Value", ...], _Sized):  # noqa: SLOT001 - a tuple cannot have any
+    """A list or tuple. Raises `NoValueError` if it is too large."""
+
+    def __init__(self, members: Iterable[Value]) -> None:  # noqa: ARG002 - `tuple` has read them
+        self._measure(self)
+
+
+class Entries(dict["Value", "Value"], _Sized):
+    """A dictionary. Raises `NoValueError` if it is too large, or if its keys are chosen to collide."""
+
+    def __init__(self, entries: Mapping[Value, Value]) -> None:
+        super().__init__(entries)
+        self._measure([*self, *self.values()])
+
+
+def size_of(value: Value) -> int:
+    """Return the number of steps that one operation on `value` counts: 0 for what has no members."""
+    if isinstance(value, (Items, Entries)):
+        return value.size
+    return len(value) if isinstance(value, str) else 0
 
 
 def number(value: Value) -> int | Fraction | float:
@@ -142,13 +192,20 @@ def _range(*ends: Value) -> Value:
     if not all(isinstance(end, int) for end in ends):
         raise NoValueError("range takes integers")
     values = range(*[int(number(end)) for end in ends])
-    if len(values) > MAX_ITEMS:
+    if len(values[: MAX_ITEMS + 1]) > MAX_ITEMS:  # `len` of a range has at most 63 bits
         raise NoValueError("a range is too long")
-    return tuple(values)
+    return Items(values)
 
 
 def _power(base: Value, exponent: Value) -> Value:
     return power(number(base), number(exponent))
+
+
+def _sum(values: Value) -> Value:
+    total: Value = 0
+    for one in items(values):
+        total = bounded(number(total) + number(one))
+    return total
 
 
 FUNCTIONS: dict[str, Callable[..., Value]] = {
@@ -164,28 +221,35 @@ FUNCTIONS: dict[str, Callable[..., Value]] = {
     "pow": _power,
     "range": _range,
     "round": _round,
-    "sum": lambda values: sum(map(number, values)),
+    "sum": _sum,
 }
 """Python's functions that may be called."""
 OF_MEMBERS = frozenset({"all", "any", "len", "max", "min", "sum"})
 """Those that ask a set for its members alone, in whatever order they are."""
 
 
-def distinct(values: Iterable[Value]) -> tuple[Value, ...]:
-    """Return each of `values` once. Raises `NoValueError` for what cannot be in a set."""
+def distinct(values: Iterable[Value]) -> Items:
+    """Return each of `values` once. Raises `NoValueError` for values that cannot be in a set."""
+    by_hash: dict[int, list[Value]] = {}
     try:
-        return tuple(dict.fromkeys(values))
+        for value in values:
+            alike = by_hash.setdefault(hash(value), [])
+            if value not in alike:
+                alike.append(value)
+            if len(alike) > _MAX_COLLISIONS:
+                raise NoValueError("too many members of a set or keys of a dictionary have the same hash")
     except TypeError:
         raise NoValueError("a member of a set is a dictionary") from None
+    return Items(dict.fromkeys(values))
 
 
 def items(value: Value) -> tuple[Value, ...]:
-    """Return what a loop over `value` goes through. Raises `NoValueError` unless it is a list or a text."""
+    """Return the members over which a loop runs. Raises `NoValueError` unless `value` is a list or a text."""
     if isinstance(value, tuple):
         return value
     if isinstance(value, (str, dict)):
         return tuple(value)
-    raise NoValueError(f"{_shown(value)} is no list")
+    raise NoValueError(f"{_shown(value)} is not a list")
 
 
 def _shown(value: Value) -> str:

@@ -10,6 +10,7 @@ import pytest
 
 from robochoc.formats import InvalidInputError, check_team
 from robochoc.formats.dialects.dialect import ImportOptions
+from robochoc.formats.dialects.pydcop import python_function
 from robochoc.formats.dialects.registry import read_foreign
 from robochoc.model.problem import RemoveAgent
 from tests.support.foreign_problems import imported, optimum
@@ -92,6 +93,15 @@ def test_distribution_and_scenario_are_files_of_their_own(tmp_path: Path) -> Non
     assert [event.changes for event in found.team.scenario] == [(RemoveAgent("a2"),)]
 
 
+LOOP = "|\n      a = 0\n      for i in range(99999):\n        "
+
+
+def doubling(result: str) -> str:
+    """Return the body of a function whose lists a and b have 2 ** 60 members, shared."""
+    doubled = "      for i in range(60):\n        a = (a, a)\n        b = (b, b)\n"
+    return f"|\n      a = (x,)\n      b = (x,)\n{doubled}      return {result}"
+
+
 @pytest.mark.parametrize(
     ("function", "message"),
     [
@@ -104,6 +114,20 @@ def test_distribution_and_scenario_are_files_of_their_own(tmp_path: Path) -> Non
         ("|\n      while x:\n        pass\n      return x", "While"),
         ("sum([i for i in range(100000) if sum([j for j in range(100000)])]) + x", "too many steps"),
         ("'a' * 10 ** 9 + x", "is no number"),
+        (doubling("1 if a == b else x"), "more than 100000 members"),
+        (doubling("{a: 1}[b]"), "more than 100000 members"),
+        (
+            "|\n      a = 0\n      for i in range(99999):\n        a = [a]\n      return len({a: x})",
+            "nested more than 50",
+        ),
+        (f"{LOOP}a = len([1 for j in range(999) if x not in range(999)])\n      return x", "too many steps"),
+        ("sum([1 / (3 ** 400 + i) for i in range(10000)]) + x", "a number is too large"),
+        (
+            f"len({{{', '.join(f'x+{i * (2**61 - 1)}' for i in range(2000))}}})",
+            "too many members of a set or keys",
+        ),
+        (LOOP + 999 * "a = a + x\n        " + "a = 0\n      return x", "too many steps"),
+        ("len(range(-10 ** 30, 10 ** 30)) + x", "a range is too long"),
         (f"{'(' * 500}x{')' * 500}", "function"),
         ("x / 0 + y", "has no value at x=0, y=0: ZeroDivisionError"),
         ("z + x", "'z', which is no variable"),
@@ -111,7 +135,10 @@ def test_distribution_and_scenario_are_files_of_their_own(tmp_path: Path) -> Non
         ("len({x, {y: 1}})", "a member of a set is a dictionary"),
     ],
 )
-def test_functions_that_are_refused(function: str, message: str, tmp_path: Path) -> None:
+def test_functions_that_are_refused(
+    function: str, message: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(python_function, "MAX_STEPS", 500_000)
     with pytest.raises(InvalidInputError) as error:
         imported(constraint(function), tmp_path, "a.yaml")
     assert len(error.value.diagnostics) == 1
