@@ -12,8 +12,8 @@ _SECTIONS = {"robots", "tasks"}
 
 
 def recognises(path: Path, beginning: bytes) -> bool:
-    """Return whether a file is called YAML, and has robots and tasks; of a long list of robots, robots alone."""
-    if path.suffix.lower() not in (".yaml", ".yml"):
+    """Return whether a file is called YAML or JSON, and has robots and tasks; of a long list, robots alone."""
+    if path.suffix.lower() not in (".yaml", ".yml", ".json"):
         return False
     found = sections(beginning.decode("utf-8", "replace").lstrip("\ufeff"))
     return found >= _SECTIONS or ("robots" in found and "variables" not in found)

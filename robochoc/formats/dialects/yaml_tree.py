@@ -6,15 +6,17 @@ bounded before they are there.
 
 from __future__ import annotations
 
+import difflib
 import math
-from collections.abc import Iterator
+from collections import deque
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
 from fractions import Fraction
-from typing import Any
+from typing import Any, TypeVar
 
 import yaml
 
-from robochoc.formats.diagnostics import MistakeError, shortened
+from robochoc.formats.diagnostics import MistakeError, shortened, suggestion
 
 MAX_BYTES = 64 * 1024 * 1024
 """The maximum size of all files together."""
@@ -26,61 +28,268 @@ MAX_NODES = 2_000_000
 Scalar = None | bool | int | Fraction | float | str
 """A value: a float of YAML is the decimal that it shows, as a fraction; only infinities are floats."""
 
+_LOADER = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
 _CORE = "tag:yaml.org,2002:"
 _SCALARS = {_CORE + name for name in ("null", "bool", "int", "float", "str", "value")}
 _MERGE = _CORE + "merge"
 
 
-@dataclass(slots=True)
+Read = TypeVar("Read")
+_NOTHING_ASKED: frozenset[Scalar] = frozenset()
+_ALIKE = 0.75
+"""Keys that are more alike than this are taken for the same word, misspelt."""
+_Path = tuple["_Path", str | int] | None
+"""The way from the root to a value: the way to what holds it, and its key or number there."""
+
+
 class Node:
-    """A value of the file: one of `scalar`, `items` and `entries` holds it.
+    """A value of the file, and a record of its parts that a reader has used.
+
+    A reader gets at the parts by `scalar`, `items`, `get` and `named` alone. Each marks what it returns as read, and
+    `read_yaml` refuses a file of which any part was not read. `skip` marks everything below as left out on purpose.
 
     Attributes:
-        line: Where it begins, from 1 on.
-        scalar: A single value.
-        items: A list.
-        entries: A mapping.
-        keys: Where the keys of a mapping stand.
+        line: The line of its beginning, from 1 on.
         size: The number of values in it.
+        is_named: Whether it has an anchor that an alias refers to.
     """
 
-    line: int
-    scalar: Scalar = None
-    items: list[Node] | None = None
-    entries: dict[Scalar, Node] | None = None
-    keys: dict[Scalar, int] = field(default_factory=dict)
-    size: int = 1
+    __slots__ = ("_asked", "_is_read", "_is_skipped", "_key_lines", "_value", "is_named", "line", "size")
+
+    def __init__(
+        self,
+        line: int,
+        value: Scalar | list[Node] | dict[Scalar, Node] = None,
+        key_lines: dict[Scalar, int] | None = None,
+    ) -> None:
+        self.line = line
+        self.size = 1
+        self.is_named = False
+        self._value = value
+        self._is_read = self._is_skipped = False
+        self._asked: set[Scalar] | frozenset[Scalar] = _NOTHING_ASKED
+        self._key_lines = key_lines
 
     @property
     def is_scalar(self) -> bool:
         """Return whether it is a single value."""
-        return self.items is None and self.entries is None
+        return not isinstance(self._value, (list, dict))
+
+    @property
+    def is_empty(self) -> bool:
+        """Return whether nothing is written there."""
+        return self._value is None
+
+    @property
+    def is_mapping(self) -> bool:
+        """Return whether it is a mapping."""
+        return isinstance(self._value, dict)
+
+    @property
+    def scalar(self) -> Scalar:
+        """Return a single value; None for an empty one, a list or a mapping."""
+        if isinstance(self._value, (list, dict)):
+            return None
+        self._is_read = True
+        return self._value
+
+    @property
+    def items(self) -> list[Node] | None:
+        """Return the values of a list; None for anything else."""
+        if not isinstance(self._value, list):
+            return None
+        self._is_read = True
+        return self._value
+
+    def get(self, key: str) -> Node | None:
+        """Return the value of a key; None if it is missing, or this is not a mapping."""
+        if not isinstance(self._value, dict):
+            return None
+        self._is_read = True
+        if not isinstance(self._asked, set):
+            self._asked = set(self._asked)
+        self._asked.add(key)
+        return self._value.get(key)
+
+    def named(self) -> Iterator[tuple[Scalar, Node]]:
+        """Yield the keys and values of a mapping whose keys the author of the file chooses; nothing for others."""
+        if isinstance(self._value, dict):
+            self._is_read = True
+            self._asked = frozenset(self._value)
+            yield from self._value.items()
+
+    def skip(self) -> None:
+        """Leave out this value and everything in it."""
+        self._is_read = self._is_skipped = True
+
+    def key_line(self, key: Scalar) -> int:
+        """Return the line of a key."""
+        return (self._key_lines or {}).get(key, self.line)
+
+    def needed(self, key: str, owner: str, hint: str = "") -> Node:
+        """Return the value of a key that a mapping must have.
+
+        Args:
+            key: The key.
+            owner: The name of the mapping in messages.
+            hint: What to write.
+
+        Raises:
+            MistakeError: It is not there. A key that may be a misspelling of it is named.
+        """
+        found = self.get(key)
+        if found is not None:
+            return found
+        keys = {shown(one)[:40]: one for one in self._value} if isinstance(self._value, dict) else {}
+        for close in difflib.get_close_matches(key, [one for one in keys if one != key], n=1, cutoff=_ALIKE):
+            message = f"unknown key '{shortened(close)}' in {owner}"
+            raise MistakeError(message, f"did you mean '{key}'?", self.key_line(keys[close]))
+        raise MistakeError(f"{owner} has no {key}", hint or f"write {key}:", self.line)
+
+    def copy(self, line: int) -> Node:
+        """Return an alias in `line`: another value with the same parts."""
+        alias = Node(line, self._value, self._key_lines)
+        alias.size = self.size
+        return alias
+
+    @property
+    def is_done(self) -> bool:
+        """Return whether a reader has used it, and it has no parts."""
+        return self._is_read and self.is_scalar
+
+    def unread(self, path: _Path) -> Iterator[MistakeError | tuple[Node, _Path]]:
+        """Yield a mistake for each part that no reader has used, and the other parts, which are to be looked through.
+
+        Args:
+            path: The way to this value.
+        """
+        if self._is_skipped:
+            return
+        if not self._is_read:
+            if self._value is not None:
+                yield self._unused(path)
+        elif isinstance(self._value, list):
+            yield from ((one, (path, number)) for number, one in enumerate(self._value) if not one.is_done)
+        elif isinstance(self._value, dict):
+            for key, one in self._value.items():
+                if key in self._asked:
+                    if not one.is_done:
+                        yield one, (path, shown(key))
+                elif not one.is_named:  # a part that aliases elsewhere in the file repeat needs no reader here
+                    yield self._unknown(key, path)
+
+    def _unused(self, path: _Path) -> MistakeError:
+        what = "a list" if isinstance(self._value, list) else "a mapping" if self.is_mapping else "a value"
+        return MistakeError(
+            f"{_written(path)}: {what} does not belong here", "delete it, or check the format", self.line
+        )
+
+    def _unknown(self, key: Scalar, path: _Path) -> MistakeError:
+        where = f" in {_written(path)}" if path else ""
+        known = sorted(str(one) for one in self._asked)
+        return MistakeError(
+            f"unknown key '{shortened(shown(key))}'{where}", suggestion(shown(key), known, "keys"), self.key_line(key)
+        )
+
+    def append(self, node: Node) -> None:
+        """Add a value to a list."""
+        if isinstance(self._value, list):
+            self._value.append(node)
+
+    def enter(self, key: Scalar, node: Node, line: int) -> bool:
+        """Add a key and its value to a mapping. Return whether the key is new there; merged ones do not count."""
+        if isinstance(self._value, dict):
+            self._value[key] = node
+        if self._key_lines is None:
+            self._key_lines = {}
+        is_new = key not in self._key_lines
+        self._key_lines[key] = line
+        return is_new
+
+    def merge(self, entries: Mapping[Scalar, Node]) -> None:
+        """Add the keys of another mapping that are not there yet."""
+        if isinstance(self._value, dict):
+            self._value.update({key: one for key, one in entries.items() if key not in self._value})
 
 
-@dataclass(frozen=True)
-class Document:
-    """A YAML document.
-
-    Attributes:
-        root: Its tree.
-        repeated: Keys that stand twice in one mapping, with the line of the later one, which counts.
-    """
-
-    root: Node
-    repeated: tuple[tuple[int, str], ...]
+def _written(path: _Path) -> str:
+    steps = []
+    while path:
+        path, step = path
+        steps.append(f"[{step}]" if isinstance(step, int) else f".{shortened(step)}")
+    return "".join(reversed(steps)).removeprefix(".") or "the file"
 
 
 _PROBLEM = "a problem has a name, an objective, domains, variables and constraints"
+Repeated = Callable[[int, str], None]
+"""What is done with the line and the name of a key that stands twice in one mapping; the later one counts."""
 
 
-def read_yaml(text: str, expected: str = _PROBLEM) -> Document:
-    """Return the one document in `text`; `expected` says what such a file has.
+def read_yaml(
+    text: str, read: Callable[[Node], Read], expected: str = _PROBLEM, repeated: Repeated | None = None
+) -> Read:
+    """Return what `read` makes of the one document in `text`.
+
+    Args:
+        text: The file.
+        read: Reads its root, and by that all parts of it.
+        expected: The usual content of such a file.
+        repeated: Called for each key that stands twice. None: such keys are refused.
 
     Raises:
-        MistakeError: It is empty, or not such YAML. It has the line.
+        MistakeError: It is empty, is not such YAML, or has a part that `read` did not use. It has the line.
     """
+    root = _tree(text, expected, repeated or _refuse_repeated)
+    found = read(root)
+    for mistake in unread_parts(root):
+        raise mistake
+    return found
+
+
+def unread_parts(root: Node) -> list[MistakeError]:
+    """Return a mistake for each part below `root`, at whatever depth, that no reader has used."""
+    found: list[MistakeError] = []
+    left: deque[tuple[Node, _Path]] = deque([(root, None)])
+    while left:
+        node, path = left.popleft()
+        for part in node.unread(path):
+            if isinstance(part, MistakeError):
+                found.append(part)
+            else:
+                left.append(part)
+    return sorted(found, key=lambda one: one.line)
+
+
+def root_keys(text: str) -> set[str]:
+    """Return the keys of the root mapping in `text`, as far as it is YAML: it may be the beginning of a file."""
+    keys, depth, is_key = set(), 0, True
     try:
-        return _Composer(expected).document(yaml.parse(text, Loader=getattr(yaml, "CSafeLoader", yaml.SafeLoader)))
+        for event in yaml.parse(text, Loader=_LOADER):
+            if isinstance(event, (yaml.MappingStartEvent, yaml.SequenceStartEvent)):
+                depth += 1
+                is_key = depth == 1
+            elif isinstance(event, (yaml.MappingEndEvent, yaml.SequenceEndEvent)):
+                depth -= 1
+                is_key = True
+            elif isinstance(event, (yaml.ScalarEvent, yaml.AliasEvent)) and depth == 1:
+                if is_key and isinstance(event, yaml.ScalarEvent):
+                    keys.add(event.value)
+                is_key = not is_key
+            if depth > MAX_DEPTH:
+                break
+    except (yaml.YAMLError, ValueError):
+        pass  # whoever reads the whole file reports it
+    return keys
+
+
+def _refuse_repeated(line: int, key: str) -> None:
+    raise MistakeError(f"'{shortened(key)}' stands twice", "delete one, or name it otherwise", line)
+
+
+def _tree(text: str, expected: str, repeated: Repeated) -> Node:
+    try:
+        events = yaml.parse(text, Loader=_LOADER)
+        return _Composer(expected, repeated).root(events)
     except yaml.MarkedYAMLError as error:
         line = error.problem_mark.line + 1 if error.problem_mark else 0
         raise MistakeError(f"is not YAML: {error.problem or error.context}", "mend it there", line) from None
@@ -91,15 +300,15 @@ def read_yaml(text: str, expected: str = _PROBLEM) -> Document:
 class _Composer:
     """Makes the tree of events, with a stack of its own: nesting does not recurse."""
 
-    def __init__(self, expected: str) -> None:
+    def __init__(self, expected: str, repeated: Repeated) -> None:
         self._expected = expected
+        self._repeated = repeated
         self._plain = yaml.SafeLoader("")
         self._anchors: dict[str, Node] = {}
         self._open: list[_Open] = []
-        self._repeated: list[tuple[int, str]] = []
         self._root: Node | None = None
 
-    def document(self, events: Iterator[Any]) -> Document:
+    def root(self, events: Iterator[Any]) -> Node:
         documents = 0
         for event in events:
             line = event.start_mark.line + 1
@@ -120,7 +329,7 @@ class _Composer:
                     pass
         if self._root is None:
             raise MistakeError("is empty", self._expected)
-        return Document(self._root, tuple(self._repeated))
+        return self._root
 
     def _alias(self, anchor: str, line: int) -> Node:
         node = self._anchors.get(anchor)
@@ -128,7 +337,8 @@ class _Composer:
             raise MistakeError(
                 f"the alias *{shortened(anchor)} has no anchor before it", "write & before its name", line
             )
-        return node
+        node.is_named = True
+        return node.copy(line)
 
     def _begin(self, event: Any, line: int) -> None:  # noqa: ANN401 - an event of either kind
         is_list = isinstance(event, yaml.SequenceStartEvent)
@@ -136,7 +346,7 @@ class _Composer:
             raise _tag_mistake(event.tag, line)
         if len(self._open) == MAX_DEPTH:
             raise MistakeError("is nested too deeply", f"{MAX_DEPTH} levels are allowed", line)
-        node = Node(line, items=[]) if is_list else Node(line, entries={})
+        node = Node(line, []) if is_list else Node(line, {})
         self._open.append(_Open(node, event.anchor))
 
     def _end(self) -> None:
@@ -159,8 +369,8 @@ class _Composer:
             raise MistakeError(
                 f"has more than {MAX_NODES} values, counting what aliases repeat", "write fewer", node.line
             )
-        if holder.node.items is not None:
-            holder.node.items.append(node)
+        if not holder.node.is_mapping:
+            holder.node.append(node)
         elif holder.key is None:
             holder.key = (self._key(node), node.line, event is not None and self._is_merge(event))
         else:
@@ -168,21 +378,14 @@ class _Composer:
 
     def _enter(self, holder: _Open, node: Node) -> None:
         (key, line, merges), holder.key = holder.key or (None, 0, False), None
-        entries = holder.node.entries
-        if entries is None:
-            return
         if merges:
-            for source in node.items if node.items is not None else [node]:
-                if source.entries is None:
+            for source in node.items or [node]:
+                if not source.is_mapping:
                     raise MistakeError("'<<' merges something that is no mapping", "let an alias follow it", line)
-                holder.merged.update({key: one for key, one in source.entries.items() if key not in holder.merged})
-            for known, one in holder.merged.items():
-                entries.setdefault(known, one)
-            return
-        if key in holder.node.keys:
-            self._repeated.append((line, shown(key)))
-        entries[key] = node
-        holder.node.keys[key] = line
+                holder.merged.update({key: one for key, one in source.named() if key not in holder.merged})
+            holder.node.merge(holder.merged)
+        elif not holder.node.enter(key, node, line):
+            self._repeated(line, shown(key))
 
     def _key(self, node: Node) -> Scalar:
         if not node.is_scalar:
@@ -190,7 +393,7 @@ class _Composer:
         return node.scalar
 
     def _is_merge(self, event: Any) -> bool:  # noqa: ANN401 - a scalar's event
-        return bool(event.value == "<<" and event.implicit[0] and event.style is None)
+        return bool(event.value == "<<" and event.implicit[0] and not event.style)  # libyaml has "" for None
 
     def _scalar(self, event: Any, line: int) -> Scalar:  # noqa: ANN401 - a scalar's event
         tag = event.tag

@@ -33,6 +33,7 @@ _FAR_M = Fraction(1_000_000)
 _YAW = Fraction(1000)
 _MODES = ("trinary", "scale", "raw")
 _KEYS = ("image", "resolution", "origin", "negate", "occupied_thresh", "free_thresh")
+_EXPECTED = f"a map has the keys {', '.join(_KEYS)}"
 _MAGIC_BYTES = 8
 _PERCENT = 100
 _RAW = 255
@@ -103,7 +104,7 @@ def read_occupancy_grid(path: Path) -> OccupancyGrid:
             text = content.decode()
         except UnicodeDecodeError:
             raise MistakeError("is not text in UTF-8", "name the YAML file of the map, not its image") from None
-        described = _Description(text)
+        described = read_yaml(text, _Description, _EXPECTED)
         image = described.image_beside(path)
     with told(image):
         shades = read_image(content_of(image, MAX_BYTES), adds_alpha=described.mode == "trinary")
@@ -129,16 +130,11 @@ def _upright(grid: OccupancyGrid, yaw: Fraction) -> OccupancyGrid:
 class _Description:
     """The description of a map in its YAML file. Raises `MistakeError` where something is wrong or missing."""
 
-    def __init__(self, text: str) -> None:
-        document = read_yaml(text, f"a map has the keys {', '.join(_KEYS)}")
-        if document.root.entries is None:
-            raise MistakeError("is no map", f"expected the keys {', '.join(_KEYS)}", document.root.line)
-        for line, key in document.repeated:
-            raise MistakeError(f"has the key {shortened(key)} twice", "keep one", line)
-        self._entries = document.root.entries
-        missing = [key for key in _KEYS if key not in self._entries]
-        if missing:
-            raise MistakeError(f"has no {missing[0]}", f"a map has the keys {', '.join(_KEYS)}")
+    def __init__(self, root: Node) -> None:
+        if not root.is_mapping:
+            raise MistakeError("is no map", f"expected the keys {', '.join(_KEYS)}", root.line)
+        self._entries = {key: root.needed(key, "the map", _EXPECTED) for key in _KEYS}
+        self._given_mode = root.get("mode")
         self.image = self._image()
         self.resolution = self._number("resolution", _SIDE_MIN_M, _SIDE_MAX_M)
         self.origin, self.yaw = self._pose()
@@ -203,7 +199,7 @@ class _Description:
         return bool(node.scalar)
 
     def _mode(self) -> str:
-        node = self._entries.get("mode")
+        node = self._given_mode
         if node is None:
             return _MODES[0]
         for mode in _MODES:

@@ -6,7 +6,7 @@ checked when it is read.
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping
+from collections.abc import Mapping
 from enum import StrEnum
 from fractions import Fraction
 from pathlib import Path
@@ -14,7 +14,7 @@ from pathlib import Path
 import msgspec
 
 from robochoc.flight.layout import Point
-from robochoc.formats.diagnostics import MistakeError, on_one_line, shortened, suggestion
+from robochoc.formats.diagnostics import MistakeError, on_one_line, shortened
 from robochoc.formats.dialects.yaml_tree import Node, read_yaml, shown
 from robochoc.ros.autopilots.frames import FAR_M, LATITUDE_MAX, GpsPlace
 from robochoc.ros.autopilots.kinds import Kind, address_of, shared_port
@@ -22,7 +22,7 @@ from robochoc.ros.autopilots.kinds import Kind, address_of, shared_port
 BYTES_MAX = 64 * 1024
 VEHICLES_MAX = 64
 _PORTS = range(1, 65_536)
-_KNOWN = ("vehicles", "fence", "takeoff", "near", "end", "patience", "time", "distance", "downwash")
+_EXPECTED = "see docs/guides/autopilots.md for what a fleet file has"
 _CORNERS, _AXES = 2, 3
 _LARGE = 10**9
 
@@ -120,7 +120,7 @@ def read_fleet(path: Path, kind: Kind = Kind.MAVLINK) -> Fleet:
     if len(content) > BYTES_MAX:
         raise FleetError(on_one_line(f"{path}: a fleet file has at most {BYTES_MAX:,} bytes"))
     try:
-        return _fleet(_root(content.decode()), kind)
+        return read_yaml(content.decode(), lambda root: _fleet(root, kind), _EXPECTED)
     except UnicodeDecodeError:
         raise FleetError(on_one_line(f"{path}: is no text in UTF-8")) from None
     except MistakeError as mistake:
@@ -128,37 +128,29 @@ def read_fleet(path: Path, kind: Kind = Kind.MAVLINK) -> Fleet:
         raise FleetError(on_one_line(f"{where}: {mistake.message}; {mistake.hint}")) from None
 
 
-def _root(text: str) -> Node:
-    document = read_yaml(text, "see docs/guides/autopilots.md for what a fleet file has")
-    for line, key in document.repeated:
-        raise MistakeError(f"has {shortened(key)!r} twice", "keep one", line)
-    return document.root
-
-
 def _fleet(root: Node, kind: Kind) -> Fleet:
     rules = kind.rules
-    entries = _mapping(root, "a fleet file", (*_KNOWN, *rules.entries), f" of {kind}")
-    for name in ("vehicles", "fence"):
-        if name not in entries:
-            raise MistakeError(f"has no '{name}'", "see docs/guides/autopilots.md for what a fleet file has", root.line)
-    origin = _origin(entries["origin"]) if "origin" in entries else None
+    _check_mapping(root, "a fleet file")
+    vehicles, box = (root.needed(key, f"a fleet file of {kind}", _EXPECTED) for key in ("vehicles", "fence"))
+    end, place = root.get("end"), root.get("origin") if "origin" in rules.entries else None
+    origin = _origin(place) if place else None
     fleet = Fleet(
-        _vehicles(entries["vehicles"], kind, origin),
-        _fence(entries["fence"]),
+        _vehicles(vehicles, kind, origin),
+        _fence(box),
         origin,
-        takeoff_m=_number(entries, "takeoff", rules.takeoff_m, rules.least_takeoff_m, 100),
-        near_m=_number(entries, "near", rules.near_m, 0.05, 10),
-        end=_end(entries["end"]) if "end" in entries else AtEnd.LAND,
-        patience_s=_number(entries, "patience", 10, 1, 600),
-        time_s=_number(entries, "time", 120, 1, 3_600),
+        takeoff_m=_number(root, "takeoff", rules.takeoff_m, rules.least_takeoff_m, 100),
+        near_m=_number(root, "near", rules.near_m, 0.05, 10),
+        end=_end(end) if end else AtEnd.LAND,
+        patience_s=_number(root, "patience", 10, 1, 600),
+        time_s=_number(root, "time", 120, 1, 3_600),
         kind=kind,
-        speed_ms=_number(entries, "speed", 1.0, 0.1, 5),
-        distance_m=_number(entries, "distance", rules.distance_m, 0.1, 100),
-        downwash=_number(entries, "downwash", 1, 1, 10),
+        speed_ms=_number(root, "speed", 1.0, 0.1, 5) if "speed" in rules.entries else 1.0,
+        distance_m=_number(root, "distance", rules.distance_m, 0.1, 100),
+        downwash=_number(root, "downwash", 1, 1, 10),
     )
     low, high = fleet.fence.low[2], fleet.fence.high[2]
     if fleet.takeoff_m > high - low:
-        line = entries.get("takeoff", entries["fence"]).line
+        line = (root.get("takeoff") or box).line
         raise MistakeError(
             f"a take-off to {fleet.takeoff_m:g} m leaves a fence that is {high - low:g} m high",
             "raise the fence, or lower 'takeoff'",
@@ -170,7 +162,9 @@ def _fleet(root: Node, kind: Kind) -> Fleet:
 def _vehicles(node: Node, kind: Kind, origin: GpsPlace | None) -> dict[str, Link]:
     found: dict[str, Link] = {}
     names: dict[str, str] = {}
-    for name, entry in _mapping(node, "'vehicles'").items():
+    _check_mapping(node, "'vehicles'")
+    for key, entry in node.named():
+        name = shown(key)
         link = _link(entry, name, kind, origin)
         address = address_of(link.url)
         if address in names:
@@ -188,16 +182,15 @@ def _vehicles(node: Node, kind: Kind, origin: GpsPlace | None) -> dict[str, Link
 
 
 def _link(node: Node, name: str, kind: Kind, origin: GpsPlace | None) -> Link:
-    if node.entries is None:
+    if not node.is_mapping:
         return Link(_url(node, name, kind))
-    entries = _mapping(node, f"vehicle {shortened(name)}", ("link", "at"))
-    if "link" not in entries:
-        raise MistakeError(f"vehicle {shortened(name)} has no 'link'", f"as in link: {kind.rules.example}", node.line)
-    if "at" not in entries:
-        return Link(_url(entries["link"], name, kind))
+    link = node.needed("link", f"vehicle {shortened(name)}", f"as in link: {kind.rules.example}")
+    at = node.get("at")
+    if at is None:
+        return Link(_url(link, name, kind))
     if origin:
-        raise MistakeError("'at' is for vehicles without GPS", "delete it, or 'origin'", entries["at"].line)
-    return Link(_url(entries["link"], name, kind), _point(entries["at"], "'at'"))
+        raise MistakeError("'at' is for vehicles without GPS", "delete it, or 'origin'", at.line)
+    return Link(_url(link, name, kind), _point(at, "'at'"))
 
 
 def _url(node: Node, name: str, kind: Kind) -> str:
@@ -249,13 +242,14 @@ def _point(node: Node, what: str) -> Point:
     return x, y, z
 
 
-def _number(entries: Mapping[str, Node], name: str, usual: float, least: float, most: float) -> float:
-    if name not in entries:
+def _number(root: Node, name: str, usual: float, least: float, most: float) -> float:
+    node = root.get(name)
+    if node is None:
         return usual
-    found = _decimal(entries[name])
+    found = _decimal(node)
     if found is None or not least <= found <= most:
-        given = shortened(shown(entries[name].scalar))
-        raise MistakeError(f"'{name}' is {given!r}", f"expected {least:g} to {most:,g}", entries[name].line)
+        given = shortened(shown(node.scalar))
+        raise MistakeError(f"'{name}' is {given!r}", f"expected {least:g} to {most:,g}", node.line)
     return found
 
 
@@ -266,17 +260,9 @@ def _decimal(node: Node) -> float | None:
     return float(value) if -_LARGE <= value <= _LARGE else None
 
 
-def _mapping(node: Node, what: str, known: Collection[str] = (), kind: str = "") -> dict[str, Node]:
-    if node.entries is None:
-        raise MistakeError(f"{what} is no mapping", "expected lines of NAME: VALUE", node.line)
-    found = {shown(key): entry for key, entry in node.entries.items()}
-    for name in found if known else ():
-        if name not in known:
-            hint = suggestion(name, known, "entries") or f"known are {', '.join(known)}"
-            raise MistakeError(
-                f"{shortened(name)!r} does not belong in {what}{kind}", hint, node.keys.get(name, node.line)
-            )
-    return found
+def _check_mapping(node: Node, what: str) -> None:
+    if not node.is_mapping:
+        raise MistakeError(f"{what} is not a mapping", "expected lines of NAME: VALUE", node.line)
 
 
 def point_text(place: Point) -> str:

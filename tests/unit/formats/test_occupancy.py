@@ -119,7 +119,7 @@ def test_modes_in_which_free_means_free_are_read(tmp_path: Path, mode: str) -> N
 @pytest.mark.parametrize(
     ("old", "new", "said"),
     [
-        ("image: plan.pgm\n", "", "plan.yaml: has no image"),
+        ("image: plan.pgm\n", "", "plan.yaml:1: the map has no image"),
         ("plan.pgm", "[plan]", "plan.yaml:1: has an image that is no path"),
         ("plan.pgm", "other.pgm", "plan.yaml:1: names the image other.pgm, which does not exist .*folder of this file"),
         (YAML, f"P2 1 1 255 1{' ' * MAX_YAML}", "plan.yaml: is an image .*name the YAML file"),
@@ -135,8 +135,10 @@ def test_modes_in_which_free_means_free_are_read(tmp_path: Path, mode: str) -> N
         ("0.25", "0.7", "plan.yaml:6: has a wrong free_thresh .*from 0 to 0.65"),
         ("negate: 0", "negate: 0\nmode: [raw]", "plan.yaml:5: has a list or mapping as its mode .*are read"),
         ("negate: 0", "negate: 0\nmode: rare", "plan.yaml:5: has the mode rare .*trinary, scale, raw are read"),
-        ("negate: 0", "negate: 0\nnegate: 1", "plan.yaml:5: has the key negate twice"),
+        ("negate: 0", "negate: 0\nnegate: 1", "plan.yaml:5: 'negate' stands twice"),
         ("negate: 0", "negate: !!python/object:os.system 0", "plan.yaml:4: the tag"),
+        ("negate: 0", "negate: 0\nmood: raw", "plan.yaml:5: unknown key 'mood' .*did you mean 'mode'"),
+        ("negate: 0", "negate: 0\nmode:\n- raw", "plan.yaml:6: has a list or mapping"),
         ("negate: 0", "negate: {", "plan.yaml:.*is not YAML"),
         (YAML, "- 1\n", "plan.yaml:1: is no map"),
         (YAML, "#" * (MAX_YAML + 1), "plan.yaml: is too large"),

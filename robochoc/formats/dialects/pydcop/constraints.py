@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from fractions import Fraction
 from pathlib import Path
@@ -66,20 +66,20 @@ class ConstraintReader:
 
     def read(self, name: str, node: Node) -> Costs:
         """Return the constraint in `node`. Raises `MistakeError`."""
-        if node.entries is None:
+        if not node.is_mapping:
             raise MistakeError("is no mapping", "write type: and function:, or variables: and values:")
-        kind = node.entries.get("type")
+        kind = node.get("type")
         match kind.scalar if kind else None:
             case "intention":
-                return self._intention(name, node.entries, node.line)
+                return self._intention(name, node)
             case "extensional":
-                return self._extensional(name, node.entries, node.line)
+                return self._extensional(name, node)
             case None:
                 raise MistakeError("has no type", "write type: intention, or type: extensional")
             case other:
                 raise MistakeError(f"is of the type '{shortened(str(other))}'", "intention and extensional are known")
 
-    def function(self, name: str, node: Node, variables: Sequence[str], sources: Node | None = None) -> Costs:
+    def function(self, name: str, node: Node, variables: Collection[str], sources: Node | None = None) -> Costs:
         """Return the costs that the function in `node` says for some of `variables`."""
         if isinstance(node.scalar, (bool, int, Fraction, float)):
             return Costs(name, (), CostTable(name, {}, self._amount(node.scalar), 1), node.line)
@@ -94,11 +94,9 @@ class ConstraintReader:
             return Costs(name, function.scope, simple, node.line)
         return Costs(name, function.scope, self._tabulated(name, function), node.line)
 
-    def _intention(self, name: str, entries: Mapping[Scalar, Node], line: int) -> Costs:
-        function = entries.get("function")
-        if function is None:
-            raise MistakeError("has no function", "write function: and a Python expression", line)
-        return self.function(name, function, tuple(self.values), entries.get("source"))
+    def _intention(self, name: str, node: Node) -> Costs:
+        function = node.needed("function", "it", "write function: and a Python expression")
+        return self.function(name, function, self.values, node.get("source"))
 
     def _outside(self, node: Node | None) -> Mapping[str, Callable[..., Value]]:
         if node is None:
@@ -144,21 +142,22 @@ class ConstraintReader:
             return CostTable(name, {}, rows[()], 1)
         return CostTable(name, rows, 0, size)
 
-    def _extensional(self, name: str, entries: Mapping[Scalar, Node], line: int) -> Costs:
-        scope = self._scope(entries.get("variables"), line)
-        values = entries.get("values")
-        if values is None or values.entries is None:
-            raise MistakeError("has no values", "write values: and, below, COST: v w | v w", line)
+    def _extensional(self, name: str, node: Node) -> Costs:
+        line, hint = node.line, "write values: and, below, COST: v w | v w"
+        scope = self._scope(node.needed("variables", "it", "write variables: [v1, v2]"), line)
+        values = node.needed("values", "it", hint)
+        if not values.is_mapping:
+            raise MistakeError("has no values", hint, line)
         rows: dict[tuple[int, ...], Amount] = {}
-        for cost, node in values.entries.items():
+        for cost, tuples in values.named():
             if not isinstance(cost, (int, Fraction, float)):
                 what = f"has the cost '{shortened(str(cost))}', which is no number"
-                raise MistakeError(what, "write COST: v w | v w", values.keys.get(cost, node.line))
+                raise MistakeError(what, "write COST: v w | v w", values.key_line(cost))
             amount = self._amount(cost)
-            for codes in self._tuples(scope, node):
+            for codes in self._tuples(scope, tuples):
                 rows[codes] = amount
-        default = entries.get("default")
-        if default is None or default.scalar is None:
+        default = node.get("default")
+        if default is None or default.is_empty:
             amount = math.inf
             if len(rows) < self._size(scope):
                 self.incomplete.append(name)
@@ -168,8 +167,8 @@ class ConstraintReader:
             raise MistakeError("has a default that is no number", "write default: 100", default.line)
         return Costs(name, scope, CostTable(name, rows, amount, self._size(scope)), line)
 
-    def _scope(self, node: Node | None, line: int) -> tuple[str, ...]:
-        parts = [node] if node and node.is_scalar else (node.items if node else None)
+    def _scope(self, node: Node, line: int) -> tuple[str, ...]:
+        parts = [node] if node.is_scalar else node.items
         if not parts:
             raise MistakeError("has no variables", "write variables: [v1, v2]", line)
         scope = tuple(str(one.scalar).strip() for one in parts)

@@ -14,6 +14,8 @@ from robochoc.formats.dialects.yaml_tree import Node, Scalar, shown
 from robochoc.formats.names import check_integer
 from robochoc.model.constraint import Domain
 
+_HINT = "write values: [R, G] or [0..4]"
+
 
 @dataclass(frozen=True)
 class Values:
@@ -83,9 +85,12 @@ def _are_integers(values: Iterable[Scalar]) -> bool:
 
 
 def _scalars(name: str, node: Node) -> list[Scalar]:
-    values = (node.entries or {}).get("values")
-    if values is None or not values.items:
-        raise MistakeError(f"the domain '{shortened(name)}' has no values", "write values: [R, G] or [0..4]", node.line)
+    values = node.needed("values", f"the domain '{shortened(name)}'", _HINT)
+    if not values.items:
+        raise MistakeError(f"the domain '{shortened(name)}' has no values", _HINT, node.line)
+    for key in ("type", "initial_value"):
+        if remark := node.get(key):
+            remark.skip()  # a word for people, and a value that pyDCOP itself does not read
     for one in values.items:
         if not one.is_scalar:
             raise MistakeError("a list or a mapping as a value of a domain", "values are numbers and names", one.line)

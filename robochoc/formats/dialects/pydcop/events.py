@@ -2,23 +2,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator, Mapping
+from collections.abc import Collection, Iterator
 
 from robochoc.formats.diagnostics import MistakeError, shortened, suggestion
 from robochoc.formats.dialects.dialect import Names, Note
 from robochoc.formats.dialects.pydcop.hosting import text_of
-from robochoc.formats.dialects.yaml_tree import Document, Node, Scalar
+from robochoc.formats.dialects.yaml_tree import Node
 from robochoc.model.problem import RemoveAgent, ScenarioEvent, Team
 from robochoc.model.wording import counted
 
 
 def read_scenario(
-    document: Document, team: Team, names: Names, agents: Collection[str], notes: list[Note]
+    root: Node, team: Team, names: Names, agents: Collection[str], notes: list[Note]
 ) -> tuple[ScenarioEvent, ...]:
     """Return the events of a scenario.
 
     Args:
-        document: The file.
+        root: The file.
         team: The team at its start.
         names: The names of robots, for those of agents.
         agents: All agents of the problem, also those without variables.
@@ -28,16 +28,16 @@ def read_scenario(
         MistakeError: if it is none.
     """
     there, events, delays, left_out = {robot.name for robot in team.robots}, [], 0, 0
-    root = document.root.entries or {}
     listed = root.get("events")
     if listed is None or listed.items is None:
-        raise MistakeError("has no events", "write events: and a list of them", document.root.line)
-    notes += [Note("repeated", f"{shortened(key)} stands twice; the later one counts") for _, key in document.repeated]
+        raise MistakeError("has no events", "write events: and a list of them", root.line)
     for event in listed.items:
-        entries = event.entries or {}
-        delays += "delay" in entries
+        delay, name = event.get("delay"), event.get("id")
+        for left_aside in filter(None, (delay, name)):
+            left_aside.skip()
+        delays += delay is not None
         changes: list[RemoveAgent] = []
-        for action in _actions(entries, event):
+        for action in _actions(event, is_delay=delay is not None):
             robot = _leaving(action, names, agents)
             if robot is None:
                 left_out += 1
@@ -62,21 +62,20 @@ def _notes(events: int, delays: int, left_out: int) -> Iterator[Note]:
         yield Note("dropped", f"{left_out} actions that remove no agent, which pyDCOP passes over, too")
 
 
-def _actions(entries: Mapping[Scalar, Node], event: Node) -> list[Node]:
-    actions = entries.get("actions")
-    if actions is None:
-        if "delay" not in entries:
-            raise MistakeError("an event has neither delay nor actions", "write actions: or delay:", event.line)
-        return []
-    return actions.items or []
+def _actions(event: Node, *, is_delay: bool) -> list[Node]:
+    actions = event.get("actions")
+    if actions is None and not is_delay:
+        raise MistakeError("an event has neither delay nor actions", "write actions: or delay:", event.line)
+    return (actions.items if actions else None) or []
 
 
 def _leaving(action: Node, names: Names, agents: Collection[str]) -> str | None:
     """Return the robot that an action removes. None: it does something else."""
-    entries = action.entries or {}
-    kind, agent = entries.get("type"), entries.get("agent")
+    kind = action.get("type")
     if kind is None or kind.scalar != "remove_agent":
+        action.skip()
         return None
+    agent = action.get("agent")
     name = text_of(agent.scalar if agent else None, action.line)
     if name not in agents:
         what = f"removes the agent '{shortened(name)}', which the problem has not"

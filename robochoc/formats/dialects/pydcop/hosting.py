@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass, field
 
 from robochoc.formats.diagnostics import MistakeError, shortened, suggestion
@@ -36,10 +36,10 @@ class Hosting:
 
     def by_agent(self, node: Node, what: str) -> None:
         """Take the owners from a mapping of agents to what they host. Those that are known stay."""
-        if node.entries is None:
+        if not node.is_mapping:
             raise MistakeError(f"the {what} is no mapping", "write AGENT: [VARIABLE, VARIABLE]", node.line)
         found: dict[str, str] = {}
-        for agent, hosted in _named(node.entries):
+        for agent, hosted in _named(node):
             if agent not in self.agents:
                 message = f"the {what} names the agent '{shortened(agent)}', which the problem has not"
                 raise MistakeError(message, suggestion(agent, self.agents, "agents"), hosted.line)
@@ -86,21 +86,25 @@ class Hosting:
 
 
 def agent_names(node: Node | None) -> list[str]:
-    """Return the agents that `node` lists, or maps to what is known of them."""
-    if node is None or (node.is_scalar and node.scalar is None):
+    """Return the agents that `node` lists, or maps to their attributes, which concern pyDCOP's distribution alone."""
+    if node is None or node.is_empty:
         return []
-    if node.entries is not None:
-        return [name for name, _ in _named(node.entries)]
-    return list(dict.fromkeys(_names(node)))
+    if not node.is_mapping:
+        return list(dict.fromkeys(_names(node)))
+    names = []
+    for name, attributes in _named(node):
+        attributes.skip()
+        names.append(name)
+    return names
 
 
-def _named(entries: Mapping[Scalar, Node]) -> Iterator[tuple[str, Node]]:
-    for key, node in entries.items():
-        yield text_of(key, node.line), node
+def _named(node: Node) -> Iterator[tuple[str, Node]]:
+    for key, one in node.named():
+        yield text_of(key, one.line), one
 
 
 def _names(node: Node) -> Iterator[str]:
-    if node.is_scalar and node.scalar is None:
+    if node.is_empty:
         return
     for one in node.items if node.items is not None else [node]:
         yield text_of(one.scalar, one.line)

@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
 from robochoc.formats.diagnostics import Diagnostic, InvalidInputError, MistakeError, encodable
-from robochoc.formats.dialects.yaml_tree import MAX_BYTES, Document, read_yaml
+from robochoc.formats.dialects.yaml_tree import MAX_BYTES, Node, Read, Repeated, read_yaml, root_keys
 
-_SECTION = re.compile(r"^([a-z_]+)[ \t]*:", re.MULTILINE)
+_SECTION = re.compile(r"""^["']?([a-z_]+)["']?[ \t]*:""", re.MULTILINE)
 _PROBLEM = {"domains", "variables", "constraints", "agents", "objective", "external_variables", "distribution_hints"}
 
 
@@ -27,10 +27,10 @@ class Part:
     files: tuple[tuple[Path, int], ...]
     text: str
 
-    def document(self) -> Document:
-        """Return the document in the files."""
+    def read(self, read: Callable[[Node], Read], repeated: Repeated) -> Read:
+        """Return what `read` makes of the files. Raises `InvalidInputError` for a part of them that it does not use."""
         with self.blamed():
-            return read_yaml(self.text)
+            return read_yaml(self.text, read, repeated=repeated)
 
     @contextmanager
     def blamed(self) -> Iterator[None]:
@@ -63,8 +63,16 @@ class Parts:
 
 
 def sections(text: str) -> set[str]:
-    """Return the names at the beginning of lines."""
-    return set(_SECTION.findall(text))
+    """Return the keys of the root mapping: those at the beginning of lines, or in braces (as in JSON)."""
+    return root_keys(text) if _is_in_braces(text) else set(_SECTION.findall(text))
+
+
+def _is_in_braces(text: str) -> bool:
+    for line in text.split("\n"):
+        content = line.strip().removeprefix("---").lstrip()
+        if content and not content.startswith("#"):
+            return content.startswith("{")
+    return False
 
 
 def read_parts(paths: Sequence[Path]) -> Parts:

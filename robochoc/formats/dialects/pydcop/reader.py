@@ -19,7 +19,7 @@ from robochoc.formats.dialects.pydcop.hosting import Hosting, agent_names, text_
 from robochoc.formats.dialects.pydcop.parts import Part, Parts, read_parts
 from robochoc.formats.dialects.pydcop.translation import Violated
 from robochoc.formats.dialects.tables import CostTable, Scale, definition_name, relation, word
-from robochoc.formats.dialects.yaml_tree import Node, Scalar
+from robochoc.formats.dialects.yaml_tree import Node, Scalar, shown
 from robochoc.model.assembly import assemble
 from robochoc.model.constraint import (
     INFINITE,
@@ -35,10 +35,11 @@ from robochoc.model.cost_units import CostUnits
 from robochoc.model.expression import Apply, Expression, Name
 from robochoc.model.problem import ProblemKind, ScenarioEvent, Team
 
-_SECTIONS = {
-    "name", "objective", "description", "domains", "variables", "external_variables", "constraints", "agents",
-    "distribution_hints", "distribution", "infinity", "inputs",
-}  # fmt: skip
+_REMARKS = ("description", "inputs")
+"""Sections for people, and of the programs that wrote the file."""
+_WISHES = ("host_with", "may_host")
+"""Hints on distribution that decide nothing about owners."""
+_OF_DISTRIBUTE = ("inputs", "status", "cost", "duration", "communication_cost", "hosting_cost")
 _OBJECTIVE = "write objective: min, or objective: max"
 _DROPPED = {
     "routes": "routes between agents",
@@ -54,18 +55,21 @@ def read(paths: Sequence[Path], options: ImportOptions) -> Imported:
     Raises:
         InvalidInputError: with the first mistake.
     """
-    parts = read_parts(paths)
-    with parts.problem.blamed():
-        return _Reader(parts, options).imported()
+    parts, notes = read_parts(paths), []
+
+    def repeated(line: int, key: str) -> None:
+        path, number = parts.problem.place(line)
+        notes.append(Note("repeated", f"{path}:{number}: {shortened(key)} stands twice; the later one counts"))
+
+    return parts.problem.read(lambda root: _Reader(parts, options, root, notes).imported(), repeated)
 
 
 class _Reader:
-    def __init__(self, parts: Parts, options: ImportOptions) -> None:
+    def __init__(self, parts: Parts, options: ImportOptions, root: Node, notes: list[Note]) -> None:
         self._parts = parts
         self._options = options
-        self._document = parts.problem.document()
-        self._root = _entries(self._document.root, "the problem")
-        self._notes: list[Note] = []
+        self._root = _mapping(root, "the problem")
+        self._notes = notes
         self._variable_names, self._robot_names = Names(), Names()
 
     def imported(self) -> Imported:
@@ -78,6 +82,7 @@ class _Reader:
         domains = Domains(dict(_section(self._root, "domains")))
         self._notes += notes_on_names(list(domains.renamed))
         values = {name: _values(name, node, domains) for name, node in nodes.items()}
+        self._constraints = dict(_section(self._root, "constraints"))
         reader = ConstraintReader(values, self._external(domains), self._infinity(), maximize, self._folder())
         costs = list(self._costs(reader, nodes))
         if reader.incomplete:
@@ -91,15 +96,13 @@ class _Reader:
         return Imported(team, "pydcop", changed, tuple(self._notes))
 
     def _note_what_is_left_out(self) -> None:
-        for line, repeated in self._document.repeated:
-            path, number = self._parts.problem.place(line)
-            self._notes.append(
-                Note("repeated", f"{path}:{number}: {shortened(repeated)} stands twice; the later one counts")
-            )
-        for key in self._root:
-            name = str(key)
-            if name in _DROPPED or name not in _SECTIONS:
-                self._notes.append(Note("dropped", _DROPPED.get(name, f"the section {shortened(name)}")))
+        for key in _REMARKS:
+            if remark := self._root.get(key):
+                remark.skip()
+        for key, what in _DROPPED.items():
+            if dropped := self._root.get(key):
+                dropped.skip()
+                self._notes.append(Note("dropped", what))
 
     def _maximize(self) -> bool:
         node = self._root.get("objective")
@@ -129,7 +132,7 @@ class _Reader:
     def _external(self, domains: Domains) -> dict[str, Scalar]:
         fixed: dict[str, Scalar] = {}
         for name, node in _section(self._root, "external_variables"):
-            values, initial = _values(name, node, domains), (node.entries or {}).get("initial_value")
+            values, initial = _values(name, node, domains), node.get("initial_value")
             if initial is None or initial.scalar not in values.scalars.values():
                 what = f"the external variable '{shortened(name)}' has no initial_value of its domain"
                 raise MistakeError(what, "write initial_value: and a value of its domain", node.line)
@@ -141,16 +144,13 @@ class _Reader:
     def _costs(self, reader: ConstraintReader, variables: Mapping[str, Node]) -> Iterator[Costs]:
         parts: dict[str, list[str]] = {"noise_level": [], "initial_value": [], "partial": []}
         for name, node in variables.items():
-            entries = _entries(node, f"the variable '{shortened(name)}'")
-            for part, found in parts.items():
-                if part in entries:
-                    found.append(name)
-            if function := entries.get("cost_function"):
+            for part in ("noise_level", "initial_value", "partial"):
+                _leave_out(node, part, name, parts)
+            if function := node.get("cost_function"):
                 with _named(f"the cost_function of {shortened(name)}", function.line):
                     yield reader.function(f"cost_{name}", function, (name,))
-        for name, node in _section(self._root, "constraints"):
-            if node.entries and "partial" in node.entries:
-                parts["partial"].append(name)
+        for name, node in self._constraints.items():
+            _leave_out(node, "partial", name, parts)
             with _named(f"the constraint {shortened(name)}", node.line):
                 yield reader.read(name, node)
         for part, found in parts.items():
@@ -158,19 +158,23 @@ class _Reader:
                 self._notes.append(Note("dropped", f"{part} of {_some(found)}"))
 
     def _robots(self, variables: Sequence[str]) -> dict[str, list[str]]:
-        constraints = [name for name, _ in _section(self._root, "constraints")]
-        hosting = Hosting(agent_names(self._root.get("agents")), variables, constraints)
-        hints = self._root.get("distribution_hints")
+        hosting = Hosting(agent_names(self._root.get("agents")), variables, self._constraints)
+        hints, own = self._root.get("distribution_hints"), self._root.get("distribution")
+        must = hints.get("must_host") if hints else None
+        for wish in filter(None, (hints.get(key) if hints else None for key in _WISHES)):
+            wish.skip()
         if self._options.owner is not None:
             hosting.by_pattern(self._options.owner)
+            for other in filter(None, (own, must)):
+                other.skip()
         elif self._parts.distribution is not None:
-            root = self._parts.distribution.document().root
-            with self._parts.distribution.blamed():
-                hosting.by_agent(_entries(root, "the distribution")["distribution"], "distribution")
-        elif "distribution" in self._root:
-            hosting.by_agent(self._root["distribution"], "distribution")
-        if self._options.owner is None and hints and hints.entries and "must_host" in hints.entries:
-            hosting.by_agent(hints.entries["must_host"], "must_host")
+            self._parts.distribution.read(lambda root: _distribute(root, hosting), _pass_over)
+            if own:
+                own.skip()
+        elif own is not None:
+            hosting.by_agent(own, "distribution")
+        if self._options.owner is None and must is not None:
+            hosting.by_agent(must, "must_host")
         hosting.rest()
         robots = hosting.robots()
         self._notes += hosting.notes
@@ -210,11 +214,11 @@ class _Reader:
         part: Part | None = self._parts.scenario
         if part is None:
             return ()
-        with part.blamed():
-            return read_scenario(part.document(), team, self._robot_names, self._agents(), self._notes)
-
-    def _agents(self) -> Collection[str]:
-        return agent_names(self._root.get("agents"))
+        agents = agent_names(self._root.get("agents"))
+        return part.read(
+            lambda root: read_scenario(root, team, self._robot_names, agents, self._notes),
+            lambda _, key: self._notes.append(Note("repeated", f"{shortened(key)} stands twice; the later one counts")),
+        )
 
 
 class _Maker:
@@ -295,26 +299,44 @@ def _is_soft(constraint: Constraint) -> bool:
 
 
 def _values(name: str, node: Node, domains: Domains) -> Values:
-    domain = _entries(node, f"the variable '{shortened(name)}'").get("domain")
-    wanted = str(domain.scalar) if domain is not None else ""
+    domain = _mapping(node, f"the variable '{shortened(name)}'").get("domain")
+    wanted = shown(domain.scalar) if domain is not None else ""
     if wanted not in domains.all:
         what = f"the variable '{shortened(name)}' has no domain that is known"
         raise MistakeError(what, suggestion(wanted, list(domains.all), "domains"), node.line)
     return domains.all[wanted]
 
 
-def _section(root: Mapping[Scalar, Node], name: str) -> Iterator[tuple[str, Node]]:
+def _section(root: Node, name: str) -> Iterator[tuple[str, Node]]:
     node = root.get(name)
-    if node is None or (node.is_scalar and node.scalar is None):
+    if node is None or node.is_empty:
         return
-    for key, one in _entries(node, name).items():
+    for key, one in _mapping(node, name).named():
         yield text_of(key, one.line), one
 
 
-def _entries(node: Node, what: str) -> Mapping[Scalar, Node]:
-    if node.entries is None:
+def _mapping(node: Node, what: str) -> Node:
+    if not node.is_mapping:
         raise MistakeError(f"{what} is no mapping", "write NAME: VALUE, one a line", node.line)
-    return node.entries
+    return node
+
+
+def _leave_out(node: Node, part: str, name: str, found: Mapping[str, list[str]]) -> None:
+    if given := node.get(part):
+        given.skip()
+        found[part].append(name)
+
+
+def _distribute(root: Node, hosting: Hosting) -> None:
+    """Read a distribution; what pyDCOP's `distribute` tells of itself there is left out."""
+    for key in _OF_DISTRIBUTE:
+        if told := root.get(key):
+            told.skip()
+    hosting.by_agent(root.needed("distribution", "the file"), "distribution")
+
+
+def _pass_over(_line: int, _key: str) -> None:
+    """Let the later of two equal keys count, as pyDCOP does."""
 
 
 @contextmanager

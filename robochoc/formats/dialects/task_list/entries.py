@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
+from enum import StrEnum
 from fractions import Fraction
+from typing import TypeVar
 
 from robochoc.formats.diagnostics import DiagnosticCollector, MistakeError, shortened, suggestion
 from robochoc.formats.dialects.yaml_tree import Node, Scalar, shown
@@ -15,6 +18,7 @@ MOST = 10**12
 """No number is larger."""
 MAX_PLACES = 9
 _PLANE, _SPACE = 2, 3
+_Choice = TypeVar("_Choice", bound=StrEnum)
 
 
 @dataclass(frozen=True)
@@ -73,20 +77,15 @@ class Synergy:
 class Entry:
     """A mapping with known keys. Each is read by a method of its type, which raises `MistakeError`."""
 
-    def __init__(self, what: str, node: Node, known: Collection[str]) -> None:
-        if node.entries is None:
-            raise MistakeError(f"{what} is no mapping", f"write {{{': ..., '.join(known)}: ...}}", node.line)
+    def __init__(self, what: str, node: Node) -> None:
+        if not node.is_mapping:
+            raise MistakeError(f"{what} is not a mapping", "write KEY: VALUE, one a line, or {KEY: VALUE}", node.line)
         self._what = what
-        self._line = node.line
-        self._entries: Mapping[Scalar, Node] = node.entries
-        for key in self._entries:
-            if key not in known:
-                found = f"{what} has the key '{shortened(str(key))}'"
-                raise MistakeError(found, suggestion(str(key), known, "keys"), node.keys.get(key, node.line))
+        self._node = node
 
     def point(self, key: str) -> Point:
         """Return a place of two or three coordinates; empty where there is none."""
-        node = self._entries.get(key)
+        node = self.node(key)
         if node is None:
             return ()
         if node.items is None or len(node.items) not in (_PLANE, _SPACE):
@@ -95,56 +94,60 @@ class Entry:
 
     def number(self, key: str, default: Fraction | None, least: int = 0) -> Fraction | None:
         """Return a decimal of at least `least`; `default` where there is none."""
-        node = self._entries.get(key)
+        node = self.node(key)
         return default if node is None else self._number(key, node, least)
 
     def needed(self, key: str, least: int = 0) -> Fraction:
         """Return a decimal that must be there."""
-        node = self._entries.get(key)
-        if node is None:
-            raise MistakeError(f"{self._what} has no {key}", f"write {key}: and a number", self._line)
-        return self._number(key, node, least)
+        return self._number(key, self.needed_node(key), least)
 
     def whole(self, key: str, default: int | None, least: int = 0) -> int | None:
         """Return an integer of at least `least`; `default` where there is none."""
-        node = self._entries.get(key)
+        node = self.node(key)
         if node is None:
             return default
-        if isinstance(node.scalar, bool) or not isinstance(node.scalar, int) or not least <= node.scalar <= MOST:
-            raise self._mistake(key, node, f"write a whole number from {least} on")
-        return node.scalar
+        value = node.scalar
+        if isinstance(value, bool) or not isinstance(value, int) or not least <= value <= MOST:
+            raise self._mistake(key, node, f"write a whole number from {least} to {MOST}")
+        return value
 
     def flag(self, key: str) -> bool:
         """Return whether `key` says yes; no where there is none."""
-        node = self._entries.get(key)
+        node = self.node(key)
         if node is None:
             return False
-        if not isinstance(node.scalar, bool):
+        value = node.scalar
+        if not isinstance(value, bool):
             raise self._mistake(key, node, f"write {key}: yes, or {key}: no")
-        return node.scalar
+        return value
 
     def words(self, key: str) -> tuple[str, ...]:
         """Return a list of words; a single word is a list of one."""
-        node = self._entries.get(key)
+        node = self.node(key)
         if node is None:
             return ()
-        items = [node] if node.is_scalar and node.scalar is not None else node.items
-        if items is None or any(not one.is_scalar or one.scalar is None for one in items):
+        items = [node] if node.is_scalar and not node.is_empty else node.items
+        if items is None or any(not one.is_scalar or one.is_empty for one in items):
             raise self._mistake(key, node, f"write {key}: [ONE, OTHER]")
-        return tuple(word_of(one) for one in items)
+        return tuple(word_of(one.scalar) for one in items)
 
-    def choice(self, key: str, choices: Sequence[str]) -> str | None:
-        """Return one of `choices`; None where there is none."""
-        node = self._entries.get(key)
+    def choice(self, key: str, kind: type[_Choice]) -> _Choice | None:
+        """Return a member of the enum `kind`; None where there is none."""
+        node = self.node(key)
         if node is None:
             return None
-        if node.scalar not in choices:
-            raise self._mistake(key, node, f"write one of {', '.join(choices)}")
-        return str(node.scalar)
+        for member in kind:
+            if node.scalar == member.value:
+                return member
+        raise self._mistake(key, node, suggestion(shown(node.scalar), [one.value for one in kind], "words"))
 
     def node(self, key: str) -> Node | None:
-        """Return what stands at `key`."""
-        return self._entries.get(key)
+        """Return the value of `key`."""
+        return self._node.get(key)
+
+    def needed_node(self, key: str) -> Node:
+        """Return the value of a key that must be there."""
+        return self._node.needed(key, self._what)
 
     def _number(self, key: str, node: Node, least: int) -> Fraction:
         scalar = node.scalar
@@ -157,23 +160,17 @@ class Entry:
         return MistakeError(f"{self._what} cannot have {value} as '{key}'", hint, node.line)
 
 
-def word_of(node: Node) -> str:
+def word_of(value: Scalar) -> str:
     """Return a name: YAML reads 7 as a number, and yes as true."""
-    return "yes" if node.scalar is True else "no" if node.scalar is False else shown(node.scalar)
+    return "yes" if value is True else "no" if value is False else shown(value)
 
 
-def names_in(section: Node | None) -> list[str]:
-    """Return the names in a section."""
-    entries = section.entries if section is not None else None
-    return [word_of(Node(0, key)) for key in entries or ()]
-
-
-def read_robots(node: Node | None, mistakes: DiagnosticCollector) -> dict[str, RobotEntry]:
+def read_robots(node: Node, mistakes: DiagnosticCollector) -> dict[str, RobotEntry]:
     """Return the robots in a section; mistakes are noted."""
     found = {}
     for name, one in _named("robots", node):
-        with mistakes.at(one.line):
-            entry = Entry(f"the robot '{shortened(name)}'", one, ("at", "skills", "capacity", "most", "speed"))
+        with _noted(one, mistakes):
+            entry = Entry(f"the robot '{shortened(name)}'", one)
             speed = entry.number("speed", Fraction(1)) or Fraction(0)
             if not speed:
                 raise MistakeError(f"the robot '{shortened(name)}' has the speed 0", "write more than 0", one.line)
@@ -183,13 +180,12 @@ def read_robots(node: Node | None, mistakes: DiagnosticCollector) -> dict[str, R
     return found
 
 
-def read_tasks(node: Node | None, mistakes: DiagnosticCollector) -> dict[str, TaskEntry]:
+def read_tasks(node: Node, mistakes: DiagnosticCollector) -> dict[str, TaskEntry]:
     """Return the tasks in a section; mistakes are noted."""
     found = {}
     for name, one in _named("tasks", node):
-        with mistakes.at(one.line):
-            keys = ("at", "needs", "worth", "load", "deadline", "robots")
-            entry = Entry(f"the task '{shortened(name)}'", one, keys)
+        with _noted(one, mistakes):
+            entry = Entry(f"the task '{shortened(name)}'", one)
             needs, worth = frozenset(entry.words("needs")), entry.needed("worth", -MOST)
             load, robots = entry.whole("load", 1) or 0, entry.whole("robots", 1, 1) or 1
             deadline = entry.number("deadline", None)
@@ -207,9 +203,9 @@ def read_synergies(node: Node | None, tasks: Collection[str], mistakes: Diagnost
         )
     found = []
     for one in node.items:
-        with mistakes.at(one.line):
-            entry = Entry("a synergy", one, ("tasks", "worth"))
-            names = entry.words("tasks")
+        with _noted(one, mistakes):
+            entry = Entry("a synergy", one)
+            names, worth = entry.words("tasks"), entry.needed("worth", -MOST)
             for name in names:
                 if name not in tasks:
                     raise MistakeError(
@@ -219,24 +215,31 @@ def read_synergies(node: Node | None, tasks: Collection[str], mistakes: Diagnost
                     )
             if len(set(names)) != _PLANE or len(names) != _PLANE:
                 raise MistakeError("a synergy is not of two tasks", "write tasks: [ONE, OTHER]", one.line)
-            found.append(Synergy(one.line, (names[0], names[1]), entry.needed("worth", -MOST)))
+            found.append(Synergy(one.line, (names[0], names[1]), worth))
     return found
 
 
-def _named(section: str, node: Node | None) -> Iterator[tuple[str, Node]]:
-    if node is None or node.entries is None:
-        what = f"has no {section}" if node is None else f"{section} is no mapping"
-        raise MistakeError(what, f"write {section}: and, below, NAME: {{at: [X, Y], ...}}", node.line if node else 0)
-    if not node.entries:
-        raise MistakeError(f"has no {section}", "write at least one", node.line)
+@contextmanager
+def _noted(entry: Node, mistakes: DiagnosticCollector) -> Iterator[None]:
+    """Note a mistake in an entry, and leave out the rest of the entry."""
+    with mistakes.at(entry.line):
+        try:
+            yield
+        except MistakeError:
+            entry.skip()
+            raise
+
+
+def _named(section: str, node: Node) -> Iterator[tuple[str, Node]]:
+    hint = f"write {section}: and, below, NAME: {{at: [X, Y], ...}}"
+    if not node.is_mapping:
+        raise MistakeError(f"{section} is not a mapping", hint, node.line)
     names = set()
-    for key, one in node.entries.items():
-        name = word_of(Node(one.line, key))
+    for key, one in node.named():
+        name = word_of(key)
         if name in names:
             raise MistakeError(f"{section} has '{shortened(name)}' twice", "name one otherwise", one.line)
         names.add(name)
-        yield name, Node(one.line, entries={}) if _is_empty(one) else one
-
-
-def _is_empty(node: Node) -> bool:
-    return node.is_scalar and node.scalar is None
+        yield name, Node(one.line, {}) if one.is_empty else one
+    if not names:
+        raise MistakeError(f"has no {section}", hint, node.line)

@@ -20,13 +20,13 @@ from robochoc.formats.dialects.task_list.entries import (
     RobotEntry,
     Synergy,
     TaskEntry,
-    names_in,
     read_robots,
     read_synergies,
     read_tasks,
+    word_of,
 )
 from robochoc.formats.dialects.task_list.tours import Tasks, Trip, rounded
-from robochoc.formats.dialects.yaml_tree import read_yaml
+from robochoc.formats.dialects.yaml_tree import Node, read_yaml, unread_parts
 from robochoc.formats.symbols import check_symbol
 from robochoc.model.allocation import Distance, Job, TasksModel, Worker, assignment, several, way
 from robochoc.model.assembly import assemble
@@ -43,7 +43,6 @@ NONE = "none"
 """The value of a robot that does no task."""
 _ONLY = "task"
 """The last part of the name of a robot's only variable."""
-_KEYS = ("name", "model", "distance", "places", "tours", "robots", "tasks", "synergies")
 
 
 def read(paths: Sequence[Path], options: ImportOptions) -> Imported:
@@ -85,27 +84,34 @@ class _List:
 
 
 def _read(text: str, stem: str, mistakes: DiagnosticCollector) -> _List:
-    document = read_yaml(text)
-    for line, key in document.repeated:
-        mistakes.add(line, f"'{shortened(key)}' stands twice", "delete one, or name it otherwise")
-    head = Entry("the file", document.root, _KEYS)
-    robots, tasks = read_robots(head.node("robots"), mistakes), read_tasks(head.node("tasks"), mistakes)
+    def read(root: Node) -> _List:
+        found = _list(Entry("the file", root), stem, mistakes)
+        for mistake in unread_parts(root):
+            mistakes.add(mistake.line, mistake.message, mistake.hint)
+        mistakes.finish()
+        return found
+
+    read_list = read_yaml(text, read, "a list has robots and tasks")
+    _check_model(read_list, mistakes)
+    return read_list
+
+
+def _list(head: Entry, stem: str, mistakes: DiagnosticCollector) -> _List:
+    listed = head.needed_node("tasks")
+    robots, tasks = read_robots(head.needed_node("robots"), mistakes), read_tasks(listed, mistakes)
     for what, entries in (("robots", robots), ("tasks", tasks)):
         if len(entries) > MAX_NUMBER:
             raise MistakeError(f"has {len(entries)} {what}", f"{MAX_NUMBER} are allowed")
-    synergies = read_synergies(head.node("synergies"), names_in(head.node("tasks")), mistakes)
-    model = head.choice("model", list(TasksModel)) or _model(robots, tasks)
-    distance = head.choice("distance", list(Distance)) or Distance.STRAIGHT
+    synergies = read_synergies(head.node("synergies"), [word_of(name) for name, _ in listed.named()], mistakes)
+    model = head.choice("model", TasksModel) or _model(robots, tasks)
+    distance = head.choice("distance", Distance) or Distance.STRAIGHT
     places = head.whole("places", 0) or 0
     if places > MAX_PLACES:
         raise MistakeError(f"has {places} places", f"costs have at most {MAX_PLACES} decimal places")
     tours = head.flag("tours") and model is not TasksModel.ASSIGNMENT
     name = " ".join(head.words("name")) or stem
     _check_points([*robots.values(), *tasks.values()], mistakes)
-    mistakes.finish()
-    read = _List(name, TasksModel(model), Distance(distance), places, robots, tasks, synergies, tours)
-    _check_model(read, mistakes)
-    return read
+    return _List(name, model, distance, places, robots, tasks, synergies, tours)
 
 
 def _model(robots: Mapping[str, RobotEntry], tasks: Mapping[str, TaskEntry]) -> TasksModel:

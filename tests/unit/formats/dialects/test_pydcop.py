@@ -178,3 +178,82 @@ def test_python_files_are_executed_only_where_that_is_allowed(tmp_path: Path) ->
     with pytest.raises(InvalidInputError, match="--allow-code"):
         imported(text, tmp_path, "a.yaml")
     assert optimum(imported(text, tmp_path, "a.yaml", allow_code=True).team) == Fraction(-5, 4)
+
+
+WHOLE = """name: small
+description: a problem
+objective: min
+domains:
+  few: {values: [0..2], type: numbers}
+variables:
+  x: {domain: few, cost_function: 2 * x, noise_level: 0.2, initial_value: 1}
+  y: {domain: few}
+external_variables:
+  e: {domain: few, initial_value: 1}
+constraints:
+  k: {type: intention, function: x + y + e}
+  t: {type: extensional, variables: [x, y], default: 1, values: {2: 0 0}}
+agents:
+  a1: {capacity: 3}
+  a2: {capacity: 4}
+distribution_hints: {must_host: {a1: [x]}}
+"""
+
+
+def test_unknown_keys_are_refused_at_every_level(tmp_path: Path) -> None:
+    imported(WHOLE, tmp_path, "a.yaml")
+    for line, before, inside in (
+        (1, "name:", ""),
+        (5, "values: [0..2]", " in domains.few"),
+        (7, "domain: few, cost", " in variables.x"),
+        (10, "domain: few, initial_value: 1}\nc", " in external_variables.e"),
+        (12, "type: int", " in constraints.k"),
+        (13, "type: ext", " in constraints.t"),
+        (17, "must_host", " in distribution_hints"),
+    ):
+        assert before in WHOLE
+        sign = "\n" if before == "name:" else ", "
+        with pytest.raises(InvalidInputError) as error:
+            imported(WHOLE.replace(before, f"zebra: 1{sign}{before}", 1), tmp_path, "a.yaml")
+        assert f":{line}: unknown key 'zebra'{inside} (" in str(error.value)
+
+
+def test_values_of_another_kind_are_refused(tmp_path: Path) -> None:
+    for now, then, message in (
+        ("default: 1", "default: [1]", "has a default that is no number"),
+        ("domain: few}\ne", "domain: [few]}\ne", "has no domain that is known"),
+        ("name: small", "name: {a: b}", "1: name: a mapping does not belong here"),
+        (
+            "values: {2: 0 0}",
+            "valus: {2: 0 0}",
+            "13: the constraint t: unknown key 'valus' in it (did you mean 'values'?)",
+        ),
+    ):
+        assert now in WHOLE
+        with pytest.raises(InvalidInputError) as error:
+            imported(WHOLE.replace(now, then, 1), tmp_path, "a.yaml")
+        assert message in str(error.value)
+
+
+def test_scenarios_and_distributions_are_strict_too(tmp_path: Path) -> None:
+    (tmp_path / "a.yaml").write_text(WHOLE)
+    (tmp_path / "d.yaml").write_text(
+        "inputs: {algo: dpop}\ncost: 3\nstatus: SUCCESS\ndistribution: {a1: [x], a2: [y]}\n"
+    )
+    (tmp_path / "s.yaml").write_text(
+        "events:\n- {id: w, delay: 3}\n- {id: e, actions: [{type: remove_agent, agent: a2}]}\n"
+    )
+    files = [tmp_path / name for name in ("a.yaml", "d.yaml", "s.yaml")]
+    assert len(read_foreign(files, ImportOptions()).team.scenario) == 1
+    for name, now, then in (
+        ("d.yaml", "cost: 3", "costs: 3"),
+        ("s.yaml", "delay: 3", "delays: 3, actions: []"),
+        ("s.yaml", "agent: a2", "agent: a2, at: 3"),
+    ):
+        path = tmp_path / name
+        text = path.read_text()
+        assert now in text
+        path.write_text(text.replace(now, then))
+        with pytest.raises(InvalidInputError, match="unknown key"):
+            read_foreign(files, ImportOptions())
+        path.write_text(text)

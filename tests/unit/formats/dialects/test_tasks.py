@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 from random import Random
 
 import pytest
+import yaml
 
 from robochoc.cli.reports.outcome import outcome_report
 from robochoc.formats import InvalidInputError, read_team, write_team
-from robochoc.formats.dialects.registry import recognise
+from robochoc.formats.dialects.dialect import ImportOptions
+from robochoc.formats.dialects.registry import read_foreign, recognise
 from robochoc.formats.problems import read_problem
 from robochoc.run import Options, Runtime, solve
 from robochoc.run.options import CENTRAL
@@ -85,27 +88,31 @@ def test_what_nobody_can_do_is_told(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("now", "then", "told"),
     [
-        ("skills: [camera]", "skill: [camera]", "3: the robot 'bob' has the key 'skill' (did you mean 'skills'?)"),
+        ("skills: [camera]", "skill: [camera]", "3: unknown key 'skill' in robots.bob (did you mean 'skills'?)"),
         ("most: 2", "most: 2.5", "3: the robot 'bob' cannot have '2.5' as 'most' (write a whole number"),
         ("most: 2", "most: yes", "3: the robot 'bob' cannot have 'True' as 'most'"),
         ("most: 2", "speed: 0", "3: the robot 'bob' has the speed 0 (write more than 0)"),
         ("at: [8, 1]", "at: [8]", "3: the robot 'bob' cannot have this value as 'at' (write at: [X, Y]"),
         ("at: [8, 1]", "at: [8, x]", "3: the robot 'bob' cannot have 'x' as 'at'"),
         ("at: [8, 1]", "at: [8, 1, 0]", "3: a place has another number of coordinates than others"),
-        (", worth: 10", "", "6: the task 'survey' has no worth (write worth: and a number)"),
+        (", worth: 10", "", "6: the task 'survey' has no worth (write worth:"),
         ("worth: 10", "worth: .inf", "6: the task 'survey' cannot have 'inf' as 'worth'"),
         ("robots: 2", "robots: 3", "9: the task 'carry' is worth 20, which 3 robots cannot share"),
         ("[survey, inspect]", "[survey, inspct]", "a synergy has the task 'inspct', which is not there (did you mean"),
         ("[survey, inspect]", "[survey, survey]", "12: a synergy is not of two tasks"),
+        ("streets", "street", "13: the file cannot have 'street' as 'distance' (did you mean 'streets'?)"),
         (
-            "streets",
-            "air",
-            "13: the file cannot have 'air' as 'distance' (write one of streets, straight)",
+            "distance: streets",
+            "model: severl",
+            "13: the file cannot have 'severl' as 'model' (did you mean 'several'?)",
         ),
+        ("distance: streets", "tour: yes", "13: unknown key 'tour' (did you mean 'tours'?)"),
+        (", worth: 10", ", wort: 10", "6: unknown key 'wort' in the task 'survey' (did you mean 'worth'?)"),
         ("distance: streets", "model: assignment", "may do 2 tasks, and the model is assignment"),
         ("distance: streets", "places: 10", "has 10 places"),
         ("  bob:", "  ann:", "3: 'ann' stands twice"),
-        ("robots:\n", "robots: []\nrobot:\n", "the file has the key 'robot'"),
+        ("tasks:\n", "task:\n", "5: unknown key 'task' in the file (did you mean 'tasks'?)"),
+        ("robots:\n", "robots: []\nrobot:\n", "1: robots is not a mapping"),
         ("fetch: {", "fetch: !!python/object:os.system {", "8: the tag"),
         ("  cid:", "  a.b: {skills: eye}\n  a: {skills: eye}\n  cid:", None),
     ],
@@ -130,9 +137,9 @@ def test_all_mistakes_are_told_at_once(tmp_path: Path) -> None:
         ("robots: {a: }\ntasks: {none: {worth: 1}}\nmodel: assignment", "2: a task is called 'none', as no task is"),
         ("robots: {a: }\ntasks: {t t: {worth: 1}}\nmodel: assignment", "2: 't t'"),
         ("robots: {a: }", "has no tasks"),
-        ("robots: 3\ntasks: 4", "1: robots is no mapping"),
-        ("robots: {}\ntasks: {t: {worth: 1}}", "1: has no robots (write at least one)"),
-        ("robots: {a: }\ntasks: {t: 3}", "2: the task 't' is no mapping"),
+        ("robots: 3\ntasks: 4", "1: robots is not a mapping"),
+        ("robots: {}\ntasks: {t: {worth: 1}}", "1: has no robots (write robots:"),
+        ("robots: {a: }\ntasks: {t: 3}", "2: the task 't' is not a mapping"),
         ("robots: {7: , '7': }\ntasks: {t: {worth: 1}}", "robots has '7' twice"),
         ("robots: {a: {most: 0}}\ntasks: {t: {worth: 1}}", "no robot can do any of the tasks"),
         ("robots: {a: }\ntasks: {t: {worth: 1}}\nsynergies: 3", "3: synergies is no list"),
@@ -171,3 +178,23 @@ def test_random_changes_of_a_list_are_read_or_refused(tmp_path: Path) -> None:
             refused += 1
     assert read
     assert refused
+
+
+def test_flow_style_and_json_are_lists_too(tmp_path: Path) -> None:
+    block = imported(LIST, tmp_path).team
+    whole = yaml.safe_load(LIST)
+    for name, text in (
+        ("tasks.json", json.dumps(whole, indent=1)),
+        ("tasks.yaml", f"# tasks\n---\n{yaml.safe_dump(whole, default_flow_style=True, sort_keys=False)}"),
+        ("tasks.yml", json.dumps(whole)),
+    ):
+        path = tmp_path / name
+        path.write_text(text)
+        assert recognise(path) is not None, name
+        assert read_foreign([path], ImportOptions()).team == block, name
+
+
+def test_ways_cost_the_same_with_tours_where_a_robot_does_one_task(tmp_path: Path) -> None:
+    text = LIST.replace("capacity: 3", "most: 1").replace("most: 2", "most: 1").replace(", robots: 2", "")
+    text = f"model: assignment\n{text}"
+    assert imported(f"tours: yes\n{text}", tmp_path).team == imported(text, tmp_path).team
