@@ -1,8 +1,8 @@
 """`robochoc.from_cpmpy`: a model of CPMpy (https://cpmpy.readthedocs.io), split over robots. An extra: `cpmpy`.
 
-What CPMpy says by operators becomes predicates and cost functions; `AllDifferent`, `Element`, `Table`, `Cumulative` and
-some more are split here, without further variables. Other global constraints are decomposed by CPMpy itself: further
-variables that it makes belong to the robot of the constraint's first variable.
+Operators of CPMpy become predicates and cost functions; `AllDifferent`, `Element`, `Table`, `Cumulative` and some more
+are split here, without further variables. CPMpy decomposes other global constraints: the further variables of a
+decomposition belong to the robot of the constraint's first variable.
 """
 
 from __future__ import annotations
@@ -10,7 +10,7 @@ from __future__ import annotations
 import itertools
 import re
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any
 
 from robochoc.formats.definitions import MAX_VALUES
 from robochoc.formats.diagnostics import MistakeError
@@ -19,13 +19,13 @@ from robochoc.formats.dialects.xcsp3.objective import split
 from robochoc.formats.dialects.xcsp3.posting import Posting
 from robochoc.formats.dialects.xcsp3.scheduling import Task, post_tasks
 from robochoc.formats.dialects.xcsp3.tables import choose
-from robochoc.formats.dialects.xcsp3.terms import Condition
+from robochoc.formats.dialects.xcsp3.terms import INVERSE, TRUE, Condition, some
 from robochoc.formats.dialects.xcsp3.variables import Variables
 from robochoc.model.assembly import assemble
 from robochoc.model.cost_units import CostUnits
-from robochoc.model.expression import Expression, Name
+from robochoc.model.expression import Apply, Expression
 from robochoc.model.problem import Domain, ProblemKind, Team, Variable
-from robochoc.modelling.cpmpy_terms import COMPARISONS, NATIVE, Translation, integer_of, is_variable
+from robochoc.modelling.cpmpy_terms import COMPARISONS, TRANSLATED, Translation, integer_of, is_variable
 from robochoc.modelling.model import Model
 
 if TYPE_CHECKING:
@@ -67,38 +67,29 @@ def cpmpy_team(model: cpmpy.Model, owner: Owner | None = None, name: str = "cpmp
     """Return the team of `from_cpmpy`."""
     try:
         import cpmpy  # noqa: PLC0415 - an extra
-        from cpmpy.transformations.decompose_global import decompose_in_tree, decompose_objective  # noqa: PLC0415 - the same
         from cpmpy.transformations.get_variables import get_variables  # noqa: PLC0415 - the same
         from cpmpy.transformations.normalize import toplevel_list  # noqa: PLC0415 - the same
     except ImportError as error:
         raise ImportError(f"from_cpmpy needs CPMpy; say: pip install 'robochoc[cpmpy]' ({error})") from error
     if not isinstance(model, cpmpy.Model):
         raise TypeError(f"from_cpmpy takes a cpmpy.Model, not a {type(model).__name__}")
-    expressions = CpmpyExpressions(decompose_in_tree, decompose_objective, get_variables)
     constraints = toplevel_list(model.constraints)
     has_objective = hasattr(model.objective_, "name")
-    every = [*constraints, model.objective_] if has_objective else constraints
-    own = {variable.name: variable for variable in get_variables(every)}
-    owned = {variable: _owner_of(variable, owner) for variable in own}
-    minimized, further = expressions.objective(model.objective_) if has_objective else (None, [])
-    if has_objective:
-        expressions.note([minimized], model.objective_, own, owned)
-    parts = []
-    for one in [*constraints, *further]:
-        found = expressions.parts(one)
-        expressions.note(found, one, own, owned)
-        parts += found
+    own = {one.name: one for one in get_variables([*constraints, *([model.objective_] if has_objective else [])])}
     if not own:
         raise ValueError("the CPMpy model has no variables")
-    posting = _posting(own)
-    translation = Translation(posting)
+    robots = _Robots({variable: _owner_of(variable, owner) for variable in own})
+    posting = _posting(own, robots.names)
+    translation = Translation(posting, lambda variable: robots.add(variable, posting))
     try:
-        for one in parts:
-            posting.title = re.sub(r"[^A-Za-z0-9_.]", "_", str(getattr(one, "name", "C"))) or "C"
-            _post(one, translation)
+        for one in constraints:
+            posting.title = _title(one)
+            robots.owner_of_further(get_variables([one]))
+            _post_with_definitions(one, translation)
         posting.title = "objective"
-        if minimized is not None:
-            _post_objective(minimized, translation)
+        if has_objective:
+            robots.owner_of_further(get_variables([model.objective_]))
+            _post_objective(model.objective_, translation)
     except MistakeError as mistake:
         raise ValueError(f"{mistake.message} ({mistake.hint})") from None
     except RecursionError:
@@ -106,33 +97,46 @@ def cpmpy_team(model: cpmpy.Model, owner: Owner | None = None, name: str = "cpmp
     constant = 0 if has_objective or model.objective_ is None else integer_of(model.objective_)
     units = CostUnits(model.objective_ is not None and not model.objective_is_min, 0, posting.constant + constant)
     kind = ProblemKind.DISCSP if model.objective_ is None else ProblemKind.DISWCSP
-    return assemble(name, _robots(posting, owned), [*posting.constraints, *posting.costs], kind=kind, costs=units)
+    return assemble(name, robots.variables(posting), [*posting.constraints, *posting.costs], kind=kind, costs=units)
 
 
-class CpmpyExpressions(NamedTuple):
-    """What CPMpy does with its own expressions."""
+class _Robots:
+    """The robots of variables: of those of the model, and of further ones, which CPMpy's decompositions make.
 
-    decompose: Callable[..., list[Any]]
-    decompose_objective: Callable[..., tuple[Any, list[Any]]]
-    variables: Callable[..., list[Any]]
+    Args:
+        owned: The robot of each variable of the model.
+    """
 
-    def parts(self, constraint: Any) -> list[Any]:  # noqa: ANN401 - CPMpy's expressions
-        """Return what `constraint` says, without global constraints that are not translated."""
-        if not hasattr(constraint, "name") or is_variable(constraint):
-            return [constraint]
-        return self.decompose([constraint], supported=NATIVE, supported_reified=NATIVE)
+    def __init__(self, owned: Mapping[str, str]) -> None:
+        self.names = Names()
+        self._owned = owned
+        self._further: dict[str, str] = {}
+        self._owner = ""
 
-    def objective(self, objective: Any) -> tuple[Any, list[Any]]:  # noqa: ANN401 - CPMpy's expressions
-        """Return an objective without what is not translated, and the constraints that it takes."""
-        return self.decompose_objective(objective, supported=NATIVE, supported_reified=NATIVE)
+    def owner_of_further(self, variables: Sequence[Any]) -> None:
+        """Let further variables, from now on, belong to the robot of the first of `variables`."""
+        self._owner = self._owned[variables[0].name] if variables else next(iter(self._owned.values()))
 
-    def note(self, parts: Sequence[Any], origin: Any, own: dict[str, Any], owned: dict[str, str]) -> None:  # noqa: ANN401
-        """Note the further variables of `parts`: they belong to the robot of the first variable of `origin`."""
-        first = [variable.name for variable in self.variables([origin])]
-        for variable in self.variables(list(parts)):
-            if variable.name not in own:
-                own[variable.name] = variable
-                owned[variable.name] = owned[first[0]] if first else variable.name
+    def add(self, variable: Any, posting: Posting) -> Expression:  # noqa: ANN401 - CPMpy's expressions
+        """Add a further variable to `posting`, and return it."""
+        made = posting.add_variable(self.names.of(_pretty(variable.name)), _values(variable))
+        self._further[made.name] = self._owner
+        return made
+
+    def variables(self, posting: Posting) -> dict[str, list[Variable]]:
+        """Return the variables of each robot."""
+        names = Names()
+        robots: dict[str, list[Variable]] = {}
+        robot_names: dict[str, str] = {}
+        for original, ours in posting.names.items():
+            robot = self._owned[original]
+            robot_names.setdefault(robot, names.of(ours if robot == original else robot))
+            domain = Domain(f"d_{ours}", (_as_range(posting.values[original]),))
+            robots.setdefault(robot_names[robot], []).append(Variable(ours, domain))
+        for ours, robot in self._further.items():
+            domain = Domain(f"d_{ours}", (_as_range(posting.extra[ours]),))
+            robots[robot_names[robot]].append(Variable(ours, domain))
+        return robots
 
 
 def _owner_of(variable: str, owner: Owner | None) -> str:
@@ -145,77 +149,139 @@ def _owner_of(variable: str, owner: Owner | None) -> str:
     return str(owner[variable])
 
 
-def _posting(own: Mapping[str, Any]) -> Posting:
+def _title(constraint: Any) -> str:  # noqa: ANN401 - CPMpy's expressions
+    return re.sub(r"[^A-Za-z0-9_.]", "_", str(getattr(constraint, "name", "C"))) or "C"
+
+
+def _pretty(name: str) -> str:
+    return re.sub(r"[\[\],\s]+", "_", name).strip("_")
+
+
+def _values(variable: Any) -> range:  # noqa: ANN401 - CPMpy's expressions
+    low, high = integer_of(variable.lb), integer_of(variable.ub)
+    if high - low >= MAX_VALUES:
+        message = f"the variable {variable.name} has {high - low + 1:,} values"
+        raise ValueError(f"{message}; {MAX_VALUES:,} are supported")
+    return range(low, high + 1)
+
+
+def _as_range(values: Sequence[int]) -> range:
+    return range(values[0], values[-1] + 1)
+
+
+def _posting(own: Mapping[str, Any], names: Names) -> Posting:
     """Return the variables of a CPMpy model, with nothing posted on them."""
-    domains = {}
-    for name, variable in own.items():
-        low, high = integer_of(variable.lb), integer_of(variable.ub)
-        if high - low >= MAX_VALUES:
-            raise ValueError(f"the variable {name} has {high - low + 1:,} values; {MAX_VALUES:,} are supported")
-        domains[name] = (range(low, high + 1),)
-    names = Names()
-    pretty = {name: re.sub(r"[\[\],\s]+", "_", name).strip("_") for name in own}
+    values = {name: _values(variable) for name, variable in own.items()}
+    pretty = {name: _pretty(name) for name in own}
     clear = len(set(pretty.values())) == len(pretty)
     ours = {name: names.of(pretty[name] if clear else name) for name in own}
-    return Posting(Variables(dict(domains)), {name: tuple(part) for name, (part,) in domains.items()}, {}, ours)
+    domains = {name: (part,) for name, part in values.items()}
+    return Posting(Variables(dict(domains)), {name: tuple(part) for name, part in values.items()}, {}, ours)
 
 
-def _robots(posting: Posting, owned: Mapping[str, str]) -> dict[str, list[Variable]]:
-    names = Names()
-    robots: dict[str, list[Variable]] = {}
-    for original, ours in posting.names.items():
-        domain = Domain(f"d_{ours}", (range(posting.values[original][0], posting.values[original][-1] + 1),))
-        robot = owned[original]
-        robots.setdefault(names.of(ours if robot == original else robot), []).append(Variable(ours, domain))
-    return robots
+def _post_with_definitions(constraint: Any, translation: Translation) -> None:  # noqa: ANN401 - CPMpy's expressions
+    """Post a constraint that must hold, and the definitions of the further variables in it."""
+    _post(constraint, translation)
+    _post_definitions(translation)
+
+
+def _post_definitions(translation: Translation) -> None:
+    while translation.definitions:
+        constraint, defined = translation.definitions.pop()
+        if defined == TRUE:
+            _post(constraint, translation)
+        else:
+            undefined = Apply("not", (defined,))
+            translation.posting.post(some([undefined, translation.boolean(constraint)]))
 
 
 def _post(constraint: Any, translation: Translation) -> None:  # noqa: ANN401 - CPMpy's expressions
     """Post a constraint that must hold: tables and tasks as such, all else as predicates."""
-    posting = translation.posting
+    if _post_as_such(constraint, translation):
+        return
+    if hasattr(constraint, "decompose") and constraint.name not in TRANSLATED:
+        with translation.context() as conditions:
+            parts = translation.decomposed(constraint, must_hold=True)
+        for condition in conditions:
+            translation.posting.post(condition)
+        for part in parts:
+            _post(part, translation)
+        return
+    for part in translation.parts(constraint):
+        translation.posting.post(part)
+
+
+def _post_as_such(constraint: Any, translation: Translation) -> bool:  # noqa: ANN401 - CPMpy's expressions
+    """Post a table, tasks, or an element that is compared. Return whether it is one that can be posted as such."""
     kind = getattr(constraint, "name", "")
-    match kind:
-        case "table" | "negative_table":
-            members, rows = constraint.args
-            scope = [translation.integer(member) for member in _flat(members)]
-            flat = [[integer_of(value) for value in row] for row in rows]
-            if all(isinstance(member, Name) for member in scope):
-                posting.post_table(scope, flat, allowed=kind == "table")
-                return
-        case "cumulative":
-            if _post_cumulative(constraint, translation):
-                return
-        case "==" | "!=" | "<" | "<=" | ">" | ">=" if getattr(constraint.args[0], "name", "") == "element":
-            array, index = constraint.args[0].args
-            if is_variable(index):
-                members = translation.integers(array)
-                cells: dict[tuple[int, ...], Expression] = {(place,): cell for place, cell in enumerate(members)}
-                condition = Condition(COMPARISONS[kind], translation.integer(constraint.args[1]))
-                if not translation.take_conditions():
-                    choose(posting, [translation.integer(index)], cells, condition)
-                    return
-    posting.post(translation.boolean(constraint))
+    with translation.context() as conditions:
+        match kind:
+            case "table" | "negative_table":
+                posted = _post_table(constraint, translation)
+            case "cumulative":
+                posted = _post_cumulative(constraint, translation)
+            case "==" | "!=" | "<" | "<=" | ">" | ">=":
+                posted = _post_element(constraint, translation)
+            case _:
+                return False
+    if posted:
+        for condition in conditions:
+            translation.posting.post(condition)
+    return posted
+
+
+def _post_table(constraint: Any, translation: Translation) -> bool:  # noqa: ANN401 - CPMpy's expressions
+    members, rows = constraint.args
+    if not all(map(is_variable, _flat(members))):
+        return False
+    flat = [[integer_of(value) for value in row] for row in rows]
+    translation.posting.post_table(translation.integers(members), flat, allowed=constraint.name == "table")
+    return True
+
+
+def _post_element(constraint: Any, translation: Translation) -> bool:  # noqa: ANN401 - CPMpy's expressions
+    """Post a comparison with a member that variables choose, on whichever side it is."""
+    left, right = constraint.args
+    operator = COMPARISONS[constraint.name]
+    if not _is_element(left):
+        left, right, operator = right, left, INVERSE[operator]
+    if not _is_element(left):
+        return False
+    indexes, cells = translation.cells(left.args)
+    choose(translation.posting, indexes, cells, Condition(operator, translation.integer(right)))
+    return True
+
+
+def _is_element(term: Any) -> bool:  # noqa: ANN401 - CPMpy's expressions
+    """Return whether distinct variables choose a member of an array, all of whose members have values."""
+    if getattr(term, "name", "") not in {"element", "nd_element"}:
+        return False
+    array, *indexes = term.args
+    known = all(is_variable(one) or not hasattr(one, "name") for one in _flat(array))
+    return known and all(map(is_variable, indexes)) and len({one.name for one in indexes}) == len(indexes)
 
 
 def _post_cumulative(constraint: Any, translation: Translation) -> bool:  # noqa: ANN401 - CPMpy's expressions
     starts, durations, *ends, demands, capacity = constraint.args
-    columns = [[translation.integer(one) for one in _flat(column)] for column in (starts, durations, demands)]
+    columns = [translation.integers(_flat(column)) for column in (starts, durations, demands)]
+    if any(isinstance(one, Apply) for one in columns[1]):
+        return False
+    if any(translation.limits(one).low < 0 for one in itertools.chain(*columns[1:])):
+        return False
     posting = translation.posting
-    if not all(min(posting.values_of(one)) >= 0 for one in itertools.chain(*columns[1:])):
-        return False
     if ends and ends[0] is not None:
-        for start, duration, end in zip(columns[0], columns[1], _flat(ends[0]), strict=True):
-            posting.post(translation.sum_is(start, duration, translation.integer(end)))
-    if any(not isinstance(one, Name) and hasattr(one, "arguments") for one in columns[1]):
-        return False
+        for start, duration, end in zip(columns[0], columns[1], translation.integers(_flat(ends[0])), strict=True):
+            posting.post(translation.sum_is(start, duration, end))
     post_tasks(list(map(Task, *columns)), Condition("le", translation.integer(capacity)), posting)
     return True
 
 
 def _post_objective(objective: Any, translation: Translation) -> None:  # noqa: ANN401 - CPMpy's expressions
-    expression: Expression = translation.integer(objective)
-    for condition in translation.take_conditions():
+    with translation.context() as conditions:
+        expression = translation.integer(objective)
+    for condition in conditions:
         translation.posting.post(condition)
+    _post_definitions(translation)
     for term in split(expression):
         translation.posting.post_cost(term)
 

@@ -1,11 +1,18 @@
-"""CPMpy's expressions as ours. CPMpy is looked at by the names of its operators, and never imported."""
+"""CPMpy's expressions as ours. CPMpy is looked at by the names of its operators, and never imported.
+
+A partial function (a quotient, an element of an array) has CPMpy's relational semantics: the nearest Boolean expression
+around it is false where it has no value. `Translation.boolean` attaches that condition, and nothing rewrites a CPMpy
+expression before it gets there: negations stay where the user wrote them, and a global constraint without a counterpart
+is decomposed at its own node.
+"""
 
 from __future__ import annotations
 
 import itertools
 import numbers
-from collections.abc import Callable, Iterable, Sequence
-from typing import Any
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import contextmanager
+from typing import Any, NamedTuple
 
 from robochoc.formats.diagnostics import MistakeError
 from robochoc.formats.dialects.xcsp3.kinds import distinct
@@ -13,6 +20,7 @@ from robochoc.formats.dialects.xcsp3.posting import Posting
 from robochoc.formats.dialects.xcsp3.terms import (
     FALSE,
     TRUE,
+    as_boolean,
     as_integer,
     compare,
     every,
@@ -22,13 +30,23 @@ from robochoc.formats.dialects.xcsp3.terms import (
     times,
     total,
 )
-from robochoc.model.expression import Apply, Constant, Expression, Name
+from robochoc.model.expression import Apply, Constant, Expression, Name, names
+from robochoc.model.expression.bounds import Interval, bounds
+from robochoc.modelling.translation import may_be_undefined
 
 COMPARISONS = {"==": "eq", "!=": "ne", "<": "lt", "<=": "le", ">": "gt", ">=": "ge"}
-_GLOBALS = ("alldifferent", "allequal", "table", "negative_table", "cumulative", "xor", "ite", "indomain")
-_FUNCTIONS = ("min", "max", "abs", "element", "count", "nvalue", "div", "mod", "pow", "mul")
-NATIVE = frozenset((*_GLOBALS, *_FUNCTIONS))
-"""CPMpy's global constraints and functions that are translated here. It decomposes the others itself."""
+
+
+class Definition(NamedTuple):
+    """A constraint that defines a further variable of a decomposition.
+
+    Attributes:
+        constraint: CPMpy's constraint.
+        defined: The condition under which the arguments of the decomposed expression have values.
+    """
+
+    constraint: Any
+    defined: Expression
 
 
 def integer_of(value: object) -> int:
@@ -50,89 +68,159 @@ def is_variable(term: object) -> bool:
 class Translation:
     """Translates expressions over the variables of `posting`.
 
-    A division by zero makes the comparison around it false, as in CPMpy: what must hold for an expression to have a
-    value is collected until the comparison is made.
+    Args:
+        posting: The variables.
+        add_variable: Adds a variable of a decomposition to `posting`, and returns it.
+
+    Attributes:
+        posting: The variables.
+        definitions: The definitions of further variables, which are still to be posted.
     """
 
-    def __init__(self, posting: Posting) -> None:
+    def __init__(self, posting: Posting, add_variable: Callable[[Any], Expression]) -> None:
         self.posting = posting
+        self.definitions: list[Definition] = []
+        self._add_variable = add_variable
+        self._names: dict[str, Expression] = {theirs: Name(ours) for theirs, ours in posting.names.items()}
         self._conditions: list[Expression] = []
+        self._decompositions: dict[int, tuple[Any, Any]] = {}
 
-    def take_conditions(self) -> list[Expression]:
-        """Return what must hold for the integers so far to have values, and forget it."""
-        found, self._conditions = self._conditions, []
-        return found
+    @contextmanager
+    def context(self) -> Iterator[list[Expression]]:
+        """Collect the conditions under which the integers translated inside have values."""
+        outside, self._conditions = self._conditions, []
+        try:
+            yield self._conditions
+        finally:
+            self._conditions = outside
 
     def integer(self, term: Any) -> Expression:  # noqa: ANN401 - CPMpy's expressions
         """Return `term` as an integer. Raises `MistakeError` for what has no counterpart."""
         if not hasattr(term, "name"):
             return Constant(integer_of(term))
         if is_variable(term):
-            return Name(self.posting.names[term.name])
+            if term.name not in self._names:
+                self._names[term.name] = self._add_variable(term)
+            return self._names[term.name]
         if hasattr(term, "_bv"):
             return Apply("sub", (Constant(1), self.integer(~term)))
-        make = _INTEGERS.get(term.name)
-        return make(self, term.args) if make else as_integer(self.boolean(term))
+        if term.name in _INTEGERS:
+            return _INTEGERS[term.name](self, term.args)
+        if hasattr(term, "decompose") and not term.is_bool():
+            return self._decomposed_function(term)
+        return as_integer(self.boolean(term))
 
     def integers(self, terms: Iterable[Any]) -> list[Expression]:
         """Return all of `terms` as integers."""
         return [self.integer(term) for term in (terms.flat if hasattr(terms, "flat") else terms)]
 
     def boolean(self, term: Any) -> Expression:  # noqa: ANN401 - CPMpy's expressions
-        """Return `term` as a Boolean. Raises `MistakeError` for what has no counterpart."""
+        """Return `term` as a Boolean, which is false where an integer in it has no value.
+
+        Raises:
+            MistakeError: for what has no counterpart.
+        """
+        with self.context() as conditions:
+            found = self._unguarded(term)
+        return _guarded(conditions, found)
+
+    def parts(self, term: Any) -> list[Expression]:  # noqa: ANN401 - CPMpy's expressions
+        """Return Booleans whose conjunction is `term`: for a constraint that must hold."""
+        with self.context() as conditions:
+            found = self._unguarded(term)
+        return [*conditions, found]
+
+    def _unguarded(self, term: Any) -> Expression:  # noqa: ANN401 - CPMpy's expressions
         if not hasattr(term, "name"):
             return TRUE if bool(term) else FALSE
-        if is_variable(term):
-            return compare("ne", self.integer(term), Constant(0))
         if hasattr(term, "_bv"):
             return compare("eq", self.integer(~term), Constant(0))
-        if term.name == "boolval":
-            return TRUE if bool(term.args[0]) else FALSE
-        outside, self._conditions = self._conditions, []
-        make = _BOOLEANS.get(term.name)
-        if make:
-            found = make(self, term.args)
-        elif term.name in _INTEGERS:
-            found = compare("ne", self.integer(term), Constant(0))
-        else:
-            raise MistakeError(f"CPMpy's '{term.name}' has no counterpart", "write it otherwise")
-        conditions, self._conditions = self._conditions, outside
-        return _guarded(conditions, found)
+        if term.name in _BOOLEANS:
+            return _BOOLEANS[term.name](self, term.args)
+        if hasattr(term, "decompose") and term.is_bool():
+            return every(self.booleans(self.decomposed(term)))
+        if is_variable(term) or term.name in _INTEGERS or hasattr(term, "decompose"):
+            return compare("ne", self.integer(term), Constant(0))
+        raise MistakeError(f"CPMpy's '{term.name}' has no counterpart", "write it otherwise")
 
     def booleans(self, terms: Iterable[Any]) -> list[Expression]:
         """Return all of `terms` as Booleans."""
         return [self.boolean(term) for term in (terms.flat if hasattr(terms, "flat") else terms)]
 
+    def decomposed(self, term: Any, *, must_hold: bool = False) -> Any:  # noqa: ANN401 - CPMpy's expressions
+        """Return CPMpy's decomposition of a global constraint or function, and note the definitions that belong to it.
+
+        The conditions under which its arguments have values become those of the expression around it.
+
+        Args:
+            term: The global constraint or function.
+            must_hold: Whether it is a constraint that must hold, which CPMpy may decompose into less.
+        """
+        for argument in _leaves(term.args):
+            self.integer(argument)
+        if id(term) not in self._decompositions:
+            try:
+                found, definitions = term.decompose_positive() if must_hold else term.decompose()
+            except Exception as error:  # noqa: BLE001 - CPMpy's own exceptions, and CPMpy is not imported here
+                raise MistakeError(f"CPMpy cannot decompose its '{term.name}'", str(error)) from None
+            defined = _guarded(self._conditions, TRUE)
+            self.definitions += [Definition(one, defined) for one in definitions]
+            self._decompositions[id(term)] = term, found
+        return self._decompositions[id(term)][1]
+
+    def _decomposed_function(self, term: Any) -> Expression:  # noqa: ANN401 - CPMpy's expressions
+        if not term.is_total():
+            raise MistakeError(f"CPMpy's '{term.name}' has no counterpart", "it is not defined everywhere")
+        return self.integer(self.decomposed(term))
+
     def sum_is(self, one: Expression, other: Expression, result: Expression) -> Expression:
         """Return that two integers add up to a third."""
         return compare("eq", plus(one, other), result)
 
+    def limits(self, expression: Expression) -> Interval:
+        """Return an interval in which the values of `expression` lie."""
+        ends = {name: self.posting.domain(Name(name)) for name in names(expression)}
+        return bounds(expression, {name: Interval(min(one), max(one)) for name, one in ends.items()})
+
     def has_value_if(self, condition: Expression) -> None:
-        """Note what must hold for the expression in hand to have a value."""
-        self._conditions.append(condition)
+        """Note a condition under which the expression in hand has a value."""
+        if condition not in self._conditions:
+            self._conditions.append(condition)
 
     def quotient(self, operator: str, terms: Sequence[Any]) -> Expression:
         """Return a quotient or a remainder."""
         dividend, divisor = self.integers(terms)
-        if not isinstance(divisor, Constant) or divisor.value == 0:
+        low, high = self.limits(divisor)
+        if low <= 0 <= high:
             self.has_value_if(compare("ne", divisor, Constant(0)))
         return Apply(operator, (dividend, divisor))
 
     def power(self, terms: Sequence[Any]) -> Expression:
         """Return a power."""
         base, exponent = self.integers(terms)
-        if not isinstance(exponent, Constant) or exponent.value < 0:
+        if self.limits(exponent).low < 0:
             self.has_value_if(compare("ge", exponent, Constant(0)))
         return Apply("pow", (base, exponent))
 
     def element(self, terms: Sequence[Any]) -> Expression:
-        """Return the member of a list that an index chooses."""
-        members, index = self.integers(terms[0]), self.integer(terms[1])
-        self.has_value_if(inside(index, range(len(members))))
-        chosen = (
-            times(as_integer(compare("eq", index, Constant(place))), member) for place, member in enumerate(members)
-        )
+        """Return the member that indexes choose in an array of as many dimensions."""
+        indexes, cells = self.cells(terms)
+        chosen = []
+        for place, cell in cells.items():
+            here = every([compare("eq", *pair) for pair in zip(indexes, map(Constant, place), strict=True)])
+            chosen.append(times(as_integer(here), cell))
         return total([part for part in chosen if part != Constant(0)])
+
+    def cells(self, terms: Sequence[Any]) -> tuple[list[Expression], dict[tuple[int, ...], Expression]]:
+        """Return the indexes of an element, and the members of its array by place. It has a value at these places."""
+        array, *others = terms
+        shape = array.shape if hasattr(array, "shape") else (len(array),)
+        members, indexes = self.integers(array), self.integers(others)
+        for index, size in zip(indexes, shape, strict=True):
+            low, high = self.limits(index)
+            if low < 0 or high >= size:
+                self.has_value_if(inside(index, range(size)))
+        return indexes, dict(zip(itertools.product(*map(range, shape)), members, strict=True))
 
     def table(self, terms: Sequence[Any]) -> Expression:
         """Return that a list has one of some tuples of values."""
@@ -145,14 +233,29 @@ class Translation:
         return itertools.combinations(self.integers(terms), 2)
 
 
+def _leaves(arguments: Any) -> Iterator[Any]:  # noqa: ANN401 - CPMpy's expressions, in lists of lists
+    """Yield the expressions among the arguments of a global constraint or function."""
+    if hasattr(arguments, "name"):
+        yield arguments
+    elif not isinstance(arguments, str) and isinstance(arguments, Iterable):
+        for one in arguments.flat if hasattr(arguments, "flat") else arguments:
+            yield from _leaves(one)
+
+
 def _guarded(conditions: Sequence[Expression], found: Expression) -> Expression:
-    """Return `found`, and false where a condition does not hold: then `found` is not looked at."""
+    """Return `found`, and false where a condition does not hold: then `found` is not looked at.
+
+    A condition may have a value only where those before it hold. Those that always have one are looked at together.
+    """
     if not conditions:
         return found
     value = as_integer(found)
-    for condition in reversed(conditions):
+    for condition in reversed([one for one in conditions if may_be_undefined(one)]):
         value = Apply("if", (condition, value, Constant(0)))
-    return compare("ne", value, Constant(0))
+    always = [one for one in conditions if not may_be_undefined(one)]
+    if always:
+        value = Apply("if", (every(always), value, Constant(0)))
+    return as_boolean(value)
 
 
 def _compared(operator: str) -> Callable[[Translation, Sequence[Any]], Expression]:
@@ -188,12 +291,14 @@ _INTEGERS: dict[str, Callable[[Translation, Sequence[Any]], Expression]] = {
     "min": _best("min"),
     "max": _best("max"),
     "element": lambda t, args: t.element(args),
+    "nd_element": lambda t, args: t.element(args),
     "count": lambda t, args: total([as_integer(compare("eq", one, t.integer(args[1]))) for one in t.integers(args[0])]),
     "nvalue": lambda t, args: distinct(t.integers(args)),
 }
 
 _BOOLEANS: dict[str, Callable[[Translation, Sequence[Any]], Expression]] = {
     **{name: _compared(operator) for name, operator in COMPARISONS.items()},
+    "boolval": lambda _, args: TRUE if bool(args[0]) else FALSE,
     "and": lambda t, args: every(t.booleans(args)),
     "or": lambda t, args: some(t.booleans(args)),
     "->": lambda t, args: some([_negated(t.boolean(args[0])), t.boolean(args[1])]),
@@ -213,3 +318,6 @@ _BOOLEANS: dict[str, Callable[[Translation, Sequence[Any]], Expression]] = {
     "negative_table": lambda t, args: _negated(t.table(args)),
     "indomain": _domain,
 }
+
+TRANSLATED = frozenset((*_INTEGERS, *_BOOLEANS))
+"""CPMpy's names of the operators, global constraints and functions that are translated here."""

@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-import itertools
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from contextlib import suppress
 from random import Random
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import pytest
 
@@ -16,6 +15,12 @@ from robochoc.model.outcome import Verdict
 from robochoc.model.problem import Team
 from robochoc.modelling.cpmpy_models import cpmpy_team
 from robochoc.solver.central import CentralSolver
+from tests.support.examples import count
+
+if TYPE_CHECKING:
+    from tests.support import random_cpmpy
+else:
+    random_cpmpy = pytest.importorskip("tests.support.random_cpmpy", reason="the extra cpmpy")
 
 cp = pytest.importorskip("cpmpy", reason="the extra cpmpy")
 argval = pytest.importorskip("cpmpy.expressions.utils").argval
@@ -23,104 +28,70 @@ IncompleteFunctionError = pytest.importorskip("cpmpy.exceptions").IncompleteFunc
 
 Term = Any
 """CPMpy's expressions."""
-BATCHES = [0, *(pytest.param(batch, marks=pytest.mark.slow) for batch in range(1, 11))]
-EACH = 20
 
 
-def term(chance: Random, x: Term, depth: int) -> Term:
-    """A random integer expression over the variables `x`."""
-    if depth == 0 or chance.random() < 0.3:
-        return chance.choice([*x, *x, chance.randint(-2, 3)])
-    one, other = (term(chance, x, depth - 1) for _ in range(2))
-    kinds: list[Callable[[], Term]] = [
-        lambda: one + other,
-        lambda: one - other,
-        lambda: chance.randint(-2, 3) * one,
-        lambda: one * other,
-        lambda: -(x[0] + one),
-        lambda: abs(x[1] - other),
-        lambda: cp.max([one, other, x[0]]),
-        lambda: cp.min([one, other, x[1]]),
-        lambda: (x[0] + one) // other,
-        lambda: (x[1] + one) % other,
-        lambda: cp.Count(list(x), other),
-        lambda: cp.NValue(list(x)),
-        lambda: cp.Element([3, 1, 2], x[2]),
-        lambda: cp.Element(list(x), x[0]),
-        lambda: (x[0] == 1) + other,
+def drawn(seed: int) -> random_cpmpy.RandomExpressions:
+    return random_cpmpy.RandomExpressions(Random(seed))
+
+
+def model_of(given: random_cpmpy.RandomExpressions, *constraints: Term) -> Term:
+    """Return a model of `constraints` in which all variables stand."""
+    return cp.Model([*(variable >= variable.lb for variable in given.variables), *constraints])
+
+
+def check_solutions(given: random_cpmpy.RandomExpressions, constraint: Term) -> None:
+    """Check that the team of a constraint allows the assignments for which CPMpy says that the constraint holds."""
+    team = cpmpy_team(model_of(given, constraint))
+    judge = random_cpmpy.Judge(team, [variable.name for variable in given.variables])
+    for values in given.assignments():
+        assert judge.allows(values) is bool(argval(constraint)), (values, str(constraint))
+
+
+@count("number", fast=40, slow=5000)
+def test_random_expressions_hold_where_cpmpy_says_so(number: int) -> None:
+    for seed in range(number):
+        given = drawn(seed)
+        check_solutions(given, given.fact(3) if seed % 3 else given.constraint(2))
+
+
+def partial(x: Term, b: Term) -> list[Term]:
+    """Return constraints that hold also where a quotient, a remainder or an element in them has no value."""
+    pay, grid = cp.cpm_array([1, 1]), cp.cpm_array([[1, 0], [1, 1]])
+    facts = [pay[x[2]] == 1, 1 // x[0] == 1, 5 % x[1] == 0, grid[x[2], x[1]] == 1, cp.AllDifferent([4 // x[0], x[1]])]
+    facts += [cp.Increasing([x[1], 3 // x[0]]), pay[x[2]] + 2 // x[1] <= 3, pay[1 // x[0]] == 1]
+    kinds: list[Callable[[Term], Term]] = [
+        lambda fact: ~fact,
+        lambda fact: fact == False,  # noqa: E712 - CPMpy's operator
+        lambda fact: b.implies(~fact),
+        lambda fact: fact.implies(b),
+        lambda fact: b == fact,
+        lambda fact: ~(fact & b),
+        lambda fact: cp.Xor([fact, b]),
+        lambda fact: cp.IfThenElse(fact, b, ~b),
+        lambda fact: cp.sum([fact, b, ~fact]) <= 1,
     ]
-    return chance.choice(kinds)()
+    return [kind(fact) for kind in kinds for fact in facts]
 
 
-def fact(chance: Random, x: Term, b: Term, depth: int) -> Term:
-    """A random Boolean expression."""
-    one, other = term(chance, x, depth), term(chance, x, depth)
-    comparisons: list[Callable[[], Term]] = [
-        lambda: x[0] + one == other,
-        lambda: x[1] - one != other,
-        lambda: x[2] + one <= other,
-        lambda: x[0] + one > other,
-    ]
-    if depth == 0 or chance.random() < 0.4:
-        return chance.choice(comparisons)()
-    left, right = (fact(chance, x, b, depth - 1) for _ in range(2))
-    kinds: list[Callable[[], Term]] = [
-        lambda: left & right,
-        lambda: left | right | ~b,
-        lambda: left.implies(right),
-        lambda: ~left,
-        lambda: b == left,
-        lambda: cp.Xor([left, right, b]),
-        lambda: cp.IfThenElse(b, left, right),
-        lambda: cp.AllDifferent(list(x)) | left,
-        lambda: b.implies(cp.AllEqual(list(x))),
-        lambda: cp.Table(list(x), [[0, 1, 2], [2, 1, 0], [1, 1, 1]]) | b,
-    ]
-    return chance.choice(kinds)()
+def test_partial_functions_make_the_nearest_boolean_expression_false() -> None:
+    given = drawn(0)
+    for constraint in partial(given.x, given.b):
+        check_solutions(given, constraint)
 
 
-GLOBALS: list[Callable[[Random, Term], Term]] = [
-    lambda _, x: cp.AllDifferent(x),
-    lambda _, x: cp.AllDifferentExcept0(x),
-    lambda _, x: cp.AllEqual(x[:2]),
-    lambda _, x: cp.Increasing(x),
-    lambda _, x: cp.Circuit(x),
-    lambda _, x: cp.InDomain(x[0], [0, 2]),
-    lambda c, x: cp.Table(list(x), [[c.randint(0, 2) for _ in x] for _ in range(5)]),
-    lambda c, x: cp.NegativeTable(list(x), [[c.randint(0, 2) for _ in x] for _ in range(5)]),
-    lambda c, x: cp.Cumulative(list(x), [c.randint(0, 2) for _ in x], demand=[1, 2, 2], capacity=c.randint(2, 4)),
-    lambda c, x: cp.GlobalCardinalityCount(list(x), [0, 1], [1, c.randint(0, 2)]),
-    lambda c, x: cp.Element(list(x), x[1]) == c.randint(0, 2),
-    lambda c, x: cp.LexLess([x[0], x[1]], [x[2], c.randint(0, 2)]),
-]
+def test_an_element_is_compared_with_any_expression_on_either_side() -> None:
+    given = drawn(0)
+    x, y, z = given.x
+    for element in (cp.Element([3, -1, 2], y), cp.Element([x, 1, z], y), cp.cpm_array([[1, 2], [3, 0]])[y, z]):
+        for other in (x + 1, z + 0 * x, 2, y, cp.max([x, z]), 6 // x):
+            for constraint in (element >= other, other == element, other != element, other < element):
+                check_solutions(given, constraint)
 
 
-def random_model(chance: Random) -> tuple[Term, list[Term]]:
-    """A model over four variables, and CPMpy's own solutions of it by trying everything."""
-    x = cp.intvar(0, 2, shape=3, name="x")
-    b = cp.boolvar(name="b")
-    model = cp.Model([x[0] + b >= 0, x[1] >= 0, x[2] >= 0])
-    for _ in range(chance.randint(0, 2)):
-        model += fact(chance, x, b, 2)
-    for _ in range(chance.randint(0, 1)):
-        model += chance.choice(GLOBALS)(chance, x)
-    if chance.random() < 0.7:
-        objective = term(chance, x, 2) + 2 * x[0] - 3 * x[1] + b
-        (model.minimize if chance.random() < 0.5 else model.maximize)(objective)
-    return model, [*x, b]
-
-
-def assignments(variables: list[Term]) -> Iterator[tuple[int, ...]]:
-    for values in itertools.product(*(range(variable.lb, variable.ub + 1) for variable in variables)):
-        for variable, value in zip(variables, values, strict=True):
-            variable._value = bool(value) if variable.is_bool() else value  # noqa: SLF001 - as its solvers do
-        yield values
-
-
-def by_hand(model: Term, variables: list[Term]) -> tuple[bool, int | None]:
-    """Whether there is a solution, and the best objective: each constraint is asked for its value."""
+def by_hand(model: Term, given: random_cpmpy.RandomExpressions) -> tuple[bool, int | None]:
+    """Return whether there is a solution, and the best objective: each constraint is asked for its value."""
     found: list[int] = []
-    for _ in assignments(variables):
+    for _ in given.assignments():
         if all(argval(one) for one in model.constraints):
             with suppress(IncompleteFunctionError):
                 found.append(0 if model.objective_ is None else int(argval(model.objective_)))
@@ -136,21 +107,15 @@ def solved(team: Team) -> tuple[bool, int | None]:
     return answer.verdict is not Verdict.NO_SOLUTION, None if cost is None else int(cost)
 
 
-@pytest.mark.parametrize("batch", BATCHES)
-def test_random_models_have_the_same_optimum(batch: int) -> None:
-    for seed in range(EACH * batch, EACH * (batch + 1)):
-        model, variables = random_model(Random(seed))
-        assert solved(cpmpy_team(model)) == by_hand(model, variables), (seed, str(model))
-
-
-@pytest.mark.parametrize("kind", range(len(GLOBALS)))
-def test_each_global_constraint(kind: int) -> None:
-    for seed in range(3):
-        x = cp.intvar(0, 2, shape=3, name="x")
-        one = GLOBALS[kind](Random(seed), x)
-        cost = [Random(seed).randint(-3, 3) for _ in range(3)]
-        model = cp.Model([one, *(each >= 0 for each in x)], minimize=cp.sum(cost[i] * x[i] for i in range(3)) + x[0])
-        assert solved(cpmpy_team(model)) == by_hand(model, list(x)), (seed, str(model))
+@count("number", fast=25, slow=500)
+def test_random_models_have_the_same_optimum(number: int) -> None:
+    for seed in range(number):
+        given, chance = drawn(seed), Random(seed)
+        model = model_of(given, *(given.fact(2) for _ in range(chance.randint(0, 2))))
+        if chance.random() < 0.8:
+            objective = given.number(2) + 2 * given.x[0] - 3 * given.x[1] + given.b
+            (model.minimize if chance.random() < 0.5 else model.maximize)(objective)
+        assert solved(cpmpy_team(model)) == by_hand(model, given), (seed, str(model))
 
 
 def test_owners_names_and_kinds() -> None:
@@ -175,3 +140,6 @@ def test_what_has_no_counterpart_is_refused() -> None:
         cpmpy_team("x")
     with pytest.raises(ValueError, match="no variables"):
         cpmpy_team(cp.Model())
+    y = cp.intvar(0, 1, name="y")
+    with pytest.raises(ValueError, match="CPMpy cannot decompose its 'circuit'"):
+        cpmpy_team(cp.Model(cp.Circuit([y == 1, y])))

@@ -136,7 +136,7 @@ class Posting:
         """Return whether the values of our variable `name` are symbols."""
         return name in self._original and self.variables.is_symbolic(self._original[name])
 
-    def add_variable(self, name: str, values: Iterable[int]) -> Expression:
+    def add_variable(self, name: str, values: Iterable[int]) -> Name:
         """Return a variable that the instance has not. Raises `MistakeError` where it would have too many values."""
         found = tuple(sorted(set(values)))
         if len(found) > MAX_VALUES:

@@ -155,9 +155,12 @@ def _element_of_matrix(element: Element, posting: Posting, condition: Condition)
 def choose(
     posting: Posting, indexes: Sequence[Expression], cells: Mapping[Row, Expression], condition: Condition
 ) -> None:
-    """Post `condition` on the cell that `indexes` choose: a table where all cells are integers, else cell by cell."""
-    if all(isinstance(cell, Constant) for cell in cells.values()):
-        operand = condition.operand
+    """Post `condition` on the cell that `indexes` choose: a table where all cells are integers, else cell by cell.
+
+    A table has no column for an expression, with which the cell is compared.
+    """
+    operand = condition.operand
+    if not isinstance(operand, Apply) and all(isinstance(cell, Constant) for cell in cells.values()):
         others = [] if isinstance(operand, tuple | Constant) else [operand]
         known = [set(posting.domain(index)) for index in indexes]
         rows: list[Row] = []
