@@ -38,7 +38,7 @@ def check_member_name(name: str, role: Role = Role.ROBOT) -> None:
         raise InvalidNameError(f"'{shown}' is no robot's name: a letter, then letters, digits, '_' and '.'")
     if len(name) > LONGEST_NAME:
         raise InvalidNameError(f"'{shown}' is too long: a certificate names at most {LONGEST_NAME} characters")
-    if name.upper() == MASTER or role is Role.MASTER:
+    if name.upper() == MASTER or role == Role.MASTER:
         raise InvalidNameError(
             f"the name {MASTER} is the master's own, which needs no token; choose another name, or role"
         )

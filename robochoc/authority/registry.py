@@ -96,7 +96,7 @@ class EnrolledName(msgspec.Struct, frozen=True):
     def expires(self, now: float) -> float:
         """Return when (Unix time) its token, if it is invited, or its last certificate expires; 0 if it has neither."""
         token = self.invitation.expires if self.invitation and not self.invitation.used else 0
-        if self.state(now) is EnrolmentState.INVITED:
+        if self.state(now) == EnrolmentState.INVITED:
             return token
         return max((one.expires for one in self.certificates), default=token)
 

@@ -32,11 +32,11 @@ class Agreement:
         Raises:
             DisagreementError: if they contradict each other, or the checker has refuted it.
         """
-        if row.status is Status.REFUTED:
+        if row.status == Status.REFUTED:
             raise DisagreementError(
                 f"the checker refutes the answer of {task.setup.label}: {row.reason}\n{repeat(task)}"
             )
-        if row.status is not Status.DONE or "after" in task.problem.scenario:
+        if row.status != Status.DONE or "after" in task.problem.scenario:
             return
         others = self._answers.setdefault((row.digest, task.setup.withdraw), [])
         for other_task, other in others:

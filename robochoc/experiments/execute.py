@@ -84,7 +84,7 @@ class Bench(AbstractContextManager["Bench"]):
         cpu = time.process_time()
         options = options_of(task.setup, task.limits, task.seed)
         journal = journal_of(team, options) if Recording.JOURNAL in task.record else None
-        sent = curve.sent if curve and options.runtime is Runtime.ARRAYS else None
+        sent = curve.sent if curve and options.runtime == Runtime.ARRAYS else None
         outcome = solve(team, options, observer=several(curve, loads, journal), progress=sent, solver=self._solver)
         row.cpu_s = None if task.is_timed else time.process_time() - cpu
         _fill(row, outcome, team)
@@ -154,11 +154,11 @@ def _fill(row: Row, outcome: Outcome, team: Team) -> None:
     """Write what an outcome says into its row."""
     metrics = outcome.metrics
     row.status = Status.DONE
-    if outcome.verdict is Verdict.UNKNOWN:
+    if outcome.verdict == Verdict.UNKNOWN:
         by_itself = (outcome.reason or "").endswith((GAVE_UP, FOUND_NOTHING))
         row.status = Status.ENDED if by_itself else Status.LIMIT
     row.reason, row.verdict = outcome.reason, str(outcome.verdict)
-    row.cost, row.bound = _exact(outcome.cost if team.kind is ProblemKind.DISWCSP else None), _exact(outcome.bound)
+    row.cost, row.bound = _exact(outcome.cost if team.kind == ProblemKind.DISWCSP else None), _exact(outcome.bound)
     row.withdrawn, row.verified, row.confirmed = len(outcome.withdrawn), outcome.verified, outcome.confirmed
     row.wall_s, row.compile_s, row.memory = metrics.wall_s, metrics.compile_s, metrics.memory or None
     if outcome.protocol == CENTRAL:  # it sends none, and that is no count to compare

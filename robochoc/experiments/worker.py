@@ -41,7 +41,7 @@ def main(descriptor: int, parent: int, memory_mb: int) -> None:
         while (content := read_frame(connection)) is not None:
             row = bench.run(msgspec.json.decode(content, type=Task))
             write_frame(connection, msgspec.json.encode(row))
-            if row.status is Status.MEMORY:
+            if row.status == Status.MEMORY:
                 return  # what is left is in pieces; another worker takes over
 
 

@@ -149,7 +149,7 @@ class MissionBuilder:
 
     def leg(self, epoch: EpochOutcome, withdrawn: Iterable[str] = ()) -> Leg:
         """Return what `epoch`, the next one, asks of the drones. A drone whose robot has left lands at the edge."""
-        values: Assignment = {} if epoch.verdict is Verdict.NO_SOLUTION else epoch.assignment
+        values: Assignment = {} if epoch.verdict == Verdict.NO_SOLUTION else epoch.assignment
         here = {*(epoch.robots if self._robots else values or self._seen)} - {*withdrawn}
         gone = (self._seen | {*withdrawn}) - here
         self._seen |= here
@@ -261,7 +261,7 @@ def mission_of(
     epochs = outcome.epochs or (
         EpochOutcome(outcome.verdict, team.order if team else (), assignment=outcome.assignment),
     )
-    decided = [epoch.assignment for epoch in epochs if epoch.verdict is not Verdict.NO_SOLUTION]
+    decided = [epoch.assignment for epoch in epochs if epoch.verdict != Verdict.NO_SOLUTION]
     first: dict[str, int] = {}
     for values in decided:
         first = {**values, **first}

@@ -34,7 +34,7 @@ def differing_copies(members: TeamMembers, misplaced: Collection[str]) -> Iterat
 def _differing(
     file: str, copies: Iterable[Constraint], child: Robot, domains: Mapping[str, Domain]
 ) -> Iterator[Diagnostic]:
-    held = _grouped(constraint for constraint in child.shared if constraint.model is ConstraintModel.TKC)
+    held = _grouped(constraint for constraint in child.shared if constraint.model == ConstraintModel.TKC)
     for variables, group in _grouped(copies).items():
         what = f"the copy of '{shortened(group[0].name)}' over {shortened(' '.join(variables))}"
         originals = held.get(variables)

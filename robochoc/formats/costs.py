@@ -83,7 +83,7 @@ def check_units(units: CostUnits, kind: ProblemKind) -> None:
     if not 0 <= units.places <= MAX_PLACES:
         raise MistakeError(f"costs of {units.places} decimal places", f"expected 0 to {MAX_PLACES}")
     check_integer(units.constant)
-    if kind is not ProblemKind.DISWCSP and units != CostUnits():
+    if kind != ProblemKind.DISWCSP and units != CostUnits():
         what = "maximize" if units.maximize else "a constant cost" if units.constant else "a scale of costs"
         raise MistakeError(f"{what} in a DisCSP", 'write type="DisWCSP" in the presentation, or delete it')
 
@@ -130,7 +130,7 @@ class Rescaled:
 
     def definition(self, definition: Definition) -> Definition:
         """Return `definition` in the finer unit. Raises `MistakeError`."""
-        if not isinstance(definition, Relation) or definition.semantics is not Semantics.SOFT:
+        if not isinstance(definition, Relation) or definition.semantics != Semantics.SOFT:
             return definition
         if id(definition) not in self._known:
             finer = replace(

@@ -69,14 +69,14 @@ def refuse_predefined(name: str) -> None:
 
 def check_semantics(semantics: Semantics, kind: ProblemKind) -> None:
     """Raise `MistakeError` where a robot of that `kind` cannot have such a relation."""
-    if semantics is Semantics.SOFT and kind is not ProblemKind.DISWCSP:
+    if semantics == Semantics.SOFT and kind != ProblemKind.DISWCSP:
         hint = 'write type="DisWCSP" in the presentation, or semantics="supports" or "conflicts"'
         raise MistakeError("a soft relation in a DisCSP", hint)
 
 
 def refuse_function(kind: ProblemKind) -> None:
     """Raise `MistakeError` where a robot of that `kind` cannot have a function: its value is a cost."""
-    if kind is not ProblemKind.DISWCSP:
+    if kind != ProblemKind.DISWCSP:
         hint = 'write type="DisWCSP" in the presentation, or a predicate'
         raise MistakeError("a function, whose value is a cost, in a DisCSP", hint)
 
@@ -84,7 +84,7 @@ def refuse_function(kind: ProblemKind) -> None:
 def check_relation(relation: Relation) -> None:
     """Raise `MistakeError` unless its tuples have its arity, stand once, and cost something if it is soft."""
     check_tuple_count(len(relation.tuples))
-    if relation.semantics is not Semantics.SOFT and (relation.default_cost != 0 or relation.costs):
+    if relation.semantics != Semantics.SOFT and (relation.default_cost != 0 or relation.costs):
         wrong = "defaultCost" if relation.default_cost != 0 else "costs"
         hint = "supports and conflicts forbid, and cost nothing: make it soft"
         raise MistakeError(f"{wrong} in a {relation.semantics} relation", hint)
@@ -92,7 +92,7 @@ def check_relation(relation: Relation) -> None:
         message = f"a relation of arity {in_short(relation.arity)}"
         raise MistakeError(message, "its tuples need a value for each variable of the scope")
     _check_tuples(relation)
-    if relation.semantics is Semantics.SOFT:
+    if relation.semantics == Semantics.SOFT:
         if len(relation.costs) != len(relation.tuples):
             message = f"{len(relation.tuples)} tuples, but {len(relation.costs)} costs"
             raise MistakeError(message, "write cost:tuple, 5:1 2|3:2 2")

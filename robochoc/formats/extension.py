@@ -77,7 +77,7 @@ def read_relation(element: etree._Element, units: CostUnits, code: Callable[[str
     words = [part for part in (element.text or "").split("|") if part.strip()]
     check_tuple_count(len(words))
     costs: list[float] = []
-    if semantics is Semantics.SOFT:
+    if semantics == Semantics.SOFT:
         words, costs = _priced(words, units)
     rows = [word.split() for word in words]
     symbolic = tuple(place for place, word in enumerate(rows[0] if rows else ()) if not _NUMERIC.match(word))
@@ -117,7 +117,7 @@ def _priced(words: list[str], units: CostUnits) -> tuple[list[str], list[float]]
 
 
 def _default_cost(given: str, semantics: Semantics, units: CostUnits) -> float:
-    if semantics is Semantics.SOFT:
+    if semantics == Semantics.SOFT:
         return read_cost(given, units) if given else INFINITE
     if given:
         hint = 'write semantics="soft", or delete it: supports and conflicts forbid, and cost nothing'

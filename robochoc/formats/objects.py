@@ -156,7 +156,7 @@ class Objects:
                 check_name(child.name)
                 check_shown_variables(child.variables, own)
             for constraint in child.constraints:
-                if constraint.model is ConstraintModel.TKC:
+                if constraint.model == ConstraintModel.TKC:
                     message = f"a totally known constraint (TKC) with the child '{shortened(child.name)}'"
                     hint = "the child holds it; with the parent stands its part of a PKC only"
                     self._note(places.constraint(constraint), message, hint)
@@ -164,7 +164,7 @@ class Objects:
                     self._shared(constraint, own, robot, places)
                 yield
             for copy in child.copies:
-                if copy.model is ConstraintModel.PKC:
+                if copy.model == ConstraintModel.PKC:
                     message = f"a copy of a partially known constraint (PKC) of the child '{shortened(child.name)}'"
                     self._note(places.constraint(copy), message, "nobody knows another's part: leave the copy out")
                 else:

@@ -111,7 +111,7 @@ def read_robot_again(path: Path, symbols: tuple[str, ...], units: CostUnits) -> 
         raise InvalidInputError(
             [Diagnostic(str(path), 0, f"the symbol '{new[0]}' is new to the team", "use its symbols")]
         )
-    if file.robot.kind is ProblemKind.DISWCSP and (costs.maximize, max(costs.places, units.places)) != (
+    if file.robot.kind == ProblemKind.DISWCSP and (costs.maximize, max(costs.places, units.places)) != (
         units.maximize,
         units.places,
     ):
@@ -311,8 +311,8 @@ class _Reader:
         for agent in self._agents("agents_children"):
             name = attribute(agent, "name")
             held = self._constraints(agent, context, read_shared)
-            parts = tuple(constraint for constraint in held if constraint.model is ConstraintModel.PKC)
-            kept = tuple(constraint for constraint in held if constraint.model is ConstraintModel.TKC)
+            parts = tuple(constraint for constraint in held if constraint.model == ConstraintModel.PKC)
+            kept = tuple(constraint for constraint in held if constraint.model == ConstraintModel.TKC)
             if kept:
                 copies[name] = kept
             scopes = itertools.chain.from_iterable(constraint.variables for constraint in held)

@@ -53,7 +53,7 @@ def check_constraint(constraint: Constraint, kind: ProblemKind, units: CostUnits
     _check_application(constraint.definition, constraint.scope, constraint.parameters)
     if constraint.cost == INFINITE:
         return
-    if kind is not ProblemKind.DISWCSP:
+    if kind != ProblemKind.DISWCSP:
         raise MistakeError("a cost in a DisCSP", 'write type="DisWCSP" in the presentation, or delete the cost')
     if isinstance(constraint.definition, Relation):
         raise MistakeError("a cost on a relation", 'a soft relation names the costs of its tuples: semantics="soft"')
@@ -85,7 +85,7 @@ def _refuse_undefined(predicate: Predicate) -> None:
 
 def refuse_private_part(model: ConstraintModel | None) -> None:
     """Raise `MistakeError` for a private constraint of which a neighbour would hold a part."""
-    if model is ConstraintModel.PKC:
+    if model == ConstraintModel.PKC:
         raise MistakeError("a private constraint with model PKC", "a private constraint is its robot's alone: no model")
 
 
@@ -175,13 +175,13 @@ def repeated_neighbours(
 
 def check_added_constraint(constraint: Constraint) -> None:
     """Raise `MistakeError` for a partially known constraint that a scenario adds to two robots."""
-    if constraint.model is ConstraintModel.PKC:
+    if constraint.model == ConstraintModel.PKC:
         message = "a partially known constraint (PKC) in a scenario"
         raise MistakeError(message, 'each side would need its part: write model="TKC"')
 
 
 def check_constraint_of_added_robot(constraint: Constraint) -> None:
     """Raise `MistakeError` for a partially known constraint of a robot that a scenario adds."""
-    if constraint.model is ConstraintModel.PKC:
+    if constraint.model == ConstraintModel.PKC:
         message = "a partially known constraint (PKC) of a robot that a scenario adds"
         raise MistakeError(message, 'the parent could not bring its part: write model="TKC"')

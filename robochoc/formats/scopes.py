@@ -48,7 +48,7 @@ def _place(members: TeamMembers, robot: Robot, parent: Parent, constraint: Const
     if parent.name not in others:
         message = f"the scope has no variable of the parent '{parent.name}', under which it stands"
         return message, f"move it to '{min(others)}'; '{parent.name}' is {members.place(parent.name)}"
-    if constraint.model is ConstraintModel.PKC and len(others) > 1:
+    if constraint.model == ConstraintModel.PKC and len(others) > 1:
         message = "a PKC constraint over more than two robots"
         return message, f"only '{robot.name}' and '{parent.name}' ({members.place(parent.name)}) can share its parts"
     lowest = [max(others, key=rank.__getitem__) for rank in members.ranks]

@@ -93,7 +93,7 @@ def robot_names(folder: Path | str) -> tuple[str, ...]:
 
 def _in_one_unit(folder: Path, files: dict[str, RobotFile], found: list[Diagnostic]) -> dict[str, RobotFile]:
     """Return `files` with costs in the finest unit of any, the scenario's included; mistakes are added to `found`."""
-    if not any(file.robot.kind is ProblemKind.DISWCSP for file in files.values()):
+    if not any(file.robot.kind == ProblemKind.DISWCSP for file in files.values()):
         return files
     places = max(file.robot.costs.places for file in files.values())
     if has_scenario(folder):

@@ -21,7 +21,7 @@ class NeighbourRole(StrEnum):
     @property
     def opposite(self) -> NeighbourRole:
         """Return what the other says of the robot, if they agree."""
-        return NeighbourRole.CHILD if self is NeighbourRole.PARENT else NeighbourRole.PARENT
+        return NeighbourRole.CHILD if self == NeighbourRole.PARENT else NeighbourRole.PARENT
 
 
 @dataclass(frozen=True)
@@ -81,8 +81,8 @@ class TeamMembers:
         return (
             below is not None
             and above is not None
-            and below.role is NeighbourRole.CHILD
-            and above.role is NeighbourRole.PARENT
+            and below.role == NeighbourRole.CHILD
+            and above.role == NeighbourRole.PARENT
         )
 
     @cached_property

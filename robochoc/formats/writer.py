@@ -138,7 +138,7 @@ def _write_relation(section: etree._Element, relation: Relation, robot: Robot) -
         else " ".join(map(str, values))
         for values in relation.tuples
     ]
-    if relation.semantics is Semantics.SOFT:
+    if relation.semantics == Semantics.SOFT:
         element.set("defaultCost", cost_text(relation.default_cost, units))
         tuples = [f"{cost_text(cost, units)}:{values}" for cost, values in zip(relation.costs, tuples, strict=True)]
     element.text = "|".join(tuples)

@@ -50,7 +50,7 @@ def _as_told(team: Team, network: Network, costs: Codes) -> tuple[Network, Codes
     """Return a network of normalised costs with the costs that the user has: negated, and with their constant."""
     sign = -1 if team.told_in.maximize else 1
     constant = flat_units(team).constant
-    if team.kind is not ProblemKind.DISWCSP or (sign == 1 and not constant):
+    if team.kind != ProblemKind.DISWCSP or (sign == 1 and not constant):
         return network, costs
     if abs(constant) > MAX_TOTAL_COST:
         raise UnsupportedError(f"{team.name} has a constant cost of {constant:,}, too much for XCSP3's solvers")

@@ -103,6 +103,6 @@ def coloring_of(
             told = f"-weighted{max_cost}{places_told(units)}"
             most = max_cost * 10**places
             constraints = {edge: replace(one, cost=any_of(chance, 1, most)) for edge, one in soft.items()}
-    kind = ProblemKind.DISCSP if conflicts is Conflicts.HARD else ProblemKind.DISWCSP
+    kind = ProblemKind.DISCSP if conflicts == Conflicts.HARD else ProblemKind.DISWCSP
     name = f"coloring-{graph.agents}-{colors}-{graph.label}{told}-{seed}{graph.suffix}"
     return team_of_edges(name, graph.agents, colors, constraints, kind, units)

@@ -134,7 +134,7 @@ def _apart(parent: Cell, child: Cell, model: QueensModel) -> Constraint:
     """Return the constraint between two cells. p1's i and j are the coordinates in which the cells differ."""
     names = (_variable(parent), _variable(child))
     diagonal = parent[0] != child[0] and parent[1] != child[1]
-    if diagonal and model is QueensModel.PLANAR:
+    if diagonal and model == QueensModel.PLANAR:
         return Constraint("C5", PREDEFINED["neq"], names, names)
     axis = 1 if parent[0] == child[0] else 0
     terms = (*names, parent[axis], child[axis])

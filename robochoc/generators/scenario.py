@@ -244,7 +244,7 @@ class _Author:
 
 def _known(constraint: Constraint) -> bool:
     """Return whether a scenario can bring it: no partially known one."""
-    return constraint.model is not ConstraintModel.PKC
+    return constraint.model != ConstraintModel.PKC
 
 
 def _under(team: Team, agent: str, parent: str) -> Iterator[Constraint]:

@@ -127,7 +127,7 @@ def tasks(
     if not variables:
         raise ValueError("no robot has a skill that a task asks for; another seed, or more of skilled")
     told = f"{ways.side}-{worth}-{skills.each}of{skills.number}-{ways.distance}{ways.places or ''}"
-    room = f"-{capacity}" if model is TasksModel.SEVERAL else ""
+    room = f"-{capacity}" if model == TasksModel.SEVERAL else ""
     return assemble(
         f"tasks-{model}-{agents}-{tasks}-{told}{room}-{seed}",
         variables,

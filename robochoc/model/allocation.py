@@ -143,7 +143,7 @@ def way(start: Sequence[int | Fraction], end: Sequence[int | Fraction], distance
     # Whole numbers stay integers, which are several times as fast.
     parts = cast("list[Fraction]", [abs(one - other) for one, other in zip(start, end, strict=True)])
     unit: int = 10**places
-    if distance is Distance.STREETS:
+    if distance == Distance.STREETS:
         return floor(2 * sum(parts) * unit + 1) // 2
     square = sum(part * part for part in parts) * unit**2
     return (isqrt(floor(4 * square)) + 1) // 2

@@ -110,9 +110,9 @@ class Relation:
 
     @cached_property
     def _listed(self) -> dict[tuple[int, ...], float]:
-        if self.semantics is Semantics.SOFT:
+        if self.semantics == Semantics.SOFT:
             return dict(zip(self.tuples, self.costs, strict=True))
-        return dict.fromkeys(self.tuples, 0 if self.semantics is Semantics.SUPPORTS else INFINITE)
+        return dict.fromkeys(self.tuples, 0 if self.semantics == Semantics.SUPPORTS else INFINITE)
 
     @property
     def prices(self) -> tuple[Mapping[tuple[int, ...], float], float]:

@@ -31,7 +31,7 @@ def describe_outcome(
             once_solved = any(epoch.assignment for epoch in outcome.epochs)
             return f"no solution{_left(outcome)}{' in the end' if once_solved else ''}"
         case Verdict.SOLUTION | Verdict.OPTIMAL if outcome.withdrawn_alive:
-            best = "proven" if outcome.verdict is Verdict.OPTIMAL else "not proven to be the"
+            best = "proven" if outcome.verdict == Verdict.OPTIMAL else "not proven to be the"
             what = "best" if weighted is None else "maximum by weight" if weighted else "maximum"
             return f"{flying} of {total} fly ({best} {what}{_lost(outcome)})"
         case Verdict.SOLUTION | Verdict.OPTIMAL if outcome.lost:
@@ -41,7 +41,7 @@ def describe_outcome(
 
 
 def _solution(outcome: Outcome) -> str:
-    return "optimal solution" if outcome.verdict is Verdict.OPTIMAL else "solution"
+    return "optimal solution" if outcome.verdict == Verdict.OPTIMAL else "solution"
 
 
 def _left(outcome: Outcome) -> str:
@@ -53,6 +53,6 @@ def _lost(outcome: Outcome) -> str:
 
 
 def _cost(outcome: Outcome) -> str:
-    if outcome.cost is None or not (outcome.cost or outcome.verdict is Verdict.OPTIMAL):
+    if outcome.cost is None or not (outcome.cost or outcome.verdict == Verdict.OPTIMAL):
         return ""
     return f", cost {cost_shown(outcome.cost)}"

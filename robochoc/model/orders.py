@@ -249,7 +249,7 @@ class _Reordering:
 
     def _holder(self, robot: Robot, constraint: Constraint) -> str:
         """Return the robot that holds `constraint` from now on. So far it was `robot`."""
-        if constraint.model is ConstraintModel.PKC:
+        if constraint.model == ConstraintModel.PKC:
             return robot.name
         return max(_owners(self._old, constraint), key=self._rank.__getitem__)
 
@@ -259,7 +259,7 @@ class _Reordering:
             needed = self._needed_before[robot.name]
             for parent in robot.parents:
                 below = _child(self._old[parent.name], robot.name)
-                parts = [one for one in (*parent.constraints, *below.constraints) if one.model is ConstraintModel.PKC]
+                parts = [one for one in (*parent.constraints, *below.constraints) if one.model == ConstraintModel.PKC]
                 if parts and self._rank[robot.name] < self._rank[parent.name]:
                     raise OrderError(
                         f"{robot.name} shares a partially known constraint (PKC, {parts[0].name}) with its parent"

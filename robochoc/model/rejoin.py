@@ -46,7 +46,7 @@ def _check_returning(team: Team, robot: Robot) -> None:
     if robot.kind is not team.kind:
         raise ChangeError(f"{quoted(robot.name)} is a {robot.kind} in a team of {team.kind}", "write the same type")
     parts = (part for child in robot.children for part in child.constraints)
-    secret = next((one for one in (*robot.shared, *parts) if one.model is ConstraintModel.PKC), None)
+    secret = next((one for one in (*robot.shared, *parts) if one.model == ConstraintModel.PKC), None)
     if secret:
         message = f"{quoted(secret.name)} is partially known (PKC)"
         raise ChangeError(message, "a robot that comes back turns its links: use TKC")

@@ -87,7 +87,7 @@ class _Builder:
         every = [*self._drafts, *(draft for found in (*self._parts.values(), *self._added.values()) for draft in found)]
         soft = model.maximized is not None or any(draft.soft for draft in every)
         self._kind = (
-            ProblemKind.DISWCSP if soft or (given and given.kind is ProblemKind.DISWCSP) else ProblemKind.DISCSP
+            ProblemKind.DISWCSP if soft or (given and given.kind == ProblemKind.DISWCSP) else ProblemKind.DISCSP
         )
         known = given.units if given else PLAIN_COSTS
         places = max([known.places, places_of(constant), *(draft.places for draft in every)])

@@ -53,7 +53,7 @@ class Draft:
     @property
     def soft(self) -> bool:
         """Whether it has costs."""
-        return self.is_cost or self.cost is not None or self.semantics is Semantics.SOFT
+        return self.is_cost or self.cost is not None or self.semantics == Semantics.SOFT
 
     @property
     def places(self) -> int:
@@ -247,7 +247,7 @@ def _called(definition: Definition, name: str) -> Definition:
 def _relation(draft: Draft, unit: int, sign: int) -> Relation:
     semantics = draft.semantics or Semantics.SUPPORTS
     rows = tuple(sorted(draft.rows))
-    if semantics is not Semantics.SOFT:
+    if semantics != Semantics.SOFT:
         return Relation("", len(draft.scope), semantics, rows)
     penalty = sign if draft.is_penalty else 1
     costs = tuple(_units(draft.rows[row], unit * penalty) for row in rows)

@@ -59,7 +59,7 @@ def given_by(team: Team) -> Given:
         finer = 10 ** (units.places - robot.costs.places)
         held = [*robot.private, *robot.shared, *(one for child in robot.children for one in child.constraints)]
         for one in (in_finer_units(constraint, finer) for constraint in held):
-            if one.model is ConstraintModel.PKC:
+            if one.model == ConstraintModel.PKC:
                 parts.setdefault(robot.name, []).append(one)
             else:
                 constraints.append(one)

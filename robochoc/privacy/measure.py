@@ -83,7 +83,7 @@ class _Measured:
             branches=self._branches(),
             fixed_holders=not robots.protocol.traits.shared_scopes,
             one_sided=robots.protocol.traits.asymmetric
-            and any(one.model is ConstraintModel.PKC for one in self._team.constraints()),
+            and any(one.model == ConstraintModel.PKC for one in self._team.constraints()),
             minimises=any(host.protocol.problem.has_costs for host in robots.hosts.values()),
         )
         self._observers = {

@@ -177,7 +177,7 @@ class TeamSecrets:
         self._make_room(math.prod(map(len, columns)), f"constraint {constraint.name} of {holder} has")
         places = tuple(self._places[name] for name in names)
         owners = frozenset(robot for robot, _ in places)
-        knowing = frozenset([holder]) if constraint.model is ConstraintModel.PKC else owners | {holder}
+        knowing = frozenset([holder]) if constraint.model == ConstraintModel.PKC else owners | {holder}
         secrets: dict[Value, Secret] = {
             values: self._added(constraint.price(dict(zip(names, values, strict=True))))
             for values in itertools.product(*columns)

@@ -25,9 +25,9 @@ def unmet_requirement(robot: Robot, traits: Traits, owners: Mapping[str, str]) -
     """
     held_for_children = (constraint for child in robot.children for constraint in child.constraints)
     for constraint in (*robot.shared, *held_for_children):
-        if constraint.model is ConstraintModel.PKC and is_soft(constraint) and not traits.asymmetric:
+        if constraint.model == ConstraintModel.PKC and is_soft(constraint) and not traits.asymmetric:
             return f"{robot.name} has costs of its own for a partially known constraint (PKC, {constraint.name})"
-        if constraint.model is ConstraintModel.PKC and not traits.partially_known:
+        if constraint.model == ConstraintModel.PKC and not traits.partially_known:
             return f"{robot.name} shares a partially known constraint (PKC, {constraint.name})"
         if not traits.n_ary and len({owners.get(variable) for variable in constraint.variables}) > _TWO:
             return f"{robot.name} holds a constraint over more than two robots ({constraint.name})"

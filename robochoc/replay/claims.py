@@ -82,7 +82,7 @@ def contradicted_claims(journal: Journal, runs: Sequence[ReplayedRun], *, whole:
     lost = bool(outcome.lost) or any(isinstance(event, Lost) for event in events)
     if not whole or lost or not runs or any(one.run.given is None for one in runs):
         return  # who died took its last words with it; across machines robots tell what they like
-    if outcome.verdict is not Verdict.UNKNOWN or outcome.runtime == "simulator":
+    if outcome.verdict != Verdict.UNKNOWN or outcome.runtime == "simulator":
         names = _COUNTED_BEFORE if header.version == STAMPED_LATE else _COUNTED
         before = outcome.preprocessing.metrics if outcome.preprocessing else Metrics()
         compared = _exceeding if _may_have_left_out(outcome) else _differing
@@ -149,7 +149,7 @@ def _beginning(header: Header, runs: Sequence[RecordedRun], placed_by: str | Non
 
 def _answers(whose: str, recorded: EpochOutcome | Outcome, last: ReplayedRun) -> Iterator[Contradiction]:
     replayed = last.answer
-    if replayed is None or recorded.verdict is Verdict.UNKNOWN:  # limits are not in a journal
+    if replayed is None or recorded.verdict == Verdict.UNKNOWN:  # limits are not in a journal
         return
     if recorded.improvements:
         yield from _published(whose, recorded, replayed, last.team)
@@ -179,8 +179,8 @@ def _published(
     of_replayed = rank.of(replayed.cost or 0, replayed.withdrawn if isinstance(replayed, Outcome) else ())
     if found and of_replayed < of_recorded:
         yield Contradiction(what=whose + "cost", recorded=recorded.cost, replayed=replayed.cost)
-    proven = replayed.verdict is Verdict.OPTIMAL and of_replayed == of_recorded
-    if recorded.verdict is Verdict.OPTIMAL and not (proven or (replayed.bound == cost and not withdrawn)):
+    proven = replayed.verdict == Verdict.OPTIMAL and of_replayed == of_recorded
+    if recorded.verdict == Verdict.OPTIMAL and not (proven or (replayed.bound == cost and not withdrawn)):
         yield Contradiction(what=whose + "verdict", recorded=recorded.verdict, replayed=replayed.verdict)
 
 

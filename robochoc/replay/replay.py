@@ -179,4 +179,4 @@ def _decided_before(journal: Journal) -> bool:
     outcome = journal.outcome
     if outcome is None or journal.events or journal.damage is not None or outcome.metrics.messages:
         return False
-    return outcome.verdict is Verdict.NO_SOLUTION and bool(outcome.witness)
+    return outcome.verdict == Verdict.NO_SOLUTION and bool(outcome.witness)

@@ -105,7 +105,7 @@ def refuse_team(team: Team, options: Options, traits: Traits) -> None:
 
 def _central_solver_fits(team: Team, options: Options) -> bool:
     """Return whether the central solver would take the team, for sure."""
-    if options.runtime is not Runtime.PROCESSES:
+    if options.runtime != Runtime.PROCESSES:
         return False
     central = replace(options, protocol=CENTRAL)
     try:

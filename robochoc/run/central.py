@@ -75,7 +75,7 @@ def _decide(solver: TeamSolver, team: Team, options: Options) -> _Decision:
     else:
         answer = _answer(solver, team, options)
     if answer.verified:
-        check_assignment(team, answer.assignment, answer.withdrawn, maximal=answer.verdict is not Verdict.UNKNOWN)
+        check_assignment(team, answer.assignment, answer.withdrawn, maximal=answer.verdict != Verdict.UNKNOWN)
     return _Decision(replace(answer, metrics=Metrics(wall_s=time.monotonic() - began)), solutions)
 
 
@@ -83,9 +83,9 @@ def _answer(solver: TeamSolver, team: Team, options: Options) -> Answer:
     """Return the solver's answer; as few robots as possible withdraw, if that is asked for and necessary."""
     price = None
     found = None
-    if options.withdraw is not Withdrawal.MINIMUM or team.kind is ProblemKind.DISCSP:
+    if options.withdraw != Withdrawal.MINIMUM or team.kind == ProblemKind.DISCSP:
         found = solver.solve(team)
-    if found is None or (options.withdraw is not None and found.verdict is Verdict.NO_SOLUTION):
+    if found is None or (options.withdraw is not None and found.verdict == Verdict.NO_SOLUTION):
         price = int(withdrawal_cost(team))
         found = solver.solve(team, withdrawal_cost=price)
     return _answer_of(found, team, price, options)
@@ -102,11 +102,11 @@ def _answer_of(found: CentralAnswer, team: Team, price: int | None, options: Opt
         total = total_cost(team, assignment, price)
         if total != found.cost:
             raise SolverLostError(f"the constraint solver's answer costs {total:,}, and it says {found.cost:,}")
-    if verdict is Verdict.UNKNOWN and found.bound is not None:
+    if verdict == Verdict.UNKNOWN and found.bound is not None:
         bound = told_cost(team, found.bound) if price is None else found.bound // price
-    if verdict is Verdict.OPTIMAL and team.kind is ProblemKind.DISCSP and not robots_without_values(team, assignment):
+    if verdict == Verdict.OPTIMAL and team.kind == ProblemKind.DISCSP and not robots_without_values(team, assignment):
         verdict = Verdict.SOLUTION
-    has_answer = found.cost is not None or verdict is Verdict.SOLUTION
+    has_answer = found.cost is not None or verdict == Verdict.SOLUTION
     withdrawn = robots_without_values(team, assignment) if has_answer and options.withdraw else ()
     paid = told_cost(team, assignment_cost(team, assignment), without=withdrawn) if has_answer else None
     return Answer(verdict, assignment=assignment, cost=paid, withdrawn=withdrawn, bound=bound, verified=has_answer)

@@ -70,7 +70,7 @@ def decided(team: Team, options: Options, *, environment: bool = False, ordered:
     else:
         facts = Facts(team, environment)
         choice = Choice(_with_order(options, facts, Order.MAX_DEGREE, "nobody has given the robots an order"))
-    if choice.options.order is Order.GIVEN:
+    if choice.options.order == Order.GIVEN:
         choice = replace(choice, options=replace(choice.options, order=None))
     return choice
 
@@ -185,9 +185,9 @@ def faster_order(team: Team, options: Options) -> Order | None:
 def _with_suitable_order(options: Options, facts: Facts) -> Options:
     """Return `options` with the order that suits the protocol, if it has one."""
     order = ORDERS.get(options.protocol)
-    if options.protocol == DEFAULT_COST_PROTOCOL and options.withdraw is Withdrawal.MINIMUM:
+    if options.protocol == DEFAULT_COST_PROTOCOL and options.withdraw == Withdrawal.MINIMUM:
         order = Order.DOM_DEG  # a withdrawal is found soon
-    if order is Order.MIN_WIDTH and facts.has_costs:
+    if order == Order.MIN_WIDTH and facts.has_costs:
         order = Order.MAX_DEGREE
     if options.order is not None or order is None:
         return options
@@ -196,7 +196,7 @@ def _with_suitable_order(options: Options, facts: Facts) -> Options:
 
 def _with_order(options: Options, facts: Facts, order: Order, why: str) -> Options:
     """Return `options` with `order`, unless that of the team must be kept."""
-    if options.withdraw is Withdrawal.MAXIMAL or facts.changes or facts.partially_known:
+    if options.withdraw == Withdrawal.MAXIMAL or facts.changes or facts.partially_known:
         return options  # it says who is placed first; changes speak of it; PKC links are not turned
     return replace(options, order=order, chosen={**options.chosen, "order": why})
 

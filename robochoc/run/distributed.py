@@ -107,7 +107,7 @@ class Deployment(ABC):
 
     def why_unknown(self, phase: Phase, answer: Answer) -> str | None:
         """Return why `answer` has no verdict; None if it has one."""
-        if answer.verdict is not Verdict.UNKNOWN:
+        if answer.verdict != Verdict.UNKNOWN:
             return None
         if answer.witness is not None:
             return f"{answer.witness} {GAVE_UP}"
@@ -145,7 +145,7 @@ class Deployment(ABC):
         """Return how many solutions, or optima, there are, if that is asked for and known."""
         if not self.options.count:
             return None
-        return 0 if answer.verdict is Verdict.NO_SOLUTION else answer.count
+        return 0 if answer.verdict == Verdict.NO_SOLUTION else answer.count
 
     def _search_without_losses(self, phase: Phase) -> Search:
         """Search until a search ends without a loss. Its metrics are those of all searches together."""
@@ -176,7 +176,7 @@ def solve_distributed(deployment: Deployment, protocol: type[Protocol], header: 
     options = deployment.options
     phase = first_phase(options, protocol, deployment.withdrawal_cost)
     answer = deployment.solve(phase)
-    if answer.verdict is Verdict.NO_SOLUTION and options.withdraw is not None and not phase.withdrawal:
+    if answer.verdict == Verdict.NO_SOLUTION and options.withdraw is not None and not phase.withdrawal:
         phase = second_phase(options, deployment.withdrawal_cost)
         answer = answer.then(deployment.solve(phase))
         header = replace(header, placed_by=phase.name)

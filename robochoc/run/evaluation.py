@@ -93,7 +93,7 @@ class Answer:
     def confirmed_as(self, solvers: tuple[str, ...]) -> Answer:
         """Return this answer, with which central `solvers` agree: that there is no solution, nothing else shows."""
         sure = bool(solvers)
-        verified = sure if self.verdict is Verdict.NO_SOLUTION else self.verified
+        verified = sure if self.verdict == Verdict.NO_SOLUTION else self.verified
         return replace(self, verified=verified, confirmed=sure, confirmed_by=solvers)
 
     def then(self, second: Answer) -> Answer:
@@ -167,12 +167,12 @@ def evaluate_search(
     if is_spoiled(phase, search.result):
         return _evaluate_spoiled(phase, search, kind)
     result = search.result
-    ended = result.verdict is Verdict.SOLUTION
-    cut = deadline is not None and result.verdict is Verdict.UNKNOWN and result.witness is None
+    ended = result.verdict == Verdict.SOLUTION
+    cut = deadline is not None and result.verdict == Verdict.UNKNOWN and result.witness is None
     answer = Answer(result.verdict, result.metrics, result.witness, tree=pseudo_tree(result.findings), ended=ended)
     if ended and not result.lost:
         answer = replace(answer, count=optima(result.findings))
-    if result.lost or result.verdict is Verdict.NO_SOLUTION or not (ended or phase.traits.costs or cut):
+    if result.lost or result.verdict == Verdict.NO_SOLUTION or not (ended or phase.traits.costs or cut):
         return answer
     bound = None if is_proven(phase, result) else _bound_of(phase, result, told)
     found = search.check()
@@ -181,7 +181,7 @@ def evaluate_search(
     verdict = _verdict_of(phase, result, kind, found)
     if cut and found.verified and (found.assignment or not found.withdrawn):  # of nobody it is none
         verdict, answer = Verdict.SOLUTION, replace(answer, deadline=deadline)
-    if _meets_bound(result, found, told) and verdict is Verdict.SOLUTION and kind is ProblemKind.DISWCSP:
+    if _meets_bound(result, found, told) and verdict == Verdict.SOLUTION and kind == ProblemKind.DISWCSP:
         verdict, bound = Verdict.OPTIMAL, None
         answer = replace(answer, deadline=None)
     return replace(
@@ -221,7 +221,7 @@ def _evaluate_spoiled(phase: Phase, search: Search, kind: ProblemKind) -> Answer
         return answer
     sure = found.verified and not found.withdrawn
     had = "this is the best that the robots had, and may be what they began with"
-    unfinished = f"{why_spoiled(phase, search.result.metrics)}: {had}" if kind is ProblemKind.DISWCSP else None
+    unfinished = f"{why_spoiled(phase, search.result.metrics)}: {had}" if kind == ProblemKind.DISWCSP else None
     return replace(
         answer,
         verdict=Verdict.SOLUTION if sure else Verdict.UNKNOWN,
@@ -241,7 +241,7 @@ def is_proven(phase: Phase, result: RunResult) -> bool:
     """
     if is_spoiled(phase, result) or (result.metrics.lost_messages and not phase.traits.complete):
         return False
-    return result.verdict is Verdict.SOLUTION and (phase.traits.complete or not phase.traits.costs)
+    return result.verdict == Verdict.SOLUTION and (phase.traits.complete or not phase.traits.costs)
 
 
 @collection_paused()
@@ -321,11 +321,11 @@ def check_assignment(
 def _verdict_of(phase: Phase, result: RunResult, kind: ProblemKind, found: CheckedAssignment) -> Verdict:
     """Return the verdict on what was found."""
     if is_proven(phase, result):
-        minimum = phase.traits.costs and phase.traits.complete and (found.withdrawn or kind is ProblemKind.DISWCSP)
+        minimum = phase.traits.costs and phase.traits.complete and (found.withdrawn or kind == ProblemKind.DISWCSP)
         return Verdict.OPTIMAL if minimum else Verdict.SOLUTION
     if not found.verified:
         return Verdict.UNKNOWN
-    if kind is ProblemKind.DISCSP and not phase.withdrawal:
+    if kind == ProblemKind.DISCSP and not phase.withdrawal:
         return Verdict.SOLUTION
     return result.verdict
 

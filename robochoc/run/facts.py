@@ -48,7 +48,7 @@ class Facts:
     @property
     def has_costs(self) -> bool:
         """Whether costs are minimised."""
-        return self.team.kind is ProblemKind.DISWCSP
+        return self.team.kind == ProblemKind.DISWCSP
 
     @property
     def changes(self) -> bool:
@@ -64,7 +64,7 @@ class Facts:
     def partially_known(self) -> bool:
         """Whether a constraint is partially known (PKC), at any time."""
         epochs = (team_after_events(self.team, events) for events in range(len(self.team.scenario) + 1))
-        return any(one.model is ConstraintModel.PKC for team in epochs for one in team.constraints())
+        return any(one.model == ConstraintModel.PKC for team in epochs for one in team.constraints())
 
     @cached_property
     def graph(self) -> Graph:

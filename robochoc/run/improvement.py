@@ -166,13 +166,13 @@ class Improvements(SearchWatch):
 
     def _is_proven(self, best: Answer, answer: Answer) -> bool:
         """Return whether nothing is better than the `best`, as `answer` says, or the bound."""
-        optimal = answer.verdict is Verdict.OPTIMAL and self._rank.of_answer(answer) == self._rank.of_answer(best)
+        optimal = answer.verdict == Verdict.OPTIMAL and self._rank.of_answer(answer) == self._rank.of_answer(best)
         return optimal or self._rank.meets(best, self._bound)
 
     def _publish_if_due(self, now: float) -> None:
         if now >= self._deadline and self._best is not None:
             self._tell(self._best, now)
-            final = self._best.verdict is Verdict.OPTIMAL or not (self._has_costs or self._best.withdrawn)
+            final = self._best.verdict == Verdict.OPTIMAL or not (self._has_costs or self._best.withdrawn)
             self._over = self._over or final
 
     def _tell(self, best: Answer, now: float) -> None:
@@ -203,7 +203,7 @@ class Improvements(SearchWatch):
             return replace(final, improvements=tuple(self.improvements))
         self._tell(best, now)
         best = self._published or best
-        proven = self._best is not None and self._best.verdict is Verdict.OPTIMAL and not self._outdated
+        proven = self._best is not None and self._best.verdict == Verdict.OPTIMAL and not self._outdated
         return replace(
             final,
             verdict=Verdict.OPTIMAL if proven else Verdict.SOLUTION,
@@ -223,9 +223,9 @@ class Improvements(SearchWatch):
         best = self._best
         if best is None:
             return
-        if final.verdict is Verdict.NO_SOLUTION:
+        if final.verdict == Verdict.NO_SOLUTION:
             raise RefutedError(f"the protocol says that there is no solution, and one ({best.cost}) was found")
-        if final.verdict is Verdict.OPTIMAL and self._rank.of_answer(best) < self._rank.of_answer(final):
+        if final.verdict == Verdict.OPTIMAL and self._rank.of_answer(best) < self._rank.of_answer(final):
             raise RefutedError(f"the protocol says that {final.cost} is optimal, and {best.cost} was found before")
 
 
@@ -266,7 +266,7 @@ def improvements_of(  # noqa: PLR0913 - what differs between deployments, by nam
         deadline=began + (options.deadline or 0.0),
         evaluate=evaluate,
         rank=Rank(team, told),
-        has_costs=team.kind is ProblemKind.DISWCSP,
+        has_costs=team.kind == ProblemKind.DISWCSP,
         bounded=phase.parameters.withdrawal_cost is None,
         publish=publish,
         has_news=lambda: audience is not None and audience.has_news(team),
@@ -288,5 +288,5 @@ def _as_told_one_after_the_other(snapshot: RunResult, phase: Phase, options: Opt
 
 def _is_found(answer: Answer) -> bool:
     """Return whether `answer` is one that was checked. That nobody flies is none, unless nothing else is possible."""
-    flown = bool(answer.assignment) or not answer.withdrawn or answer.verdict is Verdict.OPTIMAL
+    flown = bool(answer.assignment) or not answer.withdrawn or answer.verdict == Verdict.OPTIMAL
     return flown and answer.verdict in _FOUND and answer.verified and answer.cost is not None

@@ -162,7 +162,7 @@ class Options:
     @property
     def dropped(self) -> float:
         """Return the probability with which robots drop what they receive: outside the simulator, which loses it."""
-        return 0.0 if self.runtime is Runtime.SIMULATOR else self.message_loss
+        return 0.0 if self.runtime == Runtime.SIMULATOR else self.message_loss
 
     @property
     def wants_anytime(self) -> bool:
@@ -172,4 +172,4 @@ class Options:
     @property
     def survives_losses(self) -> bool:
         """Return whether the run goes on when a robot is lost."""
-        return self.on_loss is OnLoss.WITHDRAW or (self.on_loss is None and self.spares > 0)
+        return self.on_loss == OnLoss.WITHDRAW or (self.on_loss is None and self.spares > 0)

@@ -16,11 +16,11 @@ if TYPE_CHECKING:
 
 def objective_to_record(team: Team, options: Options) -> Callable[[], Objective] | None:
     """Return what makes the objective of a run. None where nothing is minimised, or the problem changes."""
-    minimum = options.withdraw is Withdrawal.MINIMUM
-    if team.dynamic or not (minimum or team.kind is ProblemKind.DISWCSP):
+    minimum = options.withdraw == Withdrawal.MINIMUM
+    if team.dynamic or not (minimum or team.kind == ProblemKind.DISWCSP):
         return None
     counted = normalized(team)
-    in_step = options.schedule is ScheduleName.CYCLES or options.runtime is Runtime.ARRAYS
+    in_step = options.schedule == ScheduleName.CYCLES or options.runtime == Runtime.ARRAYS
     return lambda: Objective(counted, withdrawal_cost(counted) if minimum else None, in_step=in_step)
 
 

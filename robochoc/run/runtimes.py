@@ -111,7 +111,7 @@ def open_processes(request: SessionRequest) -> Session:
 
 def _import_tables(request: SessionRequest) -> None:
     """Import what computes with tables, if robots will: here once, and not in each of their processes."""
-    costs = request.team.team.kind is ProblemKind.DISWCSP or request.parameters.withdrawal_cost is not None
+    costs = request.team.team.kind == ProblemKind.DISWCSP or request.parameters.withdrawal_cost is not None
     if costs and request.protocol.traits.tables:
         import_module("robochoc.solver.cost_table")
 

@@ -168,7 +168,7 @@ class ScenarioRun:
             if result.lost:
                 joining = self._lose(result.lost)
                 opened = _describe_loss(result.lost, joining)
-            elif self._next is None or (result.verdict is Verdict.UNKNOWN and self.is_over):
+            elif self._next is None or (result.verdict == Verdict.UNKNOWN and self.is_over):
                 return
             else:
                 opened = self._describe(self._next)

@@ -128,7 +128,7 @@ class ThisMachine(Deployment):
         from robochoc.verification.second_opinion import total_cost  # noqa: PLC0415 - start-up: seldom asked for
 
         cost = phase.parameters.withdrawal_cost
-        if answer.verdict is Verdict.NO_SOLUTION:
+        if answer.verdict == Verdict.NO_SOLUTION:
             return self._confirmed(withdrawal_cost=cost)
         total = total_cost(self._scenario.team, answer.assignment, cost)
         return self._confirmed(total=total, withdrawal_cost=cost)
@@ -175,7 +175,7 @@ class ThisMachine(Deployment):
     def _events_missed(self, answer: Answer) -> str:
         """Return in words that a limit came before all events, with an answer; empty: it did not."""
         left = self._scenario.events_left
-        if not left or answer.verdict is Verdict.UNKNOWN:
+        if not left or answer.verdict == Verdict.UNKNOWN:
             return ""
         missed = f"{left} event{'s' * (left != 1)} had not happened"
         return f"{self._limit_reached(answer.metrics)}, and {missed}"
@@ -234,9 +234,9 @@ class ThisMachine(Deployment):
         whole = self._searched
         values = sum(len(robot.domain.values) for robot in whole.robots.values())
         self._done.append(Preprocessing(phase.name, result.metrics, removed_values(whole, result.findings), values))
-        if result.verdict is Verdict.SOLUTION:
+        if result.verdict == Verdict.SOLUTION:
             return self._compile(restricted(whole, result.findings)), None
-        if result.verdict is Verdict.UNKNOWN:
+        if result.verdict == Verdict.UNKNOWN:
             self._cut_short = self.why_unknown(phase, Answer(result.verdict, result.metrics)) or ""
         return whole, RunResult.of(result.verdict, result.witness, {}, (), 0)
 
@@ -244,7 +244,7 @@ class ThisMachine(Deployment):
         """Return the answer of a run that has ended before the protocol began."""
         before = total_preprocessing(self._done)
         answer = Answer(found.verdict, witness=found.witness, reason=self._cut_short or None, preprocessing=before)
-        return answer.confirmed_as(self.confirm(phase, answer)) if found.verdict is Verdict.NO_SOLUTION else answer
+        return answer.confirmed_as(self.confirm(phase, answer)) if found.verdict == Verdict.NO_SOLUTION else answer
 
     def _answer_of(self, phase: Phase, epoch: FinishedEpoch) -> Answer:
         """Return the answer of an epoch, checked with the files."""

@@ -45,7 +45,7 @@ def first_phase(options: Options, protocol: type[Protocol], withdrawal_cost: Cal
         protocol: the class of the protocol that `options` name.
         withdrawal_cost: returns what the withdrawal of a robot of weight 1 costs.
     """
-    withdrawal = options.withdraw is Withdrawal.MINIMUM and protocol.traits.costs
+    withdrawal = options.withdraw == Withdrawal.MINIMUM and protocol.traits.costs
     cost = withdrawal_cost() if withdrawal else None
     parameters = RunParameters(options.seed, options.settings, cost, options.dropped)
     return Phase(options.protocol, protocol, parameters, withdrawal)
@@ -56,7 +56,7 @@ def second_phase(options: Options, withdrawal_cost: Callable[[], float]) -> Phas
 
     The protocol was not asked for, so it gets no settings. For the arguments see `first_phase`.
     """
-    name = DEFAULT_COST_PROTOCOL if options.withdraw is Withdrawal.MINIMUM else FIRST_FIT
+    name = DEFAULT_COST_PROTOCOL if options.withdraw == Withdrawal.MINIMUM else FIRST_FIT
     protocol = protocol_or_stage(name)
     cost = withdrawal_cost() if protocol.traits.costs else None
     parameters = RunParameters(options.seed, withdrawal_cost=cost, message_loss=options.dropped)

@@ -70,7 +70,7 @@ def request(
 ) -> str:
     """Return the content of a REQUEST for `function` to `df`; for a search, `description` is a template."""
     arguments: list[Expression] = [described(description)]
-    if function is Function.SEARCH:
+    if function == Function.SEARCH:
         constraints = () if max_results is None else (Word(":max-results"), Word(str(max_results)))
         arguments.append(list_of("search-constraints", *constraints))
     return content_of(list_of("action", expression_of(df), list_of(function, *arguments)))

@@ -253,9 +253,9 @@ def _said(verdict: Verdict) -> str:
 
 def _by(outcome: Outcome) -> str:
     """Return in words which robot concluded alone; a robot that gave up is named in the reason."""
-    if outcome.witness is None or outcome.verdict is Verdict.UNKNOWN:
+    if outcome.witness is None or outcome.verdict == Verdict.UNKNOWN:
         return ""
-    return f", as {outcome.ruled_out if outcome.verdict is Verdict.NO_SOLUTION else f'{outcome.witness} has concluded'}"
+    return f", as {outcome.ruled_out if outcome.verdict == Verdict.NO_SOLUTION else f'{outcome.witness} has concluded'}"
 
 
 def _epochs(epochs: Sequence[EpochOutcome]) -> str:

@@ -142,7 +142,7 @@ def agent_problems(
         for robot in team.robots:
             for one in held_above(robot):
                 for owner in {team.owner[name] for name in one.constraint.variables} - {robot.name}:
-                    if one.constraint.model is not ConstraintModel.PKC:
+                    if one.constraint.model != ConstraintModel.PKC:
                         copies[owner].append(one)
     pkc_holders: dict[str, list[str]] = {robot.name: [] for robot in team.robots}
     for robot in team.robots:

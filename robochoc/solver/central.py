@@ -128,7 +128,7 @@ class CentralSolver:
         """
         if withdrawal_cost is not None:
             return self._minimum(team, components_with_withdrawal(team, withdrawal_cost))
-        if team.kind is ProblemKind.DISWCSP and not count:
+        if team.kind == ProblemKind.DISWCSP and not count:
             return self._minimum(team, weighted_components(team.variables.values(), list(team.constraints())))
         return self._all_components(team, count=count)
 
@@ -253,7 +253,7 @@ class CentralSolver:
             return None
         if not answer.complete or answer.found > MAX_CLIQUE_ROWS:
             return None
-        if self._cache and answer.means is SolvedBy.ACE:
+        if self._cache and answer.means == SolvedBy.ACE:
             self._cache.put(clique, answer.solutions)
         return answer.solutions
 

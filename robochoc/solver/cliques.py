@@ -72,8 +72,8 @@ def with_cliques(network: Network, solutions: Callable[[Network], tuple[Codes, .
     `solutions` gives all solutions of a sub-network, or None where there are too many to be a table.
     """
     demanded = demands(network)
-    differ = {t.scope: d for t, d in zip(network.tables, demanded, strict=True) if d is not Demand.OTHER}
-    more = {t.scope for t, d in zip(network.tables, demanded, strict=True) if d is Demand.DIFFER_AND_MORE}
+    differ = {t.scope: d for t, d in zip(network.tables, demanded, strict=True) if d != Demand.OTHER}
+    more = {t.scope for t, d in zip(network.tables, demanded, strict=True) if d == Demand.DIFFER_AND_MORE}
     different: list[Codes] = []
     compiled: list[Table] = []
     for clique in cliques(differ):
@@ -91,7 +91,7 @@ def with_cliques(network: Network, solutions: Callable[[Network], tuple[Codes, .
     kept = [
         table
         for table, demand in zip(network.tables, demanded, strict=True)
-        if not (demand is Demand.DIFFER and table.scope in said)
+        if not (demand == Demand.DIFFER and table.scope in said)
         and not any(scope.issuperset(table.scope) for scope in covered)
     ]
     return replace(network, tables=(*compiled, *kept), different=(*network.different, *different))

@@ -143,7 +143,7 @@ class Compiler:
         if known is None:
             answer = self._solved(robot, network, limit)
             known, source = answer.solutions, _source(answer)
-            if self._cache is not None and answer.complete and source is CompiledFrom.ACE:
+            if self._cache is not None and answer.complete and source == CompiledFrom.ACE:
                 self._cache.put(network, known)
         self._known[network] = known
         if len(known) > self._limits.solutions:

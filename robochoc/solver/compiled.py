@@ -323,7 +323,7 @@ class LocalProblem(LocalConstraints):
     @property
     def has_costs(self) -> bool:
         """Whether something is minimised: costs, or robots that withdraw."""
-        return self._part.robot.kind is ProblemKind.DISWCSP or self._part.parameters.withdrawal_cost is not None
+        return self._part.robot.kind == ProblemKind.DISWCSP or self._part.parameters.withdrawal_cost is not None
 
     def allowed(
         self, domains: Mapping[str, Sequence[Value]], lowest: str

@@ -123,7 +123,7 @@ class CpSatSolver:
                 continue
             cost += part.cost(found.codes)
             assignment.update(part.decoded(found.codes))
-        has_costs = withdrawal_cost is not None or team.kind is ProblemKind.DISWCSP
+        has_costs = withdrawal_cost is not None or team.kind == ProblemKind.DISWCSP
         if assignment is None:
             return CentralAnswer(Verdict.UNKNOWN, bound=bound if has_costs else None)
         assignment = {name: assignment[name] for name in team.variables if name in assignment}

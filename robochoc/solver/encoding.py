@@ -161,7 +161,7 @@ def is_soft(constraint: Constraint) -> bool:
     """Return whether `constraint` may cost something without being broken."""
     match constraint.definition:
         case Relation(semantics=semantics):
-            return semantics is Semantics.SOFT
+            return semantics == Semantics.SOFT
         case Predicate():
             return constraint.cost < INFINITE
         case Function():
@@ -331,9 +331,9 @@ def _rows(constraint: Constraint, domains: Mapping[str, list[int]]) -> _Rows | N
     scope = constraint.variables
     size = math.prod(len(domains[name]) for name in scope)
     definition = constraint.definition
-    if size > MAX_TUPLES and isinstance(definition, Relation) and definition.semantics is not Semantics.SOFT:
+    if size > MAX_TUPLES and isinstance(definition, Relation) and definition.semantics != Semantics.SOFT:
         listed = tuple(set(_listed(constraint, definition, domains)))
-        allows = definition.semantics is Semantics.SUPPORTS
+        allows = definition.semantics == Semantics.SUPPORTS
         return _Rows(scope, allows, listed) if allows or listed else None
     if size > MAX_TUPLES:
         raise UnsupportedError(

@@ -165,7 +165,7 @@ class _Exclusions:
         """Return the two variables of a `constraint` that `robot` holds. Raises `UnsupportedError`."""
         names = constraint.variables
         apart = {self._owners.get(name) for name in names}
-        if constraint.model is ConstraintModel.PKC or not len(names) == len(apart) == len(("one", "other")):
+        if constraint.model == ConstraintModel.PKC or not len(names) == len(apart) == len(("one", "other")):
             raise UnsupportedError(f"{robot} shares {constraint.name!r}, which is not over one variable of two robots")
         return names[0], names[1]
 

@@ -77,7 +77,7 @@ class LocalConstraints:
         self.neighbours = tuple(sorted({*self.parents, *self.children, *met}, key=rank.__getitem__))
         self._table: ConflictTable | None = self._looked_up() if len(self.values) >= MIN_TABLE_VALUES else None
         self._below = by_robot(below)
-        parts_above = [constraint for model, constraint in above if model is ConstraintModel.PKC]
+        parts_above = [constraint for model, constraint in above if model == ConstraintModel.PKC]
         secretive = {*part.pkc_holders, *by_robot(parts_above)}
         self.pkc_parents = tuple(parent for parent in self.parents if parent in secretive)
         self._parts = by_robot([*parts_above, *below])

@@ -71,7 +71,7 @@ class TeamCompiler:
                 compilation = compiler.compile(robot)
             except SolverTimeoutError:
                 raise late from None
-            solved = solved or compilation.source is not CompiledFrom.DIRECT
+            solved = solved or compilation.source != CompiledFrom.DIRECT
             if not (compilation.domain.values or every):
                 raise NoLocalSolutionError(robot.name)
             return compilation.domain

@@ -62,7 +62,7 @@ def _cost_domains(team: Team, charges: Sequence[Table]) -> list[Codes]:
     """Return the domains of the cost variables: one for each table of `charges`, one for constant costs."""
     domains = [tuple(sorted({row[-1] for row in table.rows})) for table in charges]
     constant = constant_costs(team)
-    if constant or (team.kind is ProblemKind.DISWCSP and not domains):
+    if constant or (team.kind == ProblemKind.DISWCSP and not domains):
         domains.append((constant,))
     if sum(map(max, domains)) > MAX_TOTAL_COST:
         raise UnsupportedError(

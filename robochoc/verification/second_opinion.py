@@ -44,7 +44,7 @@ def confirmed(
             claim = "no solution" if total == INFINITE else f"a solution of the least cost, {total:,}"
             found = f"{team.name} has {claim}, and {solver.name} has found {against or 'one'}"
             raise RefutedError(f"{protocol} says that {found}")
-        if opinion.verdict is not Verdict.UNKNOWN:
+        if opinion.verdict != Verdict.UNKNOWN:
             agreeing.append(solver.name)
     return tuple(agreeing)
 
@@ -54,10 +54,10 @@ def contradiction(opinion: CentralAnswer, total: float) -> str | None:
 
     `total` is the minimum cost that is claimed, withdrawal costs included; infinite: that there is no solution.
     """
-    if opinion.verdict is Verdict.NO_SOLUTION:
+    if opinion.verdict == Verdict.NO_SOLUTION:
         return None if total == INFINITE else "none"
     if total == INFINITE:
-        return "one" if opinion.verdict is not Verdict.UNKNOWN or opinion.assignment else None
+        return "one" if opinion.verdict != Verdict.UNKNOWN or opinion.assignment else None
     if opinion.bound is not None and opinion.bound > total:
         return f"that nothing costs less than {opinion.bound:,}"
     if opinion.cost is not None and opinion.cost < total:

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import ast
 import re
 import subprocess
 import sys
 import tomllib
+from collections.abc import Collection, Iterator
 from pathlib import Path
 
 from tests.support.program import ROOT
@@ -51,6 +53,37 @@ def test_untrusted_bytes_reach_neither_eval_nor_pickle() -> None:
 
 def test_names_that_say_nothing_are_not_used() -> None:
     assert not [path for path in SOURCES if re.search(r"manager|utils|helper", path.stem)]
+
+
+def test_members_of_text_enums_are_compared_by_value() -> None:
+    """`==`, `in`, `match` and dictionaries treat the text "minimum" as `Withdrawal.MINIMUM`; `is` would not.
+
+    Texts are converted where they enter (`Options`, decoders); a text that slips through still means the same here.
+    """
+    sources = {path: path.read_text() for path in SOURCES}
+    enums = {name for text in sources.values() for name in re.findall(r"^class (\w+)\(.*StrEnum", text, re.MULTILINE)}
+    assert {"Verdict", "Runtime", "Withdrawal"} <= enums
+    likely = re.compile(rf"\bis\s+(not\s+)?(\w+\.)*({'|'.join(enums)})\.[A-Z]|({'|'.join(enums)})\.[A-Z]\w*\s+is\b")
+    found = {path: _identities(ast.parse(text), enums) for path, text in sources.items() if likely.search(text)}
+    assert {f"{path.relative_to(ROOT)}:{line}" for path, lines in found.items() for line in lines} == set()
+
+
+def test_comparisons_by_identity_are_found() -> None:
+    code = (
+        "a is Withdrawal.MINIMUM; 1 < 2 is not run.Withdrawal.MAXIMAL; a == Withdrawal.MINIMUM; a is Other.X; a is None"
+    )
+    assert list(_identities(ast.parse(code), {"Withdrawal"})) == [1, 1]
+
+
+def _identities(tree: ast.AST, enums: Collection[str]) -> Iterator[int]:
+    """Yield the lines in which something `is`, or `is not`, a member of one of the enums."""
+    member = re.compile(rf"(\w+\.)*({'|'.join(enums)})\.[A-Z]\w*")
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Compare):
+            for operator, *sides in zip(node.ops, [node.left, *node.comparators], node.comparators, strict=False):
+                compared = isinstance(operator, ast.Is | ast.IsNot)
+                if compared and any(member.fullmatch(ast.unparse(side)) for side in sides):
+                    yield node.lineno
 
 
 def test_every_dependency_is_explained() -> None:

@@ -81,7 +81,7 @@ def _words(robot: Robot, constraint: Constraint) -> str:
 def _forbids(constraint: Constraint, limits: Mapping[str, Interval]) -> bool:
     """Return whether a constraint can be in the way: one that only costs cannot, unless it is undefined somewhere."""
     definition = constraint.definition
-    if isinstance(definition, Relation) and definition.semantics is Semantics.SOFT:
+    if isinstance(definition, Relation) and definition.semantics == Semantics.SOFT:
         return INFINITE in (*definition.costs, definition.default_cost)
     if isinstance(definition, Function):
         return can_be_undefined(constraint, limits)

@@ -20,6 +20,6 @@ def can_hold(team: Team, until: float) -> bool:
     if left <= 0:
         raise OutOfTimeError
     verdict = solve(team, Options(protocol=CENTRAL, timeout=left, cache=False)).verdict
-    if verdict is Verdict.UNKNOWN:
+    if verdict == Verdict.UNKNOWN:
         raise OutOfTimeError
-    return verdict is not Verdict.NO_SOLUTION
+    return verdict != Verdict.NO_SOLUTION

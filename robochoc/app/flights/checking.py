@@ -56,7 +56,7 @@ def _found(run: Run, result: RunResult) -> list[str]:
     checked = run.record.checked
     if checked is None:
         return [say("opened.unchecked")]
-    if checked is not Checked.KEPT:
+    if checked != Checked.KEPT:
         return [say(f"opened.{checked}")]
     number = "" if result.cost is None else "-worth" if run.record.maximised else "-cost"
     proves = result.verdict == "optimal" or result.bound is not None

@@ -36,7 +36,7 @@ def _verdict(run: Run) -> str:
     result = run.result
     if result is None:
         return say("fly.verdict.nothing")
-    key = result.verdict if result.verdict in _VERDICTS else "stopped" if run.state is State.STOPPED else "limit"
+    key = result.verdict if result.verdict in _VERDICTS else "stopped" if run.state == State.STOPPED else "limit"
     if key in {"stopped", "limit"} and not result.assignment:
         return say("fly.verdict.nothing")
     words = [say(f"fly.verdict.{key}")]

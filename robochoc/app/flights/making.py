@@ -132,7 +132,7 @@ class Making:
     def wanted(self, told: Callable[[], None]) -> Callable[[], None]:
         """Begin, if that has not been done; call `told` at every stage. Return what says that it is not wanted."""
         leave = self._wanted.add(told)
-        if self.stage is Stage.WAITING:
+        if self.stage == Stage.WAITING:
             self._begin()
 
         def release() -> None:
@@ -144,7 +144,7 @@ class Making:
 
     def again(self) -> None:
         """Try again to make what could not be made, and a flight that was refused. Raises `OSError`."""
-        if self.stage is not Stage.DONE:
+        if self.stage != Stage.DONE:
             return
         flown = flown_of(self.run)
         if flown and flown.refused:

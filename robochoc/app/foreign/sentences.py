@@ -39,7 +39,7 @@ def sentence(constraint: Constraint, symbols: Sequence[str] = (), units: CostUni
     if isinstance(constraint.definition, Predicate) and constraint.cost != INFINITE:
         cost = cost_shown(CostUnits(places=units.places).told(constraint.cost))
         says = say("foreign.or-costs", says=says, cost=cost)
-    return say("foreign.own-part", says=says) if constraint.model is ConstraintModel.PKC else says
+    return say("foreign.own-part", says=says) if constraint.model == ConstraintModel.PKC else says
 
 
 def _says(constraint: Constraint, symbols: Sequence[str], units: CostUnits) -> str:

@@ -191,7 +191,7 @@ class Run(HasParts):
 
     def become(self, state: State, message: str = "") -> None:
         """Note that it is over, and how. What was noted first stays."""
-        if self.state is not State.RUNNING:
+        if self.state != State.RUNNING:
             return
         self.record.message = " ".join(message.split())[:_MAX_MESSAGE]
         self.record.ended = time.time()
@@ -223,6 +223,6 @@ def run_of(folder: Path) -> Run:
         return Run(folder, Record(RunOptions(), state=State.FAILED, message="broken"))
     run = Run(folder, record)
     run.read_result()
-    if record.state is State.RUNNING:
+    if record.state == State.RUNNING:
         run.become(State.ENDED if run.result else State.FAILED, "" if run.result else "lost")
     return run

@@ -143,7 +143,7 @@ class Runs:
                 run.watched_by.end()
 
     def _forget_old(self) -> None:
-        over = [run for run in self._runs if run.state is not State.RUNNING]
+        over = [run for run in self._runs if run.state != State.RUNNING]
         for run in over[: max(0, len(self._runs) - MOST_KEPT)]:
             self._runs.remove(run)
             with suppress(OSError):  # without its record it is no run any more, should this process die now

@@ -31,7 +31,7 @@ def hopeless(facts: Facts) -> Iterator[Trouble]:
     """Yield rules that cannot hold."""
     hard = [rule for rule in facts.sound if rule.cost is None and not PALETTE[rule.kind].graded]
     own: Own = {}
-    found = [*_alone(facts, [rule for rule in hard if PALETTE[rule.kind].links is Links.EACH], own)]
+    found = [*_alone(facts, [rule for rule in hard if PALETTE[rule.kind].links == Links.EACH], own)]
     yield from found
     if found:
         return

@@ -56,11 +56,11 @@ class Blocked(Change, frozen=True):
         """Return the team with that cell blocked, also where places are listed. Raises `EditError` if none is left."""
         number = sketch.area.number(self.cell)
         sketch = edits.with_cell_blocked(sketch, self.cell, blocked=True)
-        if any(one.kind is Kind.PLACE and one.values == (number,) for one in sketch.decisions):
+        if any(one.kind == Kind.PLACE and one.values == (number,) for one in sketch.decisions):
             raise EditError("whatif.last-place", "map")
         decisions = tuple(
             msgspec.structs.replace(one, values=tuple(value for value in one.values if value != number))
-            if one.kind is Kind.PLACE
+            if one.kind == Kind.PLACE
             else one
             for one in sketch.decisions
         )
@@ -68,7 +68,7 @@ class Blocked(Change, frozen=True):
 
     def words(self, sketch: Sketch) -> str:
         """Return which cell it is, and that it changes nothing where nobody decides a place."""
-        matters = any(one.kind is Kind.PLACE for one in sketch.decisions)
+        matters = any(one.kind == Kind.PLACE for one in sketch.decisions)
         key = "whatif.blocked" if matters else "whatif.blocked-in-vain"
         return say(key, column=self.cell.x + 1, row=self.cell.y + 1)
 
@@ -163,7 +163,7 @@ def _check_there(sketch: Sketch, robot: str) -> None:
 
 def _levels(sketch: Sketch, robot: str) -> list[Decision]:
     """Return the robot's decisions about levels."""
-    return [one for one in sketch.decisions if one.kind is Kind.LEVEL and robot in sketch.deciders(one)]
+    return [one for one in sketch.decisions if one.kind == Kind.LEVEL and robot in sketch.deciders(one)]
 
 
 def _reached(sketch: Sketch, decision: Decision, percent: int) -> list[int]:

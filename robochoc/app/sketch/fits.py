@@ -70,7 +70,7 @@ def _of_robots(facts: Facts, rule: SketchRule, entry: PaletteRule) -> Iterator[T
     stranger, twice = strangers(rule.robots, facts.robots), repeated(rule.robots)
     idle = strangers(rule.robots, facts.deciders[rule.decision])
     count = facts.bound(rule)
-    group = entry.links is Links.GROUP
+    group = entry.links == Links.GROUP
     if stranger is not None:
         yield _trouble(rule, "robot-unknown", robot=shortened(stranger))
     elif twice is not None:
@@ -123,17 +123,17 @@ def of_secrets(facts: Facts) -> Iterator[Trouble]:
     """
     if any(rule.cost is not None or PALETTE[rule.kind].graded for rule in facts.sound):
         for rule in facts.sound:
-            if rule.private and PALETTE[rule.kind].links is not Links.EACH:
+            if rule.private and PALETTE[rule.kind].links != Links.EACH:
                 yield _trouble(rule, "private-cost")
 
 
 def why_not_private(sketch: Sketch, rule: SketchRule) -> Trouble | None:
     """Return why a rule cannot be made private as the team stands. None: it can be."""
     entry = PALETTE.get(rule.kind)
-    if entry is None or entry.links is Links.EACH:
+    if entry is None or entry.links == Links.EACH:
         return None
     count = len(sketch.bound(rule))
-    if entry.links is Links.GROUP and count > _PAIR:
+    if entry.links == Links.GROUP and count > _PAIR:
         return _trouble(rule, "private-many", count=count)
     costly = next((one for one in sketch.rules if one.on and (one.cost is not None or _is_graded(one))), None)
     return None if costly is None else _trouble(rule, "private-off", other=shortened(costly.id))
@@ -143,7 +143,7 @@ def why_no_cost(sketch: Sketch, rule: SketchRule | None = None) -> Trouble | Non
     """Return why a rule (None: a new one) cannot cost anything as the team stands. None: it can."""
     for other in sketch.rules:
         entry = PALETTE.get(other.kind)
-        if other.on and other.private and entry is not None and entry.links is not Links.EACH:
+        if other.on and other.private and entry is not None and entry.links != Links.EACH:
             return _trouble(rule or other, "cost-off", other=shortened(other.id))
     return None
 

@@ -100,7 +100,7 @@ def _broken(before: str, parts: Sequence[object], after: str) -> Iterator[str]:
 
 
 def _decision(sketch: Sketch, decision: Decision, dictionary: str) -> Iterator[str]:
-    if decision.kind is Kind.PLACE:
+    if decision.kind == Kind.PLACE:
         yield f"# cells of a map of {sketch.area.columns} columns, row by row from the south-west"
     deciders, values = sketch.deciders(decision), sketch.values(decision)
     begin = f"    name: robots[name].variable({written(decision.name)}, "
@@ -154,7 +154,7 @@ def _rule(sketch: Sketch, rule: SketchRule, dictionary: str) -> Iterator[str]:
     entry, links = PALETTE[rule.kind], [*applied(sketch, rule)]
     bound = sketch.bound(rule)
     one_line = 1
-    if entry.links is Links.GROUP:
+    if entry.links == Links.GROUP:
         few = 2
         names = bound if len(bound) == few else ()
         each = Each(f"{dictionary}[a]", _over(sketch, rule, dictionary))

@@ -21,7 +21,7 @@ def resized(sketch: Sketch, columns: int, rows: int) -> Sketch:
         msgspec.structs.replace(robot, at=Cell(min(robot.at.x, columns - 1), min(robot.at.y, rows - 1)))
         for robot in sketch.robots
     )
-    places = {decision.name for decision in sketch.decisions if decision.kind is Kind.PLACE}
+    places = {decision.name for decision in sketch.decisions if decision.kind == Kind.PLACE}
     moved = _Moved(sketch.area, area)
     return msgspec.structs.replace(
         sketch,
@@ -46,7 +46,7 @@ class _Moved:
         """Return a rule about the same cells."""
         settings = dict(rule.settings)
         for opening in PALETTE[rule.kind].openings if rule.kind in PALETTE else ():
-            if opening.form is not Form.NUMBER and opening.name in settings:
+            if opening.form != Form.NUMBER and opening.name in settings:
                 kept = self._setting(settings.pop(opening.name))
                 if kept is not None:
                     settings[opening.name] = kept

@@ -43,12 +43,12 @@ def _squared(given: Applied, pair: Group) -> Operand:
 
 def _apart(given: Applied, pair: Group) -> Operand:
     gap = given.number("gap")
-    return _squared(given, pair) >= gap * gap if given.kind is Kind.PLACE else abs(pair[0] - pair[1]) >= gap
+    return _squared(given, pair) >= gap * gap if given.kind == Kind.PLACE else abs(pair[0] - pair[1]) >= gap
 
 
 def _close(given: Applied, pair: Group) -> Operand:
     gap = given.number("gap")
-    return _squared(given, pair) <= gap * gap if given.kind is Kind.PLACE else abs(pair[0] - pair[1]) <= gap
+    return _squared(given, pair) <= gap * gap if given.kind == Kind.PLACE else abs(pair[0] - pair[1]) <= gap
 
 
 def _different(_: Applied, pair: Group) -> Operand:
@@ -91,7 +91,7 @@ def _prefers(given: Applied, alone: Group) -> Operand:
 
 def _rather(given: Applied, alone: Group) -> Operand:
     wish, step = given.value("value"), given.number("step")
-    if given.kind is not Kind.PLACE or not isinstance(wish, int):
+    if given.kind != Kind.PLACE or not isinstance(wish, int):
         return abs(alone[0] - wish) * step
     columns = given.sketch.area.columns  # steps on the map go across, and along
     return (abs(alone[0] % columns - wish % columns) + abs(alone[0] // columns - wish // columns)) * step

@@ -107,7 +107,7 @@ def of_decisions(sketch: Sketch) -> Iterator[Trouble]:
                 told = named | {"robot": shortened(found)}
                 yield Trouble(About.DECISION, decision.name, f"trouble.decision-robot-{key}", told)
         if not sketch.values(decision):
-            key = "trouble.decision-no-cell" if decision.kind is Kind.PLACE else "trouble.decision-empty"
+            key = "trouble.decision-no-cell" if decision.kind == Kind.PLACE else "trouble.decision-empty"
             yield Trouble(About.DECISION, decision.name, key, named)
         yield from _of_values(sketch, decision)
 
@@ -134,7 +134,7 @@ def _of_value(sketch: Sketch, kind: Kind, value: int | str) -> str | None:
         return None if is_text else "trouble.decision-text"
     if isinstance(value, str):
         return "trouble.decision-no-number"
-    if kind is not Kind.PLACE:
+    if kind != Kind.PLACE:
         return None if abs(value) <= MAX_NUMBER else "trouble.decision-large"
     if not 0 <= value < sketch.area.columns * sketch.area.rows:
         return "trouble.decision-outside"

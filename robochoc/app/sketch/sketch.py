@@ -189,7 +189,7 @@ class Sketch(msgspec.Struct, frozen=True):
 
     def values(self, decision: Decision) -> tuple[int | str, ...]:
         """Return the values of a decision."""
-        return self.area.free if decision.kind is Kind.PLACE and not decision.values else decision.values
+        return self.area.free if decision.kind == Kind.PLACE and not decision.values else decision.values
 
     def bound(self, rule: SketchRule) -> tuple[str, ...]:
         """Return whom a rule binds: those of its robots that take its decision, in the rule's order."""

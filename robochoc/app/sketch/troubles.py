@@ -63,7 +63,7 @@ class Trouble(msgspec.Struct, frozen=True):
     @property
     def is_error(self) -> bool:
         """Whether the sketch is no team with it."""
-        return self.severity is Severity.ERROR
+        return self.severity == Severity.ERROR
 
 
 class NotReadyError(ValueError):

@@ -35,7 +35,7 @@ def weight_of(rule: SketchRule) -> str:
     entry = PALETTE.get(rule.kind)
     parts = [] if entry and entry.graded else [_must_or_cost(rule)]
     if rule.private:
-        parts.append(say("rule-words.alone") if entry and entry.links is Links.EACH else say("rule-words.private"))
+        parts.append(say("rule-words.alone") if entry and entry.links == Links.EACH else say("rule-words.private"))
     parts += [] if rule.on else [say("rule-words.off")]
     return " ".join(parts)
 
@@ -51,7 +51,7 @@ def robot_words(sketch: Sketch, rule: SketchRule) -> str:
 
 def value_words(sketch: Sketch, decision: Decision, value: int | str) -> str:
     """Return a value in words: a cell of the map by its column and row, from 1; all others as they are."""
-    if decision.kind is Kind.PLACE and isinstance(value, int):
+    if decision.kind == Kind.PLACE and isinstance(value, int):
         cell = sketch.area.cell(value)
         return say("value.place", column=cell.x + 1, row=cell.y + 1)
     return str(value)
@@ -59,7 +59,7 @@ def value_words(sketch: Sketch, decision: Decision, value: int | str) -> str:
 
 def value_in_short(sketch: Sketch, decision: Decision, value: int | str) -> str:
     """Return a value as it stands in pictures: a cell of the map as its column and row, from 1."""
-    if decision.kind is Kind.PLACE and isinstance(value, int):
+    if decision.kind == Kind.PLACE and isinstance(value, int):
         cell = sketch.area.cell(value)
         return f"({cell.x + 1}, {cell.y + 1})"
     return str(value)
@@ -77,7 +77,7 @@ def listed(names: Sequence[str], most: int = MOST_NAMED) -> str:
 
 def _named(sketch: Sketch, rule: SketchRule) -> dict[str, object]:
     entry, decision, bound = PALETTE[rule.kind], sketch.decision(rule.decision), [*sketch.bound(rule)]
-    has_leader = entry.links is Links.STAR
+    has_leader = entry.links == Links.STAR
     named: dict[str, object] = {
         "decision": rule.decision or _OPEN,
         "robots": _in_order(bound) if entry.has_order and not has_leader else _everybody(sketch, rule, bound),

@@ -75,7 +75,7 @@ def possible(sketch: Sketch, files: TeamFiles | None = None) -> Possible:
     usual = tuple(name for name in (chosen, beside) if name in names)
     family = None if files else family_of(sketch)
     partial = Facts(team).partially_known
-    return Possible(fit, usual, team.kind is ProblemKind.DISWCSP, family, ordered=partial)
+    return Possible(fit, usual, team.kind == ProblemKind.DISWCSP, family, ordered=partial)
 
 
 def folder_of(sketch: Sketch) -> str:

@@ -93,7 +93,7 @@ class Study:
     def report(self) -> Path | None:
         """The report, if there is one."""
         file = self._folder / REPORT
-        return file if self.facts and self.facts.stage is Stage.DONE and file.is_file() else None
+        return file if self.facts and self.facts.stage == Stage.DONE and file.is_file() else None
 
     def start(self, sketch: Sketch, question: Question, files: TeamFiles | None = None) -> None:
         """Begin, on the team of a sketch or of files. Of runs that are the same as before, the rows are kept."""

@@ -28,7 +28,7 @@ def sizes_json(team: Team, found: Sequence[Found], seconds: float) -> bytes:
 def print_sizes(team: Team, found: Sequence[Found], seconds: float, folder: Path) -> None:
     """Print the table, the robots without local solution, and the next step."""
     click.echo(on_one_line(team.name))
-    costs = ("cost",) if team.kind is ProblemKind.DISWCSP else ()
+    costs = ("cost",) if team.kind == ProblemKind.DISWCSP else ()
     numbers = ("variables", "seen", "private", "local", "groups", *costs, "time")
     print_table(("robot", *numbers, "how"), [_cells(_row(team, one), costs) for one in found], right=numbers)
     empty = [one.robot for one in found if isinstance(one, Compilation) and not one.domain.values]
@@ -52,7 +52,7 @@ def _row(team: Team, one: Found) -> dict[str, Any]:
     if not isinstance(one, Compilation):
         return {**row, "reason": str(one)}
     known = {"local_solutions": one.domain.total, "groups": len(one.domain.values)}
-    if one.domain.costs and team.kind is ProblemKind.DISWCSP:
+    if one.domain.costs and team.kind == ProblemKind.DISWCSP:
         known |= {"cheapest": int(min(one.domain.costs)), "dearest": int(max(one.domain.costs))}
     return {**row, **known, "seconds": round(one.seconds, 6), "source": str(one.source)}
 

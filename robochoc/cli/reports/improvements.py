@@ -55,7 +55,7 @@ class ImprovementsTold:
 
         last = epoch.improvements[-1]
         what = "an optimum" if last.verdict == "optimal" else "a solution"
-        shown = "" if last.cost is None or team.kind is ProblemKind.DISCSP else cost_shown(last.cost)
+        shown = "" if last.cost is None or team.kind == ProblemKind.DISCSP else cost_shown(last.cost)
         maximised = any(robot.costs.maximize or robot.told_in.maximize for robot in team.robots)
         cost = shown and f" {'worth' if maximised else 'of cost'} {shown}"
         without = f", {len(last.withdrawn)} of {len(team.robots)} withdrawn" if last.withdrawn else ""

@@ -72,7 +72,7 @@ def _epochs(outcome: Outcome) -> list[str]:
     counts = ("seconds",) if outcome.runtime == "central" else ("messages", "NCCCs")
     rows = []
     for number, epoch in enumerate(outcome.epochs):
-        verdict = f"{epoch.verdict}{', confirmed' * (epoch.verified and epoch.verdict is Verdict.NO_SOLUTION)}"
+        verdict = f"{epoch.verdict}{', confirmed' * (epoch.verified and epoch.verdict == Verdict.NO_SOLUTION)}"
         spent = epoch.metrics
         told = {
             "seconds": f"{spent.wall_s:.2f}",
@@ -133,7 +133,7 @@ def _is_unfinished(outcome: Outcome) -> bool:
 
 def _counted(count: int, outcome: Outcome) -> str:
     """Return the number of solutions, or optima, which may have any number of digits."""
-    if outcome.verdict is Verdict.SOLUTION:
+    if outcome.verdict == Verdict.SOLUTION:
         return f"{Decimal(count):,} solution{'s' * (count != 1)}"
     return f"{Decimal(count):,} optim{'um' if count == 1 else 'a'} of cost {cost_shown(outcome.cost or 0)}"
 
@@ -165,7 +165,7 @@ def _trusted(team: Team, outcome: Outcome) -> str:
 
 
 def _not_proven(team: Team, outcome: Outcome) -> str:
-    known = team.kind is ProblemKind.DISCSP or outcome.verdict is Verdict.OPTIMAL
+    known = team.kind == ProblemKind.DISCSP or outcome.verdict == Verdict.OPTIMAL
     by = _by_the_deadline(outcome)
     if known:
         return by
@@ -214,7 +214,7 @@ def _so_far(team: Team, outcome: Outcome) -> str:
         lower = f" (lower bound {_number(bound)})" if bound else ""
         withdraw = "withdraws" if len(outcome.withdrawn_alive) == 1 else "withdraw"
         return f"; in the best answer so far {len(outcome.withdrawn_alive)} {withdraw}{_weight(team, outcome)}{lower}"
-    if team.kind is ProblemKind.DISCSP:
+    if team.kind == ProblemKind.DISCSP:
         return ""
     verb = "is worth" if _maximizes(team) else "costs"
     known = [f"the best so far {verb} {_number(outcome.cost)}"] if outcome.assignment else []
@@ -312,7 +312,7 @@ def _listed(team: Team, outcome: Outcome, places: MapPlaces) -> list[str]:
     """Return the optima that were listed, but for the first, which is the assignment."""
     if outcome.optima is None:
         return []
-    what = "solution" if outcome.verdict is Verdict.SOLUTION else "optimum"
+    what = "solution" if outcome.verdict == Verdict.SOLUTION else "optimum"
     number, others = Decimal(outcome.optima.number), outcome.optima.assignments[1:]
     if number == 1:
         return [f"  there is no other {what}"]

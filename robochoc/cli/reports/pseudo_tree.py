@@ -18,7 +18,7 @@ def tree_text(outcome: Outcome) -> str:
     A run may end while robots still build it. Who knows its place then has no root yet: roots are the last to know.
     """
     nodes = outcome.tree
-    if not nodes and (outcome.verdict is not Verdict.UNKNOWN or not _builds_tree(outcome.protocol)):
+    if not nodes and (outcome.verdict != Verdict.UNKNOWN or not _builds_tree(outcome.protocol)):
         return f"  {outcome.protocol} builds no pseudo-tree"
     if not nodes or any(node.parent not in nodes for node in nodes.values() if node.parent is not None):
         return "  the run ended before the robots had built a pseudo-tree"

@@ -34,7 +34,7 @@ def check_constraints(
     own = robot.private if assignment else ()
     held = [one for one in (*own, *robot.shared, *parts) if values.keys() >= set(one.variables)]
     cost = sum(constraint.price(values) for constraint in held)
-    shared = tuple(_charges(robot.name, [one for one in robot.shared if one.model is not ConstraintModel.PKC], values))
+    shared = tuple(_charges(robot.name, [one for one in robot.shared if one.model != ConstraintModel.PKC], values))
     known = [*((child.name, child.copies) for child in robot.children), *learnt.items()]
     charges = (one for holder, theirs in known for one in _charges(holder, theirs, values))
     copies = tuple(islice(charges, max(0, MOST_CHARGES - len(shared))))  # others may have told any number

@@ -130,7 +130,7 @@ class Searcher(RobotLoop):
         owners = {name: agent for agent, names in self._task.interfaces.items() for name in names}
         self._refuse_unfit(owners)
         if self._protocol.traits.shared_scopes:
-            known = [one for one in held_above(self._robot) if one.constraint.model is not ConstraintModel.PKC]
+            known = [one for one in held_above(self._robot) if one.constraint.model != ConstraintModel.PKC]
             for parent in self._robot.parents:
                 theirs = [one for one in known if parent.name in {owners.get(v) for v in one.constraint.variables}]
                 copies = Copies(self.epoch, msgspec.msgpack.encode(list(map(record_of, theirs))))
@@ -141,7 +141,7 @@ class Searcher(RobotLoop):
         """Raise `UnsupportedError` where the own file asks for more than the protocol can do."""
         robot, traits = self._robot, self._protocol.traits
         unmet = unmet_requirement(robot, traits, owners)
-        if robot.kind is ProblemKind.DISWCSP and not traits.costs:
+        if robot.kind == ProblemKind.DISWCSP and not traits.costs:
             unmet = f"{robot.name} is part of a DisWCSP"
         if unmet:
             raise UnsupportedError(f"{unmet}, which {self._task.protocol} does not support")

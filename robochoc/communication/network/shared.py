@@ -122,7 +122,7 @@ def _definition(record: Record) -> Definition:
         raise SharedConstraintError(f"a tuple of {shortened(record.name)!r} has not {record.arity} values")
     if len(set(record.tuples)) < len(record.tuples):
         raise SharedConstraintError(f"a tuple of {shortened(record.name)!r} stands twice")
-    costs = len(record.tuples) if record.semantics is Semantics.SOFT else 0
+    costs = len(record.tuples) if record.semantics == Semantics.SOFT else 0
     if len(record.costs) != costs or not all(cost >= 0 for cost in (*record.costs, record.default_cost)):
         raise SharedConstraintError(f"the costs of {shortened(record.name)!r} are none")
     return Relation(record.name, record.arity, record.semantics, record.tuples, record.costs, record.default_cost)

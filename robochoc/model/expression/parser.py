@@ -216,7 +216,7 @@ class _Parser:
             arguments = _operands(name, operator, arguments[0])
         _check_arity(name, operator, len(arguments))
         wanted: Iterator[Type]
-        if resolved in SYMBOLIC and any(argument.type is Type.SYMBOL for argument in arguments):
+        if resolved in SYMBOLIC and any(argument.type == Type.SYMBOL for argument in arguments):
             wanted = itertools.repeat(Type.SYMBOL)
         else:
             wanted = itertools.chain(operator.takes, itertools.repeat(operator.takes[-1]))

@@ -28,7 +28,7 @@ def team_html(team: Team, told: Mapping[str, Iterable[object]] = {}) -> str:
     counts = {"robot": len(team.robots), "variable": len(team.variables), "constraint": len(constraints)}
     sizes = ", ".join(counted(number, thing) for thing, number in counts.items())
     aim = ""
-    if team.kind is ProblemKind.DISWCSP:
+    if team.kind == ProblemKind.DISWCSP:
         aim = ", maximised" if team.robots[0].costs.maximize else ", minimised"
     events = f", {counted(len(team.scenario), 'event')}" if team.scenario else ""
     robots = [
@@ -40,7 +40,7 @@ def team_html(team: Team, told: Mapping[str, Iterable[object]] = {}) -> str:
         for robot in team.robots
         for variable in robot.variables
     ]
-    columns = 5 if team.kind is ProblemKind.DISWCSP else 4
+    columns = 5 if team.kind == ProblemKind.DISWCSP else 4
     parts = (
         heading(team.name, f"{sizes}{events}: a {team.kind}{aim}"),
         table(("robot", "variable", "values"), robots),
@@ -60,7 +60,7 @@ def _constraints(team: Team) -> Iterator[tuple[str, str, str, str, str]]:
 def _says(constraint: Constraint) -> str:
     match constraint.definition:
         case Relation(semantics=semantics, tuples=tuples):
-            return f"a table of {len(tuples):,} {'costs' if semantics is Semantics.SOFT else semantics}"
+            return f"a table of {len(tuples):,} {'costs' if semantics == Semantics.SOFT else semantics}"
         case Predicate(parameters=formals, body=body) | Function(parameters=formals, body=body):
             return expression_text(_with(body, dict(zip(formals, constraint.parameters, strict=True))))
 
@@ -80,7 +80,7 @@ def _cost(constraint: Constraint, units: CostUnits) -> str:
     definition = constraint.definition
     if isinstance(definition, Function):
         return "its value"
-    if isinstance(definition, Relation) and definition.semantics is Semantics.SOFT:
+    if isinstance(definition, Relation) and definition.semantics == Semantics.SOFT:
         return "in the table"
     if constraint.cost == INFINITE:
         return "must hold"

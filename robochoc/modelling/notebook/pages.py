@@ -19,7 +19,7 @@ def solution_html(solution: Solution) -> str:
     """Return an outcome: what happened, the values, the epochs, and what the run took."""
     team = solution.problem
     owner = _owners(team) if team else {}
-    plain = team is None or team.kind is ProblemKind.DISCSP
+    plain = team is None or team.kind == ProblemKind.DISCSP
     metrics = solution.metrics
     spent = {
         "messages": f"{sum(metrics.messages.values()):,}",

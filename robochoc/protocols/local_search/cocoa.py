@@ -145,7 +145,7 @@ class CoCoA(Protocol):
             case Costs(burdens):
                 self._keep(sender, burdens)
             case FinalSide(burdens):
-                if self.states[sender] is not State.DONE:
+                if self.states[sender] != State.DONE:
                     raise ValueError(f"{sender} has told {self.problem.agent} no value that is final")
                 self._keep(sender, burdens)
                 self.sides[sender] = burdens
@@ -185,7 +185,7 @@ class CoCoA(Protocol):
         self.state = State.ACTIVE
         self._done_before = len(self.view)
         self.answers = {}
-        self._asked = tuple(name for name, state in self.states.items() if state is not State.DONE or self._lacks(name))
+        self._asked = tuple(name for name, state in self.states.items() if state != State.DONE or self._lacks(name))
         inquiry = Inquiry(list(self.problem.values), dict(self.view))
         for name in self._asked:
             self.send(name, inquiry)
@@ -196,7 +196,7 @@ class CoCoA(Protocol):
 
     def _ask_again(self, name: str) -> None:
         """Ask a neighbour that has taken its value after its answer for what its parts charge now."""
-        if self.state is State.ACTIVE and name in self.answers and self._lacks(name):
+        if self.state == State.ACTIVE and name in self.answers and self._lacks(name):
             del self.answers[name]
             self.send(name, Inquiry(list(self.problem.values), dict(self.view)))
 
@@ -232,7 +232,7 @@ class CoCoA(Protocol):
 
     def _keep(self, sender: str, burdens: list[Burden]) -> None:
         """Store an answer; raise `ValueError` if it was not asked for, or is not about the own values."""
-        asked = self.state is State.ACTIVE and sender in self._asked and sender not in self.answers
+        asked = self.state == State.ACTIVE and sender in self._asked and sender not in self.answers
         if not asked:
             raise ValueError(f"{sender} tells costs that {self.problem.agent} has not asked for")
         self._refuse_number(sender, burdens)
@@ -262,7 +262,7 @@ class CoCoA(Protocol):
     def _tell(self, message: wire.Message) -> None:
         """Tell all neighbours that have no value yet."""
         for name, state in self.states.items():
-            if state is not State.DONE:
+            if state != State.DONE:
                 self.send(name, message)
 
 

@@ -120,7 +120,7 @@ class DynABT(ABT, DynamicProtocol):
 
     def _backtrack(self) -> None:
         super()._backtrack()
-        if self.verdict is Verdict.NO_SOLUTION:
+        if self.verdict == Verdict.NO_SOLUTION:
             self.proof = self._explanation()
 
     def _nogood(self, lhs: dict[str, Value], value: Value) -> Nogood:

@@ -140,7 +140,7 @@ class Guard:
 
     def end(self, how: AtEnd, *, waits: bool) -> None:
         """Bring all vehicles to an end."""
-        if how is AtEnd.LAND:
+        if how == AtEnd.LAND:
             with suppress(Exception):  # without a plan each lands where it is, after a while
                 self._traffic.bring_down()
         for flight in self._flights.values():

@@ -242,7 +242,7 @@ def _environment(kind: Kind) -> dict[str, str]:
     They are descriptions of cameras and the like. MAVSDK goes on without them where no folder can be made; it ends
     where the temporary folder does not exist, or so it does in 4.1.
     """
-    leaves_files = kind is Kind.MAVLINK and Path(_UNWRITABLE).is_dir()
+    leaves_files = kind == Kind.MAVLINK and Path(_UNWRITABLE).is_dir()
     nowhere = {"TMPDIR": _UNWRITABLE, "XDG_CACHE_HOME": _UNWRITABLE} if leaves_files else {}
     return {**os.environ, **nowhere}
 

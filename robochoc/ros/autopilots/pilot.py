@@ -110,9 +110,9 @@ class Pilot:
                 self._recover(seen)
             elif self._ending:
                 self._end(seen, *self._ending)
-            elif self._phase is Phase.CONNECTING:
+            elif self._phase == Phase.CONNECTING:
                 self._connect(seen)
-            elif self._phase is Phase.OUT:
+            elif self._phase == Phase.OUT:
                 self._bring_down(seen)
             else:
                 self._go_on(seen)
@@ -209,7 +209,7 @@ class Pilot:
         """Set out for `target`. Who should land outside of the fence lands where it is."""
         self._order, self._target, self._commanded = order, target, True
         self._follow()
-        if self._phase is not Phase.LANDING:
+        if self._phase != Phase.LANDING:
             self._enter(Phase.FLYING)
 
     def _follow(self) -> None:
@@ -225,9 +225,9 @@ class Pilot:
 
     def _arrive(self, seen: Telemetry) -> None:
         """Take note that a vehicle is there, or that it has to make room once more."""
-        if self._phase is Phase.ARRIVED and not self._clearance.rests:
+        if self._phase == Phase.ARRIVED and not self._clearance.rests:
             self._enter(Phase.FLYING)
-        elif self._phase is Phase.FLYING and self._clearance.rests and self._is_there(seen):
+        elif self._phase == Phase.FLYING and self._clearance.rests and self._is_there(seen):
             self._enter(Phase.ARRIVED)
 
     def _is_there(self, seen: Telemetry) -> bool:
@@ -246,7 +246,7 @@ class Pilot:
             return f"{problems[0]} for {self._fleet.patience_s:g} s"
         if self._phase in {Phase.READY, Phase.LANDED}:
             return ""
-        lands = self._phase is Phase.LANDING
+        lands = self._phase == Phase.LANDING
         if (not lands or self._takeover.lasts) and self._takeover.has_come(seen):
             return f"{_NOT_OURS} {seen.mode_and_who}"
         if lands or seen.alarm:
@@ -259,7 +259,7 @@ class Pilot:
         """Return what a vehicle does that should be in the air and follow us; empty if it does."""
         if not seen.armed:
             return "its motors have stopped" if seen.is_heard else ""
-        if self._phase is Phase.CLIMBING or seen.mode == OFFBOARD:
+        if self._phase == Phase.CLIMBING or seen.mode == OFFBOARD:
             return ""
         return f"{_NOT_OURS} {seen.mode_and_who if self._takeover.has_left_us() else seen.mode_in_words}"
 
@@ -282,7 +282,7 @@ class Pilot:
     def _fail(self, why: str) -> None:
         """Make a vehicle land whose step has failed. What it told last counts; traffic may be what has failed."""
         with suppress(Exception):
-            if self._phase is not Phase.OUT:
+            if self._phase != Phase.OUT:
                 self._out(why)
         with suppress(Exception):
             if self._commanded and not self._obeyed:
@@ -308,7 +308,7 @@ class Pilot:
     def _recover(self, seen: Telemetry) -> None:
         """Find out whether the vehicle was left armed, once it is heard. One that a person flies is left alone."""
         waited_s = self._clock() - self._since_s
-        if self._phase is Phase.CONNECTING:
+        if self._phase == Phase.CONNECTING:
             if self._autopilot.connect():
                 self._enter(Phase.READY)
             else:
@@ -323,18 +323,18 @@ class Pilot:
         now = self._clock()
         if not math.isfinite(self._end_begun_s):
             self._end_begun_s = self._turn_s = now
-        lies = self._phase is Phase.LANDED and not seen.in_air
+        lies = self._phase == Phase.LANDED and not seen.in_air
         if self._obeyed and not self._takeover.is_known:
-            self._await_landing(seen, now, waits=waits and how is AtEnd.LAND)
+            self._await_landing(seen, now, waits=waits and how == AtEnd.LAND)
         elif not self._commanded or self._takeover.has_come(seen) or lies:
             self.ended = True
-        elif how is AtEnd.LAND and not self._is_my_turn(seen):
+        elif how == AtEnd.LAND and not self._is_my_turn(seen):
             self._end_begun_s = now
         elif self._is_brought_down(seen, how):
             self._obeyed = True
-            if how is AtEnd.LAND:
+            if how == AtEnd.LAND:
                 self._traffic.landing(self.name)
-                self._enter(self._phase if self._phase is Phase.OUT else Phase.LANDING)
+                self._enter(self._phase if self._phase == Phase.OUT else Phase.LANDING)
         elif now - self._end_begun_s > END_S:
             self._end_out(f"it has not answered at the end, for {END_S:g} s")
 
@@ -342,7 +342,7 @@ class Pilot:
         if not waits:
             self.ended = True
         elif self._has_landed(seen):
-            if self._phase is not Phase.OUT:
+            if self._phase != Phase.OUT:
                 self._touch_down()
             self.ended = True
         elif now - self._end_begun_s > LANDING_S:
@@ -355,9 +355,9 @@ class Pilot:
 
     def _is_my_turn(self, seen: Telemetry) -> bool:
         """Return whether a vehicle may land now at the end; if not, go on to where it may."""
-        if not seen.in_air or self._phase is Phase.LANDING or self._clock() - self._turn_s > TURN_S:
+        if not seen.in_air or self._phase == Phase.LANDING or self._clock() - self._turn_s > TURN_S:
             return True
-        if self._phase is Phase.OUT:
+        if self._phase == Phase.OUT:
             return self._may_fall()
         self._clearance = self._traffic.clearance(self.name)
         if self._clearance.lands or self._clearance.to is None:
@@ -379,7 +379,7 @@ class Pilot:
             return False
         self._retry_s = now
         try:
-            if how is AtEnd.HOLD and seen.in_air:
+            if how == AtEnd.HOLD and seen.in_air:
                 self._autopilot.hold()
             else:
                 self._autopilot.land()

@@ -134,11 +134,11 @@ class FleetSink(Sink):
         guard, names = self._guard, [*self._fleet.vehicles]
 
         def is_known(name: str) -> bool:
-            return name in guard.states and guard.states[name].phase is not Phase.CONNECTING
+            return name in guard.states and guard.states[name].phase != Phase.CONNECTING
 
         with _reported():
             guard.wait_for(lambda: all(map(is_known, names)), self._fleet.connect_s + START_S)
-        missing = [name for name in names if not is_known(name) or guard.states[name].phase is Phase.OUT]
+        missing = [name for name in names if not is_known(name) or guard.states[name].phase == Phase.OUT]
         if missing:
             state = guard.states.get(missing[0])
             why = state.why if state and state.why else "nothing is known of it"
@@ -169,7 +169,7 @@ class FleetSink(Sink):
     def _fell_out(self, names: Iterable[str]) -> Iterator[State]:
         for name in names:
             state = self._guard.states.get(name)
-            if state is not None and state.phase is Phase.OUT:
+            if state is not None and state.phase == Phase.OUT:
                 yield state
 
     def _told(self) -> str:
@@ -177,10 +177,10 @@ class FleetSink(Sink):
         if not self._may_arm:
             return f"{len(self._fleet.vehicles)} vehicles seen, none armed (--arm lets them fly)"
         states = [self._guard.states[name] for name in sorted(self._flown) if name in self._guard.states]
-        ended = sum(state.phase is Phase.LANDED for state in states)
+        ended = sum(state.phase == Phase.LANDED for state in states)
         words = [f"{len(self._flown)} flown"]
-        words.append(f"{ended} landed" if self._fleet.end is AtEnd.LAND else f"{len(states) - ended} hold")
-        words += [f"{state.vehicle} is out of order: {state.why}" for state in states if state.phase is Phase.OUT]
+        words.append(f"{ended} landed" if self._fleet.end == AtEnd.LAND else f"{len(states) - ended} hold")
+        words += [f"{state.vehicle} is out of order: {state.why}" for state in states if state.phase == Phase.OUT]
         return on_one_line(", ".join(words))
 
     def _wrong(self, problem: str, hint: str) -> SinkError:

@@ -96,7 +96,7 @@ class FleetSource(Source):
         if state.battery is not None and abs(state.battery - self._charges.get(name, -1.0)) >= _CHARGE:
             self._charges[name] = state.battery
             self._put(name, "battery", {"percentage": state.battery, "present": True})
-        if state.phase is Phase.OUT and name not in self._out:
+        if state.phase == Phase.OUT and name not in self._out:
             self._out.add(name)
             self._put(name, "out_of_order", {"data": state.why})
 

@@ -34,7 +34,7 @@ def _not_while_changing(option: str, given: Callable[[Options], object]) -> Opti
 
 def _is_delayed(options: Options) -> bool:
     """Return whether messages are delayed, or ordered, otherwise than by default."""
-    return bool(options.delay) or options.schedule is not ScheduleName.CONCURRENT
+    return bool(options.delay) or options.schedule != ScheduleName.CONCURRENT
 
 
 _WITHOUT_PROCESSES = frozenset({Runtime.SIMULATOR, Runtime.ARRAYS})
@@ -42,7 +42,7 @@ _WITHOUT_PROCESSES = frozenset({Runtime.SIMULATOR, Runtime.ARRAYS})
 OPTION_RULES = (
     OptionRule(lambda o: not LEAST_SEED <= o.seed <= LARGEST_SEED, "--seed is a number of 64 bits: less than 2^64"),
     OptionRule(
-        lambda o: o.channel and o.runtime is not Runtime.SIMULATOR,
+        lambda o: o.channel and o.runtime != Runtime.SIMULATOR,
         "--channel is the simulator's",
         "add --runtime simulator",
     ),
@@ -52,7 +52,7 @@ OPTION_RULES = (
         "drop --delay and --schedule",
     ),
     OptionRule(
-        lambda o: _is_delayed(o) and o.runtime is not Runtime.SIMULATOR,
+        lambda o: _is_delayed(o) and o.runtime != Runtime.SIMULATOR,
         "--delay and --schedule are the simulator's",
         "add --runtime simulator",
     ),
@@ -64,16 +64,16 @@ OPTION_RULES = (
     OptionRule(lambda o: o.improve and not o.deadline, "--improve goes on after --deadline SECONDS: add it"),
     OptionRule(lambda o: not 0 <= o.message_loss <= MOST_LOSS, "--message-loss is a probability from 0 to 0.9"),
     OptionRule(
-        lambda o: o.loss and (o.runtime is Runtime.ARRAYS or o.preprocess or o.wants_anytime),
+        lambda o: o.loss and (o.runtime == Runtime.ARRAYS or o.preprocess or o.wants_anytime),
         "--message-loss goes with no --runtime arrays, --preprocess or --set anytime=yes",
     ),
     OptionRule(
-        lambda o: o.ncccs is not None and o.runtime is not Runtime.SIMULATOR,
+        lambda o: o.ncccs is not None and o.runtime != Runtime.SIMULATOR,
         "--ncccs is a limit for the simulator, which knows all clocks",
         "add --runtime simulator",
     ),
     OptionRule(
-        lambda o: o.cycles is not None and o.schedule is not ScheduleName.CYCLES,
+        lambda o: o.cycles is not None and o.schedule != ScheduleName.CYCLES,
         "--cycles is a limit on the simulator's cycles",
         "add --runtime simulator --schedule cycles (a local search has its own number of cycles: --set cycles=N)",
     ),
@@ -106,7 +106,7 @@ OPTION_RULES = (
         "drop it",
     ),
     OptionRule(
-        lambda o: o.protocol == CENTRAL and o.withdraw is Withdrawal.MAXIMAL,
+        lambda o: o.protocol == CENTRAL and o.withdraw == Withdrawal.MAXIMAL,
         "--withdraw maximal is settled by the robots, in priority order; the central solver finds a minimum",
         "--withdraw minimum",
     ),
@@ -125,7 +125,7 @@ OPTION_RULES = (
         "--count is of solutions for all robots; --withdraw asks who can do without",
     ),
     OptionRule(
-        lambda o: o.filters and o.runtime is not Runtime.NETWORK,
+        lambda o: o.filters and o.runtime != Runtime.NETWORK,
         "--filter is for messages that cross a network",
         "add --runtime network",
     ),
@@ -135,7 +135,7 @@ OPTION_RULES = (
         "drop it",
     ),
     OptionRule(
-        lambda o: o.spares and o.runtime is Runtime.NETWORK,
+        lambda o: o.spares and o.runtime == Runtime.NETWORK,
         "--spare starts processes of this machine again",
         "drop --runtime network",
     ),
@@ -150,11 +150,11 @@ OPTION_RULES = (
         "drop --runtime",
     ),
     OptionRule(
-        lambda o: o.spares and o.on_loss is OnLoss.FAIL,
+        lambda o: o.spares and o.on_loss == OnLoss.FAIL,
         "--spare brings robots back that died; --on-loss fail ends the run instead",
     ),
     OptionRule(
-        lambda o: o.withdraw is not None and o.protocol != CENTRAL and o.runtime is Runtime.ARRAYS,
+        lambda o: o.withdraw is not None and o.protocol != CENTRAL and o.runtime == Runtime.ARRAYS,
         "--withdraw is settled by protocols that have no form as arrays",
         "add --runtime simulator",
     ),
@@ -164,8 +164,8 @@ OPTION_RULES = (
 ENVIRONMENT_RULES = (
     _not_while_changing("--protocol central", lambda o: o.protocol == CENTRAL),
     _not_while_changing("--withdraw", lambda o: o.withdraw is not None),
-    _not_while_changing("--runtime network", lambda o: o.runtime is Runtime.NETWORK),
-    _not_while_changing("--runtime arrays", lambda o: o.runtime is Runtime.ARRAYS),
+    _not_while_changing("--runtime network", lambda o: o.runtime == Runtime.NETWORK),
+    _not_while_changing("--runtime arrays", lambda o: o.runtime == Runtime.ARRAYS),
     _not_while_changing("--preprocess", lambda o: o.preprocess),
 )
 """Further combinations that are refused if an environment changes the problem."""

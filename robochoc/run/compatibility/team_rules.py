@@ -43,7 +43,7 @@ class Case:
     @property
     def has_costs(self) -> bool:
         """Return whether the problem has costs."""
-        return self.team.kind is ProblemKind.DISWCSP
+        return self.team.kind == ProblemKind.DISWCSP
 
     @property
     def has_negative_costs(self) -> bool:
@@ -58,7 +58,7 @@ class Case:
     @property
     def minimum_withdrawal(self) -> bool:
         """Return whether as few robots as possible are to withdraw."""
-        return self.is_distributed and self.options.withdraw is Withdrawal.MINIMUM
+        return self.is_distributed and self.options.withdraw == Withdrawal.MINIMUM
 
     @cached_property
     def epochs(self) -> tuple[Team, ...]:
@@ -116,11 +116,11 @@ TEAM_RULES = (
         ),
         "{team} has partially known constraints (PKC), which --preprocess does not support: drop it",
     ),
-    _not_with_scenario("--runtime network", lambda o: o.protocol != CENTRAL and o.runtime is Runtime.NETWORK),
-    _not_with_scenario("--runtime arrays", lambda o: o.protocol != CENTRAL and o.runtime is Runtime.ARRAYS),
+    _not_with_scenario("--runtime network", lambda o: o.protocol != CENTRAL and o.runtime == Runtime.NETWORK),
+    _not_with_scenario("--runtime arrays", lambda o: o.protocol != CENTRAL and o.runtime == Runtime.ARRAYS),
     TeamRule(lambda c: c.traits.lacks, "{protocol} needs {case.traits.lacks}"),
     TeamRule(
-        lambda c: c.is_distributed and c.options.runtime is Runtime.ARRAYS and not c.traits.arrays,
+        lambda c: c.is_distributed and c.options.runtime == Runtime.ARRAYS and not c.traits.arrays,
         "{protocol} has no form as arrays",
         "add --runtime simulator, or choose a protocol that has one ('robochoc protocols --long')",
     ),
@@ -156,7 +156,7 @@ TEAM_RULES = (
         "add a constant to the costs of each constraint, so that all are 0 or more and minimised",
     ),
     TeamRule(
-        lambda c: c.has_costs and c.options.withdraw is Withdrawal.MAXIMAL,
+        lambda c: c.has_costs and c.options.withdraw == Withdrawal.MAXIMAL,
         "{team} is a DisWCSP; --withdraw maximal knows no costs",
         "--withdraw minimum does",
     ),
@@ -194,7 +194,7 @@ def _takers(case: Case) -> Iterator[tuple[str, Traits]]:
         yield options.protocol, traits
     if taken_over:
         yield "--withdraw minimum", Traits(costs=True)
-    if options.withdraw is Withdrawal.MAXIMAL:
+    if options.withdraw == Withdrawal.MAXIMAL:
         yield "--withdraw maximal", FirstFit.traits
     if options.spares:
         yield "--spare", Traits(costs=True)

@@ -220,7 +220,7 @@ class Machines(Deployment):
             return None  # one has not said in time what it has: neither that it flies, nor that it withdraws
         without = tuple(name for name in members.order if not state.assigned.get(name))
         if self._master.is_private:
-            withdrawn = without if phase.withdrawal and result.verdict is Verdict.SOLUTION else ()
+            withdrawn = without if phase.withdrawal and result.verdict == Verdict.SOLUTION else ()
             why = "every robot knows its own values, and nobody else's (--private)"
             return CheckedAssignment({}, None, withdrawn, verified=False, reason=why)
         self._values = self._reported(result.assignments)

@@ -28,7 +28,7 @@ def headline(run: Run, foreign: Facts | None = None) -> str:
 
 def _headline(run: Run, foreign: Facts | None) -> str:
     result, sketch = run.result, run.sketch
-    if run.state is State.FAILED:
+    if run.state == State.FAILED:
         known = {"lost": "decide.lost", "broken": "decide.broken"}
         return say(known[run.message]) if run.message in known else say("decide.failed", why=run.message)
     if result is None:
@@ -57,7 +57,7 @@ def _who(count: int, result: RunResult) -> str:
 def _so_far(result: RunResult, state: State) -> str:
     if result.verdict in _WHOLE:
         return ""
-    return say("decide.stopped") if state is State.STOPPED else say("decide.limit")
+    return say("decide.stopped") if state == State.STOPPED else say("decide.limit")
 
 
 def _cost(result: RunResult, *, worth: bool) -> str:

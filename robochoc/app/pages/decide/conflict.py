@@ -26,7 +26,7 @@ _MOST_HINTS = 3
 
 def hints_about_rules(sketch: Sketch) -> list[Trouble]:
     """Return which rules can be seen to be impossible, each with what to do."""
-    return [one for one in troubles(sketch) if one.about is About.RULE and not one.is_error]
+    return [one for one in troubles(sketch) if one.about == About.RULE and not one.is_error]
 
 
 class Doors:
@@ -93,7 +93,7 @@ class Doors:
                 with ui.element("ul").classes("rules"):
                     for name in conflict.rules:
                         self._rule(name, [hint for hint in hints if hint.element == name])
-                ui.label(say("decide.by-cpmpy" if conflict.finder is Finder.CPMPY else "decide.by-own")).classes("soft")
+                ui.label(say("decide.by-cpmpy" if conflict.finder == Finder.CPMPY else "decide.by-own")).classes("soft")
         elif conflict.why:
             self._tell(say("decide.conflict-failed", why=conflict.why))
         elif conflict.late:

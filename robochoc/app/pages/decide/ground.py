@@ -33,7 +33,7 @@ class Target(msgspec.Struct, frozen=True):
 
 def decides_places(sketch: Sketch) -> bool:
     """Return whether somebody decides a place, so that the picture of the team is a map."""
-    return any(decision.kind is Kind.PLACE for decision in sketch.decisions)
+    return any(decision.kind == Kind.PLACE for decision in sketch.decisions)
 
 
 def targets_of(sketch: Sketch, assignment: Mapping[str, Value]) -> dict[str, Target]:
@@ -43,7 +43,7 @@ def targets_of(sketch: Sketch, assignment: Mapping[str, Value]) -> dict[str, Tar
     for decision in sketch.decisions:
         for robot in sketch.deciders(decision):
             value = assignment.get(f"{robot}.{decision.name}")
-            if decision.kind is Kind.PLACE:
+            if decision.kind == Kind.PLACE:
                 if isinstance(value, int) and sketch.area.has(sketch.area.cell(value)):
                     cells.setdefault(robot, sketch.area.cell(value))
             elif value is not None:
@@ -60,7 +60,7 @@ def shown_part(sketch: Sketch) -> tuple[Cell, Cell]:
     """Return the south-western and the north-eastern cell of what is drawn: all that matters, and a cell around it."""
     cells = [robot.at for robot in sketch.robots]
     for decision in sketch.decisions:
-        if decision.kind is Kind.PLACE:
+        if decision.kind == Kind.PLACE:
             cells += [sketch.area.cell(value) for value in sketch.values(decision) if isinstance(value, int)]
     across, along = [cell.x for cell in cells] or [0], [cell.y for cell in cells] or [0]
     area = sketch.area

@@ -94,7 +94,7 @@ class _Page:
         """Decide, or stop; the second click of a double click does not stop what the first one has begun."""
         if event.args not in _SINGLE_CLICKS:
             return
-        if self._run is not None and self._run.state is State.RUNNING:
+        if self._run is not None and self._run.state == State.RUNNING:
             self._run.stop()
             self._go.set_text(say("decide.stopping"))
             self._go.disable()
@@ -128,7 +128,7 @@ class _Page:
                         with ui.element("li"):
                             ui.label(f"{trouble.text} {trouble.remedy}")
                 ui.link(say("decide.to-model"), f"/team/{self._project.id}/model")
-        running = self._run is not None and self._run.state is State.RUNNING
+        running = self._run is not None and self._run.state == State.RUNNING
         self._go.set_enabled(running or not errors)
         self._show()
 
@@ -136,7 +136,7 @@ class _Page:
 
     def _show(self) -> None:
         shown, sketch = self._run, self._sketch()
-        running = shown is not None and shown.state is State.RUNNING
+        running = shown is not None and shown.state == State.RUNNING
         self._show_button(running=running)
         self._show_talk(shown)  # first: what is played back may be of the run before
         self._show_live(shown, sketch)
@@ -170,13 +170,13 @@ class _Page:
 
     def _show_talk(self, shown: Run | None) -> None:
         """Show what the robots say. Who has pressed the button sees a short conversation afterwards, played slowly."""
-        if shown is not None and shown.state is State.RUNNING:
+        if shown is not None and shown.state == State.RUNNING:
             self._talk.tell(shown.live.said)
             return
         self._talk.offer(shown if shown and shown.result else None)
         if shown is not None and shown is self._pressed:
             self._pressed = None
-            if shown.state is State.ENDED and shown.result and _is_short(shown.result):
+            if shown.state == State.ENDED and shown.result and _is_short(shown.result):
                 self._talk.begin()
 
     def _draw(self) -> None:
@@ -204,7 +204,7 @@ class _Page:
             self._show_moment(sketch, *played)
             return
         live, result = shown.live, shown.result
-        running = shown.state is State.RUNNING
+        running = shown.state == State.RUNNING
         if running and len(sketch.robots) > MOST_LIVE and self._picture.content:
             self._tell_facts(shown)
             return
@@ -226,7 +226,7 @@ class _Page:
         self._tell_facts(shown)
 
     def _tell_facts(self, shown: Run) -> None:
-        live, running = shown.live, shown.state is State.RUNNING
+        live, running = shown.live, shown.state == State.RUNNING
         facts = [say("decide.live", messages=f"{live.messages:,}", seconds=f"{shown.seconds:.0f}")] if running else []
         if running and live.costs:
             now = "foreign.worth-now" if shown.record.maximised else "decide.best-now"
@@ -242,7 +242,7 @@ class _Page:
             if shown is None:
                 ui.label(say("decide.nothing")).classes("soft")
                 return
-            if shown.state is State.RUNNING and shown.result is None:
+            if shown.state == State.RUNNING and shown.result is None:
                 ui.label(say("decide.running")).classes("soft")
                 return
             with ui.element("h2").classes("headline").props("aria-live=polite"):
@@ -250,7 +250,7 @@ class _Page:
             if shown.result is None:
                 return
             ui.label(took(shown)).classes("soft")
-            if shown.message and shown.state is State.ENDED:
+            if shown.message and shown.state == State.ENDED:
                 ui.label(say("decide.beside", why=shown.message)).classes("error")
             if why := shown.result.chosen.get("protocol"):
                 ui.label(say("decide.why-chosen", protocol=shown.result.protocol, why=why)).classes("soft")

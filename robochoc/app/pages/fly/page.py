@@ -65,7 +65,7 @@ class _Page:
         if shown == self._shown and shown is not None:
             return
         self._leave()
-        self._leave = run.on_change(self._follow) if run and run.state is State.RUNNING else _nothing
+        self._leave = run.on_change(self._follow) if run and run.state == State.RUNNING else _nothing
         self._shown = shown
         self._body.clear()
         with self._body:
@@ -84,12 +84,12 @@ class _Page:
             _title()
             ui.label(say("fly.damaged", why=damaged)).classes("error")
             return
-        if run.state is State.RUNNING:
+        if run.state == State.RUNNING:
             _title()
             with ui.row(align_items="center").props("role=status"):
                 ui.spinner(size="1.4rem")
                 ui.label(say("fly.running"))
-        elif run.state is State.FAILED:
+        elif run.state == State.FAILED:
             why = say("fly.failed", why=run.message)
             _told(why, "fly.nothing-remedy", "fly.to-decide", f"/team/{self._project.id}/decide")
         else:
@@ -166,10 +166,10 @@ class _Made:
     def _told(self) -> None:
         making, stage = self._making, self._making.stage
         works = stage in {Stage.FLIGHT, Stage.CONVERSATION}
-        self._line.set_visibility(stage is not Stage.DONE)
+        self._line.set_visibility(stage != Stage.DONE)
         self._spinner.set_visibility(works)
         self._cancel.set_visibility(works)
-        self._again.set_visibility(stage is Stage.WAITING)
+        self._again.set_visibility(stage == Stage.WAITING)
         self._timer.active = works
         self._tell_time()
         flight, talk = _framed(making, making.flight), _framed(making, making.conversation)
@@ -190,7 +190,7 @@ class _Made:
         for told in words:
             ui.label(told).classes("error" if flown and flown.refused else "note")
         failed = making.troubles or (flown and flown.refused)
-        if making.stage is Stage.DONE and failed:
+        if making.stage == Stage.DONE and failed:
             ui.button(say("fly.try-again"), icon="refresh", on_click=self._try_again).props("flat no-caps dense")
 
     def _try_again(self) -> None:
@@ -202,9 +202,9 @@ class _Made:
 
     def _tell_time(self) -> None:
         stage = self._making.stage
-        if stage is Stage.WAITING:
+        if stage == Stage.WAITING:
             self._says.set_text(say("fly.cancelled"))
-        elif stage is not Stage.DONE:
+        elif stage != Stage.DONE:
             self._says.set_text(say(f"fly.making.{stage}", seconds=int(self._making.seconds)))
 
 

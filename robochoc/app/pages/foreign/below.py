@@ -104,7 +104,7 @@ class ForeignDoors:
                     if (more := len(conflict.words) - _MOST_CONSTRAINTS) > 0:
                         with ui.element("li"):
                             ui.label(say("foreign.more", count=f"{more:,}"))
-                ui.label(say("decide.by-cpmpy" if conflict.finder is Finder.CPMPY else "decide.by-own")).classes("soft")
+                ui.label(say("decide.by-cpmpy" if conflict.finder == Finder.CPMPY else "decide.by-own")).classes("soft")
 
 
 def _door(title: str, hint: str, does: Callable[[], object]) -> None:

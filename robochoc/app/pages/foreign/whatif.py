@@ -59,7 +59,7 @@ class _Page:
         self._follow_latest()
 
     def _press(self) -> None:
-        if self._run is not None and self._run.state is State.RUNNING:
+        if self._run is not None and self._run.state == State.RUNNING:
             self._run.stop()
             return
         chosen = self._who.value if isinstance(self._who.value, list) else []
@@ -86,7 +86,7 @@ class _Page:
 
     def _show(self) -> None:
         run = self._run
-        running = run is not None and run.state is State.RUNNING
+        running = run is not None and run.state == State.RUNNING
         self._go.set_text(say("whatif.stop" if running else "foreign.again"))
         told = say("whatif.running-messages", messages=f"{run.live.messages:,}") if running and run else ""
         self._says.set_text(told)
@@ -100,7 +100,7 @@ class _Page:
             epochs = run.result.epochs if run.result else ()
             if len(epochs) >= _TWICE:
                 self._told(run, epochs[-2], epochs[-1])
-            elif run.state is State.STOPPED:
+            elif run.state == State.STOPPED:
                 ui.label(say("whatif.stopped"))
             else:
                 reason = (run.result.reason or "") if run.result else ""

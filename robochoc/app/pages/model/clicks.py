@@ -34,7 +34,7 @@ def with_cell_clicked(sketch: Sketch, cell: Cell, cells_of: str | None, opened: 
     """
     check_cell(sketch, cell)
     decision = None if cells_of is None else sketch.decision(cells_of)
-    if decision is not None and decision.kind is Kind.PLACE:
+    if decision is not None and decision.kind == Kind.PLACE:
         values = with_cell(sketch, decision, sketch.area.number(cell))
         made = msgspec.structs.replace(decision, values=values)
         return with_decision(sketch, made, instead_of=decision.name)
@@ -44,12 +44,12 @@ def with_cell_clicked(sketch: Sketch, cell: Cell, cells_of: str | None, opened: 
 
 def _with_cell_in_rule(sketch: Sketch, rule: SketchRule, number: int) -> Sketch:
     decision = sketch.decision(rule.decision)
-    if decision is None or decision.kind is not Kind.PLACE or number not in sketch.values(decision):
+    if decision is None or decision.kind != Kind.PLACE or number not in sketch.values(decision):
         return sketch
     for opening in PALETTE[rule.kind].openings:
-        if opening.form is Form.VALUE:
+        if opening.form == Form.VALUE:
             return _filled(sketch, rule, opening.name, number)
-        if opening.form is Form.VALUES:
+        if opening.form == Form.VALUES:
             given = rule.settings.get(opening.name)
             cells = [one for one in given if isinstance(one, int)] if isinstance(given, list) else []
             kept = [one for one in cells if one != number] if number in cells else [*cells, number]

@@ -83,7 +83,7 @@ class _DecisionCard:
                 self._everybody = everybody_button(lambda: self._change(robots=()))
                 self._values: ui.input | None = None
                 self._cells: ui.switch | None = None
-                if self._kind is Kind.PLACE:
+                if self._kind == Kind.PLACE:
                     self._about_cells()
                 else:
                     self._values = ui.input(say("model.values"), validation=self._given)

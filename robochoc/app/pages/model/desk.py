@@ -106,7 +106,7 @@ class Desk:
         if self.opened is not None and self.sketch.rule(self.opened) is None:
             self.opened = None
         decision = None if self.cells_of is None else self.sketch.decision(self.cells_of)
-        if decision is None or decision.kind is not Kind.PLACE:
+        if decision is None or decision.kind != Kind.PLACE:
             self.cells_of = None
         if self.just_added not in self.selected:
             self.just_added = None

@@ -95,7 +95,7 @@ def first_rule(sketch: Sketch, entry: PaletteRule, decision: Decision, selected:
         chosen = (chosen or deciders)[: entry.most]
     values = sketch.values(decision)
     settings = {opening.name: _first(opening, values) for opening in entry.openings}
-    if entry.key == _NEAR and decision.kind is Kind.PLACE and len(chosen) == 1:
+    if entry.key == _NEAR and decision.kind == Kind.PLACE and len(chosen) == 1:
         settings["value"] = _nearest(sketch, chosen[0], values)
     cost = FIRST_COST if entry.key == _PREFERENCE else None  # the graded ones have their own
     return SketchRule("", entry.key, decision.name, chosen, settings, cost)

@@ -69,7 +69,7 @@ def robots_of(sketch: Sketch, troubles: Iterable[Trouble] = ()) -> list[DrawnRob
     """Return the robots as they are drawn. Whoever has a trouble has a mark."""
     bad: dict[str, list[str]] = {}
     for trouble in troubles:
-        if trouble.about is About.ROBOT:
+        if trouble.about == About.ROBOT:
             bad.setdefault(trouble.element, []).append(f"{trouble.text} {trouble.remedy}")
     return [_robot(robot, bad.get(robot.name, [])) for robot in sketch.robots]
 
@@ -111,9 +111,9 @@ def links_of(sketch: Sketch) -> LinksDrawn:
 def _groups(sketch: Sketch, rule: SketchRule, room: int) -> list[tuple[str, ...]] | None:
     """Return a rule's links, or nothing if they are too many."""
     entry, bound = PALETTE[rule.kind], sketch.bound(rule)
-    if entry.links is Links.PAIRS and len(bound) * (len(bound) - 1) // 2 > MOST_PAIRS:
+    if entry.links == Links.PAIRS and len(bound) * (len(bound) - 1) // 2 > MOST_PAIRS:
         return [bound]
-    if entry.links is Links.NEIGHBOURS and len(bound) > MOST_LOOKED_AT:
+    if entry.links == Links.NEIGHBOURS and len(bound) > MOST_LOOKED_AT:
         return None
     groups = [*islice(entry.groups(sketch, rule), room + 1)]
     return groups if len(groups) <= room else None

@@ -82,7 +82,7 @@ class RuleForm:
         self._follow.append(follow)
 
     def _robots(self) -> None:
-        leads = self._entry.has_order and self._entry.links is Links.STAR
+        leads = self._entry.has_order and self._entry.links == Links.STAR
         key = "model.rule-robots-leader" if leads else "model.rule-robots"
         choice = ui.select([], multiple=True, label=say(key), with_input=True).classes("wide")
         choice.props(f'dense outlined use-chips hint="{say("model.rule-robots-hint")}"')

@@ -51,7 +51,7 @@ def written_values(values: tuple[int | str, ...]) -> str:
 
 def first_values(sketch: Sketch, kind: Kind, names: str) -> tuple[int | str, ...]:
     """Return the values with which a decision begins: a number for each robot, or some names to be changed."""
-    if kind is Kind.PLACE:
+    if kind == Kind.PLACE:
         return ()
     return tuple(range(1, max(len(sketch.robots), 3) + 1)) if kind in NUMBERED else typed_values(kind, names)
 

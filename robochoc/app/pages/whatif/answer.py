@@ -150,7 +150,7 @@ def _line(row: Row, *, several: bool) -> None:
         with ui.element("th").props("scope=row"):
             ui.label(row.robot)
         cells = [*([row.decision] if several else []), row.before or say("whatif.nobody")]
-        cells += [row.after or say("whatif.nobody"), "" if row.fate is Fate.OPEN else say(f"whatif.{row.fate}")]
+        cells += [row.after or say("whatif.nobody"), "" if row.fate == Fate.OPEN else say(f"whatif.{row.fate}")]
         for text in cells:
             with ui.element("td"):
                 ui.label(text)
@@ -173,8 +173,8 @@ def _failure(story: Story) -> str:
     if story.message:
         return say("whatif.failed", message=story.message)
     for run in (story.run, story.beside):
-        if run is not None and run.state is State.FAILED:
+        if run is not None and run.state == State.FAILED:
             return say("whatif.failed", message=run.message)
-        if run is not None and run.state is State.STOPPED:
+        if run is not None and run.state == State.STOPPED:
             return say("whatif.stopped")
     return say("whatif.unknown") if story.run else ""

@@ -51,4 +51,4 @@ def _by_protocol(team: Team) -> str:
 def _has_secrets(sketch: Sketch) -> bool:
     """Return whether two robots have a rule of which only one of them knows."""
     private = [rule for rule in sketch.rules if rule.on and rule.private and rule.kind in PALETTE]
-    return any(PALETTE[rule.kind].links is not Links.EACH for rule in private)
+    return any(PALETTE[rule.kind].links != Links.EACH for rule in private)

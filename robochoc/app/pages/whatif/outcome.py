@@ -73,7 +73,7 @@ class Outcome:
     @property
     def moved(self) -> list[str]:
         """Who decides something else than before."""
-        return [*dict.fromkeys(row.robot for row in self.rows if row.fate is Fate.MOVED)]
+        return [*dict.fromkeys(row.robot for row in self.rows if row.fate == Fate.MOVED)]
 
     @property
     def stayed(self) -> int:

@@ -200,7 +200,7 @@ def _looked_at(before: Sketch, after: Sketch) -> tuple[LinksDrawn, str, str]:
 def _offered(sketch: Sketch) -> tuple[dict[str, str], dict[str, str]]:
     """Return what can happen to a robot, and to a cell."""
     robot = {"fail": say("whatif.fail")}
-    if any(decision.kind is Kind.LEVEL for decision in sketch.decisions):
+    if any(decision.kind == Kind.LEVEL for decision in sketch.decisions):
         shares = {"half": FULL // 2, "quarter": FULL // 4}
         robot |= {act: say("whatif.battery-set", percent=percent) for act, percent in shares.items()}
     return robot, {"block": say("whatif.block"), "join": say("whatif.join")}

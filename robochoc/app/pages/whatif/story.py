@@ -112,7 +112,7 @@ class Story:
     @property
     def running(self) -> bool:
         """Whether it decides at present."""
-        return self.preparing or any(run.state is State.RUNNING for run in (self.run, self.beside) if run)
+        return self.preparing or any(run.state == State.RUNNING for run in (self.run, self.beside) if run)
 
     async def decide(self) -> None:
         """Let the team decide, before and after what has happened. Returns as soon as it has begun."""
@@ -162,8 +162,8 @@ class Story:
     def _follow(self) -> None:
         """Begin the second run when the first one has ended, and find the outcome when both have."""
         run, kept = self.run, self.kept
-        if run and kept and run.state is not State.RUNNING:
-            if self.beside is None and run.state is State.ENDED and run.result and self._wants_beside(run):
+        if run and kept and run.state != State.RUNNING:
+            if self.beside is None and run.state == State.ENDED and run.result and self._wants_beside(run):
                 protocol = run.result.protocol
                 options = RunOptions(protocol=protocol) if not kept.anew else RunOptions()
                 self.beside = runs_of(self._project).start(options, sketch=kept.after, purpose=BESIDE)
@@ -211,7 +211,7 @@ class Story:
         """Find what was decided before the server ended."""
         runs = runs_of(self._project)
         run = runs.latest_for(PURPOSE)
-        if run is None or run.state is State.RUNNING:
+        if run is None or run.state == State.RUNNING:
             return
         with suppress(OSError, msgspec.DecodeError, ValueError, RecursionError):
             self.kept = msgspec.json.decode((run.folder / CHANGE).read_bytes(), type=Kept)

@@ -57,7 +57,7 @@ class WaysOut:
             return
         self._box.clear()
         with self._box, ui.element("section").classes("panel answer"):
-            if run.state is State.RUNNING:
+            if run.state == State.RUNNING:
                 ui.label(say("whatif.running"))
                 return
             with ui.element("h2").classes("headline"):

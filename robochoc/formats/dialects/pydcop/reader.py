@@ -291,7 +291,7 @@ def _amounts(costs: Iterable[Costs]) -> Iterator[int | Fraction | float]:
 def _is_soft(constraint: Constraint) -> bool:
     match constraint.definition:
         case Relation(semantics=semantics):
-            return semantics is Semantics.SOFT
+            return semantics == Semantics.SOFT
         case Predicate():
             return constraint.cost != INFINITE
         case Function():

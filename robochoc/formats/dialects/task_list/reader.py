@@ -108,7 +108,7 @@ def _list(head: Entry, stem: str, mistakes: DiagnosticCollector) -> _List:
     places = head.whole("places", 0) or 0
     if places > MAX_PLACES:
         raise MistakeError(f"has {places} places", f"costs have at most {MAX_PLACES} decimal places")
-    tours = head.flag("tours") and model is not TasksModel.ASSIGNMENT
+    tours = head.flag("tours") and model != TasksModel.ASSIGNMENT
     name = " ".join(head.words("name")) or stem
     _check_points([*robots.values(), *tasks.values()], mistakes)
     return _List(name, model, distance, places, robots, tasks, synergies, tours)
@@ -128,7 +128,7 @@ def _check_points(entries: Sequence[RobotEntry | TaskEntry], mistakes: Diagnosti
 
 
 def _check_model(read: _List, mistakes: DiagnosticCollector) -> None:
-    if read.model is TasksModel.ASSIGNMENT:
+    if read.model == TasksModel.ASSIGNMENT:
         for name, robot in read.robots.items():
             if robot.most not in (None, 1):
                 what = f"the robot '{shortened(name)}' may do {robot.most} tasks, and the model is assignment"
@@ -181,7 +181,7 @@ class _Maker:
         read = self._read
         workers = [self._worker(name, robot) for name, robot in read.robots.items()]
         self._note_what_nobody_does(workers)
-        if read.model is TasksModel.ASSIGNMENT:
+        if read.model == TasksModel.ASSIGNMENT:
             _check_symbols(read.tasks)
             variables, constraints = assignment(workers, (NONE, *read.tasks))
         else:
@@ -208,10 +208,10 @@ class _Maker:
         together: dict[tuple[int, int], int] = {}
         for one in self._read.synergies:
             first, second = sorted(self._number[task] for task in one.tasks)
-            if first in profit and second in profit and self._read.model is TasksModel.SEVERAL:
+            if first in profit and second in profit and self._read.model == TasksModel.SEVERAL:
                 together[first, second] = together.get((first, second), 0) + int(self._scale.units(one.worth))
         own = self._robot_names.of(name)
-        if self._read.model is TasksModel.ASSIGNMENT:
+        if self._read.model == TasksModel.ASSIGNMENT:
             return Worker(own, own, f"{own}.{_ONLY}", profit)
         if not profit:
             self._notes.append(Note("left out", f"the robot {shortened(name)}, which can do none of the tasks"))
@@ -242,7 +242,7 @@ class _Maker:
         tasks = list(self._read.tasks)
         found = dict(self._robot_names.changed)
         for name, one in zip(self._read.robots, workers, strict=True):
-            if self._read.model is TasksModel.ASSIGNMENT:
+            if self._read.model == TasksModel.ASSIGNMENT:
                 found[one.variable] = f"{name}.{_ONLY}"
             else:
                 own = {f"{one.variable}.{self._task_names.of(tasks[task - 1])}": tasks[task - 1] for task in one.profit}

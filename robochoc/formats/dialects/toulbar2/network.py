@@ -82,7 +82,7 @@ def imported(network: Network, options: ImportOptions, dialect: str) -> Imported
 
 
 def _is_soft(constraint: Constraint) -> bool:
-    return isinstance(constraint.definition, Relation) and constraint.definition.semantics is Semantics.SOFT
+    return isinstance(constraint.definition, Relation) and constraint.definition.semantics == Semantics.SOFT
 
 
 def _domains(network: Network, symbols: Names) -> tuple[dict[str, Sequence[int]], dict[str, Domain]]:

@@ -58,7 +58,7 @@ class FlatTeam:
         self.team = team
         self.title = title
         self.units = common_units(robot.costs for robot in team.robots)
-        self.weighted = team.kind is ProblemKind.DISWCSP
+        self.weighted = team.kind == ProblemKind.DISWCSP
         self.domains, self.domain_of = _domains(team)
         self.held = list(_held(team))
 
@@ -84,8 +84,8 @@ class FlatTeam:
     def _projected(self, one: Held, relation: Relation) -> Rows:
         terms = one.constraint.parameters
         variables = tuple(dict.fromkeys(term for term in terms if isinstance(term, str)))
-        soft = relation.semantics is Semantics.SOFT
-        listed = relation.costs or [0 if relation.semantics is Semantics.SUPPORTS else INFINITE] * len(relation.tuples)
+        soft = relation.semantics == Semantics.SOFT
+        listed = relation.costs or [0 if relation.semantics == Semantics.SUPPORTS else INFINITE] * len(relation.tuples)
         costs = {}
         for values, cost in zip(relation.tuples, listed, strict=True):
             found: dict[str, int] = {}
@@ -94,14 +94,14 @@ class FlatTeam:
                     break
             else:
                 costs[tuple(found[name] for name in variables)] = self.cost(one.robot, cost)
-        other = relation.default_cost if soft else INFINITE if relation.semantics is Semantics.SUPPORTS else 0
+        other = relation.default_cost if soft else INFINITE if relation.semantics == Semantics.SUPPORTS else 0
         return Rows(variables, costs, self.cost(one.robot, other))
 
 
 def _held(team: Team) -> Iterator[Held]:
     for robot in team.robots:
         for constraint in (*robot.private, *robot.shared):
-            yield Held(constraint, robot, constraint.model is ConstraintModel.PKC)
+            yield Held(constraint, robot, constraint.model == ConstraintModel.PKC)
         for child in robot.children:
             for constraint in child.constraints:
                 yield Held(constraint, robot, private_part=True)

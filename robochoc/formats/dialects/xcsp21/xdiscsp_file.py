@@ -91,7 +91,7 @@ class _Writer:
         definition = one.constraint.definition
         soft = self._flat.weighted or not isinstance(definition, Relation)
         listed = [" ".join(map(str, values)) for values in rows.costs]
-        if not soft and isinstance(definition, Relation) and definition.semantics is not Semantics.SOFT:
+        if not soft and isinstance(definition, Relation) and definition.semantics != Semantics.SOFT:
             return self._document.relation(rows, {"semantics": definition.semantics}, "|".join(listed))
         if not self._flat.weighted:  # a predicate without a counterpart
             allowed = {values: cost for values, cost in rows.costs.items() if cost != INFINITE}

@@ -59,14 +59,14 @@ def type_of(expression: Expression) -> Type:
 
 def as_integer(expression: Expression) -> Expression:
     """Return `expression` as an integer: 1 where it is true."""
-    if type_of(expression) is Type.INTEGER:
+    if type_of(expression) == Type.INTEGER:
         return expression
     return Apply("if", (expression, Constant(1), Constant(0)))
 
 
 def as_boolean(expression: Expression) -> Expression:
     """Return `expression` as a Boolean: true unless it is 0."""
-    if type_of(expression) is Type.BOOLEAN:
+    if type_of(expression) == Type.BOOLEAN:
         return expression
     if isinstance(expression, Apply) and expression.operator == "if":
         condition, then, otherwise = expression.arguments
@@ -289,14 +289,14 @@ def _equal(parts: list[Expression]) -> Expression:
 
 
 def _same(one: Expression, other: Expression) -> Expression:
-    if type_of(one) is Type.BOOLEAN and type_of(other) is Type.BOOLEAN:
+    if type_of(one) == Type.BOOLEAN and type_of(other) == Type.BOOLEAN:
         return Apply("iff", (one, other))
     return Apply("eq", (as_integer(one), as_integer(other)))
 
 
 def _unequal(parts: list[Expression]) -> Expression:
     one, other = parts
-    if type_of(one) is Type.BOOLEAN and type_of(other) is Type.BOOLEAN:
+    if type_of(one) == Type.BOOLEAN and type_of(other) == Type.BOOLEAN:
         return Apply("xor", (one, other))
     return Apply("ne", (as_integer(one), as_integer(other)))
 
