@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import hashlib
 import re
+from dataclasses import fields
 from enum import StrEnum
 from typing import Any
 
 import msgspec
 
 from robochoc.communication.simulator.channel import ChannelModel
-from robochoc.model.orders import Order
-from robochoc.run.options import CENTRAL, Options, Preprocess, Runtime, ScheduleName, Withdrawal
+from robochoc.run.options import CENTRAL, Options, Runtime, ScheduleName
 
 Parameter = str | int | float | bool
 Content = bytes
@@ -101,23 +101,11 @@ NO_LIMITS = Limits()
 
 def options_of(setup: Setup, limits: Limits = NO_LIMITS, seed: int = 0) -> Options:
     """Return the options of a run."""
-    return Options(
-        protocol=setup.protocol,
-        runtime=Runtime(setup.runtime),
-        seed=seed,
-        timeout=limits.timeout,
-        withdraw=None if setup.withdraw is None else Withdrawal(setup.withdraw),
-        preprocess=None if setup.preprocess is None else Preprocess(setup.preprocess),
-        schedule=ScheduleName(setup.schedule),
-        delay=setup.delay,
-        verify=setup.verify,
-        order=None if setup.order is None else Order(setup.order),
-        messages=limits.messages,
-        ncccs=limits.ncccs,
-        cycles=limits.cycles,
-        channel=setup.channel,
-        settings=setup.settings,
-    )
+    given = msgspec.structs.asdict(setup) | msgspec.structs.asdict(limits)
+    return Options(**{name: value for name, value in given.items() if name in _OPTIONS}, seed=seed)
+
+
+_OPTIONS = frozenset(one.name for one in fields(Options))
 
 
 class Task(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True):

@@ -7,7 +7,7 @@ from collections.abc import Iterable
 from functools import cache
 from pathlib import Path
 from threading import Lock
-from typing import Protocol, cast
+from typing import Any, Protocol, cast
 
 from lxml import etree
 
@@ -71,6 +71,13 @@ class SchemaError(InvalidInputError):
     def __init__(self, diagnostics: Iterable[Diagnostic], tree: etree._Element) -> None:
         super().__init__(diagnostics)
         self.tree = tree
+
+    def __getstate__(self) -> dict[str, object]:
+        return {**vars(self), "tree": etree.tostring(self.tree)}
+
+    def __setstate__(self, state: dict[str, Any] | None) -> None:
+        super().__setstate__(state)
+        self.tree = etree.fromstring(cast("bytes", self.tree), etree.XMLParser(resolve_entities=False, no_network=True))
 
 
 class LogEntry(Protocol):

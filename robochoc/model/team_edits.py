@@ -9,12 +9,13 @@ from collections.abc import Iterable
 from dataclasses import replace
 
 from robochoc.model.problem import Child, Constraint, Parent, Robot, Team
+from robochoc.system.errors import TransferableError
 
 MAX_SHOWN = 60
 """The maximum number of characters of a name, or of a list, in a message."""
 
 
-class ChangeError(ValueError):
+class ChangeError(TransferableError, ValueError):
     """A change that the team as it stands cannot take: what is wrong, and what was expected.
 
     Attributes:

@@ -29,9 +29,10 @@ from robochoc.modelling.drafts import Definitions, Draft, costs_of
 from robochoc.modelling.events import Event, Removal
 from robochoc.modelling.given import changes_in_finer_units, in_finer_units
 from robochoc.modelling.numbers import places_of
-from robochoc.modelling.places import ModelError, Place, did_you_mean
+from robochoc.modelling.places import ModelError, Place
 from robochoc.modelling.robots import ModelRobot
 from robochoc.modelling.rules import Rule
+from robochoc.system.suggestions import did_you_mean
 
 if TYPE_CHECKING:
     from robochoc.modelling.model import Model

@@ -6,10 +6,11 @@ from collections.abc import Hashable
 from typing import TYPE_CHECKING
 
 from robochoc.model.problem import AddValue, RemoveAgent, RemoveValue
-from robochoc.modelling.places import ModelError, ModelTypeError, Place, UnknownNameError, did_you_mean, here
+from robochoc.modelling.places import ModelError, ModelTypeError, Place, UnknownNameError, here
 from robochoc.modelling.robots import ModelRobot, check_robot
 from robochoc.modelling.rules import Rule
 from robochoc.modelling.terms import Variable
+from robochoc.system.suggestions import did_you_mean
 
 if TYPE_CHECKING:
     from robochoc.modelling.model import Model

@@ -32,12 +32,13 @@ from robochoc.modelling.drafts import split
 from robochoc.modelling.events import Event
 from robochoc.modelling.given import Given, given_by, given_variable
 from robochoc.modelling.numbers import Exact
-from robochoc.modelling.places import ModelError, Place, UnknownNameError, did_you_mean, here
+from robochoc.modelling.places import ModelError, Place, UnknownNameError, here
 from robochoc.modelling.robots import ModelRobot, check_robot
 from robochoc.modelling.rules import Rule, check_owned, conditions_in, exact_or_none
 from robochoc.modelling.solution import Solution
 from robochoc.modelling.solving import Solvable
 from robochoc.modelling.terms import Term, Variable, all_of, number
+from robochoc.system.suggestions import did_you_mean
 
 
 class Model(Solvable):

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-import difflib
 import sys
-from collections.abc import Iterable
 from pathlib import Path
 from typing import NamedTuple
+
+from robochoc.system.errors import TransferableError
 
 _HERE = str(Path(__file__).resolve().parent.parent)
 
@@ -21,7 +21,7 @@ class Place(NamedTuple):
         return f"{self.file}:{self.line}"
 
 
-class ModelError(ValueError):
+class ModelError(TransferableError, ValueError):
     """A model says what cannot be. The message names the line of the program that said so."""
 
     def __init__(self, message: str, hint: str = "", place: Place | None = None) -> None:
@@ -45,13 +45,3 @@ def here() -> Place:
     while frame.f_back is not None and frame.f_code.co_filename.startswith(_HERE):
         frame = frame.f_back
     return Place(frame.f_code.co_filename, frame.f_lineno)
-
-
-def did_you_mean(word: object, known: Iterable[object], fallback: str = "") -> str:
-    """Return a hint that names what comes nearest to `word`; if nothing does, `fallback`."""
-    words = [str(one) for one in known]
-    near = [one for one in words if one.endswith(f".{word}")] or difflib.get_close_matches(str(word), words, 1)
-    if not near:
-        folded = {one.lower(): one for one in words}
-        near = [folded[one] for one in difflib.get_close_matches(str(word).lower(), folded, 1)]
-    return f"did you mean {near[0]!r}?" if near else fallback

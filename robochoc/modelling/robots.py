@@ -9,10 +9,11 @@ from robochoc.formats.names import MAX_NAME, MAX_WEIGHT, RESERVED, is_name
 from robochoc.model.expression import Expression
 from robochoc.model.problem import Topic
 from robochoc.modelling.codes import codes_of
-from robochoc.modelling.places import ModelError, ModelTypeError, Place, UnknownNameError, did_you_mean, here
+from robochoc.modelling.places import ModelError, ModelTypeError, Place, UnknownNameError, here
 from robochoc.modelling.rules import Rule
 from robochoc.modelling.terms import Variable, number
 from robochoc.modelling.translation import Translator, UntranslatableError
+from robochoc.system.suggestions import did_you_mean
 
 if TYPE_CHECKING:
     from robochoc.modelling.model import Model

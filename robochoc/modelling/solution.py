@@ -13,8 +13,9 @@ from robochoc.model.headline import describe_outcome
 from robochoc.model.outcome import Outcome
 from robochoc.model.problem import Team
 from robochoc.modelling.meanings import UndefinedTermError
-from robochoc.modelling.places import UnknownNameError, did_you_mean
+from robochoc.modelling.places import UnknownNameError
 from robochoc.modelling.terms import Term, Variable
+from robochoc.system.suggestions import did_you_mean
 
 if TYPE_CHECKING:
     from robochoc.modelling.notebook.scenes import ScenePage

@@ -5,22 +5,19 @@ from __future__ import annotations
 import inspect
 from abc import ABC, abstractmethod
 from collections.abc import Iterable, Mapping, Sequence
-from enum import StrEnum
-from typing import TYPE_CHECKING, Never, TypeVar
+from dataclasses import fields, replace
+from typing import TYPE_CHECKING, Never
 
 from robochoc.journal.events import Observer
-from robochoc.model.orders import Order
 from robochoc.model.outcome import Outcome
 from robochoc.model.problem import Team
-from robochoc.modelling.places import did_you_mean
 from robochoc.modelling.solution import Solution
-from robochoc.run.choice import decided
 from robochoc.run.defaults import AUTO
-from robochoc.run.options import CentralSolverName, OnLoss, Options, Preprocess, Runtime, ScheduleName, Withdrawal
+from robochoc.run.options import CentralSolverName, Options, Runtime, ScheduleName
 from robochoc.run.orchestrator import solve
-from robochoc.run.registry import installed_spelling
 from robochoc.run.scenario import Environment
 from robochoc.solver.compile import Limits
+from robochoc.system.suggestions import did_you_mean
 
 if TYPE_CHECKING:
     from robochoc.communication.kill_schedule import Kill
@@ -28,7 +25,7 @@ if TYPE_CHECKING:
 
 NO_LIMITS = Limits()
 """The default limits on the compilation of domains."""
-_Choice = TypeVar("_Choice", bound=StrEnum)
+_OPTIONS = frozenset(one.name for one in fields(Options))
 
 
 class Solvable(ABC):
@@ -127,44 +124,12 @@ class Solvable(ABC):
             >>> len(outcome.assignment)
             10
         """
+        given = {name: value for name, value in locals().items() if name in _OPTIONS}
         _refuse(unknown)
-        _check_numbers(seed=seed, timeout=timeout, deadline=deadline, improve=improve, patience=patience)
-        _check_numbers(delay=delay, spares=spares, messages=messages, ncccs=ncccs, cycles=cycles)
         team = self._team_to_solve()
-        called = self._robots_called(team)
-        options = Options(
-            protocol=installed_spelling(protocol) if protocol else AUTO,
-            runtime=_choice("runtime", Runtime, runtime),
-            seed=seed,
-            timeout=timeout,
-            deadline=deadline,
-            improve=improve,
-            withdraw=None if withdraw is None else _choice("withdraw", Withdrawal, withdraw),
-            schedule=_choice("schedule", ScheduleName, schedule),
-            delay=delay,
-            local=local,
-            cache=cache,
-            count=count,
-            central_with=_choice("central_with", CentralSolverName, central_with),
-            verify=verify,
-            order=_order(order, called),
-            messages=messages,
-            ncccs=ncccs,
-            cycles=cycles,
-            on_loss=None if on_loss is None else _choice("on_loss", OnLoss, on_loss),
-            spares=spares,
-            patience=patience,
-            channel=channel,
-            message_loss=message_loss,
-            settings={name: str(value) for name, value in settings.items()},
-            filters=tuple(filters),
-            kill=tuple(one._replace(robot=called.get(one.robot, one.robot)) for one in kill),
-            bounds=bounds,
-            preprocess=None if preprocess is None else _choice("preprocess", Preprocess, preprocess),
-        )
-        changes = environment is not None
-        options = decided(team, options, environment=changes, ordered=self._is_ordered).options
-        return self._solution(solve(team, options, observer=observer, environment=environment), team)
+        options = _with_team_names(Options(**given | {"protocol": protocol or AUTO}), self._robots_called(team))
+        outcome = solve(team, options, observer=observer, environment=environment, ordered=self._is_ordered)
+        return self._solution(outcome, team)
 
     def _repr_html_(self) -> str:
         from robochoc.model.notebook.team import team_html  # noqa: PLC0415 - notebooks only
@@ -196,32 +161,18 @@ def _refuse(unknown: Iterable[str]) -> None:
         raise TypeError(f"solve() has no option {name!r}; {hint}")
 
 
-def _check_numbers(**given: float | None) -> None:
-    """Raise `TypeError` for options that are no numbers, or integers, and `ValueError` for those that are negative."""
-    for name, value in given.items():
-        whole = name not in {"timeout", "deadline", "improve", "patience"}
-        if value is None:
-            continue
-        if not isinstance(value, int if whole else (int, float)):
-            raise TypeError(f"{name}={value!r} is not allowed; expected {'an integer' if whole else 'seconds'}")
-        if name != "seed" and not value >= 0:
-            raise ValueError(f"{name}={value!r} is not allowed; expected 0 or more")
+def _with_team_names(options: Options, called: Mapping[str, str]) -> Options:
+    """Return `options` with the names that robots have in the team. Raises `ValueError` for an unknown robot.
 
-
-def _choice(name: str, choices: type[_Choice], given: str) -> _Choice:
-    """Return the member of an enumeration. Raises `ValueError` with those that there are."""
-    try:
-        return choices(given)
-    except ValueError:
-        known = [str(one) for one in choices]
-        hint = did_you_mean(given, known, f"expected {', '.join(known)}")
-        raise ValueError(f"{name}={given!r} is not allowed; {hint}") from None
-
-
-def _order(order: str | Sequence[str] | None, called: Mapping[str, str]) -> Order | tuple[str, ...] | None:
-    if order is None or isinstance(order, str):
-        return None if order is None else _choice("order", Order, order)
-    for name in order:
-        if name not in called:
-            raise ValueError(f"order: there is no robot {name!r}; {did_you_mean(name, called, 'name all robots')}")
-    return tuple(called[name] for name in order)
+    Args:
+        options: The options, with the user's names of robots.
+        called: The names of robots in the team, by the user's.
+    """
+    order = options.order
+    if isinstance(order, tuple):
+        for name in order:
+            if name not in called:
+                raise ValueError(f"order: there is no robot {name!r}; {did_you_mean(name, called, 'name all robots')}")
+        order = tuple(called[name] for name in order)
+    kill = tuple(one._replace(robot=called.get(one.robot, one.robot)) for one in options.kill)
+    return replace(options, order=order, kill=kill)

@@ -16,7 +16,8 @@ from robochoc.modelling.codes import BOOLEAN, NUMBER, Codes, Kind, kind_of
 from robochoc.modelling.extents import ALONE, Extent, extent_of
 from robochoc.modelling.meanings import MEANINGS
 from robochoc.modelling.numbers import Exact, exact, is_number, shown
-from robochoc.modelling.places import ModelError, ModelTypeError, Place, did_you_mean
+from robochoc.modelling.places import ModelError, ModelTypeError, Place
+from robochoc.system.suggestions import did_you_mean
 
 Values = Mapping["Variable", object]
 """The users' values of variables."""

@@ -30,6 +30,7 @@ from robochoc.solver.compiled_team import CompiledRobot, CompiledTeam
 from robochoc.solver.domain import CompiledDomain, TooManySolutionsError
 from robochoc.solver.encoding import UnsupportedError
 from robochoc.solver.failures import SolverLostError, SolverMissingError, SolverTimeoutError
+from robochoc.system.errors import TransferableError
 from robochoc.verification.objective import withdrawal_cost
 
 _UNCOMPILED = (
@@ -45,7 +46,7 @@ _UNCOMPILED = (
 """Raised for robots that cannot be compiled, or whose settings do not fit."""
 
 
-class CannotReplayError(Exception):
+class CannotReplayError(TransferableError):
     """A run that cannot be replayed: why, and what would help. `broken`: the journal is damaged."""
 
     def __init__(self, why: str, *, broken: bool = False) -> None:

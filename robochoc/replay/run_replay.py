@@ -15,6 +15,7 @@ from robochoc.replay.channels import MessageDecoder, RecordedChannels
 from robochoc.replay.comparison import Difference, StepComparison
 from robochoc.replay.rebuild import RebuiltRobots
 from robochoc.replay.steps import RecordedRun, RecordedStep, steps_of
+from robochoc.system.errors import TransferableError
 
 SIMULATED = "simulator"
 """The runtime whose schedules may delay messages: a message may then move the receiver's clock on."""
@@ -29,7 +30,7 @@ class NoEndError(Exception):
     """A step in which the protocol has sent so many messages that it may never end."""
 
 
-class ReplayStopsError(Exception):
+class ReplayStopsError(TransferableError):
     """A robot that cannot be followed any further.
 
     `unsaid`: a message to it cannot be rebuilt from the journal, but by replaying its sender.

@@ -5,10 +5,28 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from enum import StrEnum
+from types import MappingProxyType
 from typing import TYPE_CHECKING, Self
 
 from robochoc.model.orders import Order
 from robochoc.run.defaults import AUTO
+from robochoc.run.option_values import (
+    channel_model,
+    count,
+    flag,
+    instance_of,
+    integer,
+    items_of,
+    kill,
+    one_of,
+    optional,
+    priority_order,
+    protocol_name,
+    real,
+    seconds,
+    text,
+    texts_by_name,
+)
 from robochoc.solver.compile import Limits
 
 if TYPE_CHECKING:
@@ -80,6 +98,13 @@ class CentralSolverName(StrEnum):
 class Options:
     """The options of a run. `run/compatibility` decides which of them can be combined.
 
+    Every value is converted and checked: members of enums may be given as texts ("minimum"), numbers in any type of
+    number, lists instead of tuples.
+
+    Raises:
+        TypeError: if a value has a wrong type.
+        ValueError: if a value is not allowed.
+
     Attributes:
         protocol: The name of the protocol by which the robots solve the problem, or `CENTRAL`; or `AUTO`, for one that
             suits it (`run/choice.py`).
@@ -146,6 +171,10 @@ class Options:
     bounds: bool = False
     preprocess: Preprocess | None = None
 
+    def __post_init__(self) -> None:
+        for name, given in vars(self).copy().items():
+            object.__setattr__(self, name, _CONVERTERS[name](name, given))
+
     @property
     def limit_s(self) -> float | None:
         """Return the limit on wall-clock time, in seconds, by whichever option; None: there is none."""
@@ -173,3 +202,39 @@ class Options:
     def survives_losses(self) -> bool:
         """Return whether the run goes on when a robot is lost."""
         return self.on_loss == OnLoss.WITHDRAW or (self.on_loss is None and self.spares > 0)
+
+
+_CONVERTERS = MappingProxyType(
+    {
+        "protocol": protocol_name,
+        "runtime": one_of(Runtime),
+        "seed": integer,
+        "timeout": optional(seconds),
+        "deadline": optional(seconds),
+        "improve": optional(seconds),
+        "withdraw": optional(one_of(Withdrawal)),
+        "schedule": one_of(ScheduleName),
+        "delay": count,
+        "local": instance_of(Limits),
+        "cache": flag,
+        "count": flag,
+        "central_with": one_of(CentralSolverName),
+        "verify": flag,
+        "order": optional(priority_order),
+        "messages": optional(count),
+        "ncccs": optional(count),
+        "cycles": optional(count),
+        "on_loss": optional(one_of(OnLoss)),
+        "spares": count,
+        "patience": optional(seconds),
+        "channel": optional(channel_model),
+        "message_loss": real,
+        "settings": texts_by_name,
+        "filters": items_of(text, "the names of filters"),
+        "kill": items_of(kill, "objects of the class Kill"),
+        "chosen": texts_by_name,
+        "bounds": flag,
+        "preprocess": optional(one_of(Preprocess)),
+    }
+)
+"""The conversion of each field of `Options`: a field without one cannot be set."""

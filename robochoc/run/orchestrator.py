@@ -44,6 +44,7 @@ def solve(
     solver: AceProcess | None = None,
     environment: Environment | None = None,
     audience: Audience | None = None,
+    ordered: bool = True,
 ) -> Outcome:
     """Let `team` solve its problem, epoch by epoch if it changes, and check each answer against every constraint.
 
@@ -55,6 +56,7 @@ def solve(
         solver: a constraint solver that is running already: a program that solves many teams saves time with it.
         environment: gets each epoch's answer, and returns the next change of the problem.
         audience: with `Options.improve`, gets each answer while the search goes on.
+        ordered: whether the priority order of `team` is meant. Otherwise one is chosen for any protocol.
 
     Returns:
         The outcome. When a limit was reached, its verdict is `unknown`.
@@ -72,7 +74,7 @@ def solve(
     check_team(team)
     environment = environment and with_checked_events(environment)
     refuse_options(options, environment=environment is not None)
-    options = decided(team, options, environment=environment is not None).options
+    options = decided(team, options, environment=environment is not None, ordered=ordered).options
     try:
         context = RunContext(options, observer, progress, solver)
         counted = normalized(team)

@@ -10,6 +10,8 @@ from typing import assert_never
 
 import msgspec
 
+from robochoc.system.errors import TransferableError
+
 MAX_SERVICES = 64
 MAX_NAMES = 256
 """Protocols, ontologies, languages or addresses in one description."""
@@ -41,7 +43,7 @@ FAILURES = frozenset({Reason.ALREADY_REGISTERED, Reason.NOT_REGISTERED, Reason.I
 """Reasons that are found only during a request. Any other reason refuses it beforehand."""
 
 
-class RequestRefusedError(Exception):
+class RequestRefusedError(TransferableError):
     """The Directory does not do what it was asked: for `reason`, and what that is about."""
 
     def __init__(self, reason: Reason, *about: str) -> None:

@@ -13,8 +13,10 @@ import re
 from dataclasses import dataclass, field
 from typing import NamedTuple, assert_never
 
+from robochoc.system.errors import TransferableError
 
-class SymbolicExpressionError(ValueError):
+
+class SymbolicExpressionError(TransferableError, ValueError):
     """A text that is no expression, or not the one expected; `at` is the character it is about, from 0."""
 
     def __init__(self, message: str, at: int) -> None:

@@ -29,6 +29,7 @@ from robochoc.services.symbolic import (
     text_of,
     written,
 )
+from robochoc.system.errors import TransferableError
 
 CAPS = Caps(characters=1 << 25, expressions=10_000, depth=16)
 """The largest message of a protocol, a piece of a table of `dpop`, has 16 MiB, and a third more as text."""
@@ -37,7 +38,7 @@ _DATE_TIME = re.compile(r"[+-]?[0-9]{8}T[0-9]{9}[A-Za-z]?")
 _USER_DEFINED = re.compile(r"x-[a-z0-9_.-]{1,64}")
 
 
-class ACLError(ValueError):
+class ACLError(TransferableError, ValueError):
     """A text or message that cannot be used; `at` is the position of the error; None: it has no position."""
 
     def __init__(self, message: str, at: int | None = None) -> None:

@@ -14,6 +14,7 @@ from robochoc.solver.cache import SolutionCache
 from robochoc.solver.domain import MAX_SOLUTIONS, CompiledDomain, TooManySolutionsError, compile_domain
 from robochoc.solver.encoding import Codes, Network, UnsupportedError
 from robochoc.solver.failures import SolverLostError, SolverTimeoutError
+from robochoc.system.errors import TransferableError
 
 if TYPE_CHECKING:
     from robochoc.solver.ace import AceProcess
@@ -45,7 +46,7 @@ class CompiledFrom(StrEnum):
     ACE = "ace"
 
 
-class CompileTimeoutError(Exception):
+class CompileTimeoutError(TransferableError):
     """A robot's local problem took too long."""
 
     def __init__(self, robot: str, limit_s: float) -> None:
@@ -56,7 +57,7 @@ class CompileTimeoutError(Exception):
         self.robot = robot
 
 
-class CompileError(Exception):
+class CompileError(TransferableError):
     """The solver was lost over a robot's local problem."""
 
     def __init__(self, robot: str, why: str) -> None:

@@ -24,6 +24,7 @@ from robochoc.solver.encoding import (
     cost_function,
     is_soft,
 )
+from robochoc.system.errors import TransferableError
 
 MAX_SOLUTIONS = 100_000
 """The default maximum of local solutions of a robot."""
@@ -32,7 +33,7 @@ SolveNetwork = Callable[[Network], Iterable[Sequence[int]]]
 """All solutions of a network of several variables, in codes; `solver/ace.py` has one."""
 
 
-class TooManySolutionsError(Exception):
+class TooManySolutionsError(TransferableError):
     """The robot has more local solutions, or values, than the limit."""
 
     def __init__(self, robot: str, limit: int) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from robochoc.solver.encoding import Codes
+from robochoc.system.errors import TransferableError
 
 
 class SolverMissingError(Exception):
@@ -13,7 +14,7 @@ class SolverLostError(Exception):
     """The solver's process died, or failed at the task; says what is known about it."""
 
 
-class SolverTimeoutError(Exception):
+class SolverTimeoutError(TransferableError):
     """The time was over before the solver's answer. `best` is the cheapest solution so far, where one was sought."""
 
     def __init__(self, best: Codes | None = None) -> None:

@@ -13,12 +13,13 @@ from robochoc.solver.compile import CompiledFrom, Compiler, Limits
 from robochoc.solver.compiled_team import CompiledTeam
 from robochoc.solver.domain import CompiledDomain
 from robochoc.solver.failures import SolverTimeoutError
+from robochoc.system.errors import TransferableError
 
 if TYPE_CHECKING:
     from robochoc.solver.ace import AceProcess
 
 
-class NoLocalSolutionError(Exception):
+class NoLocalSolutionError(TransferableError):
     """The private constraints of `robot` leave it no local solution."""
 
     def __init__(self, robot: str) -> None:

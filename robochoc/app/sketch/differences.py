@@ -23,12 +23,13 @@ from robochoc.formats import InvalidInputError
 from robochoc.modelling.events import Event
 from robochoc.modelling.model import Model
 from robochoc.modelling.places import ModelError
+from robochoc.system.errors import TransferableError
 
 Domains = dict[tuple[str, str], list[Value]]
 """The values that are left, by robot and decision."""
 
 
-class AnewError(ValueError):
+class AnewError(TransferableError, ValueError):
     """Events cannot say this difference: the team decides anew. `key` is its text in the catalogue."""
 
     def __init__(self, key: str, **named: object) -> None:

@@ -13,9 +13,10 @@ from robochoc.app.sketch import sketch as limits
 from robochoc.app.sketch.resizing import resized
 from robochoc.app.sketch.sketch import Cell, Decision, Sketch, SketchRobot, SketchRule
 from robochoc.formats.names import MAX_WEIGHT, RESERVED, is_name
+from robochoc.system.errors import TransferableError
 
 
-class EditError(ValueError):
+class EditError(TransferableError, ValueError):
     """An edit that cannot be: the `key` of its text in the catalogue, what the text names, and the element."""
 
     def __init__(self, key: str, element: str = "", **named: object) -> None:

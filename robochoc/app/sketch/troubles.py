@@ -7,6 +7,7 @@ from enum import StrEnum
 import msgspec
 
 from robochoc.app.texts import say
+from robochoc.system.errors import TransferableError
 
 
 class About(StrEnum):
@@ -66,7 +67,7 @@ class Trouble(msgspec.Struct, frozen=True):
         return self.severity == Severity.ERROR
 
 
-class NotReadyError(ValueError):
+class NotReadyError(TransferableError, ValueError):
     """A sketch is no team yet: something has to be mended first. The message says what, and how."""
 
     def __init__(self, trouble: Trouble) -> None:

@@ -15,6 +15,7 @@ from robochoc.cli.options.numbers import WholeNumber
 from robochoc.cli.options.paths import InputPath, OutputFile, refuse_same_places
 from robochoc.cli.options.saved import saved_journal
 from robochoc.cli.reports.failures import INVALID, USAGE, Failure
+from robochoc.system.errors import TransferableError
 
 if TYPE_CHECKING:
     from robochoc.journal.journal import Journal
@@ -137,7 +138,7 @@ def _pieces(form: str, read: Journal, trace: Trace, meant: Selection, messages: 
             return [_page(read, trace, meant)]
 
 
-class _TooManyError(Exception):
+class _TooManyError(TransferableError):
     """Too many messages for the form; `last` is the last one of those that are not (None: there are none)."""
 
     def __init__(self, why: str, fitting: Sequence[int]) -> None:

@@ -91,12 +91,12 @@ def serve(
     from robochoc.ros.decision import FollowedDecision
     from robochoc.ros.names import ros_name
     from robochoc.ros.sinks import lacking_for
-    from robochoc.run.options import Options, Runtime
+    from robochoc.run.options import Options
 
     lacking = lacking_for(kind)
     if lacking:
         raise Failure(USAGE, lacking)
-    options = Options(given["protocol"], Runtime(given["runtime"]), given["seed"], given["timeout"])
+    options = Options(given["protocol"], given["runtime"], given["seed"], given["timeout"])
     triggers = {f"/robochoc{ros_name(team.name)}/decide": team.name for team in teams}
     if len(triggers) < len(teams):
         raise Failure(USAGE, "two teams would have the same service in ROS: give one's folder another name")

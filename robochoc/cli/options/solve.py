@@ -120,7 +120,8 @@ filter_option = click.option(
 
 _SAME_NAMES = (
     "seed", "timeout", "delay", "count", "verify", "messages", "ncccs", "cycles", "spares", "patience", "filters",
-    "kill", "bounds", "message_loss", "deadline", "improve",
+    "kill", "bounds", "message_loss", "deadline", "improve", "runtime", "schedule", "withdraw", "on_loss", "preprocess",
+    "central_with",
 )  # fmt: skip
 """Arguments of `robochoc solve` that are called as in `robochoc.run.Options`."""
 
@@ -231,20 +232,10 @@ def options_of(arguments: dict[str, Any], *, environment: bool) -> Options:
 
 
 def _take_options(arguments: dict[str, Any]) -> Options:
-    from robochoc.run.options import (
-        CentralSolverName,
-        OnLoss,
-        Options,
-        Preprocess,
-        Runtime,
-        ScheduleName,
-        Withdrawal,
-    )
+    from robochoc.run.options import Options
 
     with failures_told("--channel"):
         channel = channel_for(arguments.pop("channel"))
-    withdraw, on_loss = arguments.pop("withdraw"), arguments.pop("on_loss")
-    preprocess = arguments.pop("preprocess")
     return Options(
         protocol=arguments["protocol"],
         order=() if arguments["order"] not in {None, GIVEN} else None,  # which one, each team's robots say
@@ -253,12 +244,6 @@ def _take_options(arguments: dict[str, Any]) -> Options:
         ),
         cache=not arguments.pop("no_cache"),
         settings=protocol_settings(arguments.pop("settings_given")),
-        runtime=Runtime(arguments.pop("runtime")),
-        schedule=ScheduleName(arguments.pop("schedule")),
-        withdraw=Withdrawal(withdraw) if withdraw else None,
-        on_loss=OnLoss(on_loss) if on_loss else None,
-        preprocess=Preprocess(preprocess) if preprocess else None,
-        central_with=CentralSolverName(arguments.pop("central_with")),
         channel=channel,
         **{name: arguments.pop(name) for name in _SAME_NAMES},
     )

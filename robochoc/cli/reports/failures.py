@@ -9,6 +9,8 @@ from typing import IO, Any, ParamSpec, TypeVar
 
 import click
 
+from robochoc.system.errors import TransferableError
+
 INVALID, USAGE, LIMIT, LOST = 1, 2, 3, 4
 
 _WORST_FIRST = (INVALID, USAGE, LOST, LIMIT)
@@ -17,7 +19,7 @@ P = ParamSpec("P")
 R = TypeVar("R")
 
 
-class Failure(click.ClickException):
+class Failure(TransferableError, click.ClickException):  # noqa: N818 - it ends a command, as click's do
     """The command ends with `status`, and its message goes to stderr as it is."""
 
     def __init__(self, status: int, message: str) -> None:

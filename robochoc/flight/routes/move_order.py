@@ -9,11 +9,12 @@ from typing import Generic, TypeVar
 import numpy as np
 
 from robochoc.flight.routes.spacing import Array, Spacing, norms
+from robochoc.system.errors import TransferableError
 
 _Space = TypeVar("_Space", bound=Spacing)
 
 
-class NoRouteError(ValueError):
+class NoRouteError(TransferableError, ValueError):
     """No order of moves was found in which `drones` reach their goals.
 
     Standing points enclose them; or drones are in each other's way between walls, if these are `indoors`.

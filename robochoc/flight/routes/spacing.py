@@ -11,6 +11,8 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from robochoc.system.errors import TransferableError
+
 Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 
@@ -23,7 +25,7 @@ def squashed(points: Array, downwash: float) -> Array:
     return np.asarray(points / np.array([1.0, 1.0, downwash]))
 
 
-class TooCloseError(ValueError):
+class TooCloseError(TransferableError, ValueError):
     """Two drones, or a drone and a standing point, would rest nearer to each other than the distance.
 
     `first` and `second` are drones' numbers; standing points are counted on from the drones. `where` says whether

@@ -24,6 +24,7 @@ from rosbags.typesys import Stores, TypesysError, get_types_from_msg, get_typest
 from robochoc.ros.mappings import definition_of, short_kind
 from robochoc.ros.recordings.definitions import same_fields
 from robochoc.ros.sink import Fields
+from robochoc.system.errors import TransferableError
 
 Version = Literal[1, 2]
 """ROS 1 or ROS 2."""
@@ -77,7 +78,7 @@ class _Kind(NamedTuple):
     empty: Any
 
 
-class _FieldError(Exception):
+class _FieldError(TransferableError):
     """The value of a field is wrong. `path` leads to the field, the last name first."""
 
     def __init__(self, why: str, *path: str) -> None:

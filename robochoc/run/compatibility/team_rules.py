@@ -16,6 +16,7 @@ from robochoc.protocols.traits import Traits
 from robochoc.run.options import CENTRAL, Options, Runtime, Withdrawal
 from robochoc.solver.encoding import UnsupportedError
 from robochoc.solver.exclusions import allocation_fault
+from robochoc.system.errors import TransferableError
 from robochoc.verification.objective import withdrawal_cost
 
 LARGEST = 2**62
@@ -24,7 +25,7 @@ CENTRAL_TRAITS = Traits(partially_known=True, asymmetric=True, costs=True)
 """The problems that the central solver supports."""
 
 
-class UnfitProtocolError(UnsupportedError):
+class UnfitProtocolError(TransferableError, UnsupportedError):
     """The protocol does not fit; another one may. `complete`: it must be one that proves its answers."""
 
     def __init__(self, why: str, *, complete: bool = False) -> None:

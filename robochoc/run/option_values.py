@@ -1,0 +1,154 @@
+"""Conversion of the values of options: from texts, numbers of other libraries, lists; and errors for other values."""
+
+from __future__ import annotations
+
+import math
+import operator
+from collections.abc import Callable, Iterable, Mapping
+from enum import StrEnum
+from numbers import Real
+from typing import TypeVar
+
+from robochoc.model.orders import Order
+from robochoc.run.defaults import AUTO
+from robochoc.system.suggestions import did_you_mean
+
+Converter = Callable[[str, object], object]
+"""It gets the name of an option and a value, and returns the value in the type of the option.
+
+It raises `TypeError` for a value of a wrong type, and `ValueError` for one that is not allowed.
+"""
+_Member = TypeVar("_Member", bound=StrEnum)
+
+
+def _refusal(name: str, value: object, expected: str) -> str:
+    return f"{name}={value!r} is not allowed; expected {expected}"
+
+
+def member(choices: type[_Member], name: str, value: object) -> _Member:
+    """Return the member of `choices` that is called `value`. Raises `ValueError`, which names the nearest member."""
+    try:
+        return choices(value)  # type: ignore[arg-type]
+    except ValueError:
+        known = [str(one) for one in choices]
+        hint = did_you_mean(value, known, f"expected {', '.join(known)}")
+        raise ValueError(f"{name}={value!r} is not allowed; {hint}") from None
+
+
+def one_of(choices: type[StrEnum]) -> Converter:
+    """Return a converter to a member of `choices`."""
+    return lambda name, value: member(choices, name, value)
+
+
+def instance_of(kind: type) -> Converter:
+    """Return a converter that accepts objects of one class, as they are."""
+
+    def convert(name: str, value: object) -> object:
+        if not isinstance(value, kind):
+            raise TypeError(_refusal(name, value, f"an object of the class {kind.__name__}"))
+        return value
+
+    return convert
+
+
+def optional(convert: Converter) -> Converter:
+    """Return a converter that accepts None besides."""
+    return lambda name, value: None if value is None else convert(name, value)
+
+
+def text(name: str, value: object) -> str:
+    """Accept a text."""
+    if not isinstance(value, str):
+        raise TypeError(_refusal(name, value, "a text"))
+    return value
+
+
+def protocol_name(name: str, value: object) -> str:
+    """Convert the name of a protocol, in any case, to the spelling of its package."""
+    if not isinstance(value, str):
+        raise TypeError(_refusal(name, value, "the name of an installed protocol, such as 'abt'"))
+    if value == AUTO:
+        return value
+    from robochoc.run.registry import installed_spelling  # noqa: PLC0415 - start-up; and the registry imports options
+
+    return installed_spelling(value)
+
+
+def integer(name: str, value: object) -> int:
+    """Convert an integer of any type."""
+    try:
+        return operator.index(value)  # type: ignore[arg-type]
+    except TypeError:
+        raise TypeError(_refusal(name, value, "an integer")) from None
+
+
+def count(name: str, value: object) -> int:
+    """Convert an integer that is not negative."""
+    number = integer(name, value)
+    if number < 0:
+        raise ValueError(_refusal(name, number, "0 or more"))
+    return number
+
+
+def real(name: str, value: object, expected: str = "a number") -> float:
+    """Convert a real number of any type."""
+    if not isinstance(value, Real):
+        raise TypeError(_refusal(name, value, expected))
+    return float(value)
+
+
+def seconds(name: str, value: object) -> float:
+    """Convert a number of seconds, which is finite and not negative."""
+    number = real(name, value, "seconds")
+    if not 0 <= number < math.inf:
+        raise ValueError(_refusal(name, number, "0 or more seconds"))
+    return number
+
+
+def flag(name: str, value: object) -> bool:
+    """Convert a Boolean of any type."""
+    if not isinstance(value, bool) and type(value).__name__ not in {"bool", "bool_"}:  # numpy's is no Python integer
+        raise TypeError(_refusal(name, value, "True or False"))
+    return bool(value)
+
+
+def items_of(convert: Converter, expected: str) -> Converter:
+    """Return a converter of lists, sets and so on to a tuple, by item."""
+
+    def convert_all(name: str, value: object) -> tuple[object, ...]:
+        if isinstance(value, str | bytes) or not isinstance(value, Iterable):
+            raise TypeError(_refusal(name, value, expected))
+        items = value if isinstance(value, tuple) else tuple(value)
+        return tuple(convert(f"{name}[{place}]", item) for place, item in enumerate(items))
+
+    return convert_all
+
+
+def texts_by_name(name: str, value: object) -> Mapping[str, str]:
+    """Convert a mapping of names to values, which become texts."""
+    if not isinstance(value, Mapping):
+        raise TypeError(_refusal(name, value, "a mapping of names to values"))
+    return {text(f"a name in {name}", key): str(one) for key, one in value.items()}
+
+
+def priority_order(name: str, value: object) -> object:
+    """Convert the name of an order, or the names of robots."""
+    if isinstance(value, str):
+        return member(Order, name, value)
+    return items_of(text, "the name of an order, or the names of all robots")(name, value)
+
+
+def channel_model(name: str, value: object) -> object:
+    """Accept a `ChannelModel`."""
+    from robochoc.communication.simulator.channel import ChannelModel  # noqa: PLC0415 - start-up: seldom asked for
+
+    return instance_of(ChannelModel)(name, value)
+
+
+def kill(name: str, value: object) -> object:
+    """Accept a `Kill`, with its time in seconds."""
+    from robochoc.communication.kill_schedule import Kill  # noqa: PLC0415 - start-up: seldom asked for
+
+    if not isinstance(value, Kill):
+        raise TypeError(_refusal(name, value, "a Kill(robot, after_s)"))
+    return Kill(text(f"{name}.robot", value.robot), seconds(f"{name}.after_s", value.after_s))

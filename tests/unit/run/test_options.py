@@ -1,0 +1,122 @@
+"""Options convert and check each of their values, whoever gives them."""
+
+from __future__ import annotations
+
+from dataclasses import fields
+from enum import StrEnum
+from fractions import Fraction
+from typing import Any
+
+import numpy as np
+import pytest
+
+import robochoc
+from robochoc.communication.kill_schedule import Kill
+from robochoc.model.orders import Order
+from robochoc.run import solve
+from robochoc.run.options import CentralSolverName, OnLoss, Options, Preprocess, Runtime, ScheduleName, Withdrawal
+
+ENUMS: dict[str, type[StrEnum]] = {
+    "runtime": Runtime,
+    "withdraw": Withdrawal,
+    "schedule": ScheduleName,
+    "central_with": CentralSolverName,
+    "on_loss": OnLoss,
+    "preprocess": Preprocess,
+    "order": Order,
+}
+NAMES = [one.name for one in fields(Options)]
+
+
+def options(**given: Any) -> Options:  # noqa: ANN401 - of any type
+    """Return options with values of any type."""
+    return Options(**given)
+
+
+def test_every_field_refuses_an_arbitrary_object_by_name() -> None:
+    for name in NAMES:
+        with pytest.raises((TypeError, ValueError), match=rf"^{name}=<object object .* is not allowed; "):
+            options(**{name: object()})
+
+
+def test_every_member_may_be_given_as_a_text() -> None:
+    for name, choices in ENUMS.items():
+        for member in choices:
+            assert getattr(options(**{name: str(member)}), name) is member
+    assert options(withdraw="fewest").withdraw is Withdrawal.MINIMUM
+
+
+def test_an_unknown_text_is_refused_with_the_nearest_name() -> None:
+    for name, choices in ENUMS.items():
+        with pytest.raises(ValueError, match=rf"^{name}='nonsense' is not allowed; expected {', '.join(choices)}$"):
+            options(**{name: "nonsense"})
+    with pytest.raises(ValueError, match=r"^withdraw='minimun' is not allowed; did you mean 'minimum'\?$"):
+        options(withdraw="minimun")
+    with pytest.raises(ValueError, match=r"^runtime='SIMULATOR' is not allowed; did you mean 'simulator'\?$"):
+        options(runtime="SIMULATOR")
+
+
+def test_numbers_of_other_libraries_become_pythons() -> None:
+    for name in ("seed", "delay", "spares", "messages", "ncccs", "cycles"):
+        value = getattr(options(**{name: np.int64(3)}), name)
+        assert (type(value), value) == (int, 3)
+    for name in ("timeout", "deadline", "improve", "patience", "message_loss"):
+        for given in (np.float32(0.5), np.float64(0.5), Fraction(1, 2)):
+            value = getattr(options(**{name: given}), name)
+            assert (type(value), value) == (float, 0.5)
+        assert getattr(options(**{name: np.int8(0)}), name) == 0
+    for name in ("cache", "count", "verify", "bounds"):
+        assert getattr(options(**{name: np.True_}), name) is True
+
+
+def test_numbers_that_are_not_allowed() -> None:
+    for name in ("delay", "spares", "messages", "ncccs", "cycles"):
+        with pytest.raises(ValueError, match=f"^{name}=-1 is not allowed; expected 0 or more$"):
+            options(**{name: -1})
+    for name in ("timeout", "deadline", "improve", "patience"):
+        for wrong in (-1, float("nan"), float("inf")):
+            with pytest.raises(ValueError, match=f"^{name}=.* is not allowed; expected 0 or more seconds$"):
+                options(**{name: wrong})
+    for name in ("seed", "delay", "spares", "cache"):
+        with pytest.raises(TypeError, match=f"^{name}=None is not allowed"):
+            options(**{name: None})
+    with pytest.raises(TypeError, match=r"^messages=2\.0 is not allowed; expected an integer$"):
+        options(messages=2.0)
+
+
+def test_lists_and_mappings_are_checked_by_item() -> None:
+    made = options(
+        protocol="ABT",
+        order=["b", "a"],
+        filters=["x"],
+        settings={"cycles": 3},
+        kill=[Kill("a", np.int64(1))],  # type: ignore[arg-type]
+    )
+    assert (made.protocol, made.order, made.filters) == ("abt", ("b", "a"), ("x",))
+    assert (made.settings, made.kill) == ({"cycles": "3"}, (Kill("a", 1.0),))
+    for name, wrong, told in (
+        ("order", ["a", 3], r"order\[1\]=3"),
+        ("filters", "ab", "filters='ab'"),
+        ("kill", ["a"], r"kill\[0\]='a' is not allowed; expected a Kill\(robot, after_s\)"),
+        ("settings", ["a"], "settings="),
+    ):
+        with pytest.raises(TypeError, match=f"^{told}"):
+            options(**{name: wrong})
+    with pytest.raises(ValueError, match=r"^kill\[0\].after_s=-1.0 is not allowed; expected 0 or more seconds$"):
+        options(kill=(Kill("a", -1),))
+
+
+def star() -> robochoc.Model:
+    """Return a hub with one value that none of its leaves may have, which have no other."""
+    model = robochoc.Model("star")
+    hub, *leaves = [model.robot(name).variable("x", [0]) for name in ("hub", "l0", "l1", "l2", "l3")]
+    model.add([hub != leaf for leaf in leaves])
+    return model
+
+
+def test_texts_mean_the_same_wherever_options_are_given() -> None:
+    made = options(protocol="abt", runtime="simulator", withdraw="minimum")
+    outcome = solve(star().team, made)
+    assert (outcome.withdrawn, outcome.verdict) == (("hub",), "optimal")
+    assert star().solve("abt", "simulator", withdraw="minimum").withdrawn == ("hub",)
+    assert star().solve("ABT", "simulator", withdraw="maximal").withdrawn == ("l0", "l1", "l2", "l3")
