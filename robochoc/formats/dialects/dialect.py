@@ -41,7 +41,8 @@ class Note(NamedTuple):
 
 
 OTHER_PROBLEM = {
-    "bound", "default", "dropped", "external", "infinity", "left out", "repeated", "rounded", "scenario", "truncated",
+    "bound", "count", "default", "dropped", "external", "infinity", "left out", "repeated", "rounded", "scenario",
+    "truncated",
 }  # fmt: skip
 """Kinds of notes on what the team says otherwise than the file, or not at all; the others are on how it says it."""
 

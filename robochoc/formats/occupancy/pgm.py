@@ -59,18 +59,27 @@ def read_pgm(content: bytes) -> tuple[Pixels, int]:
 def _raw(content: bytes, place: int, count: int, white: int) -> Pixels:
     """Return the pixels that begin behind one blank: a byte each, or two where white is more than one byte."""
     size = 1 if white <= _ONE_BYTE else 2
-    raster = content[place + 1 : place + 1 + count * size]
+    end = place + 1 + count * size
+    raster = content[place + 1 : end]
     if len(raster) < count * size:
         raise MistakeError(f"ends after {len(raster) // size} of {count} pixels", "the image is not complete")
+    _refuse_more(content[end:], count)
     return np.frombuffer(raster, dtype=np.dtype(f">u{size}")).astype(np.int64)
 
 
 def _plain(content: bytes, place: int, count: int, white: int) -> Pixels:
     """Return the pixels that are numbers with blanks between them."""
-    words = _COMMENT.sub(b"", content[place:]).split(None, count)[:count]
+    words = _COMMENT.sub(b"", content[place:]).split(None, count)
     if len(words) < count:
         raise MistakeError(f"ends after {len(words)} of {count} pixels", "the image is not complete")
+    _refuse_more(b"".join(words[count:]), count)
+    del words[count:]
     return np.fromiter((_number(word, "pixel", 0, white) for word in words), np.int64, count)
+
+
+def _refuse_more(content: bytes, count: int) -> None:
+    if content.strip():
+        raise MistakeError(f"goes on after its {count} pixels", "one image is a file; check its width and height")
 
 
 def _number(word: bytes, what: str, least: int, most: int) -> int:

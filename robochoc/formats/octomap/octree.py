@@ -25,7 +25,7 @@ from fractions import Fraction
 import numpy as np
 import numpy.typing as npt
 
-from robochoc.formats.diagnostics import MistakeError, shortened
+from robochoc.formats.diagnostics import MistakeError, shortened, suggestion
 
 DEPTH = 16
 """Levels below the root. A leaf of the last one is a voxel."""
@@ -35,6 +35,7 @@ MAX_NODES = 4_000_000
 _BINARY, _FULL = b"# Octomap OcTree binary file", b"# Octomap OcTree file"
 _HEADER_MAX = 64 * 1024
 _SIDE_MIN_M, _SIDE_MAX_M = Fraction(1, 1000), Fraction(100)
+_KEYS = ("id", "size", "res")
 _NUMBER = re.compile(r"[0-9]{1,20}(?:\.[0-9]{1,30})?(?:e[+-]?[0-9]{1,2})?")
 _COUNT = re.compile(r"[0-9]{1,10}")
 _BYTES_OF_NODE = {"OcTree": 5, "1": 5, "OcTreeStamped": 5, "ColorOcTree": 8}
@@ -82,9 +83,18 @@ def read_octree(content: bytes) -> Octree:
     """
     header = _Header(content)
     if not header.size:
+        _refuse_more(content, header.end)
         return Octree(header.resolution, ())
     nodes = _BinaryNodes(content, header) if content.startswith(_BINARY) else _FullNodes(content, header)
-    return Octree(header.resolution, tuple(nodes.leaves()))
+    found = Octree(header.resolution, tuple(nodes.leaves()))
+    _refuse_more(content, nodes.end)
+    return found
+
+
+def _refuse_more(content: bytes, end: int) -> None:
+    """Raise `MistakeError` for anything but blanks behind the last node."""
+    if content[end:].strip():
+        raise MistakeError(f"has {len(content) - end:,} bytes after its last node", "the file is damaged")
 
 
 class _Header:
@@ -105,8 +115,16 @@ class _Header:
             if line == ["data"]:
                 break
             if line and not line[0].startswith("#"):
+                if line[0] not in _KEYS:
+                    raise MistakeError(
+                        f"has the unknown line '{shortened(line[0])}' in its header",
+                        suggestion(line[0], _KEYS, "lines"),
+                        number,
+                    )
+                if line[0] in found:
+                    raise MistakeError(f"has the line '{line[0]}' twice in its header", "delete one", number)
                 found[line[0]] = (number, line[1].strip() if len(line) > 1 else "")
-        for key in ("id", "size", "res"):
+        for key in _KEYS:
             if key not in found:
                 raise MistakeError(f"has no {key} in its header", "it has the lines id, size, res and data", number)
         self.type = self._type(*found["id"])
@@ -155,6 +173,11 @@ class _Nodes:
         self.count = int(ends[0]) + 1
         self.children = children[: self.count]
         self._end = self._ends(left)
+
+    @property
+    def end(self) -> int:
+        """Return the byte behind the last node."""
+        return self._begin + self.count * self._size
 
     def _ends(self, left: Integers) -> Integers:
         """Return for each node the one behind its subtree: the first one before which fewer nodes are to come."""
@@ -215,7 +238,7 @@ class _BinaryNodes(_Nodes):
             found += len(nodes) + len(leaves)
             yield Leaves(exponent, leaves, occupied)
         if found != self._expected:
-            raise MistakeError(f"has {found:,} nodes, and its header says {self._expected:,}", "the file is damaged")
+            raise _other_count(found, self._expected)
 
     @staticmethod
     def _kind(words: Integers, child: int) -> Integers:
@@ -232,6 +255,7 @@ class _FullNodes(_Nodes):
         self._odds = np.ascontiguousarray(rows[:, :4]).view("<f4").ravel()
         self._bits = rows[:, -1]
         super().__init__(header.end, size, np.bitwise_count(self._bits).astype(np.int64))
+        self._expected = header.size
 
     def leaves(self) -> Iterator[Leaves]:
         """Yield the known leaves, level by level. A leaf whose odds are no number is not known."""
@@ -251,6 +275,12 @@ class _FullNodes(_Nodes):
                 inner.append((following[there], _below(corners, child)[there]))
                 following[there] = self.behind(following[there])
             nodes, corners = (np.concatenate(parts) for parts in zip(*inner, strict=True))
+        if self.count != self._expected:
+            raise _other_count(self.count, self._expected)
+
+
+def _other_count(found: int, expected: int) -> MistakeError:
+    return MistakeError(f"has {found:,} nodes, and its header says {expected:,}", "the file is damaged")
 
 
 def _below(corners: Integers, child: int) -> Integers:

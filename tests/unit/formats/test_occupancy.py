@@ -39,6 +39,8 @@ def test_plain_and_raw_images_are_read_with_their_comments() -> None:
         (b"", "is no PGM image"),
         (b"\x89PNG\r\n", "is no PGM image"),
         (b"P6 1 1 255 abc", "is no PGM image"),
+        (b"P2 2 1 255\n1 2 3", "goes on after its 2 pixels"),
+        (b"P5 2 1 255\n12\n3", "goes on after its 2 pixels"),
         (b"P5", "has no width"),
         (b"P5 2", "has no height"),
         (b"P5 2 2 # 255", "has no value of white"),

@@ -121,16 +121,16 @@ def test_the_whole_tree_may_be_one_leaf() -> None:
 
 def test_the_space_of_one_leaf_is_bounded(tmp_path: Path) -> None:
     path = tmp_path / "all.ot"
-    path.write_bytes(OT + HEAD + struct.pack("<fB", -1.0, 0))
+    path.write_bytes(OT + HEAD.replace(b"size 2", b"size 1") + struct.pack("<fB", -1.0, 0))
     grid = read_voxels(path)
     assert grid.free.size <= 16_000_000
     assert grid.free.all()
     assert grid.origin == tuple([-MIDDLE * Fraction(1, 2)] * 3)
 
 
-def test_colours_and_other_headers_are_read_over() -> None:
+def test_colours_are_read_over() -> None:
     node = struct.pack("<fBBBB", -1.0, 200, 100, 0, 0)
-    head = b"# more\nres 5e-1\nstamp now and then\nid ColorOcTree\nsize  1 \n\ndata\n"
+    head = b"# more\nres 5e-1\nid ColorOcTree\nsize  3 \n\ndata\n"
     tree = read_octree(OT + head + struct.pack("<fBBBB", 2.0, 1, 2, 3, 0b101) + node + node[:3] + b"?" + node[4:])
     assert tree.resolution == Fraction(1, 2)
     assert [leaves.corners.tolist() for leaves in tree.leaves if leaves.corners.size] == [[[0, 0, 0], [0, 1, 0]]]
@@ -138,7 +138,9 @@ def test_colours_and_other_headers_are_read_over() -> None:
 
 def test_odds_that_are_no_number_are_not_known() -> None:
     nodes = struct.pack("<fB", 0, 7) + b"".join(struct.pack("<fB", odds, 0) for odds in (float("nan"), 0.0, -1e-9))
-    (leaves,) = [leaves for leaves in read_octree(OT + HEAD + nodes).leaves if leaves.corners.size]
+    (leaves,) = [
+        leaves for leaves in read_octree(OT + HEAD.replace(b"size 2", b"size 4") + nodes).leaves if leaves.corners.size
+    ]
     assert leaves.corners.tolist() == [[1, 0, 0], [0, 1, 0]]
     assert leaves.occupied.tolist() == [True, False]
 
@@ -152,7 +154,12 @@ CHAIN = b"\x03\x00"
         (b"", "is no OctoMap file"),
         (b"\x03\x00\x00\x00 an old binary file", "is no OctoMap file"),
         (BT, "has a header without end"),
-        (BT + b"id OcTree\n" * 10_000, "has a header without end"),
+        (BT + b"# id OcTree\n" * 10_000, "has a header without end"),
+        (BT + b"id OcTree\n" * 2, "has the line 'id' twice in its header"),
+        (BT + HEAD.replace(b"data", b"resolution 1\ndata"), "has the unknown line 'resolution' in its header"),
+        (BT + HEAD.replace(b"2", b"0") + CHAIN, "has 2 bytes after its last node"),
+        (BT + HEAD.replace(b"2", b"9") + b"\x01\x00 \n\xff\xff", "has 2 nodes, and its header says 9"),
+        (BT + HEAD + b"\x01\x00 \n\xff\xff", "has 4 bytes after its last node"),
         (BT + b"id OcTree\nsize 1\ndata\n", "has no res in its header"),
         (BT + b"size 1\nres 1\ndata\n", "has no id in its header"),
         (BT + b"id OcTree\nres 1\ndata\n", "has no size in its header"),
@@ -171,6 +178,8 @@ CHAIN = b"\x03\x00"
         (BT + HEAD + CHAIN * 16 + b"\x01\x00", "has a node below level 16 at byte 103"),
         (BT + HEAD + b"\x05\x00", "has 3 nodes, and its header says 2"),
         (OT + HEAD + struct.pack("<fB", 1, 1), "ends after 1 nodes"),
+        (OT + HEAD + struct.pack("<fB", 1, 0), "has 1 nodes, and its header says 2"),
+        (OT + HEAD + struct.pack("<fBfB", 1, 1, 1, 0) + b"x", "has 1 bytes after its last node"),
         (OT + HEAD + struct.pack("<fB", 1, 1) * 17 + struct.pack("<fB", 1, 0), "has a node below level 16 at byte"),
     ],
 )

@@ -219,7 +219,7 @@ class _Maker:
 
     def _tours(self, name: str, robot: RobotEntry, able: Collection[int]) -> tuple[dict[Tasks, int], bool]:
         """Return the lengths of the robot's tours, and whether deadlines leave it no others."""
-        if not self._read.tours:
+        if not self._read.tours or not robot.at:  # a robot without a place has no ways
             return {}, False
         numbered = enumerate(self._read.tasks.values(), start=1)
         placed = {number: entry for number, entry in numbered if number in able and entry.at}

@@ -26,7 +26,7 @@ class Trip:
     Attributes:
         name: The robot's name.
         robot: What the list says of it.
-        tasks: The tasks with a place that it can do, by number.
+        tasks: The tasks with a place that it can do, by number. The robot has a place, too.
         way: The length of the way between two places, in units of 10**-MAX_PLACES.
     """
 
@@ -86,7 +86,7 @@ class Trip:
                 continue
             length = min((way + legs[task, last] for task, way in before.items()), default=first[last])
             deadline = self.tasks[last].deadline
-            if deadline is None or not self.robot.at or length <= deadline * self.robot.speed * 10**MAX_PLACES:
+            if deadline is None or length <= deadline * self.robot.speed * 10**MAX_PLACES:
                 yield last, length
 
     def _refuse(self, sets: int) -> None:

@@ -17,7 +17,7 @@ from robochoc.formats.diagnostics import shortened, suggestion
 from robochoc.formats.dialects.dialect import Imported, ImportOptions, Note
 from robochoc.formats.dialects.tables import Amount, CostTable
 from robochoc.formats.dialects.toulbar2.network import CostFunction, Network, imported
-from robochoc.formats.dialects.toulbar2.text import Reader, Words
+from robochoc.formats.dialects.toulbar2.text import Reader, Words, read_words
 from robochoc.model.constraint import INFINITE
 from robochoc.model.wording import counted
 
@@ -26,7 +26,7 @@ _TOKEN = re.compile(r'[{}\[\]]|[^{}\[\]\s":,]+')
 
 def read(text: str, stem: str, options: ImportOptions) -> Imported:
     """Return the problem in the `text` of a file. Raises `MistakeError`."""
-    network = _CfnReader(Reader(_words(text)), stem).network()
+    network = read_words(_words(text), lambda source: _CfnReader(source, stem).network())
     return imported(network, options, "cfn")
 
 
@@ -57,8 +57,9 @@ class _CfnReader:
         self._read_variables()
         self._tag("functions")
         self._open("the functions")
-        while (word := self._in.more()) is not None and not _closes(word):
+        while not _closes(word := self._in.word("a function, or '}'")):
             self._read_function(word)
+        self._close("the problem")
         for place, wanted in self._shared:
             self._functions[place] = self._sharing(self._functions[place], wanted)
         notes: tuple[Note, ...] = ()
@@ -134,7 +135,7 @@ class _CfnReader:
                 self._in.refuse(f"'{shortened(word)}' where 'costs' should stand", 'write "costs": [...]')
             word = self._in.word("costs")
         if _opens(word):
-            rows = self._dense(scope, sized) if default is None else self._sparse(scope, default)
+            rows = self._dense(scope, sized) if default is None else self._sparse(scope)
             table = CostTable(name, rows, default or 0, sized)
         else:
             self._shared.append((len(self._functions), word))
@@ -186,7 +187,7 @@ class _CfnReader:
             self._in.refuse(f"more than {size} costs", "write one for each tuple")
         return rows
 
-    def _sparse(self, scope: Sequence[int], default: Amount) -> dict[tuple[int, ...], Amount]:
+    def _sparse(self, scope: Sequence[int]) -> dict[tuple[int, ...], Amount]:
         rows: dict[tuple[int, ...], Amount] = {}
         while not _closes(word := self._in.word("a tuple")):
             if not scope:
@@ -194,9 +195,8 @@ class _CfnReader:
             values = [self._value(scope[0], word)]
             values += [self._value(place, self._in.word("a value")) for place in scope[1:]]
             cost = self._cost(self._in.word("a cost"))
-            if rows.get(tuple(values), default) != default:
-                self._in.refuse("a tuple that stands twice", "delete one of them")
-            rows[tuple(values)] = cost
+            if rows.setdefault(tuple(values), cost) != cost:
+                self._in.refuse("a tuple with two costs", "delete one of them")
             if len(rows) > MAX_TUPLES:
                 self._in.refuse(f"a function of more than {MAX_TUPLES} tuples", "make it smaller")
         return rows

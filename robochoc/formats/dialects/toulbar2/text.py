@@ -9,7 +9,7 @@ import re
 from collections.abc import Callable, Iterator, Sequence
 from fractions import Fraction
 from pathlib import Path
-from typing import NoReturn
+from typing import NoReturn, TypeVar
 
 from robochoc.formats.diagnostics import Diagnostic, InvalidInputError, MistakeError, encodable, shortened
 from robochoc.formats.dialects.dialect import Imported, ImportOptions
@@ -22,6 +22,7 @@ MAX_TEXT = 256 * 1024 * 1024
 _INTEGER = re.compile(r"[+-]?[0-9]{1,18}")
 _DECIMAL = re.compile(r"[+-]?(?=[.0-9])[0-9]{0,18}(?:\.[0-9]{0,60})?")
 
+Found = TypeVar("Found")
 Words = Iterator[tuple[int, str]]
 """The words of a file, each with its line."""
 
@@ -70,6 +71,16 @@ class Reader:
     def refuse(self, message: str, hint: str) -> NoReturn:
         """Raise `MistakeError` for the line of the word that was read last."""
         raise MistakeError(message, hint, self.line)
+
+
+def read_words(words: Words, read: Callable[[Reader], Found]) -> Found:
+    """Return what `read` makes of the words of a file. Raises `MistakeError` where it leaves some."""
+    source = Reader(words)
+    found = read(source)
+    left = source.more()
+    if left is not None:
+        source.refuse(f"'{shortened(left)}' after the end of the problem", "delete it, or check the numbers before it")
+    return found
 
 
 def read_with(

@@ -11,7 +11,7 @@ from robochoc.formats.diagnostics import shortened
 from robochoc.formats.dialects.dialect import Imported, ImportOptions, Note
 from robochoc.formats.dialects.tables import Amount, CostTable
 from robochoc.formats.dialects.toulbar2.network import CostFunction, Network, imported
-from robochoc.formats.dialects.toulbar2.text import Reader, Words
+from robochoc.formats.dialects.toulbar2.text import Reader, Words, read_words
 
 MAX_VARIABLES = 1_000_000
 """The maximum number of variables and of cost functions."""
@@ -19,7 +19,8 @@ MAX_VARIABLES = 1_000_000
 
 def read(text: str, stem: str, options: ImportOptions) -> Imported:
     """Return the problem in the `text` of a file. Raises `MistakeError`."""
-    return imported(_WcspReader(Reader(_words(text)), stem).network(), options, "wcsp")
+    network = read_words(_words(text), lambda source: _WcspReader(source, stem).network())
+    return imported(network, options, "wcsp")
 
 
 def _words(text: str) -> Words:
@@ -96,7 +97,9 @@ class _WcspReader:
         rows: dict[tuple[int, ...], Amount] = {}
         for _ in range(count):
             values = tuple([self._value(place) for place in scope])
-            rows[values] = self._cost(self._in.integer("a cost"))
+            cost = self._cost(self._in.integer("a cost"))
+            if rows.setdefault(values, cost) != cost:
+                self._in.refuse(f"the tuple {' '.join(map(str, values))} with two costs", "delete one of them")
         return CostTable(name, rows, self._cost(default), size)
 
     def _place(self) -> int:

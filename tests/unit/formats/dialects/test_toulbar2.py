@@ -61,6 +61,17 @@ def test_a_maximised_cfn(tmp_path: Path) -> None:
         ("a.wcsp", WCSP.replace("0 -1", "0 -2"), "the shared function 2"),
         ("a.wcsp", WCSP[:30], "the file ends"),
         ("a.wcsp", WCSP.replace("0 0 1", "0 7 1"), "the value 7"),
+        ("a.wcsp", WCSP.replace(" 4 5", " 3 5"), ":9: '0' after the end of the problem"),
+        ("a.wcsp", WCSP + "7", ":10: '7' after the end of the problem"),
+        ("a.wcsp", WCSP.replace("1 1 9", "0 0 9"), ":5: the tuple 0 0 with two costs"),
+        ("a.cfn", CFN + "{}", ":10: '{' after the end of the problem"),
+        ("a.cfn", CFN.replace("} }", "}, more: { } }"), ":9: 'more' where the problem should end"),
+        ("a.cfn", CFN.replace("} }", "}"), "the file ends where '}' should stand"),
+        ("a.cfn", CFN.replace("} }", ""), "the file ends where a function, or '}' should stand"),
+        ("a.cfn", CFN.replace("2 3]}", "2 3], extra: 4}"), ":8: 'extra' where the function should end"),
+        ("a.cfn", CFN.replace("scope: [x 2]", "scop: [x 2]"), ":8: 'scop' where 'scope' should stand"),
+        ("a.cfn", CFN.replace('"<20.00"', '"<20.00", by: me'), ":2: 'by' where the problem should end"),
+        ("a.cfn", CFN.replace("b 2 inf", "a 0 3"), "a tuple with two costs"),
     ],
 )
 def test_what_is_refused(name: str, text: str, message: str, tmp_path: Path) -> None:
