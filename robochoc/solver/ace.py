@@ -50,6 +50,7 @@ from robochoc.solver.propagation import propagate
 from robochoc.solver.query import Query, SolvedBy, SolverAnswer
 from robochoc.system.signals import signals_held
 from robochoc.system.temporary_files import PrivateFolder
+from robochoc.system.time_limit import TimeLimitError, computed_by
 
 CHUNK = 1 << 20
 LONGEST_WAIT_S = 1e6
@@ -128,7 +129,7 @@ class AceProcess:
             SolverLostError: if the solver's process died. The next task starts another.
             SolverTimeoutError: if the time is over. The process is ended, and the next task starts another.
         """
-        self.begin(network, limit=limit, count_only=count_only, strategy=strategy)
+        self.begin(network, limit=limit, count_only=count_only, strategy=strategy, deadline=deadline)
         return self.answer(deadline)
 
     def begin(
@@ -139,22 +140,40 @@ class AceProcess:
         count_only: bool = False,
         strategy: Strategy = "default",
         costs: Codes = (),
+        deadline: float | None = None,
     ) -> bool:
-        """Give the solver a task, whose `answer` is to be asked for before the next. Raises `SolverLostError`.
+        """Give the solver a task, whose `answer` is to be asked for before the next.
 
         With `costs`, the answer is one solution, for which the codes of the variables at these places sum up to the
-        least. False when there was nothing left to ask ACE, and so nothing to wait for: propagation had the answer,
-        or the network was enumerated here.
+        least.
+
+        Returns:
+            False when there was nothing left to ask ACE, and so nothing to wait for: propagation had the answer, or
+            the network was enumerated here.
+
+        Raises:
+            SolverMissingError: if there is no Java.
+            SolverLostError: if the solver's process died.
+            SolverTimeoutError: if the time is over before the solver has the task.
         """
         limit = 1 if costs else limit
-        self._question = question = Query.of(propagate(network), limit, count_only=count_only, costs=costs)
-        self._enumerated = None if question.trivial or self._always else self._small(question)
-        if question.trivial or self._enumerated:
-            return False
+        self._question = self._enumerated = None
+        try:
+            question = Query.of(computed_by(deadline, propagate, network), limit, count_only=count_only, costs=costs)
+            self._question = question
+            if question.trivial:
+                return False
+            self._enumerated = None if self._always else computed_by(deadline, self._small, question)
+            if self._enumerated:
+                return False
+            task = computed_by(
+                deadline, _task, question.asked, limit, count_only=count_only, strategy=strategy, costs=question.costs
+            )
+        except TimeLimitError:
+            raise SolverTimeoutError from None
         if self._tasks == TASKS:
             self.close()
-        task = _task(question.asked, limit, count_only=count_only, strategy=strategy)
-        self._ask(msgspec.structs.replace(task, costs=list(question.costs)))
+        self._ask(task, deadline)
         return True
 
     def answer(self, deadline: float | None = None) -> SolverAnswer:
@@ -200,8 +219,7 @@ class AceProcess:
 
         Raises as `solve` does.
         """
-        task = _task(network, None, count_only=True, strategy="default")
-        self._ask(Export(list(names), msgspec.structs.replace(task, costs=list(costs))))
+        self._ask(Export(list(names), _task(network, None, count_only=True, strategy="default", costs=costs)))
         word = self._hear(None)
         if not isinstance(word, Exported):
             raise SolverLostError(f"the solver answered with a {type(word).__name__}")
@@ -273,14 +291,19 @@ class AceProcess:
             os.close(watched)
         self._socket = ours
 
-    def _ask(self, task: ToSolver) -> None:
+    def _ask(self, task: ToSolver, deadline: float | None = None) -> None:
         if self._searching:  # for an answer that is no longer wanted
             self.close()
         self.start()
         body = msgspec.msgpack.encode(task)
         try:
             if self._socket is not None:
+                self._socket.settimeout(_left_s(deadline))
                 self._socket.sendall(LENGTH.pack(len(body)) + body)
+                self._socket.settimeout(None)
+        except TimeoutError:  # it starts, and does not read yet
+            self._question = None
+            raise self.give_up() from None
         except OSError:  # it has hung up: perhaps it has said why
             self._hear(time.monotonic() + LAST_WORDS_S)
             self._lose()
@@ -298,9 +321,9 @@ class AceProcess:
             self._receive(deadline)
 
     def _receive(self, deadline: float | None) -> None:
-        left = None if deadline is None else min(max(0.0, deadline - time.monotonic()), LONGEST_WAIT_S)
+        left = _left_s(deadline)
         if not select.select([self.fileno()], [], [], left)[0]:
-            if left == LONGEST_WAIT_S:
+            if deadline is not None and time.monotonic() < deadline:
                 return
             raise self.give_up()
         chunk = b""
@@ -337,7 +360,12 @@ class AceProcess:
         raise SolverLostError(f"the constraint solver's process {fate}" + (f" ({output})" if output else ""))
 
 
-def _task(network: Network, limit: int | None, *, count_only: bool, strategy: Strategy) -> Task:
+def _left_s(deadline: float | None) -> float | None:
+    """Return how many seconds to wait at most, more than 0. None: for ever."""
+    return None if deadline is None else min(max(1e-3, deadline - time.monotonic()), LONGEST_WAIT_S)
+
+
+def _task(network: Network, limit: int | None, *, count_only: bool, strategy: Strategy, costs: Codes = ()) -> Task:
     rows: dict[tuple[Codes, ...], int] = {}
     forms = [
         EncodedTable(table.scope, table.allowed, rows.setdefault(table.rows, len(rows))) for table in network.tables
@@ -350,4 +378,5 @@ def _task(network: Network, limit: int | None, *, count_only: bool, strategy: St
         limit=limit,
         count_only=count_only,
         strategy=strategy,
+        costs=list(costs),
     )

@@ -26,6 +26,7 @@ from robochoc.solver.failures import SolverTimeoutError
 from robochoc.solver.query import SolvedBy, SolverAnswer
 from robochoc.solver.symmetry import break_symmetries, orbits, symmetries
 from robochoc.solver.weighted import WeightedComponent, components_with_withdrawal, constant_costs, weighted_components
+from robochoc.system.time_limit import TimeLimitError, computed_by
 
 MAX_CLIQUE_ROWS = 20_000
 """A clique with more solutions than this stays an allDifferent."""
@@ -126,27 +127,30 @@ class CentralSolver:
             SolverLostError: if the solver's process died.
             UnsupportedError: if a constraint or its costs are too large.
         """
-        if withdrawal_cost is not None:
-            return self._minimum(team, components_with_withdrawal(team, withdrawal_cost))
-        if team.kind == ProblemKind.DISWCSP and not count:
-            return self._minimum(team, weighted_components(team.variables.values(), list(team.constraints())))
-        return self._all_components(team, count=count)
+        try:
+            if withdrawal_cost is not None:
+                parts = computed_by(self._deadline, components_with_withdrawal, team, withdrawal_cost)
+                return self._minimum(team, parts)
+            if team.kind == ProblemKind.DISWCSP and not count:
+                variables, constraints = team.variables.values(), list(team.constraints())
+                return self._minimum(team, computed_by(self._deadline, weighted_components, variables, constraints))
+            return self._all_components(team, count=count)
+        except (SolverTimeoutError, TimeLimitError):
+            return CentralAnswer(Verdict.UNKNOWN)
 
     def _all_components(self, team: Team, *, count: bool) -> CentralAnswer:
         """Solve the components of a problem without costs, the smallest first, or multiply their counts."""
         with ExitStack() as processes:
             ace = self._solver or processes.enter_context(AceProcess(always=self._always_ace))
             spare = processes.enter_context(AceProcess(always=True))
-            parts = components(team.variables.values(), team.constraints(), may_split=True)
+            variables, constraints = team.variables.values(), list(team.constraints())
+            parts = computed_by(self._deadline, components, variables, constraints, may_split=True)
             if sum(len(table.rows) for part in parts for table in part.network.tables) > MANY_ROWS:
                 ace.start()
             parts.sort(key=lambda part: math.prod(len(domain) for domain in part.network.domains))
             found = []
             for part in parts:
-                try:
-                    found.append(self._solve(part, ace, spare, count=count))
-                except SolverTimeoutError:
-                    return CentralAnswer(Verdict.UNKNOWN)
+                found.append(self._solve(part, ace, spare, count=count))
                 if not found[-1].found:
                     return CentralAnswer(Verdict.NO_SOLUTION, count=0 if count else None)
         if count:
@@ -191,7 +195,7 @@ class CentralSolver:
         if self._time_is_over:
             return None, False
         try:
-            if ace.begin(network, limit=1, costs=part.costs):
+            if ace.begin(network, limit=1, costs=part.costs, deadline=self._deadline):
                 self._watch(ace)
             answer = ace.answer(self._deadline)
         except SolverTimeoutError as over:
@@ -218,19 +222,20 @@ class CentralSolver:
         if not network.tables:
             (domain,) = network.domains
             return SolverAnswer(len(domain), complete=True, solutions=((domain[0],),))
-        group = symmetries(part)
+        group = computed_by(self._deadline, symmetries, part)
         if group:
-            smaller = break_symmetries(network, group)
+            smaller = computed_by(self._deadline, break_symmetries, network, group)
             if not count:
                 return self._search(smaller, ace, spare, _Wanted(limit=1, in_order=True))
             first = self._search(smaller, ace, spare, _Wanted(limit=MAX_ORBITS, in_order=True))
             if first.complete:
-                return SolverAnswer(len(orbits(first.solutions, group, network)), complete=True, solutions=())
+                images = computed_by(self._deadline, orbits, first.solutions, group, network)
+                return SolverAnswer(len(images), complete=True, solutions=())
         wanted = _Wanted(count_only=True, in_order=True) if count else _Wanted(limit=1)
         return self._search(network, ace, spare, wanted)
 
     def _search(self, network: Network, ace: AceProcess, spare: AceProcess, wanted: _Wanted) -> SolverAnswer:
-        strong = with_cliques(network, lambda clique: self._table(ace, clique))
+        strong = computed_by(self._deadline, with_cliques, network, lambda clique: self._table(ace, clique))
         return NO_SOLUTIONS if strong.impossible else self._race(strong, ace, spare, wanted)
 
     def _table(self, ace: AceProcess, clique: Network) -> tuple[Codes, ...] | None:
@@ -260,7 +265,8 @@ class CentralSolver:
     def _race(self, network: Network, first: AceProcess, second: AceProcess, wanted: _Wanted) -> SolverAnswer:
         """Return the answer of the faster of two strategies. The second starts when the first takes long."""
         usual, other = wanted.strategies
-        if not first.begin(network, limit=wanted.limit, count_only=wanted.count_only, strategy=usual):
+        limit, count_only, deadline = wanted.limit, wanted.count_only, self._deadline
+        if not first.begin(network, limit=limit, count_only=count_only, strategy=usual, deadline=deadline):
             return first.answer()
         running = [first]
         hedge = time.monotonic() + HEDGE_S
@@ -270,7 +276,7 @@ class CentralSolver:
             if self._time_is_over:
                 break
             if second not in running and time.monotonic() >= hedge:
-                second.begin(network, limit=wanted.limit, count_only=wanted.count_only, strategy=other)
+                second.begin(network, limit=limit, count_only=count_only, strategy=other, deadline=deadline)
                 running.append(second)
         for ace in running:
             if ace not in ready[:1]:

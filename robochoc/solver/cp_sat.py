@@ -32,12 +32,14 @@ from robochoc.solver.weighted import (
     weighted_components,
 )
 from robochoc.system.signals import signals_held
+from robochoc.system.time_limit import TimeLimitError, computed_by
 
 NAME = "OR-Tools"
 INSTALL = "pip install 'robochoc[ortools]'"
-LAST_WORDS_S = 2.0
-"""How long after its time CP-SAT may take to say what it has found, in seconds."""
+LAST_WORDS_S = 0.6
+"""The seconds after its time in which CP-SAT may report the best that it has found."""
 _TICK_S = 0.2
+_LONGEST_WAIT_S = 1e6
 _CHUNK = 1 << 20
 
 
@@ -90,6 +92,8 @@ class CpSatSolver:
             raise SolverMissingError(f"OR-Tools is not installed; say: {INSTALL}")
         try:
             return self._solve(team, withdrawal_cost)
+        except TimeLimitError:
+            return CentralAnswer(Verdict.UNKNOWN)
         finally:
             if not self._kept:
                 self.close()
@@ -106,9 +110,10 @@ class CpSatSolver:
 
     def _solve(self, team: Team, withdrawal_cost: int | None) -> CentralAnswer:
         if withdrawal_cost is None:
-            parts = weighted_components(team.variables.values(), list(team.constraints()))
+            variables, constraints = team.variables.values(), list(team.constraints())
+            parts = computed_by(self._deadline, weighted_components, variables, constraints)
         else:
-            parts = components_with_withdrawal(team, withdrawal_cost)
+            parts = computed_by(self._deadline, components_with_withdrawal, team, withdrawal_cost)
         cost = bound = constant_costs(team)
         assignment: dict[str, int] | None = {}
         proven = True
@@ -136,10 +141,9 @@ class CpSatSolver:
         network = part.network
         if not all(network.domains):
             return CpSatAnswer(None, proven=True)
-        left = None if self._deadline is None else self._deadline - time.monotonic()
-        if left is not None and left <= 0:
+        if self._deadline is not None and time.monotonic() >= self._deadline:
             return CpSatAnswer(None, proven=False)
-        return self._asked(_task(network, part.costs, left))
+        return self._asked(_task(network, part.costs, self._deadline))
 
     # The process
 
@@ -147,8 +151,11 @@ class CpSatSolver:
         connection = self._socket or self._start()
         body = msgspec.msgpack.encode(task)
         try:
+            connection.settimeout(self._left_s())
             connection.sendall(LENGTH.pack(len(body)) + body)
             word = self._hear(connection)
+        except TimeoutError:
+            word = None
         except OSError as error:
             self.close()
             raise SolverLostError(f"the process of OR-Tools was lost ({error})") from None
@@ -184,15 +191,14 @@ class CpSatSolver:
     def _hear(self, connection: socket.socket) -> FromCpSat | None:
         """Return the answer; None when the time is over. Raises `OSError` where the process died."""
         buffer = bytearray()
-        end = None if self._deadline is None else self._deadline + LAST_WORDS_S
         while True:
             if len(buffer) >= LENGTH.size and len(buffer) == LENGTH.size + LENGTH.unpack_from(buffer)[0]:
                 word: FromCpSat = msgspec.msgpack.decode(bytes(buffer[LENGTH.size :]), type=FromCpSat)
                 return word
-            left = _TICK_S if end is None else min(_TICK_S, end - time.monotonic())
-            if left <= 0:
+            left = self._left_s()
+            if left is not None and left <= 0:
                 return None
-            if not select.select([connection], [], [], left)[0]:
+            if not select.select([connection], [], [], _TICK_S if left is None else min(_TICK_S, left))[0]:
                 if self._progress:
                     self._progress()
                 continue
@@ -201,7 +207,13 @@ class CpSatSolver:
                 raise OSError("it has hung up")
             buffer += chunk
 
+    def _left_s(self) -> float | None:
+        """Return the seconds until no answer is waited for. None: there is no limit."""
+        return (
+            None if self._deadline is None else min(self._deadline + LAST_WORDS_S - time.monotonic(), _LONGEST_WAIT_S)
+        )
 
-def _task(network: Network, costs: Sequence[int], seconds: float | None) -> CpSatTask:
+
+def _task(network: Network, costs: Sequence[int], deadline: float | None) -> CpSatTask:
     tables = tuple(CpSatTable(table.scope, table.allowed, table.rows) for table in network.tables)
-    return CpSatTask(network.domains, tables, tuple(costs), seconds)
+    return CpSatTask(network.domains, tables, tuple(costs), deadline)

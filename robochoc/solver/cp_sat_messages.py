@@ -20,13 +20,14 @@ class CpSatTable(msgspec.Struct, frozen=True, array_like=True):
 class CpSatTask(msgspec.Struct, frozen=True, array_like=True, tag=True):
     """Find one solution; with `costs`, one whose codes at these places sum up to the least.
 
-    `domains` holds each variable's codes, `seconds` the time (None: any).
+    `domains` holds each variable's codes, `deadline` the end of the time on the monotonic clock, which all processes
+    of a machine share (None: there is no limit).
     """
 
     domains: tuple[tuple[int, ...], ...]
     tables: tuple[CpSatTable, ...]
     costs: tuple[int, ...] = ()
-    seconds: float | None = None
+    deadline: float | None = None
 
 
 class CpSatAnswer(msgspec.Struct, frozen=True, array_like=True, tag=True):

@@ -14,6 +14,7 @@ from robochoc.solver.compiled_team import CompiledTeam
 from robochoc.solver.domain import CompiledDomain
 from robochoc.solver.failures import SolverTimeoutError
 from robochoc.system.errors import TransferableError
+from robochoc.system.time_limit import TimeLimitError, computed_by
 
 if TYPE_CHECKING:
     from robochoc.solver.ace import AceProcess
@@ -60,18 +61,13 @@ class TeamCompiler:
                 `OutOfTimeError`; and as `Compiler.compile` does.
         """
         began = time.monotonic()
-        solved, number = False, count(1)
+        solved, number, name = False, count(1), ""
 
         def compile_robot(robot: Robot) -> CompiledDomain:
-            nonlocal solved
-            self._stage(f"compiling {robot.name} ({next(number)} of {len(team.robots)})")
-            late = OutOfTimeError(f"the time was over while {robot.name} was compiled")
-            if self.deadline is not None and time.monotonic() >= self.deadline:
-                raise late
-            try:
-                compilation = compiler.compile(robot)
-            except SolverTimeoutError:
-                raise late from None
+            nonlocal solved, name
+            name = robot.name
+            self._stage(f"compiling {name} ({next(number)} of {len(team.robots)})")
+            compilation = compiler.compile(robot)
             solved = solved or compilation.source != CompiledFrom.DIRECT
             if not (compilation.domain.values or every):
                 raise NoLocalSolutionError(robot.name)
@@ -79,7 +75,10 @@ class TeamCompiler:
 
         try:
             with Compiler(self._limits, self._cache, self.deadline, self._solver) as compiler:
-                return CompiledTeam(team, compile_robot)
+                return computed_by(self.deadline, CompiledTeam, team, compile_robot)
+        except (SolverTimeoutError, TimeLimitError):
+            name = name or next((robot.name for robot in team.robots), team.name)
+            raise OutOfTimeError(f"the time was over while {name} was compiled") from None
         finally:
             if solved:
                 self.seconds += time.monotonic() - began

@@ -4,26 +4,39 @@ from __future__ import annotations
 
 import _signal  # type: ignore[import-not-found]  # what `signal` is made of: typeshed does not tell of it
 import signal
+import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
 
 _STOPPING = {signal.SIGINT, signal.SIGTERM}
+_holding: set[int] = set()
+"""The threads in which signals are held."""
 
 
 @contextmanager
 def signals_held() -> Iterator[None]:
-    """Let Ctrl-C and SIGTERM wait meanwhile: what is half done would be lost.
+    """Let Ctrl-C, SIGTERM and time limits (`system/time_limit.py`) wait meanwhile: what is half done would be lost.
 
     A process that is started meanwhile holds them as well, until it calls `leave_ctrl_c_to_the_parent`: they would
     break off the start of Python with an error of its own.
     """
     before = signal.pthread_sigmask(signal.SIG_BLOCK, ())
+    thread = threading.get_ident()
+    is_outermost = thread not in _holding
     try:
         # Within, because it may block them and still raise what a signal just before has to say.
         signal.pthread_sigmask(signal.SIG_BLOCK, _STOPPING)
+        _holding.add(thread)
         yield
     finally:
+        if is_outermost:
+            _holding.discard(thread)
         signal.pthread_sigmask(signal.SIG_SETMASK, before)
+
+
+def are_held(thread: int) -> bool:
+    """Return whether signals are held in a thread."""
+    return thread in _holding
 
 
 def leave_ctrl_c_to_the_parent() -> None:

@@ -6,6 +6,7 @@ import time
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 
@@ -29,10 +30,18 @@ from tests.support.cost_problems import with_costs
 from tests.support.limits import HANG_S, wait_until
 from tests.support.moved_clock import MovedClock
 from tests.support.problems import team_of
+from tests.support.solver_networks import queens_network
 
 CENTRAL = Options(protocol="central")
 HARD = random_csp(30, 8, 0.3, 0, 1, max_cost=100)
 """Hours would not do."""
+SMALL = random_csp(3, 3, 1, 0, 1, max_cost=9)
+SOON_S = 0.05
+
+
+def endless(*_: object, **__: object) -> None:
+    while True:
+        pass
 
 
 @pytest.fixture
@@ -71,14 +80,49 @@ def test_when_the_time_is_over_the_best_so_far_is_told(warm: AceProcess, over_wi
     assert outcome.verified
 
 
-def test_without_an_answer_until_then_there_is_a_bound() -> None:
+def test_without_an_answer_until_then_there_is_a_bound(monkeypatch: pytest.MonkeyPatch) -> None:
     """Of two parts one is seen through without ACE."""
     unary = Relation("U", 1, Semantics.SOFT, ((1,), (2,)), (5, 4), 0)
     differ = Constraint("D", PREDEFINED["ne"], ("A", "B"), ("A", "B"), cost=3)
     domains = {"A": (1, 2), "B": (1, 2), "C": (1, 2)}
     team = with_costs(team_of(domains, [differ, Constraint("U", unary, ("C",), ("C",))]))
-    judgement = CentralSolver(deadline=time.monotonic()).solve(team)
+    clock = MovedClock()
+    clock.end()
+    monkeypatch.setattr(central, "time", clock)
+    judgement = CentralSolver(deadline=time.monotonic() + HANG_S).solve(team)
     assert judgement == CentralAnswer(Verdict.UNKNOWN, bound=4)
+
+
+@pytest.mark.parametrize("step", ["weighted.components", "weighted.propagate", "weighted.costs_by_scope"])
+def test_preparation_without_an_end_ends_with_the_time(step: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(f"robochoc.solver.{step}", endless)
+    outcome = solve(SMALL, replace(CENTRAL, timeout=SOON_S))
+    assert outcome.verdict is Verdict.UNKNOWN
+
+
+@pytest.mark.parametrize("step", ["central.components", "central.symmetries", "central.with_cliques", "ace.propagate"])
+def test_preparation_without_costs_ends_with_the_time(step: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(f"robochoc.solver.{step}", endless)
+    outcome = solve(queens3d(4), replace(CENTRAL, timeout=SOON_S))
+    assert outcome.verdict is Verdict.UNKNOWN
+
+
+def test_compilation_without_an_end_ends_with_the_time(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("robochoc.solver.compile.compile_domain", endless)
+    outcome = solve(SMALL, Options(protocol="dpop", timeout=SOON_S))
+    assert outcome.verdict is Verdict.UNKNOWN
+    assert outcome.reason == "the time was over while Robot1 was compiled"
+
+
+def test_a_process_that_does_not_read_its_task_is_given_up(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """While Java starts it reads nothing, and a large task does not fit into the socket."""
+    program = tmp_path / "sleeping"
+    program.write_text("#!/bin/sh\nexec sleep 1000\n")
+    program.chmod(0o700)
+    monkeypatch.setattr("robochoc.solver.ace.sys", SimpleNamespace(executable=str(program)))
+    monkeypatch.setattr("robochoc.solver.ace.msgspec.msgpack.encode", lambda _: bytes(10**7))
+    with AceProcess(always=True) as sleeping, pytest.raises(SolverTimeoutError):
+        sleeping.solve(queens_network(4), deadline=time.monotonic() + SOON_S)
 
 
 def test_a_task_that_is_given_up_has_a_best_once_ace_has_one(warm: AceProcess) -> None:
@@ -109,7 +153,7 @@ def test_when_the_time_is_over_those_who_stay_so_far_are_told(
     warm: AceProcess, over_with_a_best: Callable[..., None]
 ) -> None:
     team = queens3d(6)
-    judge = CentralSolver(deadline=1.0, progress=over_with_a_best, solver=warm)
+    judge = CentralSolver(deadline=time.monotonic() + HANG_S, progress=over_with_a_best, solver=warm)
     judgement = judge.solve(team, withdrawal_cost=1)
     away = robots_without_values(team, judgement.assignment)
     assert judgement.verdict is Verdict.UNKNOWN

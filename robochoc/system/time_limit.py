@@ -1,0 +1,81 @@
+"""Time limits for computations that look at no clock: preparation with many nested loops, all in Python.
+
+A look at the clock in each loop would be forgotten in one. Here a second thread raises `TimeLimitError` in the thread
+that computes, wherever that is, as Ctrl-C raises `KeyboardInterrupt`. Where signals are held (`system/signals.py`), it
+waits.
+"""
+
+from __future__ import annotations
+
+import _thread
+import threading
+import time
+from collections.abc import Callable
+from typing import ParamSpec, TypeVar
+
+from robochoc.system.signals import are_held
+
+AGAIN_S = 0.05
+"""The error is raised again after so many seconds: Python drops an exception in a destructor."""
+_LONGEST_WAIT_S = 1e6
+"""Locks refuse longer waits."""
+
+Arguments = ParamSpec("Arguments")
+Result = TypeVar("Result")
+
+
+class TimeLimitError(Exception):
+    """The time of a computation was over before its result."""
+
+
+def computed_by(
+    deadline: float | None, function: Callable[Arguments, Result], *args: Arguments.args, **kwargs: Arguments.kwargs
+) -> Result:
+    """Return the result of `function`, which holds nothing that has to be released by more than `with` and `finally`.
+
+    Args:
+        deadline: The end of the time, on the monotonic clock. None: there is none.
+        function: The computation.
+        args: Its arguments.
+        kwargs: Its arguments with names.
+
+    Raises:
+        TimeLimitError: when the deadline has passed.
+    """
+    if deadline is None:
+        return function(*args, **kwargs)
+    if time.monotonic() >= deadline:
+        raise TimeLimitError
+    running, raising = _thread.allocate_lock(), _thread.allocate_lock()
+    raised: list[float] = []
+    running.acquire()
+    # Python looks for an exception of another thread after a call: `release` comes before the first look.
+    try:
+        _thread.start_new_thread(_watch, (threading.get_ident(), deadline, running, raising, raised))
+        return function(*args, **kwargs)
+    finally:
+        try:
+            running.release()
+        finally:
+            with raising:
+                if raised:
+                    _raise_in(threading.get_ident(), None)
+
+
+def _watch(
+    thread: int, deadline: float, running: _thread.LockType, raising: _thread.LockType, raised: list[float]
+) -> None:
+    """Raise `TimeLimitError` in a thread from the deadline on, until `running` is released."""
+    while not running.acquire(timeout=min(max(AGAIN_S, deadline - time.monotonic()), _LONGEST_WAIT_S)):
+        with raising:
+            if running.locked() and not are_held(thread) and time.monotonic() >= deadline:
+                raised.append(deadline)
+                _raise_in(thread, TimeLimitError)
+
+
+def _raise_in(thread: int, error: type[Exception] | None) -> None:
+    """Raise an error in a thread; None: take back the one that it has not seen yet."""
+    import ctypes  # noqa: PLC0415 - start-up: few runs come to the end of their time
+
+    raised = None if error is None else ctypes.py_object(error)
+    ctypes.pythonapi.PyThreadState_SetAsyncExc(ctypes.c_ulong(thread), raised)
