@@ -149,6 +149,18 @@ class ElementView:
             raise self.mistake(f"<{self.tag}> without <{name}>", _hint_on_missing(name, unread))
         return found
 
+    def one_of(self, *names: str) -> ElementView:
+        """Return the only child element of these names. Raises `MistakeError` where there is none, or a second one."""
+        found = self.children(*names)
+        if len(found) == 1:
+            return found[0]
+        for child in found[1:]:
+            raise child.mistake(f"a second element in <{self.tag}>: <{child.tag}>", "write one of them")
+        for child in self._views():
+            if not child._is_read:
+                raise self._unread_element(child)
+        raise self.mistake(f"an element is missing in <{self.tag}>", suggested_name("", names, "elements"))
+
     def children(self, *names: str) -> list[ElementView]:
         """Return the child elements of these names, in the order of the document."""
         self._asked.update(names)
@@ -202,26 +214,27 @@ class ElementView:
             if view._is_unchecked:
                 continue
             with view.guard():
-                children = view._views()
-                for child in children:
+                for child in view._views():
                     if child._is_read:
                         waiting.append(child)
                     else:
-                        self._report_unread_part("element", f"<{child.tag}>", child.tag, view, child.line)
+                        with child.guard():
+                            raise view._unread_element(child)
             for name in view._attributes():
                 if name not in view._asked_attributes:
-                    self._report_unread_part("attribute", f"'{shortened(name)}'", name, view, view.line)
+                    message = f"the attribute '{shortened(name)}' is not supported in <{view.tag}>"
+                    self.report.add(view.line, message, view._hint(name, view._asked_attributes, "attributes"))
             if not view._is_text_read:
                 view._report_text()
 
-    def _report_unread_part(self, what: str, shown: str, name: str, parent: ElementView, number: int) -> None:
-        asked = parent._asked if what == "element" else parent._asked_attributes
+    def _unread_element(self, child: ElementView) -> MistakeError:
+        hint = self._hint(child.tag, self._asked, "elements")
+        return child.mistake(f"<{shortened(child.tag)}> is not supported in <{self.tag}>", hint)
+
+    def _hint(self, name: str, asked: set[str], what: str) -> str:
         if name in asked:
-            hint = f"it is not supported together with the other parts of this <{parent.tag}>"
-        else:
-            hint = suggested_name(name, sorted(asked), f"{what}s of <{parent.tag}>") if asked else "delete it"
-        place = "" if what == "element" else f"the {what} "
-        self.report.add(number, f"{place}{shortened(shown)} is not supported in <{parent.tag}>", hint)
+            return f"it is not supported together with the other parts of this <{self.tag}>"
+        return suggested_name(name, sorted(asked), f"{what} of <{self.tag}>") if asked else "delete it"
 
     def _report_text(self) -> None:
         for number, text in [
@@ -238,4 +251,4 @@ def _hint_on_missing(name: str, unread: Sequence[str]) -> str:
     if hint.startswith("did you mean"):
         similar = hint.removeprefix("did you mean '").removesuffix("'?")
         return f"write '{name}' instead of '{shortened(similar)}'"
-    return "add it"
+    return f"add it; found: {shortened(' '.join(unread))}" if unread else "add it"

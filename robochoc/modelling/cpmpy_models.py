@@ -119,7 +119,7 @@ class _Robots:
 
     def add(self, variable: Any, posting: Posting) -> Expression:  # noqa: ANN401 - CPMpy's expressions
         """Add a further variable to `posting`, and return it."""
-        made = posting.add_variable(self.names.of(_pretty(variable.name)), _values(variable))
+        made = posting.add_variable(self.names.of(_pretty(variable.name)), _values(variable), "part of a decomposition")
         self._further[made.name] = self._owner
         return made
 
@@ -134,7 +134,7 @@ class _Robots:
             domain = Domain(f"d_{ours}", (_as_range(posting.values[original]),))
             robots.setdefault(robot_names[robot], []).append(Variable(ours, domain))
         for ours, robot in self._further.items():
-            domain = Domain(f"d_{ours}", (_as_range(posting.extra[ours]),))
+            domain = Domain(f"d_{ours}", (_as_range(posting.extra[ours].values),))
             robots[robot_names[robot]].append(Variable(ours, domain))
         return robots
 

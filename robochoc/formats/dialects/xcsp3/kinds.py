@@ -12,7 +12,7 @@ from collections.abc import Callable, Iterable, Sequence
 
 from robochoc.formats.diagnostics import MistakeError, shortened
 from robochoc.formats.dialects.xcsp3.posting import Item, Posting
-from robochoc.formats.dialects.xcsp3.template import Element
+from robochoc.formats.dialects.xcsp3.template import Element, first_index
 from robochoc.formats.dialects.xcsp3.terms import (
     Condition,
     as_boolean,
@@ -20,14 +20,20 @@ from robochoc.formats.dialects.xcsp3.terms import (
     compare,
     every,
     inside,
+    integer,
     plus,
     some,
     times,
+    together,
     total,
 )
 from robochoc.formats.dialects.xcsp3.variables import lists, values_of
 from robochoc.model.expression import Apply, Constant, Expression, Name
 
+Vector = tuple[Expression, ...]
+"""Members of lists that are compared as a whole."""
+Row = tuple[int, ...]
+"""Values of as many variables."""
 ORDERS = ("lt", "le", "ge", "gt")
 
 
@@ -40,39 +46,35 @@ def intension(element: Element, posting: Posting) -> None:
 def all_different(element: Element, posting: Posting) -> None:
     """All values of a list differ, or lists do; of a matrix those of each row and each column."""
     if element.has("matrix"):
-        rows = [[posting.item(word) for word in row] for row in element.matrix("matrix")]
-        groups = [*rows, *map(list, zip(*rows, strict=True))]
-    elif element.count("list") > 1:
-        members = [items(words, posting) for words in element.every("list")]
-        for one, other in itertools.combinations(members, 2):
-            pairs = zip(as_integers(one), as_integers(other), strict=True)
-            posting.post(some([compare("ne", left, right) for left, right in pairs]))
-        return
+        rows = [as_integers(posting.item(word) for word in row) for row in element.matrix("matrix")]
+        groups = [vectors_of([group]) for group in (*rows, *map(list, zip(*rows, strict=True)))]
     else:
-        groups = [items(element.whole(), posting)]
-    spared = values_of(element.words("except")) if element.has("except") else []
+        groups = [vectors(element, posting)]
+    spared = excepted(element, groups)
     for group in groups:
-        for here, there in itertools.combinations(as_integers(group), 2):
-            posting.post(some([compare("ne", here, there), *([inside(here, spared)] if spared else [])]))
+        for here, there in itertools.combinations(group, 2):
+            posting.post(some([differ(here, there), *_is_one_of(here, spared)]))
 
 
 def all_equal(element: Element, posting: Posting) -> None:
-    """All values of a list are equal."""
-    element.refuse("except")
-    for one, other in itertools.pairwise(as_integers(items(element.whole(), posting))):
-        posting.post(compare("eq", one, other))
+    """All values of a list are equal, or all lists are."""
+    members = vectors(element, posting)
+    spared = excepted(element, [members])
+    for one, other in itertools.combinations(members, 2) if spared else itertools.pairwise(members):
+        posting.post(some([same(one, other), *_is_one_of(one, spared), *_is_one_of(other, spared)]))
 
 
 def ordered(element: Element, posting: Posting) -> None:
-    """Values of a list follow each other in an order, with given distances."""
-    members = as_integers(items(element.words("list"), posting))
-    lengths = (
-        as_integers(items(element.words("lengths"), posting))
-        if element.has("lengths")
-        else [Constant(0)] * len(members)
-    )
+    """Values of a list follow each other in an order, with given distances; lists follow in the lexicographic order."""
     operator = order_of(element)
-    for (one, other), length in zip(itertools.pairwise(members), lengths, strict=False):
+    members = vectors(element, posting)
+    if not element.has("lengths") or any(len(member) > 1 for member in members):
+        _post_chain(operator, members, posting)
+        return
+    lengths = as_integers(items(element.words("lengths"), posting))
+    if len(lengths) != len(members) - 1:
+        raise MistakeError(f"{len(lengths)} lengths for {len(members)} values", f"write {len(members) - 1} lengths")
+    for ((one,), (other,)), length in together(list(itertools.pairwise(members)), lengths):
         posting.post(compare(operator, plus(one, length), other))
 
 
@@ -80,15 +82,15 @@ def lex(element: Element, posting: Posting) -> None:
     """Lists follow each other in the lexicographic order; of a matrix rows and columns do."""
     operator = order_of(element)
     if element.has("matrix"):
-        rows = [as_integers([posting.item(word) for word in row]) for row in element.matrix("matrix")]
-        groups = [rows, list(map(list, zip(*rows, strict=True)))]
+        rows = [tuple(as_integers(posting.item(word) for word in row)) for row in element.matrix("matrix")]
+        groups = [rows, list(zip(*rows, strict=True))]
     else:
-        groups = [[as_integers(items(words, posting)) for words in element.every("list")]]
+        members = [tuple(as_integers(items(words, posting))) for words in element.lists()]
         if element.has("limit"):
-            groups[0].append(as_integers(items(element.words("limit"), posting)))
+            members.append(tuple(as_integers(items(element.words("limit"), posting))))
+        groups = [members]
     for group in groups:
-        for one, other in itertools.pairwise(group):
-            posting.post(_lexicographic(operator, one, other))
+        _post_chain(operator, group, posting)
 
 
 def sum_of(element: Element, posting: Posting) -> None:
@@ -99,10 +101,10 @@ def sum_of(element: Element, posting: Posting) -> None:
 def weighted(element: Element, posting: Posting) -> Expression:
     """Return the sum that `<list>` and `<coeffs>` mean."""
     members = as_integers(items(element.words("list"), posting))
-    coefficients = [posting.term(word) for word in element.words("coeffs")] if element.has("coeffs") else []
-    if coefficients and len(coefficients) != len(members):
-        raise MistakeError(f"{len(members)} terms, but {len(coefficients)} coefficients", "write one for each")
-    return total(list(map(times, coefficients, members)) if coefficients else members)
+    if not element.has("coeffs"):
+        return total(members)
+    coefficients = [posting.term(word) for word in element.words("coeffs")]
+    return total(_products(coefficients, members, "<coeffs> and <list>"))
 
 
 def count(element: Element, posting: Posting) -> None:
@@ -114,45 +116,52 @@ def count(element: Element, posting: Posting) -> None:
 
 
 def n_values(element: Element, posting: Posting) -> None:
-    """A condition on how many different values a list has."""
-    members = as_integers(items(element.words("list"), posting))
-    spared = values_of(element.words("except")) if element.has("except") else []
-    posting.post(posting.condition(element.text("condition")).on(distinct(members, spared)))
+    """A condition on how many different values a list has, or how many lists differ."""
+    members = vectors(element, posting)
+    spared = excepted(element, [members])
+    posting.post(posting.condition(element.text("condition")).on(_distinct(members, spared)))
 
 
-def distinct(members: Sequence[Expression], spared: Sequence[int] = ()) -> Expression:
-    """Return the number of different values of `members`: each counts unless an earlier one has its value."""
+def distinct(members: Sequence[Expression]) -> Expression:
+    """Return the number of different values of `members`."""
+    return _distinct([(member,) for member in members], [])
+
+
+def _distinct(members: Sequence[Vector], spared: Sequence[Row]) -> Expression:
+    """Return the number of different `members` that are not `spared`: each counts unless an earlier one is equal."""
     first = []
     for number, member in enumerate(members):
-        new = [compare("ne", member, earlier) for earlier in members[:number]]
+        new = [differ(member, earlier) for earlier in members[:number]]
         if spared:
-            new.append(Apply("not", (inside(member, spared),)))
+            new.append(Apply("not", (some(_is_one_of(member, spared)),)))
         first.append(as_integer(every(new)) if new else Constant(1))
     return _sum_with_constants(first)
 
 
 def cardinality(element: Element, posting: Posting) -> None:
-    """How often each of some values stands in a list."""
+    """How often each of some values occurs in a list."""
     members = as_integers(items(element.words("list"), posting))
     values = [posting.term(word) for word in element.words("values")]
-    occurrences = element.words("occurs")
-    if len(values) != len(occurrences):
-        raise MistakeError(f"{len(values)} values, but {len(occurrences)} occurrences", "write one for each")
-    for value, word in zip(values, occurrences, strict=True):
+    for value, word in together(values, element.words("occurs"), what="<values> and <occurs>"):
         number = total([as_integer(compare("eq", member, value)) for member in members])
         condition = Condition("in", tuple(values_of([word]))) if ".." in word else Condition("eq", posting.term(word))
         posting.post(condition.on(number))
-    if element.attribute("closed", "values") == "true":
+    if element.is_true("closed", "values"):
         for member in members:
             posting.post(_one_of(member, values))
 
 
 def extremum(operator: str) -> Callable[[Element, Posting], None]:
-    """Return the kind: a condition on the least, or the greatest, value of a list."""
+    """Return the kind: a condition on the least, or the greatest, value of a list, and perhaps on its place."""
     easy = {"max": {"lt", "le"}, "min": {"gt", "ge"}}[operator]
 
     def post(element: Element, posting: Posting) -> None:
         members = as_integers(items(element.words("list"), posting))
+        if element.has("index"):
+            place = Condition("eq", posting.term(element.text("index")))
+            _post_place(operator, members, place, element.start(), element.attribute("rank", "index"), posting)
+            if not element.has("condition"):
+                return
         condition = posting.condition(element.text("condition"))
         if condition.operator in easy:
             for member in members:
@@ -163,34 +172,78 @@ def extremum(operator: str) -> Callable[[Element, Posting], None]:
     return post
 
 
+def place_of_extremum(operator: str) -> Callable[[Element, Posting], None]:
+    """Return the kind: a condition on the place of the least, or the greatest, value of a list."""
+
+    def post(element: Element, posting: Posting) -> None:
+        members = as_integers(items(element.whole(), posting))
+        condition = posting.condition(element.text("condition"))
+        _post_place(operator, members, condition, element.start(), element.attribute("rank"), posting)
+
+    return post
+
+
 def best(operator: str, members: Sequence[Expression]) -> Expression:
-    """Return the least, or the greatest, of some integers."""
+    """Return the least, or the greatest, of some integers. Raises `MistakeError` where there are none."""
+    if not members:
+        raise MistakeError("the extremum of an empty list", "name its members")
     return members[0] if len(members) == 1 else Apply(operator, tuple(members))
 
 
+def _post_place(
+    operator: str, members: Sequence[Expression], condition: Condition, start: int, rank: str, posting: Posting
+) -> None:
+    """Post that `condition` holds for a place of the extremum: any of them, the first or the last one."""
+    if rank not in {"", "any", "first", "last"}:
+        raise MistakeError(f'rank="{shortened(rank)}"', "expected any, first or last")
+    weak, strict = {"max": ("ge", "gt"), "min": ("le", "lt")}[operator]
+
+    def beats(here: int, there: int) -> Expression:
+        is_strict = (rank == "first" and there < here) or (rank == "last" and there > here)
+        return compare(strict if is_strict else weak, members[here], members[there])
+
+    places = range(len(members))
+    numbers = [Constant(start + place) for place in places]
+    if condition.operator == "eq" and not isinstance(condition.operand, Constant | tuple):
+        posting.post(inside(condition.operand, [number.value for number in numbers]))
+        for here, there in itertools.permutations(places, 2):
+            posting.post(some([compare("ne", condition.operand, numbers[here]), beats(here, there)]))
+        return
+    possible = [place for place in places if condition.with_constant(start + place) is not False]
+    cases = []
+    for here in possible:
+        known = condition.with_constant(start + here) is not None
+        others = [beats(here, there) for there in places if there != here]
+        cases.append(every([*([] if known else [condition.on(numbers[here])]), *others]))
+    posting.post(some(cases))
+
+
 def channel(element: Element, posting: Posting) -> None:
-    """Two lists say the same in two ways: `x[i] = j` if and only if `y[j] = i`."""
-    both = [as_integers(items(words, posting)) for words in element.every("list")] or [
-        as_integers(items(element.whole(), posting))
-    ]
-    if any(element.attribute("startIndex", "list", place) not in {"", "0"} for place in range(len(both))):
-        raise MistakeError("a channel with another startIndex than 0", "count from 0")
+    """Two lists are inverse functions: `x[i] = j` if and only if `y[j] = i`; or one list has a single 1, at a value."""
+    both = [as_integers(items(words, posting)) for words in element.lists()]
+    starts = [first_index(one) for one in element.view.children("list")] or [0]
     if element.has("value"):
+        if len(both) > 1:
+            raise MistakeError("a <channel> of two lists with a <value>", "write one <list>")
+        (members,), (start,) = both, starts
         chosen = posting.term(element.text("value"))
-        posting.post(inside(chosen, range(len(both[0]))))
-        for place, member in enumerate(both[0]):
+        posting.post(inside(chosen, range(start, start + len(members))))
+        for place, member in enumerate(members, start):
             posting.post(Apply("iff", (compare("eq", member, Constant(1)), compare("eq", chosen, Constant(place)))))
             posting.post(inside(member, (0, 1)))
         return
+    if len(both) > 2:  # noqa: PLR2004 - one for each direction
+        raise MistakeError(f"a <channel> of {len(both)} lists", "write one or two")
     here, there = both[0], both[-1]
     if len(here) > len(there):
-        raise MistakeError("a channel whose first list is the longer one", "exchange them")
+        raise MistakeError("a <channel> whose first list is the longer one", "exchange the lists")
+    first, second = starts[0], starts[-1]
     for member in here:
-        posting.post(inside(member, range(len(there))))
+        posting.post(inside(member, range(second, second + len(there))))
     alike = len(here) == len(there)
     for member in there if alike else []:
-        posting.post(inside(member, range(len(here))))
-    for (i, one), (j, other) in itertools.product(enumerate(here), enumerate(there)):
+        posting.post(inside(member, range(first, first + len(here))))
+    for (i, one), (j, other) in itertools.product(enumerate(here, first), enumerate(there, second)):
         forth, back = compare("eq", one, Constant(j)), compare("eq", other, Constant(i))
         posting.post(Apply("iff", (forth, back)) if alike else some([Apply("not", (forth,)), back]))
 
@@ -198,9 +251,7 @@ def channel(element: Element, posting: Posting) -> None:
 def instantiation(element: Element, posting: Posting) -> None:
     """Variables have given values."""
     members, values = items(element.words("list"), posting), element.words("values")
-    if len(members) != len(values):
-        raise MistakeError(f"{len(members)} variables, but {len(values)} values", "write one for each")
-    for member, word in zip(members, values, strict=True):
+    for member, word in together(members, values, what="<list> and <values>"):
         if word != "*":
             posting.post(compare("eq", as_integer(member), posting.item(word)))
 
@@ -211,15 +262,20 @@ def clause(element: Element, posting: Posting) -> None:
 
 
 def precedence(element: Element, posting: Posting) -> None:
-    """Each of some values stands in a list only behind the value before it."""
-    if element.attribute("covered", "values") == "true" or not element.has("values"):
-        raise MistakeError("<precedence> without values, or covered, has no counterpart", "write its values")
-    members = as_integers(items(element.words("list"), posting))
-    values = [Constant(value) for value in values_of(element.words("values"))]
+    """Each of some values occurs in a list only behind the value before it."""
+    members = as_integers(items(element.whole(), posting))
+    if element.has("values"):
+        numbers = values_of(element.words("values"))
+        covered = element.is_true("covered", "values")
+    else:
+        numbers, covered = sorted({value for member in members for value in posting.domain(member)}), False
+    values = [Constant(value) for value in numbers]
     for before, after in itertools.pairwise(values):
         for place, member in enumerate(members):
             earlier = [compare("eq", other, before) for other in members[:place]]
             posting.post(some([compare("ne", member, after), *earlier]))
+    if covered and values:
+        posting.post(some([compare("eq", member, values[-1]) for member in members]))
 
 
 def knapsack(element: Element, posting: Posting) -> None:
@@ -229,33 +285,80 @@ def knapsack(element: Element, posting: Posting) -> None:
     if element.has("limit"):
         conditions.insert(0, Condition("le", posting.term(element.text("limit"))))
     if len(conditions) != 2:  # noqa: PLR2004 - of weight and profit
-        raise MistakeError("a knapsack without two conditions", "of its weight, and of its profit")
+        raise MistakeError(f"a <knapsack> with {len(conditions)} conditions", "write one for weights, one for profits")
     for kind, condition in zip(("weights", "profits"), conditions, strict=True):
         factors = [posting.term(word) for word in element.words(kind)]
-        posting.post(condition.on(total(_products(factors, members))))
+        posting.post(condition.on(total(_products(factors, members, f"<{kind}> and <list>"))))
 
 
 def bin_packing(element: Element, posting: Posting) -> None:
     """Conditions on the load of each bin."""
     bins = as_integers(items(element.words("list"), posting))
     sizes = [posting.term(word) for word in element.words("sizes")]
-    if len(bins) != len(sizes):
-        raise MistakeError(f"{len(bins)} items, but {len(sizes)} sizes", "write one for each")
+    start = element.start()
     if element.has("condition"):
         condition = posting.condition(element.text("condition"))
         used = sorted({value for item in bins for value in posting.domain(item)})
         conditions = dict.fromkeys(used, condition)
-    elif element.has("limits") or element.has("loads"):
-        kind, operator = ("limits", "le") if element.has("limits") else ("loads", "eq")
-        words = element.words(kind)
-        conditions = {place: Condition(operator, posting.term(word)) for place, word in enumerate(words)}
-        for item in bins:
-            posting.post(inside(item, range(len(words))))
     else:
-        raise MistakeError("a <binPacking> without condition, limits or loads", "write one of them")
+        conditions = dict(enumerate(_conditions_of_bins(element, posting), start))
+        for item in bins:
+            posting.post(inside(item, conditions))
     for number, condition in conditions.items():
         hits = [as_integer(compare("eq", item, Constant(number))) for item in bins]
-        posting.post(condition.on(total(_products(sizes, hits))))
+        posting.post(condition.on(total(_products(sizes, hits, "<sizes> and <list>"))))
+
+
+def _conditions_of_bins(element: Element, posting: Posting) -> list[Condition]:
+    """Return the condition on the load of each bin, in their order."""
+    if element.has("conditions"):
+        return posting.conditions(element.text("conditions"))
+    for kind, operator in (("limits", "le"), ("loads", "eq")):
+        if element.has(kind):
+            return [Condition(operator, posting.term(word)) for word in element.words(kind)]
+    raise MistakeError("a <binPacking> without a condition", "write <condition>, <conditions>, <limits> or <loads>")
+
+
+def vectors(element: Element, posting: Posting) -> list[Vector]:
+    """Return the members that a constraint compares: those of its only list, one by one, or several lists as wholes."""
+    return vectors_of([as_integers(items(words, posting)) for words in element.lists()])
+
+
+def vectors_of(lists: Sequence[Sequence[Expression]]) -> list[Vector]:
+    """Return the members of the only list, one by one, or several lists as wholes. Raises `MistakeError`."""
+    if len(lists) == 1:
+        return [(member,) for member in lists[0]]
+    found: list[Vector] = list(zip(*together(*lists), strict=True))
+    if not found:
+        raise MistakeError("empty lists", "name their members")
+    return found
+
+
+def excepted(element: Element, groups: Sequence[Sequence[Vector]]) -> list[Row]:
+    """Return the rows of values that `<except>` names. Raises `MistakeError`."""
+    if not element.has("except"):
+        return []
+    width = max((len(member) for group in groups for member in group), default=1)
+    text = element.text("except")
+    rows: list[Row] = (
+        [(value,) for value in values_of(text.split())]
+        if text[:1] != "("
+        else [tuple(map(integer, row)) for row in rows_of(text)]
+    )
+    for row in rows:
+        if len(row) != width:
+            raise MistakeError(f"{len(row)} values in <except>", f"write tuples of {width} values")
+    return rows
+
+
+def same(one: Vector, other: Vector) -> Expression:
+    """Return that two rows have the same values."""
+    return every([compare("eq", *pair) for pair in zip(one, other, strict=True)])
+
+
+def differ(one: Vector, other: Vector) -> Expression:
+    """Return that two rows have different values."""
+    return some([compare("ne", *pair) for pair in zip(one, other, strict=True)])
 
 
 def items(words: Iterable[str], posting: Posting) -> list[Item]:
@@ -276,10 +379,15 @@ def order_of(element: Element) -> str:
     return operator
 
 
-def _products(factors: Sequence[Expression], members: Sequence[Expression]) -> list[Expression]:
-    if len(factors) != len(members):
-        raise MistakeError(f"{len(members)} terms, but {len(factors)} factors", "write one for each")
-    return list(map(times, factors, members))
+def _products(factors: Sequence[Expression], members: Sequence[Expression], what: str) -> list[Expression]:
+    return [times(factor, member) for factor, member in together(factors, members, what=what)]
+
+
+def _is_one_of(member: Vector, rows: Sequence[Row]) -> list[Expression]:
+    """Return that `member` is one of `rows`, as a list of cases."""
+    if len(member) == 1:
+        return [inside(member[0], [value for (value,) in rows])] if rows else []
+    return [same(member, tuple(map(Constant, row))) for row in rows]
 
 
 def _one_of(member: Expression, values: Sequence[Expression]) -> Expression:
@@ -295,16 +403,22 @@ def _sum_with_constants(parts: Sequence[Expression]) -> Expression:
     return total([*(part for part in parts if not isinstance(part, Constant)), Constant(fixed)])
 
 
-def _lexicographic(operator: str, one: Sequence[Expression], other: Sequence[Expression]) -> Expression:
-    if len(one) != len(other) or not one:
-        raise MistakeError("lists of different lengths in <lex>", "give them one length")
+def _post_chain(operator: str, members: Sequence[Vector], posting: Posting) -> None:
+    """Post that `members` follow each other in the lexicographic order."""
+    for one, other in itertools.pairwise(members):
+        posting.post(_lexicographic(operator, list(together(one, other))))
+
+
+def _lexicographic(operator: str, pairs: Sequence[tuple[Expression, Expression]]) -> Expression:
+    if not pairs:
+        raise MistakeError("an empty list", "name its members")
     strict = {"le": "lt", "ge": "gt"}.get(operator, operator)
-    *before, (left, right) = zip(one, other, strict=True)
+    *before, last = pairs
     cases = []
-    for place, (here, there) in enumerate(before):
-        alike = [compare("eq", *pair) for pair in before[:place]]
-        cases.append(every([*alike, compare(strict, here, there)]))
-    cases.append(every([*(compare("eq", *pair) for pair in before), compare(operator, left, right)]))
+    for place, pair in enumerate(before):
+        alike = [compare("eq", *earlier) for earlier in before[:place]]
+        cases.append(every([*alike, compare(strict, *pair)]))
+    cases.append(every([*(compare("eq", *pair) for pair in before), compare(operator, *last)]))
     return some(cases)
 
 

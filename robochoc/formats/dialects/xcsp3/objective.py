@@ -4,34 +4,35 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 
-from lxml import etree
-
 from robochoc.formats.diagnostics import MistakeError, shortened
-from robochoc.formats.dialects.xcsp3.document import attribute, line
+from robochoc.formats.dialects.xcsp3.document import ignore_remarks
 from robochoc.formats.dialects.xcsp3.kinds import as_integers, best, distinct, items, weighted
 from robochoc.formats.dialects.xcsp3.posting import Posting
 from robochoc.formats.dialects.xcsp3.template import Element
-from robochoc.formats.dialects.xcsp3.terms import as_integer, compare, times, total
+from robochoc.formats.dialects.xcsp3.terms import as_integer, compare, some, times, total
+from robochoc.formats.element_view import ElementView
 from robochoc.model.expression import Apply, Constant, Expression, names
 
 MAX_TOGETHER = 10_000
-"""The maximum of a list with more combinations of values becomes a variable of its own, at least each of them."""
+"""The extremum, or the number of values, of a list with more combinations of values gets auxiliary variables."""
+
+_BOUND = "the bound that the objective minimises or maximises"
+_USED = "whether a value is used, of which the objective minimises the number"
+_NEW = "whether a variable has a value that no variable before it has; the objective maximises their number"
 
 
-def post_objective(objectives: etree._Element, posting: Posting) -> bool:
+def post_objective(objectives: ElementView, posting: Posting) -> bool:
     """Post the costs that `<objectives>` asks to minimise or to maximise. Return whether to maximise.
 
     Raises:
-        MistakeError: if there are several, or one that has no counterpart.
+        MistakeError: if there are several, or one that is not supported.
     """
-    if len(objectives) != 1:
-        raise MistakeError(f"{len(objectives)} objectives have no counterpart", "one has", line(objectives))
-    (xml,) = objectives
-    if xml.tag not in {"minimize", "maximize"}:
-        raise MistakeError(f"<{xml.tag}> in <objectives>", "expected <minimize> or <maximize>", line(xml))
-    posting.line, posting.title = line(xml), "objective"
-    objective = _objective(Element(xml, posting.variables), posting)
-    maximize = bool(xml.tag == "maximize")
+    ignore_remarks(objectives)
+    view = objectives.one_of("minimize", "maximize")
+    ignore_remarks(view)
+    posting.line, posting.title = view.line, "objective"
+    maximize = view.tag == "maximize"
+    objective = _objective(Element(view, posting.variables), posting, maximize=maximize)
     worst = "min" if maximize else "max"
     for term in split(objective):
         if isinstance(term, Apply) and term.operator == worst and posting.size(names(term)) > MAX_TOGETHER:
@@ -46,20 +47,19 @@ def _bounded_by(worst: Apply, posting: Posting) -> Expression:
     values: set[int] = set()
     for member in worst.arguments:
         values.update(posting.values_of(member))
-    bound = posting.add_variable("objective", values)
+    bound = posting.add_variable("objective", values, _BOUND)
     for member in worst.arguments:
         posting.post(compare("le" if worst.operator == "max" else "ge", member, bound))
     return bound
 
 
-def _objective(element: Element, posting: Posting) -> Expression:
+def _objective(element: Element, posting: Posting, *, maximize: bool) -> Expression:
     """Return what is minimised or maximised, as one expression."""
-    kind = attribute(element.xml, "type") or "expression"
+    kind = element.attribute("type") or "expression"
     if kind == "expression":
         return as_integer(posting.term(element.text()))
-    if kind == "sum" and len(element.xml):
+    if kind == "sum" and element.view.has_children:
         return weighted(element, posting)
-    element.refuse("coeffs")
     members = as_integers(items(element.whole(), posting))
     if not members:
         raise MistakeError("an objective without variables", "name them")
@@ -71,9 +71,40 @@ def _objective(element: Element, posting: Posting) -> Expression:
         case "minimum" | "maximum":
             return best(kind[:3], members)
         case "nValues":
-            return distinct(members)
+            return _number_of_values(members, posting, maximize=maximize)
         case _:
-            raise MistakeError(f'an objective of type="{shortened(kind)}" has no counterpart', "write a sum")
+            raise MistakeError(f'an objective of type="{shortened(kind)}" is not supported', "write a sum")
+
+
+def _number_of_values(members: Sequence[Expression], posting: Posting, *, maximize: bool) -> Expression:
+    """Return the number of different values of `members`; of many, as a sum of auxiliary variables.
+
+    In the best solution the sum is that number, otherwise no better.
+    """
+    if posting.size({name for member in members for name in names(member)}) <= MAX_TOGETHER:
+        return distinct(members)
+    parts: list[Expression] = []
+    if maximize:
+        for number, member in enumerate(members):
+            beside = next(iter(names(member)), None)
+            is_new = posting.add_variable(f"{beside or 'value'}_is_new", (0, 1), _NEW, beside)
+            for earlier in members[:number]:
+                posting.post(some([compare("eq", is_new, Constant(0)), compare("ne", member, earlier)]))
+            parts.append(is_new)
+        return total(parts)
+    holders: dict[int, list[Expression]] = {}
+    for member in members:
+        for value in posting.values_of(member):
+            holders.setdefault(value, []).append(member)
+    for value in sorted(holders):
+        if len(holders[value]) == 1:
+            parts.append(as_integer(compare("eq", holders[value][0], Constant(value))))
+            continue
+        is_used = posting.add_variable(f"uses_{value}".replace("-", "minus_"), (0, 1), _USED)
+        for member in holders[value]:
+            posting.post(some([compare("ne", member, Constant(value)), compare("eq", is_used, Constant(1))]))
+        parts.append(is_used)
+    return total(parts)
 
 
 def split(expression: Expression) -> list[Expression]:

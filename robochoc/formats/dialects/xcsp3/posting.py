@@ -6,6 +6,7 @@ import itertools
 import math
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
+from typing import NamedTuple
 
 from robochoc.formats.definitions import MAX_TUPLES, MAX_VALUES
 from robochoc.formats.diagnostics import MistakeError, shortened
@@ -18,10 +19,11 @@ from robochoc.formats.dialects.xcsp3.terms import (
     compare,
     integer,
     read_condition,
+    read_conditions,
     read_tree,
     resolved,
 )
-from robochoc.formats.dialects.xcsp3.variables import Variables
+from robochoc.formats.dialects.xcsp3.variables import MAX_VARIABLES, Variables
 from robochoc.model.expression import Apply, Constant, Expression, Name, UndefinedValueError, evaluate, names
 from robochoc.model.expression.bounds import Interval, bounds
 from robochoc.model.problem import Constraint, Definition, Function, Predicate, Relation, Semantics
@@ -44,6 +46,14 @@ Item = Expression
 """A member of a list: a variable, an integer, or an expression."""
 
 
+class Auxiliary(NamedTuple):
+    """A variable that is not in the instance: its values, its use, and the variable whose robot has it, if any."""
+
+    values: tuple[int, ...]
+    purpose: str
+    beside: str | None
+
+
 @dataclass
 class Posting:
     """The variables of an instance, and what has been posted on them.
@@ -56,7 +66,7 @@ class Posting:
         constraints: The constraints, over our names.
         costs: The costs, over our names.
         constant: The constant part of the costs.
-        extra: Variables that the instance has not, by our names, with their values.
+        extra: Auxiliary variables, which are not in the instance, by our names.
         line: The line of the element that is read.
         title: The name of the constraint that is read.
         work: The operators, terms and values so far.
@@ -69,7 +79,7 @@ class Posting:
     constraints: list[Constraint] = field(default_factory=list)
     costs: list[Constraint] = field(default_factory=list)
     constant: int = 0
-    extra: dict[str, tuple[int, ...]] = field(default_factory=dict)
+    extra: dict[str, Auxiliary] = field(default_factory=dict)
     line: int = 0
     title: str = ""
     work: int = 0
@@ -112,6 +122,10 @@ class Posting:
         """Return the condition in a text."""
         return read_condition(text, self.term, MAX_VALUES)
 
+    def conditions(self, text: str) -> list[Condition]:
+        """Return the conditions in a text."""
+        return read_conditions(text, self.term, MAX_VALUES)
+
     def domain(self, item: Expression) -> Sequence[int]:
         """Return the values that a variable or an integer may have. Raises `MistakeError` for an expression."""
         match item:
@@ -136,18 +150,30 @@ class Posting:
         """Return whether the values of our variable `name` are symbols."""
         return name in self._original and self.variables.is_symbolic(self._original[name])
 
-    def add_variable(self, name: str, values: Iterable[int]) -> Name:
-        """Return a variable that the instance has not. Raises `MistakeError` where it would have too many values."""
+    def add_variable(self, name: str, values: Iterable[int], purpose: str, beside: str | None = None) -> Name:
+        """Return a new auxiliary variable.
+
+        Args:
+            name: A name for the variable, to be extended where it is not free.
+            values: The values of the variable.
+            purpose: The use of the variable, for users.
+            beside: The variable, by our name, whose robot gets the new one. None: a robot of its own does.
+
+        Raises:
+            MistakeError: if there are too many values or variables.
+        """
         found = tuple(sorted(set(values)))
         if len(found) > MAX_VALUES:
-            raise MistakeError(f"an objective of {len(found):,} values", f"{MAX_VALUES:,} are supported")
-        while name in self._original:
+            raise MistakeError(f"an auxiliary variable of {len(found):,} values", f"{MAX_VALUES:,} are supported")
+        if len(self.extra) == MAX_VARIABLES:
+            raise MistakeError(f"more than {MAX_VARIABLES:,} auxiliary variables", "import a smaller problem")
+        while name in self._original or name in self.extra:
             name += "_"
-        self.extra[name] = found
+        self.extra[name] = Auxiliary(found, purpose, beside)
         return Name(name)
 
     def _values(self, name: str) -> Sequence[int]:
-        return self.extra[name] if name in self.extra else self.values[self._original[name]]
+        return self.extra[name].values if name in self.extra else self.values[self._original[name]]
 
     def size(self, items: Iterable[str]) -> int:
         """Return the number of combinations of values of variables."""

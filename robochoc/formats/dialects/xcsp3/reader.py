@@ -7,17 +7,17 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from lxml import etree
-
 from robochoc.formats.definitions import MAX_VALUES
-from robochoc.formats.diagnostics import DiagnosticCollector, MistakeError, encodable, shortened
-from robochoc.formats.dialects.dialect import Imported, ImportOptions, Names, Note
+from robochoc.formats.diagnostics import MistakeError, invalid_input
+from robochoc.formats.dialects.dialect import MAX_FILE, Imported, ImportOptions, Names, Note
 from robochoc.formats.dialects.xcsp3 import kinds, scheduling, tables
-from robochoc.formats.dialects.xcsp3.document import attribute, content, invalid, line, read_document
+from robochoc.formats.dialects.xcsp3.circuit import circuit
+from robochoc.formats.dialects.xcsp3.document import check_root, ignore_remarks
 from robochoc.formats.dialects.xcsp3.objective import post_objective
 from robochoc.formats.dialects.xcsp3.posting import Posting, in_words
 from robochoc.formats.dialects.xcsp3.template import Element, slide_scopes
 from robochoc.formats.dialects.xcsp3.variables import Variables, domain_of, read_variables
+from robochoc.formats.element_view import ElementView, open_xml
 from robochoc.model.assembly import assemble
 from robochoc.model.cost_units import CostUnits
 from robochoc.model.problem import Domain, ProblemKind, Variable
@@ -38,6 +38,8 @@ KINDS: Mapping[str, Kind] = {
     "cardinality": kinds.cardinality,
     "minimum": kinds.extremum("min"),
     "maximum": kinds.extremum("max"),
+    "minimumArg": kinds.place_of_extremum("min"),
+    "maximumArg": kinds.place_of_extremum("max"),
     "channel": kinds.channel,
     "instantiation": kinds.instantiation,
     "clause": kinds.clause,
@@ -47,7 +49,7 @@ KINDS: Mapping[str, Kind] = {
     "element": tables.element,
     "regular": tables.regular,
     "mdd": tables.mdd,
-    "circuit": tables.circuit,
+    "circuit": circuit,
     "noOverlap": scheduling.no_overlap,
     "cumulative": scheduling.cumulative,
 }
@@ -69,39 +71,42 @@ def read(paths: Sequence[Path], options: ImportOptions) -> Imported:
         InvalidInputError: with what is wrong, or has no counterpart, each with its line.
     """
     if len(paths) != 1:
-        raise invalid(paths[0], 0, f"{len(paths)} files", "an XCSP3 instance is one file: import them one by one")
+        raise invalid_input(paths[0], f"{len(paths)} files", "an XCSP3 instance is one file: import them one by one")
     (path,) = paths
-    root = read_document(path)
-    mistakes = DiagnosticCollector(encodable(str(path)))
-    variables = read_variables(root.find("variables"), mistakes)
-    mistakes.finish()
+    with open_xml(path, MAX_FILE, long_texts=True) as root:
+        check_root(root)
+        return _read_instance(root, path, options)
+
+
+def _read_instance(root: ElementView, path: Path, options: ImportOptions) -> Imported:
+    variables = read_variables(root.child("variables"))
+    root.report.finish()
     if not variables.domains:
-        raise invalid(path, line(root), "has no variables", "expected <variables> with <var> or <array>")
+        raise root.mistake("has no variables", "expected <variables> with <var> or <array>")
     ids = _names(variables)
     symbols = {symbol: number for number, symbol in enumerate(variables.symbols)}
     domains = {name: domain_of(values, symbols, f"d_{ids[name]}") for name, values in variables.domains.items()}
-    with mistakes.at(line(root)):
-        if sum(map(len, domains.values())) > 10 * MAX_VALUES:
-            raise MistakeError(f"domains with more than {10 * MAX_VALUES:,} values together", "make them smaller")
-    mistakes.finish()
+    if sum(map(len, domains.values())) > 10 * MAX_VALUES:
+        raise MistakeError(f"domains with more than {10 * MAX_VALUES:,} values together", "make them smaller")
     posting = Posting(variables, {name: tuple(domain) for name, domain in domains.items()}, symbols, ids)
-    constraints = root.find("constraints")
+    constraints = root.child("constraints")
     if constraints is not None:
-        _Reader(posting, mistakes).read(constraints)
-    objectives = root.find("objectives")
+        _Reader(posting).read(constraints)
+    objectives = root.child("objectives")
     maximize = False
-    if objectives is not None and len(objectives):
-        with mistakes.at(posting.line):
+    if objectives is not None:
+        with objectives.guard():
             maximize = post_objective(objectives, posting)
-    mistakes.finish()
+    root.ignore("annotations")
+    root.report.finish()
     own = {name: Variable(ids[name], domains[name]) for name in variables.domains}
     robots = _robots(own, options.owner, path)
-    _add_extra(robots, posting)
+    _add_auxiliaries(robots, posting)
     team = assemble(
         _team_name(path, options),
         robots,
         [*posting.constraints, *posting.costs],
-        kind=ProblemKind.DISWCSP if attribute(root, "type") == "COP" else ProblemKind.DISCSP,
+        kind=ProblemKind.DISWCSP if root.attribute("type") == "COP" else ProblemKind.DISCSP,
         costs=CostUnits(maximize, 0, posting.constant),
     )
     changed = {ours: theirs for theirs, ours in ids.items() if ours != theirs}
@@ -116,13 +121,13 @@ class _Reader:
     """Reads constraints, in blocks, groups and slides."""
 
     posting: Posting
-    mistakes: DiagnosticCollector
     _extensions: tables.Extensions = field(default_factory=tables.Extensions)
 
-    def read(self, parent: etree._Element) -> None:
+    def read(self, parent: ElementView) -> None:
         """Read all constraints in `parent`."""
-        for child in parent:
-            with self.mistakes.at(line(child)):
+        ignore_remarks(parent)
+        for child in parent.children("block", "group", "slide", "extension", *KINDS):
+            with child.guard():
                 match child.tag:
                     case "block":
                         self.read(child)
@@ -133,42 +138,39 @@ class _Reader:
                     case _:
                         self._post(Element(child, self.posting.variables))
 
-    def _group(self, group: etree._Element) -> None:
-        arguments = group.findall("args")
-        template = self._template(group, len(group) - len(arguments))
-        for one in arguments:
-            words = list(self.posting.variables.named(content(one)))
-            self._post(Element(template.xml, template.variables, words))
+    def _group(self, group: ElementView) -> None:
+        every = group.children("args")
+        template = self._template(group)
+        if not every:
+            raise MistakeError("a <group> without <args>", "write the arguments of each constraint")
+        for one in every:
+            words = list(self.posting.variables.named(one.text()))
+            self._post(template.applied(words))
 
-    def _slide(self, slide: etree._Element) -> None:
-        template = self._template(slide, len(slide) - len(slide.findall("list")))
+    def _slide(self, slide: ElementView) -> None:
+        template = self._template(slide)
         for words in slide_scopes(slide, self.posting.variables, template.arity):
-            self._post(Element(template.xml, template.variables, words))
+            self._post(template.applied(words))
 
-    def _template(self, parent: etree._Element, number: int) -> Element:
-        if number != 1:
-            raise MistakeError(f"<{parent.tag}> with {number} constraints", "one template is expected")
-        (template,) = (child for child in parent if child.tag not in {"args", "list"})
-        return Element(template, self.posting.variables, [])
+    def _template(self, parent: ElementView) -> Element:
+        ignore_remarks(parent)
+        return Element(parent.one_of("extension", *KINDS), self.posting.variables, [])
 
     def _post(self, element: Element) -> None:
-        kind = KINDS.get(element.kind, self._extensions if element.kind == "extension" else None)
-        if kind is None:
-            hint = f"of XCSP3, {' '.join(sorted([*KINDS, 'extension']))} are read"
-            raise MistakeError(f"the constraint <{shortened(element.kind)}> has no counterpart", hint)
-        element.check()
-        self.posting.line = line(element.xml)
-        self.posting.title = attribute(element.xml, "id") or element.kind
+        ignore_remarks(element.view)
+        kind = element.kind
+        self.posting.line = element.view.line
+        self.posting.title = element.attribute("id") or kind
         before = len(self.posting.constraints)
-        kind(element, self.posting)
-        if element.kind not in _SYMBOLIC and self.posting.symbols:
-            self._refuse_symbols(element.kind, before)
+        (self._extensions if kind == "extension" else KINDS[kind])(element, self.posting)
+        if kind not in _SYMBOLIC and self.posting.symbols:
+            self._refuse_symbols(kind, before)
 
     def _refuse_symbols(self, kind: str, before: int) -> None:
         for constraint in self.posting.constraints[before:]:
             for name in constraint.variables:
                 if self.posting.is_symbolic(name):
-                    raise MistakeError(f"<{kind}> over symbols has no counterpart", "write it as a table")
+                    raise MistakeError(f"<{kind}> over symbols is not supported", "write it as a table")
 
 
 def _names(variables: Variables) -> dict[str, str]:
@@ -191,25 +193,31 @@ def _robots(own: Mapping[str, Variable], owner: str | None, path: Path) -> dict[
     try:
         pattern = re.compile(owner) if owner is not None else None
     except re.error as error:
-        raise invalid(path, 0, f"--owner {owner} is no regular expression: {error}", "write x\\[(\\d+)\\]") from None
+        raise invalid_input(
+            path, f"--owner {owner} is not a valid regular expression: {error}", "write x\\[(\\d+)\\]"
+        ) from None
     names = Names()
     robots: dict[str, list[Variable]] = {}
     for original, variable in own.items():
         match = pattern.search(original) if pattern else None
         if pattern and not match:
-            raise invalid(path, 0, f"--owner {owner} fits no part of '{original}'", "let it fit all variables")
+            raise invalid_input(path, f"--owner {owner} fits no part of '{original}'", "let it fit all variables")
         word = variable.name if match is None else match[1] if match.re.groups and match[1] else match[0]
         robots.setdefault(names.of(word if word[:1].isalpha() else f"r{word}"), []).append(variable)
     return robots
 
 
-def _add_extra(robots: dict[str, list[Variable]], posting: Posting) -> None:
-    """Give variables that the instance has not to a robot of their own, the last."""
-    for name, values in posting.extra.items():
+def _add_auxiliaries(robots: dict[str, list[Variable]], posting: Posting) -> None:
+    """Add auxiliary variables to the robots of the variables that they belong to; others get robots of their own."""
+    owner = {variable.name: robot for robot, variables in robots.items() for variable in variables}
+    for name, (values, _, beside) in posting.extra.items():
+        domain = Domain(f"d_{name}", tuple(range(value, value + 1) for value in values))
+        if beside is not None:
+            robots[owner[beside]].append(Variable(name, domain))
+            continue
         robot = name
         while robot in robots:
             robot += "_"
-        domain = Domain(f"d_{name}", tuple(range(value, value + 1) for value in values))
         robots[robot] = [Variable(name, domain)]
 
 
@@ -217,13 +225,18 @@ def _team_name(path: Path, options: ImportOptions) -> str:
     return options.name or path.name.removesuffix(".xml")
 
 
-def _notes(posting: Posting, root: etree._Element, changed: Mapping[str, str]) -> list[Note]:
+def _notes(posting: Posting, root: ElementView, changed: Mapping[str, str]) -> list[Note]:
     notes = [Note("renamed", f"{original} is {name}") for name, original in changed.items()]
-    notes += [
-        Note("auxiliary", f"{name} is a further variable: the bound that the objective minimises or maximises")
-        for name in posting.extra
-    ]
-    if root.find("annotations") is not None:
+    by_purpose: dict[str, list[str]] = {}
+    for name, auxiliary in posting.extra.items():
+        by_purpose.setdefault(auxiliary.purpose, []).append(name)
+    for purpose, added in by_purpose.items():
+        if len(added) == 1:
+            notes.append(Note("auxiliary", f"{added[0]} is an additional variable: {purpose}"))
+        else:
+            every = f"{added[0]} to {added[-1]}"
+            notes.append(Note("auxiliary", f"{every} are {len(added)} additional variables: each is {purpose}"))
+    if root.has("annotations"):
         notes.append(Note("annotations", "advice to solvers is left out"))
     wide = [one for one in posting.constraints if posting.size(one.variables) > _WIDE]
     notes += [

@@ -10,7 +10,17 @@ from robochoc.formats.diagnostics import MistakeError
 from robochoc.formats.dialects.xcsp3.kinds import as_integers, items
 from robochoc.formats.dialects.xcsp3.posting import Posting
 from robochoc.formats.dialects.xcsp3.template import Element
-from robochoc.formats.dialects.xcsp3.terms import Condition, as_integer, compare, every, plus, some, times, total
+from robochoc.formats.dialects.xcsp3.terms import (
+    Condition,
+    as_integer,
+    compare,
+    every,
+    plus,
+    some,
+    times,
+    together,
+    total,
+)
 from robochoc.model.expression import Constant, Expression
 
 MAX_COVERS = 5_000
@@ -28,35 +38,34 @@ class Task(NamedTuple):
 def no_overlap(element: Element, posting: Posting) -> None:
     """Tasks, or boxes, do not overlap."""
     origins, lengths = (_points(element, child, posting) for child in ("origins", "lengths"))
-    if len(origins) != len(lengths):
-        raise MistakeError(f"{len(origins)} origins, but {len(lengths)} lengths", "write one for each")
-    spared = element.attribute("zeroIgnored") != "false"
-    for one, other in itertools.combinations(zip(origins, lengths, strict=True), 2):
+    spared = element.is_true("zeroIgnored", default=True)
+    boxes = [
+        list(together(*box, what="<origins> and <lengths>"))
+        for box in together(origins, lengths, what="<origins> and <lengths>")
+    ]
+    for one, other in itertools.combinations(boxes, 2):
         apart = []
-        for (x, y), (long, wide) in zip(
-            zip(one[0], other[0], strict=True), zip(one[1], other[1], strict=True), strict=True
-        ):
+        for (x, long), (y, wide) in together(one, other):
             apart += [compare("le", plus(x, long), y), compare("le", plus(y, wide), x)]
-        apart += [_is_zero(side) for side in (*one[1], *other[1]) if spared and _may_be_zero(side, posting)]
+            apart += [_is_zero(side) for side in (long, wide) if spared and _may_be_zero(side, posting)]
         posting.post(some(apart))
 
 
 def cumulative(element: Element, posting: Posting) -> None:
     """At no time do tasks need more than there is."""
-    starts, lengths, heights = (
-        as_integers(items(element.words(child), posting)) for child in ("origins", "lengths", "heights")
-    )
-    if not len(starts) == len(lengths) == len(heights):
-        raise MistakeError("different numbers of origins, lengths and heights", "write one of each for a task")
-    if element.has("ends"):
-        for start, length, end in zip(starts, lengths, as_integers(items(element.words("ends"), posting)), strict=True):
+    children = ["origins", "lengths", "heights", *(["ends"] if element.has("ends") else [])]
+    columns = [as_integers(items(element.words(child), posting)) for child in children]
+    tasks = []
+    for start, length, height, *ends in together(*columns, what=f"<cumulative>: {', '.join(children)}"):
+        tasks.append(Task(start, length, height))
+        for end in ends:
             posting.post(compare("eq", plus(start, length), end))
-    if any(min(posting.domain(one), default=0) < 0 for one in (*lengths, *heights)):
-        raise MistakeError("tasks with negative lengths or heights have no counterpart", "they are 0 or more")
+    if any(min(posting.domain(one), default=0) < 0 for task in tasks for one in (task.length, task.height)):
+        raise MistakeError("tasks with negative lengths or heights are not supported", "they are 0 or more")
     condition = posting.condition(element.text("condition"))
     if condition.operator not in {"lt", "le"}:
-        raise MistakeError(f"<cumulative> with {condition.operator} has no counterpart", "write (le,10)")
-    post_tasks(list(map(Task, starts, lengths, heights)), condition, posting)
+        raise MistakeError(f"<cumulative> with {condition.operator} is not supported", "write (le,10)")
+    post_tasks(tasks, condition, posting)
 
 
 def post_tasks(every_task: Sequence[Task], condition: Condition, posting: Posting) -> None:

@@ -1,4 +1,4 @@
-"""The constraint kinds of XCSP3-core that are tables, or become such: extension, element, regular, mdd, circuit."""
+"""The constraint kinds of XCSP3-core that are tables, or become such: extension, element, regular, mdd."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from collections import defaultdict
 from collections.abc import Iterator, Mapping, Sequence
 
 from robochoc.formats.definitions import MAX_TUPLES
-from robochoc.formats.diagnostics import MistakeError, shortened
+from robochoc.formats.diagnostics import MistakeError, shortened, suggestion
 from robochoc.formats.dialects.xcsp3.kinds import as_integers, items, rows_of
 from robochoc.formats.dialects.xcsp3.posting import Item, Posting
 from robochoc.formats.dialects.xcsp3.template import Element
@@ -35,8 +35,8 @@ class Extensions:
     def __call__(self, element: Element, posting: Posting) -> None:
         """Post a table of allowed or of forbidden tuples."""
         if element.attribute("type") not in {"", "ordinary", "starred", "extension"}:
-            raise MistakeError("a hybrid table has no counterpart", "write ordinary tuples")
-        allowed = element.has("supports")
+            raise MistakeError("hybrid tables are not supported", "write ordinary tuples")
+        allowed = element.has("supports") or not element.has("conflicts")
         scope = items(element.words("list"), posting)
         text = element.text("supports" if allowed else "conflicts")
         wild = "*" in text or ".." in text
@@ -68,7 +68,7 @@ def _rows(text: str, scope: Sequence[Item], posting: Posting) -> Iterator[Row]:
             yield from ((value,) for value in _cell(word, scope[0], posting))
         return
     number = "[+-]?[0-9]{1,18}"
-    plain = "".join(text.split())
+    plain = _squeezed(text)
     if re.fullmatch(rf"(?>\({number}(?:,{number}){{{len(scope) - 1}}}\))++", plain):
         flat = list(map(int, plain[1:-1].replace(")(", ",").split(",")))
         yield from zip(*(flat[place :: len(scope)] for place in range(len(scope))), strict=True)
@@ -84,12 +84,16 @@ def _rows(text: str, scope: Sequence[Item], posting: Posting) -> Iterator[Row]:
 
 def _cells(text: str, scope: Sequence[Item]) -> Iterator[list[str]]:
     """Yield the words of each tuple. Raises `MistakeError`."""
-    squeezed = "".join(text.split())
-    for row in squeezed.removeprefix("(").removesuffix(")").split(")("):
+    for row in _squeezed(text).removeprefix("(").removesuffix(")").split(")("):
         words = row.split(",")
         if len(words) != len(scope):
             raise MistakeError(f"the tuple ({shortened(row)}) of {len(words)}", f"{len(scope)} values are expected")
         yield words
+
+
+def _squeezed(text: str) -> str:
+    """Return `text` without blanks around commas and parentheses. Others are mistakes."""
+    return re.sub(r"\s*([(),])\s*", r"\1", text)
 
 
 def _post_cases(text: str, scope: Sequence[Item], posting: Posting, *, allowed: bool) -> None:
@@ -133,16 +137,16 @@ def element(element: Element, posting: Posting) -> None:
         posting.post(some([condition.on(member) for member in members]))
         return
     if element.attribute("rank", "index") not in {"", "any"}:
-        raise MistakeError("an element of a given rank has no counterpart", "leave rank out")
-    start = integer(element.attribute("startIndex", "list") or "0")
+        raise MistakeError("an <element> of a given rank is not supported", "leave rank out")
+    start = element.start()
     index = posting.term(element.text("index"))
     choose(posting, [index], {(start + place,): member for place, member in enumerate(members)}, condition)
 
 
 def _element_of_matrix(element: Element, posting: Posting, condition: Condition) -> None:
     rows = [as_integers(posting.term(word) for word in row) for row in element.matrix("matrix")]
-    down = integer(element.attribute("startRowIndex", "matrix") or "0")
-    across = integer(element.attribute("startColIndex", "matrix") or "0")
+    down = element.start("startRowIndex", "matrix")
+    across = element.start("startColIndex", "matrix")
     indexes = items(element.words("index"), posting)
     if len(indexes) != 2:  # noqa: PLR2004 - of row and column
         raise MistakeError("a matrix without two indexes", "write <index> i j </index>")
@@ -185,8 +189,15 @@ def choose(
 
 def regular(element: Element, posting: Posting) -> None:
     """A list is a word that an automaton accepts."""
-    final = set(element.text("final").split())
-    _walk(element, posting, element.text("start"), final)
+    start, final = element.text("start"), element.text("final").split()
+    arcs = _arcs(element)
+    states = {*arcs, *(state for by_value in arcs.values() for targets in by_value.values() for state in targets)}
+    for state in [start, *final]:
+        if state not in states:
+            raise MistakeError(
+                f"the state '{shortened(state)}' is in no transition", suggestion(state, states, "states")
+            )
+    _walk(element, posting, arcs, start, set(final))
 
 
 def mdd(element: Element, posting: Posting) -> None:
@@ -196,7 +207,7 @@ def mdd(element: Element, posting: Posting) -> None:
     roots, ends = set(arcs) - reached, reached - set(arcs)
     if len(roots) != 1 or not ends:
         raise MistakeError("a decision diagram without one root", "expected one, and an end")
-    _walk(element, posting, roots.pop(), ends)
+    _walk(element, posting, arcs, roots.pop(), ends)
 
 
 def _arcs(element: Element) -> Arcs:
@@ -209,9 +220,8 @@ def _arcs(element: Element) -> Arcs:
     return arcs
 
 
-def _walk(element: Element, posting: Posting, start: str, final: set[str]) -> None:
+def _walk(element: Element, posting: Posting, arcs: Arcs, start: str, final: set[str]) -> None:
     """Post the words that lead from `start` to a state in `final`, as a table."""
-    arcs = _arcs(element)
     scope = items(element.words("list"), posting)
     domains = [set(posting.domain(item)) for item in scope]
     useful = [final]
@@ -232,35 +242,3 @@ def _walk(element: Element, posting: Posting, start: str, final: set[str]) -> No
                 raise MistakeError(f"<{kind}> has more than {MAX_WRITTEN_OUT:,} words", "it becomes a table: split it")
         words = longer
     posting.post_table(scope, [word for word, states in words.items() if states], allowed=True)
-
-
-def circuit(element: Element, posting: Posting) -> None:
-    """The values of a list are successors: all places but those that follow themselves lie on one circle."""
-    if element.attribute("startIndex", "list") not in {"", "0"}:
-        raise MistakeError("a circuit with another startIndex than 0", "count from 0")
-    scope = items(element.whole(), posting)
-    size = posting.condition(f"(eq,{element.text('size')})") if element.has("size") else None
-    if size is not None and not isinstance(size.operand, Constant):
-        raise MistakeError("a circuit of a variable size has no counterpart", "give its size as an integer")
-
-    def holds(row: Sequence[int]) -> bool:
-        length = _circle(row)
-        return length > 1 and (size is None or bool(size.with_constant(length)))
-
-    for one, other in itertools.combinations(as_integers(scope), 2):
-        posting.post(compare("ne", one, other))
-    posting.post_tried(element.kind, scope, holds)
-
-
-def _circle(successors: Sequence[int]) -> int:
-    """Return the length of the one circle among `successors`; 0 where there is none, or several."""
-    places = range(len(successors))
-    moving = [place for place in places if successors[place] != place]
-    if not moving or any(value not in places for value in successors):
-        return 0
-    seen: list[int] = []
-    place = moving[0]
-    while place not in seen:
-        seen.append(place)
-        place = successors[place]
-    return len(seen) if place == moving[0] and len(seen) == len(moving) else 0

@@ -7,14 +7,13 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
-from lxml import etree
-
 from robochoc.formats.diagnostics import MistakeError, shortened
-from robochoc.formats.dialects.xcsp3.document import attribute, content, line
+from robochoc.formats.dialects.xcsp3.document import flag
+from robochoc.formats.dialects.xcsp3.terms import integer, together
 from robochoc.formats.dialects.xcsp3.variables import Variables
+from robochoc.formats.element_view import ElementView
 
 _PARAMETER = re.compile(r"%([0-9]{1,6}|\.\.\.)")
-_REIFIED = ("reifiedBy", "hreifiedFrom", "hreifiedTo")
 
 
 @dataclass(frozen=True)
@@ -22,53 +21,46 @@ class Element:
     """A constraint element and the arguments that its parameters stand for.
 
     Attributes:
-        xml: The element.
+        view: The element.
         variables: The variables of the instance.
-        arguments: The arguments. None: it is no template.
+        arguments: The arguments. None: the element is not in a template.
     """
 
-    xml: etree._Element
+    view: ElementView
     variables: Variables
     arguments: Sequence[str] | None = None
 
     @property
     def kind(self) -> str:
         """The kind of constraint."""
-        return self.xml.tag
+        return self.view.tag
 
     def has(self, child: str) -> bool:
         """Return whether there is a child of this name."""
-        return self.xml.find(child) is not None
-
-    def count(self, child: str) -> int:
-        """Return the number of children of this name."""
-        return len(self.xml.findall(child))
-
-    def refuse(self, *children: str) -> None:
-        """Raise `MistakeError` where there is a child that has no counterpart."""
-        for child in children:
-            if self.has(child):
-                raise MistakeError(f"<{child}> in <{self.kind}> has no counterpart", "write it without")
+        return self.view.has(child)
 
     def text(self, child: str = "") -> str:
         """Return the text of a child, or of the element itself. Raises `MistakeError` where there is no such child."""
-        return self._filled(self._child(child))
+        return self._filled(self.view.required(child) if child else self.view)
 
     def texts(self, child: str) -> list[str]:
         """Return the texts of all children of this name."""
-        return [self._filled(found) for found in self.xml.findall(child)]
+        return [self._filled(found) for found in self.view.children(child)]
 
     def words(self, child: str) -> list[str]:
         """Return the words of a child; compact forms are written out. Raises `MistakeError`."""
         return list(self.variables.named(self.text(child)))
 
-    def every(self, child: str) -> list[list[str]]:
-        """Return the words of each child of this name."""
-        return [list(self.variables.named(text)) for text in self.texts(child)]
+    def lists(self) -> list[list[str]]:
+        """Return the words of each `<list>`; where the element has no children, of its own text."""
+        if not self.view.has_children:
+            return [list(self.variables.named(self.text()))]
+        texts = self.texts("list") or [self.text("list")]
+        return [list(self.variables.named(text)) for text in texts]
 
     def whole(self) -> list[str]:
-        """Return the words of `<list>`, or of the element where it has no children."""
-        return self.words("list" if len(self.xml) else "")
+        """Return the words of the only `<list>`, or of the element where it has no children."""
+        return self.words("list") if self.view.has_children else self.lists()[0]
 
     def matrix(self, child: str) -> list[list[str]]:
         """Return the rows of a child that is a matrix. Raises `MistakeError`."""
@@ -77,40 +69,41 @@ class Element:
             raise MistakeError("a matrix whose rows have different lengths", "give them one length")
         return rows
 
-    def attribute(self, name: str, child: str = "", place: int = 0) -> str:
+    def attribute(self, name: str, child: str = "") -> str:
         """Return an attribute of the element, or of one of its children; empty where there is none."""
-        if not child:
-            return attribute(self.xml, name)
-        found = self.xml.findall(child)
-        return attribute(found[place], name) if place < len(found) else ""
+        return (self.view.required(child) if child else self.view).attribute(name)
 
-    def check(self) -> None:
-        """Raise `MistakeError` for a constraint that is soft or stands for the value of a variable."""
-        for name in _REIFIED:
-            if self.attribute(name):
-                raise MistakeError(f"{name} has no counterpart", "write it as <intension>: iff(b,le(x,y))")
-        if self.attribute("type") == "soft" or self.attribute("violationCost"):
-            raise MistakeError("a soft constraint of XCSP3 has no counterpart", "write its cost in <objectives>")
+    def start(self, name: str = "startIndex", child: str = "list") -> int:
+        """Return the number of the first member of a list. Raises `MistakeError`."""
+        return first_index(self.view.required(child), name) if self.has(child) else 0
+
+    def is_true(self, name: str, child: str = "", *, default: bool = False) -> bool:
+        """Return the truth value of an attribute of the element, or of one of its children. Raises `MistakeError`."""
+        return flag(self.view.required(child) if child else self.view, name, default=default)
 
     @cached_property
     def arity(self) -> int:
         """The number of parameters `%0`, `%1`, ... in the element."""
-        text = "".join(str(part) for part in self.xml.itertext())
-        return max((int(found) + 1 for found in _PARAMETER.findall(text) if found != "..."), default=0)
+        return max((int(number) + 1 for number in self._parameters if number != "..."), default=0)
 
-    def _child(self, child: str) -> etree._Element:
-        found = self.xml.find(child) if child else self.xml
-        if found is None:
-            raise MistakeError(f"<{self.kind}> without <{child}>", "this form of it has no counterpart", line(self.xml))
-        return found
+    @cached_property
+    def _parameters(self) -> list[str]:
+        return _PARAMETER.findall(self.view.all_text())
 
-    def _filled(self, element: etree._Element) -> str:
-        text = content(element)
+    def applied(self, arguments: Sequence[str]) -> Element:
+        """Return the constraint of a template with `arguments`. Raises `MistakeError` where some are not used."""
+        if len(arguments) > self.arity and "..." not in self._parameters:
+            what = f"{len(arguments)} arguments for a template of {self.arity} parameters"
+            raise MistakeError(what, "write one for each parameter")
+        return Element(self.view, self.variables, arguments)
+
+    def _filled(self, view: ElementView) -> str:
+        text = view.text()
         if "%" not in text:
             return text
         arguments = self.arguments
         if arguments is None:
-            raise MistakeError("a parameter outside <group> and <slide>", "name the variable")
+            raise MistakeError("a parameter outside <group> and <slide>", "name the variable", view.line)
 
         def argument(match: re.Match[str]) -> str:
             if match[1] == "...":
@@ -122,40 +115,45 @@ class Element:
         return _PARAMETER.sub(argument, text)
 
 
-def slide_scopes(slide: etree._Element, variables: Variables, arity: int) -> Iterator[list[str]]:
+def first_index(view: ElementView, name: str = "startIndex") -> int:
+    """Return the number of the first member of a list. Raises `MistakeError`."""
+    return integer(view.attribute(name) or "0")
+
+
+def slide_scopes(slide: ElementView, variables: Variables, arity: int) -> Iterator[list[str]]:
     """Yield the arguments of each constraint of a `<slide>`, whose template has `arity` parameters.
 
     Raises:
         MistakeError: if its attributes are wrong.
     """
-    lists = slide.findall("list")
-    members = [list(variables.named(content(one))) for one in lists]
+    lists = slide.children("list")
+    members = [list(variables.named(one.text())) for one in lists]
     offsets = [_positive(one, "offset", 1) for one in lists]
     collects = [_positive(one, "collect", arity if len(lists) == 1 else 1) for one in lists]
-    circular = attribute(slide, "circular") == "true"
+    circular = flag(slide, "circular")
     if not lists or (circular and len(lists) > 1):
-        raise MistakeError("a slide without one list", "a circular one has one")
+        raise MistakeError("a <slide> without one <list>", "write one <list>, or delete circular", slide.line)
     number = 0
     while True:
         starts = [number * offset for offset in offsets]
         if circular:
             fits = starts[0] < len(members[0])
         else:
-            fits = all(s + c <= len(m) for s, c, m in zip(starts, collects, members, strict=True))
+            fits = all(start + collect <= len(some) for start, collect, some in together(starts, collects, members))
         if not fits:
             return
         yield [
             some[(start + step) % len(some)]
-            for start, collect, some in zip(starts, collects, members, strict=True)
+            for start, collect, some in together(starts, collects, members)
             for step in range(collect)
         ]
         number += 1
 
 
-def _positive(element: etree._Element, name: str, default: int) -> int:
-    word = attribute(element, name)
+def _positive(view: ElementView, name: str, default: int) -> int:
+    word = view.attribute(name)
     if not word:
         return default
     if not word.isdecimal() or not 0 < len(word) < 7 or int(word) == 0:  # noqa: PLR2004 - digits
-        raise MistakeError(f'{name}="{shortened(word)}"', "expected a number of 1 or more")
+        raise MistakeError(f'{name}="{shortened(word)}"', "expected a number of 1 or more", view.line)
     return int(word)

@@ -7,9 +7,10 @@ else is true. Ours have types, so that conversions are put between them.
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Collection, Iterable, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import lru_cache, reduce
+from typing import Any
 
 from robochoc.formats.diagnostics import MistakeError, shortened, suggestion
 from robochoc.model.expression import OPERATORS, Apply, Constant, Expression, Type
@@ -26,6 +27,9 @@ _TOKEN = re.compile(r"\s*([A-Za-z_][A-Za-z0-9_]*(?:\[[0-9]{1,9}\])*|[+-]?[0-9]{1
 _INTEGER = re.compile(r"[+-]?[0-9]{1,18}")
 _RANGE = re.compile(r"([+-]?[0-9]{1,18})\.\.([+-]?[0-9]{1,18})")
 _CONDITION = re.compile(r"\(\s*([a-z]+)\s*,\s*(.*?)\s*\)", re.DOTALL)
+
+_CONDITION_IN_LIST = re.compile(r"\([^()]*\)")
+_CONDITIONS = re.compile(r"(?>\([^()]*\)\s*)+")
 
 INVERSE = {"lt": "gt", "le": "ge", "gt": "lt", "ge": "le", "eq": "eq", "ne": "ne"}
 RELATIONS = frozenset(INVERSE)
@@ -147,6 +151,14 @@ class Condition:
         return bool(OPERATORS[self.operator].meaning(value, self.operand.value))
 
 
+def read_conditions(text: str, term: Callable[[str], Expression], max_values: int) -> list[Condition]:
+    """Return the conditions in a text such as `(le,10)(in,1..3)`. Raises `MistakeError`. See `read_condition`."""
+    stripped = text.strip()
+    if not _CONDITIONS.fullmatch(stripped):
+        raise MistakeError(f"'{shortened(text)}' is not a list of conditions", "write (le,10)(le,x)(in,1..3)")
+    return [read_condition(one, term, max_values) for one in _CONDITION_IN_LIST.findall(stripped)]
+
+
 def read_condition(text: str, term: Callable[[str], Expression], max_values: int) -> Condition:
     """Return the condition in a text.
 
@@ -166,6 +178,23 @@ def read_condition(text: str, term: Callable[[str], Expression], max_values: int
     raise MistakeError(f"'{shortened(text)}' is no condition", "write (le,10), (eq,x) or (in,1..3)")
 
 
+def together(*lists: Sequence[Any], what: str = "") -> Iterator[tuple[Any, ...]]:
+    """Return an iterator over the members of lists at the same places, as `zip` does.
+
+    Args:
+        lists: The lists.
+        what: Their names, for a message.
+
+    Raises:
+        MistakeError: if the lists have different lengths.
+    """
+    lengths = [len(one) for one in lists]
+    if len(set(lengths)) > 1:
+        found = f"lists of different lengths: {' and '.join(map(str, lengths))}"
+        raise MistakeError(f"{found} members{what and f' in {what}'}", "give them one length")
+    return zip(*lists, strict=True)
+
+
 def words_of(text: str) -> list[str]:
     """Return the words of a list; an expression is one, whatever blanks are in it."""
     if "(" not in text:
@@ -173,7 +202,7 @@ def words_of(text: str) -> list[str]:
     words, depth, begun = [], 0, ""
     for piece in text.split():
         depth += piece.count("(") - piece.count(")")
-        begun += piece
+        begun = f"{begun} {piece}" if begun else piece
         if depth <= 0:
             words.append(begun)
             begun = ""
@@ -272,6 +301,7 @@ def _applied(operator: str, arguments: list[Expression]) -> Expression:
 
 
 _MANY = 10**9
+"""More arguments than any operator can have in a file."""
 
 
 def _plain(operator: str) -> Callable[[list[Expression]], Expression]:

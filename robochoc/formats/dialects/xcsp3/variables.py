@@ -8,12 +8,11 @@ import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 
-from lxml import etree
-
 from robochoc.formats.definitions import MAX_VALUES
-from robochoc.formats.diagnostics import DiagnosticCollector, MistakeError, shortened
-from robochoc.formats.dialects.xcsp3.document import attribute, content, line
+from robochoc.formats.diagnostics import MistakeError, shortened, suggestion
+from robochoc.formats.dialects.xcsp3.document import ignore_remarks
 from robochoc.formats.dialects.xcsp3.terms import integer, span, words_of
+from robochoc.formats.element_view import ElementView
 from robochoc.model.problem import Domain
 from robochoc.model.ranges import merge_ranges
 
@@ -29,6 +28,8 @@ _MANY_TIMES = re.compile(r"([+-]?[0-9]{1,18})x([0-9]{1,9})")
 
 Values = tuple[range, ...] | tuple[str, ...]
 """A domain as it is written: ranges of integers, or symbols."""
+_Domains = Mapping[str, Values]
+"""The domains of a variable or an array, by the text that says for which of its variables; empty: for all."""
 
 
 @dataclass
@@ -111,8 +112,9 @@ class Variables:
                 match = _COMPACT.fullmatch(word)
                 if not match or match[1] != name:
                     raise MistakeError(f"'{shortened(word)}' is not in the array {name}", 'write for="x[0][] x[1][2]"')
-                cells = self._cells(name, self._indexes(name, match[2]), declared=False)
-                known.update(dict.fromkeys(cells, domain))
+                for cell in self._cells(name, self._indexes(name, match[2]), declared=False):
+                    if known.setdefault(cell, domain) is not domain:
+                        raise MistakeError(f"two domains for {cell}", "write one of them")
         for cell in every:
             if cell in known:
                 self.add(cell, known[cell])
@@ -122,7 +124,10 @@ class Variables:
             return (word,)
         match = _COMPACT.fullmatch(word)
         if match and match[1] in self.shapes:
-            return self._cells(match[1], self._indexes(match[1], match[2]))
+            cells = self._cells(match[1], self._indexes(match[1], match[2]))
+            if not cells:
+                raise MistakeError(f"{shortened(word)} has no domain", f"name variables of {match[1]} that have one")
+            return cells
         many = _MANY_TIMES.fullmatch(word)
         if many:
             return itertools.repeat(many[1], int(many[2]))
@@ -148,73 +153,77 @@ def lists(text: str) -> list[list[str]]:
     return [row.split(",") for row in re.split(r"\)\s*\(", text[1:-1])]
 
 
-def read_variables(element: etree._Element | None, mistakes: DiagnosticCollector) -> Variables:
-    """Return the variables that `<variables>` declares."""
+def read_variables(view: ElementView | None) -> Variables:
+    """Return the variables that `<variables>` declares; mistakes go into the report of the document."""
     variables = Variables()
-    known: dict[str, etree._Element] = {}
-    for child in [] if element is None else element:
-        with mistakes.at(line(child)):
-            name = attribute(child, "id")
-            if not _ID.fullmatch(name) or name in known:
+    if view is None:
+        return variables
+    ignore_remarks(view)
+    declared: dict[str, _Domains] = {}
+    for child in view.children("var", "array"):
+        with child.guard():
+            ignore_remarks(child)
+            name = child.attribute("id")
+            if not _ID.fullmatch(name) or name in declared:
                 raise MistakeError(f"the id '{shortened(name)}' is not allowed", "ids are words, each used once")
-            known[name] = child
-            source = _source(child, known)
+            declared[name] = {}  # for `as`: it has a mistake, unless its domains are set below
+            if declared.get(child.attribute("as")) == {} and child.attribute("as") != name:
+                continue  # a consequence of the mistake there
+            domains = _domains(child, name, declared)
             if child.tag == "var":
-                variables.add(name, _domain(source, _kind(child)))
-            elif child.tag == "array":
-                size = attribute(child, "size")
-                if not _SIZE.fullmatch(size) or attribute(child, "startIndex") not in {"", "0"}:
+                if list(domains) != [""]:
+                    raise MistakeError(f"the variable {name} has the domains of an array", "write its domain as text")
+                variables.add(name, domains[""])
+            else:
+                size = child.attribute("size")
+                if not _SIZE.fullmatch(size) or child.attribute("startIndex") not in {"", "0"}:
                     raise MistakeError(f"an array of size '{shortened(size)}'", 'write size="[3][4]", from index 0')
                 shape = tuple(int(part) for part in _BRACKETS.findall(size))
-                variables.add_array(name, shape, _domains(child, source, shape))
-            else:
-                raise MistakeError(f"<{child.tag}> in <variables>", "expected <var> or <array>")
+                whole = name + "[]" * len(shape)
+                variables.add_array(name, shape, [(words or whole, values) for words, values in domains.items()])
+            declared[name] = domains
     return variables
 
 
-def _domains(array: etree._Element, source: etree._Element, shape: Sequence[int]) -> list[tuple[str, Values]]:
-    kind, name = _kind(array), attribute(array, "id")
-    whole = name + "[]" * len(shape)
-    if not len(source):
-        return [(whole, _domain(source, kind))]
-    original = attribute(source, "id")
-    found = []
-    for part in source:
-        words = attribute(part, "for")
-        if source is not array:
-            words = re.sub(rf"\b{re.escape(original)}\[", f"{name}[", words)
-        found.append((words or whole, _domain(part, kind)))
+def _domains(child: ElementView, name: str, declared: Mapping[str, _Domains]) -> _Domains:
+    """Return the domains of a variable or an array; with `as`, those of one above. Raises `MistakeError`."""
+    kind, other = child.attribute("type"), child.attribute("as")
+    if kind not in {"", "integer", "symbolic"}:
+        raise MistakeError(f'variables of type="{shortened(kind)}" are not supported', "integer and symbolic are")
+    if other:
+        above = [known for known, domains in declared.items() if domains]
+        if other not in above:
+            raise MistakeError(f'as="{shortened(other)}" names nothing above', suggestion(other, above, "ids above"))
+        domains = declared[other]
+        is_symbolic = isinstance(next(iter(domains.values()))[0], str)
+        if kind and is_symbolic != (kind == "symbolic"):
+            raise MistakeError(f'type="{kind}" differs from the type of {other}', "leave it out")
+        return {re.sub(rf"\b{re.escape(other)}\[", f"{name}[", words): values for words, values in domains.items()}
+    if child.tag == "var" or not child.has_children:
+        return {"": _domain(child, kind)}
+    found: dict[str, Values] = {}
+    for part in child.children("domain"):
+        words = part.attribute("for")
+        if words in found:
+            raise part.mistake(f"a second domain for '{shortened(words)}'", "write one of them")
+        found[words] = _domain(part, kind)
     return found
 
 
-def _source(element: etree._Element, known: dict[str, etree._Element]) -> etree._Element:
-    """Return the element that has the domain of `element`: another one where it says `as`."""
-    other = attribute(element, "as")
-    if not other:
-        return element
-    if other not in known or known[other] is element:
-        raise MistakeError(f'as="{shortened(other)}" names nothing', "name a variable or array above")
-    return _source(known[other], known)
-
-
-def _kind(element: etree._Element) -> str:
-    kind = attribute(element, "type") or "integer"
-    if kind not in {"integer", "symbolic"}:
-        raise MistakeError(f'variables of type="{shortened(kind)}" have no counterpart', "integer and symbolic have")
-    return kind
-
-
-def _domain(element: etree._Element, kind: str) -> Values:
+def _domain(view: ElementView, kind: str) -> Values:
     """Return the domain in the text of an element. Raises `MistakeError`."""
-    words = content(element).split()
+    words = view.text().split()
     if not words:
-        raise MistakeError("a variable without a domain", "only finite domains are supported: 1..4 7")
-    if kind == "symbolic" or not re.match(r"[+-]?[0-9]", words[0]):
-        for word in words:
-            if not _SYMBOL.fullmatch(word):
-                raise MistakeError(f"'{shortened(word)}' in a domain", "finite ranges of integers, or symbols")
-            if "infinity" in word:
-                raise MistakeError("an infinite domain has no counterpart", "give it bounds")
+        raise MistakeError("a variable without a domain", "only finite domains are supported: 1..4 7", view.line)
+    for word in words:
+        if "infinity" in word:
+            raise MistakeError("an infinite domain is not supported", "give it bounds", view.line)
+        if kind == "symbolic" and not _SYMBOL.fullmatch(word):
+            raise MistakeError(f"'{shortened(word)}' is not a valid symbol", "write words of letters", view.line)
+        if kind != "symbolic" and not re.match("[+-]?[0-9]", word):
+            hint = 'write integers or ranges; symbols require type="symbolic"'
+            raise MistakeError(f"'{shortened(word)}' in a domain of integers", hint, view.line)
+    if kind == "symbolic":
         return tuple(dict.fromkeys(words))
     parts = sorted((span(word) for word in words), key=lambda part: part.start)
     if sum(map(len, parts)) > MAX_VALUES:

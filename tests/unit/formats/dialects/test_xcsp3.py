@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+import re
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 from fractions import Fraction
@@ -19,11 +20,12 @@ from robochoc.model.cost_units import CostUnits
 from robochoc.model.costs import normalized, told_cost
 from robochoc.model.problem import Team
 from robochoc.solver.central import CentralSolver
+from tests.support import brute_force
 from tests.support.cost_problems import cost_of, random_cost_team
 from tests.support.problems import random_team
+from tests.support.xcsp3_forms import FORMS
 
 Row = tuple[int, ...]
-Truth = Callable[..., bool]
 ABC = "<var id='a'> 0..2 </var><var id='b'> 0..2 </var><var id='c'> 0..2 </var>"
 ARRAY = "<array id='x' size='[3]'> 0..2 </array>"
 
@@ -40,130 +42,16 @@ def csp(path: Path, constraints: str, variables: str = ARRAY) -> Team:
 
 
 def solutions(team: Team) -> set[Row]:
-    domains = [tuple(variable.domain) for variable in team.variables.values()]
-    return {
-        row
-        for row in itertools.product(*domains)
-        if all(one.allows(dict(zip(team.variables, row, strict=True))) for one in team.constraints())
-    }
+    return {tuple(found.values()) for found in brute_force.solutions(team)}
 
 
 def rows(*domains: range) -> Iterator[Row]:
     return itertools.product(*(domains or (range(3),) * 3))
 
 
-def lists(*words: str) -> str:
-    return "".join(f"<list> {word} </list>" for word in words)
-
-
-KINDS: dict[str, tuple[str, Truth]] = {
-    "intension": ("<intension> le(add(x[0],x[1]),x[2]) </intension>", lambda x, y, z: x + y <= z),
-    "function": ("<intension><function> imp(eq(x[0],1),ne(x[1],x[2])) </function></intension>",
-                 lambda x, y, z: x != 1 or y != z),
-    "integers as Booleans": ("<intension> and(x[0],or(x[1],not(x[2]))) </intension>",
-                             lambda x, y, z: x != 0 and (y != 0 or z == 0)),
-    "Booleans as integers": ("<intension> eq(add(eq(x[0],1),gt(x[1],0)),x[2]) </intension>",
-                             lambda x, y, z: (x == 1) + (y > 0) == z),
-    "n-ary": ("<intension> or(eq(x[0],x[1],x[2]),xor(x[0],x[1],x[2])) </intension>",
-              lambda x, y, z: x == y == z or ((x > 0) + (y > 0) + (z > 0)) % 2 == 1),
-    "sets": ("<intension> and(in(x[0],set(0,2)),notin(x[1],set(1)),in(x[2],set(x[0],add(x[1],1)))) </intension>",
-             lambda x, y, z: x in {0, 2} and y != 1 and z in {x, y + 1}),
-    "operators": ("<intension> eq(dist(sqr(x[0]),mod(x[1],2)),if(x[2],neg(-1),div(x[0],2))) </intension>",
-                  lambda x, y, z: abs(x * x - y % 2) == (1 if z else x // 2)),
-    "division by zero": ("<intension> ge(div(2,x[0]),x[1]) </intension>", lambda x, y, _: x != 0 and 2 // x >= y),
-    "allDifferent": ("<allDifferent> x[] </allDifferent>", lambda *v: len(set(v)) == 3),
-    "allDifferent except": ("<allDifferent><list> x[] </list><except> 0 </except></allDifferent>",
-                            lambda *v: len([w for w in v if w]) == len({w for w in v if w})),
-    "allDifferent of expressions": ("<allDifferent> add(x[0],1) x[1] x[2] </allDifferent>",
-                                    lambda x, y, z: len({x + 1, y, z}) == 3),
-    "allDifferent of lists": (f"<allDifferent>{lists('x[0..1]', 'x[1..2]')}</allDifferent>",
-                              lambda x, y, z: (x, y) != (y, z)),
-    "allEqual": ("<allEqual> x[] </allEqual>", lambda x, y, z: x == y == z),
-    "ordered": ("<ordered><list> x[] </list><lengths> 1 0 </lengths><operator> le </operator></ordered>",
-                lambda x, y, z: x + 1 <= y <= z),
-    "lex": (f"<lex>{lists('x[0] x[1]', 'x[1] x[2]')}<operator> lt </operator></lex>", lambda x, y, z: (x, y) < (y, z)),
-    "lex le": (f"<lex>{lists('x[0] x[1]', 'x[1] x[2]')}<operator> ge </operator></lex>",
-               lambda x, y, z: (x, y) >= (y, z)),
-    "sum": ("<sum><list> x[] </list><coeffs> 1 -2 3 </coeffs><condition> (in,1..3) </condition></sum>",
-            lambda x, y, z: 1 <= x - 2 * y + 3 * z <= 3),
-    "sum of variables": ("<sum><list> x[0] x[1] </list><condition> (ne,x[2]) </condition></sum>",
-                         lambda x, y, z: x + y != z),
-    "many coefficients": ("<sum><list> x[] </list><coeffs> 2x3 </coeffs><condition> (eq,4) </condition></sum>",
-                          lambda *v: 2 * sum(v) == 4),
-    "count": ("<count><list> x[] </list><values> 0 2 </values><condition> (ge,2) </condition></count>",
-              lambda *v: sum(w in {0, 2} for w in v) >= 2),
-    "count a variable": ("<count><list> x[0] x[1] </list><values> x[2] </values><condition>(eq,1)</condition></count>",
-                         lambda x, y, z: (x == z) + (y == z) == 1),
-    "nValues": ("<nValues><list> x[] </list><condition> (eq,2) </condition></nValues>", lambda *v: len(set(v)) == 2),
-    "nValues except": ("<nValues><list> x[] </list><except> 1 </except><condition> (eq,1) </condition></nValues>",
-                       lambda *v: len(set(v) - {1}) == 1),
-    "cardinality": (("<cardinality><list> x[] </list><values closed='true'> 0 1 </values><occurs> 0..1 2 </occurs>"
-                    "</cardinality>"), lambda *v: v.count(0) <= 1 and v.count(1) == 2 and 2 not in v),
-    "minimum": ("<minimum><list> x[] </list><condition> (eq,1) </condition></minimum>", lambda *v: min(v) == 1),
-    "maximum": ("<maximum><list> x[0..1] </list><condition> (lt,x[2]) </condition></maximum>",
-                lambda x, y, z: max(x, y) < z),
-    "element": ("<element><list> 2 0 1 </list><index> x[0] </index><value> x[1] </value></element>",
-                lambda x, y, _: (2, 0, 1)[x] == y),
-    "element of variables": (("<element><list> x[0] x[1] </list><index> x[2] </index><condition> (ge,1) </condition>"
-                             "</element>"), lambda x, y, z: z < 2 and (x, y)[z] >= 1),
-    "element from 1": (("<element><list startIndex='1'> x[0] x[1] </list><index> x[2] </index><value> 1 </value>"
-                       "</element>"), lambda x, y, z: z >= 1 and (x, y)[z - 1] == 1),
-    "element of a matrix": (("<element><matrix> (0,1)(2,0) </matrix><index> x[0] x[1] </index><value> x[2] </value>"
-                            "</element>"), lambda x, y, z: max(x, y) < 2 and ((0, 1), (2, 0))[x][y] == z),
-    "member": ("<element><list> x[0] x[1] </list><value> x[2] </value></element>", lambda x, y, z: z in {x, y}),
-    "channel": ("<channel> x[] </channel>", lambda *v: all(v[w] == i for i, w in enumerate(v))),
-    "instantiation": ("<instantiation><list> x[0] x[2] </list><values> 1 2 </values></instantiation>",
-                      lambda x, _, z: (x, z) == (1, 2)),
-    "clause": ("<clause> x[0] not(x[1]) </clause>", lambda x, y, _: x != 0 or y == 0),
-    "precedence": ("<precedence><list> x[] </list><values> 0 1 2 </values></precedence>",
-                   lambda *v: all(w == 0 or w - 1 in v[:i] for i, w in enumerate(v))),
-    "circuit": ("<circuit> x[] </circuit>",
-                lambda *v: v in {(1, 2, 0), (2, 0, 1), (1, 0, 2), (2, 1, 0), (0, 2, 1)}),
-    "circuit of a size": ("<circuit><list> x[] </list><size> 3 </size></circuit>",
-                          lambda *v: v in {(1, 2, 0), (2, 0, 1)}),
-    "regular": (("<regular><list> x[] </list><transitions> (a,0,a)(a,1,b)(b,1,b)(b,2,c) </transitions><start>a</start>"
-                "<final> b c </final></regular>"),
-                lambda *v: v in {(0, 0, 1), (0, 1, 1), (1, 1, 1), (0, 1, 2), (1, 1, 2)}),
-    "mdd": ("<mdd><list> x[] </list><transitions> (r,0,p)(r,1,q)(p,2,s)(q,0,s)(s,1,t) </transitions></mdd>",
-            lambda *v: v in {(0, 2, 1), (1, 0, 1)}),
-    "knapsack": (("<knapsack><list> x[] </list><weights> 1 2 3 </weights><condition> (le,6) </condition>"
-                 "<profits> 2 1 1 </profits><condition> (ge,4) </condition></knapsack>"),
-                 lambda x, y, z: x + 2 * y + 3 * z <= 6 and 2 * x + y + z >= 4),
-    "binPacking": ("<binPacking><list> x[] </list><sizes> 2 3 1 </sizes><condition> (le,4) </condition></binPacking>",
-                   lambda *v: all(sum(s for s, w in zip((2, 3, 1), v, strict=True) if w == b) <= 4 for b in v)),
-    "noOverlap": ("<noOverlap><origins> x[] </origins><lengths> 1 2 0 </lengths></noOverlap>",
-                  lambda x, y, _: x + 1 <= y or y + 2 <= x),
-    "cumulative": (("<cumulative><origins> x[] </origins><lengths> 2 1 2 </lengths><heights> 1 2 1 </heights>"
-                   "<condition> (le,2) </condition></cumulative>"),
-                   lambda *v: all(sum(h for s, n, h in zip(v, (2, 1, 2), (1, 2, 1), strict=True) if s <= t < s + n) <= 2
-                                  for t in range(5))),
-    "cumulative of variables": (("<cumulative><origins> 0 x[0] </origins><lengths> 2 x[1] </lengths><heights> 1 2 "
-                                "</heights><condition> (le,x[2]) </condition></cumulative>"),
-                                lambda x, y, z: all((t < 2) + 2 * (x <= t < x + y) <= z for t in range(5))),
-    "supports": ("<extension><list> x[0] x[2] </list><supports> (0,1)(2,*) </supports></extension>",
-                 lambda x, _, z: (x, z) == (0, 1) or x == 2),
-    "conflicts": ("<extension><list> x[] </list><conflicts> (0,*,1)(2,2,2) </conflicts></extension>",
-                  lambda x, y, z: (x, z) != (0, 1) and (x, y, z) != (2, 2, 2)),
-    "unary": ("<extension><list> x[1] </list><supports> 0 2..5 </supports></extension>", lambda _, y, __: y != 1),
-    "no supports": ("<extension><list> x[0] x[1] </list><supports/></extension>", lambda *_: False),
-    "a variable twice": ("<extension><list> x[0] x[0] </list><supports> (0,1)(1,1) </supports></extension>",
-                         lambda x, *_: x == 1),
-    "group": ("<group><intension> lt(%0,%1) </intension><args> x[0] x[1] </args><args> x[1] x[2] </args></group>",
-              lambda x, y, z: x < y < z),
-    "group of the rest": (("<group><sum><list> %1 %... </list><condition> (eq,%0) </condition></sum><args>3 x[]</args>"
-                          "</group>"), lambda *v: sum(v) == 3),
-    "slide": ("<slide><list> x[] </list><intension> le(%0,%1) </intension></slide>", lambda x, y, z: x <= y <= z),
-    "circular slide": ("<slide circular='true'><list> x[] </list><intension> ne(%0,%1) </intension></slide>",
-                       lambda x, y, z: x != y != z != x),
-    "block": (("<block class='symmetry'><allEqual> x[0] x[1] </allEqual><block><allEqual> x[1..2] </allEqual></block>"
-              "</block>"), lambda x, y, z: x == y == z),
-}  # fmt: skip
-"""Each kind over `x[0] x[1] x[2]` with the values 0 to 2, and what it means."""
-
-
-@pytest.mark.parametrize("kind", KINDS)
-def test_each_kind_means_what_it_says(kind: str, tmp_path: Path) -> None:
-    xml, truth = KINDS[kind]
+@pytest.mark.parametrize("form", FORMS)
+def test_each_form_means_what_it_says(form: str, tmp_path: Path) -> None:
+    xml, truth = FORMS[form]
     assert solutions(csp(tmp_path, xml)) == {row for row in rows() if truth(*row)}
 
 
@@ -229,6 +117,66 @@ def test_a_wide_maximum_becomes_a_bound_that_is_a_variable(tmp_path: Path) -> No
     assert CentralSolver().solve(team).cost == 3
 
 
+def test_the_number_of_values_of_many_variables_gets_auxiliary_variables(tmp_path: Path) -> None:
+    """Whatever the constraints are, the optimum is that of brute force."""
+    for seed in range(4):
+        chance = Random(seed)
+        apart = [pair for pair in itertools.combinations(range(7), 2) if chance.random() < 0.5]
+        hard = "".join(f"<intension> ne(x[{i}],x[{j}]) </intension>" for i, j in apart)
+        allowed = [row for row in itertools.product(range(4), repeat=7) if all(row[i] != row[j] for i, j in apart)]
+        for direction, best in (("minimize", min), ("maximize", max)):
+            body = f"""<variables><array id="x" size="[7]"> 0..3 </array></variables><constraints>{hard}</constraints>
+              <objectives><{direction} type="nValues"> x[] </{direction}></objectives>"""
+            found = imported(tmp_path, body, "COP")
+            assert "auxiliary" in {note.kind for note in found.notes}
+            assert max(len(one.variables) for one in found.team.constraints()) <= 3
+            answer = CentralSolver().solve(normalized(found.team))
+            truth = [len(set(row)) for row in allowed]
+            assert (answer.cost is None) == (not truth), seed
+            if answer.cost is not None:
+                assert told_cost(normalized(found.team), answer.cost) == best(truth), (seed, direction)
+
+
+def test_large_circuits_get_auxiliary_variables_that_are_determined(tmp_path: Path) -> None:
+    """The solutions of the instance are those of brute force, each once, for all forms of circuits."""
+    for seed in range(12):
+        chance = Random(seed)
+        number, start = chance.choice([(7, 0), (8, 1), (9, 0)]), chance.choice([0, 0, 2])
+        nodes = range(start, start + number[0])
+        domains = [sorted({*chance.sample(nodes, 2), *([node] if chance.random() < 0.4 else [])}) for node in nodes]
+        domains[0] = sorted({*domains[0], *nodes[: 1 + number[1]]})
+        fixed = chance.randint(3, len(nodes))
+        size = chance.choice(["", f"<size> {fixed} </size>", "<size> s </size>"])
+        words = "".join(
+            f'<var id="x{node}"> {" ".join(map(str, domain))} </var>'
+            for node, domain in zip(nodes, domains, strict=True)
+        )
+        variables = f'{words}<var id="s"> 2..20 </var>'
+        names = " ".join(f"x{node}" for node in nodes)
+        xml = f'<circuit><list startIndex="{start}"> {names} </list>{size}</circuit>'
+        team = csp(tmp_path, xml, variables)
+        truth = set()
+        for row in itertools.product(*domains):
+            length = circle([value - start for value in row])
+            for last in range(2, 21):
+                wanted = {"": length, "<size> s </size>": last}.get(size, fixed)
+                if length > 1 and length == wanted:
+                    truth.add((*row, last))
+        found = [tuple(one.values())[: len(nodes) + 1] for one in brute_force.solutions(team)]
+        assert len(found) == len(truth), seed
+        assert set(found) == truth, seed
+
+
+def circle(successors: list[int]) -> int:
+    """The length of the one circle among nodes that do not follow themselves; 0 where there are several, or none."""
+    moving = [node for node, after in enumerate(successors) if after != node]
+    seen, node = [], moving[0] if moving else 0
+    while node not in seen:
+        seen.append(node)
+        node = successors[node]
+    return len(seen) if sorted(seen) == moving and node == seen[0] else 0
+
+
 def test_owners_are_robots(tmp_path: Path) -> None:
     body = "<variables><array id='x' size='[2][2]'> 0 1 </array></variables>"
     found = imported(tmp_path, body, options=ImportOptions(owner=r"x\[(\d)\]", name="rows"))
@@ -240,15 +188,39 @@ def test_owners_are_robots(tmp_path: Path) -> None:
 
 
 REFUSED = {
-    "<stretch><list> x[] </list></stretch>": "<stretch> has no counterpart",
+    "<stretch><list> x[] </list></stretch>": "<stretch> is not supported in <constraints>",
     "<intension> eq(x[0],sin(x[1])) </intension>": "'sin' has no counterpart",
     "<intension> neq(x[0],x[1]) </intension>": "'neq' has no counterpart (did you mean 'ne'?)",
     "<intension> eq(x[0],y) </intension>": "no variable 'y'",
     "<intension> eq(x[0] </intension>": "is no expression",
-    "<intension reifiedBy='x[0]'> eq(x[1],1) </intension>": "reifiedBy has no counterpart",
+    "<intension reifiedBy='x[0]'> eq(x[1],1) </intension>": "the attribute 'reifiedBy' is not supported in <intension>",
     "<allDifferent> x[7] </allDifferent>": "is not in the array",
     "<sum><list> x[] </list><condition> (about,3) </condition></sum>": "is no condition",
-    "<sum><list> x[] </list><coeffs> 1 </coeffs><condition> (le,3) </condition></sum>": "3 terms, but 1",
+    "<sum><list> x[] </list><coeffs> 1 </coeffs><condition> (le,3) </condition></sum>": "different lengths: 1 and 3",
+    "<sum><list> x[] </list><coefs> 2 1 1 </coefs><condition> (le,3) </condition></sum>": "did you mean 'coeffs'?",
+    "<sum><list> x[] </list><conditon> (le,3) </conditon></sum>": "write 'condition' instead of 'conditon'",
+    "<sum><list> x[] </list><condition> (le,3) </condition><condition> (le,2) </condition></sum>": "a second",
+    "<sum><list> x[] </list><list> x[] </list><condition> (le,3) </condition></sum>": "a second <list> in <sum>",
+    "<extension><list> x[0] </list><supports> 1 </supports><conflicts> 2 </conflicts></extension>": "<conflicts> is",
+    "<extension><list> x[0] x[1] </list><supports> (1 2,0) </supports></extension>": "'1 2' is no integer",
+    "<intension> eq(x[0],1 2) </intension>": "is no expression",
+    "<allDifferent><list> x[0] </list><list> x[1] x[2] </list></allDifferent>": "different lengths: 1 and 2",
+    "<allDifferent><list> x[] </list><except> (1,1) </except></allDifferent>": "2 values in <except>",
+    "<ordered><list> x[] </list><lengths> 1 </lengths><operator> le </operator></ordered>": "1 lengths for 3 values",
+    "<lex><list> x[0] </list><list> x[1] x[2] </list><operator> le </operator></lex>": "different lengths: 1 and 2",
+    "<cumulative><origins> x[] </origins><lengths> 1 1 1 </lengths><heights> 1 1 1 </heights><ends> 1 </ends>"
+    "<condition> (le,1) </condition></cumulative>": "different lengths: 3 and 3 and 3 and 1",
+    "<noOverlap><origins> (x[0],1)(x[1],1) </origins><lengths> (1,1,1)(1,1,1) </lengths></noOverlap>": "2 and 3",
+    "<binPacking><list> x[] </list><sizes> 1 1 1 </sizes><conditions> le,3 </conditions></binPacking>": "not a list",
+    "<maximum><list/><condition> (ge,1) </condition></maximum>": "an empty list",
+    "<maximumArg rank='best'><list> x[] </list><condition> (ge,1) </condition></maximumArg>": 'rank="best"',
+    "<cardinality><list> x[] </list><values closed='yes'> 1 </values><occurs> 1 </occurs></cardinality>": "true or",
+    "<channel><list> x[] </list><list> x[] </list><list> x[] </list></channel>": "a <channel> of 3 lists",
+    "<group><intension> eq(%0,1) </intension><args> x[0] x[1] </args></group>": "2 arguments for a template of 1",
+    "<group><args> x[0] </args></group>": "an element is missing in <group>",
+    "<group><stretch> %0 </stretch><args> x[0] </args></group>": "<stretch> is not supported in <group>",
+    "<group><intension> eq(%0,1) </intension></group>": "a <group> without <args>",
+    "<group><allEqual> %0 </allEqual><allEqual> %0 </allEqual><args> x[] </args></group>": "a second element",
     "<group><intension> eq(%0,%4) </intension><args> x[0] </args></group>": "%4 of only 1",
     "<intension> eq(%0,1) </intension>": "outside <group>",
     "<extension type='hybrid-1'><list> x[] </list><supports/></extension>": "hybrid",
@@ -257,7 +229,7 @@ REFUSED = {
     "<extension><list> x[0] add(x[1],1) </list><supports> (1,2) </supports></extension>": "an expression in the scope",
     "<element><list> x[] </list><index rank='first'> x[0] </index><value> 1 </value></element>": "rank",
     "<cumulative><origins> x[] </origins><lengths> 1 1 1 </lengths><heights> 1 1 1 </heights>"
-    "<condition> (ge,1) </condition></cumulative>": "ge has no counterpart",
+    "<condition> (ge,1) </condition></cumulative>": "<cumulative> with ge is not supported",
 }
 
 
@@ -268,6 +240,53 @@ def test_what_has_no_counterpart_is_refused_by_name_with_its_line(xml: str, tmp_
     (mistake,) = refused.value.diagnostics
     assert REFUSED[xml] in f"{mistake.message} ({mistake.hint})"
     assert mistake.line == 3
+
+
+def test_unknown_parts_anywhere_in_a_constraint_are_refused(tmp_path: Path) -> None:
+    """Each element of each form gets an unknown child, an unknown attribute and a text in turn."""
+    for form, (xml, _) in FORMS.items():
+        elements = [match.end() - 1 for match in re.finditer(r"<\w[^>/]*>", xml)]
+        ends = [match.start() for match in re.finditer(r"</\w+>", xml)]
+        changed = [f"{xml[:place]} strange='1'{xml[place:]}" for place in elements]
+        changed += [f"{xml[:place]}<strange/>{xml[place:]}" for place in ends]
+        changed += [f"{xml[:place]} strange {xml[place:]}" for place in ends]
+        for wrong in changed:
+            with pytest.raises(InvalidInputError) as refused:
+                csp(tmp_path, f"\n{wrong}")
+            (mistake,) = refused.value.diagnostics
+            assert " strange " in wrong or "strange" in f"{mistake.message} {mistake.hint}", (form, wrong)
+            assert mistake.line == 2, (form, wrong)
+
+
+def test_unknown_parts_outside_of_constraints_are_refused(tmp_path: Path) -> None:
+    whole = """<instance format="XCSP3" type="COP" id="it" note="a remark">
+      <variables note="all">
+        <var id="a" type="symbolic" note="a symbol"> red blue </var><var id="b" as="a"/>
+        <array id="x" size="[2]" class="main">
+          <domain for="x[0]"> 0 1 </domain><domain for="others"> 0 2 </domain></array>
+        <array id="y" size="[2]" as="x"/>
+      </variables>
+      <constraints><block class="one" note="remark">
+        <group id="g"><allEqual id="c"> %... </allEqual><args> x[] </args></group>
+        <slide><list offset="1" collect="2"> x[] </list><allEqual> %0 %1 </allEqual></slide></block></constraints>
+      <objectives><minimize type="sum" id="o"><list> x[] </list><coeffs> 1 2 </coeffs></minimize></objectives>
+      <annotations><decision anything="goes"> x[] </decision></annotations>
+    </instance>"""
+    file = tmp_path / "whole.xml"
+    file.write_text(whole)
+    assert len(DIALECT.read([file], ImportOptions()).team.variables) == 6
+    advice = {"annotations", "decision"}
+    heads = [match for match in re.finditer(r"<(\w+)[^>]*?(?=/?>)", whole) if match[1] not in advice]
+    ends = [match for match in re.finditer(r"</(\w+)>", whole) if match[1] not in advice]
+    for place, part in [
+        *((match.end(), " strange='1'") for match in heads),
+        *((match.start(), "<strange/>") for match in ends),
+        *((match.start(), " strange ") for match in ends if match[1] != "var"),  # there, it is one more symbol
+    ]:
+        file.write_text(whole[:place] + part + whole[place:])
+        with pytest.raises(InvalidInputError) as refused:
+            DIALECT.read([file], ImportOptions())
+        assert "strange" in str(refused.value), whole[place - 30 : place + 10] + part
 
 
 def deep(levels: int) -> str:
@@ -286,13 +305,14 @@ HOSTILE = {
     instance(""): "no variables",
     instance('<array id="x" size="[99999][99999]"> 0 </array>'): "9,999,800,001 variables",
     instance('<var id="x"> 0..999999999999 </var>'): "more than 100,000 values",
-    instance('<var id="x"> 0..infinity </var>'): "no integer",
+    instance('<var id="x"> 0..infinity </var>'): "infinite domain",
     instance('<var id="x"/>'): "without a domain",
     instance('<var id="x" as="x"/>'): "names nothing",
     instance(constraints=deep(60)): "nested deeper",
     instance(constraints=f"<intension> {'neg(' * 999}x{')' * 999} </intension>"): "nested too deeply",
     instance(constraints="<sum><list> 1x999999999 </list><condition> (le,1) </condition></sum>"): "a list of more than",
-    instance('<array id="x" size="[20]"> 0..9 </array>', "<circuit> x[] </circuit>"): "combinations of values",
+    instance('<var id="x" as="y"/><var id="y" as="x"/>'): "names nothing above",
+    "<a>" * 3000: "not well-formed",
 }
 
 
