@@ -30,6 +30,9 @@ def main() -> NoReturn:
     ending = TerminationSignals()
     try:
         ending.listen()
+        from robochoc.system.streams import unblock_standard_error
+
+        unblock_standard_error()
         from robochoc.cli.group import run
 
         status = run()

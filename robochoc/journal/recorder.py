@@ -203,10 +203,13 @@ class JournalFile:
             raise OSError(error.errno, error.strerror, str(self._path)) from error
 
     def close(self) -> None:
-        """Close the file."""
-        if self._file and not self._closed:
-            self._file.close()
-        self._closed = True
+        """Close the file. Raises `OSError` if its reader, if it is a pipe, did not read all of it."""
+        file, self._file, self._closed = self._file, None, True
+        if file:
+            try:
+                file.close()
+            except OSError as error:
+                raise OSError(error.errno, error.strerror, str(self._path)) from error
 
 
 class _Outlet:

@@ -11,6 +11,12 @@ import os
 from contextlib import suppress
 from pathlib import Path
 
+from robochoc.system.streams import BackgroundWriter
+
+MAX_AHEAD = 64 << 20
+"""The number of bytes that may wait for the reader of a pipe to which a file grows."""
+READER_PATIENCE_S = 5.0
+"""Closing such a file waits for its reader as long as that reads something within this time."""
 _NO_UNNAMED = {errno.EOPNOTSUPP, errno.EISDIR, errno.EINVAL}
 """The errors of file systems and kernels without unnamed files."""
 
@@ -108,7 +114,8 @@ class AppendableFile:
     """A file that takes the place of `path` with its `beginning`, and then grows.
 
     Readers see the old file, or the beginning and what was appended since. Devices, pipes and streams are written to
-    as they are. Nothing is buffered. Processes that are forked meanwhile have the descriptor too.
+    as they are, without waiting for their readers. Nothing else is buffered. Processes that are forked
+    meanwhile have the descriptor too.
 
     Args:
         path: The file to be replaced. It need not exist.
@@ -122,9 +129,10 @@ class AppendableFile:
     def __init__(self, path: Path, beginning: bytes, mode: int = 0o666) -> None:
         self._size = 0
         self._torn = False
-        self._is_stream = _is_stream(path)
-        if self._is_stream:
+        self._stream: BackgroundWriter | None = None
+        if _is_stream(path):
             self._descriptor = _open_stream(path)
+            self._stream = BackgroundWriter(self._descriptor, MAX_AHEAD)
             self._append_first(beginning)
             return
         file = PendingFile(path, mode)
@@ -146,8 +154,8 @@ class AppendableFile:
         Raises:
             OSError: if it cannot be written. Nothing is added to a file then.
         """
-        if self._is_stream:
-            self._append_to_stream(content)
+        if self._stream:
+            self._append_to_stream(self._stream, content)
             return
         done = 0
         try:
@@ -160,8 +168,19 @@ class AppendableFile:
         self._size += done
 
     def close(self) -> None:
-        """Close the file."""
-        os.close(self._descriptor)
+        """Close the file.
+
+        Raises:
+            OSError: if it is a stream, and its reader did not read all of it.
+        """
+        if self._stream is None:
+            os.close(self._descriptor)
+            return
+        try:
+            if not self._stream.finish(READER_PATIENCE_S):
+                raise OSError(errno.ETIMEDOUT, f"its reader has not read anything for {READER_PATIENCE_S:g} s")
+        finally:
+            self._stream.close()
 
     def _append_first(self, beginning: bytes) -> None:
         try:
@@ -170,14 +189,14 @@ class AppendableFile:
             self.close()
             raise
 
-    def _append_to_stream(self, content: bytes) -> None:
+    def _append_to_stream(self, stream: BackgroundWriter, content: bytes) -> None:
         if self._torn:
             raise OSError(errno.EIO, "an interrupt came between two bytes")
         self._torn = True  # after an interrupt nobody knows how much was written
-        left = memoryview(content)
-        while left:
-            left = left[os.write(self._descriptor, left) :]
+        fits = stream.write(content)
         self._torn = False
+        if not fits:
+            raise OSError(errno.ENOBUFS, f"its reader is more than {MAX_AHEAD >> 20} MiB behind")
 
 
 def resolved(path: Path) -> Path:

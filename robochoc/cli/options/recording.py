@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -58,6 +58,9 @@ def recording(
             recorder.close()
         for failure in _failures(recorder):
             failure.show()
+        if file:
+            with suppress(OSError):  # what has ended the run counts
+                file.close()
         raise
     else:
         recorder.close()
