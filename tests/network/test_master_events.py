@@ -4,12 +4,20 @@ from __future__ import annotations
 
 import itertools
 from types import SimpleNamespace
+from typing import TYPE_CHECKING, cast
 
 import pytest
 
+from robochoc.authority.admission import InMemoryAuthority
+from robochoc.communication.network.control_messages import ControlMessage, LostFrames, Objection
+from robochoc.communication.network.master import Master
 from robochoc.communication.network.master_events import MasterEvents
-from robochoc.communication.network.quotas import BURST_S, EVENTS_A_SECOND
+from robochoc.communication.network.members import Member, Members
+from robochoc.communication.network.quotas import BURST_S, EVENTS_A_SECOND, REPORTS_A_SECOND
 from robochoc.journal.events import AnyEvent, Decided, Granted, Lost, Refused, Registered
+
+if TYPE_CHECKING:
+    from robochoc.communication.network.profile import Profile
 
 
 def test_times_are_since_the_search_began(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -45,6 +53,32 @@ def test_where_nobody_observes_nothing_is_told() -> None:
     chronicle = MasterEvents(None)
     chronicle.refuse("A", "anything", "it may not")
     chronicle.registered("A")
+
+
+def test_a_robot_that_floods_reports_of_others_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Whatever names it invents, and whatever it reports of them, its further reports are dropped."""
+    now = 0.0
+    monkeypatch.setattr("robochoc.communication.network.master_events.time", SimpleNamespace(monotonic=lambda: now))
+    told: list[AnyEvent] = []
+    authority = InMemoryAuthority("ABC")
+    identity = authority.master_identity(("127.0.0.1",))
+    master = Master(authority, identity, "127.0.0.1:7447", Members(), observer=told.append)
+    member = Member(cast("Profile", None), "1")
+
+    def hear(name: str, message: ControlMessage) -> None:
+        master._handle(name, member, message)  # noqa: SLF001 - without a network
+
+    for number in range(3 * int(BURST_S) * REPORTS_A_SECOND):
+        hear("A", Objection(f"B{number}", "a frame", "no") if number % 2 else LostFrames(f"B{number}", 1 + number))
+    hear("C", Objection("B", "a frame", "no"))
+    refused = [event for event in told if isinstance(event, Refused)]
+    assert len(refused) < BURST_S * REPORTS_A_SECOND + 10
+    assert ("A", "report others", "more than 10 times a second") in [(one.who, one.what, one.why) for one in refused]
+    assert (refused[-1].who, refused[-1].why) == ("B", "no (C says so)")
+    now += 1.0
+    hear("A", Objection("D", "a frame", "no"))
+    assert isinstance(told[-1], Refused)
+    assert told[-1].who == "D"
 
 
 def test_who_tells_more_than_robots_have_to_tell_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -358,6 +358,8 @@ class Master(MasterLoop):
             case Failed(why, unsupported, elsewhere):
                 refusal = TooLargeError if elsewhere else UnsupportedError
                 self._note_failure(name, why, refusal if unsupported else None)
+            case Objection() | LostFrames() if not self.events.may_report_others(name):
+                pass
             case Objection(who, what, why):
                 self.events.refuse(who, what, f"{why} ({name} says so)")
             case LostFrames():

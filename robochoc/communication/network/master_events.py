@@ -8,7 +8,7 @@ from collections.abc import Sequence
 import msgspec
 
 from robochoc.communication.network.plausibility import Doubt
-from robochoc.communication.network.quotas import EVENTS_A_SECOND, Allowance
+from robochoc.communication.network.quotas import EVENTS_A_SECOND, REPORTS_A_SECOND, Allowance
 from robochoc.communication.network.refusals import Refusals
 from robochoc.journal.events import AnyEvent, DroppedOut, Granted, Lost, Observer, Refused, Registered, actor
 
@@ -19,7 +19,7 @@ class MasterEvents:
     def __init__(self, observer: Observer | None) -> None:
         self._observer = observer
         self._began = time.monotonic()
-        self._events: dict[str, Allowance] = {}
+        self._allowances: dict[tuple[str, float], Allowance] = {}
         self.refuse = Refusals(self._refused).note
         """Reports a refusal: who, what, and why."""
 
@@ -54,7 +54,7 @@ class MasterEvents:
 
     def relay_from(self, name: str, events: Sequence[AnyEvent]) -> None:
         """Report a robot's events. Events that are not about itself are refused."""
-        if not self._is_within_quota(name, len(events)):
+        if not self._is_within_quota(name, len(events), EVENTS_A_SECOND):
             self.refuse(name, "tell of events", f"more than {EVENTS_A_SECOND:,} a second")
             return
         for event in events:
@@ -63,6 +63,13 @@ class MasterEvents:
             else:
                 self.refuse(name, f"tell of {type(event).__name__}", "it is not about itself")
 
+    def may_report_others(self, name: str) -> bool:
+        """Return whether `name` may report one more refusal or loss of others. That it reports too many is refused."""
+        is_allowed = self._is_within_quota(name, 1, REPORTS_A_SECOND)
+        if not is_allowed:
+            self.refuse(name, "report others", f"more than {REPORTS_A_SECOND} times a second")
+        return is_allowed
+
     def doubted(self, doubts: Sequence[Doubt]) -> str:
         """Report pairs of robots with contradictory reports. Return a text on them, after a semicolon."""
         for doubt in doubts:
@@ -70,13 +77,11 @@ class MasterEvents:
                 self.refuse(name, "its counts of messages", doubt.why)
         return "".join(f"; {doubt.why}" for doubt in doubts)
 
-    def _is_within_quota(self, name: str, events: int) -> bool:
+    def _is_within_quota(self, name: str, number: int, a_second: float) -> bool:
         now = time.monotonic()
-        if name not in self._events:
-            self._events[name] = Allowance(EVENTS_A_SECOND, now)
-        allowance = self._events[name]
-        enough = allowance.has(events, now)
-        allowance.use(events if enough else 0)
+        allowance = self._allowances.setdefault((name, a_second), Allowance(a_second, now))
+        enough = allowance.has(number, now)
+        allowance.use(number if enough else 0)
         return enough
 
     def _refused(self, who: str, what: str, why: str) -> None:

@@ -12,6 +12,8 @@ BURST_S = 60.0
 """Seconds for which unused quota is kept. It can be used at once: after an outage, messages come together."""
 EVENTS_A_SECOND = 10_000
 """The events that a robot may report to the master, in the long run."""
+REPORTS_A_SECOND = 10
+"""The refusals and losses that a robot may report of others to the master, in the long run."""
 NO_LIMIT = 1e15
 
 
