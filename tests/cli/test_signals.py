@@ -302,7 +302,7 @@ def told(strike: Strike, errors: str) -> bool:
         whys = {
             "robot": tuple(f"{strike.robot} was lost: {why}" for why in STOPPED),
             "solver": ("the time was over",),
-            "router": ("was lost: it has not been there for", "router"),
+            "router": ("was lost: it has not been there for", "the router's process did not respond"),
         }[strike.target]
     else:
         name = strike.signum.name

@@ -182,11 +182,14 @@ def test_a_router_that_is_opened_anew(tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
-def test_a_router_that_dies(tmp_path: Path) -> None:
+@pytest.mark.parametrize(
+    ("number", "why"), [(signal.SIGKILL, "has ended"), (signal.SIGSTOP, "did not respond for 3 s")]
+)
+def test_a_router_that_dies_or_is_stopped(number: int, why: str, tmp_path: Path) -> None:
     with NetworkRun(tmp_path, settings=NetworkSettings(patience_s=3)) as run:
         run.wait_for_progress()
-        os.kill(run.router, signal.SIGKILL)
-        with pytest.raises(RobotsLostError, match="the router's process has ended"):
+        os.kill(run.router, number)
+        with pytest.raises(RobotsLostError, match=f"the router's process {why}"):
             run.wait_for_result()
 
 

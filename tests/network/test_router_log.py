@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import signal
 import socket
 from collections.abc import Iterator
 from contextlib import closing
@@ -16,6 +17,7 @@ from robochoc.authority.admission import InMemoryAuthority
 from robochoc.communication.network import router
 from robochoc.communication.network.router import Log, Refusal, Router
 from tests.support.examples import examples
+from tests.support.limits import wait_until
 from tests.support.ports import free_endpoint
 
 NO_RULE = "no rule of the Authority allows it"
@@ -136,6 +138,18 @@ def test_every_single_cut_tells_the_same() -> None:
 
 def test_line_by_line_tells_the_same() -> None:
     assert read_in(LOG.splitlines(keepends=True)) == TOLD
+
+
+def test_a_router_that_no_longer_responds_is_killed() -> None:
+    """It would be waited for otherwise, by robots and master."""
+    stopped = Router(free_endpoint(), IDENTITY, None, 1000, patience_s=0.5)
+    with closing(stopped):
+        stopped.open({"A": ()})
+        process = stopped._process  # noqa: SLF001 - as another program would stop it
+        assert process
+        process.send_signal(signal.SIGSTOP)
+        wait_until(lambda: stopped.failure != "", "it is not noticed")
+        assert stopped.failure == "did not respond for 0.5 s"
 
 
 def test_a_router_that_does_not_come_is_given_up_and_said_to_be_late(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -11,6 +11,7 @@ from robochoc.authority.identity import Identity
 from robochoc.authority.registry import Right, Role
 from robochoc.communication.network.quotas import OF_A_ROBOT, OF_AN_OBSERVER, Share
 from robochoc.communication.network.router import RefusalObserver, Router
+from robochoc.communication.network.settings import PATIENCE_S
 
 Reach = Mapping[str, tuple[str, ...]]
 """The members that may take part, each with those to which it may write besides the master."""
@@ -31,9 +32,10 @@ class ConnectionPolicy:
         lease_ms: int,
         ways: Reach = MappingProxyType({}),
         scratch: str = "",
+        patience_s: float = PATIENCE_S,
     ) -> None:
         self._admission = admission
-        self._router = Router(endpoint, identity, refused, lease_ms, scratch)
+        self._router = Router(endpoint, identity, refused, lease_ms, scratch, patience_s)
         self._ways = ways
         self.admitted: tuple[str, ...] = ()
         """The names that may connect by the router's present rules."""
@@ -91,9 +93,9 @@ class ConnectionPolicy:
         return [name for name in names if self.is_revoked(name)]
 
     @property
-    def broken(self) -> bool:
-        """Return whether the router's process has ended without `close`."""
-        return self._router.ended
+    def failure(self) -> str:
+        """Return why the router no longer works; empty if it works."""
+        return self._router.failure
 
     def close(self) -> None:
         """End the router."""

@@ -283,8 +283,8 @@ class Master(MasterLoop):
 
     def _check_robots(self, now: float) -> None:
         """Find robots that have been away for too long, and those that may take part no more."""
-        if self._policy.broken:
-            raise RobotsLostError({MASTER: "the router's process has ended"})
+        if failure := self._policy.failure:
+            raise RobotsLostError({MASTER: f"the router's process {failure}"})
         away_s = self._settings.patience_s
         for name in [n for n, member in self.members.robots.items() if member.is_away(away_s) and not member.left]:
             self._lose(name, f"it has not been there for {away_s:g} s")

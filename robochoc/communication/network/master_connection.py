@@ -53,7 +53,7 @@ class MasterConnection:
         self._events = events
         note_refusal, listen = self._note_refusal if events.observed else None, settings.listen or endpoint
         self.policy = ConnectionPolicy(
-            admission, identity, listen, note_refusal, settings.lease_ms, ways, settings.scratch
+            admission, identity, listen, note_refusal, settings.lease_ms, ways, settings.scratch, settings.patience_s
         )
         self.framing = Framing(MASTER, run)
         self.journal_server = JournalServer(run, self.policy.may_sniff, events)

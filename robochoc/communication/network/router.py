@@ -28,6 +28,9 @@ START_S = 60.0
 """The longest wait until the router listens, in seconds. To start Python takes seconds where all cores are busy."""
 _PROCESS = "robochoc.communication.network.router_process"
 _READY = "listening"
+_RESPONDING = b"responding\n"
+_CHECK_S = 0.5
+"""The interval at which the router's process is asked whether it still responds, in seconds."""
 _LOG = "warn"
 _LOG_OF_REFUSALS = "warn,zenoh::net::routing::interceptor=trace,zenoh_link_tls=debug"
 """With allowed actions as well, the log has several lines for each frame, which cost more than the frames."""
@@ -79,11 +82,18 @@ class Router:
     """Runs the router's process with the master's `identity`, on `endpoint` (`HOST:PORT`).
 
     `refused` is told of refusals, from a thread of its own (None: nobody wants to know, which is much faster). Whoever
-    opens it closes it. `scratch` is removed by the router's process if this one dies (see `Conditions`).
+    opens it closes it. `scratch` is removed by the router's process if this one dies (see `Conditions`). A process that
+    has not responded for `patience_s` seconds is killed: zenoh would wait much longer for one that is stopped.
     """
 
     def __init__(
-        self, endpoint: str, identity: Identity, refused: RefusalObserver | None, lease_ms: int, scratch: str = ""
+        self,
+        endpoint: str,
+        identity: Identity,
+        refused: RefusalObserver | None,
+        lease_ms: int,
+        scratch: str = "",
+        patience_s: float = 10.0,
     ) -> None:
         self.endpoint = endpoint
         self._identity = identity
@@ -92,7 +102,12 @@ class Router:
         self._scratch = scratch
         self._process: subprocess.Popen[bytes] | None = None
         self._reader: threading.Thread | None = None
+        self._patience_s = patience_s
+        self._response = threading.Event()
+        self._is_closed = threading.Event()
+        self._watcher: threading.Thread | None = None
         self._was_late = False
+        self._is_silent = False
 
     def open(self, reach: Mapping[str, Sequence[str]], sniffers: Collection[str] | None = None) -> None:
         """Listen, with these rules (see `access_control`) instead of those before. Raises `RouterError`."""
@@ -113,11 +128,39 @@ class Router:
         said = self._wait_until_ready(process.stdout)
         self._reader = threading.Thread(target=self._read, args=[process.stdout, Log(reach), said], daemon=True)
         self._reader.start()
+        self._is_closed.clear()
+        self._response.clear()
+        self._watcher = threading.Thread(target=self._watch, args=[process, process.stdin], daemon=True)
+        self._watcher.start()
 
     @property
-    def ended(self) -> bool:
-        """Return whether its process has ended without `close`."""
-        return self._process is not None and self._process.poll() is not None
+    def failure(self) -> str:
+        """Return why the router no longer works, although nobody has closed it; empty if it works."""
+        if self._process is None or self._process.poll() is None:
+            return ""
+        return f"did not respond for {self._patience_s:g} s" if self._is_silent else "has ended"
+
+    def _watch(self, process: subprocess.Popen[bytes], questions: IO[bytes]) -> None:
+        """Kill the process when it no longer responds.
+
+        Time counts in steps of `_CHECK_S`: if this process itself was stopped, the router may respond afterwards.
+        """
+        silent_s = 0.0
+        while silent_s < self._patience_s:
+            if silent_s == 0:
+                try:
+                    os.write(questions.fileno(), b"\n")  # unbuffered: `close` would write what is left
+                except (OSError, ValueError):  # it has ended
+                    return
+            if not self._response.wait(_CHECK_S):
+                silent_s += _CHECK_S
+            elif self._is_closed.wait(_CHECK_S):
+                return
+            else:
+                self._response.clear()
+                silent_s = 0.0
+        self._is_silent = True
+        process.kill()
 
     def close(self) -> None:
         """End all links. The router's process ends at once."""
@@ -126,8 +169,11 @@ class Router:
             return
         process.kill()
         process.wait()
-        if self._reader:
-            self._reader.join()
+        self._is_closed.set()
+        self._response.set()
+        for thread in (self._reader, self._watcher):
+            if thread:
+                thread.join()
         for stream in (process.stdin, process.stdout):
             if stream:
                 stream.close()
@@ -180,6 +226,8 @@ class Router:
         while chunk := cast("io.BufferedReader", output).read1(_CHUNK):
             text = rest + chunk
             whole = text.rfind(b"\n") + 1
+            if text.find(_RESPONDING, 0, whole) >= 0:
+                self._response.set()
             if self._refused and _TELLING.search(text, 0, whole):
                 for refusal in log.refusals(text[:whole]):
                     self._refused(refusal)

@@ -1,8 +1,8 @@
 """The router's process: `python -m robochoc.communication.network.router_process`, started by `router.py`.
 
-It takes its configuration from standard input, says when it listens, and ends when standard input does, so never later
-than the master, whose scratch folder it removes then. Next to nothing is imported: whoever opens the router anew waits
-for it.
+It takes its configuration from standard input, says when it listens, answers each further line, and ends when standard
+input does, so never later than the master, whose scratch folder it removes then. Next to nothing is imported: whoever
+opens the router anew waits for it.
 """
 
 from __future__ import annotations
@@ -19,6 +19,7 @@ from robochoc.system.orphans import signal_when_orphaned
 from robochoc.system.signals import leave_ctrl_c_to_the_parent
 
 READY = "listening"
+RESPONDING = "responding"
 
 
 def main() -> None:
@@ -30,8 +31,9 @@ def main() -> None:
     with zenoh.open(config(settings)):
         sys.stdout.write(f"{READY}\n")
         sys.stdout.flush()
-        while sys.stdin.read(1):
-            pass
+        while sys.stdin.readline():
+            sys.stdout.write(f"{RESPONDING}\n")
+            sys.stdout.flush()
         if scratch:  # the master was killed, and could not
             import shutil  # noqa: PLC0415 - nobody else waits for it
 
