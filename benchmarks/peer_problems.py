@@ -13,6 +13,7 @@ from colouring import AGENTS, EDGES, colouring
 from measure import FailedError
 
 from robochoc.formats import write_team
+from robochoc.formats.dialects.dialect import ExportOptions
 from robochoc.formats.dialects.registry import dialect_called
 from robochoc.generators.coloring import coloring
 from robochoc.generators.random_csp import random_csp
@@ -132,7 +133,7 @@ def _exported(team: Team, name: str) -> bytes:
     dialect = dialect_called(name)
     if dialect is None or dialect.write is None:
         raise FailedError(f"no export to {name}")
-    (content,) = dialect.write(team).values()
+    (content,) = dialect.write(team, ExportOptions()).files.values()
     return content
 
 

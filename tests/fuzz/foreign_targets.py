@@ -10,7 +10,7 @@ from random import Random
 
 from robochoc.cli.reports.notes import notes_told
 from robochoc.formats import InvalidInputError, check_team, read_team, write_team
-from robochoc.formats.dialects.dialect import Dialect, Imported, ImportOptions
+from robochoc.formats.dialects.dialect import Dialect, ExportOptions, Imported, ImportOptions
 from robochoc.formats.dialects.names_file import NAMES_FILE, names_json, original_names
 from robochoc.formats.dialects.registry import dialect_called, read_foreign, recognise
 from robochoc.model.problem import Team
@@ -46,7 +46,7 @@ def _first_file(files: dict[str, bytes]) -> bytes:
 
 
 def _written(dialect: Dialect, team: Team) -> dict[str, bytes]:
-    return dict(dialect.write(team)) if dialect.write else {}
+    return dict(dialect.write(team, ExportOptions()).files) if dialect.write else {}
 
 
 @cache

@@ -10,8 +10,8 @@ from pathlib import Path
 from random import Random
 from typing import Any
 
-from robochoc.formats.dialects.dialect import Imported, ImportOptions
-from robochoc.formats.dialects.registry import read_foreign
+from robochoc.formats.dialects.dialect import ExportOptions, Imported, ImportOptions
+from robochoc.formats.dialects.registry import dialect_called, read_foreign
 from robochoc.model.assembly import Extras, assemble
 from robochoc.model.constraint import INFINITE, Constraint, Domain, Function, Predicate, Relation, Semantics, Variable
 from robochoc.model.cost_units import CostUnits, common_units
@@ -73,6 +73,14 @@ def imported(text: str, folder: Path, name: str = "problem.xml", **options: Any)
     return read_foreign([path], ImportOptions(**options))
 
 
+def written(name: str, team: Team, *, intension: bool = False) -> Mapping[str, bytes]:
+    """The files of `team` in the format `name`."""
+    dialect = dialect_called(name)
+    assert dialect
+    assert dialect.write
+    return dialect.write(team, ExportOptions(intension=intension)).files
+
+
 _FORMULAS: Sequence[tuple[str, Callable[..., int]]] = (
     ("abs(sub(X,Y))", lambda x, y: abs(x - y)),
     ("add(mul(2,X),neg(Y))", lambda x, y: 2 * x - y),
@@ -98,7 +106,7 @@ def random_problem(chance: Random, *, plain: bool = False, parts: bool = True) -
     sizes = [chance.choice((1, 1, 2)) for _ in range(chance.randint(2, 4))]
     owned = {f"a{robot}": [f"v{robot}.{place}" for place in range(size)] for robot, size in enumerate(sizes)}
     names = [name for own in owned.values() for name in own]
-    values = {name: sorted(chance.sample(range(-2, 5), chance.choice((2, 3)))) for name in names}
+    values = {name: _random_values(chance) for name in names}
     constant = 0 if chance.random() < 0.5 else chance.randint(0 if plain else -50, 50)
     problem = Tables(maximize, values, constant=Fraction(constant, 10**places))
     owner = {name: robot for robot, own in owned.items() for name in own}
@@ -115,12 +123,25 @@ def random_problem(chance: Random, *, plain: bool = False, parts: bool = True) -
         else:
             constraints.append(constraint)
     variables = {
-        robot: [Variable(name, Domain(f"d{name}", tuple(range(v, v + 1) for v in values[name]))) for name in own]
+        robot: [Variable(name, Domain(f"d{name}", _ranges(values[name]))) for name in own]
         for robot, own in owned.items()
     }
     units = CostUnits(maximize, places, constant)
     team = assemble("random", variables, constraints, kind=ProblemKind.DISWCSP, costs=units, extras=Extras(parts=held))
     return problem, team
+
+
+def _random_values(chance: Random) -> list[int]:
+    size = chance.choice((1, 2, 2, 2, 3, 3, 3))
+    first = chance.randint(-2, 2)
+    return [*range(first, first + size)] if chance.random() < 0.5 else sorted(chance.sample(range(-2, 5), size))
+
+
+def _ranges(values: Sequence[int]) -> tuple[range, ...]:
+    """The ranges of ascending values, neighbouring values in one."""
+    starts = [value for value in values if value - 1 not in values]
+    ends = [value + 1 for value in values if value + 1 not in values]
+    return tuple(map(range, starts, ends))
 
 
 def _random_constraint(

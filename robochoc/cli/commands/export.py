@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -13,6 +12,7 @@ from robochoc.cli.options.problems import WRITTEN, Problem, reading_options
 from robochoc.cli.reports.failures import USAGE, Failure, failures_told
 
 if TYPE_CHECKING:
+    from robochoc.formats.dialects.dialect import ExportOptions, Written
     from robochoc.model.problem import Team
 
 
@@ -22,14 +22,15 @@ if TYPE_CHECKING:
     "--format", "kind", type=click.Choice(WRITTEN), default="xcsp3", show_default=True, help="What is written."
 )
 @click.option("-o", "--output", type=OutputFile(), metavar="FILE", help="File to write.  [default: standard output]")
+@click.option("--intension", is_flag=True, help="Keep predicates and functions (frodo only, for its JaCoP parser).")
 @reading_options
-def export(folder: Path, kind: str, output: Path | None, **reading: Any) -> None:  # noqa: ANN401 - `read_problem`
+def export(folder: Path, kind: str, output: Path | None, intension: bool, **reading: Any) -> None:  # noqa: ANN401, FBT001 - `read_problem`, click's
     """Write the problem of the team in the folder TEAM for other tools, all files merged.
 
     \b
     xcsp3    one XCSP3-core file (tables, allDifferent; for a DisWCSP, a sum
              of costs to minimise), for ACE, Choco and others
-    frodo    FRODO's XCSP 2.1
+    frodo    FRODO's XCSP 2.1 (relations; costs are integers)
     xdiscsp  XDisCSP 1.0, for DisChoco and DCOPSolver
     pydcop   pyDCOP's YAML
     cfn      a cost function network, for toulbar2; wcsp: its older format
@@ -41,36 +42,37 @@ def export(folder: Path, kind: str, output: Path | None, **reading: Any) -> None
     from robochoc.system.files import write_atomically
 
     refuse_same_places({"-o": output}, teams=[folder])
+    if intension and kind != "frodo":
+        raise click.UsageError("--intension requires --format frodo")
     with failures_told(folder):
+        from robochoc.formats.dialects.dialect import ExportOptions
         from robochoc.formats.problems import read_problem
 
         team = read_problem(folder, **reading).team
-        files = _files(team, kind)
+        written = _written(team, kind, ExportOptions(intension=intension))
     if output is None:
-        if len(files) > 1:
+        if len(written.files) > 1:
             raise Failure(USAGE, f"{folder}: the scenario is a file of its own; name the first one: -o FILE")
-        (content,) = files.values()
+        (content,) = written.files.values()
         click.echo(content, nl=not content.endswith(b"\n"))
-        return
-    for place, (name, content) in enumerate(files.items()):
-        path = output if place == 0 else output.with_name(f"{output.stem}{_ending(team, name)}")
-        write_atomically(path, content)
-        of_it = f", {len(team.variables)} variables" if place == 0 else ""
-        click.echo(f"{path}: {len(content):,} bytes{of_it}")
+    else:
+        for place, (name, content) in enumerate(written.files.items()):
+            path = output if place == 0 else output.with_name(f"{output.stem}{_ending(team, name)}")
+            write_atomically(path, content)
+            of_it = f", {len(team.variables)} variables" if place == 0 else ""
+            click.echo(f"{path}: {len(content):,} bytes{of_it}")
+    for kind_of_note, text in written.notes:
+        click.echo(f"  {kind_of_note}: {text}", err=output is None)
 
 
-def _files(team: Team, kind: str) -> Mapping[str, bytes]:
-    """Return the files of `team` in the format `kind`, the problem first."""
+def _written(team: Team, kind: str, options: ExportOptions) -> Written:
+    """Return the files of `team` in the format `kind`."""
     from robochoc.formats.dialects.registry import dialect_called
 
     dialect = dialect_called(kind)
-    if dialect and dialect.write:
-        return dialect.write(team)
-    if kind == "xcsp3":
-        from robochoc.formats.xcsp3 import xcsp3
-
-        return {f"{team.name}.xml": xcsp3(team)}
-    raise Failure(USAGE, f"this version does not write {kind}")
+    if dialect is None or dialect.write is None:
+        raise Failure(USAGE, f"this version does not write {kind}")
+    return dialect.write(team, options)
 
 
 def _ending(team: Team, name: str) -> str:

@@ -68,6 +68,29 @@ class Imported:
 
 
 @dataclass(frozen=True)
+class ExportOptions:
+    """The options of an export.
+
+    Attributes:
+        intension: Whether predicates and functions are kept where a format has them, rather than tabulated.
+    """
+
+    intension: bool = False
+
+
+class Written(NamedTuple):
+    """A team in the format of another tool.
+
+    Attributes:
+        files: The contents of the files by their names, the problem first.
+        notes: What the files say otherwise than the team, or what the other tool has to be told.
+    """
+
+    files: Mapping[str, bytes]
+    notes: tuple[Note, ...] = ()
+
+
+@dataclass(frozen=True)
 class Dialect:
     """A format of another tool.
 
@@ -76,8 +99,8 @@ class Dialect:
         title: Its name in messages, such as `FRODO's XCSP 2.1`.
         recognises: Returns whether the file at a path, which begins with some bytes, is in it.
         read: Returns the problem in some files. Raises `InvalidInputError`.
-        write: Returns the files that a team makes in it, by their names. Raises `UnsupportedError` where the team has
-            what the dialect has not. None: it is only read.
+        write: Returns the files of a team in it. Raises `UnsupportedError` where the team has what the dialect has
+            not. None: it is only read.
         is_part: Returns whether the file at a path, which begins with some bytes, is one of several of a problem:
             those in its folder are read together. None: none is.
     """
@@ -86,7 +109,7 @@ class Dialect:
     title: str
     recognises: Callable[[Path, bytes], bool]
     read: Callable[[Sequence[Path], ImportOptions], Imported]
-    write: Callable[[Team], Mapping[str, bytes]] | None = None
+    write: Callable[[Team, ExportOptions], Written] | None = None
     is_part: Callable[[Path, bytes], bool] | None = None
 
 

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 
-from robochoc.formats.dialects.dialect import Dialect, Imported, ImportOptions
+from robochoc.formats.dialects.dialect import Dialect, ExportOptions, Imported, ImportOptions, Written
 from robochoc.formats.dialects.graph import pseudo_tree, shared_constraints
 from robochoc.model.problem import Team
 from robochoc.solver.encoding import UnsupportedError
@@ -14,7 +14,8 @@ from robochoc.solver.encoding import UnsupportedError
 NAME = "dot"
 
 
-def _write(team: Team) -> Mapping[str, bytes]:
+def _write(team: Team, options: ExportOptions) -> Written:
+    del options
     tree = pseudo_tree(team)
     shared: Counter[frozenset[str]] = Counter()
     for (one, other), number in shared_constraints(team).items():
@@ -35,7 +36,7 @@ def _write(team: Team) -> Mapping[str, bytes]:
         if tree[one] != other and tree[other] != one:
             edge = f"{_quoted(one)} -- {_quoted(other)}"
             lines.append(f"  {edge} [style=dashed, constraint=false{_label(number)}];")
-    return {f"{team.name}.dot": "\n".join([*lines, "}", ""]).encode()}
+    return Written({f"{team.name}.dot": "\n".join([*lines, "}", ""]).encode()})
 
 
 def _label(number: int) -> str:

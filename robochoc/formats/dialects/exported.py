@@ -1,19 +1,39 @@
-"""A team's costs as tables in the user's numbers: what formats of other tools can say."""
+"""A team's constraints as tables of costs in the user's numbers, as formats of other tools need them."""
 
 from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from collections import Counter
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
 from fractions import Fraction
+from typing import NamedTuple
 
 from robochoc.formats.definitions import MAX_TUPLES
 from robochoc.formats.dialects.tables import Amount, CostTable
-from robochoc.model.constraint import INFINITE, Constraint, Domain, Function, Relation, Semantics
-from robochoc.model.cost_units import CostUnits
+from robochoc.model.constraint import (
+    INFINITE,
+    Constraint,
+    ConstraintModel,
+    Domain,
+    Function,
+    Predicate,
+    Relation,
+)
 from robochoc.model.problem import Robot, Team
 from robochoc.solver.encoding import UnsupportedError
+
+CONSTANT = "constant"
+"""The name of a constraint that stands for the constant cost."""
+
+
+class Held(NamedTuple):
+    """A constraint, the robot in whose file it stands, and whether only this robot knows it."""
+
+    constraint: Constraint
+    robot: Robot
+    private_part: bool
 
 
 @dataclass(frozen=True)
@@ -29,22 +49,80 @@ class Exported:
     table: CostTable
 
 
+def held(team: Team) -> Iterator[Held]:
+    """Yield the constraints of `team`, each part of a partially known one by itself."""
+    for robot in team.robots:
+        for constraint in (*robot.private, *robot.shared):
+            yield Held(constraint, robot, constraint.model == ConstraintModel.PKC)
+        for child in robot.children:
+            for constraint in child.constraints:
+                yield Held(constraint, robot, private_part=True)
+
+
+class Tabulator:
+    """Tabulates the constraints of a team; constraints that differ only in their variables are tabulated once."""
+
+    def __init__(self, team: Team) -> None:
+        self._domains = {name: variable.domain for name, variable in team.variables.items()}
+        self._known: dict[object, CostTable] = {}
+
+    def table(self, one: Held, name: str = "", most: int = MAX_TUPLES) -> Exported | None:
+        """Return the costs of a constraint. None: they need more than `most` tuples."""
+        constraint = one.constraint
+        scope, definition = constraint.variables, constraint.definition
+        domains = [self._domains[variable] for variable in scope]
+        size = math.prod(map(len, domains))
+        if size > most and not isinstance(definition, Relation):
+            return None
+        pattern = tuple(scope.index(term) if isinstance(term, str) else (term,) for term in constraint.parameters)
+        places = one.robot.costs.places
+        same = id(definition) if isinstance(definition, Relation) else definition
+        key = same, pattern, tuple(domain.ranges for domain in domains), constraint.cost, places
+        if key not in self._known:
+            if isinstance(definition, Relation):
+                self._known[key] = _listed(definition, pattern, domains, places, size)
+            else:
+                self._known[key] = _evaluated(_price(definition, constraint.cost, places), pattern, domains, size)
+        return Exported(scope, replace(self._known[key], name=name or constraint.name))
+
+
 def exported(team: Team) -> tuple[list[Exported], Fraction]:
     """Return the costs of a team that has not been normalised, and the constant among them.
 
     Raises:
         UnsupportedError: if a constraint is too large for a table.
     """
-    domains = {name: variable.domain for name, variable in team.variables.items()}
-    names: dict[str, int] = {}
+    tabulator = Tabulator(team)
+    taken = {*team.variables, CONSTANT}  # pyDCOP has one set of names for both
     found = []
-    for robot in team.robots:
-        for constraint in _held(robot):
-            names[constraint.name] = number = names.get(constraint.name, 0) + 1
-            name = constraint.name if number == 1 else f"{constraint.name}_{number}"
-            found.append(_table(constraint, name, robot.costs, domains))
-    constant = sum((Fraction(one.costs.constant, 10**one.costs.places) for one in team.robots), Fraction(0))
-    return found, constant
+    for one in held(team):
+        table = tabulator.table(one, free_name(one.constraint.name, taken))
+        if table is None:
+            raise UnsupportedError(too_large(team, one.constraint))
+        found.append(table)
+    return found, constant_of(team)
+
+
+def free_name(name: str, taken: set[str]) -> str:
+    """Return `name`, with a number where it is in `taken`, and add it to these."""
+    free, number = name, 1
+    while free in taken:
+        number += 1
+        free = f"{name}_{number}"
+    taken.add(free)
+    return free
+
+
+def constant_of(team: Team) -> Fraction:
+    """Return the constant cost of a team that has not been normalised."""
+    return sum((Fraction(one.costs.constant, 10**one.costs.places) for one in team.robots), Fraction(0))
+
+
+def too_large(team: Team, constraint: Constraint) -> str:
+    """Return the error text for a constraint that is too large for a table."""
+    size = math.prod(len(team.variables[name].domain) for name in constraint.variables)
+    what = f"the constraint {constraint.name} over {' '.join(constraint.variables)} has {size:,} combinations of values"
+    return f"{what}; a table has at most {MAX_TUPLES:,}"
 
 
 def maximises(team: Team) -> bool:
@@ -52,7 +130,7 @@ def maximises(team: Team) -> bool:
     return any(robot.costs.maximize for robot in team.robots)
 
 
-def magnitude(tables: list[Exported], constant: Fraction) -> int:
+def magnitude(tables: Sequence[Exported], constant: Fraction) -> int:
     """Return an integer that no sum of finite costs reaches, nor its negative."""
     most = abs(constant)
     for one in tables:
@@ -71,39 +149,46 @@ def decimal(amount: Amount, places: int | None = None) -> str:
     return f"{sign}{digits[:-width]}.{digits[-width:]}" if width else f"{sign}{digits}"
 
 
-def _held(robot: Robot) -> Iterator[Constraint]:
-    yield from robot.private
-    yield from robot.shared
-    for child in robot.children:
-        yield from child.constraints
+_Pattern = tuple[int | tuple[int], ...]
+"""The terms of a scope: a variable's place among the distinct variables, or a constant in a tuple of its own."""
 
 
-def _table(constraint: Constraint, name: str, units: CostUnits, domains: Mapping[str, Domain]) -> Exported:
-    scope = constraint.variables
-    size = math.prod(len(domains[one]) for one in scope)
-    definition = constraint.definition
-    if isinstance(definition, Relation) and constraint.parameters == scope:
-        return Exported(scope, _listed(definition, name, units, size, [domains[one] for one in scope]))
-    if size > MAX_TUPLES:
-        what = f"the constraint {constraint.name} over {' '.join(scope)} has {size} combinations of values"
-        raise UnsupportedError(f"{what}; a table has at most {MAX_TUPLES}")
-    rows: dict[tuple[int, ...], Amount] = {}
-    for values in itertools.product(*[domains[one] for one in scope]):
-        cost = constraint.price(dict(zip(scope, values, strict=True)))
-        rows[values] = _amount(cost, 0 if isinstance(definition, Function) else units.places)
-    return Exported(scope, CostTable(name, rows, 0, size))
+def _price(definition: Predicate | Function, cost: float, places: int) -> Callable[[Sequence[int]], Amount]:
+    if isinstance(definition, Function):
+        return lambda values: _amount(definition.cost(values), 0)
+    broken = _amount(cost, places)
+    return lambda values: 0 if definition.holds(values) else broken
 
 
-def _listed(relation: Relation, name: str, units: CostUnits, size: int, domains: list[Domain]) -> CostTable:
-    """Return a relation's table; tuples with values that no variable has are left out."""
-    default = {Semantics.SUPPORTS: INFINITE, Semantics.CONFLICTS: 0, Semantics.SOFT: relation.default_cost}
-    known = [set(domain) for domain in domains]
-    rows = {
-        values: _amount(relation.cost(values), units.places)
-        for values in relation.tuples
-        if all(value in domain for value, domain in zip(values, known, strict=True))
+def _evaluated(
+    price: Callable[[Sequence[int]], Amount], pattern: _Pattern, domains: Sequence[Domain], size: int
+) -> CostTable:
+    """Return the table of a predicate or function; its most frequent cost is the default."""
+    costs = {
+        values: price([values[term] if isinstance(term, int) else term[0] for term in pattern])
+        for values in itertools.product(*domains)
     }
-    return CostTable(name, rows, _amount(default[relation.semantics], units.places), size)
+    ((default, _),) = Counter(costs.values()).most_common(1)
+    return CostTable("", {values: cost for values, cost in costs.items() if cost != default}, default, size)
+
+
+def _listed(relation: Relation, pattern: _Pattern, domains: Sequence[Domain], places: int, size: int) -> CostTable:
+    """Return the table of a relation over its distinct variables; tuples with values outside domains are left out."""
+    listed, other = relation.prices
+    known = [frozenset(domain) for domain in domains]
+    rows: dict[tuple[int, ...], Amount] = {}
+    for values, cost in listed.items():
+        if cost == other:
+            continue
+        found: dict[int, int] = {}
+        for term, value in zip(pattern, values, strict=True):
+            if (found.setdefault(term, value) if isinstance(term, int) else term[0]) != value:
+                break
+        else:
+            row = tuple(found[place] for place in range(len(domains)))
+            if all(value in domain for value, domain in zip(row, known, strict=True)):
+                rows[row] = _amount(cost, places)
+    return CostTable("", rows, _amount(other, places), size)
 
 
 def _amount(cost: float, places: int) -> Amount:

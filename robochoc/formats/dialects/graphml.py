@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 
 from lxml import etree
 
-from robochoc.formats.dialects.dialect import Dialect, Imported, ImportOptions
+from robochoc.formats.dialects.dialect import Dialect, ExportOptions, Imported, ImportOptions, Written
 from robochoc.formats.dialects.graph import shared_constraints
 from robochoc.model.problem import Team
 from robochoc.solver.encoding import UnsupportedError
@@ -18,7 +18,8 @@ _NAMESPACE = "http://graphml.graphdrawing.org/xmlns"
 _KEYS = (("robot", "node", "string"), ("values", "node", "int"), ("constraints", "edge", "int"))
 
 
-def _write(team: Team) -> Mapping[str, bytes]:
+def _write(team: Team, options: ExportOptions) -> Written:
+    del options
     root = etree.Element("graphml", xmlns=_NAMESPACE)
     for name, what, kind in _KEYS:
         etree.SubElement(root, "key", {"id": name, "for": what, "attr.name": name, "attr.type": kind})
@@ -31,7 +32,7 @@ def _write(team: Team) -> Mapping[str, bytes]:
         edge = etree.SubElement(graph, "edge", source=one, target=other)
         etree.SubElement(edge, "data", key="constraints").text = str(number)
     body = etree.tostring(root, pretty_print=True, encoding="unicode")
-    return {f"{team.name}.graphml": f'<?xml version="1.0" encoding="UTF-8"?>\n{body}'.encode()}
+    return Written({f"{team.name}.graphml": f'<?xml version="1.0" encoding="UTF-8"?>\n{body}'.encode()})
 
 
 def _read(paths: Sequence[Path], options: ImportOptions) -> Imported:

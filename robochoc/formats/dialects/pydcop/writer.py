@@ -1,4 +1,8 @@
-"""Teams as pyDCOP's YAML: tables, owners as hints, a scenario of robots that leave.
+"""Teams as pyDCOP's YAML: tables, owners, a scenario of robots that leave.
+
+The file has the section `distribution` of a distribution file, too, so it may be given to pyDCOP as both: with several
+variables a robot, pyDCOP finds no distribution by itself for DPOP. For algorithms over factors (Max-Sum) it does
+(`adhoc`): the hints name the owners, and the capacities suffice.
 
 pyDCOP has no hard constraints. What forbids costs an infinity that no sum of the other costs reaches, and the file
 names it: `infinity: 10000`. pyDCOP passes over that; here the costs from there on forbid again.
@@ -8,28 +12,38 @@ from __future__ import annotations
 
 import json
 from collections import defaultdict
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator
 
-from robochoc.formats.dialects.exported import Exported, decimal, exported, magnitude, maximises
+from robochoc.formats.dialects.dialect import ExportOptions, Note, Written
+from robochoc.formats.dialects.exported import CONSTANT, Exported, decimal, exported, magnitude, maximises
 from robochoc.formats.dialects.tables import Amount, CostTable
 from robochoc.model.constraint import INFINITE, Domain
 from robochoc.model.problem import RemoveAgent, Team
 from robochoc.solver.encoding import UnsupportedError
 
+CAPACITY = 1000
+"""The capacity of an agent for each variable, constraint and value: no algorithm of pyDCOP needs as much."""
 LEAST_INFINITY = 10_000
 """What forbids costs at least so much: pyDCOP's own convention."""
 
 
-def written(team: Team) -> Mapping[str, bytes]:
+def written(team: Team, options: ExportOptions) -> Written:
     """Return the files of `team`.
 
     Raises:
         UnsupportedError: if a constraint is too large for a table, or robots join in its scenario.
     """
-    files = {f"{team.name}.yaml": "\n".join(_problem(team)) + "\n"}
+    del options
+    file = f"{team.name}.yaml"
+    files = {file: "\n".join(_problem(team)) + "\n"}
     if team.scenario:
         files[f"{team.name}.scenario.yaml"] = "\n".join(_scenario(team)) + "\n"
-    return {name: text.encode() for name, text in files.items()}
+    several = any(len(robot.variables) > 1 for robot in team.robots)
+    text = (
+        f"robots have several variables: give the file to pyDCOP as the distribution, too, with --distribution {file}"
+    )
+    notes = (Note("distribution", text),) if several else ()
+    return Written({name: text.encode() for name, text in files.items()}, notes)
 
 
 def _problem(team: Team) -> Iterator[str]:
@@ -50,18 +64,26 @@ def _problem(team: Team) -> Iterator[str]:
         yield f"  {_quoted(name)}: {{domain: {_quoted(f'd_{name}')}}}"
     if constant:
         first = next(iter(team.variables))
-        tables.append(Exported((first,), CostTable("constant", {}, constant, len(team.variables[first].domain))))
+        tables.append(Exported((first,), CostTable(CONSTANT, {}, constant, len(team.variables[first].domain))))
     forbidding = str(-infinity if maximize else infinity)
     yield "constraints:" if tables else "constraints: {}"
     for one in tables:
         yield from _constraint(one, team, forbidding)
+    sizes = {name: len(variable.domain) for name, variable in team.variables.items()}
+    capacity = CAPACITY * sum(1 + sizes[name] for name in [*sizes, *(name for one in tables for name in one.scope)])
     yield "agents:"
     for robot in team.robots:
-        yield f"  {_quoted(robot.name)}: {{}}"
+        yield f"  {_quoted(robot.name)}: {{capacity: {capacity}}}"
     yield "distribution_hints:"
     yield "  must_host:"
+    yield from (f"  {line}" for line in _owners(team))
+    yield "distribution:"
+    yield from _owners(team)
+
+
+def _owners(team: Team) -> Iterator[str]:
     for robot in team.robots:
-        yield f"    {_quoted(robot.name)}: [{', '.join(_quoted(one.name) for one in robot.variables)}]"
+        yield f"  {_quoted(robot.name)}: {_list(one.name for one in robot.variables)}"
 
 
 def _constraint(one: Exported, team: Team, forbidding: str) -> Iterator[str]:
@@ -72,7 +94,7 @@ def _constraint(one: Exported, team: Team, forbidding: str) -> Iterator[str]:
         by_cost[_cost(cost, forbidding)].append(" ".join(words))
     yield f"  {_quoted(one.table.name)}:"
     yield "    type: extensional"
-    yield f"    variables: [{', '.join(map(_quoted, one.scope))}]"
+    yield f"    variables: {_list(one.scope)}"
     if len(one.table.rows) < one.table.size:
         yield f"    default: {_cost(one.table.default, forbidding)}"
     yield "    values:" if by_cost else "    values: {}"
@@ -102,6 +124,10 @@ def _scenario(team: Team) -> Iterator[str]:
             if not isinstance(change, RemoveAgent):
                 raise UnsupportedError("pyDCOP's scenarios only remove agents: this one has other changes")
             yield f"      - {{type: remove_agent, agent: {_quoted(change.name)}}}"
+
+
+def _list(names: Iterable[str]) -> str:
+    return f"[{', '.join(map(_quoted, names))}]"
 
 
 def _quoted(text: str) -> str:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from fractions import Fraction
 
+from robochoc.formats.dialects.dialect import ExportOptions, Written
 from robochoc.formats.dialects.exported import Exported, decimal, exported, magnitude, maximises
 from robochoc.formats.dialects.tables import Amount, Scale
 from robochoc.model.constraint import INFINITE, Domain
@@ -12,28 +13,33 @@ from robochoc.model.problem import Team
 from robochoc.solver.encoding import UnsupportedError
 
 
-def cfn(team: Team) -> Mapping[str, bytes]:
+def cfn(team: Team, options: ExportOptions) -> Written:
     """Return the `.cfn` of `team`. Its bound is one that no finite sum reaches.
+
+    Forbidden tuples cost three times the bound, since toulbar2 1.1 does not read `inf`: even with the least cost of all
+    other functions, such a sum reaches the bound.
 
     Raises:
         UnsupportedError: if a constraint is too large for a table, or the team changes over time.
     """
+    del options
     tables, constant = _network(team)
-    return {f"{team.name}.cfn": ("\n".join(_cfn(team, tables, constant)) + "\n").encode()}
+    return Written({f"{team.name}.cfn": ("\n".join(_cfn(team, tables, constant)) + "\n").encode()})
 
 
-def wcsp(team: Team) -> Mapping[str, bytes]:
+def wcsp(team: Team, options: ExportOptions) -> Written:
     """Return the `.wcsp` of `team`, without any names.
 
     Raises:
         UnsupportedError: if a cost is negative or no integer, costs are maximised, a constraint is too large for a
             table, or the team changes over time.
     """
+    del options
     tables, constant = _network(team)
     amounts = [constant, *[amount for one in tables for amount in one.table.amounts()]]
     if maximises(team) or any(amount < 0 or (amount != INFINITE and Fraction(amount) % 1) for amount in amounts):
         raise UnsupportedError("a wcsp has integer costs of 0 or more that are minimised; a cfn can say this one")
-    return {f"{team.name}.wcsp": ("\n".join(_wcsp(team, tables, constant)) + "\n").encode()}
+    return Written({f"{team.name}.wcsp": ("\n".join(_wcsp(team, tables, constant)) + "\n").encode()})
 
 
 def _network(team: Team) -> tuple[list[Exported], Fraction]:
@@ -45,7 +51,9 @@ def _network(team: Team) -> tuple[list[Exported], Fraction]:
 def _cfn(team: Team, tables: list[Exported], constant: Fraction) -> Iterator[str]:
     places = Scale([constant, *[amount for one in tables for amount in one.table.amounts()]]).places
     bound = magnitude(tables, constant)
-    mustbe = f">{decimal(-bound, places)}" if maximises(team) else f"<{decimal(bound, places)}"
+    sign = -1 if maximises(team) else 1
+    mustbe = f"{'>' if sign < 0 else '<'}{decimal(sign * bound, places)}"
+    forbidding = decimal(sign * 3 * bound, places)
     names = {name: _names(variable.domain) for name, variable in team.variables.items()}
     yield "{"
     yield f'  "problem": {{"name": "{team.name}", "mustbe": "{mustbe}"}},'
@@ -58,17 +66,17 @@ def _cfn(team: Team, tables: list[Exported], constant: Fraction) -> Iterator[str
         scope = ", ".join(f'"{name}"' for name in one.scope)
         costs = ", ".join(
             ", ".join([*(f'"{names[name][value]}"' for name, value in zip(one.scope, values, strict=True)), told])
-            for values, told in ((values, _cost(cost, places)) for values, cost in one.table.rows.items())
+            for values, told in ((values, _cost(cost, places, forbidding)) for values, cost in one.table.rows.items())
         )
-        default = _cost(one.table.default, places)
+        default = _cost(one.table.default, places, forbidding)
         functions.append(f'    "f{number}": {{"scope": [{scope}], "defaultcost": {default}, "costs": [{costs}]}}')
     yield ",\n".join(functions)
     yield "  }"
     yield "}"
 
 
-def _cost(cost: Amount, places: int) -> str:
-    return '"inf"' if cost == INFINITE else decimal(cost, places)
+def _cost(cost: Amount, places: int, forbidding: str) -> str:
+    return forbidding if cost == INFINITE else decimal(cost, places)
 
 
 def _counted(domain: Domain) -> bool:

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from decimal import Decimal
 
 from lxml import etree
 
-from robochoc.formats.dialects.xcsp21.flat import FlatTeam, Rows, with_formals
-from robochoc.model.constraint import Function, Predicate
+from robochoc.formats.dialects.exported import Exported, decimal, free_name
+from robochoc.formats.dialects.tables import Amount
+from robochoc.formats.dialects.xcsp21.flat import FlatTeam, with_formals
+from robochoc.model.constraint import INFINITE, Function, Predicate
 from robochoc.model.expression import Expression, text
 
 
@@ -23,7 +24,8 @@ class Document:
     def __init__(self, team: FlatTeam, presentation: Mapping[str, str]) -> None:
         self._team = team
         self.root = etree.Element("instance")
-        etree.SubElement(self.root, "presentation", {name: value for name, value in presentation.items() if value})
+        stated = {name: value for name, value in presentation.items() if value}
+        self.presentation = etree.SubElement(self.root, "presentation", stated)
         self.agents = self._section("agents")
         self._domains()
         self.variables = self._section("variables")
@@ -45,11 +47,11 @@ class Document:
         body = etree.tostring(self.root, pretty_print=True, encoding="unicode")
         return f'<?xml version="1.0" encoding="UTF-8"?>\n{body}'.encode()
 
-    def relation(self, rows: Rows, attributes: Mapping[str, str], tuples: str) -> str:
+    def relation(self, table: Exported, attributes: Mapping[str, str], tuples: str) -> str:
         """Return the name of a relation with these tuples, which is added if there is none."""
-        key = "relation", tuple(attributes.items()), tuples, len(rows.variables)
+        key = "relation", tuple(attributes.items()), tuples, len(table.scope)
         if key not in self._known:
-            sizes = {"arity": str(len(rows.variables)), "nbTuples": str(len(rows.costs))}
+            sizes = {"arity": str(len(table.scope)), "nbTuples": str(len(table.table.rows))}
             element = self._new("relation", key, {**sizes, **attributes})
             element.text = tuples
         return self._known[key]
@@ -69,7 +71,7 @@ class Document:
         """Add a constraint. Its name is made unique."""
         variables = tuple(scope)
         stated = {
-            "name": self._unique(name),
+            "name": free_name(name, self._names),
             "arity": str(len(variables)),
             "scope": " ".join(variables),
             "reference": reference,
@@ -80,14 +82,6 @@ class Document:
         section = self._definitions[kind]
         self._known[key] = f"{kind[0].upper()}{len(section)}"
         return etree.SubElement(section, kind, {"name": self._known[key], **attributes})
-
-    def _unique(self, name: str) -> str:
-        free, number = name, 1
-        while free in self._names:
-            number += 1
-            free = f"{name}_{number}"
-        self._names.add(free)
-        return free
 
     def _section(self, tag: str) -> etree._Element:
         return etree.SubElement(self.root, tag)
@@ -106,6 +100,6 @@ def _range(part: range) -> str:
     return f"{part[0]}..{part[-1]}" if len(part) > 1 else str(part[0])
 
 
-def number(cost: Decimal | float, *, forbidden: str = "infinity") -> str:
+def cost_text(cost: Amount, *, forbidden: str = "infinity") -> str:
     """Return a cost as it is written."""
-    return forbidden if isinstance(cost, float) else f"{cost:f}"
+    return forbidden if cost == INFINITE else decimal(cost)

@@ -3,46 +3,24 @@
 from __future__ import annotations
 
 import itertools
-import math
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from decimal import Decimal
-from typing import NamedTuple
+from collections.abc import Callable, Sequence
 
-from robochoc.model.constraint import (
-    INFINITE,
-    Constraint,
-    ConstraintModel,
-    Domain,
-    Function,
-    Predicate,
-    Relation,
-    Semantics,
+from robochoc.formats.dialects.exported import (
+    Exported,
+    Held,
+    Tabulator,
+    constant_of,
+    held,
+    maximises,
+    too_large,
 )
-from robochoc.model.cost_units import common_units
+from robochoc.model.constraint import Domain, Function, Predicate
 from robochoc.model.expression import Apply, Constant, Expression, Name
-from robochoc.model.problem import ProblemKind, Robot, Team
+from robochoc.model.problem import ProblemKind, Team
 from robochoc.solver.encoding import UnsupportedError
 
 MAX_LISTED = 10_000
 """The maximum number of tuples of a predicate or function that is written as a relation although it need not be."""
-MAX_TABULATED = 1_000_000
-"""The maximum number of tuples of one that must be."""
-
-
-class Held(NamedTuple):
-    """A constraint, the robot in whose file it stands, and whether that robot alone knows it."""
-
-    constraint: Constraint
-    robot: Robot
-    private_part: bool
-
-
-class Rows(NamedTuple):
-    """A relation over distinct variables: costs in the user's numbers."""
-
-    variables: tuple[str, ...]
-    costs: Mapping[tuple[int, ...], Decimal | float]
-    default: Decimal | float
 
 
 class FlatTeam:
@@ -57,54 +35,27 @@ class FlatTeam:
             raise UnsupportedError(f"{title} has no problems that change over time: leave scenario.xml out")
         self.team = team
         self.title = title
-        self.units = common_units(robot.costs for robot in team.robots)
+        self.maximize = maximises(team)
         self.weighted = team.kind == ProblemKind.DISWCSP
+        self.constant = constant_of(team)
         self.domains, self.domain_of = _domains(team)
-        self.held = list(_held(team))
+        self.held = list(held(team))
+        self._tabulator = Tabulator(team)
 
-    def cost(self, robot: Robot, cost: float) -> Decimal | float:
-        """Return a cost of `robot` in the user's numbers."""
-        return INFINITE if cost == INFINITE else Decimal(int(cost)).scaleb(-robot.costs.places)
+    def table(self, one: Held) -> Exported:
+        """Return a constraint as a table.
 
-    def rows(self, one: Held, most: int = MAX_TABULATED) -> Rows | None:
-        """Return a constraint as a relation over distinct variables. None: it would have more than `most` tuples."""
-        if isinstance(one.constraint.definition, Relation):
-            return self._projected(one, one.constraint.definition)
-        variables = one.constraint.variables
-        domains = [self.team.variables[name].domain for name in variables]
-        if math.prod(map(len, domains)) > most:
-            return None
-        costs = {}
-        for values in itertools.product(*domains):
-            price = one.constraint.price(dict(zip(variables, values, strict=True)))
-            whole = isinstance(one.constraint.definition, Function) and price != INFINITE
-            costs[values] = Decimal(int(price)) if whole else self.cost(one.robot, price)
-        return Rows(variables, costs, INFINITE)
+        Raises:
+            UnsupportedError: if it is too large for one.
+        """
+        table = self._tabulator.table(one)
+        if table is None:
+            raise UnsupportedError(f"{self.title}: {too_large(self.team, one.constraint)}")
+        return table
 
-    def _projected(self, one: Held, relation: Relation) -> Rows:
-        terms = one.constraint.parameters
-        variables = tuple(dict.fromkeys(term for term in terms if isinstance(term, str)))
-        soft = relation.semantics == Semantics.SOFT
-        listed = relation.costs or [0 if relation.semantics == Semantics.SUPPORTS else INFINITE] * len(relation.tuples)
-        costs = {}
-        for values, cost in zip(relation.tuples, listed, strict=True):
-            found: dict[str, int] = {}
-            for term, value in zip(terms, values, strict=True):
-                if (found.setdefault(term, value) if isinstance(term, str) else term) != value:
-                    break
-            else:
-                costs[tuple(found[name] for name in variables)] = self.cost(one.robot, cost)
-        other = relation.default_cost if soft else INFINITE if relation.semantics == Semantics.SUPPORTS else 0
-        return Rows(variables, costs, self.cost(one.robot, other))
-
-
-def _held(team: Team) -> Iterator[Held]:
-    for robot in team.robots:
-        for constraint in (*robot.private, *robot.shared):
-            yield Held(constraint, robot, constraint.model == ConstraintModel.PKC)
-        for child in robot.children:
-            for constraint in child.constraints:
-                yield Held(constraint, robot, private_part=True)
+    def small_table(self, one: Held) -> Exported | None:
+        """Return a constraint as a table. None: it is so large that a predicate or function should be kept."""
+        return self._tabulator.table(one, most=MAX_LISTED)
 
 
 def _domains(team: Team) -> tuple[dict[str, Domain], dict[str, str]]:

@@ -1,22 +1,35 @@
-"""Writes a team as one file of FRODO's XCSP 2.1."""
+"""Writes a team as one file of FRODO's XCSP 2.1.
+
+As it is shipped, FRODO ignores constraints in intension (only its JaCoP parser reads them) and has costs of 32 bits.
+So constraints become relations, and decimal costs integers of a smaller unit, which the file names. FRODO's default
+parser passes over a constraint's `agent`, or lets that agent alone pay for it, so the attribute is not written.
+"""
 
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
-from decimal import Decimal
+from collections.abc import Iterator
+from fractions import Fraction
 
 from lxml import etree
 
-from robochoc.formats.dialects.xcsp21.document import Document, number
-from robochoc.formats.dialects.xcsp21.flat import MAX_LISTED, FlatTeam, Held, Rows, plain
+from robochoc.formats.dialects.dialect import ExportOptions, Note, Written
+from robochoc.formats.dialects.exported import CONSTANT, Exported, Held, decimal, magnitude
+from robochoc.formats.dialects.tables import Amount, CostTable, Scale
+from robochoc.formats.dialects.xcsp21.document import Document, cost_text
+from robochoc.formats.dialects.xcsp21.flat import FlatTeam, plain
+from robochoc.formats.dialects.xcsp21.instance import UNIT
 from robochoc.formats.global_constraints import PREFIX, write_global
 from robochoc.model.constraint import INFINITE, Function, GlobalPredicate, Predicate, Relation
-from robochoc.model.expression import Apply, Constant
+from robochoc.model.expression import Apply, Constant, Expression
 from robochoc.model.problem import Team
+from robochoc.model.wording import counted
 from robochoc.solver.encoding import UnsupportedError
 
 FORMAT = "XCSP 2.1_FRODO"
+TITLE = "FRODO's XCSP 2.1"
+LIMIT = 2**31 - 1
+"""The integer that FRODO's 32 bits take for infinity."""
 
 _TERM = r"(?:X\d+|-?\d+)"
 _FORMS = {
@@ -28,92 +41,130 @@ _FORMS = {
 """How FRODO reads the parameters of each."""
 
 
-def frodo_file(team: Team) -> Mapping[str, bytes]:
-    """Return the file. What a robot alone knows of a constraint (PKC) becomes a constraint of its agent alone.
+def frodo_file(team: Team, options: ExportOptions) -> Written:
+    """Return the file, in which all agents of a constraint's variables know it.
 
     Raises:
         UnsupportedError: if the team has what FRODO has not.
     """
-    return {f"{team.name}.xml": _Writer(FlatTeam(team, "FRODO's XCSP 2.1")).content()}
+    writer = _Writer(FlatTeam(team, TITLE), intension=options.intension)
+    return Written({f"{team.name}.xml": writer.content()}, tuple(writer.notes()))
 
 
 class _Writer:
-    def __init__(self, flat: FlatTeam) -> None:
+    def __init__(self, flat: FlatTeam, *, intension: bool) -> None:
         self._flat = flat
-        arity = max((len(one.constraint.variables) for one in flat.held), default=1)
-        self._forbidden = "-infinity" if flat.units.maximize else "infinity"
+        self._contents = [(intension and self._in_intension(one)) or flat.table(one) for one in flat.held]
+        tables = [content for content in self._contents if isinstance(content, Exported)]
+        if flat.constant:
+            first = next(iter(flat.team.variables))
+            size = len(flat.team.variables[first].domain)
+            self._constant = Exported((first,), CostTable(CONSTANT, {}, flat.constant, size))
+            tables.append(self._constant)
+        self._places = Scale([amount for one in tables for amount in one.table.amounts()]).places
+        self._check_sizes(magnitude(tables, Fraction(0)) * 10**self._places)
+        self._forbidden = "-infinity" if flat.maximize else "infinity"
         presentation = {
             "name": flat.team.name,
-            "maxConstraintArity": str(arity),
-            "maximize": "true" if flat.units.maximize else "false",
+            "maxConstraintArity": str(max((len(one.constraint.variables) for one in flat.held), default=1)),
+            "maximize": "true" if flat.maximize else "false",
             "format": FORMAT,
         }
         self._document = Document(flat, presentation)
 
     def content(self) -> bytes:
         flat, document = self._flat, self._document
+        if self._places:
+            etree.SubElement(document.presentation, "stats", name=UNIT).text = self._unit
         for robot in flat.team.robots:
             etree.SubElement(document.agents, "agent", name=robot.name)
             for variable in robot.variables:
                 domain = flat.domain_of[variable.name]
                 etree.SubElement(document.variables, "variable", name=variable.name, domain=domain, agent=robot.name)
-        for one in flat.held:
-            self._add(one)
-        if flat.units.constant:
-            first = next(iter(flat.team.variables))
-            whole = Decimal(flat.units.constant).scaleb(-flat.units.places)
-            self._listed("constant", Rows((first,), {}, whole), {})
+        for one, content in zip(flat.held, self._contents, strict=True):
+            if isinstance(content, Exported):
+                self._add(content)
+            else:
+                self._add_formula(one, content)
+        if flat.constant:
+            self._add(self._constant)
         return document.content()
 
-    def _add(self, one: Held) -> None:
-        known_to = {"agent": one.robot.name} if one.private_part else {}
-        definition = one.constraint.definition
-        if isinstance(definition, GlobalPredicate) and self._as_global(one, definition, known_to):
-            return
-        if isinstance(definition, Relation) or not self._in_intension(one, known_to):
-            rows = self._flat.rows(one)
-            if rows is None:
-                what = f"{one.constraint.name} is too large for a relation, and {definition.name} has no counterpart"
-                raise UnsupportedError(f"{self._flat.title}: {what}")
-            self._listed(one.constraint.name, rows, known_to)
+    def notes(self) -> Iterator[Note]:
+        """Yield what differs from the team."""
+        if self._places:
+            yield Note("scale", f"costs are integers, in units of {self._unit}: FRODO's costs are integers of 32 bits")
+        if any(one.private_part for one in self._flat.held):
+            text = "all agents of a constraint know it: FRODO cannot keep partially known (PKC) constraints apart"
+            yield Note("known to more", text)
+        if kept := sum(not isinstance(content, Exported) for content in self._contents):
+            text = f"{counted(kept, 'constraint')} in intension, which only FRODO's JaCoP parser reads"
+            yield Note("intension", text)
 
-    def _as_global(self, one: Held, predicate: GlobalPredicate, known_to: Mapping[str, str]) -> bool:
-        """Write a global constraint that FRODO has in this form; return whether it was done."""
-        if one.constraint.cost != INFINITE or not _FORMS[predicate.name.removeprefix(PREFIX)].fullmatch(predicate.form):
-            return False
-        scope = one.constraint.variables
-        element = self._document.constraint(one.constraint.name, scope, predicate.name, **known_to)
-        write_global(etree.SubElement(element, "parameters"), predicate, one.constraint.parameters)
-        return True
+    @property
+    def _unit(self) -> str:
+        return decimal(Fraction(1, 10**self._places))
 
-    def _in_intension(self, one: Held, known_to: Mapping[str, str]) -> bool:
-        """Write a predicate or function as such; return whether it was done."""
-        definition = one.constraint.definition
+    def _check_sizes(self, most: int) -> None:
+        if most >= LIMIT:
+            unit = f" in units of {self._unit}" if self._places else ""
+            what = f"costs add up to as much as {most:,}{unit}"
+            raise UnsupportedError(f"{TITLE}: {what}, and FRODO's integers end at {LIMIT:,}: write smaller costs")
+        for name, variable in self._flat.team.variables.items():
+            far = max(variable.domain, key=abs)
+            if abs(far) >= LIMIT:
+                what = f"the value {far:,} of {name} is beyond FRODO's integers, which end at {LIMIT:,}"
+                raise UnsupportedError(f"{TITLE}: {what}")
+
+    def _in_intension(self, one: Held) -> Predicate | Function | None:
+        """Return the definition of a constraint by FRODO's operators. None: it should be a relation."""
+        definition, cost = one.constraint.definition, one.constraint.cost
         if isinstance(definition, Relation):
-            return False
+            return None
+        if isinstance(definition, GlobalPredicate) and cost == INFINITE and _is_known_form(definition):
+            return definition
         body = plain(definition.body)
         if body is None:
-            return False
-        if isinstance(definition, Predicate) and one.constraint.cost != INFINITE:
-            cost = self._flat.cost(one.robot, one.constraint.cost)
-            if self._flat.rows(one, MAX_LISTED) is not None or cost != int(cost):
-                return False
-            body = Apply("if", (body, Constant(0), Constant(int(cost))))
-            definition = Function(definition.name, definition.parameters, body)
-        reference = self._document.formula(definition, body)
-        element = self._document.constraint(one.constraint.name, one.constraint.variables, reference, **known_to)
-        etree.SubElement(element, "parameters").text = " ".join(map(str, one.constraint.parameters))
-        return True
+            return None
+        if isinstance(definition, Predicate) and cost == INFINITE:
+            return Predicate(definition.name, definition.parameters, body)
+        return self._as_function(one, definition, body)
 
-    def _listed(self, name: str, rows: Rows, known_to: Mapping[str, str]) -> None:
+    def _as_function(self, one: Held, definition: Predicate | Function, body: Expression) -> Function | None:
+        """Return a definition whose costs are finite as a function. None: it should be a relation."""
+        if any(robot.costs.places for robot in self._flat.team.robots):  # the costs of a function have no unit
+            return None
+        if isinstance(definition, Predicate):
+            if self._flat.small_table(one) is not None:
+                return None
+            body = Apply("if", (body, Constant(0), Constant(int(one.constraint.cost))))
+        return Function(definition.name, definition.parameters, body)
+
+    def _add_formula(self, one: Held, definition: Predicate | Function) -> None:
+        constraint = one.constraint
+        if isinstance(definition, GlobalPredicate):
+            element = self._document.constraint(constraint.name, constraint.variables, definition.name)
+            write_global(etree.SubElement(element, "parameters"), definition, constraint.parameters)
+            return
+        reference = self._document.formula(definition, definition.body)
+        element = self._document.constraint(constraint.name, constraint.variables, reference)
+        etree.SubElement(element, "parameters").text = " ".join(map(str, constraint.parameters))
+
+    def _add(self, table: Exported) -> None:
         """Write a soft relation, the only kind that all of FRODO reads."""
-        by_cost: dict[Decimal | float, list[str]] = {}
-        for values, cost in rows.costs.items():
+        by_cost: dict[Amount, list[str]] = {}
+        for values, cost in table.table.rows.items():
             by_cost.setdefault(cost, []).append(" ".join(map(str, values)))
         tuples = " | ".join(f"{self._number(cost)}: {' | '.join(listed)}" for cost, listed in by_cost.items())
-        attributes = {"semantics": "soft", "defaultCost": self._number(rows.default)}
-        reference = self._document.relation(rows, attributes, tuples)
-        self._document.constraint(name, rows.variables, reference, **known_to)
+        attributes = {"semantics": "soft", "defaultCost": self._number(table.table.default)}
+        reference = self._document.relation(table, attributes, tuples)
+        self._document.constraint(table.table.name, table.scope, reference)
 
-    def _number(self, cost: Decimal | float) -> str:
-        return number(cost, forbidden=self._forbidden)
+    def _number(self, cost: Amount) -> str:
+        whole = cost if cost == INFINITE else Fraction(cost) * 10**self._places
+        return cost_text(whole, forbidden=self._forbidden)
+
+
+def _is_known_form(predicate: GlobalPredicate) -> bool:
+    """Return whether FRODO reads the parameters of a global constraint."""
+    return _FORMS[predicate.name.removeprefix(PREFIX)].fullmatch(predicate.form) is not None

@@ -58,11 +58,11 @@ def _range(word: str) -> range:
     return range(first, last + 1)
 
 
-def finite_cost(word: str) -> Decimal:
-    """Return the cost that `word` is. Raises `MistakeError`."""
+def finite_cost(word: str, places: int = 0) -> Decimal:
+    """Return the cost that `word` is in units of 10 to the power of minus `places`. Raises `MistakeError`."""
     if not _COST.fullmatch(word):
         raise MistakeError(f"'{shortened(word)}' is no cost", "a number, 'infinity' or '-infinity'")
-    cost = Decimal(word).normalize()
+    cost = Decimal(word).scaleb(-places).normalize()
     if not cost:
         return Decimal(0)
     digits, exponent = len(cost.as_tuple().digits), int(cost.as_tuple().exponent)
@@ -74,10 +74,14 @@ def finite_cost(word: str) -> Decimal:
 
 
 class CostReader:
-    """Reads costs: what is infinite, or as large as `infinity` or the file's `bound` says, forbids."""
+    """Reads costs: what is infinite, or as large as `infinity` or the file's `bound` says, forbids.
 
-    def __init__(self, *, maximize: bool, infinity: int | None, bound: Decimal | None = None) -> None:
+    A finite cost is a number of units of 10 to the power of minus `places`.
+    """
+
+    def __init__(self, *, maximize: bool, infinity: int | None, bound: Decimal | None = None, places: int = 0) -> None:
         self._maximize = maximize
+        self._places = places
         stated = [Decimal(one) for one in (infinity, bound) if one is not None]
         self._infinity = min(stated) if stated else None
 
@@ -92,7 +96,15 @@ class CostReader:
         cost = finite_cost(word)
         if self._infinity is not None and (-cost if self._maximize else cost) >= self._infinity:
             return INFINITE
-        return cost
+        return finite_cost(word, self._places)
+
+
+def unit_places(word: str) -> int:
+    """Return the decimal places of a unit of costs: 2 of 0.01. Raises `MistakeError`."""
+    match = re.fullmatch(r"0\.(0*1)", word)
+    if match is None or len(match[1]) > MAX_PLACES:
+        raise MistakeError(f"the unit of costs '{shortened(word)}'", "write 0.1, 0.01, or less")
+    return len(match[1])
 
 
 def split_tuples(text: str) -> Iterator[tuple[str, str]]:

@@ -14,6 +14,7 @@ from robochoc.formats.dialects.dialect import ImportOptions, Note
 from robochoc.formats.dialects.xcsp21.definitions import read_formula, read_relation
 from robochoc.formats.dialects.xcsp21.global_constraints import expand
 from robochoc.formats.dialects.xcsp21.instance import (
+    UNIT,
     ForeignConstraint,
     ForeignVariable,
     Formula,
@@ -22,7 +23,7 @@ from robochoc.formats.dialects.xcsp21.instance import (
     Table,
     refuse,
 )
-from robochoc.formats.dialects.xcsp21.numbers import CostReader, finite_cost, integer, is_integer, ranges
+from robochoc.formats.dialects.xcsp21.numbers import CostReader, finite_cost, integer, is_integer, ranges, unit_places
 from robochoc.formats.xml import attribute, line, read_tree
 from robochoc.model.constraint import Function, Predicate
 
@@ -65,6 +66,7 @@ class _Reader:
         self._domains: dict[str, tuple[range, ...]] = {}
         self._relations: dict[str, Table | Sides] = {}
         self._formulas: dict[str, Predicate | Function] = {}
+        self._unit_places = 0
 
     def instance(self) -> Instance:
         if self._root.tag != "instance":
@@ -96,6 +98,10 @@ class _Reader:
             self._read.type = attribute(presentation, "type")
             self._read.constraint_model = attribute(presentation, "constraintModel")
             self._read.maximize = attribute(presentation, "maximize").lower() in {"true", "1"}
+            for element in presentation.iterfind("stats"):
+                if attribute(element, "name") == UNIT:
+                    with self._at(element):
+                        self._unit_places = unit_places((element.text or "").strip())
         agents = self._root.find("agents")
         if agents is not None:
             self._read.self_agent = attribute(agents, "self")
@@ -145,7 +151,12 @@ class _Reader:
         refuse(self._path, line(element), f"{what}: stochastic problems are not read", "give the variable one value")
 
     def _define(self) -> None:
-        costs = CostReader(maximize=self._read.maximize, infinity=self._options.infinity, bound=self._read.costs_from)
+        costs = CostReader(
+            maximize=self._read.maximize,
+            infinity=self._options.infinity,
+            bound=self._read.costs_from,
+            places=self._unit_places,
+        )
         for element in self._every("relations", "relation"):
             with self._at(element):
                 self._relations[self._new(element)] = read_relation(element, costs)
@@ -153,6 +164,8 @@ class _Reader:
             for element in self._every(f"{kind}s", kind):
                 with self._at(element):
                     self._formulas[self._new(element)] = read_formula(element)
+                    if self._unit_places and kind == "function":
+                        raise MistakeError(f"a function in a file with a {UNIT}", "write its costs as a relation")
 
     def _new(self, element: etree._Element) -> str:
         name = attribute(element, "name")

@@ -2,19 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-
-from robochoc.formats.dialects.dialect import Dialect
+from robochoc.formats.dialects.dialect import Dialect, ExportOptions, Written
 from robochoc.formats.dialects.xcsp3.document import recognises
 from robochoc.formats.dialects.xcsp3.reader import NAME, read
 from robochoc.model.problem import Team
 
 
-def write(team: Team) -> Mapping[str, bytes]:
+def write(team: Team, options: ExportOptions) -> Written:
     """Return the team's problem as one XCSP3 file. See `robochoc.formats.xcsp3`."""
+    del options
     from robochoc.formats.xcsp3 import xcsp3  # noqa: PLC0415 - start-up: the solver's process writes it
 
-    return {f"{team.name}.xml": xcsp3(team)}
+    return Written({f"{team.name}.xml": xcsp3(team)})
 
 
 DIALECT = Dialect(NAME, "XCSP3", recognises, read, write)

@@ -5,16 +5,20 @@ from __future__ import annotations
 import re
 from fractions import Fraction
 from pathlib import Path
+from random import Random
 from typing import Any
 
 import pytest
+from lxml import etree
 
 from robochoc.formats import InvalidInputError, check_team
 from robochoc.formats.dialects.dialect import ImportOptions
 from robochoc.formats.dialects.registry import read_foreign
-from robochoc.model.constraint import ConstraintModel
-from robochoc.model.problem import ProblemKind
-from tests.support.foreign_problems import imported, optimum
+from robochoc.model.assembly import assemble
+from robochoc.model.constraint import Constraint, ConstraintModel, Domain, Relation, Semantics, Variable
+from robochoc.model.problem import ProblemKind, Team
+from robochoc.solver.encoding import UnsupportedError
+from tests.support.foreign_problems import imported, optimum, random_problem, written
 
 HEAD = '<instance xmlns:xsi="http://www.w3.org/2001/XMLSchema-instance">'
 
@@ -230,3 +234,52 @@ def test_expressions_in_other_forms_are_refused(tmp_path: Path) -> None:
         )
     )
     assert "'p' has an expression in the form infix" in refused(text, tmp_path)
+
+
+def test_a_unit_of_costs_divides_them(tmp_path: Path) -> None:
+    text = frodo(soft("125: 1 1 | infinity: 2 2", 'defaultCost="300"'))
+    stats = '<stats name="unit of costs">{}</stats></presentation>'
+    found = imported(text.replace("</presentation>", stats.format("0.01")), tmp_path)
+    assert optimum(found.team) == Fraction(5, 4)
+    for wrong in ("0.02", "0.0", "1", "0.0000000001", "x"):
+        with pytest.raises(InvalidInputError, match="the unit of costs"):
+            imported(text.replace("</presentation>", stats.format(wrong)), tmp_path)
+
+
+def test_an_export_has_relations_of_integers_that_all_agents_know() -> None:
+    chance = Random("relations")
+    for _ in range(20):
+        _, team = random_problem(chance)
+        (content,) = written("frodo", team).values()
+        root = etree.fromstring(content)
+        assert root.find("predicates") is None
+        assert root.find("functions") is None
+        assert all(one.get("agent") is None for one in root.iterfind("constraints/constraint"))
+        relations = root.findall("relations/relation")
+        costs = [word for one in relations for word in re.findall(r"([^ |:]+):", one.text or "")]
+        costs += [one.get("defaultCost", "") for one in relations]
+        assert all(re.fullmatch(r"-?(\d+|infinity)", cost) for cost in costs)
+
+
+def test_an_export_in_intension_keeps_formulas_and_the_optimum(tmp_path: Path) -> None:
+    chance = Random("intension")
+    kept = 0
+    for _ in range(40):
+        problem, team = random_problem(chance)
+        (content,) = written("frodo", team, intension=True).values()
+        kept += content.count(b"<predicate ") + content.count(b"<function ")
+        assert optimum(imported(content.decode(), tmp_path).team) == problem.optimum()
+    assert kept
+
+
+def test_costs_and_values_beyond_32_bits_are_refused() -> None:
+    def team_of(value: int, cost: int) -> Team:
+        relation = Relation("r", 1, Semantics.SOFT, ((value,),), (cost,), 0)
+        variables = {"a": [Variable("x", Domain("d", (range(value, value + 1), range(value + 2, value + 3))))]}
+        return assemble("t", variables, [Constraint("c", relation, ("x",), ("x",))], kind=ProblemKind.DISWCSP)
+
+    assert written("frodo", team_of(1, 2**31 - 3))
+    with pytest.raises(UnsupportedError, match="costs add up to as much as 2,147,483,648, and"):
+        written("frodo", team_of(1, 2**31 - 1))
+    with pytest.raises(UnsupportedError, match="the value 2,147,483,649 of x is beyond"):
+        written("frodo", team_of(2**31 - 1, 1))

@@ -9,8 +9,7 @@ from pathlib import Path
 import pytest
 
 from robochoc.formats import InvalidInputError, check_team
-from robochoc.formats.dialects.registry import dialect_called
-from tests.support.foreign_problems import imported
+from tests.support.foreign_problems import imported, written
 
 NAMES = "V0 V1 V2 V3"
 
@@ -89,10 +88,7 @@ def test_it_allows_what_its_definition_allows(kind: str, parameters: str, allows
 )
 def test_what_frodo_has_too_is_exported_as_it_was(kind: str, parameters: str, tmp_path: Path) -> None:
     team = imported(text_of(kind, parameters), tmp_path).team
-    dialect = dialect_called("frodo")
-    assert dialect
-    assert dialect.write
-    (content,) = dialect.write(team).values()
+    (content,) = written("frodo", team, intension=True).values()
     assert f'reference="global:{kind}"' in content.decode()
     again = imported(content.decode(), tmp_path).team
     assert list(again.constraints()) == list(team.constraints())

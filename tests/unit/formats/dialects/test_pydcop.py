@@ -7,13 +7,17 @@ from fractions import Fraction
 from pathlib import Path
 
 import pytest
+import yaml
 
 from robochoc.formats import InvalidInputError, check_team
 from robochoc.formats.dialects.dialect import ImportOptions
 from robochoc.formats.dialects.pydcop import python_function
 from robochoc.formats.dialects.registry import read_foreign
-from robochoc.model.problem import RemoveAgent
-from tests.support.foreign_problems import imported, optimum
+from robochoc.model.assembly import assemble
+from robochoc.model.constraint import Constraint, Domain, Relation, Semantics, Variable
+from robochoc.model.cost_units import CostUnits
+from robochoc.model.problem import ProblemKind, RemoveAgent
+from tests.support.foreign_problems import imported, optimum, written
 
 HEAD = """name: small
 objective: min
@@ -31,8 +35,8 @@ constraints:
 
 
 def constraint(text: str) -> str:
-    written = text if text.startswith("|") else json.dumps(text)
-    return f"{HEAD}  k:\n    type: intention\n    function: {written}\n"
+    quoted = text if text.startswith("|") else json.dumps(text)
+    return f"{HEAD}  k:\n    type: intention\n    function: {quoted}\n"
 
 
 @pytest.mark.parametrize(
@@ -257,3 +261,18 @@ def test_scenarios_and_distributions_are_strict_too(tmp_path: Path) -> None:
         with pytest.raises(InvalidInputError, match="unknown key"):
             read_foreign(files, ImportOptions())
         path.write_text(text)
+
+
+def test_an_export_is_a_distribution_file_too() -> None:
+    bit = Domain("bit", (range(2),))
+    variables = {"a": [Variable("x", bit), Variable("y", bit)], "b": [Variable("z", bit)]}
+    relation = Relation("r", 2, Semantics.SOFT, ((0, 0),), (5,), 1)
+    names = ("c", "c", "c_2", "x", "constant")
+    constraints = [Constraint(name, relation, ("x", "z"), ("x", "z")) for name in names]
+    units = CostUnits(constant=3)
+    team = assemble("t", variables, constraints, kind=ProblemKind.DISWCSP, costs=units)
+    (content,) = written("pydcop", team).values()
+    found = yaml.safe_load(content)
+    assert found["distribution"] == {"a": ["x", "y"], "b": ["z"]} == found["distribution_hints"]["must_host"]
+    assert all(agent["capacity"] > 1000 for agent in found["agents"].values())
+    assert len({*found["constraints"], *found["variables"]}) == len(names) + 1 + len(team.variables)

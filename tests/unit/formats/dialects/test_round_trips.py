@@ -13,7 +13,7 @@ from robochoc.model.assembly import assemble
 from robochoc.model.constraint import Constraint, Domain, Relation, Semantics, Variable
 from robochoc.model.problem import Team
 from tests.support.examples import count
-from tests.support.foreign_problems import optimum, random_problem
+from tests.support.foreign_problems import optimum, random_problem, written
 
 
 @count("rounds", 60, 1000)
@@ -38,23 +38,17 @@ def test_names_of_values_stand_in_a_comment(tmp_path: Path) -> None:
     scope = ("x", "y")
     relation = Relation("differ", 2, Semantics.CONFLICTS, ((0, 0), (1, 1)))
     team = assemble("t", {name: [Variable(name, domain)] for name in scope}, [Constraint("c", relation, scope, scope)])
-    dialect = dialect_called("frodo")
-    assert dialect
-    assert dialect.write
-    (content,) = dialect.write(team).values()
+    (content,) = written("frodo", team).values()
     assert b"<!-- colours: 0 is red, 1 is green -->" in content
     assert b'nbDomains="1"' in content
     assert _there_and_back("frodo", team, tmp_path) == 0
 
 
 def _there_and_back(name: str, team: Team, folder: Path) -> Fraction | None:
-    dialect = dialect_called(name)
-    assert dialect
-    assert dialect.write
-    ((_, content),) = dialect.write(team).items()
+    (content,) = written(name, team).values()
     path = folder / "there.xml"
     path.write_bytes(content)
-    assert recognise(path) is dialect
+    assert recognise(path) is dialect_called(name)
     back = read_foreign([path], ImportOptions())
     check_team(back.team)
     assert back.names == {}

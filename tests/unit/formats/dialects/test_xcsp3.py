@@ -13,7 +13,7 @@ from random import Random
 import pytest
 
 from robochoc.formats.diagnostics import InvalidInputError
-from robochoc.formats.dialects.dialect import Imported, ImportOptions
+from robochoc.formats.dialects.dialect import ExportOptions, Imported, ImportOptions
 from robochoc.formats.dialects.registry import recognise
 from robochoc.formats.dialects.xcsp3 import DIALECT
 from robochoc.model.cost_units import CostUnits
@@ -338,7 +338,7 @@ def test_teams_written_and_read_again_have_the_same_optimum(batch: int, tmp_path
     assert DIALECT.write is not None
     for seed in range(3 * batch, 3 * batch + 3):
         team = random_cost_team(Random(seed)) if seed % 2 else random_team(Random(seed))
-        ((name, document),) = DIALECT.write(team).items()
+        ((name, document),) = DIALECT.write(team, ExportOptions()).files.items()
         file = tmp_path / name
         file.write_bytes(document)
         assert recognise(file) is DIALECT
@@ -365,7 +365,7 @@ def test_units_directions_and_constants_are_written(batch: int, tmp_path: Path) 
     for seed in range(3 * batch, 3 * batch + 3):
         chance = Random(seed)
         team = with_units(random_cost_team(chance), chance)
-        ((name, document),) = DIALECT.write(team).items()
+        ((name, document),) = DIALECT.write(team, ExportOptions()).files.items()
         (tmp_path / name).write_bytes(document)
         again = normalized(DIALECT.read([tmp_path / name], ImportOptions()).team)
         small = normalized(team)

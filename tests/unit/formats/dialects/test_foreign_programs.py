@@ -1,0 +1,41 @@
+"""Exported problems have the optimum of brute force in the programs that they are for, where these are installed."""
+
+from __future__ import annotations
+
+import contextlib
+from collections.abc import Mapping
+from pathlib import Path
+from random import Random
+
+import pytest
+
+from robochoc.model.problem import Team
+from robochoc.solver.encoding import UnsupportedError
+from tests.support.foreign_problems import Tables, optimum, random_problem, written
+from tests.support.foreign_solvers import Solver, solvers
+
+ROUNDS = 100
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("kind", ["xcsp3", "frodo", "cfn", "wcsp", "pydcop"])
+def test_programs_find_the_optimum(kind: str, tmp_path: Path) -> None:
+    programs = solvers().get(kind, {})
+    if not programs:
+        pytest.skip(f"no program for {kind} is installed: see tests/support/foreign_solvers.py")
+    chance = Random(kind)
+    for _ in range(ROUNDS):
+        problem, team = random_problem(chance, plain=chance.random() < 0.5)
+        with contextlib.suppress(UnsupportedError):
+            _compare(kind, programs, problem, team, tmp_path)
+
+
+def _compare(kind: str, programs: Mapping[str, Solver], problem: Tables, team: Team, folder: Path) -> None:
+    file, content = next(iter(written(kind, team).items()))
+    path = folder / file
+    path.write_bytes(content)
+    places = max(robot.costs.places for robot in team.robots) if kind == "xcsp3" else 0
+    best = problem.optimum()
+    assert best == optimum(team)
+    wanted = None if best is None else best * 10**places
+    assert {name: solve(path) for name, solve in programs.items()} == dict.fromkeys(programs, wanted)
