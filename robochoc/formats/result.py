@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import fields
 from decimal import Decimal
 from types import MappingProxyType
 from typing import Any
 
 import msgspec
-from msgspec import UNSET, UnsetType
 
+from robochoc.model.cost_units import Cost
 from robochoc.model.outcome import (
     CheckCounts,
     EpochOutcome,
@@ -28,6 +29,10 @@ class ResultError(ValueError):
     """The text is no JSON result."""
 
 
+_ZERO = 0.0
+"""msgspec leaves out a float that is the same object as its default."""
+
+
 class _MetricsForm(msgspec.Struct):
     messages: int
     bytes: int
@@ -44,16 +49,16 @@ class _MetricsForm(msgspec.Struct):
 
 
 class _ImprovementForm(msgspec.Struct, omit_defaults=True):
-    seconds: float
+    at_s: float = msgspec.field(name="seconds")
     verdict: Verdict
     cost: int | Decimal | None
-    withdrawn: list[str] = []
+    withdrawn: tuple[str, ...] = ()
 
 
 class _EpochForm(msgspec.Struct, omit_defaults=True):
     verdict: Verdict
     opened_by: str
-    robots: list[str]
+    robots: tuple[str, ...]
     assignment: dict[str, int | str]
     cost: int | Decimal | None
     messages: int
@@ -62,12 +67,19 @@ class _EpochForm(msgspec.Struct, omit_defaults=True):
     checks: int
     wall_s: float
     verified: bool
-    lost: list[str] = []
+    lost: tuple[str, ...] = ()
     confirmed: bool = False
-    simulated_s: float | UnsetType = UNSET
-    cycles: int | UnsetType = UNSET
-    lost_messages: int | UnsetType = UNSET
-    improvements: list[_ImprovementForm] = []
+    simulated_s: float = _ZERO
+    cycles: int = 0
+    lost_messages: int = 0
+    improvements: tuple[_ImprovementForm, ...] = ()
+    messages_by_type: dict[str, int] = {}
+    compile_s: float = _ZERO
+    memory: int = 0
+    largest: int = 0
+    witness: str | None = None
+    bound: int | Decimal | None = None
+    tree: dict[str, PseudoTreeNode] = {}
 
 
 class _CheckedForm(msgspec.Struct):
@@ -77,7 +89,7 @@ class _CheckedForm(msgspec.Struct):
 
 class _OptimaForm(msgspec.Struct):
     number: Decimal
-    assignments: list[dict[str, int | str]]
+    assignments: tuple[dict[str, int | str], ...]
 
 
 class _PreprocessingForm(msgspec.Struct):
@@ -95,13 +107,13 @@ class _Form(msgspec.Struct, omit_defaults=True):
     verdict: Verdict
     assignment: dict[str, int | str]
     cost: int | Decimal | None
-    withdrawn: list[str]
-    epochs: list[_EpochForm]
+    withdrawn: tuple[str, ...]
+    epochs: tuple[_EpochForm, ...]
     metrics: _MetricsForm
     verified: bool
     count: Decimal | None = None
     reason: str | None = None
-    lost: list[str] = []
+    lost: tuple[str, ...] = ()
     order: str | None = None
     bound: int | Decimal | None = None
     placed_by: str | None = None
@@ -115,18 +127,17 @@ class _Form(msgspec.Struct, omit_defaults=True):
     preprocessing: _PreprocessingForm | None = None
     optima: _OptimaForm | None = None
     deadline: float | None = None
-    improvements: list[_ImprovementForm] = []
+    improvements: tuple[_ImprovementForm, ...] = ()
     places: dict[str, tuple[float, ...]] = {}
-
-
-_SAME = (
-    *("team", "protocol", "runtime", "seed", "verdict", "cost", "verified", "reason", "order"),
-    *("bound", "placed_by", "tree", "confirmed", "channel", "claimed_by", "chosen", "deadline"),
-)
-"""The fields that are the same in an outcome and in its JSON form."""
+    witness: str | None = None
+    confirmed_by: tuple[str, ...] = ()
+    symbols: tuple[str, ...] = ()
+    symbolic: tuple[str, ...] = ()
 
 
 _ENCODER = msgspec.json.Encoder(decimal_format="number")
+_DIGITS_S = 6
+"""The number of decimal places of seconds that were measured."""
 
 
 def result_json(
@@ -141,89 +152,83 @@ def result_json(
         names: What robots and variables are called elsewhere, by the names in `outcome`.
         places: Where on a map the values of variables are, in metres.
     """
-    same: dict[str, Any] = {name: getattr(outcome, name) for name in _SAME}
+    told = outcome.optima
     form = _Form(
-        **same,
-        assignment=outcome.labelled(outcome.assignment),
-        withdrawn=list(outcome.withdrawn),
-        lost=list(outcome.lost),
-        count=None if outcome.count is None else Decimal(outcome.count),  # an integer has 64 bits at most in msgspec
-        epochs=[_epoch(epoch, outcome) for epoch in outcome.epochs],
-        metrics=_metrics(outcome.metrics),
-        checked=_CheckedForm(*outcome.checked) if outcome.checked else None,
+        **_fields(outcome, Outcome)
+        | {
+            "assignment": outcome.labelled(outcome.assignment),
+            "cost": _number(outcome.cost),
+            "bound": _number(outcome.bound),
+            "count": None if outcome.count is None else Decimal(outcome.count),
+            "epochs": tuple([_epoch(epoch, outcome) for epoch in outcome.epochs]),
+            "metrics": _MetricsForm(**_metrics(outcome.metrics)),
+            "checked": outcome.checked and _CheckedForm(**outcome.checked._asdict()),
+            "preprocessing": _preprocessing(outcome.preprocessing),
+            "optima": told and _OptimaForm(Decimal(told.number), tuple(map(outcome.labelled, told.assignments))),
+            "improvements": _improvements(outcome.improvements),
+        },
         names=dict(names),
         places=dict(places),
-        preprocessing=_preprocessing(outcome.preprocessing),
-        optima=_optima(outcome),
-        improvements=_improvements(outcome.improvements),
     )
     return _ENCODER.encode(form)
 
 
-def _improvements(found: Sequence[Improvement]) -> list[_ImprovementForm]:
-    return [_ImprovementForm(round(one.at_s, 6), one.verdict, one.cost, list(one.withdrawn)) for one in found]
+# Fields are copied by the names in the types of `model/outcome.py`: one that the form of the JSON result lacks is a
+# `TypeError` when a result is written, and an `AttributeError` when one is read.
 
 
-def _improvements_of(forms: Sequence[_ImprovementForm]) -> tuple[Improvement, ...]:
-    return tuple([Improvement(one.seconds, one.verdict, one.cost, tuple(one.withdrawn)) for one in forms])
+def _fields(source: object, kind: type) -> dict[str, Any]:
+    """Return the values of the fields of the dataclass `kind` in `source`, by name."""
+    return {one.name: getattr(source, one.name) for one in fields(kind)}
 
 
-def _optima(outcome: Outcome) -> _OptimaForm | None:
-    if outcome.optima is None:
-        return None
-    return _OptimaForm(Decimal(outcome.optima.number), [outcome.labelled(one) for one in outcome.optima.assignments])
+def _number(number: Cost | None) -> Cost | None:
+    """Return a number that msgspec can write: its integers have 64 bits at most."""
+    return Decimal(number) if isinstance(number, int) and number.bit_length() > 63 else number  # noqa: PLR2004 - bits
 
 
-def _metrics(spent: Metrics) -> _MetricsForm:
-    return _MetricsForm(
-        messages=sum(spent.messages.values()),
-        bytes=spent.bytes,
-        ncccs=spent.ncccs,
-        checks=spent.checks,
-        wall_s=round(spent.wall_s, 6),
-        messages_by_type=dict(sorted(spent.messages.items())),
-        compile_s=round(spent.compile_s, 6),
-        memory=spent.memory,
-        simulated_s=spent.simulated_s,
-        largest=spent.largest,
-        cycles=spent.cycles,
-        lost_messages=spent.lost_messages,
-    )
+def _improvements(found: Sequence[Improvement]) -> tuple[_ImprovementForm, ...]:
+    given = [one._replace(at_s=round(one.at_s, _DIGITS_S), cost=_number(one.cost)) for one in found]
+    return tuple([_ImprovementForm(**one._asdict()) for one in given])
+
+
+def _metrics(spent: Metrics) -> dict[str, Any]:
+    return _fields(spent, Metrics) | {
+        "messages": sum(spent.messages.values()),
+        "messages_by_type": dict(sorted(spent.messages.items())),
+        "wall_s": round(spent.wall_s, _DIGITS_S),
+        "compile_s": round(spent.compile_s, _DIGITS_S),
+    }
 
 
 def _preprocessing(done: Preprocessing | None) -> _PreprocessingForm | None:
-    return _PreprocessingForm(done.name, _metrics(done.metrics), done.removed, done.values) if done else None
+    if done is None:
+        return None
+    return _PreprocessingForm(**_fields(done, Preprocessing) | {"metrics": _MetricsForm(**_metrics(done.metrics))})
 
 
 def _epoch(epoch: EpochOutcome, outcome: Outcome) -> _EpochForm:
-    spent = epoch.metrics
-    return _EpochForm(
-        verdict=epoch.verdict,
-        opened_by=epoch.opened_by,
-        robots=list(epoch.robots),
-        assignment=outcome.labelled(epoch.assignment),
-        cost=epoch.cost,
-        messages=sum(spent.messages.values()),
-        bytes=spent.bytes,
-        ncccs=spent.ncccs,
-        checks=spent.checks,
-        wall_s=round(spent.wall_s, 6),
-        verified=epoch.verified,
-        lost=list(epoch.lost),
-        confirmed=epoch.confirmed,
-        simulated_s=spent.simulated_s or UNSET,
-        cycles=spent.cycles or UNSET,
-        lost_messages=spent.lost_messages or UNSET,
-        improvements=_improvements(epoch.improvements),
-    )
+    given = _fields(epoch, EpochOutcome)
+    spent = _metrics(given.pop("metrics"))
+    spent |= {name: spent[name] or _ZERO for name in ("compile_s", "simulated_s")}
+    different = {
+        "assignment": outcome.labelled(epoch.assignment),
+        "cost": _number(epoch.cost),
+        "bound": _number(epoch.bound),
+        "improvements": _improvements(epoch.improvements),
+    }
+    return _EpochForm(**given | different, **spent)
 
 
 class _Symbols:
-    """The names that stand for values in a JSON result. It says no codes: there they get some of its own."""
+    """The symbols in a JSON result, and the variables whose values they are.
 
-    def __init__(self) -> None:
-        self.codes: dict[str, int] = {}
-        self.variables: dict[str, None] = {}
+    Results of earlier versions do not list them: they get codes in the order in which they are met.
+    """
+
+    def __init__(self, symbols: Sequence[str], variables: Sequence[str]) -> None:
+        self.codes = {symbol: code for code, symbol in enumerate(symbols)}
+        self.variables = dict.fromkeys(variables)
 
     def values(self, assignment: dict[str, int | str]) -> dict[str, int]:
         """Return an assignment in codes."""
@@ -236,29 +241,6 @@ class _Symbols:
         return self.codes.setdefault(value, len(self.codes))
 
 
-def _epoch_of(form: _EpochForm, symbols: _Symbols) -> EpochOutcome:
-    counts = form.bytes, form.ncccs, form.checks, form.wall_s
-    metrics = Metrics(
-        {"messages": form.messages},
-        *counts,
-        simulated_s=form.simulated_s or 0.0,
-        cycles=form.cycles or 0,
-        lost_messages=form.lost_messages or 0,
-    )
-    return EpochOutcome(
-        verdict=form.verdict,
-        robots=tuple(form.robots),
-        opened_by=form.opened_by,
-        assignment=symbols.values(form.assignment),
-        cost=form.cost,
-        metrics=metrics,
-        verified=form.verified,
-        lost=tuple(form.lost),
-        confirmed=form.confirmed,
-        improvements=_improvements_of(form.improvements),
-    )
-
-
 def read_result(content: bytes) -> Outcome:
     """Return the outcome in a JSON result. Raises `ResultError`, which says what is wrong."""
     try:
@@ -269,34 +251,48 @@ def read_result(content: bytes) -> Outcome:
         raise ResultError("it is nested too deep") from error
     except msgspec.MsgspecError as error:
         raise ResultError(describe_decode_error(error, _Form)) from error
-    same: dict[str, Any] = {name: getattr(form, name) for name in _SAME}
-    symbols = _Symbols()
-    assignment = symbols.values(form.assignment)
-    epochs = tuple(_epoch_of(epoch, symbols) for epoch in form.epochs)
+    symbols = _Symbols(form.symbols, form.symbolic)
     told = form.optima
-    listed = Optima(int(told.number), tuple(map(symbols.values, told.assignments))) if told else None
-    return Outcome(
-        **same,
-        assignment=assignment,
-        symbols=tuple(symbols.codes),
-        symbolic=tuple(symbols.variables),
-        withdrawn=tuple(form.withdrawn),
-        lost=tuple(form.lost),
-        epochs=epochs,
-        metrics=_metrics_of(form.metrics),
-        checked=CheckCounts(form.checked.by_both, form.checked.by_owner) if form.checked else None,
-        preprocessing=_preprocessing_of(form.preprocessing),
-        optima=listed,
-        improvements=_improvements_of(form.improvements),
-    )
+    different: dict[str, Any] = {
+        "assignment": symbols.values(form.assignment),
+        "count": None if form.count is None else _whole("count", form.count),
+        "epochs": tuple([_epoch_of(epoch, symbols) for epoch in form.epochs]),
+        "metrics": _metrics_of(form.metrics),
+        "checked": form.checked and CheckCounts(**msgspec.structs.asdict(form.checked)),
+        "preprocessing": _preprocessing_of(form.preprocessing),
+        "optima": told and Optima(_whole("optima", told.number), tuple(map(symbols.values, told.assignments))),
+        "improvements": _improvements_of(form.improvements),
+    }
+    different |= {"symbols": tuple(symbols.codes), "symbolic": tuple(symbols.variables)}  # when all values were read
+    return Outcome(**_fields(form, Outcome) | different)
+
+
+def _whole(key: str, number: Decimal) -> int:
+    if not number.is_finite() or number != int(number):
+        raise ResultError(f"{key} is {number}; expected an integer")
+    return int(number)
+
+
+def _improvements_of(forms: Sequence[_ImprovementForm]) -> tuple[Improvement, ...]:
+    return tuple([Improvement(**msgspec.structs.asdict(one)) for one in forms])
+
+
+def _epoch_of(form: _EpochForm, symbols: _Symbols) -> EpochOutcome:
+    different: dict[str, Any] = {
+        "assignment": symbols.values(form.assignment),
+        "metrics": _metrics_of(form),
+        "improvements": _improvements_of(form.improvements),
+    }
+    same = {one.name: getattr(form, one.name) for one in fields(EpochOutcome) if one.name not in different}
+    return EpochOutcome(**same, **different)
 
 
 def _preprocessing_of(form: _PreprocessingForm | None) -> Preprocessing | None:
-    return Preprocessing(form.name, _metrics_of(form.metrics), form.removed, form.values) if form else None
+    if form is None:
+        return None
+    return Preprocessing(**_fields(form, Preprocessing) | {"metrics": _metrics_of(form.metrics)})
 
 
-def _metrics_of(form: _MetricsForm) -> Metrics:
-    messages = form.messages_by_type or {"messages": form.messages}
-    counts = form.bytes, form.ncccs, form.checks, form.wall_s, form.compile_s, form.memory, form.simulated_s
-    rest = {"largest": form.largest, "cycles": form.cycles, "lost_messages": form.lost_messages}
-    return Metrics(messages, *counts, **rest)
+def _metrics_of(form: _MetricsForm | _EpochForm) -> Metrics:
+    messages = form.messages_by_type or ({"messages": form.messages} if form.messages else {})
+    return Metrics(**_fields(form, Metrics) | {"messages": messages})

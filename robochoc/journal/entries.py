@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+from decimal import Decimal
+
 import msgspec
 
 from robochoc.journal.events import AnyEvent, Event
@@ -13,6 +16,8 @@ STAMPED_LATE = 1
 """In this version the `clock` of a sent message was that of the end of the step; and it came after the decision."""
 BOUNDED = 3
 """The version of journals that hold `Bounded` events, which are written where they are asked for."""
+_BITS = 63
+"""Longer integers are written as texts: msgpack has 64 bits."""
 READ = (STAMPED_LATE, VERSION, BOUNDED)
 """Versions that are read."""
 
@@ -43,6 +48,29 @@ class Ended(Event, frozen=True, kw_only=True):
 
     t: float = 0
     outcome: Outcome
+    long: dict[str, Decimal] | msgspec.UnsetType = msgspec.UNSET
+    """Numbers of solutions and of optima with more than 64 bits, which `outcome` lacks; left out if there are none."""
+
+    @classmethod
+    def of(cls, outcome: Outcome) -> Ended:
+        """Return the entry of an outcome."""
+        long: dict[str, Decimal] = {}
+        if outcome.count is not None and outcome.count.bit_length() > _BITS:
+            long["count"], outcome = Decimal(outcome.count), replace(outcome, count=None)
+        if outcome.optima is not None and outcome.optima.number.bit_length() > _BITS:
+            long["optima"] = Decimal(outcome.optima.number)
+            outcome = replace(outcome, optima=outcome.optima._replace(number=0))
+        return cls(outcome=outcome, long=long or msgspec.UNSET)
+
+    @property
+    def whole(self) -> Outcome:
+        """The outcome, with all of its numbers."""
+        outcome, long = self.outcome, self.long or {}
+        if "count" in long:
+            outcome = replace(outcome, count=int(long["count"]))
+        if "optima" in long and outcome.optima is not None:
+            outcome = replace(outcome, optima=outcome.optima._replace(number=int(long["optima"])))
+        return outcome
 
 
 JournalEntry = AnyEvent | Header | Ended

@@ -75,7 +75,7 @@ def read_journal(content: bytes) -> Journal:
         first, last = lines[0], lines[-1]
         if not isinstance(first, Header):  # the follower has seen to it
             raise JournalError("it has no header")
-        outcome = last.outcome if isinstance(last, Ended) else None
+        outcome = last.whole if isinstance(last, Ended) else None
         events = cast("list[AnyEvent]", lines[1:-1] if outcome else lines[1:])  # so has it here
         return Journal(first, tuple(sorted_by_time(events)), outcome, damage, truncated)
 
@@ -98,7 +98,7 @@ def lines_of(journal: Journal) -> Iterator[bytes]:
     for event in journal.events:
         yield encode(event) + b"\n"
     if journal.outcome:
-        yield encode(Ended(outcome=journal.outcome)) + b"\n"
+        yield encode(Ended.of(journal.outcome)) + b"\n"
 
 
 class Follower:

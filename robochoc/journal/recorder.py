@@ -89,7 +89,7 @@ class JournalRecorder:
             if self._weighed:
                 self._pending, self._weighed = [*self._improved(self._weighed, self._given)], None
             if self.outcome:
-                self._pending.append(Ended(outcome=self.outcome))
+                self._pending.append(Ended.of(self.outcome))
             self._close_block()
             self._closed = True
 

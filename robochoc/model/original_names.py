@@ -7,7 +7,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import replace
 
 from robochoc.model.change import team_after_events
-from robochoc.model.outcome import EpochOutcome, Outcome, PseudoTreeNode
+from robochoc.model.outcome import EpochOutcome, Improvement, Outcome, PseudoTreeNode
 from robochoc.model.problem import Team
 
 _NAME = re.compile(r"[A-Za-z0-9_.]+")
@@ -28,6 +28,9 @@ def renamed_outcome(outcome: Outcome, names: Mapping[str, str]) -> Outcome:
         tree=_tree(outcome.tree, names),
         epochs=tuple(_epoch(epoch, names) for epoch in outcome.epochs),
         symbolic=_all(outcome.symbolic, names),
+        optima=outcome.optima
+        and outcome.optima._replace(assignments=tuple(_by(one, names) for one in outcome.optima.assignments)),
+        improvements=_improvements(outcome.improvements, names),
     )
 
 
@@ -70,7 +73,12 @@ def _epoch(epoch: EpochOutcome, names: Mapping[str, str]) -> EpochOutcome:
         witness=_one(epoch.witness, names),
         lost=_all(epoch.lost, names),
         tree=_tree(epoch.tree, names),
+        improvements=_improvements(epoch.improvements, names),
     )
+
+
+def _improvements(found: Iterable[Improvement], names: Mapping[str, str]) -> tuple[Improvement, ...]:
+    return tuple(one._replace(withdrawn=_all(one.withdrawn, names)) for one in found)
 
 
 def _tree(tree: Mapping[str, PseudoTreeNode], names: Mapping[str, str]) -> dict[str, PseudoTreeNode]:

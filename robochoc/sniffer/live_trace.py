@@ -133,7 +133,7 @@ class LiveTrace:
                 case Header():
                     self.trace = Trace(line, self._generation)
                 case Ended():
-                    self._outcome = line.outcome
+                    self._outcome = line.whole
                 case _:
                     if line.t < self._last and not isinstance(line, Began):
                         self._disordered = True
