@@ -18,6 +18,7 @@ from robochoc.formats.copies import differing_copies
 from robochoc.formats.diagnostics import Diagnostic, InvalidInputError, MistakeError, shortened
 from robochoc.formats.field_types import AS_BUILT, FieldTypeError, check_field_types
 from robochoc.formats.locations import Location, ObjectLocations
+from robochoc.formats.magnitudes import excessive_numbers
 from robochoc.formats.names import check_integer
 from robochoc.formats.neighbours import (
     cycles,
@@ -165,6 +166,7 @@ def _between(members: TeamMembers) -> Iterator[Diagnostic]:
     yield from scopes
     yield from misplaced_parts(members)
     yield from missing_shown_variables(members)
+    yield from excessive_numbers(members)
     yield from differing_copies(members, {mistake.file for mistake in scopes})
 
 

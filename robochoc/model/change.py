@@ -11,6 +11,7 @@ from contextlib import suppress
 from dataclasses import replace
 from typing import assert_never
 
+from robochoc.model.magnitudes import MAX_COST, MagnitudeError, Magnitudes
 from robochoc.model.problem import (
     AddAgent,
     AddConstraint,
@@ -62,7 +63,29 @@ def apply_changes(team: Team, changes: Iterable[Change]) -> Team:
                 team = _without_constraint(team, agent, parent, name)
             case never:
                 assert_never(never)
+        _check_magnitudes(team, change)
     return team
+
+
+def _check_magnitudes(team: Team, change: Change) -> None:
+    """Raise `ChangeError` where `change`, which `team` has taken, brings numbers that are too large."""
+    match change:
+        case AddAgent(robot):
+            changed = list(team[robot.name].constraints())
+        case AddConstraint(constraint=constraint):
+            changed = [constraint]
+        case AddValue(variable):
+            changed = [one for one in team.constraints() if variable in one.variables]
+        case _:
+            return
+    domains = {name: variable.domain for name, variable in team.variables.items()}
+    places = max(robot.costs.places for robot in team.robots)
+    magnitudes = Magnitudes(domains, places, 2 * MAX_COST)  # twice: normalised costs begin at 0 (`model/costs.py`)
+    for one in changed:
+        try:
+            magnitudes.check(one)
+        except MagnitudeError as error:
+            raise ChangeError(error.message, error.hint, line=one.line) from None
 
 
 def team_after_events(team: Team, events: int) -> Team:

@@ -11,11 +11,12 @@ from robochoc.formats.definitions import PREDEFINED
 from robochoc.model.constraint import INFINITE, Constraint, Definition, Function, Predicate, Relation, Semantics
 from robochoc.model.constraint import Term as Actual
 from robochoc.model.expression import Apply, Constant, Expression, Name
+from robochoc.model.magnitudes import MAX_COST
 from robochoc.modelling.meanings import UndefinedTermError
-from robochoc.modelling.numbers import Exact, exact, places_of
+from robochoc.modelling.numbers import Exact, exact, places_of, shown
 from robochoc.modelling.places import ModelError, Place
 from robochoc.modelling.rules import check_constant
-from robochoc.modelling.tables import Price, Row, commonest, listed_rows, prices, truths
+from robochoc.modelling.tables import Price, Row, commonest, in_short, listed_rows, prices, truths
 from robochoc.modelling.tabulated import Tabled
 from robochoc.modelling.terms import Applied, Linear, Term, Variable
 from robochoc.modelling.translation import Translator, UntranslatableError, may_be_undefined
@@ -132,7 +133,16 @@ def _sum(group: Sequence[tuple[Exact, Term, Place]], name: str) -> Draft:
     if scaled is not None and scaled.divisor == 1:
         return Draft(name, scope, place, scaled.expression, is_cost=True)
     found = prices(parts, scope, place)
+    _check_digits(found, whole, place)
     return _table(name, scope, place, found, commonest(found))
+
+
+def _check_digits(found: Mapping[Row, Price], term: Term, place: Place) -> None:
+    """Raise `ModelError` where a cost has more digits than files hold."""
+    for price in found.values():
+        if price != math.inf and not -MAX_COST <= price <= MAX_COST:
+            message = f"the cost {in_short(term)} reaches {shown(exact(price))}"
+            raise ModelError(message, "costs have at most 18 digits: use smaller values or coefficients", place)
 
 
 def _table(name: str, scope: tuple[Variable, ...], place: Place, rows: Mapping[Row, Price], default: Price) -> Draft:

@@ -7,10 +7,11 @@ from fractions import Fraction
 from typing import NamedTuple
 
 from robochoc.modelling.codes import BOOLEAN, NUMBER, Kind
-from robochoc.modelling.numbers import exact, is_number
+from robochoc.modelling.numbers import exact, is_number, shown
+from robochoc.modelling.places import ModelError
 
 MAX_BITS = 4096
-"""Numbers of more bits are not computed."""
+"""The maximum number of bits of a power."""
 
 
 class UndefinedTermError(ArithmeticError):
@@ -59,8 +60,8 @@ def _power(left: object, right: object) -> object:
     if not isinstance(exponent, int) or (not base and exponent < 0):
         raise UndefinedTermError
     bits = max(base.numerator.bit_length(), base.denominator.bit_length())
-    if abs(base) != 1 and bits * abs(exponent) > MAX_BITS:
-        raise UndefinedTermError
+    if base not in {-1, 0, 1} and bits * abs(exponent) > MAX_BITS:
+        raise ModelError(f"{shown(exact(base))} ** {exponent} has more than {MAX_BITS} bits", "use smaller numbers")
     return exact(base ** (exponent if abs(base) != 1 else exponent % 2))
 
 

@@ -68,9 +68,8 @@ def commonest(found: Mapping[Row, Price]) -> Price:
 def _combinations(scope: Sequence[Variable], place: Place, term: Term) -> Iterator[tuple[Row, dict[Variable, object]]]:
     size = math.prod(len(variable.codes.ever) for variable in scope)
     if size > MAX_COMBINATIONS:
-        shown = repr(term) if len(repr(term)) <= 60 else f"{repr(term)[:57]}..."  # noqa: PLR2004 - of a message
         raise ModelError(
-            f"{shown} has {size:,} combinations of values, and no file can say it but as a table",
+            f"{in_short(term)} has {size:,} combinations of values, and no file can say it but as a table",
             f"{MAX_COMBINATIONS:,} are computed: split it, or write it with integers",
             place,
         )
@@ -78,6 +77,11 @@ def _combinations(scope: Sequence[Variable], place: Place, term: Term) -> Iterat
     for row in itertools.product(*values):
         told = {variable: value for variable, (_, value) in zip(scope, row, strict=True)}
         yield tuple(code for code, _ in row), told
+
+
+def in_short(term: Term) -> str:
+    """Return a term as users wrote it, shortened for a message."""
+    return repr(term) if len(repr(term)) <= 60 else f"{repr(term)[:57]}..."  # noqa: PLR2004 - of a message
 
 
 def _truth(value: object, term: Term, place: Place) -> bool:

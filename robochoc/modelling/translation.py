@@ -13,9 +13,10 @@ from typing import NamedTuple
 
 from robochoc.model.expression import Apply, Expression, Name
 from robochoc.model.expression import Constant as Integer
-from robochoc.model.expression.bounds import Interval, bounds
+from robochoc.model.expression.bounds import Interval, bounds, excess
 from robochoc.modelling.codes import BOOLEAN, NUMBER
 from robochoc.modelling.numbers import exact
+from robochoc.modelling.tables import MAX_COMBINATIONS
 from robochoc.modelling.terms import Applied, Constant, Linear, Term, Variable
 
 MAX_SIZE = 5_000
@@ -41,15 +42,27 @@ class Translator:
     def __init__(self, names: Mapping[Variable, str]) -> None:
         self._names = names
         self._limits = {name: _interval(variable) for variable, name in names.items()}
+        self._combinations = math.prod(len(variable.codes.ever) for variable in names)
 
     def whole_condition(self, term: Term) -> Expression:
         """Return a Boolean expression of a size that files can hold. Raises `UntranslatableError`."""
-        return _of_some_size(self.condition(term))
+        return self._within_limits(self.condition(term))
 
     def whole_number(self, term: Term) -> Scaled:
         """Return a number whose expression has such a size. Raises `UntranslatableError`."""
         found = self.number(term)
-        return found._replace(expression=_of_some_size(found.expression))
+        return found._replace(expression=self._within_limits(found.expression))
+
+    def _within_limits(self, expression: Expression) -> Expression:
+        """Return `expression`, if files can hold it, and it stays within 64 bits or is too wide for a table.
+
+        Raises:
+            UntranslatableError: if the term has to become a table, whose entries are computed without such a limit.
+        """
+        _check_size(expression)
+        if self._combinations <= MAX_COMBINATIONS and excess(expression, self._limits):
+            raise UntranslatableError
+        return expression
 
     def condition(self, term: Term) -> Expression:
         """Return a Boolean expression. Raises `UntranslatableError`."""
@@ -202,8 +215,8 @@ def _times(factor: int, expression: Expression) -> Expression:
             return Apply("mul", (Integer(factor), expression))
 
 
-def _of_some_size(expression: Expression) -> Expression:
-    """Return `expression`, if it is not too large. Raises `UntranslatableError`. What is shared is looked at once."""
+def _check_size(expression: Expression) -> None:
+    """Raise `UntranslatableError` if `expression` is too large for a file. Shared parts are looked at once."""
     known: dict[int, tuple[int, int]] = {}
 
     def size(one: Expression) -> tuple[int, int]:
@@ -217,7 +230,6 @@ def _of_some_size(expression: Expression) -> Expression:
     count, depth = size(expression)
     if count > MAX_SIZE or depth > MAX_LEVELS:
         raise UntranslatableError
-    return expression
 
 
 def may_be_undefined(expression: Expression) -> bool:

@@ -72,7 +72,7 @@ def exactly(value: Number) -> Fraction:
 def random_problem(chance: Random) -> RandomProblem:
     """Return a problem that has a team. A few have costs of too many decimal places, and are drawn again."""
     while True:
-        problem = _drawn(chance)
+        problem = _drawn(chance, _integers)
         try:
             _ = problem.model.team
         except robochoc.ModelError as refused:
@@ -82,7 +82,24 @@ def random_problem(chance: Random) -> RandomProblem:
             return problem
 
 
-def _drawn(chance: Random) -> RandomProblem:
+def large_problem(chance: Random) -> RandomProblem | None:
+    """Return a problem with numbers of up to 18 digits; None: the model refuses it, and says what is too large."""
+    problem = _drawn(chance, _large_integers)
+    try:
+        _ = problem.model.team
+    except robochoc.ModelError as refused:
+        if not any(word in str(refused) for word in ("decimal", "division by zero", "False", "digits", "2^63")):
+            raise
+        return None
+    return problem
+
+
+def _large_integers(chance: Random) -> list[int]:
+    size = 10 ** chance.choice((1, 2, 5, 9, 10, 16, 18))
+    return sorted({chance.choice((-1, 1, 1)) * chance.randrange(size // 2, size) for _ in range(chance.randint(1, 3))})
+
+
+def _drawn(chance: Random, integers: Callable[[Random], list[int]]) -> RandomProblem:
     """Return a problem of 2 to 4 robots with 2 to 6 variables, private and shared constraints, and costs or none."""
     model = robochoc.Model("random")
     problem = RandomProblem(model, {})
@@ -93,7 +110,7 @@ def _drawn(chance: Random) -> RandomProblem:
         robot = model.robot(f"r{number}", priority=chance.choice((0, 0, 1)))
         for own in range(chance.choice((1, 1, 2))):
             name = f"v{own}"
-            kinds: list[tuple[list[Any], list[Variable]]] = [(_integers(chance), numbers)] * 4
+            kinds: list[tuple[list[Any], list[Variable]]] = [(integers(chance), numbers)] * 4
             kinds += [(_decimals(chance), numbers), (list(Color)[: chance.randint(2, 3)], colors)]
             domain, group = chance.choice([*kinds, ([False, True], switches)])
             group.append(robot.variable(name, domain))

@@ -1,8 +1,9 @@
 """Functional expressions: what a predicate says, as a tree (docs/reference/format.md; Figure 2).
 
 The vocabulary is XCSP 2.1's. A text is parsed by hand and type-checked, never handed to `eval`; what is computed
-stays within 64 bits, so that no expression can eat the machine. `evaluate` walks the tree and `compile_expression`
-builds closures: two independent implementations of the same meaning, and the tests hold them against each other.
+stays within 64 bits, so that no expression can eat the machine; `model/magnitudes.py` refuses teams in which it would
+not. `evaluate` walks the tree and `compile_expression` builds closures: two independent implementations of the same
+meaning, and the tests hold them against each other.
 
 All arguments of an operator are evaluated, whatever the others are; only `if` chooses. Booleans are 0 and 1.
 """
@@ -13,6 +14,7 @@ from robochoc.model.expression.parser import ExpressionError, SymbolNames, parse
 from robochoc.model.expression.tree import (
     Apply,
     Constant,
+    ExcessiveValueError,
     Expression,
     Name,
     Type,
@@ -27,6 +29,7 @@ __all__ = [
     "OPERATORS",
     "Apply",
     "Constant",
+    "ExcessiveValueError",
     "Expression",
     "ExpressionError",
     "Name",

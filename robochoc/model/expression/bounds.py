@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from functools import reduce
 from typing import NamedTuple
 
@@ -40,6 +40,51 @@ def bounds(expression: Expression, limits: Mapping[str, Interval]) -> Interval:
             return _applied(operator, [bounds(argument, limits) for argument in arguments])
 
 
+class Excess(NamedTuple):
+    """A part of an expression whose values may lie beyond +-`BOUND`, and the interval in which they lie."""
+
+    part: Expression
+    interval: Interval
+
+
+def excess(expression: Expression, limits: Mapping[str, Interval]) -> Excess | None:
+    """Return a smallest part of `expression` that may have a result beyond +-`BOUND`, also on the way to its value.
+
+    Args:
+        expression: The expression.
+        limits: Intervals in which the values of its names lie.
+    """
+    found: list[Excess] = []
+
+    def checked(part: Expression) -> Interval:
+        if not isinstance(part, Apply):
+            return bounds(part, limits)
+        parts = [checked(argument) for argument in part.arguments]
+        steps = list(_steps(part.operator, parts))
+        for step in steps:
+            if not found and max(-step.low, step.high) > BOUND:
+                found.append(Excess(part, step))
+        return steps[-1]
+
+    checked(expression)
+    return found[0] if found else None
+
+
+def _steps(operator: str, parts: list[Interval]) -> Iterator[Interval]:
+    """Yield the intervals of all results on the way to the value of an operator; that of its value is the last."""
+    match operator:
+        case "if":
+            yield _hull(*parts[1:])
+        case "add":
+            yield from itertools.accumulate(parts, _sum)
+        case "mul":
+            yield from itertools.accumulate(parts, _product_of_two)
+        case "pow":
+            yield _raised(*parts)
+        case _:
+            yield _applied(operator, parts)
+
+
 def _applied(operator: str, parts: list[Interval]) -> Interval:
     if operator in _BOUNDS:
         return _BOUNDS[operator](*parts)
@@ -47,11 +92,11 @@ def _applied(operator: str, parts: list[Interval]) -> Interval:
 
 
 def _sum(*parts: Interval) -> Interval:
-    return Interval(sum(part.low for part in parts), sum(part.high for part in parts))
+    return Interval(reduce(_plus, (part.low for part in parts)), reduce(_plus, (part.high for part in parts)))
 
 
 def _difference(left: Interval, right: Interval) -> Interval:
-    return Interval(left.low - right.high, left.high - right.low)
+    return Interval(_plus(left.low, -right.high), _plus(left.high, -right.low))
 
 
 def _product(*parts: Interval) -> Interval:
@@ -72,8 +117,19 @@ def _square(part: Interval) -> Interval:
     return Interval(_times(size.low, size.low), _times(size.high, size.high))
 
 
-def _power(base: Interval, exponent: Interval) -> Interval:  # noqa: ARG001 - no result is larger
-    return Interval(0 if base.low >= 0 else -BOUND, BOUND)
+def _power(base: Interval, exponent: Interval) -> Interval:
+    low, high = _raised(base, exponent)
+    return Interval(max(low, -BOUND), min(high, BOUND))  # what lies beyond is undefined
+
+
+def _raised(base: Interval, exponent: Interval) -> Interval:
+    """Return the bounds of a power, infinite ones where it has more than `_MAX_BITS` bits."""
+    size, most = _absolute(base).high, exponent.high
+    greatest: float = 1
+    if size > 1 and most >= 1:
+        is_finite = math.inf not in {size, most} and int(size).bit_length() * most <= _MAX_BITS
+        greatest = size**most if is_finite else math.inf
+    return Interval(0 if base.low >= 0 else -greatest, greatest)
 
 
 def _hull(one: Interval, other: Interval) -> Interval:
@@ -90,9 +146,20 @@ def _product_of_two(one: Interval, other: Interval) -> Interval:
     return Interval(min(ends), max(ends))
 
 
-def _times(left: float, right: float) -> float:
-    return left * right if left and right else 0  # zero times infinity is zero: the factor is zero everywhere
+def _plus(left: float, right: float) -> float:
+    """Return a sum of integers or equal infinities. Python adds no large integer to an infinity."""
+    return left if left in _INFINITE else right if right in _INFINITE else left + right
 
+
+def _times(left: float, right: float) -> float:
+    """Return a product of integers or infinities. Zero times infinity is zero: the factor is zero everywhere."""
+    if left in _INFINITE or right in _INFINITE:
+        return 0 if not left or not right else math.inf if (left > 0) == (right > 0) else -math.inf
+    return left * right
+
+
+_MAX_BITS = 4096
+_INFINITE = (math.inf, -math.inf)
 
 _BOUNDS: dict[str, Callable[..., Interval]] = {
     "neg": lambda part: Interval(-part.high, -part.low),

@@ -9,7 +9,15 @@ import math
 import operator as arithmetic
 from collections.abc import Callable, Sequence
 
-from robochoc.model.expression.tree import BOUND, Apply, Constant, Expression, Name, UndefinedValueError
+from robochoc.model.expression.tree import (
+    BOUND,
+    Apply,
+    Constant,
+    ExcessiveValueError,
+    Expression,
+    Name,
+    UndefinedValueError,
+)
 
 _TWO = 2
 
@@ -38,7 +46,7 @@ def compile_expression(expression: Expression, names: Sequence[str]) -> Closure:
 
 def _within(value: int) -> int:
     if abs(value) > BOUND:
-        raise UndefinedValueError
+        raise ExcessiveValueError
     return value
 
 
@@ -99,7 +107,7 @@ def _pow(left: Closure, right: Closure) -> Closure:
         if base in {0, 1, -1}:
             return int(base ** min(exponent, 2 - exponent % 2))
         if exponent * math.log2(abs(base)) > BOUND.bit_length():
-            raise UndefinedValueError
+            raise ExcessiveValueError
         return _within(base**exponent)
 
     return power

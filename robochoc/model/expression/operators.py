@@ -7,13 +7,22 @@ from collections.abc import Callable, Mapping
 from functools import reduce
 from typing import NamedTuple
 
-from robochoc.model.expression.tree import BOUND, Apply, Constant, Expression, Name, Type, UndefinedValueError
+from robochoc.model.expression.tree import (
+    BOUND,
+    Apply,
+    Constant,
+    ExcessiveValueError,
+    Expression,
+    Name,
+    Type,
+    UndefinedValueError,
+)
 
 
 def _bounded(value: int) -> int:
     if -BOUND <= value <= BOUND:
         return value
-    raise UndefinedValueError
+    raise ExcessiveValueError
 
 
 def _quotient(dividend: int, divisor: int) -> int:
@@ -34,7 +43,7 @@ def _power(base: int, exponent: int) -> int:
     if exponent < 0:
         raise UndefinedValueError
     if abs(base) > 1 and exponent >= BOUND.bit_length():
-        raise UndefinedValueError
+        raise ExcessiveValueError
     return int(base**exponent)
 
 

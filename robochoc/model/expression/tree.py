@@ -48,6 +48,10 @@ class UndefinedValueError(ArithmeticError):
     """The expression has no value here: a division by zero, a negative exponent, or a result out of bounds."""
 
 
+class ExcessiveValueError(UndefinedValueError):
+    """The expression, or a part of it, has a value beyond +-`BOUND`. Teams in which that can happen are refused."""
+
+
 SYMBOLIC = ("eq", "ne", "in")
 """The operators that compare symbols."""
 

@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
 from fractions import Fraction
 from pathlib import Path
 from random import Random
 
 import robochoc
 from robochoc.model.outcome import Verdict
+from robochoc.solver.encoding import UnsupportedError
 from tests.support.examples import count
-from tests.support.random_models import RandomProblem, random_problem
+from tests.support.random_models import RandomProblem, large_problem, random_problem
 
 PROTOCOLS = ("dpop", "syncbb", "afb", "sfb", "bnb-adopt")
 
@@ -45,3 +47,20 @@ def test_a_model_has_the_optimum_of_what_it_says(number: int, tmp_path: Path) ->
         loaded = robochoc.Model.load(tmp_path / f"team{n}")
         check(problem, loaded, protocol)
     assert solved > number / 2
+
+
+@count("number", fast=40, slow=5000)
+def test_large_numbers_are_exact_or_refused(number: int) -> None:
+    solved = refused = 0
+    for seed in range(number):
+        chance = Random(seed)
+        problem = large_problem(chance)
+        if problem is None:
+            refused += 1
+            continue
+        protocols = PROTOCOLS if problem.model.team.kind == "DisWCSP" else ("abt", "afc-ng")
+        with suppress(UnsupportedError):  # a protocol that does not hold such sums says so
+            check(problem, problem.model, chance.choice(protocols))
+            solved += 1
+    assert solved > number / 2
+    assert refused > number / 5
