@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import itertools
 import re
-import tomllib
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
@@ -12,6 +11,7 @@ from robochoc.experiments import summary
 from robochoc.experiments.account import PAIRS_TOLD, Account, headed
 from robochoc.experiments.results import Results
 from robochoc.experiments.summary import METRICS, Table
+from robochoc.formats.toml import toml_tables
 from robochoc.system.files import write_atomically
 from robochoc.system.plain_text import on_one_line
 
@@ -118,9 +118,9 @@ def _how_to_repeat(told: Account, name: str) -> Iterator[str]:
 def _without_introduction(text: str) -> str:
     """Return a study's file without the text that stands on the page already; the whole file where in doubt."""
     rest = _INTRODUCTION.sub("", text)
-    whole = tomllib.loads(text)
+    whole = toml_tables(text)
     whole.get("report", {}).pop("text", None)
     try:
-        return rest if tomllib.loads(rest) == whole else text
-    except tomllib.TOMLDecodeError:
+        return rest if toml_tables(rest) == whole else text
+    except ValueError:
         return text

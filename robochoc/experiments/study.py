@@ -16,7 +16,6 @@ A list, or a range as in `ranges.py`, stands for each of its values; several sta
 
 from __future__ import annotations
 
-import tomllib
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Annotated, Any
@@ -29,6 +28,7 @@ from robochoc.experiments.summary import METRICS, OF_RUNS
 from robochoc.experiments.table import MAX_INTEGER, Place
 from robochoc.experiments.task import Limits, ProblemSpec, Recording, Setup
 from robochoc.formats.diagnostics import invalid_input, shortened, suggestion
+from robochoc.formats.toml import toml_tables
 from robochoc.run.options import Runtime
 from robochoc.system.decode_errors import describe_decode_error
 
@@ -94,10 +94,11 @@ def read_study(path: Path) -> Study:
     """
     text = _text(path)
     try:
-        tables = tomllib.loads(text)
-    except (ValueError, RecursionError) as wrong:
-        what = "it is nested too deep" if isinstance(wrong, RecursionError) else shortened(str(wrong))
-        raise invalid_input(path, f"is no TOML file: {what}", "docs/guides/experiments.md shows one") from None
+        tables = toml_tables(text)
+    except ValueError as wrong:
+        raise invalid_input(
+            path, f"is no TOML file: {shortened(str(wrong))}", "docs/guides/experiments.md shows one"
+        ) from None
     return study_of(tables, Place(path, text))
 
 
@@ -247,5 +248,5 @@ def _text(path: Path) -> str:
 
 def study_wishes(text: str) -> ReportWishes:
     """Return what the report on a study that was read before is to show."""
-    table = tomllib.loads(text).get("report", {}) if text else {}
+    table = toml_tables(text).get("report", {}) if text else {}
     return msgspec.convert(table, ReportWishes)

@@ -183,7 +183,7 @@ def test_a_router_that_is_opened_anew(tmp_path: Path) -> None:
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
-    ("number", "why"), [(signal.SIGKILL, "has ended"), (signal.SIGSTOP, "did not respond for 3 s")]
+    ("number", "why"), [(signal.SIGKILL, "has ended"), (signal.SIGSTOP, "did not respond for 1.5 s")]
 )
 def test_a_router_that_dies_or_is_stopped(number: int, why: str, tmp_path: Path) -> None:
     with NetworkRun(tmp_path, settings=NetworkSettings(patience_s=3)) as run:

@@ -6,9 +6,10 @@
 from __future__ import annotations
 
 import re
-import tomllib
 from functools import cache
 from importlib.resources import files
+
+from robochoc.formats.toml import toml_tables
 
 LANGUAGE = "en"
 _HOLE = re.compile(r"\{([a-z_]+)\}")
@@ -28,7 +29,7 @@ def catalogue(language: str = LANGUAGE) -> dict[str, str]:
     """Return all texts of a language, by dotted keys."""
     whole: dict[str, str] = {}
     for file in sorted((files(__package__) / language).iterdir(), key=lambda file: file.name):
-        whole |= _flat("", tomllib.loads(file.read_text(encoding="utf-8")))
+        whole |= _flat("", toml_tables(file.read_text(encoding="utf-8")))
     return whole
 
 

@@ -35,7 +35,8 @@ class ConnectionPolicy:
         patience_s: float = PATIENCE_S,
     ) -> None:
         self._admission = admission
-        self._router = Router(endpoint, identity, refused, lease_ms, scratch, patience_s)
+        # Robots give up after their patience: the router's end is to be noticed before.
+        self._router = Router(endpoint, identity, refused, lease_ms, scratch, patience_s / 2)
         self._ways = ways
         self.admitted: tuple[str, ...] = ()
         """The names that may connect by the router's present rules."""

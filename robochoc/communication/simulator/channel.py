@@ -11,7 +11,6 @@ from __future__ import annotations
 import math
 import os
 import re
-import tomllib
 from pathlib import Path
 from random import Random
 from types import MappingProxyType
@@ -31,6 +30,7 @@ from robochoc.communication.simulator.link_loss import (
     refuse_table,
 )
 from robochoc.formats.diagnostics import Diagnostic, InvalidInputError, shortened, suggestion
+from robochoc.formats.toml import toml_tables
 from robochoc.system.decode_errors import describe_decode_error
 
 LARGEST_FILE = 2**16
@@ -212,10 +212,9 @@ def read_channel(path: Path) -> ChannelModel:
     """
     text = _text(path)
     try:
-        fields = tomllib.loads(text)
-    except (ValueError, RecursionError) as wrong:  # also numbers of too many digits
-        what = "it is nested too deep" if isinstance(wrong, RecursionError) else shortened(str(wrong))
-        raise _invalid(path, f"is no TOML file: {what}") from None
+        fields = toml_tables(text)
+    except ValueError as wrong:  # also numbers of too many digits
+        raise _invalid(path, f"is no TOML file: {shortened(str(wrong))}") from None
     known = ChannelModel.__struct_fields__
     for field in fields:
         if field not in known:
