@@ -23,7 +23,7 @@ KEY = re.compile(f"[0-9a-f]{{{2 * _KEY_BYTES}}}")
 """What the key of a run looks like."""
 
 
-class ProblemSpec(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True):
+class ProblemSpec(msgspec.Struct, forbid_unknown_fields=True, frozen=True, kw_only=True, omit_defaults=True):
     """A problem: of a family, or from files.
 
     Attributes:
@@ -49,7 +49,7 @@ class ProblemSpec(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True)
         return msgspec.json.encode(identity, order="deterministic").decode()
 
 
-class Setup(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True):
+class Setup(msgspec.Struct, forbid_unknown_fields=True, frozen=True, kw_only=True, omit_defaults=True):
     """A protocol and how it is run. Attributes are as in `robochoc.run.options.Options`.
 
     `label` is what tables and figures call it.
@@ -68,7 +68,7 @@ class Setup(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True):
     verify: bool = False
 
 
-class Limits(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True):
+class Limits(msgspec.Struct, forbid_unknown_fields=True, frozen=True, kw_only=True, omit_defaults=True):
     """The limits of one run.
 
     Attributes:
@@ -108,7 +108,7 @@ def options_of(setup: Setup, limits: Limits = NO_LIMITS, seed: int = 0) -> Optio
 _OPTIONS = frozenset(one.name for one in fields(Options))
 
 
-class Task(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True):
+class Task(msgspec.Struct, forbid_unknown_fields=True, frozen=True, kw_only=True, omit_defaults=True):
     """One run of a study.
 
     Attributes:

@@ -35,13 +35,19 @@ class ReadProblem(NamedTuple):
 
 
 def read_problem(
-    place: Path, *more: Path, infinity: int | None = None, owner: str | None = None, allow_code: bool = False
+    place: Path,
+    *more: Path,
+    dialect: str | None = None,
+    infinity: int | None = None,
+    owner: str | None = None,
+    allow_code: bool = False,
 ) -> ReadProblem:
     """Return the team in the folder `place`, or in the file of another tool.
 
     Args:
         place: The folder, or the file.
         *more: Further files of the problem in that file.
+        dialect: Of a file: the name of its format. None: it is recognised.
         infinity: Of a file: costs of at least so much forbid; see `ImportOptions`.
         owner: Of a file: a regular expression that says which variables belong to one robot.
         allow_code: Of a file: whether Python files that it names may be executed.
@@ -53,11 +59,12 @@ def read_problem(
     from robochoc.formats.dialects.names_file import original_names  # noqa: PLC0415 - as above
     from robochoc.formats.dialects.registry import read_foreign, recognise, recognised  # noqa: PLC0415 - as above
 
-    if place.is_file() and (recognised(place) or more):
-        imported = read_foreign([place, *more], ImportOptions(infinity=infinity, owner=owner, allow_code=allow_code))
+    if place.is_file() and (dialect or more or recognised(place)):
+        options = ImportOptions(infinity=infinity, owner=owner, allow_code=allow_code)
+        imported = read_foreign([place, *more], options, dialect)
         check_team(imported.team)
         return ReadProblem(imported.team, imported.names, foreign=True, notes=imported.notes, bound=imported.bound)
-    for option, given in (("infinity", infinity), ("owner", owner)):
+    for option, given in (("format", dialect), ("infinity", infinity), ("owner", owner)):
         if given is not None and place.is_dir():
             what, hint = f"is the folder of a team, and '{option}' is for files of other tools", "leave it out"
             raise InvalidInputError([Diagnostic(encodable(str(place)), 0, what, hint)])
@@ -71,9 +78,9 @@ def read_problem(
         return ReadProblem(read_team(place), original_names(place), foreign=False)
     except InvalidInputError as invalid:
         first = next(iter(invalid.diagnostics), None)
-        dialect = recognise(Path(first.file)) if first else None
-        if dialect is None or first is None:
+        found = recognise(Path(first.file)) if first else None
+        if found is None or first is None:
             raise
         hint = f"robochoc import {place} -o FOLDER"
-        told = Diagnostic(first.file, 0, f"is {dialect.title}, and no file of a robot", hint)
+        told = Diagnostic(first.file, 0, f"is {found.title}, and no file of a robot", hint)
         raise InvalidInputError([told]) from None

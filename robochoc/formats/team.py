@@ -149,7 +149,9 @@ def _listing(folder: Path) -> list[os.DirEntry[str]]:
     except NotADirectoryError:
         step = "give a team's folder; 'robochoc import' makes one of a file of another tool"
         if folder.suffix == ".xml":
-            step = f"a robot's team is its folder: {folder.parent}"
+            step = (
+                f"a robot's team is its folder: {folder.parent}; the format of another tool's file is named by --format"
+            )
         raise _invalid(folder, "is not a folder", step) from None
     except FileNotFoundError:
         raise _invalid(folder, "does not exist", "check its name" if folder.suffix else _NEXT_STEP) from None

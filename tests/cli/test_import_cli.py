@@ -149,6 +149,20 @@ def test_files_are_read_with_the_options_of_an_import(tmp_path: Path) -> None:
     assert ['"a" [label' in words for words in dot] == [False, True]
 
 
+def test_solve_and_validate_read_a_file_in_the_format_that_is_named(tmp_path: Path) -> None:
+    file = tmp_path / "list.txt"
+    file.write_text("robots: {ann: {at: [0, 0]}, bob: {}}\ntasks: {dig: {at: [1, 1], worth: 3}}\n")
+    for command in ("solve", "validate"):
+        unknown = robochoc_within(command, file)
+        assert (unknown.returncode, "is of no format" in unknown.stdout + unknown.stderr) == (1, True)
+    done = robochoc_within("validate", file, "--format", "tasks", "--json")
+    assert json.loads(done.stdout)["format"] == "tasks"
+    words = ["--format", "tasks", "--protocol", "dpop", "--runtime", "simulator", "--json"]
+    assert json.loads(robochoc_within("solve", file, *words).stdout)["verdict"] == "optimal"
+    wrong = robochoc_within("solve", file, "--format", "wcsp")
+    assert (wrong.returncode, len(wrong.stderr.splitlines())) == (1, 1)
+
+
 @pytest.mark.parametrize("command", ["solve", "validate", "export"])
 def test_the_options_of_an_import_are_not_for_teams(command: str, problem: Path, tmp_path: Path) -> None:
     team = tmp_path / "team"

@@ -33,7 +33,7 @@ MAX_SKETCH = 16 << 20
 """Bytes of `sketch.json`. A larger one is none of ours."""
 
 
-class _Kept(msgspec.Struct):
+class _Kept(msgspec.Struct, forbid_unknown_fields=True):
     """What stands in `sketch.json`."""
 
     version: int

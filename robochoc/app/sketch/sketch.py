@@ -51,14 +51,14 @@ NUMBERED = frozenset({Kind.LEVEL, Kind.PLACE, Kind.SLOT, Kind.CHANNEL})
 """Kinds whose values are numbers: they can be compared, and be apart from each other."""
 
 
-class Cell(msgspec.Struct, frozen=True, order=True):
+class Cell(msgspec.Struct, forbid_unknown_fields=True, frozen=True, order=True):
     """A cell of the map: column and row, from 0. Row 0 is the southernmost."""
 
     x: int
     y: int
 
 
-class Area(msgspec.Struct, frozen=True):
+class Area(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
     """The map: how large it is, and which cells nobody can be at."""
 
     columns: int = 8
@@ -84,7 +84,7 @@ class Area(msgspec.Struct, frozen=True):
         return tuple(number for number in range(self.columns * self.rows) if number not in blocked)
 
 
-class SketchRobot(msgspec.Struct, frozen=True):
+class SketchRobot(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
     """A robot.
 
     Attributes:
@@ -100,7 +100,7 @@ class SketchRobot(msgspec.Struct, frozen=True):
     rank: int = 0
 
 
-class Decision(msgspec.Struct, frozen=True):
+class Decision(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
     """What robots decide.
 
     Attributes:
@@ -116,7 +116,7 @@ class Decision(msgspec.Struct, frozen=True):
     robots: tuple[str, ...] = ()
 
 
-class SketchRule(msgspec.Struct, frozen=True):
+class SketchRule(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
     """A rule of the palette, applied.
 
     Attributes:
@@ -141,7 +141,7 @@ class SketchRule(msgspec.Struct, frozen=True):
     on: bool = True
 
 
-class Sketch(msgspec.Struct, frozen=True):
+class Sketch(msgspec.Struct, forbid_unknown_fields=True, frozen=True):
     """A team as it was drawn.
 
     Attributes:

@@ -12,7 +12,7 @@ from robochoc.cli.options.generated import next_step
 from robochoc.cli.options.order import GIVEN, ORDER_NAME, order_for
 from robochoc.cli.options.order import NAMES as ORDERS
 from robochoc.cli.options.paths import InputPath
-from robochoc.cli.options.problems import READ, reading_options
+from robochoc.cli.options.problems import format_option, reading_options
 from robochoc.cli.reports.failures import INVALID, Failure
 from robochoc.cli.reports.notes import notes_told
 
@@ -31,9 +31,7 @@ class _Source(NamedTuple):
 @click.command("import")
 @click.argument("paths", nargs=-1, required=True, type=InputPath(), metavar="FILE|FOLDER ...")
 @click.option("-o", "--output", type=InputPath(), metavar="DIR", help="Folder to write.  [default: instances/NAME]")
-@click.option(
-    "--format", "dialect", type=click.Choice(READ), help="Format of the files.  [default: recognised by their contents]"
-)
+@format_option
 @reading_options
 @click.option("--allow-code", is_flag=True, help="Execute the Python files that a pyDCOP problem names.")
 @click.option(

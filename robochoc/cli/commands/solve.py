@@ -16,7 +16,7 @@ from robochoc.cli.options.order import NAMES as ORDERS
 from robochoc.cli.options.order import ORDER_NAME
 from robochoc.cli.options.pages import html_option, serve_option
 from robochoc.cli.options.paths import refuse_same_places, teams_at
-from robochoc.cli.options.problems import Problem, reading_options
+from robochoc.cli.options.problems import Problem, format_option, reading_options
 from robochoc.cli.options.recording import bounds_option, journal_option
 from robochoc.cli.options.ros import (
     arm_option,
@@ -55,7 +55,7 @@ _SECTIONS: Sections = {
     "Losses of robots (processes and network)": ("--on-loss", "--spare", "--patience", "--kill"),
     "Messages on their way": ("--schedule", "--delay", "--channel", "--message-loss", "--filter"),
     "Robots with several variables": ("--local-solutions", "--local-timeout", "--ace", "--no-cache"),
-    "Files of other tools (docs/guides/import.md)": ("--infinity", "--owner"),
+    "Files of other tools (docs/guides/import.md)": ("--format", "--infinity", "--owner"),
     "Output": ("--explain", "--bounds", "--serve", "--open"),
     "ROS (docs/guides/ros.md)": (
         "--ros", "--frame", "--scale", "--ros-type", "--tf", "--diagnostics", "--arm",
@@ -174,6 +174,7 @@ _SECTIONS: Sections = {
 )
 @click.option("--verify", is_flag=True, help="Confirm a no-solution or an optimum centrally.")
 @local_options
+@format_option
 @reading_options
 @ros_options
 @arm_option
@@ -214,11 +215,11 @@ def solve(
     given = {option: value for option, value in named.items() if isinstance(value, Path)}
     options = options_of(settings, environment=bool(ros.situation))
     wanted = Wanted(
-        settings["order"], settings.pop("infinity"), settings.pop("owner"),
+        settings["order"], settings.pop("dialect"), settings.pop("infinity"), settings.pop("owner"),
         as_json=as_json, explain=explain, ros=ros,
     )  # fmt: skip
     products = Products(html, journal, serve, watching(settings["sniff"], open_browser=settings["open_browser"]))
-    folders = teams_at(paths, foreign=True)
+    folders = teams_at(paths, foreign=True, dialect=wanted.dialect)
     refuse_same_places(
         {"--html": html, "--journal": journal},
         given,

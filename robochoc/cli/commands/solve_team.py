@@ -89,7 +89,7 @@ def _recorded(folder: Path, options: Options, products: Products, wanted: Wanted
     from robochoc.formats import on_one_line
     from robochoc.formats.problems import read_problem
 
-    problem = read_problem(folder, infinity=wanted.infinity, owner=wanted.owner)
+    problem = read_problem(folder, dialect=wanted.dialect, infinity=wanted.infinity, owner=wanted.owner)
     for line in differences_told(problem.notes):
         click.echo(f"{on_one_line(str(folder))}: {line.strip()}", err=True)
     team = problem.team

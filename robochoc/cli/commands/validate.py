@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 
 from robochoc.cli.options.paths import InputPath, foreign_files_told
-from robochoc.cli.options.problems import reading_options
+from robochoc.cli.options.problems import format_option, reading_options
 from robochoc.cli.reports.failures import INVALID
 
 if TYPE_CHECKING:
@@ -21,10 +21,16 @@ if TYPE_CHECKING:
 @click.command()
 @click.argument("paths", nargs=-1, type=InputPath(), metavar="[PATH ...]")
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON object per team.")
+@format_option
 @reading_options
 @click.pass_context
 def validate(
-    context: click.Context, paths: tuple[Path, ...], *, as_json: bool, infinity: int | None, owner: str | None
+    context: click.Context,
+    /,
+    paths: tuple[Path, ...],
+    *,
+    as_json: bool,
+    **reading: Any,  # noqa: ANN401 - those of `read_problem`
 ) -> None:
     """Check all teams in the folders PATH and below (default: instances/), or single robots' files.
 
@@ -41,27 +47,28 @@ def validate(
         except InvalidInputError as invalid:
             reports.append(_invalid(path, invalid, foreign_files_told(path)))
         else:
-            reports.extend(_report(place, infinity, owner) for place in found)
+            reports.extend(_report(place, reading) for place in found)
     for report in reports:
         _print_json(report) if as_json else _print(report)
     if not all(report["valid"] for report in reports):
         context.exit(INVALID)
 
 
-def _report(place: Path, infinity: int | None, owner: str | None) -> dict[str, Any]:
+def _report(place: Path, reading: Mapping[str, Any]) -> dict[str, Any]:
     """The validation of one team, or of one robot's file."""
     from robochoc.formats import InvalidInputError, encodable, read_robot
-    from robochoc.formats.dialects.registry import recognised
+    from robochoc.formats.dialects.registry import dialect_called, recognised
     from robochoc.formats.problems import read_problem
 
     notes: tuple[Note, ...] = ()
     try:
-        dialect = recognised(place)
+        named = dialect_called(reading["dialect"] or "") if place.is_file() else None
+        dialect = named or recognised(place)
         if place.is_file() and dialect is None:
             robots: tuple[Robot, ...] = (read_robot(place),)
             events = 0
         else:
-            problem = read_problem(place, infinity=infinity, owner=owner)
+            problem = read_problem(place, **reading)
             team = problem.team
             notes = problem.notes
             robots, events = team.robots, len(team.scenario)

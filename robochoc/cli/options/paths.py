@@ -128,10 +128,10 @@ def foreign_files_told(path: Path) -> list[str]:
     return []
 
 
-def teams_at(paths: Iterable[Path], *, foreign: bool = False) -> list[Path]:
+def teams_at(paths: Iterable[Path], *, foreign: bool = False, dialect: str | None = None) -> list[Path]:
     """Return the folders of all teams at `paths` or below, each once.
 
-    With `foreign`, files of other tools are teams, too.
+    With `foreign`, files of other tools are teams, too; with `dialect`, all files are in this one.
 
     Raises `Failure`, which names every path without a team: nothing is done by half.
     """
@@ -142,7 +142,7 @@ def teams_at(paths: Iterable[Path], *, foreign: bool = False) -> list[Path]:
     wrong = []
     for path in paths:
         try:
-            if foreign and recognised(path):
+            if foreign and ((dialect and path.is_file()) or recognised(path)):
                 folders[path] = None
             else:
                 folders.update(dict.fromkeys(find_teams(path)))

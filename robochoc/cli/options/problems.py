@@ -47,6 +47,12 @@ class Pattern(click.ParamType[str]):
         return value
 
 
+def format_option(command: _Command) -> _Command:
+    """Add `--format`, the dialect of files that are read."""
+    told = "Format of the files.  [default: recognised by their contents]"
+    return click.option("--format", "dialect", type=click.Choice(READ), help=told)(command)
+
+
 def reading_options(command: _Command) -> _Command:
     """Add `--infinity` and `--owner`: how a file of another tool is read."""
     owner = click.option(

@@ -186,6 +186,7 @@ class Wanted:
     """The request for each team: the order (None: not asked for), how files are read, and what is told."""
 
     order: str | Path | None
+    dialect: str | None
     infinity: int | None
     owner: str | None
     as_json: bool

@@ -9,8 +9,6 @@ import re
 from collections.abc import Sequence
 from pathlib import Path
 
-from lxml import etree
-
 from robochoc.formats.dialects.dialect import Dialect, Imported, ImportOptions
 from robochoc.formats.dialects.xcsp21.frodo_file import frodo_file
 from robochoc.formats.dialects.xcsp21.instance import Instance
@@ -18,7 +16,7 @@ from robochoc.formats.dialects.xcsp21.merging import merged
 from robochoc.formats.dialects.xcsp21.reader import PUBLIC, read_instance
 from robochoc.formats.dialects.xcsp21.recognition import Beginning
 from robochoc.formats.dialects.xcsp21.team import as_team
-from robochoc.formats.xml import attribute
+from robochoc.formats.element_view import ElementView
 
 NAME = "frodo"
 
@@ -29,7 +27,7 @@ def _recognises(_path: Path, beginning: bytes) -> bool:
     found = Beginning(beginning)
     if not found.is_instance or "XDisCSP" in found.format:
         return False
-    return found.format.startswith("XCSP 2") or (not found.format and found.has_agents)
+    return found.format.startswith("XCSP 2") or (not found.format and found.has_agents) or found.is_network
 
 
 def _is_part(_path: Path, beginning: bytes) -> bool:
@@ -43,8 +41,8 @@ def _read(paths: Sequence[Path], options: ImportOptions) -> Imported:
     return as_team(whole, NAME, options)
 
 
-def _knower(element: etree._Element, _instance: Instance) -> str:
-    agent = attribute(element, "agent")
+def _knower(element: ElementView, _instance: Instance) -> str:
+    agent = element.attribute("agent")
     return "" if agent == PUBLIC else agent
 
 

@@ -4,18 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from pathlib import Path
-from typing import TypedDict
+from typing import Any
 
 from robochoc.formats.diagnostics import Diagnostic, InvalidInputError, encodable
 from robochoc.formats.dialects.dialect import Imported
 
 NAMES_FILE = "names.json"
 MAX_BYTES = 64 * 1024 * 1024
-
-
-class _Told(TypedDict):
-    dialect: str
-    names: dict[str, str]
 
 
 def names_json(imported: Imported) -> bytes:
@@ -37,12 +32,15 @@ def original_names(folder: Path) -> Mapping[str, str]:
     path = folder / NAMES_FILE
     if not path.is_file():
         return {}
+    fields = [("dialect", str), ("names", dict[str, str])]
+    form: Any = msgspec.defstruct("NamesFile", fields, forbid_unknown_fields=True)
     try:
         with path.open("rb") as file:
-            told = msgspec.json.decode(file.read(MAX_BYTES), type=_Told)
+            told = msgspec.json.decode(file.read(MAX_BYTES), type=form)
     except (msgspec.MsgspecError, UnicodeDecodeError, RecursionError):
         hint = "import the problem again, or delete the file"
         raise InvalidInputError(
             [Diagnostic(encodable(str(path)), 0, "does not hold the original names of a team", hint)]
         ) from None
-    return told["names"]
+    names: Mapping[str, str] = told.names
+    return names

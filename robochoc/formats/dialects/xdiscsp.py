@@ -11,8 +11,6 @@ from dataclasses import replace
 from decimal import Decimal
 from pathlib import Path
 
-from lxml import etree
-
 from robochoc.formats.diagnostics import MistakeError, shortened
 from robochoc.formats.dialects.dialect import Dialect, Imported, ImportOptions, Note
 from robochoc.formats.dialects.xcsp21.instance import ForeignConstraint, Formula, Instance, Table, refuse
@@ -20,7 +18,7 @@ from robochoc.formats.dialects.xcsp21.reader import read_instance
 from robochoc.formats.dialects.xcsp21.recognition import Beginning
 from robochoc.formats.dialects.xcsp21.team import as_team
 from robochoc.formats.dialects.xcsp21.xdiscsp_file import xdiscsp_file
-from robochoc.formats.xml import attribute
+from robochoc.formats.element_view import ElementView
 from robochoc.model.constraint import INFINITE, Predicate
 
 NAME = "xdiscsp"
@@ -45,14 +43,14 @@ def _read(paths: Sequence[Path], options: ImportOptions) -> Imported:
     return as_team(instance, NAME, options)
 
 
-def _knower(element: etree._Element, instance: Instance) -> str:
+def _knower(element: ElementView, instance: Instance) -> str:
     """Return the agent that alone knows a constraint. Raises `MistakeError` where a partially known one names none."""
-    model = attribute(element, "model") or instance.constraint_model
-    owner = attribute(element, "ownerId")
+    model = element.attribute("model") or instance.constraint_model
+    owner = element.attribute("ownerId")
     if model != "PKC":
         return ""
     if not owner:
-        what = f"a partially known constraint (PKC) '{shortened(attribute(element, 'name'))}' without ownerId"
+        what = f"a partially known constraint (PKC) '{shortened(element.attribute('name'))}' without ownerId"
         raise MistakeError(what, 'write ownerId="1", the id of the agent that knows it, or model="TKC"')
     return instance.ids.get(owner, owner)
 

@@ -11,11 +11,10 @@ import re
 from collections.abc import Callable, Iterator, Sequence
 from typing import NoReturn
 
-from lxml import etree
-
 from robochoc.formats.diagnostics import MistakeError, shortened
 from robochoc.formats.dialects.xcsp21.instance import Formula
 from robochoc.formats.dialects.xcsp21.numbers import integer, is_integer
+from robochoc.formats.element_view import ElementView
 from robochoc.formats.global_constraints import PREFIX, read_form
 from robochoc.model.constraint import Predicate
 from robochoc.model.expression import Apply, Constant, Expression, Name
@@ -31,7 +30,7 @@ _TOKEN = re.compile(r"[][{}]|<\w+>|[^][{}<\s]+")
 _ZERO = Constant(0)
 
 
-def expand(name: str, element: etree._Element, scope: Sequence[str]) -> list[Formula]:
+def expand(name: str, element: ElementView, scope: Sequence[str]) -> list[Formula]:
     """Return what a global constraint says, as predicates.
 
     Args:
@@ -45,7 +44,7 @@ def expand(name: str, element: etree._Element, scope: Sequence[str]) -> list[For
     if name not in _EXPANSIONS:
         known = " ".join(_EXPANSIONS)
         raise MistakeError(f"the global constraint '{shortened(name)}'", f"known are {known}: state it by others")
-    tokens = _Tokens(element.find("parameters"), name)
+    tokens = _Tokens(element.child("parameters"), name)
     formulas = list(_EXPANSIONS[name](tokens, scope))
     tokens.end()
     return formulas
@@ -67,13 +66,10 @@ def _as_it_is(tokens: _Tokens, _scope: Sequence[str]) -> Iterator[Formula]:
 class _Tokens:
     """The parameters of a global constraint, word by word. A child element `<eq/>` is the word `<eq>`."""
 
-    def __init__(self, element: etree._Element | None, name: str) -> None:
+    def __init__(self, element: ElementView | None, name: str) -> None:
         self.name = name
-        text = ""
-        if element is not None:
-            text = element.text or ""
-            for child in element:
-                text += f" <{child.tag}> {child.tail or ''}"
+        parts = element.mixed() if element is not None else ()
+        text = " ".join(part if isinstance(part, str) else f"<{part.tag}>" for part in parts)
         self._words = _TOKEN.findall(text)
         self._next = 0
         if len(self._words) > 10 * MAX_TERMS:

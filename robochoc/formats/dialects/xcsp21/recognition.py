@@ -18,6 +18,7 @@ class Beginning:
         format: The format that its presentation names. Empty: none.
         type: The type that its presentation names. Empty: none.
         has_agents: Whether it lists agents: robots' own files do not.
+        is_network: Whether it lists domains and variables, and has nothing of a robot's own file.
     """
 
     def __init__(self, beginning: bytes) -> None:
@@ -29,4 +30,6 @@ class Beginning:
         stated = {name: one or other for name, one, other in found}
         self.format = stated.get(b"format", b"").decode("utf-8", "replace").strip()
         self.type = stated.get(b"type", b"").decode("utf-8", "replace").strip()
+        is_own = b"<agents_neighbours" in text or self.type in {"DisCSP", "DisWCSP"}
+        self.is_network = not is_own and all(part in text for part in (b"<domains", b"<variables", b"<variable "))
         self.has_agents = re.search(rb"<agents[\s/>]", text) is not None and b"<agents_neighbours" not in text

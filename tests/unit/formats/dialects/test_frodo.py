@@ -13,7 +13,7 @@ from lxml import etree
 
 from robochoc.formats import InvalidInputError, check_team
 from robochoc.formats.dialects.dialect import ImportOptions
-from robochoc.formats.dialects.registry import read_foreign
+from robochoc.formats.dialects.registry import read_foreign, recognise
 from robochoc.model.assembly import assemble
 from robochoc.model.constraint import Constraint, ConstraintModel, Domain, Relation, Semantics, Variable
 from robochoc.model.problem import ProblemKind, Team
@@ -217,7 +217,7 @@ RANDOM = '<variable name="w" domain="d" type="random"/></variables>'
         ('name="c"', 'name="c" agent="e"', "constraint 'c' is known to e alone, who owns none of its variables"),
         ('reference="r"', 'reference="global:circuit"', "the global constraint 'circuit' (known are allDifferent"),
         ('domain="d"', 'domain="e"', "there is no domain 'e'"),
-        ("<relations>", "<routes/><relations>", "an element <routes>"),
+        ("<relations>", "<routes/><relations>", "<routes> is not supported in <instance>"),
         ('<agent name="b"/>', '<agent name="a"/>', "a second agent 'a'"),
     ],
 )
@@ -283,3 +283,41 @@ def test_costs_and_values_beyond_32_bits_are_refused() -> None:
         written("frodo", team_of(1, 2**31 - 1))
     with pytest.raises(UnsupportedError, match="the value 2,147,483,649 of x is beyond"):
         written("frodo", team_of(2**31 - 1, 1))
+
+
+PLAIN = """<instance>
+<presentation name="pair"{format}/>
+<domains nbDomains="1"><domain name="D" nbValues="2">1..2</domain></domains>
+<variables nbVariables="2"><variable name="P" domain="D"/><variable name="Q" domain="D"/></variables>
+<relations nbRelations="1"><relation name="R" arity="2" nbTuples="2" semantics="supports">1 2|2 1</relation></relations>
+<constraints nbConstraints="1"><constraint name="c" arity="2" scope="P Q" reference="R"/></constraints>
+</instance>"""
+
+
+def test_networks_without_a_known_format_are_recognised_by_their_contents(tmp_path: Path) -> None:
+    for stated in ("", ' format="1.1"', ' format="XCSP 2.0"', ' type="CSP"'):
+        found = imported(PLAIN.format(format=stated), tmp_path)
+        assert (found.dialect, len(found.team.variables)) == ("frodo", 2)
+        assert sum(1 for _ in found.team.constraints()) == 1
+    for own in (' type="DisCSP"', ' type="DisWCSP" format="1.1"'):
+        path = tmp_path / "own.xml"
+        path.write_text(PLAIN.format(format=own))
+        assert recognise(path) is None
+
+
+def test_parts_without_a_meaning_here_are_refused(tmp_path: Path) -> None:
+    body = soft("2: 1 1", 'defaultCost="0"')
+    for now, then, message in (
+        (
+            'reference="r"/>',
+            'reference="r"><parameters>xb xa</parameters></constraint>',
+            "<parameters> is not supported",
+        ),
+        ('name="c"', 'name="c" model="PKC"', "the attribute 'model' is not supported in <constraint>"),
+        ('defaultCost="0"', 'defaultcost="0"', "the attribute 'defaultcost' is not supported in <relation>"),
+        ('maximize="false"', 'maximise="true"', "the attribute 'maximise' is not supported in <presentation>"),
+        ("2: 1 1<", "2: 1 1 <b/><", "<b> inside <relation>"),
+    ):
+        whole = frodo(body)
+        assert now in whole
+        assert message in refused(whole.replace(now, then), tmp_path)
